@@ -35,7 +35,7 @@ namespace detail {
 template <class T, class S>
 concept factor_of = std::same_as<T, S> || std::integral<T>;
 
-/// Whether loops over so few entries are unrolled, and functions inlined.
+/// True where loops are unrolled and functions inlined.
 template <int Operations>
 inline constexpr bool is_small = Operations <= 64;
 
@@ -432,7 +432,7 @@ template <class M>
 
 /// @name Entries
 /// @{
-/// Whether no entry is infinite or not a number.
+/// True if no entry is infinite or not a number.
 template <class S, int R, int C, int O>
 requires(R > 0 && C > 0) [[nodiscard]] inline bool all_finite(const Eigen::Matrix<S, R, C, O, R, C>& a) {
   bool finite = true;
@@ -459,7 +459,7 @@ requires(R > 0 && C > 0) [[nodiscard]] inline S largest_of(const Eigen::Matrix<S
     if (a.data()[i] > most) most = a.data()[i];
   return most;
 }
-/// Whether each entry of `a` is at most that of `b`.
+/// True if each entry of `a` is at most that of `b`.
 template <class S, int R, int C, int O>
 requires(R > 0 && C > 0) [[nodiscard]] inline bool all_at_most(const Eigen::Matrix<S, R, C, O, R, C>& a,
                                                                const Eigen::Matrix<S, R, C, O, R, C>& b) {
@@ -467,7 +467,7 @@ requires(R > 0 && C > 0) [[nodiscard]] inline bool all_at_most(const Eigen::Matr
     if (!(a.data()[i] <= b.data()[i])) return false;
   return true;
 }
-/// Whether an entry of `a` is greater than that of `b`.
+/// True if an entry of `a` is greater than that of `b`.
 template <class S, int R, int C, int O>
 requires(R > 0 && C > 0) [[nodiscard]] inline bool any_greater(const Eigen::Matrix<S, R, C, O, R, C>& a,
                                                                const Eigen::Matrix<S, R, C, O, R, C>& b) {

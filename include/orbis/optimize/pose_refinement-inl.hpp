@@ -233,8 +233,7 @@ pose_refinement refine_pose(std::span<const pose_observation> observations, cons
     out.status = status;
     return out;
   };
-  if (const mat4 pose = T_world_camera.to_matrix(); !all_finite(pose) || !(largest_magnitude(pose) < 1e100))
-    return give_up(refinement_status::invalid_start);
+  if (!(largest_magnitude(T_world_camera.to_matrix()) < 1e100)) return give_up(refinement_status::invalid_start);
 
   std::size_t active = 0;
   for (std::size_t i = 0; i < observations.size(); ++i) {

@@ -34,8 +34,7 @@ inline constexpr std::size_t bytes_of_keypoint = 76, bytes_of_observation = 8;
   for (double& x : v) x = from.take<double>();
   const basic_so3<double>::quaternion q(v[6], v[3], v[4], v[5]);
   const vec3 t(v[0], v[1], v[2]);
-  if (!(largest_magnitude(t) < farthest) || !all_finite(t) || !(std::abs(q.squaredNorm() - 1.0) < 1e-6))
-    return std::nullopt;
+  if (!(largest_magnitude(t) < farthest) || !(std::abs(q.squaredNorm() - 1.0) < 1e-6)) return std::nullopt;
   return se3(so3::from_unit_quaternion(q), t);
 }
 [[nodiscard]] inline features::binary_descriptor<256> take_descriptor(section_reader& from) {
@@ -264,8 +263,8 @@ class map_reader {
     l.found = in.take<std::uint32_t>();
     l.has_current_descriptor = in.take<std::uint8_t>() != 0;
     if (in.ended() || in.left() / bytes_of_observation < count) return in.end();
-    if (!(largest_magnitude(l.position) < farthest) || !all_finite(l.position) || !all_finite(l.normal) ||
-        !(l.min_distance >= 0.0) || !(l.max_distance >= 0.0) || !std::isfinite(l.max_distance))
+    if (!(largest_magnitude(l.position) < farthest) || !all_finite(l.normal) || !(l.min_distance >= 0.0) ||
+        !(l.max_distance >= 0.0) || !std::isfinite(l.max_distance))
       return wrong("is at no finite place");
     if (l.created >= keyframe_ids_) return wrong("comes from a keyframe that never was");
     l.observations.reserve(count);
