@@ -3,13 +3,7 @@
 /// The functions of all_knn.hpp.
 #pragma once
 
-#include <algorithm>
 #include <cmath>
-#include <cstddef>
-#include <cstdint>
-#include <limits>
-#include <span>
-#include <vector>
 
 #include <orbis/cloud/all_knn.hpp>
 #include <orbis/cloud/detail/knn/knn_kernels.hpp>
@@ -17,8 +11,6 @@
 #include <orbis/cloud/detail/knn/nearest_search.hpp>
 #include <orbis/cloud/detail/knn/neighbor_rows.hpp>
 #include <orbis/cloud/detail/knn/reported_chunks.hpp>
-#include <orbis/core/execution.hpp>
-#include <orbis/core/result.hpp>
 
 namespace orbis::cloud {
 

@@ -7,14 +7,9 @@
 #include <array>
 #include <atomic>
 #include <bit>
-#include <cassert>
 #include <cmath>
-#include <cstddef>
-#include <cstdint>
-#include <limits>
 #include <span>
 #include <utility>
-#include <vector>
 
 #include <orbis/cloud/cluster.hpp>
 #include <orbis/cloud/detail/knn/knn_kernels.hpp>
@@ -22,7 +17,6 @@
 #include <orbis/cloud/detail/knn/neighbor_graph.hpp>
 #include <orbis/cloud/detail/knn/squared_distance.hpp>
 #include <orbis/cloud/detail/select/decision.hpp>
-#include <orbis/core/execution.hpp>
 
 namespace orbis::cloud {
 namespace detail {

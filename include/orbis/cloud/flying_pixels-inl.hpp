@@ -7,14 +7,10 @@
 #include <array>
 #include <bit>
 #include <cmath>
-#include <cstddef>
 #include <cstdint>
 #include <cstring>
-#include <limits>
 
 #include <orbis/cloud/flying_pixels.hpp>
-#include <orbis/core/execution.hpp>
-#include <orbis/core/image.hpp>
 #include <orbis/core/simd.hpp>
 
 namespace orbis::cloud {

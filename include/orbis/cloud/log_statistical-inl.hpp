@@ -5,14 +5,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstddef>
 #include <utility>
-#include <vector>
 
 #include <orbis/cloud/all_knn-inl.hpp>
 #include <orbis/cloud/detail/select/decision.hpp>
 #include <orbis/cloud/log_statistical.hpp>
-#include <orbis/core/execution.hpp>
 #include <orbis/core/inline.hpp>
 
 namespace orbis::cloud {

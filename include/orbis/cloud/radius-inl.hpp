@@ -7,9 +7,6 @@
 #include <array>
 #include <bit>
 #include <cmath>
-#include <cstddef>
-#include <cstdint>
-#include <vector>
 
 #include <orbis/cloud/detail/knn/knn_kernels.hpp>
 #include <orbis/cloud/detail/knn/leaf_hierarchy.hpp>
@@ -19,8 +16,6 @@
 #include <orbis/cloud/detail/knn/squared_distance.hpp>
 #include <orbis/cloud/detail/select/decision.hpp>
 #include <orbis/cloud/radius.hpp>
-#include <orbis/core/execution.hpp>
-#include <orbis/core/result.hpp>
 
 namespace orbis::cloud {
 

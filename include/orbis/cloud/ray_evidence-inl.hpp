@@ -3,19 +3,13 @@
 /// The functions of ray_evidence.hpp.
 #pragma once
 
-#include <cstddef>
-#include <cstdint>
 #include <ranges>
 #include <utility>
-#include <vector>
 
-#include <orbis/camera/model.hpp>
 #include <orbis/cloud/detail/point_view.hpp>
 #include <orbis/cloud/ray_evidence.hpp>
 #include <orbis/cloud/ray_evidence_counter-inl.hpp>
-#include <orbis/core/execution.hpp>
 #include <orbis/core/inline.hpp>
-#include <orbis/core/point.hpp>
 
 namespace orbis::cloud {
 

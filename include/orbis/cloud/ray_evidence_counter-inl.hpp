@@ -3,31 +3,14 @@
 /// The functions of ray_evidence_counter.hpp.
 #pragma once
 
-#include <algorithm>
-#include <array>
 #include <atomic>
 #include <cassert>
-#include <concepts>
-#include <cstddef>
-#include <cstdint>
-#include <limits>
-#include <ranges>
 #include <span>
-#include <vector>
 
-#include <orbis/camera/model.hpp>
-#include <orbis/camera/pinhole.hpp>
 #include <orbis/cloud/detail/knn/leaf_hierarchy.hpp>
-#include <orbis/cloud/detail/point_view.hpp>
-#include <orbis/cloud/detail/rays/depth_windows.hpp>
-#include <orbis/cloud/detail/rays/point_blocks.hpp>
 #include <orbis/cloud/detail/rays/ray_kernels.hpp>
-#include <orbis/cloud/detail/rays/ray_view.hpp>
 #include <orbis/cloud/detail/rays/take_depth_windows.hpp>
 #include <orbis/cloud/ray_evidence_counter.hpp>
-#include <orbis/core/execution.hpp>
-#include <orbis/core/point.hpp>
-#include <orbis/core/se3.hpp>
 
 namespace orbis::cloud {
 namespace detail {

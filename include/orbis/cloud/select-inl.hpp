@@ -5,32 +5,22 @@
 
 #include <algorithm>
 #include <array>
-#include <cassert>
 #include <cmath>
 #include <cstddef>
-#include <cstdint>
 #include <optional>
-#include <ranges>
-#include <span>
-#include <string>
 #include <type_traits>
 #include <utility>
 #include <variant>
-#include <vector>
 
-#include <orbis/camera/model.hpp>
 #include <orbis/cloud/detail/select/decision.hpp>
 #include <orbis/cloud/detail/select/density_judge.hpp>
 #include <orbis/cloud/detail/select/in_words.hpp>
 #include <orbis/cloud/detail/select/surroundings.hpp>
 #include <orbis/cloud/detail/select/view_judge.hpp>
-#include <orbis/cloud/detail/threads_of.hpp>
 #include <orbis/cloud/radius-inl.hpp>
 #include <orbis/cloud/ray_evidence-inl.hpp>
 #include <orbis/cloud/select.hpp>
 #include <orbis/cloud/statistical-inl.hpp>
-#include <orbis/core/execution.hpp>
-#include <orbis/core/point.hpp>
 
 namespace orbis::cloud {
 

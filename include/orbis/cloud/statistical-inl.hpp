@@ -4,21 +4,12 @@
 #pragma once
 
 #include <algorithm>
-#include <cassert>
-#include <cmath>
-#include <cstddef>
-#include <cstdint>
-#include <limits>
-#include <span>
 #include <utility>
-#include <vector>
 
 #include <orbis/cloud/all_knn-inl.hpp>
 #include <orbis/cloud/detail/select/decision.hpp>
 #include <orbis/cloud/statistical.hpp>
-#include <orbis/core/execution.hpp>
 #include <orbis/core/inline.hpp>
-#include <orbis/core/result.hpp>
 #include <orbis/core/rounded.hpp>
 
 namespace orbis::cloud {

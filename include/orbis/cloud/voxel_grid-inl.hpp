@@ -3,21 +3,11 @@
 /// The functions of voxel_grid.hpp.
 #pragma once
 
-#include <array>
 #include <bit>
-#include <concepts>
-#include <cstddef>
-#include <cstdint>
 #include <limits>
-#include <span>
-#include <vector>
 
-#include <orbis/cloud/detail/point_view.hpp>
 #include <orbis/cloud/detail/voxels/fold_voxels.hpp>
 #include <orbis/cloud/voxel_grid.hpp>
-#include <orbis/core/execution.hpp>
-#include <orbis/core/image.hpp>
-#include <orbis/core/point_cloud.hpp>
 
 namespace orbis::cloud {
 

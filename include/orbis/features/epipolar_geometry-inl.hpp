@@ -4,8 +4,6 @@
 #pragma once
 
 #include <orbis/core/inline.hpp>
-#include <orbis/core/se3.hpp>
-#include <orbis/core/types.hpp>
 #include <orbis/features/epipolar_geometry.hpp>
 
 namespace orbis::features {

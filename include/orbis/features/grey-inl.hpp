@@ -3,11 +3,8 @@
 /// The functions of grey.hpp.
 #pragma once
 
-#include <cassert>
 #include <cstddef>
-#include <cstdint>
 
-#include <orbis/core/image.hpp>
 #include <orbis/core/inline.hpp>
 #include <orbis/core/simd/dispatch.hpp>
 #include <orbis/core/simd/integer.hpp>

@@ -3,25 +3,14 @@
 /// The functions of orb.hpp.
 #pragma once
 
-#include <algorithm>
-#include <cassert>
 #include <cmath>
-#include <cstddef>
-#include <cstdint>
-#include <span>
-#include <utility>
-#include <vector>
 
-#include <orbis/core/image.hpp>
-#include <orbis/features/descriptor.hpp>
 #include <orbis/features/detail/extract/cover_first.hpp>
 #include <orbis/features/detail/extract/fast.hpp>
 #include <orbis/features/detail/extract/orientation.hpp>
 #include <orbis/features/detail/extract/steered_brief.hpp>
-#include <orbis/features/extractor.hpp>
 #include <orbis/features/grey.hpp>
 #include <orbis/features/orb.hpp>
-#include <orbis/features/pyramid.hpp>
 
 namespace orbis::features {
 

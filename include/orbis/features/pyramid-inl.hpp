@@ -3,12 +3,8 @@
 /// The functions of pyramid.hpp.
 #pragma once
 
-#include <cassert>
 #include <cmath>
-#include <cstddef>
-#include <cstdint>
 
-#include <orbis/core/image.hpp>
 #include <orbis/core/inline.hpp>
 #include <orbis/features/detail/extract/resize.hpp>
 #include <orbis/features/pyramid.hpp>

@@ -4,20 +4,15 @@
 #pragma once
 
 #include <charconv>
-#include <filesystem>
 #include <istream>
 #include <iterator>
 #include <ostream>
-#include <string>
-#include <string_view>
 #include <system_error>
 
 #include <orbis/core/file.hpp>
 #include <orbis/core/inline.hpp>
-#include <orbis/core/result.hpp>
 #include <orbis/core/types.hpp>
 #include <orbis/io/bal.hpp>
-#include <orbis/io/bal_problem.hpp>
 #include <orbis/io/detail/files/bal_parser.hpp>
 
 namespace orbis::io {

@@ -7,12 +7,10 @@
 #include <charconv>
 #include <cmath>
 #include <cstddef>
-#include <filesystem>
 #include <initializer_list>
 #include <optional>
 #include <ostream>
 #include <string>
-#include <string_view>
 #include <type_traits>
 #include <utility>
 #include <vector>
@@ -22,10 +20,8 @@
 #include <orbis/camera/kannala_brandt.hpp>
 #include <orbis/camera/pinhole.hpp>
 #include <orbis/camera/radial_tangential.hpp>
-#include <orbis/camera/settings.hpp>
 #include <orbis/core/file.hpp>
 #include <orbis/core/inline.hpp>
-#include <orbis/core/result.hpp>
 #include <orbis/io/camera_file.hpp>
 #include <orbis/io/toml.hpp>
 

@@ -3,16 +3,12 @@
 /// The functions of cloud_file.hpp.
 #pragma once
 
-#include <filesystem>
 #include <string>
 #include <string_view>
 #include <utility>
 
 #include <orbis/core/file.hpp>
 #include <orbis/core/inline.hpp>
-#include <orbis/core/point_cloud.hpp>
-#include <orbis/core/result.hpp>
-#include <orbis/core/types.hpp>
 #include <orbis/io/cloud_file.hpp>
 #include <orbis/io/pcd.hpp>
 #include <orbis/io/ply.hpp>

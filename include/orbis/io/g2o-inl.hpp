@@ -5,19 +5,14 @@
 
 #include <charconv>
 #include <cstddef>
-#include <filesystem>
 #include <ostream>
-#include <string>
-#include <string_view>
 #include <system_error>
 
 #include <orbis/core/file.hpp>
 #include <orbis/core/inline.hpp>
-#include <orbis/core/result.hpp>
 #include <orbis/core/se3.hpp>
 #include <orbis/io/detail/files/g2o_parser.hpp>
 #include <orbis/io/g2o.hpp>
-#include <orbis/io/g2o_graph.hpp>
 
 namespace orbis::io {
 

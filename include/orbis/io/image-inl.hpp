@@ -3,13 +3,8 @@
 /// The functions of image.hpp.
 #pragma once
 
-#include <cstdint>
-#include <filesystem>
-
 #include <orbis/core/file.hpp>
-#include <orbis/core/image.hpp>
 #include <orbis/core/inline.hpp>
-#include <orbis/core/result.hpp>
 #include <orbis/io/image.hpp>
 #include <orbis/io/jpeg.hpp>
 #include <orbis/io/png.hpp>

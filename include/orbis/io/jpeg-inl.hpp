@@ -4,12 +4,8 @@
 #pragma once
 
 #include <cassert>
-#include <string>
-#include <string_view>
 
-#include <orbis/core/image.hpp>
 #include <orbis/core/inline.hpp>
-#include <orbis/core/result.hpp>
 #include <orbis/io/detail/files/jpeg_codec.hpp>
 #include <orbis/io/jpeg.hpp>
 

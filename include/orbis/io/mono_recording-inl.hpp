@@ -4,24 +4,12 @@
 #pragma once
 
 #include <cassert>
-#include <cstddef>
-#include <filesystem>
-#include <optional>
-#include <span>
-#include <string>
-#include <string_view>
 #include <utility>
-#include <vector>
 
-#include <orbis/camera/mono_frame.hpp>
-#include <orbis/camera/settings.hpp>
 #include <orbis/core/inline.hpp>
-#include <orbis/core/result.hpp>
-#include <orbis/core/trajectory.hpp>
 #include <orbis/io/camera_file.hpp>
 #include <orbis/io/detail/recordings/one_camera.hpp>
 #include <orbis/io/detail/recordings/recording_folder.hpp>
-#include <orbis/io/detail/recordings/recording_index.hpp>
 #include <orbis/io/detail/recordings/sized_image.hpp>
 #include <orbis/io/image.hpp>
 #include <orbis/io/mono_recording.hpp>

@@ -7,21 +7,14 @@
 #include <bit>
 #include <cassert>
 #include <charconv>
-#include <cstddef>
 #include <cstdint>
-#include <filesystem>
 #include <ostream>
-#include <string>
-#include <string_view>
 #include <utility>
 
 #include <orbis/core/bytes.hpp>
 #include <orbis/core/file.hpp>
 #include <orbis/core/image.hpp>
 #include <orbis/core/inline.hpp>
-#include <orbis/core/point_cloud.hpp>
-#include <orbis/core/result.hpp>
-#include <orbis/core/types.hpp>
 #include <orbis/io/detail/files/lzf.hpp>
 #include <orbis/io/detail/files/pcd_format.hpp>
 #include <orbis/io/pcd.hpp>

@@ -4,27 +4,14 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
-#include <cassert>
 #include <charconv>
 #include <cmath>
-#include <cstddef>
-#include <cstdint>
-#include <filesystem>
 #include <ostream>
-#include <span>
-#include <string>
-#include <string_view>
 #include <vector>
 
 #include <orbis/core/bytes.hpp>
 #include <orbis/core/file.hpp>
-#include <orbis/core/image.hpp>
 #include <orbis/core/inline.hpp>
-#include <orbis/core/point.hpp>
-#include <orbis/core/point_cloud.hpp>
-#include <orbis/core/result.hpp>
-#include <orbis/core/types.hpp>
 #include <orbis/io/detail/files/ply_format.hpp>
 #include <orbis/io/detail/files/scalar_type.hpp>
 #include <orbis/io/ply.hpp>

@@ -5,16 +5,10 @@
 
 #include <bit>
 #include <cstddef>
-#include <cstdint>
-#include <filesystem>
-#include <string>
-#include <string_view>
 
 #include <png.h>
 
-#include <orbis/core/image.hpp>
 #include <orbis/core/inline.hpp>
-#include <orbis/core/result.hpp>
 #include <orbis/io/detail/files/png_codec.hpp>
 #include <orbis/io/png.hpp>
 

@@ -4,29 +4,13 @@
 #pragma once
 
 #include <cassert>
-#include <cstddef>
-#include <cstdint>
-#include <filesystem>
-#include <iterator>
-#include <memory>
-#include <optional>
-#include <span>
-#include <string>
-#include <string_view>
-#include <utility>
-#include <vector>
 
 #include <orbis/camera/pinhole.hpp>
-#include <orbis/camera/rgbd_frame.hpp>
-#include <orbis/camera/settings.hpp>
 #include <orbis/core/inline.hpp>
-#include <orbis/core/result.hpp>
-#include <orbis/core/trajectory.hpp>
 #include <orbis/io/camera_file.hpp>
 #include <orbis/io/detail/recordings/color_registration.hpp>
 #include <orbis/io/detail/recordings/icl_nuim.hpp>
 #include <orbis/io/detail/recordings/recording_folder.hpp>
-#include <orbis/io/detail/recordings/recording_index.hpp>
 #include <orbis/io/detail/recordings/scannet.hpp>
 #include <orbis/io/detail/recordings/seven_scenes.hpp>
 #include <orbis/io/detail/recordings/sized_image.hpp>

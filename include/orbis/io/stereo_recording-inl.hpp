@@ -5,22 +5,9 @@
 
 #include <algorithm>
 #include <cassert>
-#include <cstddef>
-#include <filesystem>
-#include <optional>
-#include <span>
-#include <string>
-#include <string_view>
-#include <utility>
-#include <vector>
 
-#include <orbis/camera/settings.hpp>
-#include <orbis/camera/stereo.hpp>
-#include <orbis/camera/stereo_frame.hpp>
 #include <orbis/core/file.hpp>
 #include <orbis/core/inline.hpp>
-#include <orbis/core/result.hpp>
-#include <orbis/core/trajectory.hpp>
 #include <orbis/io/camera_file.hpp>
 #include <orbis/io/detail/recordings/asl.hpp>
 #include <orbis/io/detail/recordings/kitti.hpp>
@@ -29,7 +16,6 @@
 #include <orbis/io/detail/recordings/recording_index.hpp>
 #include <orbis/io/detail/recordings/seven_scenes.hpp>
 #include <orbis/io/detail/recordings/sized_image.hpp>
-#include <orbis/io/detail/recordings/stereo_index.hpp>
 #include <orbis/io/detail/recordings/tum.hpp>
 #include <orbis/io/detail/text.hpp>
 #include <orbis/io/image.hpp>

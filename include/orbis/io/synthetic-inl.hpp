@@ -3,29 +3,16 @@
 /// The functions of synthetic.hpp.
 #pragma once
 
-#include <algorithm>
 #include <cassert>
-#include <cstddef>
-#include <memory>
 #include <string>
 
-#include <orbis/camera/intrinsics.hpp>
-#include <orbis/camera/rgbd_frame.hpp>
-#include <orbis/camera/stereo_frame.hpp>
-#include <orbis/core/execution.hpp>
 #include <orbis/core/inline.hpp>
-#include <orbis/core/result.hpp>
-#include <orbis/core/se3.hpp>
-#include <orbis/core/trajectory.hpp>
-#include <orbis/core/types.hpp>
 #include <orbis/io/detail/synthetic/camera_path.hpp>
-#include <orbis/io/detail/synthetic/exact_view.hpp>
 #include <orbis/io/detail/synthetic/looks.hpp>
 #include <orbis/io/detail/synthetic/scene.hpp>
 #include <orbis/io/detail/synthetic/simulator.hpp>
 #include <orbis/io/detail/synthetic/texture.hpp>
 #include <orbis/io/synthetic.hpp>
-#include <orbis/io/synthetic_options.hpp>
 
 namespace orbis::io {
 

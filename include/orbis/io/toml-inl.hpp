@@ -4,16 +4,9 @@
 #pragma once
 
 #include <algorithm>
-#include <cstddef>
-#include <filesystem>
-#include <string>
-#include <string_view>
-
-#include <toml++/toml.h>
 
 #include <orbis/core/file.hpp>
 #include <orbis/core/inline.hpp>
-#include <orbis/core/result.hpp>
 #include <orbis/core/utf8.hpp>
 #include <orbis/io/toml.hpp>
 

@@ -7,15 +7,11 @@
 #include <charconv>
 #include <cmath>
 #include <cstddef>
-#include <filesystem>
 #include <ostream>
 #include <string>
-#include <string_view>
 
 #include <orbis/core/file.hpp>
 #include <orbis/core/inline.hpp>
-#include <orbis/core/result.hpp>
-#include <orbis/core/trajectory.hpp>
 #include <orbis/io/detail/text.hpp>
 #include <orbis/io/trajectory_file.hpp>
 

@@ -7,14 +7,11 @@
 #include <cassert>
 #include <cmath>
 #include <cstddef>
-#include <cstdint>
 #include <limits>
 #include <vector>
 
-#include <orbis/core/image.hpp>
 #include <orbis/core/inline.hpp>
 #include <orbis/nav/floor_cost.hpp>
-#include <orbis/nav/floor_map.hpp>
 
 namespace orbis::nav {
 

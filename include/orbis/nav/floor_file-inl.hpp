@@ -7,16 +7,13 @@
 #include <charconv>
 #include <cmath>
 #include <cstddef>
-#include <filesystem>
 #include <ostream>
 #include <string>
 #include <vector>
 
 #include <orbis/core/file.hpp>
 #include <orbis/core/inline.hpp>
-#include <orbis/core/result.hpp>
 #include <orbis/nav/floor_file.hpp>
-#include <orbis/nav/floor_map.hpp>
 
 namespace orbis::nav {
 

@@ -3,16 +3,9 @@
 /// The functions of robot_trajectory.hpp.
 #pragma once
 
-#include <algorithm>
-#include <cassert>
-#include <cmath>
-#include <cstddef>
 #include <limits>
-#include <utility>
-#include <vector>
 
 #include <orbis/core/inline.hpp>
-#include <orbis/core/types.hpp>
 #include <orbis/nav/robot_trajectory.hpp>
 
 namespace orbis::nav {

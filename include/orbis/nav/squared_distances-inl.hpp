@@ -3,17 +3,8 @@
 /// The functions of squared_distances.hpp.
 #pragma once
 
-#include <algorithm>
-#include <array>
-#include <bit>
-#include <cassert>
 #include <cmath>
-#include <cstddef>
-#include <cstdint>
-#include <cstring>
 #include <functional>
-#include <optional>
-#include <span>
 #include <type_traits>
 
 #include <orbis/core/inline.hpp>

@@ -7,19 +7,14 @@
 #include <cassert>
 #include <charconv>
 #include <cmath>
-#include <cstddef>
-#include <filesystem>
 #include <istream>
 #include <iterator>
 #include <optional>
 #include <ostream>
-#include <span>
-#include <string>
 #include <string_view>
 #include <utility>
 
 #include <orbis/core/file.hpp>
-#include <orbis/core/result.hpp>
 #include <orbis/octree/detail/files/octomap_readers.hpp>
 #include <orbis/octree/detail/files/octomap_writers.hpp>
 #include <orbis/octree/files.hpp>

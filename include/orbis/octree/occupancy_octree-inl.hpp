@@ -3,30 +3,11 @@
 /// The functions of occupancy_octree.hpp.
 #pragma once
 
-#include <array>
-#include <cassert>
-#include <cstddef>
-#include <cstdint>
-#include <limits>
-#include <optional>
-#include <vector>
-
-#include <orbis/core/execution.hpp>
-#include <orbis/core/point.hpp>
-#include <orbis/core/se3.hpp>
-#include <orbis/core/types.hpp>
-#include <orbis/octree/change_log.hpp>
 #include <orbis/octree/detail/points/point_integrator.hpp>
 #include <orbis/octree/detail/points/scan_buffers.hpp>
 #include <orbis/octree/detail/storage/apply_scan.hpp>
-#include <orbis/octree/detail/storage/brick.hpp>
-#include <orbis/octree/detail/storage/large_leaves.hpp>
-#include <orbis/octree/detail/storage/leaves.hpp>
 #include <orbis/octree/detail/storage/palette_kernels.hpp>
-#include <orbis/octree/detail/storage/tree_parts.hpp>
-#include <orbis/octree/integration.hpp>
 #include <orbis/octree/occupancy_octree.hpp>
-#include <orbis/octree/sensor_model.hpp>
 
 namespace orbis::octree {
 

@@ -6,23 +6,13 @@
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <chrono>
-#include <cstddef>
-#include <cstdint>
-#include <span>
-#include <vector>
 
-#include <orbis/core/execution.hpp>
-#include <orbis/octree/change_log.hpp>
-#include <orbis/octree/detail/history/brick_uses.hpp>
-#include <orbis/octree/detail/history/replayed_brick.hpp>
 #include <orbis/octree/detail/storage/apply_scan.hpp>
 #include <orbis/octree/detail/storage/brick.hpp>
 #include <orbis/octree/detail/storage/update_block.hpp>
 #include <orbis/octree/occupancy_octree-inl.hpp>
 #include <orbis/octree/scan_history.hpp>
 #include <orbis/octree/scan_voxels-inl.hpp>
-#include <orbis/octree/scan_voxels.hpp>
 #include <orbis/octree/sensor_model.hpp>
 
 namespace orbis::octree {

@@ -4,21 +4,12 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
-#include <bit>
 #include <cassert>
-#include <cstddef>
-#include <cstdint>
-#include <vector>
 
-#include <orbis/core/execution.hpp>
 #include <orbis/core/inline.hpp>
-#include <orbis/core/se3.hpp>
 #include <orbis/octree/detail/points/scan_buffers.hpp>
 #include <orbis/octree/detail/storage/palette_kernels.hpp>
 #include <orbis/octree/detail/storage/scan_masks.hpp>
-#include <orbis/octree/integration.hpp>
-#include <orbis/octree/key.hpp>
 #include <orbis/octree/scan_voxels.hpp>
 
 namespace orbis::octree {

@@ -6,24 +6,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <concepts>
-#include <cstddef>
-#include <cstdint>
-#include <optional>
-#include <span>
 #include <string>
 #include <utility>
-#include <vector>
 
 #include <orbis/core/inline.hpp>
 #include <orbis/core/jacobi.hpp>
 #include <orbis/core/random.hpp>
-#include <orbis/core/result.hpp>
-#include <orbis/core/se3.hpp>
-#include <orbis/core/sim3.hpp>
 #include <orbis/core/simd/dispatch.hpp>
 #include <orbis/core/simd/vec.hpp>
-#include <orbis/core/types.hpp>
 #include <orbis/optimize/alignment.hpp>
 #include <orbis/optimize/detail/minimal/horn.hpp>
 #include <orbis/optimize/detail/unroll.hpp>

@@ -3,17 +3,11 @@
 /// The functions of bundle_adjustment.hpp.
 #pragma once
 
-#include <cstddef>
-#include <span>
 #include <utility>
 
-#include <orbis/core/execution.hpp>
-#include <orbis/core/types.hpp>
 #include <orbis/optimize/bundle_adjustment.hpp>
-#include <orbis/optimize/bundle_problem.hpp>
 #include <orbis/optimize/detail/bundle/bundle_solver.hpp>
 #include <orbis/optimize/reprojection-inl.hpp>
-#include <orbis/optimize/robust_loss.hpp>
 #include <orbis/optimize/solver_policies-inl.hpp>
 
 namespace orbis::optimize {

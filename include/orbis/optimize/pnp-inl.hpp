@@ -3,28 +3,17 @@
 /// The functions of pnp.hpp.
 #pragma once
 
-#include <array>
 #include <cmath>
 #include <concepts>
-#include <cstddef>
-#include <cstdint>
 #include <limits>
-#include <span>
 #include <string>
 #include <utility>
-#include <vector>
 
-#include <orbis/camera/model.hpp>
 #include <orbis/camera/pinhole.hpp>
 #include <orbis/core/inline.hpp>
-#include <orbis/core/result.hpp>
-#include <orbis/core/se3.hpp>
-#include <orbis/core/types.hpp>
 #include <orbis/optimize/detail/minimal/p3p_equations.hpp>
 #include <orbis/optimize/detail/minimal/pnp_estimator.hpp>
-#include <orbis/optimize/detail/minimal/pnp_matches.hpp>
 #include <orbis/optimize/pnp.hpp>
-#include <orbis/optimize/ransac.hpp>
 
 namespace orbis::optimize {
 

@@ -8,20 +8,14 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <span>
 #include <utility>
 #include <vector>
 
 #include <Eigen/Core>
 
-#include <orbis/core/execution.hpp>
 #include <orbis/optimize/detail/pose/pose_graph_equations.hpp>
-#include <orbis/optimize/detail/stage_watch.hpp>
 #include <orbis/optimize/pose_graph.hpp>
-#include <orbis/optimize/pose_graph_problem.hpp>
-#include <orbis/optimize/robust_loss.hpp>
 #include <orbis/optimize/solver_policies-inl.hpp>
-#include <orbis/optimize/solver_policies.hpp>
 
 namespace orbis::optimize {
 namespace detail {

@@ -6,20 +6,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstddef>
-#include <cstdint>
 #include <limits>
-#include <span>
 #include <type_traits>
 #include <utility>
 
-#include <orbis/core/se3.hpp>
 #include <orbis/core/small_cholesky.hpp>
 #include <orbis/core/types.hpp>
 #include <orbis/optimize/detail/pose/pose_kernels.hpp>
 #include <orbis/optimize/pose_refinement.hpp>
-#include <orbis/optimize/reprojection.hpp>
-#include <orbis/optimize/robust_loss.hpp>
 
 namespace orbis::optimize {
 namespace detail {

@@ -3,7 +3,6 @@
 /// The functions of reprojection.hpp.
 #pragma once
 
-#include <orbis/camera/model.hpp>
 #include <orbis/camera/project_lanes.hpp>
 #include <orbis/core/simd/dispatch.hpp>
 #include <orbis/optimize/reprojection.hpp>

@@ -4,16 +4,8 @@
 #pragma once
 
 #include <cassert>
-#include <cstddef>
-#include <span>
 #include <string>
 
-#include <orbis/camera/parameters.hpp>
-#include <orbis/core/execution.hpp>
-#include <orbis/core/result.hpp>
-#include <orbis/core/se3.hpp>
-#include <orbis/core/types.hpp>
-#include <orbis/optimize/bundle_problem.hpp>
 #include <orbis/optimize/detail/bundle/shared_intrinsics.hpp>
 #include <orbis/optimize/self_calibration.hpp>
 

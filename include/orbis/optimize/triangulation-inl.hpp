@@ -5,14 +5,10 @@
 
 #include <algorithm>
 #include <cassert>
-#include <cmath>
 #include <cstddef>
-#include <span>
 
 #include <orbis/core/inline.hpp>
-#include <orbis/core/se3.hpp>
 #include <orbis/core/small_cholesky.hpp>
-#include <orbis/core/types.hpp>
 #include <orbis/optimize/triangulation.hpp>
 
 namespace orbis::optimize {

@@ -4,28 +4,14 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
-#include <cmath>
-#include <concepts>
-#include <cstddef>
-#include <cstdint>
-#include <optional>
-#include <span>
-#include <string>
 #include <utility>
-#include <vector>
 
 #include <orbis/core/inline.hpp>
 #include <orbis/core/jacobi.hpp>
 #include <orbis/core/random.hpp>
-#include <orbis/core/result.hpp>
-#include <orbis/core/se3.hpp>
-#include <orbis/core/types.hpp>
 #include <orbis/optimize/detail/minimal/essential_estimator.hpp>
 #include <orbis/optimize/detail/minimal/homography_estimator.hpp>
-#include <orbis/optimize/detail/minimal/image_matches.hpp>
 #include <orbis/optimize/detail/minimal/two_view_reconstruction.hpp>
-#include <orbis/optimize/ransac.hpp>
 #include <orbis/optimize/triangulation.hpp>
 #include <orbis/optimize/two_view.hpp>
 

@@ -3,7 +3,6 @@
 /// The functions of default_vocabulary.hpp.
 #pragma once
 
-#include <cstddef>
 #include <span>
 #include <string>
 #include <string_view>
@@ -11,7 +10,6 @@
 #include <orbis/core/bytes.hpp>
 #include <orbis/places/default_vocabulary.hpp>
 #include <orbis/places/detail/default_vocabulary_data.hpp>
-#include <orbis/places/vocabulary.hpp>
 #include <orbis/places/vocabulary_file-inl.hpp>
 
 namespace orbis::places {

@@ -5,20 +5,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstddef>
-#include <cstdint>
 #include <limits>
-#include <ranges>
 #include <span>
 #include <string>
-#include <utility>
-#include <vector>
 
-#include <orbis/core/bits.hpp>
-#include <orbis/core/execution.hpp>
 #include <orbis/core/random.hpp>
-#include <orbis/core/result.hpp>
-#include <orbis/places/bag_of_words.hpp>
 #include <orbis/places/detail/k_majority.hpp>
 #include <orbis/places/train.hpp>
 #include <orbis/places/vocabulary-inl.hpp>

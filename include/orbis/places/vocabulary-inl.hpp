@@ -3,21 +3,13 @@
 /// The functions of vocabulary.hpp.
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <bit>
-#include <cstddef>
-#include <cstdint>
 #include <cstring>
-#include <span>
-#include <utility>
 
-#include <orbis/core/bits.hpp>
 #include <orbis/core/simd/dispatch.hpp>
-#include <orbis/places/bag_of_words.hpp>
 #include <orbis/places/detail/nearest_child.hpp>
 #include <orbis/places/vocabulary.hpp>
-#include <orbis/places/vocabulary_tree.hpp>
 
 namespace orbis::places {
 namespace detail {

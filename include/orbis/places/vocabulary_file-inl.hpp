@@ -6,21 +6,16 @@
 #include <array>
 #include <bit>
 #include <cerrno>
-#include <cstddef>
 #include <cstdint>
 #include <cstring>
-#include <filesystem>
 #include <fstream>
 #include <ostream>
-#include <span>
-#include <string>
 #include <system_error>
 #include <utility>
 #include <vector>
 
 #include <orbis/core/bytes.hpp>
 #include <orbis/core/file.hpp>
-#include <orbis/core/result.hpp>
 #include <orbis/places/bag_of_words.hpp>
 #include <orbis/places/vocabulary-inl.hpp>
 #include <orbis/places/vocabulary_file.hpp>

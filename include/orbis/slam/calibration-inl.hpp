@@ -3,32 +3,22 @@
 /// The functions of calibration.hpp.
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <cmath>
-#include <concepts>
-#include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <optional>
-#include <string_view>
 #include <type_traits>
 #include <unordered_map>
 #include <utility>
-#include <vector>
 
-#include <orbis/camera/any.hpp>
 #include <orbis/camera/parameters.hpp>
-#include <orbis/core/execution.hpp>
-#include <orbis/core/result.hpp>
 #include <orbis/core/se3.hpp>
 #include <orbis/core/types.hpp>
 #include <orbis/optimize/bundle_problem.hpp>
 #include <orbis/optimize/self_calibration-inl.hpp>
 #include <orbis/slam/calibration.hpp>
-#include <orbis/slam/camera_rig.hpp>
 #include <orbis/slam/detail/mapping/map_bundle.hpp>
-#include <orbis/slam/map.hpp>
 
 namespace orbis::slam {
 

@@ -3,28 +3,6 @@
 /// The functions of map.hpp.
 #pragma once
 
-#include <algorithm>
-#include <cassert>
-#include <cmath>
-#include <cstddef>
-#include <cstdint>
-#include <iterator>
-#include <map>
-#include <span>
-#include <utility>
-#include <vector>
-
-#include <orbis/core/se3.hpp>
-#include <orbis/core/sim3.hpp>
-#include <orbis/slam/covisibility_graph.hpp>
-#include <orbis/slam/detail/map/counter.hpp>
-#include <orbis/slam/detail/map/map_content.hpp>
-#include <orbis/slam/detail/map/slot_map.hpp>
-#include <orbis/slam/detail/map/typical_descriptor.hpp>
-#include <orbis/slam/frame.hpp>
-#include <orbis/slam/ids.hpp>
-#include <orbis/slam/landmark.hpp>
-#include <orbis/slam/spanning_tree.hpp>
 #include <orbis/slam/map.hpp>
 
 namespace orbis::slam {

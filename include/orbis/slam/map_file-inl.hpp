@@ -3,23 +3,17 @@
 /// The functions of map_file.hpp.
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
-#include <filesystem>
 #include <ostream>
-#include <span>
-#include <string>
 #include <string_view>
 #include <utility>
 
 #include <orbis/core/bytes.hpp>
 #include <orbis/core/file.hpp>
 #include <orbis/core/inline.hpp>
-#include <orbis/core/result.hpp>
 #include <orbis/slam/detail/map/file_sections.hpp>
 #include <orbis/slam/detail/map/map_content.hpp>
 #include <orbis/slam/detail/map/map_reader.hpp>
-#include <orbis/slam/map.hpp>
 #include <orbis/slam/map_file.hpp>
 
 namespace orbis::slam {

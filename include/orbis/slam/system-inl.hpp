@@ -3,46 +3,16 @@
 /// The functions of system.hpp.
 #pragma once
 
-#include <algorithm>
-#include <cmath>
-#include <concepts>
-#include <cstddef>
-#include <cstdint>
-#include <filesystem>
-#include <functional>
-#include <memory>
-#include <optional>
 #include <string>
-#include <utility>
-#include <vector>
 
-#include <orbis/camera/depth.hpp>
-#include <orbis/camera/model.hpp>
-#include <orbis/camera/rgbd_frame.hpp>
-#include <orbis/core/image.hpp>
-#include <orbis/core/result.hpp>
-#include <orbis/core/trajectory.hpp>
 #include <orbis/features/descriptor.hpp>
-#include <orbis/features/orb.hpp>
 #include <orbis/features/stereo-inl.hpp>
-#include <orbis/slam/atlas.hpp>
-#include <orbis/slam/camera_rig.hpp>
 #include <orbis/slam/detail/system/back_end.hpp>
-#include <orbis/slam/detail/system/shared_state.hpp>
-#include <orbis/slam/detail/system/stopwatch.hpp>
 #include <orbis/slam/detail/tracking/front_end.hpp>
-#include <orbis/slam/events.hpp>
-#include <orbis/slam/extractor.hpp>
 #include <orbis/slam/ids.hpp>
 #include <orbis/slam/map-inl.hpp>
 #include <orbis/slam/map_file.hpp>
-#include <orbis/slam/matchers.hpp>
-#include <orbis/slam/measure.hpp>
-#include <orbis/slam/options.hpp>
-#include <orbis/slam/place_recognition.hpp>
-#include <orbis/slam/shutter_estimate.hpp>
 #include <orbis/slam/system.hpp>
-#include <orbis/slam/track_result.hpp>
 
 namespace orbis::slam {
 
