@@ -16,6 +16,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include <orbis/core/random.hpp>
+#include <orbis/core/simd/level.hpp>
 #include <orbis/features.hpp>
 #include <orbis/interop/opencv.hpp>
 #include <orbis/io/image.hpp>

@@ -17,6 +17,7 @@
 
 #include <orbis/camera/pinhole.hpp>
 #include <orbis/core/random.hpp>
+#include <orbis/core/simd/level.hpp>
 #include <orbis/features.hpp>
 #include <orbis/interop/opencv.hpp>
 

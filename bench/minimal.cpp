@@ -21,6 +21,7 @@
 #include <orbis/camera/pinhole.hpp>
 #include <orbis/core/random.hpp>
 #include <orbis/core/se3.hpp>
+#include <orbis/core/simd/level.hpp>
 #include <orbis/optimize/alignment.hpp>
 #include <orbis/optimize/pnp.hpp>
 #include <orbis/optimize/two_view.hpp>

@@ -17,6 +17,7 @@
 #include <benchmark/benchmark.h>
 
 #include <orbis/core/random.hpp>
+#include <orbis/core/simd/level.hpp>
 #include <orbis/places.hpp>
 
 namespace {

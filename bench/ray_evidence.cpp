@@ -19,6 +19,7 @@
 #include <orbis/cloud/ray_evidence-inl.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/random.hpp>
+#include <orbis/core/simd/level.hpp>
 
 #include "depth_keyframes.hpp"
 
