@@ -97,8 +97,7 @@ struct correction_progress {
 /// present poses, otherwise from poses within the tolerance. It depends neither on policies nor on limits of time.
 ///
 /// One thread at a time; see live_map_thread.hpp for a map with a thread of its own. With orbis::compiled, an octree of
-/// another model than log_odds<> and a camera that is neither pinhole nor any_camera need
-/// octree/scan_history-inl.hpp as well.
+/// another model than log_odds<> needs octree/scan_history-inl.hpp as well.
 template <octree::replayable_octree Octree, camera::camera_model Camera, depth_history Depths = depth_store>
 class live_map {
  public:

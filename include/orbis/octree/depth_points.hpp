@@ -111,16 +111,13 @@ class pixel_rays {
 };
 
 /// Appends to `points` the world points (metres) of the pixels of `depth` that hold a measurement
-/// and whose ray `camera` can un-project, row by row.
+/// and whose ray the camera can un-project, row by row.
 /// @pre depth and camera have the same size
-template <camera::depth_source Depth, camera::camera_model Camera>
-void append_world_points(const Depth& depth, const Camera& camera, const se3& T_world_camera,
+template <camera::depth_source Depth>
+void append_world_points(const Depth& depth, const pixel_rays& rays, const se3& T_world_camera,
                          std::vector<vec3f>& points) {
-  assert(static_cast<int>(depth.width()) == static_cast<int>(camera.width()) &&
-         static_cast<int>(depth.height()) == static_cast<int>(camera.height()));
+  assert(static_cast<int>(depth.width()) == rays.width() && static_cast<int>(depth.height()) == rays.height());
   const camera::float_pose pose{T_world_camera};
-  pixel_rays rays;
-  rays.fit(camera);
   for (int v = 0; v < rays.height(); ++v)
     for (int u = 0; u < rays.width(); ++u) {
       const float z = depth(u, v);
@@ -129,6 +126,13 @@ void append_world_points(const Depth& depth, const Camera& camera, const se3& T_
       const detail::float3 p = camera::world_point(pose, x, y, z);
       points.emplace_back(p[0], p[1], p[2]);
     }
+}
+template <camera::depth_source Depth, camera::camera_model Camera>
+void append_world_points(const Depth& depth, const Camera& camera, const se3& T_world_camera,
+                         std::vector<vec3f>& points) {
+  pixel_rays rays;
+  rays.fit(camera);
+  append_world_points(depth, rays, T_world_camera, points);
 }
 
 }  // namespace orbis::octree

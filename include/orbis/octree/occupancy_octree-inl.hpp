@@ -40,17 +40,16 @@ integration_summary occupancy_octree<Model>::integrate_points(const parallel_pol
 }
 
 template <sensor_model Model>
-template <class Depth, class Camera>
-integration_summary occupancy_octree<Model>::integrate_depth(const parallel_policy& policy, const Depth& depth,
-                                                             const Camera& camera, const se3& T_world_camera,
+integration_summary occupancy_octree<Model>::integrate_depth(const parallel_policy& policy,
+                                                             const detail::depth_scan& scan, const se3& T_world_camera,
                                                              const integration_options& options) {
   assert(options.beam_ranges.empty());
   begin_change();
   detail::scan_buffers& buffers = scratch_.get<detail::scan_buffers>();
   integration_summary summary;
-  const detail::scan_masks& scan = detail::mark_depth(policy, buffers, grid_, depth, camera, T_world_camera, options,
-                                                      summary, detail::saturated_in<Model>(store_));
-  detail::apply_scan<Model>(store_, scan, summary, track_.on ? &track_.log : nullptr);
+  const detail::scan_masks& masks = detail::mark_depth(policy, buffers, grid_, scan, T_world_camera, options, summary,
+                                                       detail::saturated_in<Model>(store_));
+  detail::apply_scan<Model>(store_, masks, summary, track_.on ? &track_.log : nullptr);
   return summary;
 }
 

@@ -31,6 +31,7 @@
 #include <orbis/octree/accessor.hpp>
 #include <orbis/octree/cast_ray.hpp>
 #include <orbis/octree/change_log.hpp>
+#include <orbis/octree/detail/depth/depth_scan.hpp>
 #include <orbis/octree/detail/points/ray_traversal.hpp>
 #include <orbis/octree/detail/points/scan_scratch.hpp>
 #include <orbis/octree/detail/storage/brick.hpp>
@@ -111,13 +112,12 @@ class occupancy_octree {
   }
   /// Integrates a depth image (depths in metres along the optical axis). The map is the one that the image's world
   /// points (see append_world_points) make when seen from the camera's centre, but this is many times as fast.
-  /// O(pixels + voxels near surfaces). The library orbis::compiled holds this for depth_view of std::uint16_t and float
-  /// with pinhole and any_camera; other sources and models include occupancy_octree-inl.hpp.
+  /// O(pixels + voxels near surfaces).
   /// @pre depth and camera have the same size; options.beam_ranges is empty
   template <execution_policy Policy, camera::depth_source Depth, camera::camera_model Camera>
   integration_summary integrate(const Policy& policy, const Depth& depth, const Camera& camera,
                                 const se3& T_world_camera, const integration_options& options = {}) {
-    return integrate_depth(detail::as_parallel(policy), depth, camera, T_world_camera, options);
+    return integrate_depth(detail::as_parallel(policy), detail::depth_scan{depth, camera}, T_world_camera, options);
   }
   template <camera::depth_source Depth, camera::camera_model Camera>
   integration_summary integrate(const Depth& depth, const Camera& camera, const se3& T_world_camera,
@@ -323,8 +323,7 @@ class occupancy_octree {
   /// The parts of `integrate` that are not compiled for each policy and each type of points.
   integration_summary integrate_points(const parallel_policy& policy, const detail::point_view& points,
                                        const detail::float3& origin, const integration_options& options);
-  template <class Depth, class Camera>
-  integration_summary integrate_depth(const parallel_policy& policy, const Depth& depth, const Camera& camera,
+  integration_summary integrate_depth(const parallel_policy& policy, const detail::depth_scan& scan,
                                       const se3& T_world_camera, const integration_options& options);
 
   /// The change log. Copies of the map begin without one, and a map that is moved to a new place takes it along. A map

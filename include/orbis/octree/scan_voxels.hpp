@@ -16,6 +16,7 @@
 #include <orbis/core/execution.hpp>
 #include <orbis/core/point.hpp>
 #include <orbis/core/se3.hpp>
+#include <orbis/octree/detail/depth/depth_scan.hpp>
 #include <orbis/octree/detail/points/scan_scratch.hpp>
 #include <orbis/octree/integration.hpp>
 #include <orbis/octree/key.hpp>
@@ -108,13 +109,12 @@ class scan_marker {
   /// Marks a depth image (metres along the optical axis). Unlike `integrate`, this leaves out no voxel for being
   /// saturated, so that the scan may be applied to any map. The same voxels for every policy. The summary counts what
   /// `integrate` counts. O(pixels + voxels near surfaces + bricks).
-  /// The library orbis::compiled holds this for the sources and models that it holds occupancy_octree::integrate for;
-  /// others include scan_voxels-inl.hpp.
   /// @pre depth and camera have the same size; options.beam_ranges is empty
   template <execution_policy Policy, camera::depth_source Depth, camera::camera_model Camera>
   integration_summary mark(const Policy& policy, const voxel_grid& grid, const Depth& depth, const Camera& camera,
                            const se3& T_world_camera, const integration_options& options, scan_voxels& voxels) {
-    return mark_depth(detail::as_parallel(policy), grid, depth, camera, T_world_camera, options, voxels);
+    return mark_depth(detail::as_parallel(policy), grid, detail::depth_scan{depth, camera}, T_world_camera, options,
+                      voxels);
   }
   /// Marks points in the world frame (metres), seen from `origin`. O(points x voxels per ray).
   template <execution_policy Policy, point_range Points, point_like Origin>
@@ -129,10 +129,9 @@ class scan_marker {
   }
 
  private:
-  template <class Depth, class Camera>
-  integration_summary mark_depth(const parallel_policy& policy, const voxel_grid& grid, const Depth& depth,
-                                 const Camera& camera, const se3& T_world_camera, const integration_options& options,
-                                 scan_voxels& voxels);
+  template <class Policy>
+  integration_summary mark_depth(const Policy& policy, const voxel_grid& grid, const detail::depth_scan& scan,
+                                 const se3& T_world_camera, const integration_options& options, scan_voxels& voxels);
   template <class Policy>
   integration_summary mark_points(const Policy& policy, const voxel_grid& grid, const detail::point_view& points,
                                   const std::array<float, 3>& origin, const integration_options& options,

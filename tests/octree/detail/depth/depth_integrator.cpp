@@ -94,7 +94,7 @@ void require_walked(double resolution, const Depth& depth, const Camera& camera,
     INFO("resolution " << resolution << ", level " << static_cast<int>(level));
     depth_integrator marker;
     scan_masks found;
-    const auto summary = marker.mark(seq, grid, depth, camera, pose, options, found);
+    const auto summary = marker.mark(seq, grid, depth_scan{depth, camera}, pose, options, found);
     REQUIRE(differences(expected.marker.masks(), found, saturated_voxels{}) == 0);
     REQUIRE(summary.used == expected.summary.used);
     REQUIRE(summary.truncated == expected.summary.truncated);
@@ -181,7 +181,7 @@ TEST_CASE("A change of the camera is noticed") {
   const camera::radial_tangential wide{{96, 72, 70.0, 70.0, 47.0, 36.5}, {-0.2, 0.05}};
   const camera::radial_tangential narrow{{96, 72, 90.0, 90.0, 47.0, 36.5}, {-0.2, 0.05}};
   const auto check = [&](const auto& camera) {
-    marker.mark(seq, grid, view, camera, pose, {}, found);
+    marker.mark(seq, grid, depth_scan{view, camera}, pose, {}, found);
     CHECK(differences(walked(grid, view, camera, pose, {}).marker.masks(), found, saturated_voxels{}) == 0);
   };
   check(wide);
@@ -265,7 +265,7 @@ TEST_CASE("Saturated voxels are left out and the others are the walk's") {
     const voxel_grid grid{run % 2 == 0 ? 0.1 : 0.06};
     const walked expected{grid, view, camera, pose, {}};
     marker.mark(
-        seq, grid, view, camera, pose, {}, found,
+        seq, grid, depth_scan{view, camera}, pose, {}, found,
         {.find = [](const void*, std::uint64_t name, saturated_voxels::words& mask) { hide_some(name, mask); }});
     REQUIRE(differences(expected.marker.masks(), found, hide_some) == 0);
     left_out += count_free(expected.marker.masks()) - count_free(found);
@@ -281,10 +281,11 @@ TEST_CASE("Every number of threads marks the same voxels") {
     const integration_options options{.max_range = 4.0};
     depth_integrator marker;
     scan_masks alone, together;
-    const auto a = marker.mark(seq, grid, frame.depth_metres(), camera, *frame.T_world_camera, options, alone);
+    const auto depth = frame.depth_metres();
+    const depth_scan scan{depth, camera};
+    const auto a = marker.mark(seq, grid, scan, *frame.T_world_camera, options, alone);
     for (const unsigned threads : {2U, 3U, 8U}) {
-      const auto b =
-          marker.mark(par.with(threads), grid, frame.depth_metres(), camera, *frame.T_world_camera, options, together);
+      const auto b = marker.mark(par.with(threads), grid, scan, *frame.T_world_camera, options, together);
       CHECK(differences(alone, together, saturated_voxels{}) == 0);
       CHECK(a.used == b.used);
       CHECK(a.truncated == b.truncated);

@@ -37,7 +37,7 @@ void require_ends(const Depth& depth, const camera::pinhole& camera, const se3& 
     const simd::level_limit limit{level};
     endpoint_image rays;
     scan_masks found, expected;
-    const auto counts = rays.find_ends(seq, sensor, depth, camera, found);
+    const auto counts = rays.find_ends(seq, sensor, octree::detail::depth_scan{depth, camera}, found);
     octree::detail::end_counts one_by_one;
     std::size_t wrong = 0;
     for (int v = 0; v != camera.height(); ++v)

@@ -64,12 +64,19 @@ struct depth_frame : view_frame {
   }
 };
 
-/// The rays of a depth image for the descent. `EndOf`: the ray_endpoint of pixel (u, v).
-template <class EndOf>
+/// The rays of a depth image for the descent.
 struct depth_rays {
   const depth_frame& frame;
   const depth_sensor& sensor;
-  const EndOf& end_of;
+  const void* ends;
+  ray_endpoint (*end_of)(const void* ends, int u, int v);  ///< where the ray of a pixel ends
+
+  /// `end(u, v)` gives the ray_endpoint of a pixel.
+  template <class End>
+  depth_rays(const depth_frame& f, const depth_sensor& s, const End& end)
+      : frame{f}, sensor{s}, ends{&end}, end_of{[](const void* e, int u, int v) -> ray_endpoint {
+          return (*static_cast<const End*>(e))(u, v);
+        }} {}
 
   [[nodiscard]] unsigned sample(const child_offsets& o, const float3& world, const children& c, unsigned wanted) const {
     return frame.sample(frame.scene, frame.ends, o, world, c, wanted);
@@ -90,7 +97,7 @@ struct depth_rays {
   /// Whether the walk of a ray that `test` was not sure of visits the voxel.
   [[nodiscard]] bool visits(std::uint32_t number, const voxel_key& voxel) const {
     const auto [u, v] = frame.ends.pixel(number);
-    return crosses(sensor, end_of(u, v), voxel);
+    return crosses(sensor, end_of(ends, u, v), voxel);
   }
 };
 

@@ -16,13 +16,12 @@
 #include <utility>
 #include <vector>
 
-#include <orbis/camera/depth.hpp>
-#include <orbis/camera/model.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/se3.hpp>
 #include <orbis/core/simd.hpp>
 #include <orbis/octree/detail/depth/depth_descent.hpp>
 #include <orbis/octree/detail/depth/depth_frame.hpp>
+#include <orbis/octree/detail/depth/depth_scan.hpp>
 #include <orbis/octree/detail/depth/endpoint_rows.hpp>
 #include <orbis/octree/detail/depth/first_steps.hpp>
 #include <orbis/octree/detail/points/point_integrator.hpp>
@@ -48,31 +47,31 @@ class depth_integrator {
   /// `saturated(name, mask)` sets the bits of such voxels of a named brick; it may be called from several
   /// threads. O(pixels + bricks seen + voxels at surfaces).
   /// @pre depth and camera have the same size
-  template <execution_policy Policy, camera::depth_source Depth, camera::camera_model Camera>
-  integration_summary mark(const Policy& policy, const voxel_grid& grid, const Depth& depth, const Camera& camera,
+  template <execution_policy Policy>
+  integration_summary mark(const Policy& policy, const voxel_grid& grid, const depth_scan& scan,
                            const se3& T_world_camera, const integration_options& options, scan_masks& masks,
                            const saturated_voxels& saturated = {}) {
     const depth_sensor sensor{grid, T_world_camera, options.max_range};
     masks.clear();
-    const end_counts ends = frame_.ends.find_ends(policy, sensor, depth, camera, masks);
+    const end_counts ends = frame_.ends.find_ends(policy, sensor, scan, masks);
     if (sensor.key && ends.leaves) {
       if (!frame_.ends.rays().separable()) frame_.map.fit(frame_.ends.rays());
       frame_.set_scene(sensor);
       const auto bounds = frame_.bounds_of(sensor, ends.max_z);
       if (bounds && frame_.is_dense(ends))
-        mark_free(policy, sensor, depth, ends.max_z, *bounds, masks, saturated);
+        mark_free(policy, sensor, scan, ends.max_z, *bounds, masks, saturated);
       else
-        walk_all(policy, sensor, depth, camera, T_world_camera, options, masks);
+        walk_all(policy, sensor, scan, T_world_camera, options, masks);
     }
     return {.used = ends.used, .truncated = ends.truncated, .rejected = ends.rejected};
   }
   /// The part of `mark` that finds the occupied voxels.
-  template <execution_policy Policy, camera::depth_source Depth, camera::camera_model Camera>
-  integration_summary mark_ends(const Policy& policy, const voxel_grid& grid, const Depth& depth, const Camera& camera,
+  template <execution_policy Policy>
+  integration_summary mark_ends(const Policy& policy, const voxel_grid& grid, const depth_scan& scan,
                                 const se3& T_world_camera, const integration_options& options, scan_masks& masks) {
     const depth_sensor sensor{grid, T_world_camera, options.max_range};
     masks.clear();
-    const end_counts ends = frame_.ends.find_ends(policy, sensor, depth, camera, masks);
+    const end_counts ends = frame_.ends.find_ends(policy, sensor, scan, masks);
     return {.used = ends.used, .truncated = ends.truncated, .rejected = ends.rejected};
   }
 
@@ -86,53 +85,50 @@ class depth_integrator {
  private:
   // -- one frame
 
-  template <class Policy, class Depth>
-  void mark_free(const Policy& policy, const depth_sensor& sensor, const Depth& depth, float max_z,
+  template <class Policy>
+  void mark_free(const Policy& policy, const depth_sensor& sensor, const depth_scan& scan, float max_z,
                  const std::pair<voxel_key, voxel_key>& bounds, scan_masks& masks, const saturated_voxels& saturated) {
-    if (frame_.scene.map != nullptr) walk_outer(sensor, depth, masks);
+    if (frame_.scene.map != nullptr) walk_outer(sensor, scan, masks);
     frame_.pyramid.build(frame_.ends.rays().width(), frame_.ends.rays().height(), max_z,
                          [&](int v) { return frame_.ends.z(v); });
     frame_.list_nodes(sensor, bounds.first, bounds.second);
     const bool on_face = frame_.is_on_face(sensor);
 
-    const auto end = [&](int u, int v) { return end_of(sensor, depth, u, v); };
-    descend_nodes(policy, frame_, sensor, depth_rays<decltype(end)>{frame_, sensor, end}, on_face, masks, saturated,
-                  workers_);
+    const auto end = [&](int u, int v) { return end_of(sensor, scan, u, v); };
+    descend_nodes(policy, frame_, sensor, depth_rays{frame_, sensor, end}, on_face, masks, saturated, workers_);
     if (on_face) {
       first_voxels around{sensor};
-      for_each_end(sensor, depth, [&](const ray_endpoint& e) { around.add(e); });
+      for_each_end(sensor, scan, [&](const ray_endpoint& e) { around.add(e); });
       around.mark(masks);
     }
   }
 
   // -- every ray, for the few cases that need it
 
-  template <class Depth, class Use>
-  void for_each_end(const depth_sensor& sensor, const Depth& depth, Use&& use) const {
+  template <class Use>
+  void for_each_end(const depth_sensor& sensor, const depth_scan& scan, Use&& use) const {
     for (int v = 0; v != frame_.ends.rays().height(); ++v)
       for (int u = 0; u != frame_.ends.rays().width(); ++u)
-        if (frame_.ends.z(v)[u] > 0.0F) use(end_of(sensor, depth, u, v));
+        if (frame_.ends.z(v)[u] > 0.0F) use(end_of(sensor, scan, u, v));
   }
-  template <class Depth>
-  [[nodiscard]] ray_endpoint end_of(const depth_sensor& sensor, const Depth& depth, int u, int v) const {
+  [[nodiscard]] ray_endpoint end_of(const depth_sensor& sensor, const depth_scan& scan, int u, int v) const {
     const auto [x, y] = frame_.ends.rays().at(u, v);
-    return sensor.end(x, y, depth(u, v));
+    return sensor.end(x, y, scan.depth(u, v));
   }
-  template <class Policy, class Depth, class Camera>
-  void walk_all(const Policy& policy, const depth_sensor& sensor, const Depth& depth, const Camera& camera,
-                const se3& T_world_camera, const integration_options& options, scan_masks& masks) {
+  template <class Policy>
+  void walk_all(const Policy& policy, const depth_sensor& sensor, const depth_scan& scan, const se3& T_world_camera,
+                const integration_options& options, scan_masks& masks) {
     points_.clear();
-    append_world_points(depth, camera, T_world_camera, points_);
+    scan.visit([&](const auto& depth) { append_world_points(depth, frame_.ends.rays(), T_world_camera, points_); });
     walker_.mark(policy, sensor.grid, reader_.view(points_), sensor.pose.centre,
                  {.max_range = options.max_range, .mode = ray_mode::every_ray});
     masks.merge(walker_.masks());
   }
   /// Walks the rays that go too far aside for the map, and forgets them.
-  template <class Depth>
-  void walk_outer(const depth_sensor& sensor, const Depth& depth, scan_masks& masks) {
+  void walk_outer(const depth_sensor& sensor, const depth_scan& scan, scan_masks& masks) {
     for (const auto& [u, v] : frame_.map.outer()) {
       if (!(frame_.ends.z(v)[u] > 0.0F)) continue;
-      const ray_endpoint e = end_of(sensor, depth, u, v);
+      const ray_endpoint e = end_of(sensor, scan, u, v);
       masks.mark_ray(sensor.grid, sensor.pose.centre, *sensor.key, e.point, e.key);
       frame_.ends.clear(u, v);
     }

@@ -13,11 +13,11 @@
 #include <span>
 #include <vector>
 
-#include <orbis/camera/depth.hpp>
-#include <orbis/camera/model.hpp>
+#include <orbis/camera/pinhole.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/simd.hpp>
 #include <orbis/octree/depth_points.hpp>
+#include <orbis/octree/detail/depth/depth_scan.hpp>
 #include <orbis/octree/detail/depth/endpoint_rows.hpp>
 #include <orbis/octree/detail/storage/node_name.hpp>
 #include <orbis/octree/detail/storage/scan_masks.hpp>
@@ -30,14 +30,13 @@ class endpoint_image {
  public:
   /// Takes in an image: the depths at which rays end, and in `masks` the voxels of the ends that are
   /// used, as occupied. O(pixels). @pre depth and camera have the same size
-  template <execution_policy Policy, camera::depth_source Depth, camera::camera_model Camera>
-  end_counts find_ends(const Policy& policy, const depth_sensor& sensor, const Depth& depth, const Camera& camera,
-                       scan_masks& masks) {
+  template <execution_policy Policy>
+  end_counts find_ends(const Policy& policy, const depth_sensor& sensor, const depth_scan& scan, scan_masks& masks) {
     find_ = simd::kernel<find_ends_kernel, find_kernel>();
     fresh_ = simd::kernel<fresh_keys_kernel, fresh_kernel>();
-    rays_.fit(camera);
+    scan.fit(rays_);
     resize(rays_.width(), rays_.height());
-    assert(static_cast<int>(depth.width()) == rays_.width() && static_cast<int>(depth.height()) == rays_.height());
+    assert(scan.visit([&](const auto& d) { return d.width() == rays_.width() && d.height() == rays_.height(); }));
     const auto rows = static_cast<std::size_t>(rays_.height());
     const std::size_t chunks = (rows + rows_per_chunk - 1) / rows_per_chunk;
     workers_.resize(std::clamp<std::size_t>(policy.threads(), 1, std::max<std::size_t>(chunks, 1)));
@@ -50,7 +49,7 @@ class endpoint_image {
         w.forget_row();
         const std::size_t last = std::min(rows, (chunk + 1) * rows_per_chunk);
         for (std::size_t v = chunk * rows_per_chunk; v != last; ++v)
-          add_row(w, marks, sensor, depth, static_cast<int>(v));
+          add_row(w, marks, sensor, scan, static_cast<int>(v));
       }
     });
     end_counts counts;
@@ -139,10 +138,9 @@ class endpoint_image {
     z_.resize(stride_ * static_cast<std::size_t>(height) + pixel_rays::padding);
     first_ = 0;
   }
-  template <class Depth>
-  void add_row(worker& w, scan_masks& masks, const depth_sensor& sensor, const Depth& depth, int v) {
+  void add_row(worker& w, scan_masks& masks, const depth_sensor& sensor, const depth_scan& scan, int v) {
     float* const z = z_.data() + static_cast<std::size_t>(v) * stride_;
-    metres(depth, v, z);
+    scan.visit([&](const auto& depth) { metres(depth, v, z); });
     std::fill(z + rays_.width(), z + stride_ + (v + 1 == rays_.height() ? pixel_rays::padding : 0), 0.0F);
     const auto row = static_cast<std::size_t>(v & 1);
     const end_row ends{rays_.width(),     rays_.x(v), rays_.y(v),

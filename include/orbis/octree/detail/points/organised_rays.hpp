@@ -175,8 +175,7 @@ class organised_rays {
     frame_.list_nodes(sensor, bounds->first, bounds->second);
     const bool on_face = frame_.is_on_face(sensor);
     const auto end_at = [&](int u, int v) { return end_of(numbers_[first + frame_.ends.number(u, v)]); };
-    descend_nodes(policy, frame_, sensor, depth_rays<decltype(end_at)>{frame_, sensor, end_at}, on_face, masks,
-                  saturated, workers_);
+    descend_nodes(policy, frame_, sensor, depth_rays{frame_, sensor, end_at}, on_face, masks, saturated, workers_);
     if (on_face) walk_first_steps(sensor, end_at, masks);
     for (const auto& s : second_)
       for (const std::uint32_t number : s) {

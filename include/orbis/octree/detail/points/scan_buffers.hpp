@@ -10,6 +10,7 @@
 #include <orbis/core/point.hpp>
 #include <orbis/core/se3.hpp>
 #include <orbis/octree/detail/depth/depth_integrator.hpp>
+#include <orbis/octree/detail/depth/depth_scan.hpp>
 #include <orbis/octree/detail/points/point_integrator.hpp>
 #include <orbis/octree/detail/storage/scan_masks.hpp>
 #include <orbis/octree/integration.hpp>
@@ -28,23 +29,21 @@ struct scan_buffers {
 };
 
 /// Marks a depth image, in either mode. The masks are those of `buffers`; `summary` gets what became of the pixels.
-template <class Depth, class Camera>
-const scan_masks& mark_depth(const parallel_policy& policy, scan_buffers& buffers, const voxel_grid& grid,
-                             const Depth& depth, const Camera& camera, const se3& T_world_camera,
-                             const integration_options& options, integration_summary& summary,
-                             const saturated_voxels& saturated = {}) {
+template <class Policy>
+const scan_masks& mark_depth(const Policy& policy, scan_buffers& buffers, const voxel_grid& grid,
+                             const depth_scan& scan, const se3& T_world_camera, const integration_options& options,
+                             integration_summary& summary, const saturated_voxels& saturated = {}) {
   scan_masks& masks = buffers.masks;
   if (options.mode == ray_mode::every_ray) {
-    summary = options.rays ? buffers.depth.mark(policy, grid, depth, camera, T_world_camera, options, masks, saturated)
-                           : buffers.depth.mark_ends(policy, grid, depth, camera, T_world_camera, options, masks);
+    summary = options.rays ? buffers.depth.mark(policy, grid, scan, T_world_camera, options, masks, saturated)
+                           : buffers.depth.mark_ends(policy, grid, scan, T_world_camera, options, masks);
     clip(masks, grid, options.bounds);
     return masks;
   }
   // Whether a voxel is within range is decided at its centre, not at its points.
   integration_options unlimited = options;
   unlimited.max_range = std::numeric_limits<double>::infinity();
-  const std::size_t rejected =
-      buffers.depth.mark_ends(policy, grid, depth, camera, T_world_camera, unlimited, masks).rejected;
+  const std::size_t rejected = buffers.depth.mark_ends(policy, grid, scan, T_world_camera, unlimited, masks).rejected;
   const float3 origin = coordinates<float>(T_world_camera.translation());
   summary = buffers.points.mark_centers(policy, grid, masks, origin, options);
   summary.rejected += rejected;

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// A depth image and its camera without their types, so that the marking of depth images is compiled once for all.
+#pragma once
+
+#include <cstdint>
+#include <variant>
+
+#include <orbis/camera/depth.hpp>
+#include <orbis/camera/model.hpp>
+#include <orbis/octree/depth_points.hpp>
+
+namespace orbis::octree::detail {
+
+/// A depth image of a type that is not our own; a depth_source.
+struct other_depth {
+  const void* source;
+  int columns, rows;
+  float (*read)(const void* source, int u, int v);
+
+  [[nodiscard]] int width() const noexcept { return columns; }
+  [[nodiscard]] int height() const noexcept { return rows; }
+  [[nodiscard]] float operator()(int u, int v) const { return read(source, u, v); }
+};
+
+/// Refers to the image and the camera that it is made from. Reading a pixel costs a switch over the types.
+class depth_scan {
+ public:
+  template <camera::depth_source Depth, camera::camera_model Camera>
+  depth_scan(const Depth& depth, const Camera& camera)
+      : camera_{&camera}, fit_{[](const void* c, pixel_rays& rays) { rays.fit(*static_cast<const Camera*>(c)); }} {
+    if constexpr (requires { image_ = depth; })
+      image_ = depth;
+    else
+      image_ = other_depth{&depth, static_cast<int>(depth.width()), static_cast<int>(depth.height()),
+                           [](const void* d, int u, int v) -> float { return (*static_cast<const Depth*>(d))(u, v); }};
+  }
+
+  /// `f(image)` for the depth_view or other_depth.
+  template <class F>
+  decltype(auto) visit(F&& f) const {
+    return std::visit(f, image_);
+  }
+  /// Metres, or 0 where there is no measurement.
+  [[nodiscard]] float depth(int u, int v) const {
+    return visit([&](const auto& image) { return image(u, v); });
+  }
+  /// Makes `rays` those of the camera.
+  void fit(pixel_rays& rays) const { fit_(camera_, rays); }
+
+ private:
+  std::variant<camera::depth_view<std::uint16_t>, camera::depth_view<float>, other_depth> image_;
+  const void* camera_;
+  void (*fit_)(const void* camera, pixel_rays& rays);
+};
+
+}  // namespace orbis::octree::detail
