@@ -25,7 +25,8 @@ set(options -G ${GENERATOR} -DCMAKE_CXX_COMPILER=${COMPILER} -DCMAKE_BUILD_TYPE=
 if(WAY STREQUAL "find_package")
   run(${CMAKE_COMMAND} -S ${ORBIS_SOURCE} -B ${SCRATCH}/orbis ${options} -DORBIS_BUILD_TESTS=OFF
       -DORBIS_BUILD_BENCH=OFF -DORBIS_BUILD_EXAMPLES=OFF -DCMAKE_INSTALL_PREFIX=${SCRATCH}/first
-      -DCMAKE_INSTALL_INCLUDEDIR=include/versioned)
+      -DCMAKE_INSTALL_INCLUDEDIR=include/versioned
+      -DCMAKE_DISABLE_FIND_PACKAGE_Eigen3=ON -DCMAKE_DISABLE_FIND_PACKAGE_PNG=ON)  # headers install without libraries
   run(${CMAKE_COMMAND} --install ${SCRATCH}/orbis)
   file(RENAME ${SCRATCH}/first ${SCRATCH}/prefix)  # what is installed can be moved
   foreach(file IN ITEMS include/versioned/orbis/orbis.hpp share/cmake/orbis/orbis-config.cmake share/pkgconfig/orbis.pc)
@@ -34,6 +35,11 @@ if(WAY STREQUAL "find_package")
     endif()
   endforeach()
   list(APPEND options -DCMAKE_PREFIX_PATH=${SCRATCH}/prefix)
+  execute_process(COMMAND ${CMAKE_COMMAND} -S ${PROJECT} -B ${SCRATCH}/without ${options} -DWAY=find_package
+                  -DCMAKE_DISABLE_FIND_PACKAGE_Eigen3=ON ERROR_VARIABLE output OUTPUT_QUIET)
+  if(NOT output MATCHES "Eigen3 .for core." OR NOT output MATCHES "apt-get install libeigen3-dev")
+    message(FATAL_ERROR "no word of how to install Eigen:\n${output}")
+  endif()
   find_program(PKG_CONFIG pkg-config)
   if(PKG_CONFIG)
     set(ENV{PKG_CONFIG_PATH} ${SCRATCH}/prefix/share/pkgconfig)
