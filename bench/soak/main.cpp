@@ -184,18 +184,10 @@ int soak(const Recording& recording, std::size_t frames) {
   slam::rgbd_system<camera::any_camera> slam{camera.model, settings};
 
   using live_map = mapping::live_map_thread<octree::occupancy_octree<>, camera::any_camera>;
-  mapping::live_map_listeners<octree::occupancy_octree<>> events;
-  events.poll_poses = [&slam, seen = slam::pose_revision{}](auto& now, bool always) mutable {
-    if (always) seen.map = slam::no_id;
-    const auto present = slam.keyframes_since(seen);
-    if (present)
-      for (const auto& k : *present) now.poses.push_back({k.frame, k.T_world_camera});
-    return present.has_value();
-  };
   mapping::live_map_thread_options map_options;
   map_options.patience = std::chrono::seconds{10};  // the recording is played faster than a camera would bring it
   map_options.moving.emplace();
-  live_map map{camera.model, map_options, std::move(events)};
+  live_map map{camera.model, map_options, {.poll_poses = mapping::follow_keyframes(slam)}};
   slam.listen({.keyframe_culled = [&map](const auto& e) { map.remove(e.frame); }, .map_corrected = hold.listener()});
 
   std::printf("%8s %22s %22s %8s %8s %8s %10s %10s %8s %6s\n", "frames", "track ms (50/95/max)", "lock ms (50/95/max)",

@@ -86,6 +86,19 @@ struct live_map_listeners {
   std::function<void(const error&)> failed{};
 };
 
+/// A `live_map_listeners::poll_poses` that reads the keyframe poses of a SLAM system. The system must outlive the map's
+/// thread. Keyframes that SLAM has culled stay hidden in the map; `live_map_thread::remove` frees their memory.
+template <class Slam>
+[[nodiscard]] auto follow_keyframes(const Slam& slam) {
+  return [&slam, seen = typename Slam::revision_type{}](keyframe_poses& now, bool always) mutable {
+    if (always) seen = {};
+    const auto poses = slam.keyframes_since(seen);
+    if (poses)
+      for (const auto& k : *poses) now.poses.push_back({k.frame, k.T_world_camera});
+    return poses.has_value();
+  };
+}
+
 struct live_map_counters {
   std::size_t keyframes = 0;          ///< inserted
   std::size_t frames = 0;             ///< inserted, between keyframes

@@ -12,20 +12,12 @@
 ///   if (seen->map.state(p) == orbis::octree::occupancy::occupied) ...
 /// @endcode
 ///
-/// Instead of being told poses, the thread can ask a SLAM system for them:
+/// With a SLAM system, the thread reads the poses itself:
 ///
 /// @code
-///   listeners.poll_poses = [&slam, seen = orbis::slam::pose_revision{}](auto& now, bool always) mutable {
-///     if (always) seen.map = orbis::slam::no_id;
-///     const auto present = slam.keyframes_since(seen);
-///     if (present) for (const auto& k : *present) now.poses.push_back({k.frame, k.T_world_camera});
-///     return present.has_value();
-///   };
-///   ...
-///   slam.listen({.keyframe_culled = [&map](const auto& e) { map.remove(e.frame); }});
+///   live map{camera, {.map = {.resolution = 0.05}}, {.poll_poses = orbis::mapping::follow_keyframes(slam)}};
+///   slam.listen({.keyframe_culled = [&map](const auto& e) { map.remove(e.frame); }});  // frees their depth images
 /// @endcode
-///
-/// Without the last line, a culled keyframe would be hidden, and its depth image kept in case that it comes back.
 #pragma once
 
 #include <algorithm>

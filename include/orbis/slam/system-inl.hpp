@@ -192,7 +192,7 @@ orbis::trajectory ORBIS_SLAM_SYSTEM::trajectory(map_id map) const {
 
 ORBIS_SLAM_SYSTEM_TEMPLATE
 std::vector<keyframe_pose> ORBIS_SLAM_SYSTEM::keyframes() const {
-  pose_revision never{.map = no_id};
+  pose_revision never;
   return *keyframes_since(never);
 }
 

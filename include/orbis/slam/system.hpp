@@ -82,6 +82,7 @@ class system {
   using descriptor_type = descriptor_of_t<Extractor>;
   using atlas_type = basic_atlas<descriptor_type>;
   using map_type = basic_map<descriptor_type>;
+  using revision_type = pose_revision;
 
   /// A system with an extractor made from `settings.features` and default places.
   explicit system(Camera camera, const options& settings = {}) requires

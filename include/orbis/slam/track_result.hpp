@@ -90,10 +90,10 @@ struct keyframe_pose {
   std::size_t frame = 0;  ///< index of the frame, from 0
 };
 
-/// Identifies the keyframes of the active map with their poses: it differs after any of them moved, was made or was
-/// culled, and after another map became the active one.
+/// Identifies the keyframes of the active map with their poses: it changes when a keyframe moves, is made or is culled,
+/// and when another map becomes the active one. The default is the revision of no map.
 struct pose_revision {
-  map_id map{};
+  map_id map = no_id;
   std::uint64_t changes = 0;
   friend bool operator==(const pose_revision&, const pose_revision&) = default;
 };
