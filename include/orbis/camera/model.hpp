@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// What a camera model is to our algorithms.
+/// The concept of a camera model.
 #pragma once
 
 #include <concepts>
@@ -24,6 +24,33 @@ concept camera_model = requires(const C& camera, const vec3& point, const vec2& 
   { camera.project(point) } -> std::same_as<std::optional<vec2>>;
   { camera.project(point, jacobian) } -> std::same_as<std::optional<vec2>>;
   { camera.unproject(pixel) } -> std::same_as<std::optional<vec3>>;
+};
+
+/// Names `C` as `type`. If `C` lacks a member of `camera_model`, the first error of the compiler names that member.
+template <class C>
+struct checked_camera {
+  static_assert(
+      requires(const C& c) {
+        { c.width() } -> std::convertible_to<int>;
+        { c.height() } -> std::convertible_to<int>;
+      },
+      "a camera model needs width() and height(), pixels");
+  static_assert(
+      requires(const C& c, const vec3& p) {
+        { c.project(p) } -> std::same_as<std::optional<vec2>>;
+      },
+      "a camera model needs project(vec3), which returns std::optional<vec2>");
+  static_assert(
+      requires(const C& c, const vec3& p, matrix<2, 3>& j) {
+        { c.project(p, j) } -> std::same_as<std::optional<vec2>>;
+      },
+      "a camera model needs project(vec3, matrix<2, 3>& jacobian), which returns std::optional<vec2>");
+  static_assert(
+      requires(const C& c, const vec2& pixel) {
+        { c.unproject(pixel) } -> std::same_as<std::optional<vec3>>;
+      },
+      "a camera model needs unproject(vec2), which returns std::optional<vec3>");
+  using type = C;
 };
 
 }  // namespace orbis::camera

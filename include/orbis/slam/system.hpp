@@ -223,11 +223,11 @@ class system {
 };
 
 template <class Camera>
-system(Camera, options) -> system<Camera>;
+system(Camera, options) -> system<typename camera::checked_camera<Camera>::type>;
 template <class Camera>
-system(Camera) -> system<Camera>;
+system(Camera) -> system<typename camera::checked_camera<Camera>::type>;
 template <class Camera, class Extractor>
-system(Camera, options, Extractor) -> system<Camera, Extractor>;
+system(Camera, options, Extractor) -> system<typename camera::checked_camera<Camera>::type, Extractor>;
 
 /// A system for colour images with registered depth. The first frame with enough depth begins a map.
 template <camera::camera_model Camera, feature_extractor Extractor = features::orb_extractor,
@@ -238,11 +238,11 @@ class rgbd_system : public system<Camera, Extractor, Matchers, Places> {
   using system<Camera, Extractor, Matchers, Places>::system;
 };
 template <class Camera>
-rgbd_system(Camera, options) -> rgbd_system<Camera>;
+rgbd_system(Camera, options) -> rgbd_system<typename camera::checked_camera<Camera>::type>;
 template <class Camera>
-rgbd_system(Camera) -> rgbd_system<Camera>;
+rgbd_system(Camera) -> rgbd_system<typename camera::checked_camera<Camera>::type>;
 template <class Camera, class Extractor>
-rgbd_system(Camera, options, Extractor) -> rgbd_system<Camera, Extractor>;
+rgbd_system(Camera, options, Extractor) -> rgbd_system<typename camera::checked_camera<Camera>::type, Extractor>;
 
 /// A system for rectified stereo pairs, with `stereo_options`.
 using stereo_system = system<camera::any_camera>;
