@@ -403,3 +403,21 @@ TEST_CASE("a cloud that is read for the last time frees its sums, and masks imag
     CHECK(std::ranges::equal(after.pixels(), before[i].pixels()));
   }
 }
+
+TEST_CASE("a stray pixel between the strides does not follow the point of its block") {
+  for (const double voxel : {0.0, 0.03}) {
+    auto scene = orbis::test::wall_scene(1, 20);
+    auto& stored = scene.depth[0];
+    const int x = stored.width() / 2 / 2 * 2 + 1, y = stored.height() / 2 / 2 * 2 + 1;
+    REQUIRE(stored(x, y) != 0);
+    stored(x, y) = static_cast<std::uint16_t>(stored(x, y) / 3);
+    orbis::mapping::dense_cloud dense{orbis::camera::ray_table{scene.camera}, {.stride = 2, .voxel_size = voxel}};
+    dense.add_keyframe(orbis::seq, scene.keyframe(0));
+    std::vector<char> kept(dense.size(), 1);
+    kept[0] = 0;  // so that the selection is not everything
+    const auto masked = dense.masked_depth(orbis::seq, scene.keyframe(0), 0, dense.select(kept));
+    CHECK(masked(x, y) == 0);
+    CHECK(masked(x - 1, y) != 0);
+    CHECK(masked(x - 1, y - 1) != 0);
+  }
+}

@@ -208,8 +208,8 @@ class dense_cloud {
   /// The whole depth image of keyframe `number` (every pixel, whatever the stride; the stored values, see `view_like`)
   /// without what the cloud leaves out: 0 where the depth is out of range, where flying pixels were looked for and
   /// found, and where the point of the cloud that the pixel belongs to is not in `kept`. A pixel between the strides
-  /// belongs to the point in its voxel, or else to the point of its block of stride x stride pixels; where there is
-  /// neither, nothing speaks for it and it is left out. O(pixels). @pre as for `measurements`
+  /// belongs to the point in its voxel, or else to the point of its block of stride x stride pixels if their depths
+  /// agree within 3 cm + 2 %; a pixel that belongs to no point is left out. O(pixels). @pre as for `measurements`
   template <execution_policy Policy, keyframe_like Keyframe>
   [[nodiscard]] auto masked_depth(const Policy& policy, const Keyframe& k, std::size_t number,
                                   const selection& kept = {}) const {
@@ -245,7 +245,8 @@ class dense_cloud {
       });
       for (int y = 0; y != rays_.height(); ++y)
         for (int x = 0; x != rays_.width(); ++x)
-          if (block_kept(x / options_.stride, y / options_.stride) == 0) out(x, y) = 0;
+          if (block_kept(x / options_.stride, y / options_.stride) == 0 || !is_like_its_block(depth, x, y))
+            out(x, y) = 0;
       return;
     }
     points.stride = 1;
@@ -255,6 +256,7 @@ class dense_cloud {
     reader.read(
         policy, depth, rays_, points, T_world_camera, [&](std::size_t part, int x, int y, const vec3f& point, float) {
           std::optional<bool> is_kept = readers[part].find(point.cast<double>());
+          if (!is_kept && !is_like_its_block(depth, x, y)) is_kept = false;
           if (!is_kept) {  // by its block's point
             const auto block =
                 keyframe_points::point_at(depth, x - x % options_.stride, y - y % options_.stride, rays_, points, pose);
@@ -295,6 +297,13 @@ class dense_cloud {
   }
 
  private:
+  /// Returns true if the depth of a pixel agrees with that of the pixel of its block that is in the cloud.
+  template <class Depth>
+  [[nodiscard]] bool is_like_its_block(const Depth& depth, int x, int y) const {
+    const float z = depth(x, y), of_block = depth(x - x % options_.stride, y - y % options_.stride);
+    return std::abs(z - of_block) <= 0.03F + 0.02F * std::min(z, of_block);
+  }
+
   struct frame {
     se3 T_world_camera{};
     bool present = false;
