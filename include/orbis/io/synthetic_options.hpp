@@ -25,13 +25,15 @@ struct synthetic_scene_options {
 
 /// How the camera moves. The path starts at rest, goes once round (360 degrees of yaw) on an ellipse
 /// about the room's middle while looking outward, and rests at its first view again for the last
-/// `overlap` of the time, so that a loop can close.
+/// `overlap` of the time, so that a loop can close. With `sees_floor` it goes round a second time on a larger ellipse,
+/// and looks inward and down.
 struct synthetic_path_options {
   double semi_axis_x = 0.80;  ///< of the ellipse, metres
   double semi_axis_y = 0.60;  ///< metres
   double height = 1.35;       ///< of the camera above the floor, metres
   double pitch = -0.20;       ///< mean pitch, radians; negative looks down
   double overlap = 0.05;      ///< share of the time spent at the first view again
+  bool sees_floor = false;    ///< adds a round that looks inward and down at the floor
   double wobble = 1.0;        ///< scales the slow swaying in height, distance, yaw, pitch and roll
   double jitter = 1.0;        ///< scales the trembling of the hand (millimetres, tenths of degrees)
 };
@@ -56,6 +58,7 @@ struct synthetic_sensor_options {
                                   ///< begins 0.15 radians before
   bool shadow = true;             ///< no depth where the projector (on the right) does not reach
   double dropouts = 0.002;        ///< share of pixels lost anywhere
+  double stray_depths = 0.0;      ///< share of pixels with a random depth in front of the surface: dust, rain, spray
 
   double stereo_baseline = 0.12;  ///< from the camera to the second one of a stereo pair, metres
 
@@ -91,7 +94,7 @@ struct synthetic_options {
   int width = 640;            ///< pixels
   int height = 480;           ///< pixels
   double depth_scale = 5000;  ///< stored depth / depth_scale = metres; 5000 reaches 13 m
-  int frames_around = 0;      ///< in how many frames the path goes once round; 0: in all
+  int frames_around = 0;      ///< number of frames of a round of the path; 0: all frames are the path
   synthetic_scene_options scene{};
   synthetic_path_options path{};
   synthetic_sensor_options sensor{};

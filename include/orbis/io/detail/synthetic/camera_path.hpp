@@ -66,7 +66,8 @@ class camera_path {
 
   /// The pose `time` seconds after the beginning. World: z up, the floor at z = 0.
   [[nodiscard]] camera_pose at(double time) const noexcept {
-    const double turn = start_ + progress(time / duration_);
+    const double trip = (options_.sees_floor ? 2.0 : 1.0) * progress(time / duration_), turn = start_ + trip;
+    const double inward = options_.sees_floor ? inwardness(trip - 1.0) : 0.0;
     const auto sway = [&](double amplitude, int harmonic, double phase) {
       return options_.wobble * amplitude * sin_turns(static_cast<double>(harmonic) * turn + phase);
     };
@@ -74,21 +75,28 @@ class camera_path {
       return options_.jitter * amplitude *
              (smooth_noise(seed_, stream, 3.0 * time) + 0.4 * smooth_noise(seed_, stream + 50, 9.0 * time));
     };
-    const double reach = 1.0 + sway(0.08, 3, 0.1) + sway(0.015, 7, 0.6);
+    const double reach = 1.0 + sway(0.08, 3, 0.1) + sway(0.015, 7, 0.6) + 0.6 * inward;
     camera_pose pose;
     pose.position = {reach * options_.semi_axis_x * cos_turns(turn) + tremble(0.004, 0),
                      reach * options_.semi_axis_y * sin_turns(turn) + tremble(0.004, 1),
                      options_.height + sway(0.10, 2, 0.3) + sway(0.02, 11, 0.8) + tremble(0.004, 2)};
     constexpr double turns_per_radian = 0.15915494309189535;
-    const double yaw = turn + sway(0.035, 2, 0.7) + sway(0.008, 5, 0.2) + turns_per_radian * tremble(0.006, 3);
-    const double pitch =
-        turns_per_radian * (options_.pitch + sway(0.09, 3, 0.45) + sway(0.02, 8, 0.15) + tremble(0.006, 4));
+    const double yaw =
+        turn - 0.5 * inward + sway(0.035, 2, 0.7) + sway(0.008, 5, 0.2) + turns_per_radian * tremble(0.006, 3);
+    const double pitch = turns_per_radian * (options_.pitch - 0.35 * inward + sway(0.09, 3, 0.45) +
+                                             sway(0.02, 8, 0.15) + tremble(0.006, 4));
     const double roll = turns_per_radian * (sway(0.05, 2, 0.55) + sway(0.02, 6, 0.35) + tremble(0.006, 5));
     orient(pose, yaw, pitch, roll);
     return pose;
   }
 
  private:
+  /// 0 looking outward, 1 looking inward, at the share `s` of the second round: changes smoothly in its first and last
+  /// quarter.
+  [[nodiscard]] static double inwardness(double s) noexcept {
+    const double t = std::clamp(4.0 * std::min(s, 1.0 - s), 0.0, 1.0);
+    return t * t * (3.0 - 2.0 * t);
+  }
   /// The share of the round trip done at the share `s` of the time: speeds up, goes evenly, slows
   /// down, rests.
   [[nodiscard]] double progress(double s) const noexcept {

@@ -57,7 +57,12 @@ class sensor {
       if (lower_fraction(chance) < options_.dropouts) continue;
       if (is_grazed(exact.cosine(x, y), upper_fraction(chance))) continue;
       const std::uint64_t word = mix64(chance);
-      const double z = perturbed(beside_edge(exact, x, y, word), word);
+      double z = perturbed(beside_edge(exact, x, y, word), word);
+      if (options_.stray_depths > 0.0) {
+        const std::uint64_t stray = mix64(word ^ 0x7374726179ULL);
+        if (lower_fraction(stray) < options_.stray_depths)
+          z = options_.min_depth + upper_fraction(stray) * std::max(0.0, z - options_.min_depth);
+      }
       if (z < options_.min_depth || (options_.max_depth > 0.0 && z > options_.max_depth)) continue;
       const double stored = z * depth_scale_ + 0.5;
       if (stored < 65535.0) out[i] = static_cast<std::uint16_t>(stored);
