@@ -398,7 +398,8 @@ std::variant<settings, exit_code> read_command_line(int argc, char** argv) {
   demo->add_option("--seed", s.seed, "of the room, the camera's path and the sensor's noise")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
-  demo->add_flag("--person", s.person, "somebody walks round the room");
+  demo->add_flag("--plain", s.plain, "one round only, without the person and the stray depths");
+  demo->add_flag("--person", s.person, "with --plain: a person walks through the room");
   add_map_options(*demo, s);
   add_slam_options(*demo, s);
   add_viewer_options(*demo, s);

@@ -12,6 +12,7 @@
 #include <orbis/nav/distance_field.hpp>
 #include <orbis/nav/floor_file.hpp>
 #include <orbis/nav/floor_map.hpp>
+#include <orbis/nav/floor_view.hpp>
 #include <orbis/nav/path_search.hpp>
 #include <orbis/nav/planning_view.hpp>
 
@@ -23,41 +24,44 @@ namespace {
 namespace nav = orbis::nav;
 using orbis::vec3;
 using octree = orbis::octree::occupancy_octree<>;
-using view = nav::planning_view<octree>;
 
 struct way {
   vec3 from = vec3::Zero(), to = vec3::Zero();
   nav::found_path path;
 };
 
-/// Of the places where the camera was or looked along its axis, those where the robot fits.
-std::vector<vec3> free_places(const view& robot, const orbis::trajectory& cameras) {
+/// Of the places where the camera was or looked along its axis, those where the robot fits. For a robot that drives,
+/// `view` drops them onto the floor.
+template <nav::planning_space View>
+std::vector<vec3> free_places(const View& view, const orbis::trajectory& cameras) {
   std::vector<vec3> places;
   for (const auto& pose : cameras)
-    for (const double ahead : {0.0, 0.5, 1.0, 1.5, 2.0, 2.5})
-      if (const vec3 p = pose.T_world_camera * vec3(0, 0, ahead); robot.is_free(p)) places.push_back(p);
+    for (const double ahead : {0.0, 0.5, 1.0, 1.5, 2.0, 2.5}) {
+      const vec3 p = view.placed(pose.T_world_camera * vec3(0, 0, ahead));
+      if (view.key(p) && view.is_free(p)) places.push_back(p);
+    }
   return places;
 }
 
-/// A way from the first of these places to the one farthest from it, or to the farthest that can be reached of a few;
-/// if possible one to which the straight way is not free.
-std::optional<way> plan_through(const view& robot, const std::vector<vec3>& places) {
+/// A path from the first of these places to the farthest reachable of a few; preferably one that is not straight.
+template <nav::planning_space View>
+std::optional<way> plan_through(const View& view, const std::vector<vec3>& places) {
   if (places.size() < 2) return std::nullopt;
   const vec3 from = places.front();
   std::vector<vec3> goals{places.begin() + 1, places.end()};
   const auto distance = [&](const vec3& p) { return (p - from).norm(); };
   std::ranges::sort(goals, std::greater{}, distance);
-  const auto straight = std::ranges::stable_partition(goals, [&](const vec3& p) { return !robot.is_free(from, p); });
+  const auto straight = std::ranges::stable_partition(goals, [&](const vec3& p) { return !view.is_free(from, p); });
   const auto attempts = std::min<std::ptrdiff_t>(8, std::ranges::distance(goals.begin(), straight.begin()));
   way found{.from = from, .path = {}};
   for (std::ptrdiff_t i = 0; i != attempts; ++i) {
     found.to = goals[static_cast<std::size_t>(i)];
-    found.path = nav::find_path(robot, from, found.to);
+    found.path = nav::find_path(view, from, found.to);
     if (found.path.status == nav::path_status::found) return found;
   }
   if (!straight.empty()) {
     found.to = straight.front();
-    found.path = nav::find_path(robot, from, found.to);
+    found.path = nav::find_path(view, from, found.to);
   }
   return found;
 }
@@ -89,29 +93,39 @@ orbis::result<navigation_results> navigate(const octree& map, const orbis::traje
   }
 
   const nav::distance_field field{map, {.reach = field_reach(s.robot_radius, s.resolution)}};
-  const view ball{map, field, s.robot_radius};
-  const std::vector<vec3> places = free_places(ball, cameras);
   const auto start = console::clock::now();
-  if (const auto found = plan_through(ball, places)) {
-    r.planning_ms = std::chrono::duration<double, std::milli>(console::clock::now() - start).count();
-    r.path_status = to_string(found->path.status);
-    if (found->path.status == nav::path_status::found) {
-      r.path = found->path.points;
-      r.path_m = found->path.length;
-      r.straight_m = (found->to - found->from).norm();
+  const auto note = [&](const std::optional<way>& found, bool drives) {
+    if (!found) {
+      r.path_status = "no two places that the camera saw are known to be free";
+      return;
     }
-  } else {
-    r.path_status = "no two places that the camera saw are known to be free";
+    r.path_status = to_string(found->path.status);
+    if (found->path.status != nav::path_status::found) return;
+    r.drives = drives;
+    r.path = found->path.points;
+    r.path_m = found->path.length;
+    r.straight_m = (found->to - found->from).norm();
+  };
+  if (floor && r.free_m2 > 0.0) {  // drive if there is a way on the floor, otherwise fly
+    const nav::floor_view on_floor{*floor, s.robot_radius};
+    note(plan_through(on_floor, free_places(on_floor, cameras)), true);
   }
+  if (r.path.empty()) {
+    const nav::planning_view<octree> ball{map, field, s.robot_radius};
+    note(plan_through(ball, free_places(ball, cameras)), false);
+  }
+  r.planning_ms = std::chrono::duration<double, std::milli>(console::clock::now() - start).count();
 
   char text[160];
   if (r.path.empty())
-    std::snprintf(text, sizeof text, "no way: %s", r.path_status.c_str());
+    std::snprintf(text, sizeof text, "no path: %s", r.path_status.c_str());
   else
-    std::snprintf(text, sizeof text, "way of a ball of %g m: %.2f m, straight %.2f m", s.robot_radius, r.path_m,
-                  r.straight_m);
+    std::snprintf(text, sizeof text, "path of a %s of %g m: %.2f m, straight %.2f m",
+                  r.drives ? "driving robot with a radius" : "ball", s.robot_radius, r.path_m, r.straight_m);
   if (floor || !cameras.empty()) {
-    const double height = !r.path.empty() ? r.path.front().z() : floor ? floor->floor + 0.5 * s.robot_height : 0.0;
+    const double height = !r.path.empty() && !r.drives ? r.path.front().z()
+                          : floor                      ? floor->floor + 0.5 * s.robot_height
+                                                       : 0.0;
     const auto drawn = write_navigation_picture({.title = "Floor and distances",
                                                  .subtitle = text,
                                                  .map = map,
@@ -119,7 +133,8 @@ orbis::result<navigation_results> navigate(const octree& map, const orbis::traje
                                                  .height = height,
                                                  .floor = floor ? &*floor : nullptr,
                                                  .radius = s.robot_radius,
-                                                 .path = r.path},
+                                                 .path = r.path,
+                                                 .drives = r.drives},
                                                 folder / "navigation.png");
     if (!drawn) return orbis::fail(drawn.error());
   }

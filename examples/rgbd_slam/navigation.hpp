@@ -22,9 +22,9 @@ namespace app {
 }
 
 /// Makes the floor map, writes it to `floor_file` if `s.floor_map` is given (where it will be, which messages name),
-/// plans a way of a ball between two places that the camera saw, and draws navigation.png into `folder`. No picture
-/// where there is neither a floor nor a camera. Errors: write_failed, of the picture; for the floor map see
-/// `navigation_results::unsaved`.
+/// plans a path between two places that the camera saw, on the floor or else of a ball through the air, and draws
+/// navigation.png into `folder`. No picture where there is neither a floor nor a camera. Errors: write_failed, of the
+/// picture; for the floor map see `navigation_results::unsaved`.
 [[nodiscard]] orbis::result<navigation_results> navigate(const orbis::octree::occupancy_octree<>& map,
                                                          const orbis::trajectory& cameras, const settings& s,
                                                          const std::filesystem::path& folder,

@@ -140,14 +140,14 @@ orbis::result<void> write_navigation_picture(const navigation_picture& what, con
   double x = panels == 1 ? 0.5 * (1500 - width) : left;
   if (what.floor != nullptr) {
     std::snprintf(text, sizeof text, "floor at %.2f m", what.floor->floor);
-    panel(x, text, draw_floor(what, w, width, height), what.field == nullptr,
+    panel(x, text, draw_floor(what, w, width, height), what.field == nullptr || what.drives,
           {{white, "free"}, {costly, "near an obstacle"}, {too_near, "too near for the robot"}});
     x += most_across + gap;
   }
   if (what.field != nullptr) {
     std::snprintf(text, sizeof text, "distance to obstacles at a height of %.2f m, 0 to %.1f m", what.height,
                   what.field->reach());
-    panel(x, text, draw_slice(what, w, width, height), true,
+    panel(x, text, draw_slice(what, w, width, height), what.floor == nullptr || !what.drives,
           {{at_obstacle, "at an obstacle"}, {far_off, "far from any"}});
   }
   return s.write(path);

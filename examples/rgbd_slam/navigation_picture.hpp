@@ -23,6 +23,7 @@ struct navigation_picture {
   const orbis::nav::floor_map* floor = nullptr;       ///< null: no floor is drawn
   double radius = 0.2;                                ///< of the robot, metres
   std::vector<orbis::vec3> path{};  ///< world, metres; drawn over the slice, or over the floor if that is all
+  bool drives = false;              ///< the path is drawn over the floor
 };
 
 /// As PNG. Coordinates are those of the world. Errors: write_failed.

@@ -130,7 +130,8 @@ struct navigation_results {
   std::optional<double> floor_m;    ///< its height; empty: no floor was found
   double free_m2 = 0.0;             ///< where the robot can drive
   std::string path_status;          ///< "found", or why there is no path
-  std::vector<orbis::vec3> path{};  ///< of a ball through the air, metres
+  bool drives = false;              ///< the path is on the floor, otherwise that of a ball through the air
+  std::vector<orbis::vec3> path{};  ///< metres
   double path_m = 0.0, straight_m = 0.0, planning_ms = 0.0;
   std::optional<orbis::error> unsaved;  ///< why the floor map that was asked for could not be written
 };

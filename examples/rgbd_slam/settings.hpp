@@ -47,7 +47,8 @@ struct settings {
   std::size_t stride = 1;              ///< every so many frames
   std::size_t width = 640;             ///< of the synthetic camera, pixels
   std::uint64_t seed = 1;              ///< of the synthetic recording
-  bool person = false;                 ///< somebody walks through the synthetic room
+  bool plain = false;                  ///< of the synthetic recording: one round, no person, no stray depths
+  bool person = false;                 ///< a person walks through the plain room, too
   std::optional<orbis::vec3> origin;   ///< of the rays to a cloud's points (map)
   std::optional<orbis::vec3> gravity;  ///< where it pulls, in the frame of the first camera
 

@@ -306,20 +306,24 @@ class renderer {
 };
 
 frame_source make_synthetic(const settings& s) {
-  constexpr std::size_t once_round = 360;  // at an unhurried pace: a degree a frame
-  const std::size_t frames = s.frames == 0 ? once_round : std::min<std::size_t>(s.frames * s.stride, 1'000'000);
+  constexpr std::size_t round = 360;  // one degree per frame
+  const std::size_t rounds = s.plain ? 1 : 2;
+  const std::size_t frames = s.frames == 0 ? rounds * round : std::min<std::size_t>(s.frames * s.stride, 1'000'000);
+  const bool person = s.person || !s.plain;
   const auto width = static_cast<int>(s.width / 4 * 4);
   const orbis::io::synthetic_options options{.frames = static_cast<int>(frames),
                                              .seed = s.seed,
                                              .width = width,
                                              .height = width / 4 * 3,
-                                             .frames_around = static_cast<int>(std::max(frames, once_round)),
-                                             .scene = {.person = s.person}};
+                                             .frames_around = static_cast<int>(std::max(frames / rounds, round)),
+                                             .scene = {.person = person},
+                                             .path = {.sees_floor = !s.plain},
+                                             .sensor = {.stray_depths = s.plain ? 0.0 : 0.001}};
   const auto recording = std::make_shared<const orbis::io::synthetic_recording>(options);  // of no frame: small
   const auto frames_of = std::make_shared<renderer>(options);
   frame_source source;
   source.title = "synthetic room";
-  source.kind = "rendered on the fly, seed " + std::to_string(s.seed) + (s.person ? ", with a person" : "") +
+  source.kind = "rendered on the fly, seed " + std::to_string(s.seed) + (person ? ", with a person" : "") +
                 (s.sensor == "stereo" ? ", stereo"
                  : s.sensor == "mono" ? ", one camera"
                                       : "");
