@@ -13,7 +13,6 @@
 /// | pose_graph_problem.hpp | edges, residuals, options and summary of pose graphs |
 /// | pose_refinement.hpp | camera pose from known points, refined from a start, with outlier rejection |
 /// | ransac.hpp | RANSAC for any model |
-/// | ransac_policies.hpp | scoring, sampling, preemption and local optimisation for RANSAC |
 /// | reprojection.hpp | reprojection error for any camera model |
 /// | reprojection_with_intrinsics.hpp | the same with intrinsics among the unknowns; the camera of BAL files |
 /// | robust_loss.hpp | robust losses (Huber, Cauchy, Tukey), chi-squared gates |
@@ -32,7 +31,6 @@
 #include <orbis/optimize/pose_graph_problem.hpp>
 #include <orbis/optimize/pose_refinement.hpp>
 #include <orbis/optimize/ransac.hpp>
-#include <orbis/optimize/ransac_policies.hpp>
 #include <orbis/optimize/reprojection.hpp>
 #include <orbis/optimize/reprojection_with_intrinsics.hpp>
 #include <orbis/optimize/robust_loss.hpp>

@@ -185,7 +185,7 @@ result<alignment_estimate<Transform>> alignment_of(std::span<const vec3> from, s
   shuffle(pairs, random);
 
   const estimator_type estimator(std::move(pairs));
-  auto found = ransac(estimator, asked, ransac_policies{msac{}, uniform_sampling{}, sprt{}, iterated_refinement{}});
+  auto found = ransac(estimator, asked);
   if (!found) {
     if (found.error().code == errc::degenerate)
       for (const mat3& s : {spread, spread_to}) {

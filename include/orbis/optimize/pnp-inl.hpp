@@ -46,8 +46,7 @@ result<pose_estimate> estimate_pose(std::span<const vec3> points_world, std::spa
                     " are finite and in the camera's view, three are needed");
   using estimator_type = detail::pnp_estimator<detail::pnp_matches>;
   const estimator_type estimator(matches);
-  const result<ransac_estimate<estimator_type::model>> found = ransac(
-      estimator, asked, ransac_policies{msac{}, uniform_sampling{}, sprt{}, iterated_refinement{}}, workspace.ransac);
+  const result<ransac_estimate<estimator_type::model>> found = ransac(estimator, asked, workspace.ransac);
   if (!found) {
     if (found.error().code != errc::degenerate) return fail(found.error());
     const std::string why = detail::pnp_degeneracy(matches);

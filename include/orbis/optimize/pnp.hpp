@@ -2,7 +2,7 @@
 /// @file
 /// Perspective-n-point: the camera pose from known points and their pixels, many of which may be wrongly matched.
 ///
-/// Sources: M. Fischler, R. Bolles, CACM 24 (1981) for P3P in RANSAC; `ransac_policies.hpp` names those of the parts.
+/// Sources: M. Fischler, R. Bolles, CACM 24 (1981) for P3P in RANSAC; `ransac.hpp` names those of its parts.
 #pragma once
 
 #include <array>
