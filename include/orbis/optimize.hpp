@@ -17,7 +17,7 @@
 /// | reprojection_with_intrinsics.hpp | the same with intrinsics among the unknowns; the camera of BAL files |
 /// | robust_loss.hpp | robust losses (Huber, Cauchy, Tukey), chi-squared gates |
 /// | self_calibration.hpp | bundle adjustment of images of one camera whose intrinsics are among the unknowns |
-/// | solver_policies.hpp | damping (Gauss-Newton, Levenberg-Marquardt, dogleg), solvers of the reduced system |
+/// | solver_policies.hpp | damping (Gauss-Newton, Levenberg-Marquardt, dogleg), how the reduced system is solved |
 /// | triangulation.hpp | points from two or more rays |
 /// | two_view.hpp | essential matrix, homography and relative pose of two images; scene and motion that they show |
 #pragma once

@@ -43,7 +43,7 @@ class pose_graph_descent;
 ///
 /// The library orbis::compiled holds it for graphs of `se3` with the default policies and `pose_graph_edge`, without a
 /// report; for anything else, its users include pose_graph-inl.hpp.
-template <class T, robust_loss Loss = trivial, general_damping_policy Damping = dogleg,
+template <class T, robust_loss Loss = trivial, damping_policy Damping = dogleg,
           between_factor<T> Between = default_between_t<T>>
 class pose_graph_solver {
  public:
@@ -75,7 +75,7 @@ class pose_graph_solver {
 
 /// Solves a pose graph once, with a solver that is made for it; see `pose_graph_solver::solve`.
 template <execution_policy Policy, std::ranges::contiguous_range Vertices, std::ranges::contiguous_range Edges,
-          robust_loss Loss = trivial, general_damping_policy Damping = dogleg>
+          robust_loss Loss = trivial, damping_policy Damping = dogleg>
 pose_graph_summary solve_pose_graph(const Policy& policy, Vertices&& vertices, const Edges& edges,
                                     const pose_graph_options& options = {}, progress callback = {},
                                     const Loss& loss = {}, const Damping& damping = {}) {

@@ -25,6 +25,7 @@
 #include <orbis/optimize/detail/bundle/bundle_kernels.hpp>
 #include <orbis/optimize/detail/bundle/bundle_structure.hpp>
 #include <orbis/optimize/detail/bundle/schur_kernels.hpp>
+#include <orbis/optimize/detail/sparse/reduced_solver.hpp>
 #include <orbis/optimize/robust_loss.hpp>
 #include <orbis/optimize/solver_policies.hpp>
 
@@ -32,16 +33,16 @@ namespace orbis::optimize::detail {
 
 /// The unknowns are the steps of the cameras that may move, C numbers each, then those of the points in the order of
 /// `structure()`, three each. Keeps its memory.
-template <bundle_residual R, robust_loss Loss, reduced_solver Reduced>
+template <bundle_residual R, robust_loss Loss>
 class bundle_equations {
  public:
   static constexpr int camera_size = R::camera_manifold::dimension;
   using camera_state = typename R::camera_state;
   using observation = typename R::observation;
   using camera_block = matrix<camera_size, camera_size>;
-  using reduced_type = typename Reduced::template solver<camera_size>;
+  using reduced_type = reduced_solver<camera_size>;
 
-  bundle_equations(R residual, Loss loss, const Reduced& reduced)
+  bundle_equations(R residual, Loss loss, const reduced_solver_options& reduced)
       : residual_{std::move(residual)}, loss_{std::move(loss)}, reduced_{reduced} {}
 
   [[nodiscard]] const R& residual() const { return residual_; }

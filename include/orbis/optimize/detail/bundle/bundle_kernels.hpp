@@ -459,9 +459,11 @@ struct bundle_kernels {
   using reduce = double(const camera_work<R>&, const Loss&);
   reduce* linearize;
   reduce* cost;
-  bundle_kernels()
-      : linearize{simd::kernel<linearize_kernel<R, Loss>, reduce>()},
-        cost{simd::kernel<cost_kernel<R, Loss>, reduce>()} {}
+  bundle_kernels();
 };
+template <class R, class Loss>
+bundle_kernels<R, Loss>::bundle_kernels()
+    : linearize{simd::kernel<linearize_kernel<R, Loss>, reduce>()},
+      cost{simd::kernel<cost_kernel<R, Loss>, reduce>()} {}
 
 }  // namespace orbis::optimize::detail

@@ -24,13 +24,13 @@
 
 namespace orbis::optimize::detail {
 
-template <class Residual, class Loss, class Damping, class ReducedSolver>
+template <class Residual, class Loss, class Damping>
 class bundle_solver {
  public:
   using camera_state = typename Residual::camera_state;
   using observation = typename Residual::observation;
 
-  bundle_solver(Residual residual, Loss loss, Damping damping, const ReducedSolver& reduced)
+  bundle_solver(Residual residual, Loss loss, Damping damping, const reduced_solver_options& reduced)
       : equations_{std::move(residual), std::move(loss), reduced}, damping_{std::move(damping)} {}
 
   [[nodiscard]] double chi2(const camera_state& camera, const vec3& point, const observation& o) const {
@@ -72,7 +72,7 @@ class bundle_solver {
   }
 
  private:
-  using equations_type = bundle_equations<Residual, Loss, ReducedSolver>;
+  using equations_type = bundle_equations<Residual, Loss>;
 
   /// The equations as the damping policies see them.
   template <class Policy>

@@ -350,9 +350,11 @@ struct schur_kernels {
   using substituter = void(const substitution&);
   eliminator* eliminate_points;
   substituter* substitute_points;
-  schur_kernels()
-      : eliminate_points{simd::kernel<eliminate_kernel<C, ThroughCamera>, eliminator>()},
-        substitute_points{simd::kernel<substitute_kernel<C, ThroughCamera>, substituter>()} {}
+  schur_kernels();
 };
+template <int C, bool ThroughCamera>
+schur_kernels<C, ThroughCamera>::schur_kernels()
+    : eliminate_points{simd::kernel<eliminate_kernel<C, ThroughCamera>, eliminator>()},
+      substitute_points{simd::kernel<substitute_kernel<C, ThroughCamera>, substituter>()} {}
 
 }  // namespace orbis::optimize::detail

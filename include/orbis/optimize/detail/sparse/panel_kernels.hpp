@@ -79,9 +79,11 @@ template <int N>
 struct panel_kernels {
   panel_product* product;
   panel_solve* solve;
-  panel_kernels()
-      : product{simd::kernel<panel_product_kernel<N>, panel_product>()},
-        solve{simd::kernel<panel_solve_kernel<N>, panel_solve, simd::avx2>()} {}
+  panel_kernels();
 };
+template <int N>
+panel_kernels<N>::panel_kernels()
+    : product{simd::kernel<panel_product_kernel<N>, panel_product>()},
+      solve{simd::kernel<panel_solve_kernel<N>, panel_solve, simd::avx2>()} {}
 
 }  // namespace orbis::optimize::detail
