@@ -7,7 +7,7 @@
 /// | alignment.hpp | rigid or similarity transform between two lists of points, closed form or with outliers |
 /// | bundle_adjustment.hpp | bundle adjustment: cameras and points from observations |
 /// | bundle_problem.hpp | observations, residual concepts, options and summary of bundle adjustment |
-/// | pnp.hpp | camera pose from known points and pixels with outliers (P3P in RANSAC); P3P |
+/// | pnp.hpp | camera pose from known points and pixels with outliers (P3P in RANSAC) |
 /// | point_to_plane.hpp | distance of a measured point from a plane, as a residual |
 /// | pose_graph.hpp | pose graph optimisation |
 /// | pose_graph_problem.hpp | edges, residuals, options and summary of pose graphs |

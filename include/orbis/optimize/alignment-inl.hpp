@@ -70,12 +70,7 @@ class alignment_estimator {
     else
       return made_of(se3(found->rotation(), found->translation()));
   }
-  struct candidates {
-    std::optional<model> found;
-    [[nodiscard]] const model* begin() const noexcept { return found ? &*found : nullptr; }
-    [[nodiscard]] const model* end() const noexcept { return found ? &*found + 1 : nullptr; }
-  };
-  [[nodiscard]] candidates fit(const std::array<std::uint32_t, 3>& sample) const { return {fit_to(sample)}; }
+  [[nodiscard]] one_or_none<model> fit(const std::array<std::uint32_t, 3>& sample) const { return {fit_to(sample)}; }
   [[nodiscard]] std::optional<model> refine(const model&, std::span<const std::uint32_t> inliers) const {
     return fit_to(inliers);
   }

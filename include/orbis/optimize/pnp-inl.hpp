@@ -10,22 +10,10 @@
 #include <utility>
 
 #include <orbis/camera/pinhole.hpp>
-#include <orbis/core/inline.hpp>
-#include <orbis/optimize/detail/minimal/p3p_equations.hpp>
 #include <orbis/optimize/detail/minimal/pnp_estimator.hpp>
 #include <orbis/optimize/pnp.hpp>
 
 namespace orbis::optimize {
-
-ORBIS_INLINE p3p_solutions p3p(const std::array<vec3, 3>& points_world, const std::array<vec3, 3>& rays) {
-  p3p_solutions solutions;
-  detail::for_each_p3p(points_world, {normalized(vec3(rays[0])), normalized(vec3(rays[1])), normalized(vec3(rays[2]))},
-                       [&](const mat3& rotation, const vec3& translation) {
-                         const se3 pose = se3(so3(rotation), translation).inverse();
-                         if (all_finite(pose.translation())) solutions.push_back(pose);
-                       });
-  return solutions;
-}
 
 template <camera::camera_model Camera>
 result<pose_estimate> estimate_pose(std::span<const vec3> points_world, std::span<const vec2> pixels,

@@ -46,6 +46,14 @@ concept model_estimator = requires(const E& estimator, const typename E::model& 
   { estimator.refine(model, indices) } -> std::same_as<std::optional<typename E::model>>;
 };
 
+/// What `fit` may return where a sample determines one model at most.
+template <class Model>
+struct one_or_none {
+  std::optional<Model> found;
+  [[nodiscard]] const Model* begin() const noexcept { return found ? &*found : nullptr; }
+  [[nodiscard]] const Model* end() const noexcept { return found ? &*found + 1 : nullptr; }
+};
+
 /// The number of data that are scored at a time.
 inline constexpr std::size_t consensus_block = 32;
 

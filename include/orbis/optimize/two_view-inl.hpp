@@ -17,10 +17,6 @@
 
 namespace orbis::optimize {
 
-ORBIS_INLINE std::array<se3, 4> decompose_essential(const mat3& essential) {
-  return detail::decompose_essential(essential);
-}
-
 namespace detail {
 
 template <class Match>
@@ -79,14 +75,6 @@ result<relative_pose_estimate> essential_of_matches(const std::vector<Match>& ma
 }
 
 }  // namespace detail
-
-ORBIS_INLINE std::optional<mat3> homography_of_four(const std::array<vec2, 4>& first,
-                                                    const std::array<vec2, 4>& second) {
-  mat3 h;
-  if (!detail::homography_of_four(first, second, h)) return std::nullopt;
-  if (h(2, 2) != 0.0) h /= double{h(2, 2)};
-  return h;
-}
 
 template <std::same_as<homography_options> Options>
 result<homography_estimate> estimate_homography(std::span<const vec2> first, std::span<const vec2> second,
