@@ -121,8 +121,6 @@ class system {
 
   /// The state after the last frame.
   [[nodiscard]] track_state state() const;
-  /// Whether the map is kept unchanged.
-  [[nodiscard]] bool localizes_only() const noexcept { return localization_only_; }
   /// Sets whether the map is kept unchanged, from the next frame on.
   void set_localization_only(bool on) noexcept { localization_only_ = on; }
 
