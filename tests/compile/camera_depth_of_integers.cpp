@@ -9,5 +9,5 @@ struct raw_values {  // stored integers are not metres
 };
 
 void f(const orbis::camera::ray_table& rays) {
-  orbis::camera::for_each_depth_point(raw_values{}, rays, [](int, int, const orbis::vec3f&) {});
+  (void)orbis::camera::unproject_depth(orbis::seq, raw_values{}, rays);
 }
