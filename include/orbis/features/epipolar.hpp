@@ -37,8 +37,7 @@ struct epipolar_rule {
 ///
 /// @code
 ///   constexpr auto matcher = epipolar(hamming{}, {.epipole_radius = 10.0F}) | ratio_test{0.8f} | cross_check{};
-///   std::vector<match> a = matcher(f1, f2, fundamental_geometry{F});                         // pinhole images
-///   std::vector<match> b = matcher(f1, f2, ray_geometry{rays1, rays2, T_camera2_camera1, focal});  // any camera
+///   std::vector<match> found = matcher(f1, f2, ray_geometry{rays1, rays2, T_camera2_camera1, focal});
 /// @endcode
 ///
 /// The reverse neighbour of a train is the nearest of the queries whose line it lies close to.
@@ -60,8 +59,7 @@ struct epipolar_source {
                                              const feature_view<Descriptor>& /*queries*/,
                                              const feature_view<Descriptor>& /*trains*/, search_needs /*needs*/,
                                              const Other& /*geometry*/) const {
-    static_assert(epipolar_geometry<Other>,
-                  "orbis: epipolar(...) wants an epipolar_geometry, such as fundamental_geometry or ray_geometry");
+    static_assert(epipolar_geometry<Other>, "orbis: epipolar(...) wants an epipolar_geometry, such as ray_geometry");
   }
 
   /// One candidate for each query that has a train close to its line. O(queries x trains) distances to lines.

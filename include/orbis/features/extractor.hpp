@@ -77,9 +77,6 @@ struct corner {
 struct region {
   int x = 0, y = 0, width = 0, height = 0;
   [[nodiscard]] constexpr bool empty() const noexcept { return width <= 0 || height <= 0; }
-  [[nodiscard]] constexpr bool contains(int px, int py) const noexcept {
-    return px >= x && py >= y && std::int64_t{px} - x < width && std::int64_t{py} - y < height;
-  }
   friend constexpr bool operator==(const region&, const region&) = default;
 };
 
