@@ -29,6 +29,12 @@ namespace {
 
 constexpr auto matcher = brute_force(hamming{}) | ratio_test{0.8f} | cross_check{} | max_distance{64};
 
+/// No direction, for cameras that do not roll.
+struct upright {
+  static constexpr int radius = 0;
+  orientation operator()(image_view<const std::uint8_t>, int, int) const { return {}; }
+};
+
 }  // namespace
 
 TEST_CASE("ORB features are well-formed and the same on every run") {
@@ -250,8 +256,8 @@ TEST_CASE("16-bit images must be narrowed first") {
 
 TEST_CASE("an extractor is assembled from parts") {
   const auto im = moved(blocks(320, 240, 10), 0.3, 0, 0);
-  const basic_orb_extractor<fast9, strongest> clustered{{.max_features = 200}};
-  const basic_orb_extractor<fast9, cover_first> covering{{.max_features = 200}, {}, {.share = 1.0}};
+  const orb_extractor clustered{{.max_features = 200}, {}, {.share = 0.0}};
+  const orb_extractor covering{{.max_features = 200}, {}, {.share = 1.0}};
   CHECK(test::coverage(covering(im), 320, 240) > test::coverage(clustered(im), 320, 240));
   const basic_orb_extractor<fast9, cover_first, upright> level_camera{{.max_features = 200}};
   for (const keypoint& k : level_camera(im).keypoints) CHECK(k.angle == 0.0F);

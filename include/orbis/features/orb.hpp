@@ -23,13 +23,12 @@
 
 namespace orbis::features {
 
-/// The parts of `orb_extractor` and those that can stand in for them; see `extractor.hpp` for the concepts.
+/// The parts of `orb_extractor`; see `extractor.hpp` for the concepts of others that can stand in for them.
 /// - `fast9` finds FAST-9/16 corners;
-/// - `cover_first` chooses corners that cover the image, then the strongest; `strongest` the strongest of each level;
-/// - `intensity_centroid` turns keypoints towards the centre of brightness; `upright` does not turn them;
+/// - `cover_first` chooses corners that cover the image, then the strongest;
+/// - `intensity_centroid` turns keypoints towards the centre of brightness;
 /// - `steered_brief` describes keypoints by ORB's pattern, turned to their direction.
-using detail::fast9, detail::cover_first, detail::strongest, detail::intensity_centroid, detail::upright,
-    detail::steered_brief;
+using detail::fast9, detail::cover_first, detail::intensity_centroid, detail::steered_brief;
 
 /// Options of an ORB extractor.
 struct orb_options {
