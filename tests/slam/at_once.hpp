@@ -35,7 +35,7 @@ correction_report apply_correction(slam::basic_map<D>& m, const loop_correction:
   correction_report done{loop_correction::apply_poses(m, s, solved), {}};
   if (!done.corrected) return done;
   done.fusion = loop_fusion::fuse<D>(m, solved.pairs);
-  update_landmarks(m);
+  update_landmarks(m, 0, m.landmark_count());
   return done;
 }
 /// Nothing is changed unless the report says so.
@@ -73,7 +73,7 @@ global_adjustment::report apply_adjustment(slam::basic_map<D>& m, const global_a
                                            const bundle_solution& solved) {
   global_adjustment::report done = global_adjustment::apply_poses(m, s, solved);
   done.outliers = global_adjustment::erase_outliers(m, s, solved, 0, s.observations.size());
-  update_landmarks(m);
+  update_landmarks(m, 0, m.landmark_count());
   return done;
 }
 /// The report is empty if nothing was changed.

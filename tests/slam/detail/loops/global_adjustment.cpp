@@ -265,7 +265,7 @@ TEST_CASE("Outliers may be erased part by part") {
     erased += global::erase_outliers(parts, taken, solved, at, 1000);
   CHECK(steps > 3);
   CHECK(erased == report.outliers);
-  slam::detail::update_landmarks(parts);
+  slam::detail::update_landmarks(parts, 0, parts.landmark_count());
   CHECK(test::same(m, parts));
   CHECK_FALSE(test::same(m, before));
   CHECK(test::fault_of(parts) == "");

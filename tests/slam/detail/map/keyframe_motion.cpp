@@ -70,7 +70,7 @@ TEST_CASE("All keyframes move, landmarks with the oldest one that observes them,
   }
 
   slam::map parts = all;
-  slam::detail::update_landmarks(all);
+  slam::detail::update_landmarks(all, 0, all.landmark_count());
   slam::landmark_id at = 0;
   std::size_t steps = 0;
   for (; at != parts.landmark_end(); ++steps) at = slam::detail::update_landmarks(parts, at, 100);
