@@ -49,7 +49,7 @@ constexpr double relative_tolerance = 1e-6;
 struct problem {
   io::g2o_graph graph;
   double best = 0.0;  ///< the cost at its minimum
-  std::vector<detail::block_place> places;
+  std::vector<optimize::detail::block_place> places;
   std::vector<mat6> diagonal, off_diagonal;
 };
 

@@ -9,6 +9,7 @@
 #include <orbis/features/stages.hpp>
 #include <orbis/features/windowed.hpp>
 
+#include "features/sources.hpp"
 #include "support/catch.hpp"
 
 using namespace orbis;

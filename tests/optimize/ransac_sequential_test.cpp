@@ -87,17 +87,17 @@ bool is_the_line(const Found& found) {
 
 TEST_CASE("The score of a datum is between zero and the threshold, and there for outliers") {
   for (const double limit : {0.5, 3.0}) {
-    CHECK(detail::msac_cost(0.0, limit) == 0.0);
-    CHECK(detail::msac_cost(std::numeric_limits<double>::quiet_NaN(), limit) == limit);
-    CHECK(detail::msac_cost(std::numeric_limits<double>::infinity(), limit) == limit);
-    CHECK(detail::msac_cost(limit, limit) == limit);
+    CHECK(optimize::detail::msac_cost(0.0, limit) == 0.0);
+    CHECK(optimize::detail::msac_cost(std::numeric_limits<double>::quiet_NaN(), limit) == limit);
+    CHECK(optimize::detail::msac_cost(std::numeric_limits<double>::infinity(), limit) == limit);
+    CHECK(optimize::detail::msac_cost(limit, limit) == limit);
     double last = 0.0;
     for (double e = 0.0; e < 5.0; e += 0.01) {
-      CHECK(detail::msac_cost(e, limit) >= last);
-      CHECK(detail::msac_cost(e, limit) <= limit);
-      last = detail::msac_cost(e, limit);
+      CHECK(optimize::detail::msac_cost(e, limit) >= last);
+      CHECK(optimize::detail::msac_cost(e, limit) <= limit);
+      last = optimize::detail::msac_cost(e, limit);
       if (std::abs(e - limit) < 1e-3) continue;  // as a float it may lie on the other side
-      CHECK(static_cast<double>(detail::msac_cost(static_cast<float>(e), static_cast<float>(limit))) ==
+      CHECK(static_cast<double>(optimize::detail::msac_cost(static_cast<float>(e), static_cast<float>(limit))) ==
             Approx(last).margin(1e-5).epsilon(1e-5));
     }
   }
@@ -133,7 +133,7 @@ TEST_CASE("Errors by blocks rank models as errors one by one do") {
 }
 
 TEST_CASE("The sequential test lets good models through and most bad ones not") {
-  detail::sequential_test test(200.0);
+  optimize::detail::sequential_test test(200.0);
   random_bits random(5);
   const auto scored_to_its_end = [&](double ratio) {
     test.begin();
