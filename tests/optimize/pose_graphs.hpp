@@ -39,9 +39,8 @@ inline std::vector<test::synthetic_graph> small_graphs(double noise = 1.0) {
 /// Solves a pose graph once, with a solver that is made for it.
 template <class Policy, class T, class Edges, class Loss = optimize::trivial, class Damping = optimize::dogleg>
 optimize::pose_graph_summary solve_pose_graph(const Policy& policy, std::vector<T>& vertices, const Edges& edges,
-                                              const optimize::pose_graph_options& options = {},
-                                              progress callback = {}, const Loss& loss = {},
-                                              const Damping& damping = {}) {
+                                              const optimize::pose_graph_options& options = {}, progress callback = {},
+                                              const Loss& loss = {}, const Damping& damping = {}) {
   optimize::pose_graph_solver<T, Loss, Damping> solver{loss, damping};
   return solver.solve(policy, std::span<T>{vertices}, edges, options, std::move(callback));
 }
