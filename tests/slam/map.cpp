@@ -7,7 +7,7 @@
 
 #include <orbis/core/random.hpp>
 #include <orbis/slam/detail/mapping/keyframe_insertion.hpp>
-#include <orbis/slam/map.hpp>
+#include <orbis/slam/map-inl.hpp>
 
 #include "slam/random_map.hpp"
 #include "support/catch.hpp"

@@ -20,7 +20,6 @@
 #include <orbis/slam/detail/map/counter.hpp>
 #include <orbis/slam/detail/map/map_content.hpp>
 #include <orbis/slam/detail/map/slot_map.hpp>
-#include <orbis/slam/detail/map/typical_descriptor.hpp>
 #include <orbis/slam/frame.hpp>
 #include <orbis/slam/ids.hpp>
 #include <orbis/slam/landmark.hpp>

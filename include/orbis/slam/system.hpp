@@ -40,7 +40,6 @@
 #include <orbis/slam/atlas.hpp>
 #include <orbis/slam/camera_rig.hpp>
 #include <orbis/slam/detail/system/shared_state.hpp>
-#include <orbis/slam/detail/system/stopwatch.hpp>
 #include <orbis/slam/events.hpp>
 #include <orbis/slam/extractor.hpp>
 #include <orbis/slam/map.hpp>
