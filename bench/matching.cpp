@@ -145,7 +145,7 @@ void add_guided(std::size_t count) {
   const camera_projection project{camera, se3{}};
   mat3 K;
   K << 500.0, 0.0, 320.0, 0.0, 500.0, 240.0, 0.0, 0.0, 1.0;
-  const fundamental_geometry geometry{K, K, se3{so3::exp(vec3{0.0, 0.05, 0.0}), vec3{0.2, 0.02, 0.03}}};
+  const test::fundamental_geometry geometry{K, K, se3{so3::exp(vec3{0.0, 0.05, 0.0}), vec3{0.2, 0.02, 0.03}}};
 
   for (const auto& [name, level] : {levels[0], levels[3]}) {  // there are two kernels
     const std::string who = std::string("/") + name;

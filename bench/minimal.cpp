@@ -23,6 +23,7 @@
 #include <orbis/core/se3.hpp>
 #include <orbis/core/simd/level.hpp>
 #include <orbis/optimize/alignment.hpp>
+#include <orbis/optimize/detail/minimal/p3p_equations.hpp>
 #include <orbis/optimize/pnp.hpp>
 #include <orbis/optimize/two_view.hpp>
 
@@ -180,7 +181,11 @@ void add_p3p() {
   benchmark::RegisterBenchmark("p3p/one_sample/orbis", [](benchmark::State& state) {
     std::size_t k = 0;
     for (auto _ : state) {
-      benchmark::DoNotOptimize(optimize::p3p(samples[k].points, samples[k].rays));
+      const auto& r = samples[k].rays;
+      const std::array<vec3, 3> rays{r[0].normalized(), r[1].normalized(), r[2].normalized()};
+      optimize::detail::for_each_p3p(samples[k].points, rays, [](const mat3& rotation, const vec3& at) {
+        benchmark::DoNotOptimize(se3(so3(rotation), at).inverse());
+      });
       k = (k + 1) % samples.size();
     }
   })->Unit(benchmark::kMicrosecond);

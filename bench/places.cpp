@@ -153,11 +153,10 @@ void add_transforms(std::uint32_t depth, const std::string& words_name) {
       const vocabulary& words = tree_of(depth);
       const auto images = images_of(words, 40);
       bag_of_words bag;
-      std::vector<std::uint32_t> nodes;
       transform_workspace memory;
       std::size_t next = 0;
       for (auto _ : state) {
-        words.transform(images[next++ % images.size()], bag, nodes, memory);
+        words.transform(images[next++ % images.size()], bag, memory);
         benchmark::DoNotOptimize(bag.words.data());
       }
     });
@@ -198,7 +197,7 @@ std::vector<bag_of_words> way(std::size_t keyframes, std::uint32_t words) {
     std::map<std::uint32_t, float> values;
     for (const std::uint32_t w : seen) values[w] += 1.0F;
     for (const auto& [word, value] : values) bag.words.push_back({word, value});
-    normalize(bag, bag_norm::l1);
+    normalize(bag);
   }
   return bags;
 }
@@ -236,7 +235,7 @@ void add_queries(std::size_t keyframes) {
     for (auto _ : state) {
       const std::size_t q = (next++ * 37) % bags.size();
       double best = 0.0;
-      for (const bag_of_words& bag : bags) best = std::max(best, l1_score{}(bags[q], bag));
+      for (const bag_of_words& bag : bags) best = std::max(best, similarity(bags[q], bag));
       benchmark::DoNotOptimize(best);
     }
   });

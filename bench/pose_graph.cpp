@@ -49,7 +49,7 @@ constexpr double relative_tolerance = 1e-6;
 struct problem {
   io::g2o_graph graph;
   double best = 0.0;  ///< the cost at its minimum
-  std::vector<block_place> places;
+  std::vector<optimize::detail::block_place> places;
   std::vector<mat6> diagonal, off_diagonal;
 };
 
@@ -108,8 +108,9 @@ sparse assembled(const problem& p) {
 template <class Damping>
 pose_graph_summary solve(const problem& p, poses& vertices, unsigned threads = 1) {
   vertices = p.graph.vertices;
-  return solve_pose_graph(par.with(threads), vertices, p.graph.edges, {.relative_tolerance = relative_tolerance}, {},
-                          trivial{}, Damping{});
+  pose_graph_solver<se3, trivial, Damping> solver;
+  return solver.solve(par.with(threads), std::span<se3>{vertices}, p.graph.edges,
+                      {.relative_tolerance = relative_tolerance});
 }
 
 #ifdef ORBIS_BENCH_WITH_CHOLMOD

@@ -23,6 +23,7 @@ set(ORBIS_QUICK_TESTS
   octree/occupancy_octree_depth.cpp octree/sensor_model.cpp
   optimize/alignment.cpp optimize/allocations.cpp optimize/pnp.cpp optimize/pose_graph.cpp optimize/ransac.cpp
   optimize/robust_loss.cpp optimize/triangulation.cpp
-  places/allocations.cpp places/inverted_index.cpp places/keyframe_database.cpp places/score.cpp places/vocabulary.cpp
+  places/allocations.cpp places/bag_of_words.cpp places/inverted_index.cpp places/keyframe_database.cpp
+  places/vocabulary.cpp
   slam/allocations.cpp slam/covisibility_graph.cpp slam/events.cpp slam/frame.cpp slam/ids.cpp slam/landmark.cpp
   slam/map.cpp slam/map_file.cpp slam/system.cpp slam/measure.cpp slam/spanning_tree.cpp slam/tested_system.cpp)

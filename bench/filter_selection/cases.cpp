@@ -229,7 +229,8 @@ labelled_case make_case(const surface& s, trouble kind) {
   const auto regions = is_density(kind) ? dense_regions(shots, c.camera, random) : std::vector<vec3>{};
   const camera::ray_table rays{c.camera};
   for (const spoilt_shot& shot : shots) {
-    camera::for_each_depth_point(camera::depth_view<float>(shot.depth), rays, [&](int x, int y, const vec3f& p) {
+    const auto seen = camera::unproject_depth(seq, camera::depth_view<float>(shot.depth), rays);
+    const auto judge = [&](int x, int y, const vec3f& p) {
       const vec3 world = shot.T_world_camera * p.cast<double>();
       const bool on_grid = x % s.stride == 0 && y % s.stride == 0;
       if (!regions.empty()) {
@@ -248,7 +249,10 @@ labelled_case make_case(const surface& s, trouble kind) {
         l = off > std::max(0.02, 4 * s.sensor.deviation(z)) ? label::outlier : label::unsure;
       }
       c.labels.push_back(l);
-    });
+    };
+    const auto width = static_cast<std::uint32_t>(rays.width());
+    for (std::size_t i = 0; i != seen.points.size(); ++i)
+      judge(static_cast<int>(seen.pixels[i] % width), static_cast<int>(seen.pixels[i] / width), seen.points[i]);
   }
   if (is_voxel(kind)) merge(c, 0.015 + 0.005 * static_cast<double>(s.seed % 5));
   if (s.context == known::views) {

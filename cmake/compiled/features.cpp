@@ -5,7 +5,6 @@
 #include <orbis/features/brute_force-inl.hpp>
 #include <orbis/features/descriptor.hpp>
 #include <orbis/features/epipolar-inl.hpp>
-#include <orbis/features/epipolar_geometry-inl.hpp>
 #include <orbis/features/grey-inl.hpp>
 #include <orbis/features/orb-inl.hpp>
 #include <orbis/features/pyramid-inl.hpp>

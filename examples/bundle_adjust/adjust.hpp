@@ -64,7 +64,7 @@ inline void print_json(const settings& s, const bundle& b, const optimize::bundl
       t.back_substitute, t.evaluate);
 }
 
-inline optimize::automatic_reduced_solver solver_named(const std::string& name) {
+inline optimize::reduced_solver_options solver_named(const std::string& name) {
   constexpr auto any = std::numeric_limits<std::size_t>::max();
   if (name == "dense") return {.dense_limit = any};
   if (name == "sparse") return {.dense_limit = 0, .fill_limit = any};

@@ -18,7 +18,7 @@
 /// | `features/projected.hpp` | the source that looks where known points project to |
 /// | `features/project_points.hpp` | projections by a camera and its pose, for `projected` |
 /// | `features/epipolar.hpp` | the source that looks along epipolar lines |
-/// | `features/epipolar_geometry.hpp` | epipolar lines of two pinhole images, or of any two cameras |
+/// | `features/epipolar_geometry.hpp` | epipolar lines of two images of any cameras |
 /// | `features/stereo.hpp` | `stereo_matcher`: the right coordinates of features of a stereo pair |
 /// | `features/grid.hpp` | an index of keypoints by position |
 /// | `features/depth.hpp` | the depth at a keypoint and its standard deviation |

@@ -9,8 +9,7 @@
 /// | `places/train.hpp` | `train`: a vocabulary of your own images |
 /// | `places/vocabulary_file.hpp` | vocabularies in files |
 /// | `places/vocabulary_tree.hpp` | the tree inside, for readers of other formats |
-/// | `places/bag_of_words.hpp` | `bag_of_words`: the words of an image and their values |
-/// | `places/score.hpp` | how alike two bags are |
+/// | `places/bag_of_words.hpp` | `bag_of_words`: the words of an image and their values; how alike two are |
 /// | `places/keyframe_database.hpp` | `keyframe_database`: keyframes that may show the same place |
 /// | `places/inverted_index.hpp` | the images that have a word |
 ///
@@ -29,7 +28,6 @@
 #include <orbis/places/default_vocabulary.hpp>
 #include <orbis/places/inverted_index.hpp>
 #include <orbis/places/keyframe_database.hpp>
-#include <orbis/places/score.hpp>
 #include <orbis/places/train.hpp>
 #include <orbis/places/vocabulary.hpp>
 #include <orbis/places/vocabulary_file.hpp>

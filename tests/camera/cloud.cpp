@@ -66,14 +66,6 @@ TEST_CASE("un-projection gives the same bytes under every policy") {
     const auto many = unproject_depth(par.with(4), depth, rays, {.stride = stride});
     CHECK(one.points == many.points);
     CHECK(one.pixels == many.pixels);
-    std::vector<vec3f> visited;
-    for_each_depth_point(depth, rays,
-                         [&](int x, int y, const vec3f& p) {
-                           CHECK((x % stride == 0 && y % stride == 0));
-                           visited.push_back(p);
-                         },
-                         {.stride = stride});
-    CHECK(visited == one.points);  // the world is the camera here
   }
 }
 

@@ -1,4 +1,4 @@
-// error: satisf[a-z]+( of)? [^a-z ]+general_damping_policy
+// error: satisf[a-z]+( of)? [^a-z ]+damping_policy
 // A way to step that keeps no state between its steps says so.
 #include <orbis/optimize/pose_graph.hpp>
 

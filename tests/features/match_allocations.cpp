@@ -13,6 +13,7 @@
 #include <orbis/features/stages.hpp>
 #include <orbis/features/windowed.hpp>
 
+#include "features/fundamental_geometry.hpp"
 #include "features/sources.hpp"
 #include "support/allocations.hpp"
 #include "support/catch.hpp"
@@ -57,6 +58,6 @@ TEST_CASE("a matcher whose memory has served before allocates nothing") {
 
   mat3 K;
   K << 500.0, 0.0, 320.0, 0.0, 500.0, 240.0, 0.0, 0.0, 1.0;
-  const fundamental_geometry geometry{K, K, se3{so3{}, vec3{0.1, 0.0, 0.0}}};
+  const test::fundamental_geometry geometry{K, K, se3{so3{}, vec3{0.1, 0.0, 0.0}}};
   check_second_call(epipolar(hamming{}) | cross_check{} | unique{}, geometry);
 }

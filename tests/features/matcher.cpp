@@ -126,7 +126,8 @@ TEST_CASE("any distance and any callable of the right shape can stand in a chain
 
 TEST_CASE("only the nearest of those that share a train is unique") {
   std::vector<candidate> c{{0, 7, 5}, {1, 7, 3}, {2, 7, 3}, {3, 8, 9}};
-  unique{}(c, {}, {});
+  unique::workspace memory;
+  unique{}(c, {}, {}, memory);
   REQUIRE(c.size() == 2);
   CHECK(c[0].query == 1);
   CHECK(c[1].query == 3);
@@ -148,7 +149,8 @@ TEST_CASE("matches that turn alike are consistent in rotation at every angle") {
     };
     for (int i = 0; i != 60; ++i) add(by + static_cast<float>(random.uniform(0.0, 0.1)));  // straddles two bins at most
     for (int i = 0; i != 2; ++i) add(by + 0.5F * turn);  // wrong: turned the other way round
-    rotation_consistency{}(c, q, t);
+    rotation_consistency::workspace memory;
+    rotation_consistency{}(c, q, t, memory);
     INFO("turned by " << by);
     CHECK(c.size() == 60);
   }
@@ -162,7 +164,8 @@ TEST_CASE("the rotation histogram uses all of its bins") {
     q[i].angle = (static_cast<float>(i) + 0.5F) * std::numbers::pi_v<float> / 180.0F;
     c.push_back({i, i, 1});
   }
-  rotation_consistency{}(c, q, t);
+  rotation_consistency::workspace memory;
+  rotation_consistency{}(c, q, t, memory);
   CHECK(c.size() == 36);
 }
 

@@ -29,6 +29,12 @@ namespace {
 
 constexpr auto matcher = brute_force(hamming{}) | ratio_test{0.8f} | cross_check{} | max_distance{64};
 
+/// No direction, for cameras that do not roll.
+struct upright {
+  static constexpr int radius = 0;
+  orientation operator()(image_view<const std::uint8_t>, int, int) const { return {}; }
+};
+
 }  // namespace
 
 TEST_CASE("ORB features are well-formed and the same on every run") {
@@ -102,18 +108,6 @@ TEST_CASE("a strided view and a colour image have the features of the grey copy"
   CHECK(extract(color) == f);
 }
 
-TEST_CASE("no ORB feature lies where the mask is zero") {
-  const auto im = blocks(320, 240, 4);
-  image<std::uint8_t> mask(320, 240, 0);
-  for (int y = 0; y != 240; ++y)
-    for (int x = 100; x != 200; ++x) mask(x, y) = 255;
-  const auto f = orb_extractor{}(im, mask);
-  REQUIRE(f.size() > 100);
-  for (const keypoint& k : f.keypoints)
-    CHECK(mask(static_cast<int>(std::lround(k.x)), static_cast<int>(std::lround(k.y))) != 0);
-  CHECK(orb_extractor{}(im, image<std::uint8_t>(320, 240, 0)).empty());
-}
-
 TEST_CASE("ORB features are found again after a shift and a turn") {
   const auto im = blocks(400, 300, 5);
   const auto f = orb_extractor{}(im);
@@ -172,42 +166,17 @@ TEST_CASE("every level of instructions finds the same ORB features") {
   }
 }
 
-TEST_CASE("ORB features of regions of interest lie in them, all of the number wanted") {
-  const auto im = moved(blocks(400, 300, 8), 0.3, 0, 0);
-  const std::vector<region> regions{{50, 60, 100, 80}, {120, 100, 90, 90}, {390, 290, 100, 100}, {-50, 0, 60, 400}};
-  const orb_extractor extract{{.max_features = 200}};
-  const auto f = extract(im, {}, regions);
-  CHECK(f.size() == 200);
-  for (const keypoint& k : f.keypoints) {
-    const int x = static_cast<int>(std::lround(k.x)), y = static_cast<int>(std::lround(k.y));
-    CHECK(std::any_of(regions.begin(), regions.end(), [&](const region& r) { return r.contains(x, y); }));
-  }
-  const std::vector<region> whole{{0, 0, 400, 300}}, outside{{500, 0, 10, 10}}, none{{50, 50, 0, 10}};
-  CHECK(extract(im, {}, whole) == extract(im));
-  CHECK(extract(im, {}, outside).empty());
-  CHECK(extract(im, {}, none).empty());
-  // A mask and a region: both must agree.
-  image<std::uint8_t> mask(400, 300, 0);
-  for (int y = 0; y != 300; ++y)
-    for (int x = 0; x != 100; ++x) mask(x, y) = 1;
-  const auto both = extract(im, mask, regions);
-  CHECK_FALSE(both.empty());
-  for (const keypoint& k : both.keypoints) CHECK((k.x >= 49.0F && k.x < 100.0F && k.y >= 59.0F && k.y < 141.0F));
-}
-
 TEST_CASE("from the second image of its kind on, extraction allocates nothing") {
   const auto im = moved(blocks(320, 240, 9), 0.3, 0, 0);
   image<rgb8> color(320, 240);
   for (int y = 0; y != 240; ++y)
     for (int x = 0; x != 320; ++x) color(x, y) = {im(x, y), im(x, y), im(x, y)};
-  const image<std::uint8_t> mask(320, 240, 1);
-  const std::vector<region> regions{{0, 0, 320, 240}};
   const orb_extractor extract;
   orbis::features::features f, expected = extract(im);
-  extract.into(f, color, mask, regions);
+  extract.into(f, color);
   const std::size_t before = test::allocations();
   extract.into(f, im);
-  extract.into(f, color, mask, regions);
+  extract.into(f, color);
   if (test::counts_allocations()) CHECK(test::allocations() == before);
   CHECK(f == expected);
 }
@@ -287,8 +256,8 @@ TEST_CASE("16-bit images must be narrowed first") {
 
 TEST_CASE("an extractor is assembled from parts") {
   const auto im = moved(blocks(320, 240, 10), 0.3, 0, 0);
-  const basic_orb_extractor<fast9, strongest> clustered{{.max_features = 200}};
-  const basic_orb_extractor<fast9, cover_first> covering{{.max_features = 200}, {}, {.share = 1.0}};
+  const orb_extractor clustered{{.max_features = 200}, {}, {.share = 0.0}};
+  const orb_extractor covering{{.max_features = 200}, {}, {.share = 1.0}};
   CHECK(test::coverage(covering(im), 320, 240) > test::coverage(clustered(im), 320, 240));
   const basic_orb_extractor<fast9, cover_first, upright> level_camera{{.max_features = 200}};
   for (const keypoint& k : level_camera(im).keypoints) CHECK(k.angle == 0.0F);

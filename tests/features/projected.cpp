@@ -106,9 +106,9 @@ TEST_CASE("projected matching equals a search through all trains with every rule
   const auto source = projected(hamming{}, rule);
   const search_needs reverse{.reverse = true};
   CHECK(expected.size() > 50);
-  CHECK(candidates_of(source, view_of(q), view_of(t), reverse, points, project) == expected);
-  CHECK(candidates_of(source, view_of(q), view_of(t), reverse, points, project, keypoint_grid{t.keypoints, 33.0F}) ==
-        expected);
+  CHECK(test::candidates_of(source, view_of(q), view_of(t), reverse, points, project) == expected);
+  CHECK(test::candidates_of(source, view_of(q), view_of(t), reverse, points, project,
+                            keypoint_grid{t.keypoints, 33.0F}) == expected);
 }
 
 TEST_CASE("a camera projects what lies before it and into its image, from where it was seen") {

@@ -31,6 +31,18 @@ inline features::features random_features(std::size_t count, std::uint64_t seed)
   return f;
 }
 
+/// The candidates that a source finds, in memory of its own.
+template <class Source, class... Where>
+std::vector<features::candidate> candidates_of(const Source& source,
+                                               const features::feature_view<features::binary_descriptor<256>>& queries,
+                                               const features::feature_view<features::binary_descriptor<256>>& trains,
+                                               features::search_needs needs, const Where&... where) {
+  std::vector<features::candidate> candidates;
+  features::workspace_of<Source> memory;
+  source.search(candidates, memory, queries, trains, needs, where...);
+  return candidates;
+}
+
 /// By trying all pairs for which `may(q, t)`.
 template <class May>
 std::vector<features::candidate> naive_candidates(const features::features& q, const features::features& t, May&& may) {

@@ -21,6 +21,8 @@
 #include <orbis/features/windowed.hpp>
 #include <orbis/io/recording.hpp>
 
+#include "fundamental_geometry.hpp"
+
 namespace orbis::test {
 
 inline const camera::pinhole kitchen_camera{640, 480, 525.0, 525.0, 320.0, 240.0};

@@ -23,15 +23,18 @@ void solve(const io::g2o_graph& graph, const std::vector<se3>& start) {
   const optimize::pose_graph_options options{
       .max_iterations = 4, .fixed = graph.fixed, .semidefinite_information = true};
   std::vector<se3> vertices = start;
-  const auto s = optimize::solve_pose_graph(seq, vertices, graph.edges, options, {}, optimize::huber{2.0}, Damping{});
+  const auto run = [&](const auto& policy, std::vector<se3>& poses) {
+    optimize::pose_graph_solver<se3, optimize::huber, Damping> solver{optimize::huber{2.0}};
+    return solver.solve(policy, std::span<se3>{poses}, graph.edges, options);
+  };
+  const auto s = run(seq, vertices);
   fuzz::require(!(s.final_cost > s.initial_cost), "the cost does not rise");
   fuzz::require(s.where < std::max(graph.edges.size(), graph.vertices.size()) || s.where == 0,
                 "a failure is somewhere");
   if (!is_failure(s.status) && std::isfinite(s.initial_cost))
     for (const se3& v : vertices) fuzz::require(v.to_matrix().allFinite(), "poses stay numbers");
   std::vector<se3> again = start;
-  const auto t =
-      optimize::solve_pose_graph(par.with(2), again, graph.edges, options, {}, optimize::huber{2.0}, Damping{});
+  const auto t = run(par.with(2), again);
   fuzz::require(t.status == s.status && (t.final_cost == s.final_cost || std::isnan(s.final_cost)),
                 "threads make no difference");
 }

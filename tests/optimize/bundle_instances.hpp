@@ -30,7 +30,7 @@
   what struct detail::panel_kernels<size>;       \
   what struct detail::schur_kernels<size, true>; \
   what class detail::block_cholesky<size>;       \
-  what class detail::automatic_block_solver<size>;
+  what class detail::reduced_solver<size>;
 
 namespace orbis::optimize {
 

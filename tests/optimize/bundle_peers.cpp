@@ -37,7 +37,7 @@ constexpr double gate = 7.815;  // chi-squared of three degrees of freedom at 95
 /// Leaves the adjusted cameras and points in `problem`.
 template <class Damping = optimize::levenberg_marquardt, class Loss = optimize::trivial>
 optimize::bundle_summary adjust(io::bal_problem& problem, Damping damping = {}, Loss loss = {},
-                                optimize::automatic_reduced_solver solver = {}, double tolerance = 1e-6) {
+                                optimize::reduced_solver_options solver = {}, double tolerance = 1e-6) {
   std::vector<optimize::bal_camera> cameras;
   for (const auto& c : problem.cameras) cameras.push_back(optimize::bal_camera::from_parameters(c));
   std::vector<bundle_observation> observations;
@@ -116,7 +116,7 @@ TEST_CASE("Every way of stepping and solving ends at the same cost") {
     const double freedom = 2.0 * static_cast<double>(start.observations.size()) -
                            static_cast<double>(9 * start.cameras.size() + 3 * start.points.size()) + 7.0;
     CHECK(best == Approx(0.5 * 0.25 * freedom).epsilon(0.1));
-    const auto ends_there = [&](auto damping, optimize::automatic_reduced_solver solver) {
+    const auto ends_there = [&](auto damping, optimize::reduced_solver_options solver) {
       io::bal_problem again = start;
       const auto summary = adjust(again, damping, optimize::trivial{}, solver);
       CHECK(summary.final_cost <= best * (1.0 + 1e-5));

@@ -189,7 +189,7 @@ TEST_CASE("Input that cannot be solved is refused with what and where, and left 
   const auto refused = [](std::vector<se3> vertices, const std::vector<edge>& edges, pose_graph_status status,
                           std::size_t where, const pose_graph_options& options = {}) {
     const auto before = vertices;
-    const auto s = solve_pose_graph(seq, vertices, edges, options, {}, trivial{}, gauss_newton{});
+    const auto s = test::solve_pose_graph(seq, vertices, edges, options, {}, trivial{}, gauss_newton{});
     CHECK(s.status == status);
     CHECK(s.where == where);
     CHECK(is_failure(s.status));
@@ -238,7 +238,7 @@ TEST_CASE("Pieces without a fixed vertex can be held by their first") {
   auto edges = chain(6);
   edges.erase(edges.begin() + 2);
   std::vector<se3> vertices(6);
-  const auto s = solve_pose_graph(seq, vertices, edges, {.hold = pose_graph_gauge::first_of_each_piece});
+  const auto s = test::solve_pose_graph(seq, vertices, edges, {.hold = pose_graph_gauge::first_of_each_piece});
   CHECK(s.status == pose_graph_status::converged);
   for (int i = 0; i != 6; ++i)
     CHECK(vertices[static_cast<std::size_t>(i)].translation().x() == Approx(i % 3).margin(1e-9));
@@ -247,20 +247,20 @@ TEST_CASE("Pieces without a fixed vertex can be held by their first") {
 TEST_CASE("Graphs with nothing to do, and of two vertices") {
   std::vector<se3> vertices(3);
   std::vector<edge> edges;
-  CHECK(solve_pose_graph(seq, vertices, edges).status == pose_graph_status::nothing_to_do);
+  CHECK(test::solve_pose_graph(seq, vertices, edges).status == pose_graph_status::nothing_to_do);
   const std::vector<std::uint8_t> all(3, 1);
   edges = chain(3);
-  CHECK(solve_pose_graph(seq, vertices, edges, {.fixed = all}).status == pose_graph_status::nothing_to_do);
+  CHECK(test::solve_pose_graph(seq, vertices, edges, {.fixed = all}).status == pose_graph_status::nothing_to_do);
   vertices.clear();
   edges.clear();
-  CHECK(solve_pose_graph(seq, vertices, edges).status == pose_graph_status::nothing_to_do);
+  CHECK(test::solve_pose_graph(seq, vertices, edges).status == pose_graph_status::nothing_to_do);
   vertices.resize(2);
   edges = chain(2);
-  const auto s = solve_pose_graph(seq, vertices, edges);
+  const auto s = test::solve_pose_graph(seq, vertices, edges);
   CHECK(s.status == pose_graph_status::converged);
   CHECK(vertices[1].translation().x() == Approx(1.0));
   // Solved already: nothing is gained, nothing is lost.
-  const auto again = solve_pose_graph(seq, vertices, edges);
+  const auto again = test::solve_pose_graph(seq, vertices, edges);
   CHECK(again.status == pose_graph_status::converged);
   CHECK(again.final_cost <= again.initial_cost);
 }
@@ -284,7 +284,7 @@ TEST_CASE("The result is never worse than what was given, whenever it is stopped
     CHECK(total == 100);
     return done != 2;
   };
-  const auto s = solve_pose_graph(seq, vertices, made.measured.edges, {.relative_tolerance = 0.0}, stop);
+  const auto s = test::solve_pose_graph(seq, vertices, made.measured.edges, {.relative_tolerance = 0.0}, stop);
   CHECK(s.status == pose_graph_status::cancelled);
   CHECK(s.iterations == 2);
   CHECK(cost_of(vertices, made.measured.edges) == Approx(s.final_cost).epsilon(1e-9));

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <cmath>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include <orbis/core/sim3.hpp>
@@ -30,7 +31,8 @@ TEST_CASE("Sim(3) graphs distribute the drift of scale round a loop") {
   vertices.push_back(truth[0]);
   for (std::uint32_t i = 0; i + 1 != n; ++i) vertices.push_back(vertices.back() * edges[i].measurement);
   CHECK(vertices.back().scale() < 0.6);
-  const auto s = solve_pose_graph(seq, vertices, edges, {.relative_tolerance = 1e-10});
+  pose_graph_solver<sim3> solver;
+  const auto s = solver.solve(seq, std::span<sim3>{vertices}, edges, {.relative_tolerance = 1e-10});
   CHECK(s.status == pose_graph_status::converged);
   CHECK(vertices.back().scale() == Approx(1.0).epsilon(1e-3));
   // Each edge takes its share of the drift, so that no scale but the smallest in the middle is left.

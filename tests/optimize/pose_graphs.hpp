@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cstring>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include <orbis/core/execution.hpp>
@@ -35,11 +36,20 @@ inline std::vector<test::synthetic_graph> small_graphs(double noise = 1.0) {
   return graphs;
 }
 
+/// Solves a pose graph once, with a solver that is made for it.
+template <class Policy, class T, class Edges, class Loss = optimize::trivial, class Damping = optimize::dogleg>
+optimize::pose_graph_summary solve_pose_graph(const Policy& policy, std::vector<T>& vertices, const Edges& edges,
+                                              const optimize::pose_graph_options& options = {}, progress callback = {},
+                                              const Loss& loss = {}, const Damping& damping = {}) {
+  optimize::pose_graph_solver<T, Loss, Damping> solver{loss, damping};
+  return solver.solve(policy, std::span<T>{vertices}, edges, options, std::move(callback));
+}
+
 template <class Damping = optimize::levenberg_marquardt, class Loss = optimize::trivial, class Policy, class Edges>
 optimize::pose_graph_summary solve(const Policy& policy, std::vector<se3>& vertices, const Edges& edges,
                                    const optimize::pose_graph_options& options = {}, Loss loss = {},
                                    Damping damping = {}) {
-  return optimize::solve_pose_graph(policy, vertices, edges, options, {}, loss, damping);
+  return solve_pose_graph(policy, vertices, edges, options, {}, loss, damping);
 }
 
 /// Root mean square of the distances between the poses' positions.

@@ -34,12 +34,6 @@ struct own_camera {
   std::optional<vec3> unproject(const vec2& pixel) const { return pinhole_camera.unproject(pixel); }
 };
 
-/// A loss that nobody has written lanes for.
-struct own_loss {
-  double cost(double squared) const { return optimize::huber{2.0}.cost(squared); }
-  double weight(double squared) const { return optimize::huber{2.0}.weight(squared); }
-};
-
 template <class Camera>
 std::vector<pose_observation> observe(const optimize::reprojection<Camera>& model, const se3& T_world_camera, int n,
                                       double sigma, std::uint64_t seed, double with_depth = 0.7) {
@@ -142,16 +136,6 @@ TEST_CASE("Pose refinement moves with the world it is given") {
   CHECK(here.inliers == there.inliers);
 }
 
-TEST_CASE("Pose refinement takes any robust loss") {
-  const optimize::reprojection model{pinhole_camera, 40.0};
-  const auto seen = observe(model, se3{}, 50, 0.5, 4);
-  std::vector<std::uint8_t> outliers(seen.size());
-  const std::span<const pose_observation> view(seen);
-  const se3 start(so3{}, vec3(0.02, 0, 0));
-  CHECK(optimize::refine_pose(view, model, start, std::span<std::uint8_t>(outliers), {}, optimize::cauchy{2.0}).ok());
-  CHECK(optimize::refine_pose(view, model, start, std::span<std::uint8_t>(outliers), {}, optimize::tukey{8.0}).ok());
-}
-
 TEST_CASE("Pose refinement gives a status and the starting pose for degenerate input") {
   const optimize::reprojection model{pinhole_camera, 40.0};
   const se3 start(so3{}, vec3(0.1, 0.2, 0.3));
@@ -211,8 +195,8 @@ std::vector<pose_observation> observe_with_outliers(const optimize::reprojection
   return seen;
 }
 
-template <class Camera, class Loss>
-void check_levels(const Camera& camera, const Loss& loss, int n) {
+template <class Camera>
+void check_levels(const Camera& camera, int n) {
   const optimize::reprojection model{camera, 40.0};
   random_bits random(static_cast<std::uint64_t>(n));
   const se3 truth = test::random_pose(random);
@@ -227,7 +211,7 @@ void check_levels(const Camera& camera, const Loss& loss, int n) {
   const auto run = [&](simd::level level, std::vector<std::uint8_t>& out) {
     const simd::level_limit limit{level};
     return optimize::refine_pose(std::span<const pose_observation>(seen), model, truth * se3::exp(off),
-                                 std::span<std::uint8_t>(out), {}, loss);
+                                 std::span<std::uint8_t>(out));
   };
   const auto reference = run(simd::level::portable, expected);
   REQUIRE(reference.ok());
@@ -248,13 +232,10 @@ void check_levels(const Camera& camera, const Loss& loss, int n) {
 }  // namespace
 
 TEST_CASE("Pose refinement gives the same bits for every instruction set") {
-  for (const int n : {20, 63, 500, 1024, 1025, 3001}) check_levels(pinhole_camera, optimize::huber{2.447}, n);
-  check_levels(distorted_camera, optimize::huber{2.447}, 300);
-  check_levels(fisheye_camera, optimize::huber{2.447}, 300);
-  check_levels(own_camera{}, optimize::huber{2.447}, 300);
-  check_levels(pinhole_camera, own_loss{}, 300);
-  check_levels(pinhole_camera, optimize::cauchy{2.0}, 300);
-  check_levels(pinhole_camera, optimize::tukey{40.0}, 300);
+  for (const int n : {20, 63, 500, 1024, 1025, 3001}) check_levels(pinhole_camera, n);
+  check_levels(distorted_camera, 300);
+  check_levels(fisheye_camera, 300);
+  check_levels(own_camera{}, 300);
 }
 
 TEST_CASE("Pose refinement of 500 stereo observations finds all inliers and the pose to half a millimetre") {

@@ -10,10 +10,7 @@
 
 using namespace orbis::optimize;
 
-static_assert(general_damping_policy<gauss_newton> && general_damping_policy<levenberg_marquardt> &&
-              general_damping_policy<dogleg>);
-static_assert(reduced_solver<dense_reduced_solver> && reduced_solver<sparse_reduced_solver>);
-static_assert(reduced_solver<iterative_reduced_solver> && reduced_solver<automatic_reduced_solver>);
+static_assert(damping_policy<gauss_newton> && damping_policy<levenberg_marquardt> && damping_policy<dogleg>);
 
 namespace {
 
@@ -46,7 +43,7 @@ struct dense_problem {
     llt.compute(m);
     return llt.info() == Eigen::Success && llt.matrixLLT().diagonal().minCoeff() > 1e-12;
   }
-  void solve(Eigen::VectorXd& b) { llt.solveInPlace(b); }
+  void newton_step(Eigen::VectorXd& out) { out = llt.solve(-g); }
   double try_step(const Eigen::VectorXd& s) {
     tried = x + s;
     Eigen::VectorXd there;

@@ -71,7 +71,7 @@ TEST_CASE("Four matches determine a homography") {
       first[i] = vec2(random.uniform(-0.5, 0.5), random.uniform(-0.5, 0.5));
       second[i] = s.map(first[i]);
     }
-    const auto h = optimize::homography_of_four(first, second);
+    const auto h = optimize::detail::homography_of_four(first, second);
     if (!h) continue;
     ++found;
     for (std::size_t i = 0; i != 4; ++i)
@@ -82,9 +82,9 @@ TEST_CASE("Four matches determine a homography") {
   const std::array<vec2, 4> line{vec2(0, 0), vec2(1, 1), vec2(2, 2), vec2(0, 1)};
   const std::array<vec2, 4> square{vec2(0, 0), vec2(1, 0), vec2(1, 1), vec2(0, 1)};
   const std::array<vec2, 4> crossed{vec2(0, 0), vec2(1, 1), vec2(1, 0), vec2(0, 1)};
-  CHECK_FALSE(optimize::homography_of_four(line, square).has_value());
-  CHECK_FALSE(optimize::homography_of_four(square, line).has_value());
-  CHECK_FALSE(optimize::homography_of_four(square, crossed).has_value());
+  CHECK_FALSE(optimize::detail::homography_of_four(line, square).has_value());
+  CHECK_FALSE(optimize::detail::homography_of_four(square, line).has_value());
+  CHECK_FALSE(optimize::detail::homography_of_four(square, crossed).has_value());
 }
 
 TEST_CASE("The homography is found among 60 percent wrong matches, and exactly its inliers") {

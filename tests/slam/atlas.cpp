@@ -28,20 +28,20 @@ TEST_CASE("An atlas starts with an empty map, and a new one becomes the active o
   CHECK(atlas.create() != second);
 }
 
-TEST_CASE("A map that is merged hangs on the nearest keyframe if the caller names none") {
+TEST_CASE("A map that is merged hangs on the keyframe that the caller names") {
   random_bits random(1);
   slam::atlas atlas;
   for (int i = 0; i < 5; ++i) test::add_random_keyframe(random, atlas.active(), 30, 10);
   const map_id other = atlas.create();
   for (int i = 0; i < 3; ++i) test::add_random_keyframe(random, atlas.active(), 30, 10);
-  const auto offsets = atlas.merge(other, 0, se3(so3{}, vec3(0.31, 0, 0)));
+  const auto offsets = atlas.merge(other, 0, sim3(so3{}, vec3(0.31, 0, 0), 1.0), {3, 0});
   CHECK(offsets.keyframes == 5);
   CHECK(atlas.active_id() == 0);
   CHECK(atlas.active().tree().parent(5) == 3);
   CHECK(atlas.active().at(5).T_world_camera.translation().x() == Approx(0.31));
   CHECK(test::fault_of(atlas.active()) == "");
   const map_id empty = atlas.create();
-  atlas.merge(0, empty, se3{});  // into nothing
+  atlas.merge(0, empty, sim3{}, {});  // into nothing
   CHECK(atlas.active().keyframes().size() == 8);
   CHECK(atlas.current({other, 1}) == slam::map_keyframe{empty, 6});
 }
@@ -69,7 +69,7 @@ TEST_CASE("Maps are whole, and keyframes found again, after any sequence of maps
         break;
       case 1:
         if (a == b) break;
-        atlas.merge(a, b, test::random_motion(random));
+        atlas.merge(a, b, sim3(test::random_motion(random)), {atlas.at(b).tree().root(), atlas.at(a).tree().root()});
         REQUIRE_FALSE(atlas.contains(a));
         REQUIRE(test::fault_of(atlas.at(b)) == "");
         break;

@@ -7,7 +7,7 @@
 
 #include <orbis/core/random.hpp>
 #include <orbis/slam/detail/mapping/keyframe_insertion.hpp>
-#include <orbis/slam/map.hpp>
+#include <orbis/slam/map-inl.hpp>
 
 #include "slam/random_map.hpp"
 #include "support/catch.hpp"
@@ -75,7 +75,7 @@ TEST_CASE("Erased keyframes are forgotten but for those that are asked for, the 
   for (const std::uint64_t seed : {23U, 24U}) {
     random_bits random(seed);
     slam::map m = test::random_map(seed, 8000, 12);
-    m.transform(test::random_motion(random));
+    m.transform(sim3(test::random_motion(random)));
     const slam::map before = m;
     std::vector<slam::keyframe_id> erased;
     for (slam::keyframe_id k = 0; k != m.keyframe_end(); ++k) {
@@ -116,7 +116,7 @@ TEST_CASE("Erased keyframes are forgotten but for those that are asked for, the 
     CHECK(other.content().erased.empty());
     const std::size_t both = m.content().forgotten + other.content().forgotten;
     const se3 T = m.pose_of(erased[50]);
-    m.append(std::move(other), se3{}, {m.tree().root(), other.tree().root()});
+    m.append(std::move(other), sim3{}, {m.tree().root(), other.tree().root()});
     CHECK(m.content().forgotten == both);
     CHECK((m.pose_of(erased[50]).inverse() * T).log().norm() < 1e-12);
     REQUIRE(fault_of(m) == "");
@@ -266,7 +266,7 @@ TEST_CASE("An erased keyframe leaves its landmarks to others, its children to it
   CHECK(m.replacement_of(slam::keyframe_id{1}) == slam::no_id);
   CHECK(m.landmark_count() == 0);
   CHECK((m.pose_of(1).inverse() * (moved * before)).log().norm() < 1e-12);
-  m.transform(moved);
+  m.transform(sim3(moved));
   CHECK((m.pose_of(1).inverse() * (moved * moved * before)).log().norm() < 1e-12);
   CHECK(slam::detail::insert_keyframe(m, random_frame(random, 5, 3), {}) == 3);
   CHECK(m.tree().root() == 3);
@@ -296,7 +296,7 @@ TEST_CASE("A map absorbs another, which hangs on it where the caller says") {
     while (!b.has_keyframe(from)) from = test::any_keyframe(random, b);
     const se3 T = test::random_motion(random);
 
-    const auto offsets = a.append(std::move(b), T, {into, from});
+    const auto offsets = a.append(std::move(b), sim3(T), {into, from});
     REQUIRE(fault_of(a) == "");
     CHECK(a.pose_changes() > a_before.pose_changes());
     CHECK(fault_of(b) == "");  // NOLINT(bugprone-use-after-move): an empty map
@@ -324,10 +324,10 @@ TEST_CASE("A map absorbs another, which hangs on it where the caller says") {
 TEST_CASE("Nothing absorbed changes nothing, and what nothing absorbs is what it was") {
   slam::map m = test::random_map(50, 500);
   const auto count = m.landmark_count();
-  CHECK(m.append(slam::map(8, 1.2), se3{}, {}).keyframes == m.keyframe_end());
+  CHECK(m.append(slam::map(8, 1.2), sim3{}, {}).keyframes == m.keyframe_end());
   CHECK(m.landmark_count() == count);
   slam::map empty(8, 1.2, 3);
-  CHECK(empty.append(std::move(m), se3{}, {}).landmarks == 0);
+  CHECK(empty.append(std::move(m), sim3{}, {}).landmarks == 0);
   CHECK(empty.landmark_count() == count);
   CHECK(fault_of(empty) == "");
 }

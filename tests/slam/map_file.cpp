@@ -35,7 +35,7 @@ TEST_CASE("A map that is written and read is the same map, and stays it whatever
     random_bits random(seed);
     slam::map m = test::random_map(seed, 1200);
     const se3 T = test::random_motion(random);
-    m.transform(T);  // poses with digits
+    m.transform(sim3(T));  // poses with digits
     const std::string bytes = slam::map_bytes(m);
     auto again = parsed(bytes);
     REQUIRE(again.has_value());

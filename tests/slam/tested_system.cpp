@@ -32,7 +32,6 @@ std::optional<slam::shutter_estimate> slam_system::estimated_shutter() const {
 }
 slam::track_state slam_system::state() const { return held_->system.state(); }
 void slam_system::set_initial_pose(std::function<se3()> find) { held_->system.set_initial_pose(std::move(find)); }
-bool slam_system::localizes_only() const { return held_->system.localizes_only(); }
 void slam_system::set_localization_only(bool on) { held_->system.set_localization_only(on); }
 void slam_system::set_initial_pose(const se3& T_world_camera) { held_->system.set_initial_pose(T_world_camera); }
 orbis::trajectory slam_system::trajectory() const { return held_->system.trajectory(); }

@@ -32,7 +32,6 @@ class slam_system {
   slam::track_result track(const camera::rgbd_frame& f);
   void wait() const;
   [[nodiscard]] slam::track_state state() const;
-  [[nodiscard]] bool localizes_only() const;
   void set_localization_only(bool on);
   void set_initial_pose(const se3& T_world_camera);
   void set_initial_pose(std::function<se3()> find);

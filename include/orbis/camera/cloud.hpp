@@ -49,15 +49,6 @@ void for_each_point_of_row(const Depth& depth, const ray_table& rays, int y, con
 
 }  // namespace detail
 
-/// `f(x, y, point)` for every pixel with a valid depth and a ray, in the order of the pixels;
-/// `point` is in the camera frame, metres.
-/// @pre depth and rays have the same size; options.stride > 0
-template <depth_source Depth, std::invocable<int, int, const vec3f&> F>
-void for_each_depth_point(const Depth& depth, const ray_table& rays, F&& f, const unproject_options& options = {}) {
-  assert(depth.width() == rays.width() && depth.height() == rays.height() && options.stride > 0);
-  for (int y = 0; y < rays.height(); y += options.stride) detail::for_each_point_of_row(depth, rays, y, options, f);
-}
-
 /// The points of a depth image, in the world, in the order of their pixels under every policy.
 /// O(width * height / stride^2).
 /// @pre depth and rays have the same size; options.stride > 0

@@ -88,14 +88,68 @@ class shutter_correction {
   /// @pre the images have the size of the camera and do not overlap
   template <depth_source Depth, class T>
   requires std::same_as<T, typename detail::stored_depth<Depth>::type>
-  [[nodiscard]] result<void> depth(const shutter& s, const vec6& twist, const Depth& depth, image_view<T> out);
+  [[nodiscard]] result<void> depth(const shutter& s, const vec6& twist, const Depth& depth, image_view<T> out) {
+    assert(has_size(depth) && has_size(out));
+    const int width = camera_.width(), height = camera_.height();
+    constexpr bool is_view = std::same_as<Depth, depth_view<T>>;
+    double scale = 1.0;
+    if constexpr (is_view) scale = depth.scale();
+    const auto time = detail::row_time::of_depth(s, height);
+    if (auto usable = check(time, twist); !usable) return usable;
+    if (time.is_zero() || !is_needed(s, twist)) {
+      for (int y = 0; y != height; ++y)
+        for (int x = 0; x != width; ++x) {
+          if constexpr (is_view)
+            out(x, y) = depth.pixels()(x, y);
+          else
+            out(x, y) = stored<T>(depth(x, y), scale);
+        }
+      return {};
+    }
+    to_frame_.assign(camera_, time, twist);
+    to_row_.assign(camera_, time, twist);
+    move_depths(depth);
+    const auto read = simd::kernel<detail::read_surface_kernel, detail::read_surface_kernel::signature>();
+    for (int y = 0; y != height; ++y) {
+      find_surfaces(y);
+      to_row_.evaluate(camera_, y, surface_, warped_);
+      read({surface_.size(), width, height, surface_.data(), warped_.x.data(), warped_.y.data(), warped_.ratio.data(),
+            inverse_.data(), metres_.data()});
+      const auto row = out.row(y);
+      for (std::size_t x = 0; x != row.size(); ++x) row[x] = stored<T>(metres_[x], scale);
+    }
+    return {};
+  }
 
   /// The colour image that belongs to a corrected depth image: of each pixel the colour that was read where its point
   /// was seen; of a pixel without depth that of something far away; black where the image does not reach. Without a
   /// motion, or if all rows are of the frame's time, a copy. Errors and preconditions as above. O(pixels).
   template <depth_source Depth>
   [[nodiscard]] result<void> color(const shutter& s, const vec6& twist, const Depth& corrected,
-                                   image_view<const rgb8> color, image_view<rgb8> out);
+                                   image_view<const rgb8> color, image_view<rgb8> out) {
+    assert(has_size(corrected) && has_size(color) && has_size(out));
+    const int width = camera_.width(), height = camera_.height();
+    const auto time = detail::row_time::of_color(s, height);
+    if (auto usable = check(time, twist); !usable) return usable;
+    if (time.is_zero() || !is_needed(s, twist)) {
+      for (int y = 0; y != height; ++y) std::ranges::copy(color.row(y), out.row(y).begin());
+      return {};
+    }
+    to_row_.assign(camera_, time, twist);
+    std::ranges::fill(surface_, 0.0F);
+    const auto stride = static_cast<std::int32_t>(color.stride());
+    const auto pixels_of = simd::kernel<detail::nearest_pixels_kernel, detail::nearest_pixels_kernel::signature>();
+    for (int y = 0; y != height; ++y) {
+      for (int x = 0; x != width; ++x) metres_[static_cast<std::size_t>(x)] = corrected(x, y);
+      for (std::size_t x = 0; x != static_cast<std::size_t>(width); ++x)
+        surface_[x] = detail::inverse_depth_of(metres_[x]);
+      to_row_.evaluate(camera_, y, surface_, warped_);
+      pixels_of({index_.size(), width, height, stride, warped_.x.data(), warped_.y.data(), index_.data()});
+      const auto row = out.row(y);
+      for (std::size_t x = 0; x != row.size(); ++x) row[x] = index_[x] < 0 ? rgb8{} : color.data()[index_[x]];
+    }
+    return {};
+  }
 
   [[nodiscard]] const Camera& camera() const noexcept { return camera_; }
 
@@ -125,10 +179,48 @@ class shutter_correction {
 
   /// Moves each depth to the frame's time, into `nearest_`; and keeps inverse depths in `inverse_`.
   template <class Depth>
-  void move_depths(const Depth& depth);
+  void move_depths(const Depth& depth) {
+    const int width = camera_.width(), height = camera_.height();
+    if (nearest_.width() != width || nearest_.height() != height) {
+      nearest_ = image<float>(width, height);
+      inverse_ = image<float>(width + 2, height + 2);
+    }
+    std::ranges::fill(nearest_.pixels(), no_depth);
+    std::ranges::fill(surface_, 0.0F);
+    const auto pixels_of = simd::kernel<detail::nearest_pixels_kernel, detail::nearest_pixels_kernel::signature>();
+    for (int y = 0; y != height; ++y) {
+      for (int x = 0; x != width; ++x) metres_[static_cast<std::size_t>(x)] = depth(x, y);
+      for (std::size_t x = 0; x != static_cast<std::size_t>(width); ++x)
+        surface_[x] = detail::inverse_depth_of(metres_[x]);
+      std::copy_n(surface_.begin(), width, &inverse_(1, y + 1));
+      to_frame_.evaluate(camera_, y, surface_, warped_);
+      pixels_of({index_.size(), width, height, width, warped_.x.data(), warped_.y.data(), index_.data()});
+      for (std::size_t x = 0; x != static_cast<std::size_t>(width); ++x) {
+        const float moved = metres_[x] * warped_.ratio[x];
+        if (index_[x] < 0 || !(moved > 0.0F) || surface_[x] == 0.0F) continue;
+        float& nearest = nearest_.data()[index_[x]];
+        nearest = std::min(nearest, moved);
+      }
+    }
+  }
   /// The inverse depths of the surfaces that row `y` shows at the frame's time, 0 where there is none. What is
   /// stretched has cracks: these lie between two pixels of one surface.
-  void find_surfaces(int y);
+  void find_surfaces(int y) {
+    const auto row = std::as_const(nearest_).row(y);
+    for (std::size_t x = 0; x != row.size(); ++x)
+      surface_[x] = row[x] < no_depth ? detail::inverse_depth_of(row[x]) : 0.0F;
+    const auto between = [](float a, float b) {
+      const bool is_one = a < no_depth && b < no_depth && std::abs(a - b) <= detail::same_surface * std::min(a, b);
+      return is_one ? detail::inverse_depth_of(0.5F * (a + b)) : 0.0F;
+    };
+    const bool has_both = y > 0 && y + 1 < nearest_.height();
+    for (std::size_t x = 0; x != row.size(); ++x) {
+      if (surface_[x] > 0.0F) continue;
+      if (x > 0 && x + 1 < row.size()) surface_[x] = between(row[x - 1], row[x + 1]);
+      const int column = static_cast<int>(x);
+      if (surface_[x] == 0.0F && has_both) surface_[x] = between(nearest_(column, y - 1), nearest_(column, y + 1));
+    }
+  }
 
   Camera camera_;
   detail::row_warp<Camera> to_frame_, to_row_;
@@ -139,114 +231,5 @@ class shutter_correction {
   std::vector<std::int32_t> index_;
   detail::warped_row warped_;
 };
-
-template <camera_model Camera>
-template <class Depth>
-void shutter_correction<Camera>::move_depths(const Depth& depth) {
-  const int width = camera_.width(), height = camera_.height();
-  if (nearest_.width() != width || nearest_.height() != height) {
-    nearest_ = image<float>(width, height);
-    inverse_ = image<float>(width + 2, height + 2);
-  }
-  std::ranges::fill(nearest_.pixels(), no_depth);
-  std::ranges::fill(surface_, 0.0F);
-  const auto pixels_of = simd::kernel<detail::nearest_pixels_kernel, detail::nearest_pixels_kernel::signature>();
-  for (int y = 0; y != height; ++y) {
-    for (int x = 0; x != width; ++x) metres_[static_cast<std::size_t>(x)] = depth(x, y);
-    for (std::size_t x = 0; x != static_cast<std::size_t>(width); ++x)
-      surface_[x] = detail::inverse_depth_of(metres_[x]);
-    std::copy_n(surface_.begin(), width, &inverse_(1, y + 1));
-    to_frame_.evaluate(camera_, y, surface_, warped_);
-    pixels_of({index_.size(), width, height, width, warped_.x.data(), warped_.y.data(), index_.data()});
-    for (std::size_t x = 0; x != static_cast<std::size_t>(width); ++x) {
-      const float moved = metres_[x] * warped_.ratio[x];
-      if (index_[x] < 0 || !(moved > 0.0F) || surface_[x] == 0.0F) continue;
-      float& nearest = nearest_.data()[index_[x]];
-      nearest = std::min(nearest, moved);
-    }
-  }
-}
-
-template <camera_model Camera>
-void shutter_correction<Camera>::find_surfaces(int y) {
-  const auto row = std::as_const(nearest_).row(y);
-  for (std::size_t x = 0; x != row.size(); ++x)
-    surface_[x] = row[x] < no_depth ? detail::inverse_depth_of(row[x]) : 0.0F;
-  const auto between = [](float a, float b) {
-    const bool is_one = a < no_depth && b < no_depth && std::abs(a - b) <= detail::same_surface * std::min(a, b);
-    return is_one ? detail::inverse_depth_of(0.5F * (a + b)) : 0.0F;
-  };
-  const bool has_both = y > 0 && y + 1 < nearest_.height();
-  for (std::size_t x = 0; x != row.size(); ++x) {
-    if (surface_[x] > 0.0F) continue;
-    if (x > 0 && x + 1 < row.size()) surface_[x] = between(row[x - 1], row[x + 1]);
-    const int column = static_cast<int>(x);
-    if (surface_[x] == 0.0F && has_both) surface_[x] = between(nearest_(column, y - 1), nearest_(column, y + 1));
-  }
-}
-
-template <camera_model Camera>
-template <depth_source Depth, class T>
-requires std::same_as<T, typename detail::stored_depth<Depth>::type> result<void> shutter_correction<Camera>::depth(
-    const shutter& s, const vec6& twist, const Depth& depth, image_view<T> out) {
-  assert(has_size(depth) && has_size(out));
-  const int width = camera_.width(), height = camera_.height();
-  constexpr bool is_view = std::same_as<Depth, depth_view<T>>;
-  double scale = 1.0;
-  if constexpr (is_view) scale = depth.scale();
-  const auto time = detail::row_time::of_depth(s, height);
-  if (auto usable = check(time, twist); !usable) return usable;
-  if (time.is_zero() || !is_needed(s, twist)) {
-    for (int y = 0; y != height; ++y)
-      for (int x = 0; x != width; ++x) {
-        if constexpr (is_view)
-          out(x, y) = depth.pixels()(x, y);
-        else
-          out(x, y) = stored<T>(depth(x, y), scale);
-      }
-    return {};
-  }
-  to_frame_.assign(camera_, time, twist);
-  to_row_.assign(camera_, time, twist);
-  move_depths(depth);
-  const auto read = simd::kernel<detail::read_surface_kernel, detail::read_surface_kernel::signature>();
-  for (int y = 0; y != height; ++y) {
-    find_surfaces(y);
-    to_row_.evaluate(camera_, y, surface_, warped_);
-    read({surface_.size(), width, height, surface_.data(), warped_.x.data(), warped_.y.data(), warped_.ratio.data(),
-          inverse_.data(), metres_.data()});
-    const auto row = out.row(y);
-    for (std::size_t x = 0; x != row.size(); ++x) row[x] = stored<T>(metres_[x], scale);
-  }
-  return {};
-}
-
-template <camera_model Camera>
-template <depth_source Depth>
-result<void> shutter_correction<Camera>::color(const shutter& s, const vec6& twist, const Depth& corrected,
-                                               image_view<const rgb8> color, image_view<rgb8> out) {
-  assert(has_size(corrected) && has_size(color) && has_size(out));
-  const int width = camera_.width(), height = camera_.height();
-  const auto time = detail::row_time::of_color(s, height);
-  if (auto usable = check(time, twist); !usable) return usable;
-  if (time.is_zero() || !is_needed(s, twist)) {
-    for (int y = 0; y != height; ++y) std::ranges::copy(color.row(y), out.row(y).begin());
-    return {};
-  }
-  to_row_.assign(camera_, time, twist);
-  std::ranges::fill(surface_, 0.0F);
-  const auto stride = static_cast<std::int32_t>(color.stride());
-  const auto pixels_of = simd::kernel<detail::nearest_pixels_kernel, detail::nearest_pixels_kernel::signature>();
-  for (int y = 0; y != height; ++y) {
-    for (int x = 0; x != width; ++x) metres_[static_cast<std::size_t>(x)] = corrected(x, y);
-    for (std::size_t x = 0; x != static_cast<std::size_t>(width); ++x)
-      surface_[x] = detail::inverse_depth_of(metres_[x]);
-    to_row_.evaluate(camera_, y, surface_, warped_);
-    pixels_of({index_.size(), width, height, stride, warped_.x.data(), warped_.y.data(), index_.data()});
-    const auto row = out.row(y);
-    for (std::size_t x = 0; x != row.size(); ++x) row[x] = index_[x] < 0 ? rgb8{} : color.data()[index_[x]];
-  }
-  return {};
-}
 
 }  // namespace orbis::camera

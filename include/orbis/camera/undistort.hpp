@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// From a camera with distortion to an ideal one: for pixels and for whole images.
+/// Images of a camera with distortion as an ideal one would have taken them.
 #pragma once
 
 #include <cassert>
@@ -24,20 +24,6 @@ template <class C>
 concept has_intrinsics = camera_model<C> && requires(const C& camera) {
   { camera.k() } -> std::convertible_to<intrinsics>;
 };
-
-/// Where the pinhole `ideal` sees what `camera` sees at `pixel`; empty where `camera` has no ray.
-template <camera_model Camera>
-[[nodiscard]] std::optional<vec2> undistort(const Camera& camera, const vec2& pixel, const pinhole& ideal) {
-  const auto ray = camera.unproject(pixel);
-  return ray ? ideal.project(*ray) : std::nullopt;
-}
-
-/// Where the ideal pinhole with the camera's own size and matrix sees what the camera sees at `pixel`. None where there
-/// is no such pixel.
-template <has_intrinsics Camera>
-[[nodiscard]] std::optional<vec2> undistort(const Camera& camera, const vec2& pixel) {
-  return undistort(camera, pixel, pinhole{camera.k()});
-}
 
 /// Remaps images of a camera to those an ideal pinhole would have taken from the same place. Build
 /// it once, apply it to every frame. 8 bytes for each pixel.

@@ -8,8 +8,8 @@
 /// matrix: no `auto` may hold an expression of Eigen's on it, as in `auto t = (a - b).transpose()`. Other code keeps
 /// Eigen's operators. Operands of which one is an Eigen expression or of dynamic size fall back to Eigen.
 ///
-/// Sums of products run from the first entry to the last, as those of Eigen's vectors of three do; elsewhere the last bits
-/// may differ from its results.
+/// Sums of products run from the first entry to the last, as those of Eigen's vectors of three do; elsewhere the last
+/// bits may differ from its results.
 #pragma once
 
 #include <cmath>
@@ -39,52 +39,14 @@ concept factor_of = std::same_as<T, S> || std::integral<T>;
 template <int Operations>
 inline constexpr bool is_small = Operations <= 64;
 
-// Arithmetic of entries; `entrywise` is one function for each number of entries.
-struct sum_of_two {
-  template <class S>
-  static S of(S a, S b) {
-    return a + b;
-  }
-};
-struct difference_of_two {
-  template <class S>
-  static S of(S a, S b) {
-    return a - b;
-  }
-};
-struct product_of_two {
-  template <class S>
-  static S of(S a, S b) {
-    return a * b;
-  }
-};
-struct quotient_of_two {
-  template <class S>
-  static S of(S a, S b) {
-    return a / b;
-  }
-};
-struct smaller_of_two {
-  template <class S>
-  static S of(S a, S b) {
-    return b < a ? b : a;
-  }
-};
-struct larger_of_two {
-  template <class S>
-  static S of(S a, S b) {
-    return a < b ? b : a;
-  }
-};
-
-/// `out[i] = F::of(a[i], b[i * Step])`. A `Step` of 0 is for a scalar.
-template <int N, int Step, class F, class S>
-inline void entrywise(const S* a, const S* b, S* out) {
+/// `out[i] = f(a[i], b[i * Step])`. A `Step` of 0 is for a scalar.
+template <int N, int Step, class S, class F>
+inline void entrywise(const S* a, const S* b, S* out, F f) {
   if constexpr (N <= 12) {
 #pragma GCC unroll 12
-    for (int i = 0; i < N; ++i) out[i] = F::of(a[i], b[Step * i]);
+    for (int i = 0; i < N; ++i) out[i] = f(a[i], b[Step * i]);
   } else {
-    for (int i = 0; i < N; ++i) out[i] = F::of(a[i], b[Step * i]);
+    for (int i = 0; i < N; ++i) out[i] = f(a[i], b[Step * i]);
   }
 }
 
@@ -139,14 +101,14 @@ template <class S, int R, int C, int O>
 requires(R > 0 && C > 0) [[nodiscard]] inline Eigen::Matrix<S, R, C, O> operator+(
     const Eigen::Matrix<S, R, C, O, R, C>& a, const Eigen::Matrix<S, R, C, O, R, C>& b) {
   Eigen::Matrix<S, R, C, O> out;
-  detail::entrywise<R * C, 1, detail::sum_of_two>(a.data(), b.data(), out.data());
+  detail::entrywise<R * C, 1>(a.data(), b.data(), out.data(), [](S x, S y) { return x + y; });
   return out;
 }
 template <class S, int R, int C, int O>
 requires(R > 0 && C > 0) [[nodiscard]] inline Eigen::Matrix<S, R, C, O> operator-(
     const Eigen::Matrix<S, R, C, O, R, C>& a, const Eigen::Matrix<S, R, C, O, R, C>& b) {
   Eigen::Matrix<S, R, C, O> out;
-  detail::entrywise<R * C, 1, detail::difference_of_two>(a.data(), b.data(), out.data());
+  detail::entrywise<R * C, 1>(a.data(), b.data(), out.data(), [](S x, S y) { return x - y; });
   return out;
 }
 template <class S, int R, int C, int O>
@@ -161,7 +123,7 @@ requires(R > 0 && C > 0) [[nodiscard]] inline Eigen::Matrix<S, R, C, O> operator
     const Eigen::Matrix<S, R, C, O, R, C>& a, T t) {
   Eigen::Matrix<S, R, C, O> out;
   const S s = static_cast<S>(t);
-  detail::entrywise<R * C, 0, detail::product_of_two>(a.data(), &s, out.data());
+  detail::entrywise<R * C, 0>(a.data(), &s, out.data(), [](S x, S y) { return x * y; });
   return out;
 }
 template <class S, int R, int C, int O, detail::factor_of<S> T>
@@ -174,31 +136,31 @@ requires(R > 0 && C > 0) [[nodiscard]] inline Eigen::Matrix<S, R, C, O> operator
     const Eigen::Matrix<S, R, C, O, R, C>& a, T t) {
   Eigen::Matrix<S, R, C, O> out;
   const S s = static_cast<S>(t);
-  detail::entrywise<R * C, 0, detail::quotient_of_two>(a.data(), &s, out.data());
+  detail::entrywise<R * C, 0>(a.data(), &s, out.data(), [](S x, S y) { return x / y; });
   return out;
 }
 template <class S, int R, int C, int O>
 requires(R > 0 && C > 0) inline Eigen::Matrix<S, R, C, O>& operator+=(Eigen::Matrix<S, R, C, O, R, C>& a,
                                                                       const Eigen::Matrix<S, R, C, O, R, C>& b) {
-  detail::entrywise<R * C, 1, detail::sum_of_two>(a.data(), b.data(), a.data());
+  detail::entrywise<R * C, 1>(a.data(), b.data(), a.data(), [](S x, S y) { return x + y; });
   return a;
 }
 template <class S, int R, int C, int O>
 requires(R > 0 && C > 0) inline Eigen::Matrix<S, R, C, O>& operator-=(Eigen::Matrix<S, R, C, O, R, C>& a,
                                                                       const Eigen::Matrix<S, R, C, O, R, C>& b) {
-  detail::entrywise<R * C, 1, detail::difference_of_two>(a.data(), b.data(), a.data());
+  detail::entrywise<R * C, 1>(a.data(), b.data(), a.data(), [](S x, S y) { return x - y; });
   return a;
 }
 template <class S, int R, int C, int O, detail::factor_of<S> T>
 requires(R > 0 && C > 0) inline Eigen::Matrix<S, R, C, O>& operator*=(Eigen::Matrix<S, R, C, O, R, C>& a, T t) {
   const S s = static_cast<S>(t);
-  detail::entrywise<R * C, 0, detail::product_of_two>(a.data(), &s, a.data());
+  detail::entrywise<R * C, 0>(a.data(), &s, a.data(), [](S x, S y) { return x * y; });
   return a;
 }
 template <class S, int R, int C, int O, detail::factor_of<S> T>
 requires(R > 0 && C > 0) inline Eigen::Matrix<S, R, C, O>& operator/=(Eigen::Matrix<S, R, C, O, R, C>& a, T t) {
   const S s = static_cast<S>(t);
-  detail::entrywise<R * C, 0, detail::quotient_of_two>(a.data(), &s, a.data());
+  detail::entrywise<R * C, 0>(a.data(), &s, a.data(), [](S x, S y) { return x / y; });
   return a;
 }
 /// @}
@@ -513,7 +475,7 @@ requires(R > 0 && C > 0)
     [[nodiscard]] inline Eigen::Matrix<S, R, C, O> entrywise_product(const Eigen::Matrix<S, R, C, O, R, C>& a,
                                                                      const Eigen::Matrix<S, R, C, O, R, C>& b) {
   Eigen::Matrix<S, R, C, O> out;
-  detail::entrywise<R * C, 1, detail::product_of_two>(a.data(), b.data(), out.data());
+  detail::entrywise<R * C, 1>(a.data(), b.data(), out.data(), [](S x, S y) { return x * y; });
   return out;
 }
 /// Entry by entry, the smaller value.
@@ -522,7 +484,7 @@ requires(R > 0 && C > 0)
     [[nodiscard]] inline Eigen::Matrix<S, R, C, O> entrywise_min(const Eigen::Matrix<S, R, C, O, R, C>& a,
                                                                  const Eigen::Matrix<S, R, C, O, R, C>& b) {
   Eigen::Matrix<S, R, C, O> out;
-  detail::entrywise<R * C, 1, detail::smaller_of_two>(a.data(), b.data(), out.data());
+  detail::entrywise<R * C, 1>(a.data(), b.data(), out.data(), [](S x, S y) { return y < x ? y : x; });
   return out;
 }
 /// Entry by entry, the larger value.
@@ -531,7 +493,7 @@ requires(R > 0 && C > 0)
     [[nodiscard]] inline Eigen::Matrix<S, R, C, O> entrywise_max(const Eigen::Matrix<S, R, C, O, R, C>& a,
                                                                  const Eigen::Matrix<S, R, C, O, R, C>& b) {
   Eigen::Matrix<S, R, C, O> out;
-  detail::entrywise<R * C, 1, detail::larger_of_two>(a.data(), b.data(), out.data());
+  detail::entrywise<R * C, 1>(a.data(), b.data(), out.data(), [](S x, S y) { return x < y ? y : x; });
   return out;
 }
 /// The same entries as another scalar.

@@ -9,7 +9,6 @@
 #include <concepts>
 #include <cstddef>
 #include <cstdint>
-#include <cstdlib>
 #include <limits>
 #include <optional>
 #include <span>
@@ -28,7 +27,6 @@ struct epipolar_rule {
   float distance = 1.96F;       ///< at the finest level, pixels: 95 % where positions are good to a pixel
   float scale_factor = 1.2F;    ///< of the pyramid: by so much per level of the train the distance grows
   float epipole_radius = 0.0F;  ///< trains so close to the epipole (grows likewise) show no parallax: left out
-  int max_octave_difference = std::numeric_limits<int>::max();  ///< between query and train
 };
 
 /// Finds for each query the nearest and the second nearest of the trains close to its epipolar line: the search for
@@ -37,8 +35,7 @@ struct epipolar_rule {
 ///
 /// @code
 ///   constexpr auto matcher = epipolar(hamming{}, {.epipole_radius = 10.0F}) | ratio_test{0.8f} | cross_check{};
-///   std::vector<match> a = matcher(f1, f2, fundamental_geometry{F});                         // pinhole images
-///   std::vector<match> b = matcher(f1, f2, ray_geometry{rays1, rays2, T_camera2_camera1, focal});  // any camera
+///   std::vector<match> found = matcher(f1, f2, ray_geometry{rays1, rays2, T_camera2_camera1, focal});
 /// @endcode
 ///
 /// The reverse neighbour of a train is the nearest of the queries whose line it lies close to.
@@ -60,8 +57,7 @@ struct epipolar_source {
                                              const feature_view<Descriptor>& /*queries*/,
                                              const feature_view<Descriptor>& /*trains*/, search_needs /*needs*/,
                                              const Other& /*geometry*/) const {
-    static_assert(epipolar_geometry<Other>,
-                  "orbis: epipolar(...) wants an epipolar_geometry, such as fundamental_geometry or ray_geometry");
+    static_assert(epipolar_geometry<Other>, "orbis: epipolar(...) wants an epipolar_geometry, such as ray_geometry");
   }
 
   /// One candidate for each query that has a train close to its line. O(queries x trains) distances to lines.
@@ -74,19 +70,14 @@ struct epipolar_source {
     assert(trains.keypoints.size() == trains.descriptors.size());
     place_trains(memory, trains.keypoints, geometry);
     detail::search_among(distance, candidates, memory.search, queries, trains, needs, [&](std::size_t q, auto&& add) {
-      const keypoint& query = queries.keypoints[q];
-      const std::optional<epipolar_line> line = geometry.line(q, query);
+      const std::optional<epipolar_line> line = geometry.line(q, queries.keypoints[q]);
       if (!line) return;
       for (std::size_t begin = 0; begin < memory.x.size(); begin += block) {
         std::array<std::uint32_t, block> close;
         if (!any_close(*line, memory.x.data() + begin, memory.y.data() + begin, memory.limit.data() + begin, close))
           continue;
-        for (std::size_t i = 0; i != block; ++i) {
-          if (close[i] == 0) continue;
-          const auto t = static_cast<std::uint32_t>(begin + i);
-          const std::int64_t step = std::int64_t{trains.keypoints[t].octave} - query.octave;
-          if (std::abs(step) <= rule.max_octave_difference) add(t);
-        }
+        for (std::size_t i = 0; i != block; ++i)
+          if (close[i] != 0) add(static_cast<std::uint32_t>(begin + i));
       }
     });
   }

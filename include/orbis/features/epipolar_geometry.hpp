@@ -48,36 +48,6 @@ concept epipolar_geometry = requires(const G& geometry, std::size_t i, const key
   return vec2f{static_cast<float>(p.x() / p.z()), static_cast<float>(p.y() / p.z())};
 }
 
-/// Two pinhole images, by their fundamental matrix: `x_train^T F x_query = 0` for matching pixels.
-class fundamental_geometry {
- public:
-  explicit fundamental_geometry(const mat3& F) : F_{F} {
-    // The epipole is orthogonal to every column; the two that span most give it best.
-    for (int i = 0; i != 3; ++i) {
-      const vec3 normal = cross(column_of(F, i), column_of(F, (i + 1) % 3));
-      if (norm(normal) > norm(epipole_)) epipole_ = normal;
-    }
-  }
-  /// From the intrinsic matrices (pixels) and the pose of the query's camera in the train's.
-  fundamental_geometry(const mat3& K_query, const mat3& K_train, const se3& T_train_query);
-
-  [[nodiscard]] std::optional<epipolar_line> line(std::size_t, const keypoint& k) const noexcept {
-    return line_of(F_ * vec3{k.x, k.y, 1.0});
-  }
-  [[nodiscard]] vec2f point(std::size_t, const keypoint& k) const noexcept { return {k.x, k.y}; }
-  [[nodiscard]] std::optional<vec2f> epipole() const noexcept { return pixel_of(epipole_); }
-  [[nodiscard]] const mat3& matrix() const noexcept { return F_; }
-
-  /// `[t]x R`: `r_train^T E r_query = 0` for the rays of matching keypoints.
-  [[nodiscard]] static mat3 essential(const se3& T_train_query) {
-    return hat(T_train_query.translation()) * T_train_query.rotation_matrix();
-  }
-
- private:
-  mat3 F_;
-  vec3 epipole_ = zeros<vec3>();
-};
-
 /// Two images of any central camera, by the rays through their keypoints: lines and points are of
 /// the plane z = 1 of the train's camera, in pixels of a pinhole camera with this focal length.
 /// Refers to the rays; one that is NaN, or does not point forward, has no match.
@@ -88,7 +58,7 @@ class ray_geometry {
                double focal)
       : query_rays_{query_rays},
         train_rays_{train_rays},
-        E_{fundamental_geometry::essential(T_train_query)},
+        E_{hat(T_train_query.translation()) * T_train_query.rotation_matrix()},
         centre_{T_train_query.translation()},
         focal_{focal} {
     assert(focal > 0.0);
@@ -114,10 +84,6 @@ class ray_geometry {
   double focal_;
 };
 
-static_assert(epipolar_geometry<fundamental_geometry> && epipolar_geometry<ray_geometry>);
+static_assert(epipolar_geometry<ray_geometry>);
 
 }  // namespace orbis::features
-
-#ifndef ORBIS_COMPILED
-#include <orbis/features/epipolar_geometry-inl.hpp>
-#endif

@@ -7,8 +7,8 @@
 /// | `feature_extractor` | finds and describes the keypoints of an image | `orb_extractor` |
 /// | `pyramid_extractor` | hands out the image pyramid as well | `orb_extractor` |
 /// | `corner_detector` | finds the corners of a pyramid level | `fast9` |
-/// | `corner_selection` | chooses among the corners of all levels | `cover_first`, `strongest` |
-/// | `orientation_estimator` | gives a keypoint its direction | `intensity_centroid`, `upright` |
+/// | `corner_selection` | chooses among the corners of all levels | `cover_first` |
+/// | `orientation_estimator` | gives a keypoint its direction | `intensity_centroid` |
 /// | `patch_descriptor` | describes the pixels around a keypoint | `steered_brief` |
 #pragma once
 
@@ -77,9 +77,6 @@ struct corner {
 struct region {
   int x = 0, y = 0, width = 0, height = 0;
   [[nodiscard]] constexpr bool empty() const noexcept { return width <= 0 || height <= 0; }
-  [[nodiscard]] constexpr bool contains(int px, int py) const noexcept {
-    return px >= x && py >= y && std::int64_t{px} - x < width && std::int64_t{py} - y < height;
-  }
   friend constexpr bool operator==(const region&, const region&) = default;
 };
 

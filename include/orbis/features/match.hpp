@@ -96,59 +96,32 @@ template <class Part>
 using workspace_of = typename detail::workspace_of_part<Part>::type;
 
 /// The first part of a matcher. It gives the candidates in ascending order of their query, at most one for
-/// each, by `search(candidates, workspace, queries, trains, needs, where...)`, or where memory does not matter by
-/// `search(queries, trains, needs, where...)`, which returns them.
+/// each, by `search(candidates, workspace, queries, trains, needs, where...)`.
 template <class S>
 concept match_source = requires {
   typename S::match_source_tag;
 };
 
-/// A source that searches among descriptors of this type, in a workspace.
+/// A source that searches among descriptors of this type. `Where` are its further arguments, e.g. the windows of
+/// `windowed`.
 template <class S, class Descriptor, class... Where>
-concept searches_in_place = match_source<S> &&
+concept searches = match_source<S> &&
     requires(const S& source, std::vector<candidate>& candidates, workspace_of<S>& memory,
              const feature_view<Descriptor>& view, search_needs needs, const Where&... where) {
   source.search(candidates, memory, view, view, needs, where...);
 };
 
-/// A source that searches among descriptors of this type. `Where` are its further arguments, e.g. the windows of
-/// `windowed`.
-template <class S, class Descriptor, class... Where>
-concept searches = searches_in_place<S, Descriptor, Where...> ||
-    (match_source<S>&& requires(const S& source, const feature_view<Descriptor>& view, search_needs needs,
-                                const Where&... where) {
-      { source.search(view, view, needs, where...) } -> std::same_as<std::vector<candidate>>;
-    });
-
-/// The candidates that a source finds, in memory of its own.
-template <match_source Source, class Descriptor, class... Where>
-requires searches<Source, Descriptor, Where...>
-[[nodiscard]] std::vector<candidate> candidates_of(const Source& source, const feature_view<Descriptor>& queries,
-                                                   const feature_view<Descriptor>& trains, search_needs needs,
-                                                   const Where&... where) {
-  if constexpr (searches_in_place<Source, Descriptor, Where...>) {
-    std::vector<candidate> candidates;
-    workspace_of<Source> memory;
-    source.search(candidates, memory, queries, trains, needs, where...);
-    return candidates;
-  } else {
-    return source.search(queries, trains, needs, where...);
-  }
-}
-
 /// A stage that judges each candidate on its own: any callable `bool(const candidate&)`.
 template <class S>
 concept match_predicate = std::predicate<const S&, const candidate&>;
 
-/// A stage that judges the candidates together, with the keypoints (empty if the caller gave none):
-/// any callable `void(std::vector<candidate>&, std::span<const keypoint>, std::span<const keypoint>)`
-/// that erases what it rejects and keeps the order. It may take its `workspace` as fourth argument.
+/// A stage that judges the candidates together, with the keypoints (empty if the caller gave none): any callable
+/// `void(std::vector<candidate>&, std::span<const keypoint>, std::span<const keypoint>, workspace_of<S>&)` that erases
+/// what it rejects and keeps the order.
 template <class S>
 concept match_filter = std::invocable < const S&,
         std::vector<candidate>
-&, std::span<const keypoint>,
-    std::span < const keypoint >> || std::invocable<const S&, std::vector<candidate>&, std::span<const keypoint>,
-                                                    std::span<const keypoint>, workspace_of<S>&>;
+&, std::span<const keypoint>, std::span<const keypoint>, workspace_of<S>& > ;
 
 /// Any stage. It may ask for more than the nearest neighbour with a static member `needs`.
 template <class S>

@@ -73,11 +73,7 @@ class match_chain {
     if constexpr (needs.keypoints) {
       assert(q.keypoints.size() == q.descriptors.size() && t.keypoints.size() == t.descriptors.size());
     }
-    if constexpr (searches_in_place<Source, descriptor_of<Queries>, Where...>) {
-      source_.search(memory.candidates, memory.source, q, t, needs, where...);
-    } else {
-      memory.candidates = source_.search(q, t, needs, where...);
-    }
+    source_.search(memory.candidates, memory.source, q, t, needs, where...);
     run_all(memory, q.keypoints, t.keypoints, std::index_sequence_for<Stages...>{});
 
     matches.clear();
@@ -102,11 +98,8 @@ class match_chain {
                   std::span<const keypoint> trains, workspace_of<Stage>& memory) {
     if constexpr (match_predicate<Stage>) {
       std::erase_if(candidates, [&](const candidate& c) { return !stage(c); });
-    } else if constexpr (std::invocable<const Stage&, std::vector<candidate>&, std::span<const keypoint>,
-                                        std::span<const keypoint>, workspace_of<Stage>&>) {
-      stage(candidates, queries, trains, memory);
     } else {
-      stage(candidates, queries, trains);
+      stage(candidates, queries, trains, memory);
     }
   }
 

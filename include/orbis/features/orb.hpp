@@ -23,13 +23,12 @@
 
 namespace orbis::features {
 
-/// The parts of `orb_extractor` and those that can stand in for them; see `extractor.hpp` for the concepts.
+/// The parts of `orb_extractor`; see `extractor.hpp` for the concepts of others that can stand in for them.
 /// - `fast9` finds FAST-9/16 corners;
-/// - `cover_first` chooses corners that cover the image, then the strongest; `strongest` the strongest of each level;
-/// - `intensity_centroid` turns keypoints towards the centre of brightness; `upright` does not turn them;
+/// - `cover_first` chooses corners that cover the image, then the strongest;
+/// - `intensity_centroid` turns keypoints towards the centre of brightness;
 /// - `steered_brief` describes keypoints by ORB's pattern, turned to their direction.
-using detail::fast9, detail::cover_first, detail::strongest, detail::intensity_centroid, detail::upright,
-    detail::steered_brief;
+using detail::fast9, detail::cover_first, detail::intensity_centroid, detail::steered_brief;
 
 /// Options of an ORB extractor.
 struct orb_options {
@@ -69,30 +68,28 @@ class basic_orb_extractor {
 
   [[nodiscard]] const orb_options& options() const noexcept { return options_; }
 
-  /// The features of a grey image, ordered by level, then from top to bottom. `mask`: empty, or of the image's
-  /// size, 0 where no keypoint may lie. `regions`: empty, or the only places where keypoints may lie; they may
-  /// overlap and reach beyond the image. An image with a side of less than 2 `border` + 1 pixels
-  /// (39 by default) has no features. O(pixels + features).
-  [[nodiscard]] features_type operator()(image_view<const std::uint8_t> image, image_view<const std::uint8_t> mask = {},
-                                         std::span<const region> regions = {}) const;
-
-  /// The features of the luma of a colour image (`luma`); the rest as for a grey image.
-  [[nodiscard]] features_type operator()(image_view<const rgb8> image, image_view<const std::uint8_t> mask = {},
-                                         std::span<const region> regions = {}) const;
-
+  /// The features of a grey image, ordered by level, then from top to bottom. An image with a side of less than
+  /// 2 `border` + 1 pixels (39 by default) has no features. O(pixels + features).
+  [[nodiscard]] features_type operator()(image_view<const std::uint8_t> image) const {
+    features_type found;
+    into(found, image);
+    return found;
+  }
+  /// The features of the luma of a colour image (`luma`).
+  [[nodiscard]] features_type operator()(image_view<const rgb8> image) const {
+    features_type found;
+    into(found, image);
+    return found;
+  }
   /// Deleted: make 8 bits of a 16-bit image by `narrow` first, which needs its range of values.
-  features_type operator()(image_view<const std::uint16_t> image, image_view<const std::uint8_t> mask = {},
-                           std::span<const region> regions = {}) const = delete;
+  features_type operator()(image_view<const std::uint16_t> image) const = delete;
 
   /// Replaces the contents of `found` by the features of an image. Allocates nothing once an image of this size with as
   /// many corners has been seen.
-  void into(features_type& found, image_view<const std::uint8_t> image, image_view<const std::uint8_t> mask = {},
-            std::span<const region> regions = {}) const;
+  void into(features_type& found, image_view<const std::uint8_t> image) const;
+  void into(features_type& found, image_view<const rgb8> image) const;
   /// As above, with the image's pyramid left in `pyramid` for others to use: a keypoint's octave is its level there.
-  void into(features_type& found, image_pyramid& pyramid, image_view<const std::uint8_t> image,
-            image_view<const std::uint8_t> mask = {}, std::span<const region> regions = {}) const;
-  void into(features_type& found, image_view<const rgb8> image, image_view<const std::uint8_t> mask = {},
-            std::span<const region> regions = {}) const;
+  void into(features_type& found, image_pyramid& pyramid, image_view<const std::uint8_t> image) const;
 
  private:
   struct workspace {
@@ -104,13 +101,8 @@ class basic_orb_extractor {
     typename Descriptor::workspace descriptor;
   };
 
-  void extract(features_type& found, workspace& memory, image_pyramid& pyramid, image_view<const std::uint8_t> image,
-               image_view<const std::uint8_t> mask, std::span<const region> regions) const;
-  [[nodiscard]] static region area_of(image_view<const std::uint8_t> level, image_view<const std::uint8_t> image,
-                                      std::span<const region> regions);
-  static void drop_unwanted(std::vector<corner>& corners, image_view<const std::uint8_t> level,
-                            image_view<const std::uint8_t> image, image_view<const std::uint8_t> mask,
-                            std::span<const region> regions);
+  void extract(features_type& found, workspace& memory, image_pyramid& pyramid,
+               image_view<const std::uint8_t> image) const;
   void describe(features_type& found, workspace& memory, image_view<const std::uint8_t> level, int octave,
                 image_view<const std::uint8_t> image) const;
 

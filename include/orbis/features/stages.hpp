@@ -56,11 +56,6 @@ struct unique {
       return false;
     });
   }
-  void operator()(std::vector<candidate>& candidates, std::span<const keypoint> queries,
-                  std::span<const keypoint> trains) const {
-    workspace memory;
-    (*this)(candidates, queries, trains, memory);
-  }
 };
 
 /// Keeps the candidates whose change of orientation is among the most frequent: between two images
@@ -103,11 +98,6 @@ struct rotation_consistency {
     for (std::size_t i = 0; i != order.size() && static_cast<int>(i) < peaks; ++i)
       kept[order[i]] = static_cast<float>(counts[order[i]]) >= floor ? 1 : 0;
     std::erase_if(candidates, [&](const candidate& c) { return memory.kept[bin_of(c)] == 0; });
-  }
-  void operator()(std::vector<candidate>& candidates, std::span<const keypoint> queries,
-                  std::span<const keypoint> trains) const {
-    workspace memory;
-    (*this)(candidates, queries, trains, memory);
   }
 };
 

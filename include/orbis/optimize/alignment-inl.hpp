@@ -70,12 +70,7 @@ class alignment_estimator {
     else
       return made_of(se3(found->rotation(), found->translation()));
   }
-  struct candidates {
-    std::optional<model> found;
-    [[nodiscard]] const model* begin() const noexcept { return found ? &*found : nullptr; }
-    [[nodiscard]] const model* end() const noexcept { return found ? &*found + 1 : nullptr; }
-  };
-  [[nodiscard]] candidates fit(const std::array<std::uint32_t, 3>& sample) const { return {fit_to(sample)}; }
+  [[nodiscard]] one_or_none<model> fit(const std::array<std::uint32_t, 3>& sample) const { return {fit_to(sample)}; }
   [[nodiscard]] std::optional<model> refine(const model&, std::span<const std::uint32_t> inliers) const {
     return fit_to(inliers);
   }
@@ -185,7 +180,7 @@ result<alignment_estimate<Transform>> alignment_of(std::span<const vec3> from, s
   shuffle(pairs, random);
 
   const estimator_type estimator(std::move(pairs));
-  auto found = ransac(estimator, asked, ransac_policies{msac{}, uniform_sampling{}, sprt{}, iterated_refinement{}});
+  auto found = ransac(estimator, asked);
   if (!found) {
     if (found.error().code == errc::degenerate)
       for (const mat3& s : {spread, spread_to}) {

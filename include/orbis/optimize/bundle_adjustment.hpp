@@ -29,11 +29,11 @@ template <class Damping>
   if constexpr (std::same_as<Damping, levenberg_marquardt>) damping.initial = 1e-4;
   return damping;
 }
-template <class Residual, class Loss, class Damping, class ReducedSolver>
+template <class Residual, class Loss, class Damping>
 class bundle_solver;
 }  // namespace detail
 
-/// A solver made of a residual, a robust loss, a damping policy and a solver of the reduced system, each a type:
+/// A solver made of a residual, a robust loss and a damping policy, each a type:
 ///
 /// @code
 ///   bundle_adjuster ba{reprojection{camera}, huber{2.45}};
@@ -42,13 +42,12 @@ class bundle_solver;
 ///
 /// The points are eliminated by the Schur complement. One step costs O(observations + sum over the points of the square
 /// of the number of cameras that see them), and the solution of the reduced system of the cameras. Keeps its memory: a
-/// second problem of the same size allocates nothing (with `orbis::seq` and a dense or iterative reduced solver). Every
-/// policy, number of threads and instruction set gives the same bits. Not thread-safe.
+/// second problem of the same size allocates nothing (with `orbis::seq`, unless its reduced system is factored as a
+/// sparse one). Every policy, number of threads and instruction set gives the same bits. Not thread-safe.
 ///
 /// The library orbis::compiled holds it for `reprojection` of `camera::pinhole` and `camera::any_camera` with the
 /// default loss and policies and without a report; for anything else, its users include bundle_adjustment-inl.hpp.
-template <bundle_residual Residual, robust_loss Loss = huber, general_damping_policy Damping = levenberg_marquardt,
-          reduced_solver ReducedSolver = automatic_reduced_solver>
+template <bundle_residual Residual, robust_loss Loss = huber, damping_policy Damping = levenberg_marquardt>
 class bundle_adjuster {
  public:
   using camera_state = typename Residual::camera_state;
@@ -56,7 +55,7 @@ class bundle_adjuster {
 
   explicit bundle_adjuster(Residual residual, Loss loss = Loss{},
                            Damping damping = detail::default_bundle_damping<Damping>(),
-                           ReducedSolver reduced = ReducedSolver{});
+                           const reduced_solver_options& reduced = {});
 
   /// The chi-squared error of an observation: `information` times the squared norm of its residual; infinite without a
   /// projection.
@@ -88,17 +87,8 @@ class bundle_adjuster {
                              const bundle_options& options = {}, progress callback = {}, Report&& report = {});
 
  private:
-  detail::boxed<detail::bundle_solver<Residual, Loss, Damping, ReducedSolver>> solver_;
+  detail::boxed<detail::bundle_solver<Residual, Loss, Damping>> solver_;
 };
-
-template <class Residual>
-bundle_adjuster(Residual) -> bundle_adjuster<Residual>;
-template <class Residual, class Loss>
-bundle_adjuster(Residual, Loss) -> bundle_adjuster<Residual, Loss>;
-template <class Residual, class Loss, class Damping>
-bundle_adjuster(Residual, Loss, Damping) -> bundle_adjuster<Residual, Loss, Damping>;
-template <class Residual, class Loss, class Damping, class ReducedSolver>
-bundle_adjuster(Residual, Loss, Damping, ReducedSolver) -> bundle_adjuster<Residual, Loss, Damping, ReducedSolver>;
 
 }  // namespace orbis::optimize
 

@@ -10,22 +10,10 @@
 #include <utility>
 
 #include <orbis/camera/pinhole.hpp>
-#include <orbis/core/inline.hpp>
-#include <orbis/optimize/detail/minimal/p3p_equations.hpp>
 #include <orbis/optimize/detail/minimal/pnp_estimator.hpp>
 #include <orbis/optimize/pnp.hpp>
 
 namespace orbis::optimize {
-
-ORBIS_INLINE p3p_solutions p3p(const std::array<vec3, 3>& points_world, const std::array<vec3, 3>& rays) {
-  p3p_solutions solutions;
-  detail::for_each_p3p(points_world, {normalized(vec3(rays[0])), normalized(vec3(rays[1])), normalized(vec3(rays[2]))},
-                       [&](const mat3& rotation, const vec3& translation) {
-                         const se3 pose = se3(so3(rotation), translation).inverse();
-                         if (all_finite(pose.translation())) solutions.push_back(pose);
-                       });
-  return solutions;
-}
 
 template <camera::camera_model Camera>
 result<pose_estimate> estimate_pose(std::span<const vec3> points_world, std::span<const vec2> pixels,
@@ -46,8 +34,7 @@ result<pose_estimate> estimate_pose(std::span<const vec3> points_world, std::spa
                     " are finite and in the camera's view, three are needed");
   using estimator_type = detail::pnp_estimator<detail::pnp_matches>;
   const estimator_type estimator(matches);
-  const result<ransac_estimate<estimator_type::model>> found = ransac(
-      estimator, asked, ransac_policies{msac{}, uniform_sampling{}, sprt{}, iterated_refinement{}}, workspace.ransac);
+  const result<ransac_estimate<estimator_type::model>> found = ransac(estimator, asked, workspace.ransac);
   if (!found) {
     if (found.error().code != errc::degenerate) return fail(found.error());
     const std::string why = detail::pnp_degeneracy(matches);

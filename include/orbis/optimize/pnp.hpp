@@ -2,7 +2,7 @@
 /// @file
 /// Perspective-n-point: the camera pose from known points and their pixels, many of which may be wrongly matched.
 ///
-/// Sources: M. Fischler, R. Bolles, CACM 24 (1981) for P3P in RANSAC; `ransac_policies.hpp` names those of the parts.
+/// Sources: M. Fischler, R. Bolles, CACM 24 (1981) for P3P in RANSAC; `ransac.hpp` names those of its parts.
 #pragma once
 
 #include <array>
@@ -19,28 +19,6 @@
 #include <orbis/optimize/ransac.hpp>
 
 namespace orbis::optimize {
-
-/// Up to four poses `T_world_camera`, a range.
-class p3p_solutions {
- public:
-  [[nodiscard]] std::size_t size() const noexcept { return size_; }
-  [[nodiscard]] bool empty() const noexcept { return size_ == 0; }
-  [[nodiscard]] const se3& operator[](std::size_t i) const noexcept { return poses_[i]; }
-  [[nodiscard]] const se3* begin() const noexcept { return poses_.data(); }
-  [[nodiscard]] const se3* end() const noexcept { return poses_.data() + size_; }
-  void push_back(const se3& pose) noexcept {
-    if (size_ < poses_.size()) poses_[size_++] = pose;
-  }
-
- private:
-  std::array<se3, 4> poses_;
-  std::size_t size_ = 0;
-};
-
-/// Perspective three-point: all poses `T_world_camera` from which `points_world[i]` (metres) lies on the ray `rays[i]`
-/// (camera frame, of any positive length), in front of the camera. Empty if the points are collinear or anything is not
-/// finite. Constant time, no allocation. Source: see `detail/minimal/p3p_equations.hpp`.
-[[nodiscard]] p3p_solutions p3p(const std::array<vec3, 3>& points_world, const std::array<vec3, 3>& rays);
 
 struct pnp_options {
   double threshold = 3.0;  ///< largest reprojection error of an inlier, pixels

@@ -15,7 +15,6 @@
 
 #include <orbis/optimize/detail/pose/pose_graph_equations.hpp>
 #include <orbis/optimize/pose_graph.hpp>
-#include <orbis/optimize/solver_policies-inl.hpp>
 
 namespace orbis::optimize {
 namespace detail {
@@ -65,9 +64,11 @@ class pose_graph_descent {
       ++summary.factorizations;
       return equations.factor(damping);
     }
-    void solve(Eigen::VectorXd& x) {
+    void newton_step(Eigen::VectorXd& out) {
       const stage_watch watch{summary.seconds.solve};
-      equations.solve(x);
+      const Eigen::VectorXd& g = gradient();
+      set_each(out, g.size(), [&](Eigen::Index i) { return -g[i]; });
+      equations.solve(out);
     }
     [[nodiscard]] double try_step(const Eigen::VectorXd& step) {
       const stage_watch watch{summary.seconds.evaluate};
@@ -126,11 +127,11 @@ class pose_graph_descent {
 
 }  // namespace detail
 
-template <class T, robust_loss Loss, general_damping_policy Damping, between_factor<T> Between>
+template <class T, robust_loss Loss, damping_policy Damping, between_factor<T> Between>
 pose_graph_solver<T, Loss, Damping, Between>::pose_graph_solver(Loss loss, Damping damping, Between between)
     : descent_{detail::pose_graph_descent<T, Loss, Damping, Between>{loss, damping, between}} {}
 
-template <class T, robust_loss Loss, general_damping_policy Damping, between_factor<T> Between>
+template <class T, robust_loss Loss, damping_policy Damping, between_factor<T> Between>
 template <class Policy, class Edge, class Report>
 pose_graph_summary pose_graph_solver<T, Loss, Damping, Between>::solve_edges(const Policy& policy,
                                                                              std::span<T> vertices,

@@ -7,8 +7,10 @@
 /// 2010.
 #pragma once
 
+#include <concepts>
 #include <ranges>
 #include <span>
+#include <type_traits>
 
 #include <orbis/core/execution.hpp>
 #include <orbis/core/se3.hpp>
@@ -22,15 +24,7 @@ namespace orbis::optimize {
 
 /// The residual that graphs of `T` are solved with by default. For `se3` it is that of g2o.
 template <class T>
-struct default_between {
-  using type = logarithm_between<T>;
-};
-template <>
-struct default_between<se3> {
-  using type = quaternion_between;
-};
-template <class T>
-using default_between_t = typename default_between<T>::type;
+using default_between_t = std::conditional_t<std::same_as<T, se3>, quaternion_between, logarithm_between<T>>;
 
 namespace detail {
 template <class T, class Loss, class Damping, class Between>
@@ -43,7 +37,7 @@ class pose_graph_descent;
 ///
 /// The library orbis::compiled holds it for graphs of `se3` with the default policies and `pose_graph_edge`, without a
 /// report; for anything else, its users include pose_graph-inl.hpp.
-template <class T, robust_loss Loss = trivial, general_damping_policy Damping = dogleg,
+template <class T, robust_loss Loss = trivial, damping_policy Damping = dogleg,
           between_factor<T> Between = default_between_t<T>>
 class pose_graph_solver {
  public:
@@ -72,18 +66,6 @@ class pose_graph_solver {
 
   detail::boxed<detail::pose_graph_descent<T, Loss, Damping, Between>> descent_;
 };
-
-/// Solves a pose graph once, with a solver that is made for it; see `pose_graph_solver::solve`.
-template <execution_policy Policy, std::ranges::contiguous_range Vertices, std::ranges::contiguous_range Edges,
-          robust_loss Loss = trivial, general_damping_policy Damping = dogleg>
-pose_graph_summary solve_pose_graph(const Policy& policy, Vertices&& vertices, const Edges& edges,
-                                    const pose_graph_options& options = {}, progress callback = {},
-                                    const Loss& loss = {}, const Damping& damping = {}) {
-  using pose = std::ranges::range_value_t<Vertices>;
-  pose_graph_solver<pose, Loss, Damping> solver{loss, damping};
-  return solver.solve(policy, std::span<pose>{std::ranges::data(vertices), std::ranges::size(vertices)}, edges, options,
-                      callback);
-}
 
 }  // namespace orbis::optimize
 

@@ -7,7 +7,6 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <type_traits>
 #include <utility>
 
 #include <orbis/core/small_cholesky.hpp>
@@ -81,10 +80,6 @@ class pose_pieces {
   pose_lanes lanes_;
 };
 
-}  // namespace detail
-
-namespace detail {
-
 struct pose_normal_equations {
   mat6 h;  ///< the lower triangle
   vec6 g;
@@ -106,8 +101,7 @@ class pose_refiner {
         pieces_{observations, outliers} {}
 
   /// Steps until a step lowers the cost by less than the fraction `enough`.
-  template <class Loss>
-  [[nodiscard]] refinement_status run_round(const Loss& loss, double enough) {
+  [[nodiscard]] refinement_status run_round(const huber& loss, double enough) {
     double lambda = 1e-6;
     pose_normal_equations now = linearize(T_camera_world_, loss);
     for (int k = 0; k < options_.iterations; ++k) {
@@ -174,11 +168,10 @@ class pose_refiner {
     return {pose.rotation_matrix(), pose.translation(), bf_, options_.gate_depth};
   }
 
-  template <class Loss>
-  [[nodiscard]] pose_normal_equations linearize(const se3& pose, const Loss& loss) {
+  [[nodiscard]] pose_normal_equations linearize(const se3& pose, const huber& loss) {
     pose_normal_equations e{zeros<mat6>(), zeros<vec6>(), 0.0};
     const pose_at at = at_pose(pose);
-    auto* const sum = sum_pose_function<Camera, Loss>();
+    auto* const sum = sum_pose_function<Camera>();
     pieces_.for_each([&](const pose_lanes& lanes, std::size_t, std::size_t, std::size_t padded) {
       pose_sums s;
       sum(lanes, padded, camera_, at, loss, s);
@@ -206,20 +199,10 @@ class pose_refiner {
   int steps_ = 0;
 };
 
-/// Least squares; for Huber's loss by one whose width has no bound, which gives the same bits and needs no kernel of
-/// its own.
-template <class Loss>
-[[nodiscard]] auto without_robustness(const Loss&) {
-  if constexpr (std::is_same_v<Loss, huber>)
-    return huber{std::numeric_limits<double>::infinity()};
-  else
-    return trivial{};
-}
-
-template <class Camera, class Loss>
+template <class Camera>
 pose_refinement refine_pose(std::span<const pose_observation> observations, const Camera& camera, double bf,
                             const se3& T_world_camera, std::span<std::uint8_t> outliers,
-                            const pose_refinement_options& options, const Loss& loss) {
+                            const pose_refinement_options& options, const huber& loss) {
   pose_refinement out;
   out.T_world_camera = T_world_camera;
   const auto give_up = [&](refinement_status status) {
@@ -240,8 +223,8 @@ pose_refinement refine_pose(std::span<const pose_observation> observations, cons
   bool changed = true;
   for (int round = 0; round < options.rounds; ++round) {
     const bool last = round + 1 == options.rounds;
-    if (last)
-      out.status = refiner.run_round(without_robustness(loss), 1e-9);
+    if (last)  // least squares: a width without a bound gives its bits
+      out.status = refiner.run_round(huber{std::numeric_limits<double>::infinity()}, 1e-9);
     else if (changed || out.status != refinement_status::converged)
       out.status = refiner.run_round(loss, 1e-6);  // it only has to tell the outliers
     else

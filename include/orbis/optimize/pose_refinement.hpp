@@ -67,24 +67,23 @@ concept holds_a_model = requires(const Camera& camera) {
   {camera.visit([](const auto&) {})};
 };
 
-template <class Camera, class Loss>
+template <class Camera>
 [[nodiscard]] pose_refinement refine_pose(std::span<const pose_observation> observations, const Camera& camera,
                                           double bf, const se3& T_world_camera, std::span<std::uint8_t> outliers,
-                                          const pose_refinement_options& options, const Loss& loss);
+                                          const pose_refinement_options& options, const huber& loss);
 
 }  // namespace detail
 
 /// Refines `T_world_camera`, starting there, and writes for each observation whether it is an outlier (1) or not (0).
 /// Observations that are not finite, have no information or no projection are outliers. O(observations) for each step.
 /// Every instruction set gives the same bits. The camera models of the library are faster than models of your own. The
-/// library orbis::compiled holds it for these models and `huber`; for others, its users include
-/// pose_refinement-inl.hpp.
+/// library orbis::compiled holds it for these models; for others, its users include pose_refinement-inl.hpp.
 /// @pre outliers.size() == observations.size()
-template <camera::camera_model Camera, robust_loss Loss = huber>
+template <camera::camera_model Camera>
 [[nodiscard]] pose_refinement refine_pose(std::span<const pose_observation> observations,
                                           const reprojection<Camera>& model, const se3& T_world_camera,
                                           std::span<std::uint8_t> outliers, const pose_refinement_options& options = {},
-                                          const Loss& loss = Loss{2.447}) {
+                                          const huber& loss = {2.447}) {
   assert(outliers.size() == observations.size());
   const auto refine = [&](const auto& camera) {
     return detail::refine_pose(observations, camera, model.bf, T_world_camera, outliers, options, loss);

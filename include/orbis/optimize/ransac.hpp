@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// RANSAC for any model. Deterministic by seed; scoring, order of samples, preemption and local optimisation are
-/// policies (see `ransac_policies.hpp`).
+/// RANSAC for any model, deterministic by seed: models are scored by the truncated squared error, and each new best one
+/// is refined on its inliers.
 ///
-/// Sources: M. Fischler, R. Bolles, CACM 24 (1981); R. Raguram et al., "USAC: a universal framework for random sample
-/// consensus", PAMI 35 (2013), for the parts and how they go together.
+/// Sources: M. Fischler, R. Bolles, CACM 24 (1981); P. Torr, A. Zisserman, "MLESAC", CVIU 78 (2000), for the score;
+/// J. Matas, O. Chum, "Randomized RANSAC with sequential probability ratio test", ICCV 2005; R. Raguram et al., "USAC:
+/// a universal framework for random sample consensus", PAMI 35 (2013), for the parts and how they go together.
 #pragma once
 
 #include <algorithm>
@@ -22,7 +23,6 @@
 
 #include <orbis/core/random.hpp>
 #include <orbis/core/result.hpp>
-#include <orbis/optimize/ransac_policies.hpp>
 
 namespace orbis::optimize {
 
@@ -32,11 +32,9 @@ namespace orbis::optimize {
 /// - `size()`: the number of data.
 /// - `fit(sample)`: a range of candidate models from `sample_size` data; empty where these are degenerate.
 /// - `squared_error(model, i)`: the squared error of datum `i`, in squared units of the threshold; infinite or NaN if
-/// it
-///   has none.
+///   it has none.
 /// - `refine(model, inliers)`: a better model from many data, starting at `model`; empty if that fails. Return the
-/// model
-///   itself to go without local optimisation.
+///   model itself to go without refinement.
 template <class E>
 concept model_estimator = requires(const E& estimator, const typename E::model& model,
                                    std::span<const std::uint32_t> indices, std::size_t i,
@@ -46,6 +44,14 @@ concept model_estimator = requires(const E& estimator, const typename E::model& 
   { *estimator.fit(sample).begin() } -> std::convertible_to<typename E::model>;
   { estimator.squared_error(model, i) } -> std::convertible_to<double>;
   { estimator.refine(model, indices) } -> std::same_as<std::optional<typename E::model>>;
+};
+
+/// What `fit` may return where a sample determines one model at most.
+template <class Model>
+struct one_or_none {
+  std::optional<Model> found;
+  [[nodiscard]] const Model* begin() const noexcept { return found ? &*found : nullptr; }
+  [[nodiscard]] const Model* end() const noexcept { return found ? &*found + 1 : nullptr; }
 };
 
 /// The number of data that are scored at a time.
@@ -67,21 +73,12 @@ struct ransac_options {
   std::size_t max_iterations = 10000;
   std::size_t min_inliers = 0;  ///< fewer than this is a failure
   std::size_t refinements = 4;  ///< largest number, for each new best model
+  /// If positive, bad models are recognised by a sequential probability ratio test, which sometimes rejects a good one;
+  /// the number of iterations accounts for that. The value is the time to compute a model from a sample, divided by the
+  /// time to score one datum. The data must be in random order then.
+  double model_cost = 0.0;
   std::uint64_t seed = 1;
 };
-
-/// The policies of RANSAC.
-template <consensus_score Score = msac, sampling_order Sampling = uniform_sampling,
-          preemption_test Preemption = bail_out, local_optimization LocalOptimization = iterated_refinement>
-struct ransac_policies {
-  Score score{};
-  Sampling sampling{};
-  Preemption preemption{};
-  LocalOptimization optimization{};
-};
-template <class Score, class Sampling, class Preemption, class LocalOptimization>
-ransac_policies(Score, Sampling, Preemption, LocalOptimization)
-    -> ransac_policies<Score, Sampling, Preemption, LocalOptimization>;
 
 /// Memory that calls may share one after the other: with it only the inliers of the result are allocated.
 struct ransac_workspace {
@@ -92,34 +89,113 @@ template <class Model>
 struct ransac_estimate {
   Model model;
   std::vector<std::uint32_t> inliers;  ///< exactly the data within the threshold of `model`, ascending
-  double score = 0.0;                  ///< sum of the costs of all data; with `msac` of
-                                       ///< min(squared error, squared threshold)
+  double score = 0.0;                  ///< sum over all data of min(squared error, squared threshold)
   std::size_t iterations = 0;
 };
 
 namespace detail {
 
-template <model_estimator E>
-void collect_inliers(const E& estimator, const typename E::model& model, double squared_threshold,
-                     std::vector<std::uint32_t>& inliers) {
-  inliers.clear();
-  const std::size_t n = estimator.size();
-  for (std::size_t i = 0; i < n; ++i)
-    if (estimator.squared_error(model, i) < squared_threshold) inliers.push_back(static_cast<std::uint32_t>(i));
+/// The truncated squared error: what a datum adds to the score, of which the least is the best; NaN costs the limit.
+template <std::floating_point S>
+[[nodiscard]] constexpr S msac_cost(S squared, S limit) noexcept {
+  return squared < limit ? squared : limit;
 }
 
+/// `N` distinct numbers below `n`. @pre n >= N
+template <std::size_t N>
+[[nodiscard]] std::array<std::uint32_t, N> draw_sample(random_bits& random, std::size_t n) {
+  std::array<std::uint32_t, N> sample{};
+  for (std::size_t k = 0; k < N; ++k) {
+    do {
+      sample[k] = random.below(static_cast<std::uint32_t>(n));
+    } while (std::find(sample.begin(), sample.begin() + static_cast<std::ptrdiff_t>(k), sample[k]) !=
+             sample.begin() + static_cast<std::ptrdiff_t>(k));
+  }
+  return sample;
+}
+
+/// The number of samples after which one of them is without outliers, with probability `confidence`; `recognised` is
+/// the probability that such a sample is recognised.
+[[nodiscard]] inline double wanted_iterations(double confidence, double inlier_ratio, std::size_t sample_size,
+                                              double recognised) {
+  const double clean = std::pow(inlier_ratio, static_cast<double>(sample_size)) * recognised;
+  if (clean >= 1.0) return 0.0;
+  if (clean < 1e-12) return std::numeric_limits<double>::infinity();
+  return std::log(1.0 - confidence) / std::log1p(-clean);
+}
+
+/// Sequential probability ratio test: scoring stops as soon as the data seen are much more likely for a bad model than
+/// for one as good as the best so far.
+class sequential_test {
+ public:
+  /// `model_cost` as in `ransac_options`; 0: nothing is hopeless.
+  explicit sequential_test(double model_cost) noexcept : model_cost_{model_cost} {}
+
+  /// Before a model is scored.
+  void begin() noexcept { log_ratio_ = 0.0; }
+  /// Whether to stop, after a block of data with so many inliers.
+  [[nodiscard]] bool hopeless(std::size_t inliers, std::size_t data) noexcept {
+    log_ratio_ += static_cast<double>(inliers) * if_inlier_ + static_cast<double>(data - inliers) * if_outlier_;
+    return log_ratio_ > log_threshold_;
+  }
+  /// The model has so many inliers among the data seen.
+  void end(std::size_t inliers, std::size_t data) noexcept {
+    // Nearly all models are bad: their mean ratio of inliers is the one of bad models.
+    const double ratio = static_cast<double>(inliers) / static_cast<double>(std::max<std::size_t>(1, data));
+    ++seen_;
+    bad_ += (std::min(ratio, 0.5) - bad_) / std::min(500.0, 10.0 + seen_);
+    if (std::abs(bad_ - designed_for_) > 0.1 * designed_for_) design();
+  }
+  /// The inlier ratio of a new best model.
+  void adopted(double inlier_ratio) noexcept {
+    good_ = inlier_ratio;
+    design();
+  }
+  /// The probability that a model as good as the best is scored to the end.
+  [[nodiscard]] double recognised() const noexcept {
+    return std::isfinite(log_threshold_) ? 1.0 - std::exp(-log_threshold_) : 1.0;
+  }
+
+ private:
+  void design() noexcept {
+    designed_for_ = bad_;
+    const double bad = std::clamp(bad_, 1e-3, 0.9), good = std::min(good_, 0.99);
+    if (model_cost_ == 0.0 || !(good > 1.5 * bad)) {  // nothing to tell good models by, yet
+      log_threshold_ = std::numeric_limits<double>::infinity();
+      if_inlier_ = if_outlier_ = 0.0;
+      return;
+    }
+    if_inlier_ = std::log(bad / good);
+    if_outlier_ = std::log((1.0 - bad) / (1.0 - good));
+    const double information = bad * if_inlier_ + (1.0 - bad) * if_outlier_;  // per datum of a bad model
+    const double k = model_cost_ * information + 1.0;
+    double threshold = k;
+    for (int i = 0; i != 5; ++i) threshold = k + std::log(threshold);
+    log_threshold_ = std::log(std::max(threshold, 20.0));
+  }
+
+  double model_cost_;
+  double good_ = 0.0;
+  double bad_ = 0.01;
+  double designed_for_ = 0.01;
+  double seen_ = 0.0;
+  double if_inlier_ = 0.0;
+  double if_outlier_ = 0.0;
+  double log_threshold_ = std::numeric_limits<double>::infinity();
+  double log_ratio_ = 0.0;
+};
+
 /// The state of one RANSAC.
-template <model_estimator E, class Policies>
+template <model_estimator E>
 class ransac_run {
  public:
   using model = typename E::model;
   static constexpr std::size_t sample_size = E::sample_size;
 
-  ransac_run(const E& estimator, const ransac_options& options, const Policies& policies, ransac_workspace& workspace)
+  ransac_run(const E& estimator, const ransac_options& options, ransac_workspace& workspace)
       : estimator_{estimator},
         options_{options},
-        score_{policies.score},
-        preemption_{policies.preemption},
+        test_{options.model_cost},
         workspace_{workspace},
         squared_threshold_{options.threshold * options.threshold} {
     workspace.inliers.clear();
@@ -134,20 +210,26 @@ class ransac_run {
     return true;
   }
   [[nodiscard]] std::span<const std::uint32_t> inliers() const noexcept { return workspace_.inliers; }
-  [[nodiscard]] std::size_t refinements() const noexcept { return options_.refinements; }
-  bool refine(std::span<const std::uint32_t> indices) {
-    if (indices.size() <= sample_size) return false;
-    const std::optional<model> refined = estimator_.refine(*best_, indices);
-    return refined && propose(*refined);
+  /// Refines the best model on its inliers, then on those of the outcome, as long as the score improves.
+  void refine() {
+    for (std::size_t k = 0; k < options_.refinements && workspace_.inliers.size() > sample_size; ++k) {
+      const std::optional<model> refined = estimator_.refine(*best_, workspace_.inliers);
+      if (!refined || !propose(*refined)) return;
+    }
   }
   [[nodiscard]] const std::optional<model>& best() const noexcept { return best_; }
-  [[nodiscard]] double recognised() const { return preemption_.recognised(); }
+  /// The number of samples that are enough if the best model is right.
+  [[nodiscard]] double wanted() const {
+    return wanted_iterations(options_.confidence,
+                             static_cast<double>(workspace_.inliers.size()) / static_cast<double>(estimator_.size()),
+                             sample_size, test_.recognised());
+  }
 
   /// The score of the best by `squared_error`.
   [[nodiscard]] double exact_score() const {
     double sum = 0.0;
     for (std::size_t i = 0; i < estimator_.size(); ++i)
-      sum += score_.cost(static_cast<double>(estimator_.squared_error(*best_, i)), squared_threshold_);
+      sum += msac_cost(static_cast<double>(estimator_.squared_error(*best_, i)), squared_threshold_);
     return sum;
   }
 
@@ -155,8 +237,12 @@ class ransac_run {
   void adopt(const model& candidate, double score) {
     best_ = candidate;
     best_score_ = score;
-    collect_inliers(estimator_, candidate, squared_threshold_, workspace_.inliers);
-    preemption_.adopted(static_cast<double>(workspace_.inliers.size()) / static_cast<double>(estimator_.size()));
+    workspace_.inliers.clear();
+    const std::size_t n = estimator_.size();
+    for (std::size_t i = 0; i != n; ++i)
+      if (estimator_.squared_error(candidate, i) < squared_threshold_)
+        workspace_.inliers.push_back(static_cast<std::uint32_t>(i));
+    test_.adopted(static_cast<double>(workspace_.inliers.size()) / static_cast<double>(n));
   }
 
   /// Infinite for a model whose scoring stopped early.
@@ -164,19 +250,19 @@ class ransac_run {
     const std::size_t n = estimator_.size();
     double score = 0.0;
     std::size_t inliers = 0, seen = 0;
-    preemption_.begin();
+    test_.begin();
     while (seen < n) {
       const std::size_t count = std::min(consensus_block, n - seen);
       const auto [cost, inside] = score_block(candidate, seen, count);
       score += cost;
       inliers += inside;
       seen += count;
-      if (score > best_score_ || (seen < n && preemption_.hopeless(inside, count))) {
-        preemption_.end(false, inliers, seen);
+      if (score > best_score_ || (seen < n && test_.hopeless(inside, count))) {
+        test_.end(inliers, seen);
         return std::numeric_limits<double>::infinity();
       }
     }
-    preemption_.end(true, inliers, seen);
+    test_.end(inliers, seen);
     return score;
   }
 
@@ -195,7 +281,7 @@ class ransac_run {
         std::array<std::int32_t, 8> inside{};
         for (std::size_t i = 0; i != consensus_block; i += 8)
           for (std::size_t k = 0; k != 8; ++k) {
-            cost[k] += score_.cost(errors[i + k], limit);
+            cost[k] += msac_cost(errors[i + k], limit);
             inside[k] += errors[i + k] < limit ? 1 : 0;
           }
         sum.cost =
@@ -204,13 +290,13 @@ class ransac_run {
         return sum;
       }
       for (std::size_t i = 0; i != count; ++i) {
-        sum.cost += double{score_.cost(errors[i], limit)};
+        sum.cost += double{msac_cost(errors[i], limit)};
         sum.inside += errors[i] < limit ? 1U : 0U;
       }
     } else {
       for (std::size_t i = first; i != first + count; ++i) {
         const double e = estimator_.squared_error(candidate, i);
-        sum.cost += score_.cost(e, squared_threshold_);
+        sum.cost += msac_cost(e, squared_threshold_);
         sum.inside += e < squared_threshold_ ? 1U : 0U;
       }
     }
@@ -219,8 +305,7 @@ class ransac_run {
 
   const E& estimator_;
   const ransac_options& options_;
-  const decltype(Policies::score)& score_;
-  decltype(Policies::preemption) preemption_;
+  sequential_test test_;
   ransac_workspace& workspace_;
   double squared_threshold_;
   std::optional<model> best_;
@@ -229,12 +314,13 @@ class ransac_run {
 
 /// The options of RANSAC among those of an estimator, which have the same names everywhere.
 template <class Options>
-[[nodiscard]] ransac_options ransac_part(const Options& options) {
+[[nodiscard]] ransac_options ransac_part(const Options& options, double model_cost = 200.0) {
   return {.threshold = options.threshold,
           .confidence = options.confidence,
           .min_iterations = options.min_iterations,
           .max_iterations = options.max_iterations,
           .min_inliers = options.min_inliers,
+          .model_cost = model_cost,
           .seed = options.seed};
 }
 
@@ -267,7 +353,7 @@ template <class E>
   std::size_t inside = 0;
   for (std::size_t i = 0; i != estimator.size(); ++i) {
     const double e = estimator.squared_error(*refined, i);
-    score += msac::cost(e, squared_threshold);
+    score += msac_cost(e, squared_threshold);
     inside += e < squared_threshold ? 1U : 0U;
   }
   return score < found.score && inside >= min_inliers ? *refined : found.model;
@@ -275,34 +361,31 @@ template <class E>
 
 }  // namespace detail
 
-/// The model that most of the data agree with. The same data, options and seed give the same result. With `sprt` the
-/// data must be in random order. O(data) for each model that is scored to the end. Errors: `invalid_argument` for
-/// options out of range; `no_data` for fewer data than a sample; `degenerate` if no sample gives a model, or no model
-/// has `min_inliers` inliers and at least as many as a sample.
-template <model_estimator E, consensus_score Score = msac, sampling_order Sampling = uniform_sampling,
-          preemption_test Preemption = bail_out, local_optimization LocalOptimization = iterated_refinement>
-[[nodiscard]] result<ransac_estimate<typename E::model>> ransac(
-    const E& estimator, const ransac_options& options,
-    const ransac_policies<Score, Sampling, Preemption, LocalOptimization>& policies, ransac_workspace& workspace) {
+/// The model that most of the data agree with. The same data, options and seed give the same result. O(data) for each
+/// model that is scored to the end. Errors: `invalid_argument` for options out of range; `no_data` for fewer data than
+/// a sample; `degenerate` if no sample gives a model, or no model has `min_inliers` inliers and at least as many as a
+/// sample.
+template <model_estimator E>
+[[nodiscard]] result<ransac_estimate<typename E::model>> ransac(const E& estimator, const ransac_options& options,
+                                                                ransac_workspace& workspace) {
   constexpr const char* where = "ransac";
   if (const char* const fault = detail::fault_of(options)) return fail(errc::invalid_argument, where, fault);
   const std::size_t n = estimator.size();
   if (n < E::sample_size) return fail(errc::no_data, where, "fewer data than one sample needs");
 
   random_bits random(options.seed);
-  auto sampler = policies.sampling.template over<E::sample_size>(n);
-  detail::ransac_run<E, ransac_policies<Score, Sampling, Preemption, LocalOptimization>> run(estimator, options,
-                                                                                             policies, workspace);
+  detail::ransac_run<E> run(estimator, options, workspace);
   double wanted = static_cast<double>(options.max_iterations);
   std::size_t iteration = 0;
   for (; iteration < options.max_iterations &&
          (iteration < options.min_iterations || static_cast<double>(iteration) < wanted);
        ++iteration) {
     bool improved = false;
-    for (const auto& candidate : estimator.fit(sampler.draw(random))) improved |= run.propose(candidate);
+    for (const auto& candidate : estimator.fit(detail::draw_sample<E::sample_size>(random, n)))
+      improved |= run.propose(candidate);
     if (!improved) continue;
-    policies.optimization.operate(run, random);
-    wanted = sampler.wanted(options.confidence, run.inliers(), run.recognised());
+    run.refine();
+    wanted = run.wanted();
   }
 
   if (!run.best()) return fail(errc::degenerate, where, "no sample of the data gives a model");
@@ -314,13 +397,10 @@ template <model_estimator E, consensus_score Score = msac, sampling_order Sampli
 }
 
 /// As above, with memory of its own.
-template <model_estimator E, consensus_score Score = msac, sampling_order Sampling = uniform_sampling,
-          preemption_test Preemption = bail_out, local_optimization LocalOptimization = iterated_refinement>
-[[nodiscard]] result<ransac_estimate<typename E::model>> ransac(
-    const E& estimator, const ransac_options& options,
-    const ransac_policies<Score, Sampling, Preemption, LocalOptimization>& policies = {}) {
+template <model_estimator E>
+[[nodiscard]] result<ransac_estimate<typename E::model>> ransac(const E& estimator, const ransac_options& options) {
   ransac_workspace workspace;
-  return ransac(estimator, options, policies, workspace);
+  return ransac(estimator, options, workspace);
 }
 
 }  // namespace orbis::optimize

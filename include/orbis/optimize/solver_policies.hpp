@@ -11,34 +11,18 @@
 #include <cmath>
 #include <concepts>
 #include <cstddef>
-#include <cstdint>
 #include <limits>
-#include <span>
 
 #include <Eigen/Core>
 
-#include <orbis/core/types.hpp>
-#include <orbis/optimize/detail/sparse/block_solvers.hpp>
 #include <orbis/optimize/detail/sum_over.hpp>
 
 namespace orbis::optimize {
 
-namespace detail {
-template <class P>
-concept solves_newton = requires(P& problem, Eigen::VectorXd& out) {
-  {problem.newton_step(out)};
-};
-template <class P>
-concept solves = solves_newton<P> || requires(P& problem, Eigen::VectorXd& out) {
-  {problem.solve(out)};
-};
-}  // namespace detail
-
 /// A problem that is linearised at its current estimate: it has the cost there, its gradient `g`, and the positive
 /// semidefinite `H` of the model `cost + g^T s + s^T H s / 2`. `factor(d)` factors `H + diag(d)` (an empty `d` is 0)
-/// and returns whether it is positive definite; `solve(x)` then replaces `x` by the solution. Instead of `solve` a
-/// problem may have `newton_step(x)`, which sets `x` to the solution for the right-hand side `-g`. `try_step(s)` is the
-/// true cost one step away, and not finite where there is none.
+/// and returns whether it is positive definite; `newton_step(x)` then sets `x` to the solution for the right-hand side
+/// `-g`. `try_step(s)` is the true cost one step away, and not finite where there is none.
 template <class P>
 concept stepped_problem = requires(P& problem, const Eigen::VectorXd& in, Eigen::VectorXd& out) {
   { problem.cost() } -> std::same_as<double>;
@@ -46,7 +30,7 @@ concept stepped_problem = requires(P& problem, const Eigen::VectorXd& in, Eigen:
   { problem.diagonal() } -> std::same_as<const Eigen::VectorXd&>;
   { problem.curvature(in) } -> std::same_as<double>;
   { problem.factor(in) } -> std::same_as<bool>;
-  requires detail::solves<P>;
+  {problem.newton_step(out)};
   { problem.try_step(in) } -> std::same_as<double>;
 };
 
@@ -62,13 +46,6 @@ struct step_workspace {
   Eigen::VectorXd step, damping, metric, newton, cauchy, scratch;
 };
 
-/// A way to choose steps. `state` is what it keeps between the steps of one solution.
-template <class D, class P>
-concept damping_policy = std::copyable<D> && std::default_initializable<typename D::state> &&
-    requires(const D& d, typename D::state& s, P& problem, step_workspace& w) {
-  { d.advance(s, problem, w) } -> std::same_as<step_outcome>;
-};
-
 namespace detail {
 /// The members that a policy may use, for the concept below; never constructed.
 struct any_stepped_problem {
@@ -82,9 +59,12 @@ struct any_stepped_problem {
 };
 }  // namespace detail
 
-/// A damping policy that works for every problem: what the solvers take.
+/// A way to choose steps, for every `stepped_problem`. `state` is what it keeps between the steps of one solution.
 template <class D>
-concept general_damping_policy = damping_policy<D, detail::any_stepped_problem>;
+concept damping_policy = std::copyable<D> && std::default_initializable<typename D::state> &&
+    requires(const D& d, typename D::state& s, detail::any_stepped_problem& problem, step_workspace& w) {
+  { d.advance(s, problem, w) } -> std::same_as<step_outcome>;
+};
 
 namespace detail {
 
@@ -113,18 +93,6 @@ void set_each(Eigen::VectorXd& out, Eigen::Index size, const Value& value) {
   return sum_over(static_cast<std::size_t>(a.size()), [&](std::size_t i) { return p[i] * q[i]; });
 }
 
-/// `out = -(H + D)^-1 g` for the D last factored.
-template <class P>
-void newton_step(P& problem, Eigen::VectorXd& out) {
-  if constexpr (solves_newton<P>) {
-    problem.newton_step(out);
-  } else {
-    const Eigen::VectorXd& g = problem.gradient();
-    set_each(out, g.size(), [&](Eigen::Index i) { return -g[i]; });
-    problem.solve(out);
-  }
-}
-
 /// The diagonal of H as a metric of steps, which makes them invariant to the units of the unknowns.
 template <class P>
 void set_metric(P& problem, Eigen::VectorXd& out) {
@@ -145,7 +113,7 @@ struct gauss_newton {
   [[nodiscard]] step_outcome advance(state&, P& problem, step_workspace& w) const {
     const Eigen::VectorXd none;
     if (!problem.factor(none)) return step_outcome::singular;
-    detail::newton_step(problem, w.step);
+    problem.newton_step(w.step);
     if (detail::is_rounding(-0.5 * detail::dot_product(problem.gradient(), w.step), problem.cost()))
       return step_outcome::stationary;
     return std::isfinite(problem.try_step(w.step)) ? step_outcome::taken : step_outcome::exhausted;
@@ -170,7 +138,7 @@ struct levenberg_marquardt {
     for (int attempt = 0; attempt != max_attempts; ++attempt) {
       detail::set_each(w.damping, w.metric.size(), [&](Eigen::Index i) { return s.lambda * w.metric[i]; });
       if (problem.factor(w.damping)) {
-        detail::newton_step(problem, w.step);
+        problem.newton_step(w.step);
         const Eigen::VectorXd& g = problem.gradient();
         const double *const d = w.step.data(), *const damping = w.damping.data(), *const gradient = g.data();
         const double predicted = 0.5 * detail::sum_over(static_cast<std::size_t>(g.size()), [&](std::size_t i) {
@@ -263,66 +231,20 @@ struct dogleg {
       definite = problem.factor(w.damping);
     }
     if (!definite) return false;
-    detail::newton_step(problem, w.newton);
+    problem.newton_step(w.newton);
     return true;
   }
 };
 
-using block_place = detail::block_place;
-
-/// A solver of symmetric systems of C x C blocks. `s.analyze(size, places)` says where the blocks below the diagonal
-/// are; `s.factor(diagonal, off_diagonal)` takes their values and returns whether the matrix is positive definite (if
-/// not, `s.failed_block()` is a block row where it fails); `s.solve(x)` replaces the right-hand side by the solution.
-/// `s.iterations()` counts the iterations of an iterative solver.
-template <class S, int C>
-concept block_solver = requires(S& s, std::size_t size, std::span<const block_place> places,
-                                std::span<const matrix<C, C>> blocks, std::span<double> x) {
-  {s.analyze(size, places)};
-  { s.factor(blocks, blocks) } -> std::same_as<bool>;
-  { s.failed_block() } -> std::convertible_to<std::uint32_t>;
-  {s.solve(x)};
-  { s.iterations() } -> std::convertible_to<int>;
-};
-
-/// A family of solvers of the reduced system of bundle adjustment: `typename R::template solver<C>`, constructed from
-/// an `R`, for every block size C. The code of those below is in the -inl header.
-template <class R>
-concept reduced_solver = std::copyable<R> && block_solver < typename R::template solver<6>,
-6 > &&std::constructible_from<typename R::template solver<6>, const R&>;
-
-/// Dense Cholesky factorisation: best up to about a hundred cameras with many points in common. (C cameras)^3 / 3
-/// multiplications.
-struct dense_reduced_solver {
-  template <int C>
-  using solver = detail::dense_block_solver<C>;
-};
-
-/// Block-sparse Cholesky factorisation in a fill-reducing order: hundreds to thousands of cameras along a path.
-struct sparse_reduced_solver {
-  template <int C>
-  using solver = detail::sparse_block_solver<C>;
-};
-
-/// Conjugate gradients, preconditioned with the diagonal blocks: thousands of cameras, where inexact steps will do.
-struct iterative_reduced_solver {
-  double relative_tolerance = 1e-6;  ///< norm of the residual where the iteration stops, relative to the right side
-  int max_iterations = 500;
-  template <int C>
-  using solver = detail::iterative_block_solver<C>;
-};
-
-/// Dense up to `dense_limit` cameras, block-sparse while the factor has at most `fill_limit` blocks, iterative beyond.
-struct automatic_reduced_solver {
-  using kind = detail::block_solver_kind;
+/// How bundle adjustment solves its reduced system: densely up to `dense_limit` cameras, best up to about a hundred
+/// with many points in common ((C cameras)^3 / 3 multiplications); by a block-sparse factorisation in a fill-reducing
+/// order while the factor has at most `fill_limit` blocks, as for thousands of cameras along a path; beyond by
+/// conjugate gradients, preconditioned with the diagonal blocks, where inexact steps have to do.
+struct reduced_solver_options {
   std::size_t dense_limit = 100;
   std::size_t fill_limit = 2'000'000;
-  iterative_reduced_solver iterative{};
-  template <int C>
-  using solver = detail::automatic_block_solver<C>;
+  double relative_tolerance = 1e-6;  ///< of the iteration: norm of the residual over that of the right side
+  int max_iterations = 500;          ///< of the iteration
 };
 
 }  // namespace orbis::optimize
-
-#ifndef ORBIS_COMPILED
-#include <orbis/optimize/solver_policies-inl.hpp>
-#endif

@@ -17,20 +17,14 @@
 
 namespace orbis::optimize {
 
-ORBIS_INLINE std::array<se3, 4> decompose_essential(const mat3& essential) {
-  return detail::decompose_essential(essential);
-}
-
 namespace detail {
 
 template <class Match>
 result<relative_pose_estimate> essential_of_matches(const std::vector<Match>& matches, std::size_t n,
                                                     const essential_options& options) {
   constexpr const char* where = "essential matrix";
-  const ransac_options asked = ransac_part(options);
   const essential_estimator estimator(matches);
-  auto found =
-      ransac(estimator, asked, ransac_policies{msac{}, uniform_sampling{}, sprt(2000.0), iterated_refinement{}});
+  auto found = ransac(estimator, ransac_part(options, essential_estimator::model_cost));
   if (!found) return fail(found.error().code, where, found.error().message);
   const double squared_threshold = options.threshold * options.threshold;
   const std::size_t by_rotation = explained_by_rotation(matches, found->inliers, squared_threshold);
@@ -82,14 +76,6 @@ result<relative_pose_estimate> essential_of_matches(const std::vector<Match>& ma
 
 }  // namespace detail
 
-ORBIS_INLINE std::optional<mat3> homography_of_four(const std::array<vec2, 4>& first,
-                                                    const std::array<vec2, 4>& second) {
-  mat3 h;
-  if (!detail::homography_of_four(first, second, h)) return std::nullopt;
-  if (h(2, 2) != 0.0) h /= double{h(2, 2)};
-  return h;
-}
-
 template <std::same_as<homography_options> Options>
 result<homography_estimate> estimate_homography(std::span<const vec2> first, std::span<const vec2> second,
                                                 const Options& options) {
@@ -137,7 +123,7 @@ result<homography_estimate> estimate_homography(std::span<const vec2> first, std
 
   const estimator_type estimator(matches);
   asked.threshold = threshold;
-  auto found = ransac(estimator, asked, ransac_policies{msac{}, uniform_sampling{}, sprt{}, iterated_refinement{}});
+  auto found = ransac(estimator, asked);
   if (!found) {
     const auto is_line = [](const mat2& spread) {
       return !(determinant(spread) > 1e-12 * trace(spread) * trace(spread));

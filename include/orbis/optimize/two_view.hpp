@@ -9,12 +9,10 @@
 /// Vision", 2003, section 5.3, for the decomposition of homographies.
 #pragma once
 
-#include <array>
 #include <cmath>
 #include <concepts>
 #include <cstddef>
 #include <cstdint>
-#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -47,9 +45,6 @@ struct relative_pose_estimate {
   std::size_t iterations = 0;
 };
 
-/// The four poses `T_second_first`, with translations of length 1, that an essential matrix may stand for.
-[[nodiscard]] std::array<se3, 4> decompose_essential(const mat3& essential);
-
 namespace detail {
 
 /// What `estimate_essential` does with the usable matches of `n`.
@@ -65,10 +60,10 @@ template <class Match>
 /// length or options out of range; `no_data` below five matches; `degenerate` if fewer than five can be used, no matrix
 /// has `min_inliers` inliers, or a rotation alone explains nearly all inliers, so that the translation is not
 /// determined. The message says which.
-template <camera::camera_model First, camera::camera_model Second>
+template <camera::camera_model Camera>
 [[nodiscard]] result<relative_pose_estimate> estimate_essential(std::span<const vec2> first_pixels,
                                                                 std::span<const vec2> second_pixels,
-                                                                const First& first_camera, const Second& second_camera,
+                                                                const Camera& camera,
                                                                 const essential_options& options = {}) {
   constexpr const char* where = "essential matrix";
   const std::size_t n = first_pixels.size();
@@ -77,21 +72,12 @@ template <camera::camera_model First, camera::camera_model Second>
   if (const char* const fault = detail::fault_of(asked)) return fail(errc::invalid_argument, where, fault);
   if (n < 5) return fail(errc::no_data, where, "fewer than five matches");
   const std::vector<detail::image_match> matches =
-      detail::read_matches(first_pixels, second_pixels, first_camera, second_camera, options.seed);
+      detail::read_matches(first_pixels, second_pixels, camera, options.seed);
   if (matches.size() < 5)
     return fail(errc::degenerate, where,
                 "of " + std::to_string(n) + " matches " + std::to_string(matches.size()) +
-                    " are finite and in the cameras' views, five are needed");
+                    " are finite and in the camera's view, five are needed");
   return detail::essential_of_matches(matches, n, options);
-}
-
-/// As above, for two images of one camera.
-template <camera::camera_model Camera>
-[[nodiscard]] result<relative_pose_estimate> estimate_essential(std::span<const vec2> first_pixels,
-                                                                std::span<const vec2> second_pixels,
-                                                                const Camera& camera,
-                                                                const essential_options& options = {}) {
-  return estimate_essential(first_pixels, second_pixels, camera, camera, options);
 }
 
 struct homography_options {
@@ -118,11 +104,6 @@ struct plane_motion {
   vec3 translation = zeros<vec3>();
   vec3 normal = vec3(0.0, 0.0, 1.0);
 };
-
-/// The homography that takes `first[i]` to `second[i]` (pixels). Empty if three points of an image lie on one line, or
-/// if no plane in front of both cameras gives these points.
-[[nodiscard]] std::optional<mat3> homography_of_four(const std::array<vec2, 4>& first,
-                                                     const std::array<vec2, 4>& second);
 
 /// The homography that most matches agree with: four points in RANSAC, each new best one refined on its inliers (least
 /// squares of the transfer errors in both images). `first[i]` matches `second[i]`, in undistorted pixels. Matches that
@@ -182,10 +163,12 @@ template <class Match>
 /// `no_data` if fewer matches than `min_points` can be used; `degenerate` where the motion is not determined: by
 /// rotation alone, too little parallax, two motions that explain the matches about as well (as those of a plane do),
 /// too few points or too large deviations. The message says which.
-template <camera::camera_model First, camera::camera_model Second>
-[[nodiscard]] result<two_view_reconstruction> reconstruct_two_views(
-    std::span<const vec2> first_pixels, std::span<const vec2> second_pixels, const First& first_camera,
-    const Second& second_camera, const two_view_options& options = {}, std::span<const double> deviations = {}) {
+template <camera::camera_model Camera>
+[[nodiscard]] result<two_view_reconstruction> reconstruct_two_views(std::span<const vec2> first_pixels,
+                                                                    std::span<const vec2> second_pixels,
+                                                                    const Camera& camera,
+                                                                    const two_view_options& options = {},
+                                                                    std::span<const double> deviations = {}) {
   constexpr const char* where = "two views";
   const std::size_t n = first_pixels.size();
   if (n != second_pixels.size() || (!deviations.empty() && n != deviations.size()))
@@ -194,24 +177,13 @@ template <camera::camera_model First, camera::camera_model Second>
     return fail(errc::invalid_argument, where, "the deviation must be positive and finite");
   if (!(options.confidence > 0.0 && options.confidence < 1.0))
     return fail(errc::invalid_argument, where, "the confidence must lie between 0 and 1");
-  std::vector<detail::image_match> matches =
-      detail::read_matches(first_pixels, second_pixels, first_camera, second_camera, options.seed);
+  std::vector<detail::image_match> matches = detail::read_matches(first_pixels, second_pixels, camera, options.seed);
   for (detail::image_match& m : matches) {
     const double deviation = options.deviation * (deviations.empty() ? 1.0 : deviations[m.original]);
     m.first.scale_metric(1.0 / deviation);
     m.second.scale_metric(1.0 / deviation);
   }
   return detail::reconstruction_of_matches(matches, n, options);
-}
-
-/// As above, for two images of one camera.
-template <camera::camera_model Camera>
-[[nodiscard]] result<two_view_reconstruction> reconstruct_two_views(std::span<const vec2> first_pixels,
-                                                                    std::span<const vec2> second_pixels,
-                                                                    const Camera& camera,
-                                                                    const two_view_options& options = {},
-                                                                    std::span<const double> deviations = {}) {
-  return reconstruct_two_views(first_pixels, second_pixels, camera, camera, options, deviations);
 }
 
 }  // namespace orbis::optimize

@@ -3,10 +3,9 @@
 /// An image as a bag of visual words: the words that occur in it, with their values.
 #pragma once
 
-#include <cmath>
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
-#include <span>
 #include <vector>
 
 namespace orbis::places {
@@ -17,13 +16,6 @@ enum class weighting : std::uint8_t {
   tf,      ///< how often it occurs
   idf,     ///< how rare it is
   binary   ///< one
-};
-
-/// How the values of a bag are normalised.
-enum class bag_norm : std::uint8_t {
-  none,
-  l1,  ///< their sum is 1
-  l2   ///< the sum of their squares is 1
 };
 
 /// A word and its value, > 0.
@@ -45,19 +37,33 @@ struct bag_of_words {
 /// The largest weight of a word, so that values and their sums stay finite.
 inline constexpr float largest_weight = 1e20F;
 
-/// Normalises the values; words whose value underflows to zero are erased. Does nothing for an empty bag or for `none`.
+/// Scales the values to a sum of 1; words whose value underflows to zero are erased. Does nothing for an empty bag.
 /// O(words).
-inline void normalize(bag_of_words& bag, bag_norm norm) noexcept {
-  if (norm == bag_norm::none) return;
+inline void normalize(bag_of_words& bag) noexcept {
   double sum = 0.0;
-  for (const word_value& w : bag.words) {
-    const auto value = static_cast<double>(w.value);
-    sum += norm == bag_norm::l1 ? value : value * value;  // the square of a float is exact in a double
-  }
+  for (const word_value& w : bag.words) sum += static_cast<double>(w.value);
   if (!(sum > 0.0)) return;
-  const double scale = 1.0 / (norm == bag_norm::l1 ? sum : std::sqrt(sum));
+  const double scale = 1.0 / sum;
   for (word_value& w : bag.words) w.value = static_cast<float>(static_cast<double>(w.value) * scale);
   std::erase_if(bag.words, [](const word_value& w) { return !(w.value > 0.0F); });
+}
+
+/// How alike two normalised bags are, from 0 (nothing in common) to 1 (equal): the sum of what both have, which is
+/// 1 - |a - b| / 2 in the sum of absolute values. Symmetric to the last bit. O(words).
+/// Source: D. Nister, H. Stewenius, "Scalable recognition with a vocabulary tree", CVPR 2006; D. Galvez-Lopez, J. D.
+/// Tardos, "Bags of binary words for fast place recognition in image sequences", IEEE T-RO 2012.
+[[nodiscard]] inline double similarity(const bag_of_words& a, const bag_of_words& b) noexcept {
+  double sum = 0.0;
+  const word_value *i = a.words.data(), *j = b.words.data();
+  const word_value *const end_i = i + a.size(), *const end_j = j + b.size();
+  while (i != end_i && j != end_j) {
+    const std::uint32_t x = i->word, y = j->word;
+    if (x == y) sum += std::min(static_cast<double>(i->value), static_cast<double>(j->value));
+    // Which one is less cannot be predicted: no branches.
+    i += x <= y ? 1 : 0;
+    j += y <= x ? 1 : 0;
+  }
+  return std::clamp(sum, 0.0, 1.0);
 }
 
 /// How many words two bags share. O(words).

@@ -18,7 +18,6 @@
 
 #include <orbis/places/bag_of_words.hpp>
 #include <orbis/places/inverted_index.hpp>
-#include <orbis/places/score.hpp>
 
 namespace orbis::places {
 
@@ -76,7 +75,7 @@ struct no_neighbors {
 ///
 /// Source of the criteria: R. Mur-Artal, J. D. Tardos, "ORB-SLAM: a versatile and accurate monocular SLAM system",
 /// IEEE T-RO 2015, sections III.E and VII.A.
-template <keyframe_id Id = std::uint32_t, bag_score Score = l1_score>
+template <keyframe_id Id = std::uint32_t>
 class basic_keyframe_database {
  public:
   using id_type = Id;
@@ -94,7 +93,7 @@ class basic_keyframe_database {
   }
 
   /// Adds a keyframe; false, and nothing changes, if the id is in use. O(words).
-  /// @pre the bag is scaled as the score wants it, by the same vocabulary as all others
+  /// @pre the bag is normalised, and of the same vocabulary as all others
   bool add(const Id& id, const bag_of_words& bag) {
     const bool reuse = !free_.empty();
     const auto slot = reuse ? free_.back() : static_cast<std::uint32_t>(keyframes_.size());
@@ -139,7 +138,7 @@ class basic_keyframe_database {
   }
 
   /// How alike an image and a keyframe are. @pre contains(id)
-  [[nodiscard]] double score(const bag_of_words& image, const Id& id) const { return Score{}(image, bag(id)); }
+  [[nodiscard]] double score(const bag_of_words& image, const Id& id) const { return similarity(image, bag(id)); }
 
   /// The keyframes that may show what an image shows, the best group first, by id where groups are equal.
   ///
@@ -181,7 +180,7 @@ class basic_keyframe_database {
     found.clear();
     count_shared(image, memory, exclude);
     for (const std::uint32_t slot : memory.touched) {
-      const double score = Score{}(image, keyframes_[slot].bag);
+      const double score = similarity(image, keyframes_[slot].bag);
       found.push_back({keyframes_[slot].id, memory.shared[slot], score, score});
     }
     const auto end = found.begin() + static_cast<std::ptrdiff_t>(std::min(count, found.size()));
@@ -241,7 +240,7 @@ class basic_keyframe_database {
     const double enough = options.shared_words * most;
     for (const std::uint32_t slot : memory.touched) {
       if (!(memory.shared[slot] > enough)) continue;
-      memory.scores[slot] = Score{}(image, keyframes_[slot].bag);
+      memory.scores[slot] = similarity(image, keyframes_[slot].bag);
       memory.scored.push_back(slot);
     }
   }
@@ -288,7 +287,7 @@ class basic_keyframe_database {
   inverted_index index_;
 };
 
-/// Keyframes with numbers as ids, compared by the L1 score.
+/// Keyframes with numbers as ids.
 using keyframe_database = basic_keyframe_database<>;
 
 }  // namespace orbis::places

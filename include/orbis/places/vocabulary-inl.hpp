@@ -19,14 +19,11 @@ namespace detail {
 // In a large tree each level costs a cache miss. So several descriptors descend together, level by level: while one is
 // compared with the children of its node, the children of the other nodes are fetched from memory.
 
-/// Descriptors as bytes, and where to write their leaves and their nodes at `node_depth` (or the leaf, where that is
-/// higher).
+/// Descriptors as bytes, and where to write their leaves.
 struct descent {
   const std::byte* descriptors;
   std::size_t count;
-  std::uint32_t node_depth;
   std::uint32_t* leaves;
-  std::uint32_t* nodes;  ///< or null
 };
 
 template <class Target, std::size_t Bits>
@@ -49,9 +46,8 @@ ORBIS_ALWAYS_INLINE void descend(const vocabulary_tree<Bits>& tree, const descen
       std::memcpy(t.query.data(), d.descriptors + (begin + i) * sizeof t.query, sizeof t.query);
       t.node = 0;
       t.at = static_cast<std::uint32_t>(begin + i);
-      if (d.nodes != nullptr) d.nodes[t.at] = 0;
     }
-    for (std::uint32_t depth = 1; active != 0; ++depth) {
+    while (active != 0) {
       // Drop those that are at a leaf; fetch the children of the others.
       std::size_t kept = 0;
       for (std::size_t i = 0; i != active; ++i) {
@@ -74,7 +70,6 @@ ORBIS_ALWAYS_INLINE void descend(const vocabulary_tree<Bits>& tree, const descen
         query_state& t = states[i];
         t.node = t.first + nearest_child<Target, Bits>(t.query, descriptors + (t.first - 1), t.count);
         if (t.node < inner_end) prefetch(nodes + t.node);
-        if (d.nodes != nullptr && depth <= d.node_depth) d.nodes[t.at] = t.node;
       }
     }
   }
@@ -87,7 +82,7 @@ struct descent_kernel {
   }
 };
 
-/// Finds the leaves, and the nodes, of all descriptors. O(descriptors x depth x branching).
+/// Finds the leaves of all descriptors. O(descriptors x depth x branching).
 template <std::size_t Bits>
 void find_leaves(const vocabulary_tree<Bits>& tree, const descent& d) {
   using signature = void(const vocabulary_tree<Bits>&, const descent&);
@@ -99,25 +94,21 @@ void find_leaves(const vocabulary_tree<Bits>& tree, const descent& d) {
 template <std::size_t Bits>
 std::uint32_t basic_vocabulary<Bits>::word_of_bytes(const std::byte* descriptor) const noexcept {
   std::uint32_t leaf = 0;
-  detail::find_leaves(*tree_, {descriptor, 1, 0, &leaf, nullptr});
+  detail::find_leaves(*tree_, {descriptor, 1, &leaf});
   return tree_->word_of_leaf(leaf);
 }
 
 template <std::size_t Bits>
 void basic_vocabulary<Bits>::transform_bytes(const std::byte* descriptors, std::size_t count, bag_of_words& bag,
-                                             std::uint32_t* nodes, transform_workspace& memory,
-                                             const transform_options& options) const {
+                                             transform_workspace& memory) const {
   bag.words.clear();
   memory.words.resize(count);
-  if (empty()) {
-    if (nodes != nullptr) std::fill_n(nodes, count, 0U);
-    return;
-  }
-  detail::find_leaves(*tree_, {descriptors, count, options.node_depth, memory.words.data(), nodes});
+  if (empty()) return;
+  detail::find_leaves(*tree_, {descriptors, count, memory.words.data()});
   for (std::uint32_t& leaf : memory.words) leaf = tree_->word_of_leaf(leaf);
   sort(memory);
   this->count(memory.words, bag);
-  normalize(bag, options.norm);
+  normalize(bag);
 }
 
 template <std::size_t Bits>

@@ -19,12 +19,6 @@
 
 namespace orbis::places {
 
-/// How descriptors become a bag.
-struct transform_options {
-  bag_norm norm = bag_norm::l1;  ///< as the score wants it
-  std::uint32_t node_depth = 2;  ///< of the direct index's nodes, levels below the root
-};
-
 /// Memory of `transform`, which the next call uses again.
 struct transform_workspace {
   std::vector<std::uint32_t> words, sorted;
@@ -75,29 +69,20 @@ class basic_vocabulary {
     return word_of_bytes(reinterpret_cast<const std::byte*>(&descriptor));
   }
 
-  /// The words of an image's descriptors as a bag. Once there was an image of as many descriptors, nothing is
-  /// allocated. O(descriptors x depth x branching); safe to call from several threads, each with its own memory.
+  /// The words of an image's descriptors as a normalised bag. Once there was an image of as many descriptors, nothing
+  /// is allocated. O(descriptors x depth x branching); safe to call from several threads, each with its own memory.
   template <bit_string_range_of<Bits> Descriptors>
-  void transform(const Descriptors& descriptors, bag_of_words& bag, transform_workspace& memory,
-                 const transform_options& options = {}) const {
-    transform_bytes(bytes_of(descriptors), std::ranges::size(descriptors), bag, nullptr, memory, options);
-  }
-
-  /// The words of an image's descriptors as a bag, and the direct index: `nodes[i]` becomes descriptor `i`'s node at
-  /// `options.node_depth` (or its leaf, where that is higher).
-  template <bit_string_range_of<Bits> Descriptors>
-  void transform(const Descriptors& descriptors, bag_of_words& bag, std::vector<std::uint32_t>& nodes,
-                 transform_workspace& memory, const transform_options& options = {}) const {
-    nodes.resize(std::ranges::size(descriptors));
-    transform_bytes(bytes_of(descriptors), std::ranges::size(descriptors), bag, nodes.data(), memory, options);
+  void transform(const Descriptors& descriptors, bag_of_words& bag, transform_workspace& memory) const {
+    transform_bytes(reinterpret_cast<const std::byte*>(std::ranges::data(descriptors)), std::ranges::size(descriptors),
+                    bag, memory);
   }
 
   /// Returns the bag; allocates its memory.
   template <bit_string_range_of<Bits> Descriptors>
-  [[nodiscard]] bag_of_words transform(const Descriptors& descriptors, const transform_options& options = {}) const {
+  [[nodiscard]] bag_of_words transform(const Descriptors& descriptors) const {
     bag_of_words bag;
     transform_workspace memory;
-    transform(descriptors, bag, memory, options);
+    transform(descriptors, bag, memory);
     return bag;
   }
 
@@ -115,13 +100,9 @@ class basic_vocabulary {
     return tree;
   }
 
-  template <class Descriptors>
-  [[nodiscard]] static const std::byte* bytes_of(const Descriptors& descriptors) noexcept {
-    return reinterpret_cast<const std::byte*>(std::ranges::data(descriptors));
-  }
   [[nodiscard]] std::uint32_t word_of_bytes(const std::byte* descriptor) const noexcept;
-  void transform_bytes(const std::byte* descriptors, std::size_t count, bag_of_words& bag, std::uint32_t* nodes,
-                       transform_workspace& memory, const transform_options& options) const;
+  void transform_bytes(const std::byte* descriptors, std::size_t count, bag_of_words& bag,
+                       transform_workspace& memory) const;
   /// Radix sort: a comparison sort would take a quarter of the time of a transform.
   void sort(transform_workspace& memory) const;
   void count(std::span<const std::uint32_t> sorted, bag_of_words& bag) const;

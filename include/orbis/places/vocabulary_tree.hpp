@@ -31,8 +31,8 @@ struct tree_node {
 template <std::size_t Bits>
 struct vocabulary_tree {
   table_memory<bit_words<Bits>> descriptors;  ///< that of node i at i - 1: the root has none
-  std::vector<tree_node> nodes;  ///< up to the last that has children, and one more; all others are leaves
-  std::vector<float> weights;    ///< of the words
+  std::vector<tree_node> nodes;               ///< up to the last that has children, and one more; all others are leaves
+  std::vector<float> weights;                 ///< of the words
   std::uint32_t node_count = 1;
   std::uint32_t branching = 0;  ///< the most children of a node
   std::uint32_t depth = 0;      ///< levels below the root

@@ -12,7 +12,6 @@
 #include <map>
 #include <utility>
 
-#include <orbis/core/se3.hpp>
 #include <orbis/core/sim3.hpp>
 #include <orbis/slam/ids.hpp>
 #include <orbis/slam/map.hpp>
@@ -84,25 +83,6 @@ class basic_atlas {
     if (active_ == from) active_ = into;
     return offsets;
   }
-  id_offsets merge(map_id from, map_id into, const se3& T_into_from, const map_link& link) {
-    return merge(from, into, sim3(T_into_from), link);
-  }
-  /// As above, where no pair of keyframes is known: the root of `from` becomes a child of the keyframe of `into` that
-  /// is nearest to it. O(both maps).
-  id_offsets merge(map_id from, map_id into, const se3& T_into_from) {
-    map_link link{.into = no_id, .from = at(from).tree().root()};
-    double least = 0.0;
-    for (const auto& k : at(into).keyframes()) {
-      if (link.from == no_id) break;
-      const vec3 root = T_into_from * at(from).at(link.from).T_world_camera.translation();
-      const double squared = squared_norm(k.T_world_camera.translation() - root);
-      if (link.into != no_id && !(squared < least)) continue;
-      least = squared;
-      link.into = k.id;
-    }
-    return merge(from, into, T_into_from, link);
-  }
-
   /// The present id of a keyframe, after mergers of its map. The keyframe may have been erased since (see
   /// `basic_map::replacement_of`). The id of a removed map does not change. O(mergers).
   [[nodiscard]] map_keyframe current(map_keyframe k) const {

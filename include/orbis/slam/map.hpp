@@ -20,7 +20,6 @@
 #include <orbis/slam/detail/map/counter.hpp>
 #include <orbis/slam/detail/map/map_content.hpp>
 #include <orbis/slam/detail/map/slot_map.hpp>
-#include <orbis/slam/detail/map/typical_descriptor.hpp>
 #include <orbis/slam/frame.hpp>
 #include <orbis/slam/ids.hpp>
 #include <orbis/slam/landmark.hpp>
@@ -139,7 +138,6 @@ class basic_map {
   }
   /// Changes the world frame of the whole map: poses and positions are multiplied by `T_new_old`. O(map).
   void transform(const sim3& T_new_old);
-  void transform(const se3& T_new_old) { transform(sim3(T_new_old)); }
 
   /// Adds a frame as a keyframe. It observes `f.landmarks` (fused ones by their replacement). Its parent in the
   /// spanning tree is the keyframe that it shares most landmarks with, or the newest one if it shares none.
@@ -187,9 +185,6 @@ class basic_map {
   /// @pre both have the same pyramid; `link` refers to keyframes that are there, unless either map is empty;
   /// landmark_ids_left() >= other.landmark_end(), keyframe_ids_left() >= other.keyframe_end()
   id_offsets append(basic_map&& other, const sim3& T_this_other, const map_link& link);
-  id_offsets append(basic_map&& other, const se3& T_this_other, const map_link& link) {
-    return append(std::move(other), sim3(T_this_other), link);
-  }
 
   /// The keyframes that observe any of the given landmarks, with how many they observe: most first, older first where
   /// equal. O(observations of these landmarks).

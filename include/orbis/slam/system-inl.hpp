@@ -3,6 +3,7 @@
 /// The functions of system.hpp.
 #pragma once
 
+#include <chrono>
 #include <string>
 
 #include <orbis/features/descriptor.hpp>
@@ -15,6 +16,23 @@
 #include <orbis/slam/system.hpp>
 
 namespace orbis::slam {
+namespace detail {
+
+/// Measures the time between calls of `lap`.
+class stopwatch {
+ public:
+  /// Sets `milliseconds` to the time since the last call, or since the construction.
+  void lap(double& milliseconds) {
+    const auto now = std::chrono::steady_clock::now();
+    milliseconds = std::chrono::duration<double, std::milli>(now - last_).count();
+    last_ = now;
+  }
+
+ private:
+  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
+};
+
+}  // namespace detail
 
 #define ORBIS_SLAM_SYSTEM_TEMPLATE                                    \
   template <camera::camera_model Camera, feature_extractor Extractor, \

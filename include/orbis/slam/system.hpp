@@ -40,7 +40,6 @@
 #include <orbis/slam/atlas.hpp>
 #include <orbis/slam/camera_rig.hpp>
 #include <orbis/slam/detail/system/shared_state.hpp>
-#include <orbis/slam/detail/system/stopwatch.hpp>
 #include <orbis/slam/events.hpp>
 #include <orbis/slam/extractor.hpp>
 #include <orbis/slam/map.hpp>
@@ -122,8 +121,6 @@ class system {
 
   /// The state after the last frame.
   [[nodiscard]] track_state state() const;
-  /// Whether the map is kept unchanged.
-  [[nodiscard]] bool localizes_only() const noexcept { return localization_only_; }
   /// Sets whether the map is kept unchanged, from the next frame on.
   void set_localization_only(bool on) noexcept { localization_only_ = on; }
 

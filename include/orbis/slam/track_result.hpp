@@ -38,7 +38,6 @@ struct track_timings {
   double features_ms = 0.0;  ///< feature extraction and depth
   double tracking_ms = 0.0;  ///< estimation of the pose
   double mapping_ms = 0.0;   ///< keyframe and, without threads, all of mapping
-  [[nodiscard]] double total_ms() const noexcept { return features_ms + tracking_ms + mapping_ms; }
 };
 
 /// The result of tracking one frame.

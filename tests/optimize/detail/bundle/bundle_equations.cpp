@@ -47,7 +47,7 @@ static_assert(optimize::camera_frame_residual<slow_reprojection>);
 static_assert(!optimize::detail::lane_residual<slow_reprojection>);
 
 template <class R>
-using equations_of = optimize::detail::bundle_equations<R, optimize::huber, optimize::dense_reduced_solver>;
+using equations_of = optimize::detail::bundle_equations<R, optimize::huber>;
 
 template <class R, class Camera>
 Eigen::VectorXd step_of(equations_of<R>& equations, const std::vector<Camera>& cameras, const std::vector<vec3>& points,

@@ -95,8 +95,7 @@ TEST_CASE("The loops over observations give the normal equations and errors of t
     INFO("level " << static_cast<int>(level));
     const simd::level_limit limit{level};
     pose_sums sums;
-    optimize::detail::sum_pose_function<camera::pinhole, optimize::huber>()(*lanes, seen.size(), pinhole_camera, at,
-                                                                            loss, sums);
+    optimize::detail::sum_pose_function<camera::pinhole>()(*lanes, seen.size(), pinhole_camera, at, loss, sums);
     std::vector<double> errors(seen.size());
     optimize::detail::judge_pose_function<camera::pinhole>()(*lanes, seen.size(), pinhole_camera, at, errors.data());
     if (first_errors.empty()) {

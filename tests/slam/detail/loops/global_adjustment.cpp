@@ -8,6 +8,7 @@
 #include <orbis/slam/detail/loops/global_adjustment.hpp>
 #include <orbis/slam/detail/loops/loop_correction.hpp>
 
+#include "slam/at_once.hpp"
 #include "slam/random_map.hpp"
 #include "slam/ring_world.hpp"
 #include "support/catch.hpp"
@@ -28,8 +29,8 @@ slam::detail::bundle_solution solve(const global::snapshot& taken, const slam::c
 [[nodiscard]] slam::map closed_ring(test::ring_world& world) {
   slam::map m = world.round(4);
   const auto last = m.keyframes().back().id;
-  const auto check = slam::detail::verify_loop(m, last, m, 3, world.rig);
-  slam::detail::loop_correction::close(m, check.match, world.rig);
+  const auto check = test::verify_loop(m, last, m, 3, world.rig);
+  test::close_loop(m, check.match, world.rig);
   return m;
 }
 
@@ -54,7 +55,7 @@ TEST_CASE("Adjusting a whole map takes out what closing its loop has left, and f
   m.erase_keyframe(30);
   const slam::map before = m;
 
-  const auto report = slam::detail::global_adjustment::adjust(m, world.rig);
+  const auto report = test::adjust_map(m, world.rig);
   CHECK(test::fault_of(m) == "");
   CHECK(report.keyframes == 63);
   CHECK(report.landmarks > 1000);
@@ -83,9 +84,9 @@ TEST_CASE("What is added while a map is adjusted goes along, and what is gone is
   test::ring_world world({.steps = 60});
   slam::map m = closed_ring(world);
   slam::map alone = m;
-  slam::detail::global_adjustment::adjust(alone, world.rig);
+  test::adjust_map(alone, world.rig);
 
-  const auto taken = global::take(m, world.rig);
+  const auto taken = test::take_map(m, world.rig);
   REQUIRE_FALSE(taken.empty());
   slam::frame next = m.at(63);
   for (std::size_t i = 0; i < next.size(); i += 2) next.landmarks[i] = slam::no_id;
@@ -100,7 +101,7 @@ TEST_CASE("What is added while a map is adjusted goes along, and what is gone is
   const slam::map before = m;
   const auto solved = solve(taken, world.rig);
   REQUIRE(solved.complete);
-  global::apply(m, taken, solved);
+  test::apply_adjustment(m, taken, solved);
   CHECK(test::fault_of(m) == "");
   for (slam::keyframe_id k = 0; k < 64; ++k)
     if (k != 50) CHECK(m.at(k).T_world_camera.to_matrix() == alone.at(k).T_world_camera.to_matrix());
@@ -127,7 +128,7 @@ TEST_CASE("Without depth what hangs on keyframes follows the lengths around them
     world.walk(m, 0, 12, world.truth(0));
     const slam::keyframe_id last = m.keyframes().back().id;
     const slam::map before = m;
-    const auto taken = global::take(m, world.rig);
+    const auto taken = test::take_map(m, world.rig);
     // A solution that makes everything larger as seen from the first keyframe, but for some points.
     constexpr double larger = 1.25;
     const vec3 centre = taken.poses.front().translation();
@@ -138,7 +139,7 @@ TEST_CASE("Without depth what hangs on keyframes follows the lengths around them
       solved.points.emplace_back(centre + (i % 5 == 0 ? 0.8 : larger) * (taken.points[i] - centre));
     solved.outliers.assign(taken.observations.size(), 0);
     solved.usable = true;
-    global::apply(m, taken, solved);
+    test::apply_adjustment(m, taken, solved);
     CHECK(test::fault_of(m) == "");
     const double expected = with_depth ? 1.0 : larger;
     std::size_t alone = 0;
@@ -176,7 +177,7 @@ TEST_CASE("Without depth an adjusted map keeps no landmark that nothing determin
       }
   }
   REQUIRE(wrong.size() == 3);
-  const auto report = slam::detail::global_adjustment::adjust(m, world.rig);
+  const auto report = test::adjust_map(m, world.rig);
   CHECK(report.outliers >= 3);
   CHECK(test::fault_of(m) == "");
   for (const slam::landmark_id l : wrong) CHECK_FALSE(m.has_landmark(l));
@@ -185,12 +186,12 @@ TEST_CASE("Without depth an adjusted map keeps no landmark that nothing determin
 TEST_CASE("Adjustment is the same every time, and may be stopped") {
   test::ring_world world({.steps = 60, .density = 12.0});
   slam::map m(8, 1.2);
-  CHECK(global::take(m, world.rig).empty());
+  CHECK(test::take_map(m, world.rig).empty());
   world.walk(m, 0, 12, world.truth(0));
   const slam::map before = m;
   slam::map again = m;
 
-  const auto taken = global::take(m, world.rig);
+  const auto taken = test::take_map(m, world.rig);
   REQUIRE_FALSE(taken.empty());
   std::size_t calls = 0;
   const auto third = [&](std::size_t done, std::size_t total) {
@@ -205,20 +206,20 @@ TEST_CASE("Adjustment is the same every time, and may be stopped") {
 
   const auto solved = solve(taken, world.rig);
   REQUIRE(solved.complete);
-  global::apply(m, taken, solved);
-  slam::detail::global_adjustment::adjust(again, world.rig);
+  test::apply_adjustment(m, taken, solved);
+  test::adjust_map(again, world.rig);
   CHECK(test::same(m, again));
   CHECK_FALSE(test::same(m, before));
   slam::map single(8, 1.2);
   world.walk(single, 0, 1, world.truth(0));
-  CHECK(slam::detail::global_adjustment::adjust(single, world.rig).keyframes == 0);
+  CHECK(test::adjust_map(single, world.rig).keyframes == 0);
 }
 
 TEST_CASE("A map may be gathered part by part, what is added in between takes no part") {
   test::ring_world world({.steps = 60});
   const slam::map before = closed_ring(world);
   slam::map whole = before, parts = before;
-  const auto at_once = global::take(whole, world.rig);
+  const auto at_once = test::take_map(whole, world.rig);
   REQUIRE_FALSE(at_once.empty());
   slam::frame next = before.at(63);
   for (std::size_t i = 0; i < next.size(); i += 2) next.landmarks[i] = slam::no_id;
@@ -237,8 +238,8 @@ TEST_CASE("A map may be gathered part by part, what is added in between takes no
   REQUIRE_FALSE(taken.empty());
   const auto solved_at_once = solve(at_once, world.rig), solved = solve(taken, world.rig);
   REQUIRE((solved_at_once.complete && solved.complete));
-  global::apply(whole, at_once, solved_at_once);
-  global::apply(parts, taken, solved);
+  test::apply_adjustment(whole, at_once, solved_at_once);
+  test::apply_adjustment(parts, taken, solved);
   CHECK(test::fault_of(parts) == "");
   REQUIRE(parts.keyframes().size() == whole.keyframes().size());
   for (const auto& k : whole.keyframes())
@@ -250,13 +251,13 @@ TEST_CASE("A map may be gathered part by part, what is added in between takes no
 TEST_CASE("Outliers may be erased part by part") {
   test::ring_world world({.steps = 60});
   slam::map m = closed_ring(world);
-  const global::snapshot taken = global::take(m, world.rig);
+  const global::snapshot taken = test::take_map(m, world.rig);
   slam::detail::bundle_solution solved = solve(taken, world.rig);
   REQUIRE(solved.usable);
   for (std::size_t i = 0; i < solved.outliers.size(); i += 7) solved.outliers[i] = 1;
   slam::map parts = m;
   const slam::map before = m;
-  const auto report = global::apply(m, taken, solved);
+  const auto report = test::apply_adjustment(m, taken, solved);
   CHECK(report.outliers > solved.outliers.size() / 10);
   global::apply_poses(parts, taken, solved);
   std::size_t erased = 0, steps = 0;
@@ -264,7 +265,7 @@ TEST_CASE("Outliers may be erased part by part") {
     erased += global::erase_outliers(parts, taken, solved, at, 1000);
   CHECK(steps > 3);
   CHECK(erased == report.outliers);
-  slam::detail::update_landmarks(parts);
+  slam::detail::update_landmarks(parts, 0, parts.landmark_count());
   CHECK(test::same(m, parts));
   CHECK_FALSE(test::same(m, before));
   CHECK(test::fault_of(parts) == "");

@@ -9,6 +9,7 @@
 #include <orbis/slam/detail/loops/global_adjustment.hpp>
 #include <orbis/slam/detail/loops/loop_correction.hpp>
 
+#include "slam/at_once.hpp"
 #include "slam/random_map.hpp"
 #include "slam/ring_world.hpp"
 #include "support/catch.hpp"
@@ -22,7 +23,7 @@ struct open_ring {
   test::ring_world world;
   slam::map m = world.round(4);
   slam::keyframe_id last = m.keyframes().back().id;
-  slam::detail::loop_match match = slam::detail::verify_loop(m, last, m, 3, world.rig).match;
+  slam::detail::loop_match match = test::verify_loop(m, last, m, 3, world.rig).match;
 };
 
 /// How far a keyframe is from where the truth puts it, as seen from keyframe 0.
@@ -37,7 +38,7 @@ TEST_CASE("Closing a loop takes the drift out of keyframes and landmarks, erased
   r.m.erase_keyframe(40);
   const slam::map before = r.m;
   REQUIRE(r.match.inliers >= 40);
-  const auto report = slam::detail::loop_correction::close(r.m, r.match, r.world.rig);
+  const auto report = test::close_loop(r.m, r.match, r.world.rig);
   CHECK(report.corrected);
   CHECK(report.keyframes == 103);
   CHECK(report.moved > 0.2);
@@ -81,7 +82,7 @@ TEST_CASE("Closing a loop takes the drift out of keyframes and landmarks, erased
   CHECK(worst_landmark < worst + 0.2);
 
   // A second time there is nothing left to gain.
-  const auto again = slam::detail::loop_correction::close(r.m, r.match, r.world.rig);
+  const auto again = test::close_loop(r.m, r.match, r.world.rig);
   CHECK(again.corrected);
   CHECK(again.moved < 0.01);
   CHECK(again.fusion.fused < report.fusion.fused / 20);
@@ -90,7 +91,7 @@ TEST_CASE("Closing a loop takes the drift out of keyframes and landmarks, erased
 
 TEST_CASE("Where keyframes with a loop edge are erased, the next correction still has a tie between both sides") {
   open_ring r;
-  REQUIRE(slam::detail::loop_correction::close(r.m, r.match, r.world.rig).corrected);
+  REQUIRE(test::close_loop(r.m, r.match, r.world.rig).corrected);
   // All that saw the place from either side but the first few and the last few, which share nothing with each other.
   for (std::uint32_t k = 2; k <= 12; ++k) r.m.erase_keyframe(k);
   for (std::uint32_t k = 92; k <= r.last.value(); ++k) r.m.erase_keyframe(k);
@@ -116,12 +117,12 @@ TEST_CASE("Without depth a loop takes out the drift of the scale as well") {
   slam::map m = world.round(4);
   m.erase_keyframe(40);
   const slam::keyframe_id last = m.keyframes().back().id;
-  const auto check = slam::detail::verify_loop(m, last, m, 3, world.rig, {.max_rotation = 1.0});
+  const auto check = test::verify_loop(m, last, m, 3, world.rig, {.max_rotation = 1.0});
   CHECK(to_string(check.verdict) == "accepted");
   const double shrunk = std::pow(1.0 - 0.004, 100);
   CHECK(check.match.scale == Approx(1.0 / shrunk).epsilon(0.01));
   const slam::map before = m;
-  const auto report = slam::detail::loop_correction::close(m, check.match, world.rig);
+  const auto report = test::close_loop(m, check.match, world.rig);
   CHECK(report.corrected);
   CHECK(report.scale == Approx(1.0 / shrunk).epsilon(0.02));
   CHECK(test::fault_of(m) == "");
@@ -139,7 +140,7 @@ TEST_CASE("Without depth a loop takes out the drift of the scale as well") {
   CHECK(m.scale_of(0) == 1.0);
   CHECK(m.scale_of(last) == Approx(report.scale));
   // Global adjustment takes the rest out, and does not lose the scale.
-  slam::detail::global_adjustment::adjust(m, world.rig);
+  test::adjust_map(m, world.rig);
   CHECK(test::fault_of(m) == "");
   CHECK(world.errors(m)[1] < 1.2 * mean);
 }
@@ -147,7 +148,7 @@ TEST_CASE("Without depth a loop takes out the drift of the scale as well") {
 TEST_CASE("What is added while a loop is solved goes along") {
   open_ring r;
   slam::map alone = r.m;
-  slam::detail::loop_correction::close(alone, r.match, r.world.rig);
+  test::close_loop(alone, r.match, r.world.rig);
 
   const auto taken = slam::detail::loop_correction::take(r.m, r.match);
   REQUIRE(taken);
@@ -168,7 +169,7 @@ TEST_CASE("What is added while a loop is solved goes along") {
   const slam::map before = r.m;
   const auto solved = slam::detail::loop_correction::solve(*taken, r.world.rig);
   REQUIRE(solved);
-  const auto report = slam::detail::loop_correction::apply(r.m, *taken, *solved);
+  const auto report = test::apply_correction(r.m, *taken, *solved);
   CHECK(report.corrected);
   CHECK(test::fault_of(r.m) == "");
   const auto parent = before.tree().parent(added);
@@ -199,14 +200,14 @@ TEST_CASE("A loop is closed alike every time, one that is stopped, or has lost a
   CHECK(test::same(before, r.m));
   const auto solved = slam::detail::loop_correction::solve(*taken, r.world.rig);
   REQUIRE(solved);
-  slam::detail::loop_correction::apply(r.m, *taken, *solved);
+  test::apply_correction(r.m, *taken, *solved);
   CHECK_FALSE(test::same(before, r.m));
-  slam::detail::loop_correction::close(again, r.match, r.world.rig);
+  test::close_loop(again, r.match, r.world.rig);
   CHECK(test::same(again, r.m));
 
   slam::map without = before;
   without.erase_keyframe(3);
   const slam::map kept = without;
-  CHECK_FALSE(slam::detail::loop_correction::close(without, r.match, r.world.rig).corrected);
+  CHECK_FALSE(test::close_loop(without, r.match, r.world.rig).corrected);
   CHECK(test::same(kept, without));
 }

@@ -5,6 +5,7 @@
 
 #include <orbis/slam/detail/loops/loop_verification.hpp>
 
+#include "slam/at_once.hpp"
 #include "slam/ring_world.hpp"
 #include "support/catch.hpp"
 
@@ -24,7 +25,7 @@ TEST_CASE("A place seen again is recognised, and where it is seen from") {
   const slam::keyframe_id last = m.keyframes().back().id;
   REQUIRE(last == 103);
   for (const std::uint32_t candidate : {2U, 3U, 5U}) {
-    const auto check = slam::detail::verify_loop(m, last, m, candidate, world.rig);
+    const auto check = test::verify_loop(m, last, m, candidate, world.rig);
     CHECK(to_string(check.verdict) == "accepted");
     REQUIRE(check);
     const se3 truth = world.truth(candidate).inverse() * world.truth(last.value());
@@ -41,7 +42,7 @@ TEST_CASE("A place seen again is recognised, and where it is seen from") {
       const auto& by = m.landmark_at(l).observations.front();
       CHECK(world.point_of(last, feature) == world.point_of(by.keyframe, by.feature));
     }
-    const auto again = slam::detail::verify_loop(m, last, m, candidate, world.rig);
+    const auto again = test::verify_loop(m, last, m, candidate, world.rig);
     CHECK(again.match.T_candidate_keyframe.to_matrix() == check.match.T_candidate_keyframe.to_matrix());
     CHECK(again.match.matches == check.match.matches);
   }
@@ -50,7 +51,7 @@ TEST_CASE("A place seen again is recognised, and where it is seen from") {
 TEST_CASE("Without drift, where a place is seen from is known to millimetres") {
   test::ring_world world({.drift = 0.0});
   const slam::map m = world.round(4);
-  const auto check = slam::detail::verify_loop(m, 103, m, 3, world.rig);
+  const auto check = test::verify_loop(m, 103, m, 3, world.rig);
   REQUIRE(check);
   CHECK(apart(check.match.T_candidate_keyframe, world.truth(3).inverse() * world.truth(103)) < 0.004);
   // 1.2 cm of noise at 2 m, in 150 points over 2.4 m: 1.4 mrad about each axis.
@@ -63,7 +64,7 @@ TEST_CASE("The candidate may be one of another map, in a frame of its own") {
   const se3 elsewhere(so3::exp(vec3(0.3, -1.0, 2.0)), vec3(10, -20, 3));
   world.walk(first, 0, 10, world.truth(0));
   world.walk(second, 5, 15, elsewhere * world.truth(5));
-  const auto check = slam::detail::verify_loop(second, 2, first, 8, world.rig);  // steps 7 and 8
+  const auto check = test::verify_loop(second, 2, first, 8, world.rig);  // steps 7 and 8
   REQUIRE(check);
   CHECK(apart(check.match.T_candidate_keyframe, world.truth(8).inverse() * world.truth(7)) < 0.03);
 }
@@ -72,21 +73,21 @@ TEST_CASE("Another place that looks just the same is refused for the drift it wo
   test::ring_world world({.symmetry = 2});  // all looks the same half a round further
   slam::map m(8, 1.2);
   world.walk(m, 0, 54, world.truth(0));
-  const auto check = slam::detail::verify_loop(m, 53, m, 3, world.rig);
+  const auto check = test::verify_loop(m, 53, m, 3, world.rig);
   CHECK(to_string(check.verdict) == "too far");
   CHECK(check.match.inliers >= 40);  // by its looks it is the same place
   CHECK(check.match.supporters == 2);
   slam::loop_options trusting;
   trusting.max_translation = 100.0;
   trusting.max_rotation = 4.0;
-  CHECK(slam::detail::verify_loop(m, 53, m, 3, world.rig, trusting));
+  CHECK(test::verify_loop(m, 53, m, 3, world.rig, trusting));
 }
 
 TEST_CASE("What does not look alike, is not rigid, or too little, is no loop") {
   test::ring_world world;
   const slam::map m = world.round(4);
   const auto verdict = [&](const slam::map& in, slam::keyframe_id candidate, const slam::loop_options& o = {}) {
-    return slam::detail::verify_loop(in, 103, in, candidate, world.rig, o).verdict;
+    return test::verify_loop(in, 103, in, candidate, world.rig, o).verdict;
   };
   CHECK(verdict(m, 102) == loop_verdict::connected);
   CHECK(verdict(m, 50) == loop_verdict::few_matches);
@@ -111,7 +112,6 @@ TEST_CASE("What does not look alike, is not rigid, or too little, is no loop") {
   // Nothing there at all.
   slam::map with_nothing = m;
   with_nothing.add_keyframe({});
-  CHECK(slam::detail::verify_loop(with_nothing, 104, with_nothing, 3, world.rig).verdict == loop_verdict::few_matches);
-  CHECK(slam::detail::verify_loop(with_nothing, 103, with_nothing, 104, world.rig).verdict ==
-        loop_verdict::few_matches);
+  CHECK(test::verify_loop(with_nothing, 104, with_nothing, 3, world.rig).verdict == loop_verdict::few_matches);
+  CHECK(test::verify_loop(with_nothing, 103, with_nothing, 104, world.rig).verdict == loop_verdict::few_matches);
 }

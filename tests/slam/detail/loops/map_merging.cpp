@@ -6,6 +6,7 @@
 
 #include <orbis/slam/detail/loops/map_merging.hpp>
 
+#include "slam/at_once.hpp"
 #include "slam/random_map.hpp"
 #include "slam/ring_world.hpp"
 #include "support/catch.hpp"
@@ -22,11 +23,11 @@ TEST_CASE("Two maps that show the same place become one") {
   const auto from = maps.create();
   world.walk(maps.active(), 15, 35, elsewhere * world.truth(15));
   maps.at(from).erase_keyframe(10);
-  const auto check = slam::detail::verify_loop(maps.at(from), 2, maps.at(into), 16, world.rig);
+  const auto check = test::verify_loop(maps.at(from), 2, maps.at(into), 16, world.rig);
   REQUIRE(check);
   const slam::map first = maps.at(into), second = maps.at(from);
 
-  const auto report = slam::detail::map_merging::merge(maps, from, into, check.match, world.rig);
+  const auto report = test::merge_maps(maps, from, into, check.match, world.rig);
   REQUIRE(report.merged);
   CHECK(maps.size() == 1);
   CHECK(maps.active_id() == into);
@@ -71,27 +72,27 @@ TEST_CASE("Maps that grow while they are compared are merged whole, without thei
   world.walk(maps.active(), 0, 12, world.truth(0));
   const auto from = maps.create();
   world.walk(maps.active(), 6, 18, world.truth(6));
-  const auto match = slam::detail::verify_loop(maps.at(from), 2, maps.at(into), 7, world.rig).match;
+  const auto match = test::verify_loop(maps.at(from), 2, maps.at(into), 7, world.rig).match;
   REQUIRE(match.inliers >= 40);
 
   const auto taken = merging::take(maps, from, into, match);
   REQUIRE(taken);
-  const auto solved = merging::solve(*taken, world.rig);
+  const auto pairs = slam::detail::loop_fusion::find_pairs(taken->fusion, world.rig, {});
   slam::atlas without = maps;
   slam::detail::insert_keyframe(maps.at(from), world.look(18, maps.at(from).at(11).T_world_camera), {});
   slam::detail::insert_keyframe(maps.at(into), world.look(12, maps.at(into).at(11).T_world_camera), {});
-  const auto report = merging::apply(maps, *taken, solved);
+  const auto report = merging::join(maps, *taken);
   REQUIRE(report.merged);
   CHECK(report.offsets.keyframes == 13);
-  CHECK(report.fusion.fused > 100);
+  CHECK(slam::detail::loop_fusion::fuse<slam::map::descriptor_type>(maps.active(), pairs, report.offsets).fused > 100);
   CHECK(maps.active().keyframes().size() == 26);
   CHECK(test::fault_of(maps.active()) == "");
 
   without.at(into).erase_keyframe(7);
-  CHECK_FALSE(merging::apply(without, *taken, solved).merged);
+  CHECK_FALSE(merging::join(without, *taken).merged);
   CHECK(without.size() == 2);
   CHECK_FALSE(merging::take(without, from, into, match));
-  CHECK_FALSE(slam::detail::map_merging::merge(without, into, into, match, world.rig).merged);
+  CHECK_FALSE(test::merge_maps(without, into, into, match, world.rig).merged);
 }
 
 TEST_CASE("A map without depth takes on the unit of the one that it becomes a part of") {
@@ -103,10 +104,10 @@ TEST_CASE("A map without depth takes on the unit of the one that it becomes a pa
   const se3 start(so3::exp(vec3(0.1, 0.2, 0.3)), vec3(5, 6, 7));
   constexpr double unit = 0.3;
   world.walk(maps.active(), 15, 35, start, unit);
-  const auto check = slam::detail::verify_loop(maps.at(from), 2, maps.at(into), 16, world.rig);
+  const auto check = test::verify_loop(maps.at(from), 2, maps.at(into), 16, world.rig);
   CHECK(to_string(check.verdict) == "accepted");
   CHECK(check.match.scale == Approx(1.0 / unit).epsilon(0.01));
-  const auto report = slam::detail::map_merging::merge(maps, from, into, check.match, world.rig);
+  const auto report = test::merge_maps(maps, from, into, check.match, world.rig);
   REQUIRE(report.merged);
   CHECK(test::fault_of(maps.active()) == "");
   CHECK(report.fusion.fused > 100);

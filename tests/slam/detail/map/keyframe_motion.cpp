@@ -23,7 +23,7 @@ TEST_CASE("In another frame of reference every keyframe sees what it saw") {
   const slam::map before = test::random_map(2, 1500);
   slam::map m = before;
   const se3 T = test::random_motion(random);
-  m.transform(T);
+  m.transform(sim3(T));
   for (const auto& l : m.landmarks()) {
     const auto& old = before.landmark_at(l.id);
     CHECK((l.normal - T.rotation() * old.normal).norm() < 1e-12);
@@ -70,7 +70,7 @@ TEST_CASE("All keyframes move, landmarks with the oldest one that observes them,
   }
 
   slam::map parts = all;
-  slam::detail::update_landmarks(all);
+  slam::detail::update_landmarks(all, 0, all.landmark_count());
   slam::landmark_id at = 0;
   std::size_t steps = 0;
   for (; at != parts.landmark_end(); ++steps) at = slam::detail::update_landmarks(parts, at, 100);

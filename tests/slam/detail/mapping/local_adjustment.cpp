@@ -22,6 +22,10 @@ namespace {
 
 namespace local = slam::detail::local_adjustment;
 
+std::size_t outliers_of(const slam::detail::bundle_solution& s) {
+  return static_cast<std::size_t>(std::count(s.outliers.begin(), s.outliers.end(), 1));
+}
+
 /// The steps of an adjustment, with the values between them.
 struct adjustment_steps {
   slam::adjustment_options options;
@@ -182,8 +186,8 @@ TEST_CASE("Observations that disagree are forgotten, the others stay") {
   f.T_world_camera = s.wrong_pose(3);
   const auto id = s.m.add_keyframe(f);
   REQUIRE(s.adjust());
-  CHECK(s.adjustment.solved.outlier_count() >= wrong.size());
-  CHECK(s.adjustment.solved.outlier_count() < wrong.size() + 20);
+  CHECK(outliers_of(s.adjustment.solved) >= wrong.size());
+  CHECK(outliers_of(s.adjustment.solved) < wrong.size() + 20);
   for (const auto i : wrong) CHECK(s.m.at(id).landmarks[i] == slam::no_id);
   CHECK(std::count(s.m.at(id).landmarks.begin(), s.m.at(id).landmarks.end(), slam::no_id) < 30);
   CHECK(s.pose_error() < 0.003);
@@ -273,7 +277,7 @@ TEST_CASE("An adjustment that is stopped changes nothing, or leaves something be
   const auto twice = [&](std::size_t, std::size_t) { return ++asked < 5; };
   CHECK_FALSE(s.adjustment.solve(twice));
   CHECK(asked == 5);
-  CHECK(s.adjustment.solved.outlier_count() == 0);
+  CHECK(outliers_of(s.adjustment.solved) == 0);
   s.adjustment.apply(s.m);
   CHECK(s.pose_error() < error);
   CHECK(poses_of(s.m) != poses);
@@ -316,16 +320,7 @@ TEST_CASE("Another camera model is taken up") {
   s.options.robust_iterations = s.options.iterations = 0;
   REQUIRE(s.gather(5));
   CHECK(s.adjustment.solve());
-  CHECK(s.adjustment.solved.outlier_count() > 6 * s.points.size() / 2);  // which fits nothing here
-}
-
-TEST_CASE("The steps in a row do what they do one by one") {
-  scene one, row;
-  REQUIRE(one.adjust());
-  slam::detail::bundle_solver<camera::pinhole> solver{row.rig.model};
-  REQUIRE(local::adjust(row.m, 5, solver, row.rig, row.options));
-  CHECK(poses_of(one.m) == poses_of(row.m));
-  CHECK(positions_of(one.m) == positions_of(row.m));
+  CHECK(outliers_of(s.adjustment.solved) > 6 * s.points.size() / 2);  // which fits nothing here
 }
 
 TEST_CASE("Solving again what is no larger allocates nothing") {

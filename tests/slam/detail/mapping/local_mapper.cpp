@@ -79,7 +79,7 @@ TEST_CASE("A keyframe that is gone is left alone, one whose map was merged is fo
   CHECK(s.shared.places.known.empty());
   s.shared.atlas.create();
   s.world.walk(s.m(), 30, 34, s.world.truth(30));
-  s.shared.atlas.merge(1, 0, se3{}, {0, 0});
+  s.shared.atlas.merge(1, 0, sim3{}, {0, 0});
   s.mapper.process({1, 3}, at_leisure);
   CHECK(s.shared.places.contains({0, 7}));
 }

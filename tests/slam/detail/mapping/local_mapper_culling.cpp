@@ -17,6 +17,7 @@ using test::random_frame;
 namespace {
 
 constexpr double close_depth = 3.2;
+constexpr auto keep_none = [](slam::keyframe_id) { return false; };
 
 /// Shows the first `known` landmarks of keyframe 1 again, at levels `coarser` than it does.
 slam::keyframe_id add(random_bits& random, slam::map& m, std::uint32_t known, int coarser = 0) {
@@ -74,7 +75,7 @@ TEST_CASE("Redundant neighbours go as long as they are redundant, but those that
     m.add_keyframe(std::move(f));
   }
   slam::map kept = m, looped = m;
-  const auto erased = slam::detail::cull_keyframes(m, 7, close_depth, {});
+  const auto erased = slam::detail::cull_keyframes(m, 7, close_depth, {}, keep_none);
   CHECK(erased == std::vector<slam::keyframe_id>{1, 2, 3, 4});
   CHECK(m.keyframes().size() == 4);
   CHECK(test::fault_of(m) == "");
@@ -84,7 +85,7 @@ TEST_CASE("Redundant neighbours go as long as they are redundant, but those that
         std::vector<slam::keyframe_id>{6});
   // Loop edges keep none, and pass to the replacement: one between 2 and 6 is one between 0 and 6.
   looped.add_loop_edge(2, 6);
-  CHECK(slam::detail::cull_keyframes(looped, 7, close_depth, {}) == erased);
+  CHECK(slam::detail::cull_keyframes(looped, 7, close_depth, {}, keep_none) == erased);
   CHECK(looped.replacement_of(slam::keyframe_id{2}) == 0);
   CHECK(looped.tree().loop_edges(0) == std::vector<slam::keyframe_id>{6});
   CHECK(looped.tree().loop_edges(6) == std::vector<slam::keyframe_id>{0});
@@ -102,7 +103,7 @@ TEST_CASE("The root stays") {
     m.add_keyframe(std::move(f));
   }
   CHECK(slam::detail::is_redundant(m, 0, close_depth, {}));
-  slam::detail::cull_keyframes(m, 5, close_depth, {});
+  slam::detail::cull_keyframes(m, 5, close_depth, {}, keep_none);
   CHECK(m.has_keyframe(0));
   CHECK(m.keyframes().size() == 3);
 }

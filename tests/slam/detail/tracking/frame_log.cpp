@@ -41,7 +41,7 @@ TEST_CASE("Frames follow their keyframe, through erasing and merging, and are li
   const se3 before = log.trajectory(maps, second)[0].T_world_camera;
   maps.at(second).erase_keyframe(1);
   CHECK((log.trajectory(maps, second)[0].T_world_camera.inverse() * before).log().norm() < 1e-9);
-  maps.merge(second, first, moved);
+  maps.merge(second, first, sim3(moved), {0, 0});
   REQUIRE(log.trajectory(maps, first).size() == 3);
   CHECK((log.trajectory(maps, first)[1].T_world_camera.inverse() * moved * before).log().norm() < 1e-9);
   CHECK(log.trajectory(maps, second).empty());
@@ -62,7 +62,7 @@ TEST_CASE("A log names the keyframes that its frames hang on, also after their m
   using ids = std::vector<slam::keyframe_id>;
   CHECK(log.references(maps, first) == ids{0, 1});
   CHECK(log.references(maps, second) == ids{1});
-  maps.merge(second, first, se3{});
+  maps.merge(second, first, sim3{}, {0, 0});
   CHECK(log.references(maps, first) == ids{0, 4, 1});
 }
 
@@ -97,9 +97,9 @@ TEST_CASE("Frames that were forgotten count for the map that theirs became a par
   for (int i = 3; i < 5; ++i) log.add({1.0 * i, {second, 0}, {}});
   for (int i = 5; i < 9; ++i) log.add({1.0 * i, {third, 0}, {}});
   CHECK(log.largest_map(maps) == third);  // 3, 2 and 4 frames, of which 0, 0 and 2 are kept
-  maps.merge(second, first, se3{});
+  maps.merge(second, first, sim3{}, {0, 0});
   CHECK(log.largest_map(maps) == first);
-  maps.merge(first, third, se3{});
+  maps.merge(first, third, sim3{}, {0, 0});
   CHECK(log.largest_map(maps) == third);
   CHECK(log.trajectory(maps, third).size() == 2);
 }

@@ -169,7 +169,7 @@ TEST_CASE("Tracking goes on when the map was merged, moved and culled between tw
   REQUIRE(s.maps.active_id() == 1);
   s.options.initial_pose.reset();
   const se3 T_into_from = T * s.world.truth(20) * s.world.truth(0).inverse();
-  const auto offsets = s.maps.merge(1, 0, T_into_from, {3, 0});
+  const auto offsets = s.maps.merge(1, 0, sim3(T_into_from), {3, 0});
   CHECK(offsets.keyframes == 4);
   CHECK(s.see(26) > 30);
   CHECK(s.front_end.state() == track_state::tracking);
@@ -312,7 +312,7 @@ TEST_CASE("Where the trajectory is limited, the map forgets erased keyframes tha
     CHECK((test::validate(m) ? "" : test::validate(m).error().to_string()) == "");
   };
   walk(12);
-  const slam::map_keyframe last = s.front_end.last_reference();
+  const slam::map_keyframe last = s.front_end.last_frame().reference;
   REQUIRE(s.maps.active().keyframes().size() > 1);
   for (scene* in : {&s, &twin}) in->maps.active().erase_keyframe(last.keyframe);
 
@@ -335,7 +335,7 @@ TEST_CASE("Where the trajectory is limited, the map forgets erased keyframes tha
   check_alike();
   walk(20);
   check_alike();
-  REQUIRE(s.front_end.last_reference().keyframe != last.keyframe);
+  REQUIRE(s.front_end.last_frame().reference.keyframe != last.keyframe);
   erase_many(s);
   CHECK_FALSE(s.maps.active().remembers(last.keyframe));
   CHECK(twin.maps.active().remembers(last.keyframe));
@@ -351,7 +351,7 @@ TEST_CASE("A frame and a surface that hang on a keyframe that was forgotten harm
   slam::map& m = s.maps.active();
   const se3 before = s.front_end.last_pose(s.maps);
   const slam::keyframe_id other = m.add_keyframe({});
-  const slam::keyframe_id gone = s.front_end.last_reference().keyframe;
+  const slam::keyframe_id gone = s.front_end.last_frame().reference.keyframe;
   m.erase_keyframe(gone);
   m.forget_erased({}, 0);
   REQUIRE(m.has_keyframe(other));

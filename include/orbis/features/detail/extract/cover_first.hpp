@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Chooses corners: the strongest of each level, or some that cover the image and then the strongest.
+/// Chooses corners: some that cover the image, then the strongest of each level.
 #pragma once
 
 #include <algorithm>
@@ -44,11 +44,6 @@ inline void keep_strongest(std::vector<corner>& corners, int wanted) {
   std::nth_element(corners.begin(), corners.begin() + static_cast<std::ptrdiff_t>(count), corners.end(), stronger);
   corners.resize(count);
   std::sort(corners.begin(), corners.end(), before_in_image);
-}
-
-ORBIS_INLINE void strongest::operator()(std::span<level_corners> levels, int wanted, workspace& memory) const {
-  share_out(levels, wanted, memory.quotas);
-  for (std::size_t i = 0; i != levels.size(); ++i) keep_strongest(levels[i].corners, memory.quotas[i]);
 }
 
 ORBIS_INLINE void cover_first::operator()(std::span<level_corners> levels, int wanted, workspace& memory) const {

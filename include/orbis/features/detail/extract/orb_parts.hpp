@@ -56,21 +56,12 @@ struct fast9 {
 };
 static_assert(corner_detector<fast9>);
 
-/// Chooses the strongest corners of each level, wherever they are. O(n).
-struct strongest {
-  struct workspace {
-    std::vector<int> quotas;
-  };
-  void operator()(std::span<level_corners> levels, int wanted, workspace& memory) const;
-};
-static_assert(corner_selection<strongest>);
-
 /// Covers the image first: it is cut into square cells, as many as a share of the wanted corners, and every cell gives
 /// its strongest corner of all levels. The rest are the strongest corners of their levels, wherever they are, because
 /// strong corners are found again in other images. A cell gives one corner, not one on each level, so that there is
 /// room for these. O(n), and sorting of the chosen corners.
 struct cover_first {
-  double share = 0.25;  ///< of the wanted corners, for covering; 0 ... 1: from best found again to best spread
+  double share = 0.25;  ///< of the wanted corners, for covering; 0 (none) ... 1: from best found again to best spread
 
   struct workspace {
     struct candidate {
@@ -102,12 +93,6 @@ struct intensity_centroid {
   [[nodiscard]] orientation operator()(image_view<const std::uint8_t> image, int x, int y) const;
 };
 static_assert(orientation_estimator<intensity_centroid>);
-
-/// No direction, for cameras that do not roll: descriptors that are not turned tell more patches apart.
-struct upright {
-  static constexpr int radius = 0;
-  [[nodiscard]] orientation operator()(image_view<const std::uint8_t>, int, int) const noexcept { return {}; }
-};
 
 /// Memory of `smooth`, which the next call uses again.
 struct smooth_workspace {

@@ -25,6 +25,7 @@
 #include <orbis/optimize/detail/bundle/bundle_kernels.hpp>
 #include <orbis/optimize/detail/bundle/bundle_structure.hpp>
 #include <orbis/optimize/detail/bundle/schur_kernels.hpp>
+#include <orbis/optimize/detail/sparse/reduced_solver.hpp>
 #include <orbis/optimize/robust_loss.hpp>
 #include <orbis/optimize/solver_policies.hpp>
 
@@ -32,16 +33,17 @@ namespace orbis::optimize::detail {
 
 /// The unknowns are the steps of the cameras that may move, C numbers each, then those of the points in the order of
 /// `structure()`, three each. Keeps its memory.
-template <bundle_residual R, robust_loss Loss, reduced_solver Reduced>
+template <bundle_residual R, robust_loss Loss>
 class bundle_equations {
  public:
   static constexpr int camera_size = R::camera_manifold::dimension;
   using camera_state = typename R::camera_state;
   using observation = typename R::observation;
   using camera_block = matrix<camera_size, camera_size>;
-  using reduced_type = typename Reduced::template solver<camera_size>;
+  using reduced_type = reduced_solver<camera_size>;
 
-  bundle_equations(R residual, Loss loss, const Reduced& reduced);
+  bundle_equations(R residual, Loss loss, const reduced_solver_options& reduced)
+      : residual_{std::move(residual)}, loss_{std::move(loss)}, reduced_{reduced} {}
 
   [[nodiscard]] const R& residual() const { return residual_; }
   [[nodiscard]] const Loss& loss() const { return loss_; }
@@ -50,7 +52,28 @@ class bundle_equations {
 
   /// Orders the observations and finds the blocks of the reduced system.
   void set_structure(std::size_t cameras, std::size_t points, std::span<const observation> observations,
-                     std::span<const std::uint8_t> fixed);
+                     std::span<const std::uint8_t> fixed) {
+    structure_.build(cameras, points, observations, fixed,
+                     [&](std::uint32_t k) { return residual_.is_usable(observations[k]); });
+    const std::size_t places = structure_.places();
+    base_information_.assign(places, 0.0);
+    if constexpr (lane_residual<R>)
+      measurements_.assign(static_cast<std::size_t>(R::measured) * places, 0.0);
+    else
+      observations_.assign(places, observation{});
+    for (std::size_t at = 0; at != places; ++at) {
+      if (structure_.source[at] == bundle_structure::none) continue;
+      const observation& o = observations[structure_.source[at]];
+      base_information_[at] = o.information;
+      if constexpr (lane_residual<R>)
+        residual_.measure(o, measurements_.data() + static_cast<std::size_t>(R::measured) * (at / 8 * 8) + at % 8);
+      else
+        observations_[at] = o;
+    }
+    information_ = base_information_;
+    make_room();
+    analyze_reduced();
+  }
 
   /// Begins at these estimates, with the observations that are not ignored and have a projection there; counts them in
   /// `summary`.
@@ -507,35 +530,5 @@ class bundle_equations {
   std::vector<camera_block> reduced_diagonal_, reduced_off_diagonal_;
   std::vector<double> reduced_right_, pulled_;
 };
-
-template <bundle_residual R, robust_loss Loss, reduced_solver Reduced>
-bundle_equations<R, Loss, Reduced>::bundle_equations(R residual, Loss loss, const Reduced& reduced)
-    : residual_{std::move(residual)}, loss_{std::move(loss)}, reduced_{reduced} {}
-
-template <bundle_residual R, robust_loss Loss, reduced_solver Reduced>
-void bundle_equations<R, Loss, Reduced>::set_structure(std::size_t cameras, std::size_t points,
-                                                       std::span<const observation> observations,
-                                                       std::span<const std::uint8_t> fixed) {
-  structure_.build(cameras, points, observations, fixed,
-                   [&](std::uint32_t k) { return residual_.is_usable(observations[k]); });
-  const std::size_t places = structure_.places();
-  base_information_.assign(places, 0.0);
-  if constexpr (lane_residual<R>)
-    measurements_.assign(static_cast<std::size_t>(R::measured) * places, 0.0);
-  else
-    observations_.assign(places, observation{});
-  for (std::size_t at = 0; at != places; ++at) {
-    if (structure_.source[at] == bundle_structure::none) continue;
-    const observation& o = observations[structure_.source[at]];
-    base_information_[at] = o.information;
-    if constexpr (lane_residual<R>)
-      residual_.measure(o, measurements_.data() + static_cast<std::size_t>(R::measured) * (at / 8 * 8) + at % 8);
-    else
-      observations_[at] = o;
-  }
-  information_ = base_information_;
-  make_room();
-  analyze_reduced();
-}
 
 }  // namespace orbis::optimize::detail

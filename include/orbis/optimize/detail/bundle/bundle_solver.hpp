@@ -24,13 +24,13 @@
 
 namespace orbis::optimize::detail {
 
-template <class Residual, class Loss, class Damping, class ReducedSolver>
+template <class Residual, class Loss, class Damping>
 class bundle_solver {
  public:
   using camera_state = typename Residual::camera_state;
   using observation = typename Residual::observation;
 
-  bundle_solver(Residual residual, Loss loss, Damping damping, const ReducedSolver& reduced)
+  bundle_solver(Residual residual, Loss loss, Damping damping, const reduced_solver_options& reduced)
       : equations_{std::move(residual), std::move(loss), reduced}, damping_{std::move(damping)} {}
 
   [[nodiscard]] double chi2(const camera_state& camera, const vec3& point, const observation& o) const {
@@ -72,7 +72,7 @@ class bundle_solver {
   }
 
  private:
-  using equations_type = bundle_equations<Residual, Loss, ReducedSolver>;
+  using equations_type = bundle_equations<Residual, Loss>;
 
   /// The equations as the damping policies see them.
   template <class Policy>
@@ -161,7 +161,27 @@ class bundle_solver {
 
   template <class Policy, class Report>
   bundle_summary run(const Policy& policy, std::span<camera_state> cameras, std::span<vec3> points,
-                     const bundle_options& options, const progress& callback, Report& report, bundle_summary& summary);
+                     const bundle_options& options, const progress& callback, Report& report, bundle_summary& summary) {
+    assert(options.fixed_points.empty() || options.fixed_points.size() == points.size());
+    assert(options.ignored.empty() || options.ignored.size() == observations_.size());
+    {
+      const stage_watch watch{summary.seconds.set_up};
+      if (!has_finite_cameras(cameras, summary)) return summary;
+      count_unusable(options.ignored, summary);
+      equations_.begin(policy, cameras, points, options, summary);
+    }
+    if (summary.observations == 0 || !equations_.moves_anything()) return summary;
+    const int linear_before = equations_.reduced().iterations();
+    problem<Policy> view{equations_, policy, summary};
+    view.linearize();
+    summary.initial_cost = summary.final_cost = equations_.cost();
+    summary.status = bundle_status::iteration_limit;
+    report(std::as_const(summary));
+    summary.status = iterate(view, options, callback, summary, report);
+    summary.linear_iterations = equations_.reduced().iterations() - linear_before;
+    if (summary.iterations != 0) equations_.write(cameras, points);
+    return summary;
+  }
 
   template <class View, class Report>
   [[nodiscard]] bundle_status iterate(View& view, const bundle_options& options, const progress& callback,
@@ -199,31 +219,5 @@ class bundle_solver {
   std::vector<std::uint8_t> fixed_;            // of the structure
   std::vector<typename Residual::view> chi2_views_;
 };
-
-template <class Residual, class Loss, class Damping, class ReducedSolver>
-template <class Policy, class Report>
-bundle_summary bundle_solver<Residual, Loss, Damping, ReducedSolver>::run(
-    const Policy& policy, std::span<camera_state> cameras, std::span<vec3> points, const bundle_options& options,
-    const progress& callback, Report& report, bundle_summary& summary) {
-  assert(options.fixed_points.empty() || options.fixed_points.size() == points.size());
-  assert(options.ignored.empty() || options.ignored.size() == observations_.size());
-  {
-    const stage_watch watch{summary.seconds.set_up};
-    if (!has_finite_cameras(cameras, summary)) return summary;
-    count_unusable(options.ignored, summary);
-    equations_.begin(policy, cameras, points, options, summary);
-  }
-  if (summary.observations == 0 || !equations_.moves_anything()) return summary;
-  const int linear_before = equations_.reduced().iterations();
-  problem<Policy> view{equations_, policy, summary};
-  view.linearize();
-  summary.initial_cost = summary.final_cost = equations_.cost();
-  summary.status = bundle_status::iteration_limit;
-  report(std::as_const(summary));
-  summary.status = iterate(view, options, callback, summary, report);
-  summary.linear_iterations = equations_.reduced().iterations() - linear_before;
-  if (summary.iterations != 0) equations_.write(cameras, points);
-  return summary;
-}
 
 }  // namespace orbis::optimize::detail

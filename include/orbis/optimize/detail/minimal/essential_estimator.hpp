@@ -19,13 +19,13 @@
 #include <orbis/core/se3.hpp>
 #include <orbis/core/simd/dispatch.hpp>
 #include <orbis/core/simd/vec.hpp>
+#include <orbis/core/small_cholesky.hpp>
 #include <orbis/core/types.hpp>
 #include <orbis/optimize/detail/minimal/descent.hpp>
 #include <orbis/optimize/detail/minimal/epipolar_motion.hpp>
 #include <orbis/optimize/detail/minimal/five_point.hpp>
 #include <orbis/optimize/detail/minimal/horn.hpp>
 #include <orbis/optimize/detail/minimal/image_matches.hpp>
-#include <orbis/core/small_cholesky.hpp>
 #include <orbis/optimize/detail/unroll.hpp>
 #include <orbis/optimize/ransac.hpp>
 
@@ -47,6 +47,7 @@ class essential_estimator {
  public:
   using model = mat3;
   static constexpr std::size_t sample_size = 5;
+  static constexpr double model_cost = 2000.0;  ///< see `ransac_options`
 
   explicit essential_estimator(const std::vector<image_match>& matches) : matches_{matches} {
     stride_ = (matches.size() + consensus_block - 1) / consensus_block * consensus_block;

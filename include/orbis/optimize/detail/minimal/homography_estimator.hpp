@@ -14,17 +14,17 @@
 
 #include <Eigen/LU>
 
+#include <orbis/core/small_cholesky.hpp>
 #include <orbis/core/types.hpp>
 #include <orbis/optimize/detail/minimal/descent.hpp>
-#include <orbis/core/small_cholesky.hpp>
 #include <orbis/optimize/ransac.hpp>
 
 namespace orbis::optimize::detail {
 
-/// The homography of four pairs of points, by projective bases. False if three points are on a line, or if some points
-/// would lie behind a camera.
-[[nodiscard]] inline bool homography_of_four(const std::array<vec2, 4>& first, const std::array<vec2, 4>& second,
-                                             mat3& out) {
+/// The homography of four pairs of points, by projective bases, of norm 1. Empty if three points are on a line, or if
+/// some points would lie behind a camera.
+[[nodiscard]] inline std::optional<mat3> homography_of_four(const std::array<vec2, 4>& first,
+                                                            const std::array<vec2, 4>& second) {
   mat3 bases[2];
   vec3 weights[2];
   for (int k = 0; k != 2; ++k) {
@@ -36,15 +36,54 @@ namespace orbis::optimize::detail {
     weights[k] = vec3(cross(3, 1, 2), cross(0, 3, 2), cross(0, 1, 3));
     const double area = cross(0, 1, 2);
     const double extent = squared_norm(p[1] - p[0]) + squared_norm(p[2] - p[0]) + squared_norm(p[3] - p[0]);
-    if (!(std::min(std::fabs(area), smallest_of(magnitudes(weights[k]))) > 1e-6 * extent)) return false;
+    if (!(std::min(std::fabs(area), smallest_of(magnitudes(weights[k]))) > 1e-6 * extent)) return std::nullopt;
     weights[k] /= area;
     for (int i = 0; i != 3; ++i) set_column(bases[k], i, weights[k][i] * homogeneous(p[static_cast<std::size_t>(i)]));
   }
   for (int i = 0; i != 3; ++i)
-    if (!(weights[1][i] / weights[0][i] > 0.0)) return false;  // some points would see the plane from behind
-  out = bases[1] * inverse(bases[0]);
+    if (!(weights[1][i] / weights[0][i] > 0.0)) return std::nullopt;  // some points would see the plane from behind
+  mat3 out = bases[1] * inverse(bases[0]);
   out /= norm(out);
-  return all_finite(out);
+  if (!all_finite(out)) return std::nullopt;
+  return out;
+}
+
+/// Normal equations of transfer errors for D in (I + D) H, whose last entry is 0; the lower triangle of `h`. `cost` is
+/// the sum of squares.
+struct homography_equations {
+  matrix<8, 8> h = zeros<matrix<8, 8>>();
+  matrix<8> g = zeros<matrix<8>>();
+  double cost = 0.0;
+
+  /// Adds the error `r` of a point whose derivative by the point before its projection is `by_point`; that moves by
+  /// `by_d * D * moved`.
+  void add(const vec2& r, const matrix<2, 3>& by_point, const mat3& by_d, const vec3& moved) {
+    const matrix<2, 3> a = by_point * by_d;
+    matrix<2, 8> j;
+    for (int k = 0; k != 8; ++k) set_column(j, k, column_of(a, k / 3) * moved[k % 3]);
+    for (int k = 0; k != 8; ++k) {
+      for (int l = k; l != 8; ++l) h(l, k) += j(0, l) * j(0, k) + j(1, l) * j(1, k);
+      g[k] += j(0, k) * r[0] + j(1, k) * r[1];
+    }
+    cost += squared_norm(r);
+  }
+  /// I + D of a Gauss-Newton step; empty if there is none.
+  [[nodiscard]] std::optional<mat3> step() const {
+    small_cholesky<8> factors;
+    if (!factors.set(h) || !(factors.factor(1e-9) > 0.0)) return std::nullopt;
+    const matrix<8> entries = -factors.solve(g);
+    if (!all_finite(entries)) return std::nullopt;
+    mat3 d = identity<mat3>();
+    for (int j = 0; j != 8; ++j) d(j / 3, j % 3) += entries[j];
+    return d;
+  }
+};
+
+/// The derivative of `xy`, the projection of a point to z = 1, by the point.
+[[nodiscard]] inline matrix<2, 3> derivative_of_projection(const vec2& xy, double inverse_z) {
+  matrix<2, 3> projection;
+  projection << inverse_z, 0.0, -xy.x() * inverse_z, 0.0, inverse_z, -xy.y() * inverse_z;
+  return projection;
 }
 
 class homography_estimator {
@@ -70,25 +109,18 @@ class homography_estimator {
 
   [[nodiscard]] std::size_t size() const noexcept { return matches_.size(); }
 
-  struct candidates {
-    std::optional<model> found;
-    [[nodiscard]] const model* begin() const noexcept { return found ? &*found : nullptr; }
-    [[nodiscard]] const model* end() const noexcept { return found ? &*found + 1 : nullptr; }
-  };
-  [[nodiscard]] candidates fit(const std::array<std::uint32_t, 4>& s) const {
-    mat3 h;
-    if (!homography_of_four(
-            {matches_[s[0]].first, matches_[s[1]].first, matches_[s[2]].first, matches_[s[3]].first},
-            {matches_[s[0]].second, matches_[s[1]].second, matches_[s[2]].second, matches_[s[3]].second}, h))
-      return {};
-    return {made_of(h)};
+  [[nodiscard]] one_or_none<model> fit(const std::array<std::uint32_t, 4>& s) const {
+    const auto h = homography_of_four(
+        {matches_[s[0]].first, matches_[s[1]].first, matches_[s[2]].first, matches_[s[3]].first},
+        {matches_[s[0]].second, matches_[s[1]].second, matches_[s[2]].second, matches_[s[3]].second});
+    if (!h) return {};
+    return {made_of(*h)};
   }
 
   [[nodiscard]] double squared_error(const model& m, std::size_t i) const {
     const match& x = matches_[i];
     const vec3 p = m.forward * homogeneous(x.first), q = m.backward * homogeneous(x.second);
-    return 0.5 * (squared_norm(head<2>(p) / p.z() - x.second) +
-                  squared_norm(head<2>(q) / q.z() - x.first));
+    return 0.5 * (squared_norm(head<2>(p) / p.z() - x.second) + squared_norm(head<2>(q) / q.z() - x.first));
   }
 
   void squared_errors(const model& m, std::size_t first, std::span<float, consensus_block> out) const {
@@ -119,14 +151,10 @@ class homography_estimator {
   }
   [[nodiscard]] std::optional<model> refine(const model& start, std::span<const std::uint32_t> inliers,
                                             int steps) const {
-    const auto step = [](const model& m, const equations& e) -> std::optional<model> {
-      small_cholesky<8> factors;
-      if (!factors.set(e.h) || !(factors.factor(1e-9) > 0.0)) return std::nullopt;
-      const matrix<8> entries = -factors.solve(e.g);
-      if (!all_finite(entries)) return std::nullopt;
-      mat3 d = identity<mat3>();
-      for (int j = 0; j != 8; ++j) d(j / 3, j % 3) += entries[j];
-      return made_of(d * m.forward);
+    const auto step = [](const model& m, const homography_equations& e) -> std::optional<model> {
+      const auto d = e.step();
+      if (!d) return std::nullopt;
+      return made_of(*d * m.forward);
     };
     return descend(
         start, steps, [&](const model& m) { return sum_up(m, inliers); }, step);
@@ -139,32 +167,14 @@ class homography_estimator {
     return m;
   }
 
-  /// Normal equations for D in (I + D) H, whose last entry is 0; the lower triangle of `h`. `cost` is the sum of
-  /// squares.
-  struct equations {
-    matrix<8, 8> h = zeros<matrix<8, 8>>();
-    matrix<8> g = zeros<matrix<8>>();
-    double cost = 0.0;
-  };
-  [[nodiscard]] equations sum_up(const model& m, std::span<const std::uint32_t> inliers) const {
-    equations e;
+  [[nodiscard]] homography_equations sum_up(const model& m, std::span<const std::uint32_t> inliers) const {
+    homography_equations e;
     for (const std::uint32_t i : inliers) {
       const match& x = matches_[i];
       const auto add = [&](const vec3& p, const vec2& seen, const mat3& by_d, const vec3& moved) {
-        // p moves by by_d * D * moved.
         const double inverse = 1.0 / p.z();
         const vec2 xy = head<2>(p) * inverse;
-        matrix<2, 3> projection;
-        projection << inverse, 0.0, -xy.x() * inverse, 0.0, inverse, -xy.y() * inverse;
-        const matrix<2, 3> a = projection * by_d;
-        matrix<2, 8> j;
-        for (int k = 0; k != 8; ++k) set_column(j, k, column_of(a, k / 3) * moved[k % 3]);
-        const vec2 r = xy - seen;
-        for (int k = 0; k != 8; ++k) {
-          for (int l = k; l != 8; ++l) e.h(l, k) += j(0, l) * j(0, k) + j(1, l) * j(1, k);
-          e.g[k] += j(0, k) * r[0] + j(1, k) * r[1];
-        }
-        e.cost += squared_norm(r);
+        e.add(xy - seen, derivative_of_projection(xy, inverse), by_d, moved);
       };
       const vec3 p = m.forward * homogeneous(x.first);
       add(p, x.second, identity<mat3>(), p);

@@ -52,16 +52,15 @@ struct image_match {
 };
 
 /// The usable matches, in an order that depends only on the seed.
-template <camera::camera_model First, camera::camera_model Second>
+template <camera::camera_model Camera>
 [[nodiscard]] std::vector<image_match> read_matches(std::span<const vec2> first, std::span<const vec2> second,
-                                                    const First& first_camera, const Second& second_camera,
-                                                    std::uint64_t seed) {
+                                                    const Camera& camera, std::uint64_t seed) {
   std::vector<image_match> matches;
   matches.reserve(first.size());
   for (std::size_t i = 0; i != first.size(); ++i) {
     image_match m;
     m.original = static_cast<std::uint32_t>(i);
-    if (read_ray(first_camera, first[i], m.first) && read_ray(second_camera, second[i], m.second)) matches.push_back(m);
+    if (read_ray(camera, first[i], m.first) && read_ray(camera, second[i], m.second)) matches.push_back(m);
   }
   random_bits random(mix64(seed));
   shuffle(matches, random);

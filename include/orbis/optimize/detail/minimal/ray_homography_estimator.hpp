@@ -14,11 +14,11 @@
 
 #include <Eigen/LU>
 
+#include <orbis/core/small_cholesky.hpp>
 #include <orbis/core/types.hpp>
 #include <orbis/optimize/detail/minimal/descent.hpp>
 #include <orbis/optimize/detail/minimal/homography_estimator.hpp>
 #include <orbis/optimize/detail/minimal/image_matches.hpp>
-#include <orbis/core/small_cholesky.hpp>
 
 namespace orbis::optimize::detail {
 
@@ -42,22 +42,16 @@ class ray_homography_estimator {
 
   [[nodiscard]] std::size_t size() const noexcept { return matches_.size(); }
 
-  struct candidates {
-    std::optional<model> found;
-    [[nodiscard]] const model* begin() const noexcept { return found ? &*found : nullptr; }
-    [[nodiscard]] const model* end() const noexcept { return found ? &*found + 1 : nullptr; }
-  };
-  [[nodiscard]] candidates fit(const std::array<std::uint32_t, 4>& s) const {
+  [[nodiscard]] one_or_none<model> fit(const std::array<std::uint32_t, 4>& s) const {
     std::array<vec2, 4> first, second;
     for (std::size_t i = 0; i != 4; ++i) {
       const image_match& m = matches_[s[i]];
       first[i] = {m.first.x, m.first.y};
       second[i] = {m.second.x, m.second.y};
     }
-    mat3 h;
-    if (!homography_of_four(first, second, h)) return {};
-    const std::optional<model> made = made_of(h, matches_[s[0]].first.direction());
-    return {made};
+    const auto h = homography_of_four(first, second);
+    if (!h) return {};
+    return {made_of(*h, matches_[s[0]].first.direction())};
   }
 
   /// The mean of both transfers.
@@ -75,14 +69,10 @@ class ray_homography_estimator {
                                             int steps) const {
     if (inliers.empty()) return std::nullopt;
     const vec3 in_front = matches_[inliers.front()].first.direction();
-    const auto step = [&](const model& m, const equations& e) -> std::optional<model> {
-      small_cholesky<8> factors;
-      if (!factors.set(e.h) || !(factors.factor(1e-9) > 0.0)) return std::nullopt;
-      const matrix<8> entries = -factors.solve(e.g);
-      if (!all_finite(entries)) return std::nullopt;
-      mat3 d = identity<mat3>();
-      for (int j = 0; j != 8; ++j) d(j / 3, j % 3) += entries[j];
-      return made_of(d * m.forward, in_front);
+    const auto step = [&](const model& m, const homography_equations& e) -> std::optional<model> {
+      const auto d = e.step();
+      if (!d) return std::nullopt;
+      return made_of(*d * m.forward, in_front);
     };
     return descend(
         start, steps, [&](const model& m) { return sum_up(m, inliers); }, step);
@@ -99,34 +89,17 @@ class ray_homography_estimator {
     return m;
   }
 
-  /// Normal equations for D in (I + D) H, whose last entry is 0; the lower triangle of `h`. `cost` is the sum of
-  /// squares.
-  struct equations {
-    matrix<8, 8> h = zeros<matrix<8, 8>>();
-    matrix<8> g = zeros<matrix<8>>();
-    double cost = 0.0;
-  };
-  [[nodiscard]] equations sum_up(const model& m, std::span<const std::uint32_t> inliers) const {
-    equations e;
+  [[nodiscard]] homography_equations sum_up(const model& m, std::span<const std::uint32_t> inliers) const {
+    homography_equations e;
     for (const std::uint32_t i : inliers) {
       const image_match& x = matches_[i];
       const auto add = [&](const vec3& p, const metric_ray& seen, const mat3& by_d, const vec3& moved) {
-        // p moves by by_d * D * moved.
         const double inverse = 1.0 / p.z();
         const vec2 xy = head<2>(p) * inverse;
-        matrix<2, 3> projection;
-        projection << inverse, 0.0, -xy.x() * inverse, 0.0, inverse, -xy.y() * inverse;
         mat2 metric;
         metric << seen.xx, seen.xy, 0.0, seen.yy;
-        const matrix<2, 3> a = metric * projection * by_d;
-        matrix<2, 8> j;
-        for (int k = 0; k != 8; ++k) set_column(j, k, column_of(a, k / 3) * moved[k % 3]);
         const vec2 r = metric * vec2(xy.x() - seen.x, xy.y() - seen.y);
-        for (int k = 0; k != 8; ++k) {
-          for (int l = k; l != 8; ++l) e.h(l, k) += j(0, l) * j(0, k) + j(1, l) * j(1, k);
-          e.g[k] += j(0, k) * r[0] + j(1, k) * r[1];
-        }
-        e.cost += squared_norm(r);
+        e.add(r, metric * derivative_of_projection(xy, inverse), by_d, moved);
       };
       const vec3 p = m.forward * x.first.direction();
       add(p, x.second, identity<mat3>(), p);

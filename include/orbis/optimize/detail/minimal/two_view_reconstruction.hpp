@@ -232,19 +232,20 @@ result<two_view_reconstruction> reconstruction_of_matches(const std::vector<Matc
   if (usable - still < least || 5 * still > 4 * usable)
     return refuse("no parallax: a rotation alone explains " + of(still, usable) + " matches");
 
-  ransac_options asked{.threshold = std::sqrt(line_gate),
-                       .confidence = options.confidence,
-                       .max_iterations = options.max_iterations,
-                       .seed = options.seed};
+  const ransac_options asked{.threshold = std::sqrt(line_gate),
+                             .confidence = options.confidence,
+                             .max_iterations = options.max_iterations,
+                             .model_cost = essential_estimator::model_cost,
+                             .seed = options.seed};
   const essential_estimator lines(matches);
-  const auto essential =
-      ransac(lines, asked, ransac_policies{msac{}, uniform_sampling{}, sprt(2000.0), iterated_refinement{}});
+  const auto essential = ransac(lines, asked);
   if (!essential) return refuse(essential.error().message);
   if (5 * essential->inliers.size() < 2 * usable || essential->inliers.size() < least)
     return refuse("no motion explains more than " + of(essential->inliers.size(), usable) + " matches");
-  asked.threshold = std::sqrt(point_gate);
-  const ray_homography_estimator planes(matches);
-  const auto plane = ransac(planes, asked, ransac_policies{msac{}, uniform_sampling{}, sprt{}, iterated_refinement{}});
+  ransac_options of_planes = asked;
+  of_planes.threshold = std::sqrt(point_gate);
+  of_planes.model_cost = 200.0;
+  const auto plane = ransac(ray_homography_estimator(matches), of_planes);
 
   // The motions of both models. That of the model that describes the images worse is a rival all the same.
   two_view_search<Match> search(matches);
@@ -319,10 +320,7 @@ result<two_view_reconstruction> reconstruction_of_matches(const std::vector<Matc
   for (const Match& m : matches)
     if (!(squared_sampson(motion.e, m) < 2.0 * line_gate)) others.push_back(m);
   if (2 * others.size() > inliers.all.size()) {
-    asked.threshold = std::sqrt(line_gate);
-    const essential_estimator rest(others);
-    const auto second =
-        ransac(rest, asked, ransac_policies{msac{}, uniform_sampling{}, sprt(2000.0), iterated_refinement{}});
+    const auto second = ransac(essential_estimator(others), asked);
     if (second && 2 * second->inliers.size() > inliers.all.size()) return refuse(shared);
   }
 

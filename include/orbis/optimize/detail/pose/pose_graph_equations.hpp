@@ -23,7 +23,7 @@ namespace orbis::optimize::detail {
 template <class T, class Loss, class Between>
 class pose_graph_equations {
  public:
-  pose_graph_equations(const Loss& loss, const Between& between);
+  pose_graph_equations(const Loss& loss, const Between& between) : loss_{loss}, between_{between} {}
 
   [[nodiscard]] const pose_graph_structure& structure() const { return structure_; }
   [[nodiscard]] const std::vector<T>& estimate() const { return estimate_; }
@@ -189,9 +189,5 @@ class pose_graph_equations {
   std::vector<block> off_diagonal_;          // of the bundles between two unknowns
   Eigen::VectorXd gradient_, diagonal_;
 };
-
-template <class T, class Loss, class Between>
-pose_graph_equations<T, Loss, Between>::pose_graph_equations(const Loss& loss, const Between& between)
-    : loss_{loss}, between_{between} {}
 
 }  // namespace orbis::optimize::detail

@@ -80,9 +80,9 @@ ORBIS_ALWAYS_INLINE void see(const pose_lanes& in, std::size_t i, const L& infor
 
 /// The equations of the first `count` observations, a multiple of eight. A point without a projection costs as much as
 /// one at the gate, so that a step cannot gain by losing points.
-template <simd::target Target, class Camera, class Loss>
+template <simd::target Target, class Camera>
 ORBIS_ALWAYS_INLINE void sum_pose(const pose_lanes& in, std::size_t count, const Camera& camera, const pose_at& at,
-                                  const Loss& loss, pose_sums& out) {
+                                  const huber& loss, pose_sums& out) {
   using L = simd::vec<double, 8, Target>;
   constexpr bool aligned = camera::lanes_of<Camera>::axis_aligned;
   L t0(0.0), t1(0.0), t2(0.0), t3(0.0), t4(0.0), t5(0.0);
@@ -98,7 +98,7 @@ ORBIS_ALWAYS_INLINE void sum_pose(const pose_lanes& in, std::size_t count, const
     const auto active = L(0.0) < information;
     const auto valid = active & b.projection.valid;
     L cost, weight;
-    lanes_of_loss<Loss>::weigh(loss, select(valid, b.chi2, L(0.0)), cost, weight);
+    lanes_of_loss<huber>::weigh(loss, select(valid, b.chi2, L(0.0)), cost, weight);
     total = total + select(valid, cost, select(active, lost, L(0.0)));
     weight = weight * information;
 
@@ -207,11 +207,11 @@ ORBIS_ALWAYS_INLINE void judge_pose(const pose_lanes& in, std::size_t count, con
 }
 
 /// The two loops, compiled for every instruction set.
-template <class Camera, class Loss>
+template <class Camera>
 struct sum_pose_kernel {
   template <simd::target Target>
   static ORBIS_ALWAYS_INLINE void run(const pose_lanes& in, std::size_t count, const Camera& camera, const pose_at& at,
-                                      const Loss& loss, pose_sums& out) {
+                                      const huber& loss, pose_sums& out) {
     sum_pose<Target>(in, count, camera, at, loss, out);
   }
 };
@@ -225,10 +225,10 @@ struct judge_pose_kernel {
 };
 
 /// The loops for this processor.
-template <class Camera, class Loss>
+template <class Camera>
 [[nodiscard]] auto* sum_pose_function() noexcept {
-  return simd::kernel<sum_pose_kernel<Camera, Loss>,
-                      void(const pose_lanes&, std::size_t, const Camera&, const pose_at&, const Loss&, pose_sums&)>();
+  return simd::kernel<sum_pose_kernel<Camera>,
+                      void(const pose_lanes&, std::size_t, const Camera&, const pose_at&, const huber&, pose_sums&)>();
 }
 template <class Camera>
 [[nodiscard]] auto* judge_pose_function() noexcept {

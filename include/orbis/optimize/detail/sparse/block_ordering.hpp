@@ -14,9 +14,14 @@
 #include <span>
 #include <vector>
 
-#include <orbis/optimize/detail/sparse/block_solvers.hpp>
-
 namespace orbis::optimize::detail {
+
+/// The place of one block off the diagonal of a symmetric matrix; (column, row) is implied.
+struct block_place {
+  std::uint32_t row = 0;
+  std::uint32_t column = 0;
+  friend bool operator==(const block_place&, const block_place&) = default;
+};
 
 /// The neighbours of every block: `neighbors(i)` are those that share a place with i.
 class block_adjacency {

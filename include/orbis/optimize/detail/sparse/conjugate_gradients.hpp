@@ -15,7 +15,7 @@
 
 #include <orbis/core/small_cholesky.hpp>
 #include <orbis/core/types.hpp>
-#include <orbis/optimize/detail/sparse/block_solvers.hpp>
+#include <orbis/optimize/detail/sparse/block_ordering.hpp>
 #include <orbis/optimize/detail/sum_over.hpp>
 
 namespace orbis::optimize::detail {

@@ -120,14 +120,8 @@ struct depth_equations {
 /// `points`: how many points the term may count as; more are weighed down to this. `weakest`: the mean square of what
 /// the normals have in a direction, below which it counts as free; rotations as if the points were at their mean
 /// depth, which is what turns an angle into metres. O(planes).
-[[nodiscard]] depth_equations equations_of(std::span<const plane_observation_of_row> planes, const moving_pose& at,
-                                           double points, double weakest);
-
-/// The motion of the camera frame to the least cost, where the planes determine one; zero in all other directions.
-[[nodiscard]] vec6 step_of(const depth_equations& e);
-
-inline depth_equations equations_of(std::span<const plane_observation_of_row> planes, const moving_pose& at,
-                                    double points, double weakest) {
+[[nodiscard]] inline depth_equations equations_of(std::span<const plane_observation_of_row> planes,
+                                                  const moving_pose& at, double points, double weakest) {
   depth_equations e;
   e.term.at = at;
   if (planes.empty()) return e;
@@ -181,7 +175,8 @@ inline depth_equations equations_of(std::span<const plane_observation_of_row> pl
   return e;
 }
 
-inline vec6 step_of(const depth_equations& e) {
+/// The motion of the camera frame to the least cost, where the planes determine one; zero in all other directions.
+[[nodiscard]] inline vec6 step_of(const depth_equations& e) {
   const symmetric_eigen<6> h = eigen_of_symmetric<6>(block<6, 6>(e.term.h, 0, 0));
   vec6 step = zeros<vec6>();
   for (int i = 6 - e.determined; i < 6; ++i)  // the others are zero

@@ -95,15 +95,6 @@ void take_landmarks(snapshot& s, const basic_map<D>& m, const camera_rig<Camera>
   }
 }
 
-/// Copies a whole map. Empty if there is nothing to adjust. O(observations).
-template <feature_descriptor D, camera::camera_model Camera>
-[[nodiscard]] snapshot take(const basic_map<D>& m, const camera_rig<Camera>& rig,
-                            const global_adjustment_options& o = {}) {
-  snapshot s = take_keyframes(m, o);
-  take_landmarks(s, m, rig, m.landmark_count());
-  return s;
-}
-
 /// By how much a solution multiplies the lengths in the view of each keyframe: the median over its landmarks. 1 where
 /// lengths are measured. O(observations).
 [[nodiscard]] inline std::vector<double> growth_of(const snapshot& s, const bundle_solution& solved, bool is_measured) {
@@ -155,24 +146,6 @@ std::size_t erase_outliers(basic_map<D>& m, const snapshot& s, const bundle_solu
   for (std::size_t i = first; i != s.observations.size() && i - first != count; ++i)
     erased += solved.outliers[i] != 0 && erase_outlier(m, s.landmarks[s.observations[i].point], s.sources[i]);
   return erased;
-}
-
-/// As `apply_poses`, erases the outliers and updates all landmarks. @pre solved.usable
-template <feature_descriptor D>
-report apply(basic_map<D>& m, const snapshot& s, const bundle_solution& solved) {
-  report done = apply_poses(m, s, solved);
-  done.outliers = erase_outliers(m, s, solved, 0, s.observations.size());
-  update_landmarks(m);
-  return done;
-}
-
-/// Adjusts a whole map at once. The report is empty if nothing was changed.
-template <feature_descriptor D, camera::camera_model Camera>
-report adjust(basic_map<D>& m, const camera_rig<Camera>& rig, const global_adjustment_options& o = {}) {
-  const snapshot s = take(m, rig, o);
-  if (s.empty()) return {};
-  const bundle_solution solved = bundle_solver<Camera>{rig.model, loss}.solve(s, schedule_of(o));
-  return solved.usable ? apply(m, s, solved) : report{};
 }
 
 }  // namespace orbis::slam::detail::global_adjustment

@@ -193,7 +193,7 @@ class loop_closer {
       const auto edit = shared_.edit();
       const auto taken = locked(by, [&] { return map_merging::take(shared_.atlas, k.map, candidate.map, match, o); });
       if (!taken) return false;
-      const map_merging::solution solved = map_merging::solve(*taken, shared_.rig, o);
+      const std::vector<loop_fusion::pair> pairs = loop_fusion::find_pairs(taken->fusion, shared_.rig, o);
       const bool merged = locked(by, [&] {
         std::vector<keyframe_id> ids;
         for (const auto& each : shared_.atlas.at(k.map).keyframes()) ids.push_back(each.id);
@@ -215,7 +215,7 @@ class loop_closer {
       });
       if (!merged) return false;
       last_closed_ = event.from;
-      fuse(candidate.map, solved.pairs, event.offsets, by);
+      fuse(candidate.map, pairs, event.offsets, by);
     }
     report(std::move(event), by);
     return true;

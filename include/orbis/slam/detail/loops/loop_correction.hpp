@@ -2,10 +2,9 @@
 /// @file
 /// Closes a loop: distributes the drift over the keyframes between its ends, and fuses the landmarks of both ends.
 ///
-/// `take` and `apply` touch the map, `solve` works on the snapshot. The essential graph with the new edge is optimised
-/// as a pose graph; the root of the map is held, and the other edges keep their measurement. Landmarks follow the
-/// keyframes. Between `take` and `apply` keyframes, landmarks and observations may be added: keyframes follow their
-/// parent.
+/// `take` and `apply_poses` touch the map, `solve` works on the snapshot. The essential graph with the new edge is
+/// optimised as a pose graph; the root of the map is held, and the other edges keep their measurement. Landmarks follow
+/// the keyframes. Between the two keyframes, landmarks and observations may be added: keyframes follow their parent.
 ///
 /// Source: R. Mur-Artal, J. M. M. Montiel, J. D. Tardos, "ORB-SLAM: a versatile and accurate monocular SLAM system",
 /// T-RO 31 (2015), sections VII.C and VII.D; with depth, poses have no scale. H. Strasdat, J. M. M. Montiel, A. J.
@@ -18,7 +17,6 @@
 #include <cstdint>
 #include <optional>
 #include <span>
-#include <string_view>
 #include <type_traits>
 #include <vector>
 
@@ -45,15 +43,6 @@ namespace orbis::slam::detail {
 // T-RO 31 (2015), section III.D.
 
 enum class edge_kind { tree, loop, covisibility };
-
-[[nodiscard]] constexpr std::string_view to_string(edge_kind kind) noexcept {
-  switch (kind) {
-    case edge_kind::tree: return "tree";
-    case edge_kind::loop: return "loop";
-    case edge_kind::covisibility: return "covisibility";
-  }
-  return "unknown";
-}
 
 /// An edge of a pose graph.
 struct essential_edge {
@@ -140,7 +129,6 @@ namespace orbis::slam::detail::loop_correction {
 /// The result of closing a loop.
 struct report {
   bool corrected = false;
-  fusion_counts fusion;       ///< of landmarks
   double moved = 0.0;         ///< of the keyframe, metres
   double turned = 0.0;        ///< of the keyframe, radians
   double scale = 1.0;         ///< by how much lengths at the keyframe grew
@@ -231,25 +219,6 @@ report apply_poses(basic_map<D>& m, const snapshot<D>& s, const solution& solved
   done.scale = motion.at(a.value()).scale();
   done.turned = norm((before.rotation().inverse() * m.at(a).T_world_camera.rotation()).log());
   return done;
-}
-
-/// As `apply_poses`, fuses landmarks, and updates all of them.
-template <feature_descriptor D>
-report apply(basic_map<D>& m, const snapshot<D>& s, const solution& solved) {
-  report done = apply_poses(m, s, solved);
-  if (!done.corrected) return done;
-  done.fusion = loop_fusion::fuse<D>(m, solved.pairs);
-  update_landmarks(m);
-  return done;
-}
-
-/// Closes a loop at once. Nothing is changed unless the report says so.
-template <feature_descriptor D, camera::camera_model Camera>
-report close(basic_map<D>& m, const loop_match& match, const camera_rig<Camera>& rig,
-             const loop_correction_options& o = {}) {
-  const auto s = take(m, match, o);
-  const auto solved = s ? solve(*s, rig, o) : std::nullopt;
-  return solved ? apply(m, *s, *solved) : report{};
 }
 
 }  // namespace orbis::slam::detail::loop_correction

@@ -384,12 +384,4 @@ template <camera::camera_model Camera, feature_descriptor D>
 
 }  // namespace loop_verification
 
-/// Checks at once whether keyframe `k` of `current` observes the place of `candidate` of `candidate_map`, the same map
-/// or another one. Deterministic. @pre the keyframes are there, and not the same
-template <feature_descriptor D, camera::camera_model Camera>
-[[nodiscard]] loop_check verify_loop(const basic_map<D>& current, keyframe_id k, const basic_map<D>& candidate_map,
-                                     keyframe_id candidate, const camera_rig<Camera>& rig, const loop_options& o = {}) {
-  return loop_verification::verify(loop_verification::take(current, k, candidate_map, candidate, rig, o), rig, o);
-}
-
 }  // namespace orbis::slam::detail

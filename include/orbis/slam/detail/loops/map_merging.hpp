@@ -2,23 +2,19 @@
 /// @file
 /// Merges two maps that observe the same place.
 ///
-/// `take` and `apply` touch the maps, `solve` works on the snapshot. Between them both maps may grow. Who shares the
-/// maps locks them for `take`, `join` and each part of `loop_fusion::fuse`.
+/// `take` and `join` touch the maps, `loop_fusion::find_pairs` works on the snapshot. Between them both maps may grow.
+/// Who shares the maps locks them for `take`, `join` and each part of `loop_fusion::fuse`.
 ///
 /// Source: C. Campos, R. Elvira, J. J. Gomez Rodriguez, J. M. M. Montiel, J. D. Tardos, "ORB-SLAM3", T-RO 37 (2021),
 /// section VI.
 #pragma once
 
 #include <optional>
-#include <vector>
 
-#include <orbis/camera/model.hpp>
 #include <orbis/core/sim3.hpp>
 #include <orbis/slam/atlas.hpp>
-#include <orbis/slam/camera_rig.hpp>
 #include <orbis/slam/detail/loops/loop_fusion.hpp>
 #include <orbis/slam/detail/loops/loop_verification.hpp>
-#include <orbis/slam/detail/mapping/landmark_fusion.hpp>
 #include <orbis/slam/ids.hpp>
 #include <orbis/slam/options.hpp>
 
@@ -30,7 +26,6 @@ struct report {
   id_offsets offsets;     ///< by how much the ids of the one map have grown
   keyframe_id keyframe;   ///< that of the match, by its new id
   keyframe_id candidate;  ///< that of the match
-  fusion_counts fusion;   ///< of landmarks
   sim3 T_into_from;       ///< how the one map was moved
 };
 
@@ -39,11 +34,6 @@ struct snapshot {
   map_id from, into;
   loop_match match;
   loop_fusion::snapshot<D> fusion;
-};
-
-/// What landmarks of the maps are the same.
-struct solution {
-  std::vector<loop_fusion::pair> pairs;
 };
 
 /// Whether the maps and keyframes of a match are there, and ids are left for what both hold.
@@ -63,11 +53,6 @@ template <feature_descriptor D>
   return snapshot<D>{from, into, match, loop_fusion::take(maps.at(from), maps.at(into), match, o)};
 }
 
-template <feature_descriptor D, camera::camera_model Camera>
-[[nodiscard]] solution solve(const snapshot<D>& s, const camera_rig<Camera>& rig, const loop_fusion_options& o = {}) {
-  return {loop_fusion::find_pairs(s.fusion, rig, o)};
-}
-
 /// Moves `from` as the match says, makes it a part of `into`, and adds a loop edge at the match. If `from` was the
 /// active map, `into` becomes it. Nothing is changed if a map or keyframe is gone. O(`from`). `loop_fusion::fuse` is
 /// left to the caller, if the report says that the maps were merged.
@@ -84,22 +69,6 @@ report join(basic_atlas<D>& maps, const snapshot<D>& s) {
   m.add_loop_edge(done.keyframe, done.candidate);
   done.merged = true;
   return done;
-}
-
-/// As `join`, and fuses landmarks.
-template <feature_descriptor D>
-report apply(basic_atlas<D>& maps, const snapshot<D>& s, const solution& solved) {
-  report done = join(maps, s);
-  if (done.merged) done.fusion = loop_fusion::fuse<D>(maps.at(s.into), solved.pairs, done.offsets);
-  return done;
-}
-
-/// Merges two maps at once. Nothing is changed unless the report says so.
-template <feature_descriptor D, camera::camera_model Camera>
-report merge(basic_atlas<D>& maps, map_id from, map_id into, const loop_match& match, const camera_rig<Camera>& rig,
-             const loop_fusion_options& o = {}) {
-  const auto s = take(maps, from, into, match, o);
-  return s ? apply(maps, *s, solve(*s, rig, o)) : report{};
 }
 
 }  // namespace orbis::slam::detail::map_merging

@@ -52,13 +52,9 @@ class scaled_alignment {
   scaled_alignment(const Camera& camera, std::vector<pair> pairs) : camera_{camera}, pairs_{std::move(pairs)} {}
 
   [[nodiscard]] std::size_t size() const noexcept { return pairs_.size(); }
-
-  struct candidates {
-    std::optional<model> found;
-    [[nodiscard]] const model* begin() const noexcept { return found ? &*found : nullptr; }
-    [[nodiscard]] const model* end() const noexcept { return found ? &*found + 1 : nullptr; }
-  };
-  [[nodiscard]] candidates fit(const std::array<std::uint32_t, sample_size>& sample) const { return {fit_to(sample)}; }
+  [[nodiscard]] optimize::one_or_none<model> fit(const std::array<std::uint32_t, sample_size>& sample) const {
+    return {fit_to(sample)};
+  }
   [[nodiscard]] std::optional<model> refine(const model&, std::span<const std::uint32_t> inliers) const {
     return fit_to(inliers);
   }

@@ -38,10 +38,6 @@ landmark_id update_landmarks(basic_map<D>& m, landmark_id first, std::size_t cou
   for (; count != 0 && l != m.landmark_end(); --count, l = m.next_landmark(l + 1)) m.update_landmark(l);
   return l;
 }
-template <feature_descriptor D>
-void update_landmarks(basic_map<D>& m) {
-  update_landmarks(m, 0, m.landmark_count());
-}
 
 /// A keyframe and its neighbours in the covisibility graph.
 template <feature_descriptor D>

@@ -26,7 +26,6 @@
 #include <vector>
 
 #include <orbis/camera/model.hpp>
-#include <orbis/core/execution.hpp>
 #include <orbis/core/se3.hpp>
 #include <orbis/core/sim3.hpp>
 #include <orbis/slam/camera_rig.hpp>
@@ -127,16 +126,6 @@ void apply(basic_map<D>& m, const snapshot& s, const bundle_solution& solved) {
     if (solved.outliers[i] != 0) erase_outlier(m, s.landmarks[s.observations[i].point], s.sources[i]);
   for (const landmark_id l : s.landmarks)
     if (m.has_landmark(l)) m.update_landmark(l);
-}
-
-/// The three steps in a row. Returns whether there was something to adjust. @pre m.has_keyframe(newest)
-template <feature_descriptor D, camera::camera_model Camera>
-bool adjust(basic_map<D>& m, keyframe_id newest, bundle_solver<Camera>& solver, const camera_rig<Camera>& rig,
-            const adjustment_options& o, const progress& go_on = {}) {
-  const snapshot s = take(m, newest, rig, o);
-  if (s.empty()) return false;
-  apply(m, s, solver.solve(s, schedule_of(o), go_on));
-  return true;
 }
 
 }  // namespace orbis::slam::detail::local_adjustment

@@ -87,18 +87,13 @@ template <feature_descriptor D>
   return close != 0 && static_cast<double>(seen_by_others) >= o.redundant * static_cast<double>(close);
 }
 
-/// Keeps no keyframe.
-struct keep_none {
-  [[nodiscard]] constexpr bool operator()(keyframe_id) const noexcept { return false; }
-};
-
 /// Erases the redundant neighbours of keyframe `newest`, the strongest first; each is judged after the ones before it
 /// were erased. Kept are the root and those for which `keep(id)` is true. Keyframes with loop edges are erased like
 /// others, and their edges pass to the replacement (ORB-SLAM keeps such keyframes: a map that closes loops for days
 /// would grow by two keyframes for each). Returns the erased ones.
-template <feature_descriptor D, std::predicate<keyframe_id> Keep = keep_none>
+template <feature_descriptor D, std::predicate<keyframe_id> Keep>
 std::vector<keyframe_id> cull_keyframes(basic_map<D>& m, keyframe_id newest, double close_depth,
-                                        const culling_options& o, Keep&& keep = {}) {
+                                        const culling_options& o, Keep&& keep) {
   std::vector<keyframe_id> erased;
   for (const covisible& n : m.covisibility().neighbors(newest, o.neighborhood)) {
     const keyframe_id k = n.keyframe;

@@ -100,10 +100,6 @@ struct bundle_solution {
   int iterations = 0;
   double initial_cost = 0.0;  ///< half the robust sum of squared errors
   double final_cost = 0.0;    ///< the same at the end, without outliers
-
-  [[nodiscard]] std::size_t outlier_count() const noexcept {
-    return static_cast<std::size_t>(std::count(outliers.begin(), outliers.end(), 1));
-  }
 };
 
 struct bundle_schedule {
@@ -121,12 +117,9 @@ class bundle_solver {
       : adjuster_{model, loss} {}
 
   /// `go_on(iteration, iterations)` is asked before each step; if it returns false, the adjustment stops. Nothing is
-  /// called an outlier before the first half is complete. `memory`: a former solution, whose memory is used again. The
-  /// result is the same for every policy.
-  template <execution_policy Policy = sequential_policy>
+  /// called an outlier before the first half is complete. `memory`: a former solution, whose memory is used again.
   [[nodiscard]] bundle_solution solve(const bundle_snapshot& s, const bundle_schedule& schedule,
-                                      const progress& go_on = {}, bundle_solution memory = {},
-                                      const Policy& policy = seq) {
+                                      const progress& go_on = {}, bundle_solution memory = {}) {
     bundle_solution result = std::move(memory);
     result.poses.assign(s.poses.begin(), s.poses.end());
     result.points.assign(s.points.begin(), s.points.end());
@@ -143,7 +136,7 @@ class bundle_solver {
       result.usable = !optimize::is_failure(summary.status) && (!cancelled || schedule.keep_partial);
       return result.usable && !cancelled;
     };
-    const auto robust = adjuster_.solve(policy, std::span<se3>(result.poses), std::span<vec3>(result.points),
+    const auto robust = adjuster_.solve(seq, std::span<se3>(result.poses), std::span<vec3>(result.points),
                                         std::span<const optimize::bundle_observation>(s.observations),
                                         {.max_iterations = schedule.robust_iterations,
                                          .relative_tolerance = schedule.relative_tolerance,
@@ -152,7 +145,7 @@ class bundle_solver {
     if (!accept(robust)) return result;
     find_outliers(s, result);
     before = first_total;
-    const auto last = adjuster_.solve_again(policy, std::span<se3>(result.poses), std::span<vec3>(result.points),
+    const auto last = adjuster_.solve_again(seq, std::span<se3>(result.poses), std::span<vec3>(result.points),
                                             {.max_iterations = schedule.iterations,
                                              .relative_tolerance = schedule.relative_tolerance,
                                              .fixed_poses = s.is_fixed,

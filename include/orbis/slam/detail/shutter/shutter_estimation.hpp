@@ -68,8 +68,14 @@ struct shutter_equations {
 };
 
 /// Eliminates the relative pose from equations and gradient; false if the points do not determine it.
-[[nodiscard]] bool eliminate_pose(shutter_equations& e, vec2& gradient, const mat6& pose, const matrix<6, 2>& mixed,
-                                  const vec6& pose_gradient);
+[[nodiscard]] inline bool eliminate_pose(shutter_equations& e, vec2& gradient, const mat6& pose,
+                                         const matrix<6, 2>& mixed, const vec6& pose_gradient) {
+  const matrix<6, 2> solved = inverse(pose) * mixed;
+  if (!all_finite(solved)) return false;
+  e.h -= transposed(mixed) * solved;
+  gradient -= transposed(solved) * pose_gradient;
+  return true;
+}
 
 /// The equations of the points that two views share; empty where these are too few. `shutter`: by which `depth` of the
 /// keypoints was read, around which the equations are linear. O(keypoints).
@@ -173,62 +179,51 @@ class shutter_estimator {
   void clear() { blocks_.clear(); }
 
   /// The present estimate. What is assumed already is given up less easily than it was taken to. O(keyframes).
-  [[nodiscard]] shutter_estimate estimate(const camera::shutter& assumed = {}) const;
+  [[nodiscard]] shutter_estimate estimate(const camera::shutter& assumed = {}) const {
+    constexpr std::size_t enough = 8;
+    shutter_estimate result;
+    if (blocks_.size() < enough) return result;
+    shutter_equations sum;
+    for (const auto& [id, e] : blocks_) {
+      sum.h += e.h;
+      sum.c += e.c;
+    }
+    if (!(sum.h(0, 0) > 0.0)) return result;
+    const bool tells_delay = sum.h(1, 1) > 0.0 && determinant(sum.h) > 0.0;
+    matrix<2, 2> inverse = zeros<matrix<2, 2>>();
+    if (tells_delay)
+      inverse = orbis::inverse(sum.h);
+    else
+      inverse(0, 0) = 1.0 / sum.h(0, 0);
+    const vec2 found = inverse * sum.c;
+    matrix<2, 2> spread = zeros<matrix<2, 2>>();
+    for (const auto& [id, e] : blocks_) {
+      const vec2 apart = e.h * found - e.c;
+      spread += apart * transposed(apart);
+    }
+    const auto n = static_cast<double>(blocks_.size());
+    const matrix<2, 2> covariance = n / (n - 1.0) * (inverse * spread * inverse);
+    if (!all_finite(found) || !all_finite(covariance)) return result;
+    result.read_out = found[0];
+    result.read_out_deviation = std::sqrt(std::max(0.0, covariance(0, 0)));
+    if (tells_delay) {
+      result.delay = found[1];
+      result.delay_deviation = std::sqrt(std::max(0.0, covariance(1, 1)));
+    }
+    const auto holds = [](double value, double deviation, double before, double least, double most) {
+      const double sigmas = before == 0.0 ? 5.0 : 2.5;
+      return std::abs(value) > sigmas * deviation && std::abs(value) >= least && std::abs(value) <= most;
+    };
+    // A shorter read-out does no harm worth the trouble, and no camera needs longer for an image.
+    if (result.read_out > 0.0 && holds(result.read_out, result.read_out_deviation, assumed.color_read_out, 0.003, 0.07))
+      result.shutter.color_read_out = result.shutter.depth_read_out = result.read_out;
+    if (holds(result.delay, result.delay_deviation, assumed.depth_delay, 0.003, 0.05))
+      result.shutter.depth_delay = result.delay;
+    return result;
+  }
 
  private:
   std::vector<std::pair<std::uint64_t, shutter_equations>> blocks_;
 };
-
-inline bool eliminate_pose(shutter_equations& e, vec2& gradient, const mat6& pose, const matrix<6, 2>& mixed,
-                           const vec6& pose_gradient) {
-  const matrix<6, 2> solved = inverse(pose) * mixed;
-  if (!all_finite(solved)) return false;
-  e.h -= transposed(mixed) * solved;
-  gradient -= transposed(solved) * pose_gradient;
-  return true;
-}
-
-inline shutter_estimate shutter_estimator::estimate(const camera::shutter& assumed) const {
-  constexpr std::size_t enough = 8;
-  shutter_estimate result;
-  if (blocks_.size() < enough) return result;
-  shutter_equations sum;
-  for (const auto& [id, e] : blocks_) {
-    sum.h += e.h;
-    sum.c += e.c;
-  }
-  if (!(sum.h(0, 0) > 0.0)) return result;
-  const bool tells_delay = sum.h(1, 1) > 0.0 && determinant(sum.h) > 0.0;
-  matrix<2, 2> inverse = zeros<matrix<2, 2>>();
-  if (tells_delay)
-    inverse = orbis::inverse(sum.h);
-  else
-    inverse(0, 0) = 1.0 / sum.h(0, 0);
-  const vec2 found = inverse * sum.c;
-  matrix<2, 2> spread = zeros<matrix<2, 2>>();
-  for (const auto& [id, e] : blocks_) {
-    const vec2 apart = e.h * found - e.c;
-    spread += apart * transposed(apart);
-  }
-  const auto n = static_cast<double>(blocks_.size());
-  const matrix<2, 2> covariance = n / (n - 1.0) * (inverse * spread * inverse);
-  if (!all_finite(found) || !all_finite(covariance)) return result;
-  result.read_out = found[0];
-  result.read_out_deviation = std::sqrt(std::max(0.0, covariance(0, 0)));
-  if (tells_delay) {
-    result.delay = found[1];
-    result.delay_deviation = std::sqrt(std::max(0.0, covariance(1, 1)));
-  }
-  const auto holds = [](double value, double deviation, double before, double least, double most) {
-    const double sigmas = before == 0.0 ? 5.0 : 2.5;
-    return std::abs(value) > sigmas * deviation && std::abs(value) >= least && std::abs(value) <= most;
-  };
-  // A shorter read-out does no harm worth the trouble, and no camera needs longer for an image.
-  if (result.read_out > 0.0 && holds(result.read_out, result.read_out_deviation, assumed.color_read_out, 0.003, 0.07))
-    result.shutter.color_read_out = result.shutter.depth_read_out = result.read_out;
-  if (holds(result.delay, result.delay_deviation, assumed.depth_delay, 0.003, 0.05))
-    result.shutter.depth_delay = result.delay;
-  return result;
-}
 
 }  // namespace orbis::slam::detail

@@ -95,9 +95,6 @@ class front_end {
                ? maps.at(k.map).pose_of(k.keyframe) * scaled(T_reference_last_, maps.at(k.map).scale_of(k.keyframe))
                : last_.T_world_camera;
   }
-  /// That keyframe, by the id that it had then.
-  [[nodiscard]] map_keyframe last_reference() const noexcept { return last_reference_; }
-
   /// The motion during the read-out of the last tracked frame; zero with a global shutter.
   [[nodiscard]] vec6 last_twist() const { return shutter_.is_global() ? vec6(zeros<vec6>()) : last_.twist; }
 

@@ -2,13 +2,13 @@
 #include <Eigen/Cholesky>
 
 #include <orbis/core/random.hpp>
-#include <orbis/optimize/detail/sparse/reduced_solvers.hpp>
-#include <orbis/optimize/solver_policies.hpp>
+#include <orbis/optimize/detail/sparse/reduced_solver.hpp>
 
 #include "support/catch.hpp"
 
 using namespace orbis;
-using optimize::block_place;
+using optimize::detail::block_place;
+using optimize::detail::reduced_solver;
 
 namespace {
 
@@ -39,10 +39,10 @@ struct block_system {
   }
 };
 
-template <int C, class Family>
-void check(const Family& family, std::uint32_t size, std::uint32_t band, double tolerance) {
+template <int C>
+void check(const optimize::reduced_solver_options& options, std::uint32_t size, std::uint32_t band, double tolerance) {
   block_system<C> system(size, band);
-  typename Family::template solver<C> solver{family};
+  reduced_solver<C> solver{options};
   solver.analyze(size, system.places);
   REQUIRE(solver.factor(system.diagonal, system.off_diagonal));
   const Eigen::VectorXd b = Eigen::VectorXd::LinSpaced(C * size, -1.0, 1.0);
@@ -55,22 +55,23 @@ void check(const Family& family, std::uint32_t size, std::uint32_t band, double 
 
 }  // namespace
 
-TEST_CASE("Every solver of reduced systems solves them, and refuses what is not positive definite") {
-  check<6>(optimize::dense_reduced_solver{}, 20, 19, 1e-12);
-  check<6>(optimize::sparse_reduced_solver{}, 40, 3, 1e-12);
-  check<6>(optimize::iterative_reduced_solver{.relative_tolerance = 1e-10}, 40, 3, 1e-9);
-  check<9>(optimize::dense_reduced_solver{}, 7, 6, 1e-12);
-  check<9>(optimize::sparse_reduced_solver{}, 30, 2, 1e-12);
-  check<12>(optimize::dense_reduced_solver{}, 9, 4, 1e-12);
-  check<12>(optimize::sparse_reduced_solver{}, 30, 2, 1e-12);
+TEST_CASE("Every way to solve reduced systems does, and refuses what is not positive definite") {
+  const optimize::reduced_solver_options dense{.dense_limit = 1000}, sparse{.dense_limit = 0};
+  check<6>(dense, 20, 19, 1e-12);
+  check<6>(sparse, 40, 3, 1e-12);
+  check<6>({.dense_limit = 0, .fill_limit = 0, .relative_tolerance = 1e-10}, 40, 3, 1e-9);
+  check<9>(dense, 7, 6, 1e-12);
+  check<9>(sparse, 30, 2, 1e-12);
+  check<12>(dense, 9, 4, 1e-12);
+  check<12>(sparse, 30, 2, 1e-12);
 }
 
-TEST_CASE("The automatic solver goes by size and fill") {
-  using kind = optimize::automatic_reduced_solver::kind;
-  const optimize::automatic_reduced_solver family{.dense_limit = 10, .fill_limit = 300};
+TEST_CASE("The solver of reduced systems goes by size and fill") {
+  using kind = reduced_solver<6>::kind;
+  const optimize::reduced_solver_options options{.dense_limit = 10, .fill_limit = 300};
   const auto chosen = [&](std::uint32_t size, std::uint32_t band) {
     const block_system<6> system(size, band);
-    optimize::automatic_reduced_solver::solver<6> solver{family};
+    reduced_solver<6> solver{options};
     solver.analyze(size, system.places);
     REQUIRE(solver.factor(system.diagonal, system.off_diagonal));
     Eigen::VectorXd x = Eigen::VectorXd::Ones(6 * size);
@@ -82,5 +83,5 @@ TEST_CASE("The automatic solver goes by size and fill") {
   CHECK(chosen(10, 9) == kind::dense);
   CHECK(chosen(40, 2) == kind::sparse);
   CHECK(chosen(40, 39) == kind::iterative);
-  check<6>(family, 8, 2, 1e-12);
+  check<6>(options, 8, 2, 1e-12);
 }

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include <orbis/features/descriptor.hpp>
-#include <orbis/slam/detail/map/typical_descriptor.hpp>
+#include <orbis/slam/map-inl.hpp>
 
 #include "support/catch.hpp"
 

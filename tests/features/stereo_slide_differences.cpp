@@ -8,7 +8,7 @@
 
 #include <orbis/core/random.hpp>
 #include <orbis/core/simd.hpp>
-#include <orbis/features/detail/match/slide_differences.hpp>
+#include <orbis/features/stereo-inl.hpp>
 
 #include "support/catch.hpp"
 

@@ -4,7 +4,6 @@
 #include <vector>
 
 #include <orbis/optimize/ransac.hpp>
-#include <orbis/optimize/ransac_policies.hpp>
 
 #include "support.hpp"
 #include "support/allocations.hpp"
@@ -86,25 +85,22 @@ bool is_the_line(const Found& found) {
 
 }  // namespace
 
-TEST_CASE("Every way to score is between zero and the threshold, and there for outliers") {
-  const auto check = [](const auto& score) {
-    for (const double limit : {0.5, 3.0}) {
-      CHECK(score.cost(0.0, limit) == 0.0);
-      CHECK(score.cost(std::numeric_limits<double>::quiet_NaN(), limit) == limit);
-      CHECK(score.cost(std::numeric_limits<double>::infinity(), limit) == limit);
-      CHECK(score.cost(limit, limit) == limit);
-      double last = 0.0;
-      for (double e = 0.0; e < 5.0; e += 0.01) {
-        CHECK(score.cost(e, limit) >= last);
-        CHECK(score.cost(e, limit) <= limit);
-        last = score.cost(e, limit);
-        if (std::abs(e - limit) < 1e-3) continue;  // as a float it may lie on the other side
-        CHECK(static_cast<double>(score.cost(static_cast<float>(e), static_cast<float>(limit))) ==
-              Approx(last).margin(1e-5).epsilon(1e-5));
-      }
+TEST_CASE("The score of a datum is between zero and the threshold, and there for outliers") {
+  for (const double limit : {0.5, 3.0}) {
+    CHECK(optimize::detail::msac_cost(0.0, limit) == 0.0);
+    CHECK(optimize::detail::msac_cost(std::numeric_limits<double>::quiet_NaN(), limit) == limit);
+    CHECK(optimize::detail::msac_cost(std::numeric_limits<double>::infinity(), limit) == limit);
+    CHECK(optimize::detail::msac_cost(limit, limit) == limit);
+    double last = 0.0;
+    for (double e = 0.0; e < 5.0; e += 0.01) {
+      CHECK(optimize::detail::msac_cost(e, limit) >= last);
+      CHECK(optimize::detail::msac_cost(e, limit) <= limit);
+      last = optimize::detail::msac_cost(e, limit);
+      if (std::abs(e - limit) < 1e-3) continue;  // as a float it may lie on the other side
+      CHECK(static_cast<double>(optimize::detail::msac_cost(static_cast<float>(e), static_cast<float>(limit))) ==
+            Approx(last).margin(1e-5).epsilon(1e-5));
     }
-  };
-  check(msac{});
+  }
 }
 
 TEMPLATE_TEST_CASE("RANSAC finds the line by whatever it is made of", "", line_estimator, line_by_blocks) {
@@ -113,10 +109,8 @@ TEMPLATE_TEST_CASE("RANSAC finds the line by whatever it is made of", "", line_e
     const auto data = noisy_line<TestType>(seed, 61, 142);
     const auto exact = ransac(data, options);
     CHECK(is_the_line(exact));
-    CHECK(is_the_line(
-        ransac(data, options, ransac_policies{msac{}, uniform_sampling{}, bail_out{}, no_local_optimization{}})));
-    const auto tested =
-        ransac(data, options, ransac_policies{msac{}, uniform_sampling{}, sprt{}, iterated_refinement{}});
+    CHECK(is_the_line(ransac(data, {.threshold = 0.03, .max_iterations = 5000, .refinements = 0})));
+    const auto tested = ransac(data, {.threshold = 0.03, .max_iterations = 5000, .model_cost = 200.0});
     CHECK(is_the_line(tested));
     // Local optimisation ends at the same minimum, whichever sample it has started from.
     REQUIRE(exact.has_value());
@@ -139,7 +133,7 @@ TEST_CASE("Errors by blocks rank models as errors one by one do") {
 }
 
 TEST_CASE("The sequential test lets good models through and most bad ones not") {
-  sprt test;
+  optimize::detail::sequential_test test(200.0);
   random_bits random(5);
   const auto scored_to_its_end = [&](double ratio) {
     test.begin();
@@ -150,11 +144,11 @@ TEST_CASE("The sequential test lets good models through and most bad ones not") 
       inliers += inside;
       data += 32;
       if (test.hopeless(inside, 32)) {
-        test.end(false, inliers, data);
+        test.end(inliers, data);
         return false;
       }
     }
-    test.end(true, inliers, data);
+    test.end(inliers, data);
     return true;
   };
   for (int k = 0; k != 100; ++k) CHECK(scored_to_its_end(0.02));  // nothing is known yet
@@ -176,8 +170,7 @@ TEST_CASE("RANSAC with a workspace allocates nothing but its answer, however lon
   ransac_workspace workspace;
   const auto allocated = [&](std::size_t iterations) {
     const std::size_t before = test::allocations();
-    const auto found = ransac(data, {.threshold = 0.03, .min_iterations = iterations},
-                              ransac_policies{msac{}, uniform_sampling{}, sprt{}, iterated_refinement{}}, workspace);
+    const auto found = ransac(data, {.threshold = 0.03, .min_iterations = iterations, .model_cost = 200.0}, workspace);
     const std::size_t after = test::allocations();
     CHECK(is_the_line(found));
     return after - before;

@@ -2,7 +2,7 @@
 #include <chrono>
 #include <thread>
 
-#include <orbis/slam/detail/system/stopwatch.hpp>
+#include <orbis/slam/system-inl.hpp>
 
 #include "support/catch.hpp"
 
