@@ -73,7 +73,7 @@ foreach(command run map)
   app_fails(2 "--resolution: voxels of 1 mm: the first frame alone has about .* too many"
             ${command} sharp --out out --resolution 0.001)
 endforeach()
-app_fails(2 "--resolution: voxels of 1 mm" demo --frames 2 --out out --resolution 0.001)
+app_fails(2 "--resolution: voxels of 1 mm" demo --plain --frames 2 --out out --resolution 0.001)
 check(NOT EXISTS ${WORK}/out/summary.json)
 
 recording(no_entries)

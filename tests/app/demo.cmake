@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 include(${CMAKE_CURRENT_LIST_DIR}/support.cmake)
 
-app(0 demo --frames 40 --width 320 --resolution 0.1 --deterministic --save-map room.map --out demo)
+app(0 demo --plain --frames 40 --width 320 --resolution 0.1 --deterministic --save-map room.map --out demo)
 set(files trajectory.txt keyframes.txt camera_used.toml cloud.ply cloud_filtered.ply map_unfiltered.bt map.bt map.ot summary.json
           report.html trajectory.png map.png map_unfiltered.png filter.png)
 must_exist(${WORK}/demo ${files})
@@ -81,7 +81,7 @@ if(CONVERT_OCTREE)
 endif()
 
 # The octree that grew while frames were tracked is the one that is made of all keyframes in the end.
-app(0 demo --frames 40 --width 320 --resolution 0.1 --batch-map --out batch --quiet --threads 1)
+app(0 demo --plain --frames 40 --width 320 --resolution 0.1 --batch-map --out batch --quiet --threads 1)
 foreach(name trajectory.txt cloud_filtered.ply map_unfiltered.bt map.bt map.ot)
   must_equal(demo/${name} batch/${name})
 endforeach()
@@ -91,8 +91,8 @@ check(type STREQUAL "NULL")
 
 # Somebody walks through the room; what was taken out of the live map is judged again in the end. (In smaller images
 # most of the features that are left belong to the person for a while.)
-app(0 demo --frames 90 --resolution 0.1 --person --out person --quiet --threads 1)
-app(0 demo --frames 90 --resolution 0.1 --person --batch-map --out person_batch --quiet --threads 1)
+app(0 demo --plain --frames 90 --resolution 0.1 --person --out person --quiet --threads 1)
+app(0 demo --plain --frames 90 --resolution 0.1 --person --batch-map --out person_batch --quiet --threads 1)
 foreach(name cloud_filtered.ply map_unfiltered.bt map.bt map.ot)
   must_equal(person/${name} person_batch/${name})
 endforeach()
@@ -103,8 +103,21 @@ check(reason MATCHES "has moved away")
 summary(map_error ${WORK}/person map_error_m)
 check(map_error LESS 0.02)
 
+# The whole demo has stray depths, which the filter removes, and a person.
+app(0 demo --frames 60 --width 320 --resolution 0.1 --out stray --quiet --threads 1)
+summary(removed ${WORK}/stray filter removed)
+summary(points ${WORK}/stray cloud points)
+math(EXPR tenths "1000 * ${removed} / ${points}")
+check(tenths GREATER 1)
+summary(map_error ${WORK}/stray map_error_m)
+check(map_error LESS 0.05)
+summary(occupied ${WORK}/stray octree occupied)
+summary(leaves ${WORK}/stray octree leaves)
+summary(leaves_unfiltered ${WORK}/stray octree leaves_unfiltered)
+check(leaves LESS leaves_unfiltered)
+
 # --quiet says nothing; one thread means the same bytes as --deterministic.
-app(0 demo --frames 40 --width 320 --resolution 0.1 --out again --save-map again.map --quiet --threads 1)
+app(0 demo --plain --frames 40 --width 320 --resolution 0.1 --out again --save-map again.map --quiet --threads 1)
 string(LENGTH "${out}${err}" said)
 check(said EQUAL 0)
 foreach(name trajectory.txt keyframes.txt camera_used.toml cloud.ply cloud_filtered.ply map_unfiltered.bt map.bt map.ot trajectory.png
@@ -122,4 +135,4 @@ endforeach()
 summary(up ${WORK}/demo world up_from)
 check(up STREQUAL "ground truth")
 check(page MATCHES "whose z is up")
-app_fails(1 "is not a direction" demo --frames 5 --width 160 --gravity 0,0,0 --out never)
+app_fails(1 "is not a direction" demo --plain --frames 5 --width 160 --gravity 0,0,0 --out never)

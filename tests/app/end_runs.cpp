@@ -280,6 +280,7 @@ int main(int argc, char** argv) {
   // Interrupted: what was reached takes the place of all that was; twice: nothing does.
   const auto demo = [&](const char* seed, const char* frames) -> std::vector<std::string> {
     return {"demo",
+            "--plain",
             "--out",
             (work / "demo").string(),
             "--quiet",

@@ -13,7 +13,7 @@ endfunction()
 app_fails(1 "--map-every-frame wants a live map" demo --out never --map-every-frame --batch-map)
 
 # Frames between keyframes are in the live map, and not in the files.
-set(room demo --frames 80 --width 160 --resolution 0.1 --deterministic --quiet)
+set(room demo --plain --frames 80 --width 160 --resolution 0.1 --deterministic --quiet)
 app(0 ${room} --batch-map --out batch)
 app(0 ${room} --map-every-frame --threads 1 --out every)
 must_be_the_same(batch every)
@@ -28,17 +28,17 @@ summary(behind ${WORK}/every live_map behind_frames_max)  # one thread: tracking
 check(behind EQUAL 0)
 
 # At the pace of the recording, 30 Hz.
-app(0 demo --frames 61 --width 160 --resolution 0.1 --quiet --map-every-frame --realtime --out paced)
+app(0 demo --plain --frames 61 --width 160 --resolution 0.1 --quiet --map-every-frame --realtime --out paced)
 summary(dropped ${WORK}/paced live_map frames dropped)
 check(dropped EQUAL 0)
 # Three frames with 2 s between them take 4 s at least, wherever they run; without the pace less than one.
-app(0 demo --frames 3 --stride 60 --width 160 --resolution 0.1 --quiet --realtime --out sparse)
+app(0 demo --plain --frames 3 --stride 60 --width 160 --resolution 0.1 --quiet --realtime --out sparse)
 summary(fps ${WORK}/sparse fps)
 check(fps GREATER 0)
 check(fps LESS_EQUAL 0.75)
 
 # Voxels so small that the map cannot keep up: frames give way, which is told; the files are those of the keyframes.
-set(fine demo --frames 80 --width 160 --resolution 0.008 --filter none --deterministic)
+set(fine demo --plain --frames 80 --width 160 --resolution 0.008 --filter none --deterministic)
 app(0 ${fine} --batch-map --quiet --out fine_batch)
 app(0 ${fine} --map-every-frame --out fine)
 check(err MATCHES "[0-9]+ frames? between keyframes came in faster than the live map took them")

@@ -3,7 +3,7 @@
 # Recordings of one camera without depth.
 include(${CMAKE_CURRENT_LIST_DIR}/support.cmake)
 
-app(0 demo --sensor mono --frames 60 --deterministic --save-map room.map --out demo)
+app(0 demo --plain --sensor mono --frames 60 --deterministic --save-map room.map --out demo)
 must_exist(${WORK}/demo trajectory.txt keyframes.txt summary.json report.html trajectory.png)
 must_exist(${WORK} room.map)
 check(err MATCHES "lengths are in a unit of their own, and there is no cloud and no octree")
@@ -20,16 +20,16 @@ summary(scale ${WORK}/demo scale)
 check(scale GREATER 1.2)
 
 # What is not corrected for is said.
-app(3 demo --sensor mono --frames 3 --read-out-ms 30 --out rolling)
+app(3 demo --plain --sensor mono --frames 3 --read-out-ms 30 --out rolling)
 check(err MATCHES "without depth a rolling shutter is not corrected for")
-app(3 demo --sensor mono --frames 3 --read-out-ms 0 --out global)
+app(3 demo --plain --sensor mono --frames 3 --read-out-ms 0 --out global)
 check(NOT err MATCHES "rolling shutter")
 
 # The map of landmarks is used again, by one camera only.
-app(0 demo --sensor mono --frames 20 --load-map room.map --localize-only --deterministic --out again)
+app(0 demo --plain --sensor mono --frames 20 --load-map room.map --localize-only --deterministic --out again)
 summary(found ${WORK}/again tracked)
 check(found EQUAL 20)
-app_fails(2 "room.map: the map was made without depth" demo --frames 20 --load-map room.map --out out)
+app_fails(2 "room.map: the map was made without depth" demo --plain --frames 20 --load-map room.map --out out)
 
 # A trajectory in a unit of its own is compared after scaling.
 file(MAKE_DIRECTORY ${WORK}/eval)
@@ -50,7 +50,7 @@ app(0 eval eval/small.txt eval/large.txt)
 check(out MATCHES "ATE  RMSE [1-9]")
 
 # A camera that sees nothing that could be followed: no start.
-app_fails(3 "tracking never started: no two of 3 frames show enough of the same texture" demo --sensor mono --frames 3 --out still)
+app_fails(3 "tracking never started: no two of 3 frames show enough of the same texture" demo --plain --sensor mono --frames 3 --out still)
 
 # A folder of images is one camera's where nothing else is in it.
 file(MAKE_DIRECTORY ${WORK}/nothing)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 include(${CMAKE_CURRENT_LIST_DIR}/support.cmake)
 
-set(room demo --frames 10 --width 320 --deterministic --filter none --quiet)
+set(room demo --plain --frames 10 --width 320 --deterministic --filter none --quiet)
 
 function(must_have folder profile resolution)
   summary(named ${WORK}/${folder} profile)

@@ -2,7 +2,7 @@
 #
 # Maps of landmarks in files: saved, found again, gone on with.
 include(${CMAKE_CURRENT_LIST_DIR}/support.cmake)
-set(room demo --width 320 --quiet --resolution 0.1 --filter none)
+set(room demo --plain --width 320 --quiet --resolution 0.1 --filter none)
 
 # The farthest apart that two trajectories are at the same times, as their files have them: nothing is aligned.
 function(must_be_near a b metres)

@@ -3,7 +3,7 @@
 # Recordings of stereo cameras.
 include(${CMAKE_CURRENT_LIST_DIR}/support.cmake)
 
-app(0 demo --sensor stereo --frames 30 --width 320 --resolution 0.1 --deterministic --out demo)
+app(0 demo --plain --sensor stereo --frames 30 --width 320 --resolution 0.1 --deterministic --out demo)
 must_exist(${WORK}/demo trajectory.txt cloud.ply map.bt summary.json report.html)
 summary(tracked ${WORK}/demo tracked)
 check(tracked EQUAL 30)
@@ -15,7 +15,7 @@ summary(points ${WORK}/demo cloud points)
 check(points GREATER 10000)
 
 # Depth beyond what millimetres in 16 bits reach is kept in coarser steps.
-app(0 demo --sensor stereo --frames 3 --width 160 --resolution 0.2 --filter none --max-depth 130 --out far)
+app(0 demo --plain --sensor stereo --frames 3 --width 160 --resolution 0.2 --filter none --max-depth 130 --out far)
 file(READ ${WORK}/far/report.html page)
 check(page MATCHES "depth / 500 = metres" AND page MATCHES "measurements up to 130 m")
 

@@ -27,7 +27,7 @@ if(NOT HAS_WEB)
 endif()
 
 # The same bytes with it.
-set(common demo --width 320 --resolution 0.1 --deterministic)
+set(common demo --plain --width 320 --resolution 0.1 --deterministic)
 app(0 ${common} --frames 20 --out plain --quiet)
 app(0 ${common} --frames 20 --out shown --viewer web --viewer-port 0)
 check(err MATCHES "http://127.0.0.1:[0-9]+/")
@@ -45,7 +45,7 @@ file(WRITE ${WORK}/viewer.toml "viewer = \"web\"\nviewer-port = 0\nviewer-hold =
 execute_process(COMMAND bash -c "
   set -e
   : >held.log  # there before it is read
-  '${APP}' demo --frames 3 --width 160 --out held --config viewer.toml 2>held.log &
+  '${APP}' demo --plain --frames 3 --width 160 --out held --config viewer.toml 2>held.log &
   run=$!
   trap 'kill -9 $run 2>/dev/null || true' EXIT
   for i in $(seq 600); do
@@ -53,7 +53,7 @@ execute_process(COMMAND bash -c "
     [ -n \"$port\" ] && [ -e held/report.html ] && break
     sleep 0.1
   done
-  '${APP}' demo --frames 3 --width 160 --out other --viewer web --viewer-port $port 2>taken.log && exit 3 || [ $? = 1 ]
+  '${APP}' demo --plain --frames 3 --width 160 --out other --viewer web --viewer-port $port 2>taken.log && exit 3 || [ $? = 1 ]
   kill -0 $run      # it is held open ...
   kill -INT $run    # ... until Ctrl-C, which ends it well
   wait $run"
