@@ -288,20 +288,6 @@ class occupancy_octree {
     detail::visit_leaves(store_, tree_depth(),
                          [&](const voxel_key& key, int level, value_type v) { visit(leaf_of(key, level, v)); });
   }
-  /// Calls `visit(const leaf&)` for every leaf that has a voxel in `box` (metres; the voxels of both corners belong to
-  /// it), in Morton order. Looks at the part of the map in the box only.
-  template <std::invocable<const leaf&> Visit>
-  void for_each_leaf_in(const bounding_box& box, Visit&& visit) const {
-    if (const auto keys = keys_between(grid_, box.min, box.max))
-      detail::visit_leaves_in(store_, tree_depth(), *keys,
-                              [&](const voxel_key& key, int level, value_type v) { visit(leaf_of(key, level, v)); });
-  }
-  /// Calls `visit(const vec3& center)` (metres) for every occupied voxel, also for each voxel of a larger leaf.
-  /// O(bricks + voxels visited).
-  template <std::invocable<const vec3&> Visit>
-  void for_each_occupied_voxel(Visit&& visit) const {
-    detail::visit_occupied_voxels<Model>(store_, [&](const voxel_key& key, value_type) { visit(grid_.center(key)); });
-  }
   /// Numbers of nodes of the pruned octree. O(bricks + octants that are not uniform), as are the four functions below.
   [[nodiscard]] octree_counts counts() const;
   /// Leaves of the pruned octree, of any size.
