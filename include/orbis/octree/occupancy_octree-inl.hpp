@@ -44,7 +44,6 @@ template <class Depth, class Camera>
 integration_summary occupancy_octree<Model>::integrate_depth(const parallel_policy& policy, const Depth& depth,
                                                              const Camera& camera, const se3& T_world_camera,
                                                              const integration_options& options) {
-  assert(options.beam_ranges.empty());
   begin_change();
   detail::scan_buffers& buffers = scratch_.get<detail::scan_buffers>();
   integration_summary summary;

@@ -113,7 +113,7 @@ class occupancy_octree {
   /// points (see append_world_points) make when seen from the camera's centre, but this is many times as fast.
   /// O(pixels + voxels near surfaces). The library orbis::compiled holds this for depth_view of std::uint16_t and float
   /// with pinhole and any_camera; other sources and models include occupancy_octree-inl.hpp.
-  /// @pre depth and camera have the same size; options.beam_ranges is empty
+  /// @pre depth and camera have the same size
   template <execution_policy Policy, camera::depth_source Depth, camera::camera_model Camera>
   integration_summary integrate(const Policy& policy, const Depth& depth, const Camera& camera,
                                 const se3& T_world_camera, const integration_options& options = {}) {

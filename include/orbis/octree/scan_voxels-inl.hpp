@@ -55,7 +55,6 @@ template <class Depth, class Camera>
 integration_summary scan_marker::mark_depth(const parallel_policy& policy, const voxel_grid& grid, const Depth& depth,
                                             const Camera& camera, const se3& T_world_camera,
                                             const integration_options& options, scan_voxels& voxels) {
-  assert(options.beam_ranges.empty());
   integration_summary summary;
   const detail::scan_masks& scan = detail::mark_depth(policy, scratch_.get<detail::scan_buffers>(), grid, depth, camera,
                                                       T_world_camera, options, summary);

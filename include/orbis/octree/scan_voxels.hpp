@@ -110,7 +110,7 @@ class scan_marker {
   /// `integrate` counts. O(pixels + voxels near surfaces + bricks).
   /// The library orbis::compiled holds this for the sources and models that it holds occupancy_octree::integrate for;
   /// others include scan_voxels-inl.hpp.
-  /// @pre depth and camera have the same size; options.beam_ranges is empty
+  /// @pre depth and camera have the same size
   template <execution_policy Policy, camera::depth_source Depth, camera::camera_model Camera>
   integration_summary mark(const Policy& policy, const voxel_grid& grid, const Depth& depth, const Camera& camera,
                            const se3& T_world_camera, const integration_options& options, scan_voxels& voxels) {

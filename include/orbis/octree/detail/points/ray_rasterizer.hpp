@@ -39,22 +39,13 @@ class ray_rasterizer {
     source_ = {grid, origin, from};
     for (auto& q : queues_) q.clear();
     fallback_.clear();
-    batch_.clear();
-    batched_ = 0;
     passed_ = 0;
     set_up_ = set_up_rays();
     mark_crossings_ = mark_crossings();
   }
 
-  /// Marks in `masks` what traverse_ray visits, now or when `flush` is called, and perhaps `to` if it is a
-  /// `hit`: a voxel that counts as occupied whatever crosses it. @pre `to` is the key of `end`
-  void add(const float3& end, const voxel_key& to, bool hit, scan_masks& masks) {
-    const auto way = [](std::uint32_t k, std::int32_t from) { return static_cast<std::int32_t>(k) - from; };
-    batch_.set(batched_, end, {way(to.x, source_.from[0]), way(to.y, source_.from[1]), way(to.z, source_.from[2])},
-               hit);
-    if (++batched_ == ray_batch::capacity) add_waiting(masks);
-  }
-  /// Adds the first `count` rays of a batch, as above.
+  /// Marks in `masks` what traverse_ray visits for the first `count` rays of a batch, now or when `flush` is called, and
+  /// perhaps the end of a ray that is a hit: a voxel that counts as occupied whatever crosses it.
   void add(const ray_batch& rays, std::size_t count, scan_masks& masks) {
     for (std::size_t i = 0; i < count; i += ray_batch::lanes) {
       const std::uint32_t cut = ray_batch::eight(rays.cut, i);
@@ -76,7 +67,6 @@ class ray_rasterizer {
   /// Marks the rays that are waiting.
   void flush(scan_masks& masks) {
     if (grid_ == nullptr) return;
-    add_waiting(masks);
     for (std::size_t kind = 0; kind != queues_.size(); ++kind) rasterize(kind, masks);
     flush_fallback(masks);
     for (; passed_ != 0; passed_ &= passed_ - 1) {
@@ -121,11 +111,6 @@ class ray_rasterizer {
             static_cast<std::uint32_t>(source_.from[2] + away[2])};
   }
   void flush_fallback(scan_masks& masks) { fallback_.flush(*grid_, source_.origin, key({}), masks); }
-  void add_waiting(scan_masks& masks) {
-    add(batch_, batched_, masks);
-    batch_.clear();
-    batched_ = 0;
-  }
 
   /// A ray that has been prepared: to its queue; voxels that no plane marks are marked at once.
   void take(std::size_t lane, const float3& end, bool cut, scan_masks& masks) {
@@ -293,8 +278,6 @@ class ray_rasterizer {
 
   const voxel_grid* grid_ = nullptr;
   scan_origin source_;
-  ray_batch batch_;
-  std::size_t batched_ = 0;
   ray_setup setup_;
   std::uint32_t passed_ = 0;  ///< see first_steps
   std::array<std::vector<waiting_ray>, ray_setup::kinds> queues_;
