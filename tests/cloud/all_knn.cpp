@@ -33,7 +33,7 @@ std::vector<neighbor<float>> reference_neighbors(const points& cloud, std::size_
   others.resize(std::min(k, others.size()));
   std::vector<neighbor<float>> out;
   for (const auto& [squared, j] : others) out.push_back({j, std::sqrt(squared)});
-  std::sort(out.begin(), out.end(), orbis::cloud::nearest_sink<float>::less);
+  std::sort(out.begin(), out.end(), orbis::cloud::is_nearer<float>);
   return out;
 }
 
