@@ -19,7 +19,6 @@
 #include <vector>
 
 #include <orbis/core/simd.hpp>
-#include <orbis/octree/detail/points/fallback_rays.hpp>
 #include <orbis/octree/detail/points/limit_rays.hpp>
 #include <orbis/octree/detail/points/plane_crossings.hpp>
 #include <orbis/octree/detail/points/plane_masks.hpp>
@@ -56,7 +55,7 @@ class ray_rasterizer {
         const auto lane = static_cast<std::size_t>(std::countr_zero(left));
         const float3 end{rays.end[0][i + lane], rays.end[1][i + lane], rays.end[2][i + lane]};
         if ((setup_.done >> lane & 1U) == 0)
-          fallback_.add(end);
+          fallback_.push_back(end);
         else
           take(lane, end, (cut >> lane & 1U) != 0, masks);
       }
@@ -77,7 +76,7 @@ class ray_rasterizer {
   [[nodiscard]] std::size_t memory_bytes() const noexcept {
     std::size_t bytes =
         rays_.memory_bytes() + bytes_.capacity() + (counts_.capacity() + buckets_.capacity()) * sizeof(std::uint32_t) +
-        bounds_.capacity() * sizeof(bounds) + doubtful_.capacity() * sizeof(std::uint32_t) + fallback_.memory_bytes();
+        bounds_.capacity() * sizeof(bounds) + doubtful_.capacity() * sizeof(std::uint32_t) + fallback_.capacity() * sizeof(float3);
     for (const auto& q : queues_) bytes += q.capacity() * sizeof(waiting_ray);
     return bytes;
   }
@@ -110,7 +109,10 @@ class ray_rasterizer {
             static_cast<std::uint32_t>(source_.from[1] + away[1]),
             static_cast<std::uint32_t>(source_.from[2] + away[2])};
   }
-  void flush_fallback(scan_masks& masks) { fallback_.flush(*grid_, source_.origin, key({}), masks); }
+  void flush_fallback(scan_masks& masks) {
+    for (const float3& end : fallback_) masks.mark_ray(*grid_, source_.origin, key({}), end, *grid_->key(end));
+    fallback_.clear();
+  }
 
   /// A ray that has been prepared: to its queue; voxels that no plane marks are marked at once.
   void take(std::size_t lane, const float3& end, bool cut, scan_masks& masks) {
@@ -118,7 +120,7 @@ class ray_rasterizer {
     const std::int32_t kind = r.kind[lane], planes = r.planes[lane];
     if (source_.on_edge) {
       const std::uint32_t passed = first_steps(source_, end, ray_setup::down(kind));
-      if (passed == 0) return fallback_.add(end);
+      if (passed == 0) return fallback_.push_back(end);
       passed_ |= passed & ~(1U << 31U);
     }
     const auto is = [lane](std::uint32_t bits) { return (bits >> lane & 1U) != 0; };
@@ -233,7 +235,7 @@ class ray_rasterizer {
         mark_slab(place, static_cast<std::int32_t>(s), planes, bounds_[b], begin, counts_[b], masks);
       }
     }
-    for (const std::uint32_t i : doubtful_) fallback_.add(queue[i].end);
+    for (const std::uint32_t i : doubtful_) fallback_.push_back(queue[i].end);
     queue.clear();
     if (fallback_.size() >= max_waiting) flush_fallback(masks);
   }
@@ -286,7 +288,7 @@ class ray_rasterizer {
   std::vector<std::uint32_t> counts_, buckets_;
   std::vector<bounds> bounds_;
   std::vector<std::uint32_t> doubtful_;
-  fallback_rays fallback_;
+  std::vector<float3> fallback_;  ///< ends of rays that only the exact traversal can decide
   setup_kernel* set_up_ = nullptr;
   crossings_kernel* mark_crossings_ = nullptr;
 };
