@@ -29,8 +29,6 @@ template result<std::vector<std::uint32_t>> find_radius_inliers(const policy&, c
 template cluster_result filter_clusters(const policy&, const point_view&, const cluster_options&);
 template automatic_result choose_and_filter(const policy&, const point_view&, std::span<const float>,
                                             const select_options&, const view_judge&);
-template std::vector<std::uint32_t> apply_chain(const policy&, const point_view&, std::span<const float>,
-                                                const filter_chain&, const select_options&, const view_filter&);
 template flying_pixel_count read_without_flying_pixels(const policy&, const depth_row_reader&, image_view<float>,
                                                        const flying_pixel_options&, flying_pixel_workspace&);
 
