@@ -39,7 +39,7 @@ points wall_and_ball(std::size_t size, double distance) {
 /// Components by flood fill over the links, written down plainly.
 std::vector<std::uint32_t> reference_components(const points& cloud, const cluster_options& options) {
   const auto table = orbis::cloud::all_knn(orbis::seq, cloud, options.neighbors);
-  const auto spacing = orbis::cloud::mean_knn_distance(orbis::seq, table, options.neighbors);
+  const auto spacing = orbis::test::mean_distances_of(table, options.neighbors);
   std::vector<std::vector<std::uint32_t>> links(cloud.size());
   for (std::uint32_t i = 0; i != cloud.size(); ++i) {
     for (const auto& [j, distance] : table[i]) {

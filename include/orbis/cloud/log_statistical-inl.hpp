@@ -51,7 +51,7 @@ template <execution_policy Policy>
 log_statistical_result filter_by_logarithm(const Policy& policy, const point_view& points,
                                            const log_statistical_options& options) {
   log_statistical_result out =
-      log_statistical_decision(*find_mean_distances(policy, points, options.neighbors, progress{}), options);
+      log_statistical_decision(find_mean_distances(policy, points, options.neighbors), options);
   out.inliers = inliers_by_score(points, out.mean_distance, options.non_finite,
                                  [&](float d) { return double{d} > out.threshold_distance; });
   return out;
