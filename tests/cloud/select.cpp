@@ -251,7 +251,7 @@ TEST_CASE("outliers are found whatever the sensor, and the bounds can fail") {
   CHECK(lost / cases < 0.003);
 }
 
-TEST_CASE("points that are not finite stay, and modes are left out, where that is asked for") {
+TEST_CASE("points that are not finite stay where that is asked for") {
   auto cloud = orbis::test::room_cloud(160, 120, 0.002, 11);
   add_uniform(cloud, 900, 12);
   cloud.emplace_back(std::numeric_limits<float>::quiet_NaN(), 0.0F, 1.0F);
@@ -262,17 +262,6 @@ TEST_CASE("points that are not finite stay, and modes are left out, where that i
   auto keeping = options;
   keeping.non_finite = orbis::cloud::non_finite::keep;
   CHECK(filter_automatically(orbis::seq, cloud, keeping).inliers.size() == automatic.inliers.size() + 1);
-
-  SECTION("a mode that is not wanted") {
-    auto without = options;
-    without.forbidden = {filter_mode::isolation, filter_mode::cluster, filter_mode::local_log_statistical};
-    const auto choice = orbis::cloud::select_filter(orbis::par, cloud, without);
-    REQUIRE_FALSE(choice.chain.empty());
-    for (const auto mode : without.forbidden) CHECK_FALSE(has_step(choice.chain, mode));
-    without.forbidden = {filter_mode::isolation, filter_mode::cluster, filter_mode::log_statistical,
-                         filter_mode::range_log_statistical, filter_mode::local_log_statistical};
-    CHECK(orbis::cloud::select_filter(orbis::par, cloud, without).chain.empty());
-  }
 }
 
 TEST_CASE("views show what no density can") {
@@ -321,12 +310,7 @@ TEST_CASE("views show what no density can") {
         if (const auto* rays = std::get_if<orbis::cloud::ray_step>(&s)) CHECK(rays->distrusted.empty());
     }
   }
-  SECTION("unless they must not be asked") {
-    const auto silent = filter_automatically(orbis::par, seen.points, seen.views(), seen.camera,
-                                             {.ranges = seen.ranges, .forbidden = {filter_mode::ray_evidence}});
-    CHECK(silent.inliers == alone.inliers);
-  }
-  SECTION("or it is cancelled") {
+  SECTION("unless it is cancelled") {
     int calls = 0;
     const auto stopped = filter_automatically(orbis::par, seen.points, seen.views(), seen.camera, {},
                                               [&](std::size_t, std::size_t) { return ++calls < 5; });

@@ -25,16 +25,10 @@ ORBIS_INLINE log_statistical_result log_statistical_decision(std::vector<float> 
   out.judged = values.size();
   out.threshold = options.threshold;
   if (!values.empty()) {
-    // Order is kept by the logarithm: only two values need theirs.
-    float* const first = values.data();
-    float* const middle = first + (values.size() - 1) / 2;
-    std::nth_element(first, middle, first + values.size());
+    // Order is kept by the logarithm: only one value needs its own.
+    float* const middle = values.data() + (values.size() - 1) / 2;
+    std::nth_element(values.data(), middle, values.data() + values.size());
     out.median = std::log(double{*middle});
-    // The median of the distances to it of those below it, and itself, lies at their own median.
-    float* const quarter = first + (middle - first) / 2;
-    std::nth_element(first, quarter, middle + 1);
-    out.scale = std::max(1.4826 * (out.median - std::log(double{*quarter})), options.least_scale);
-    if (options.sigmas.has_value()) out.threshold = *options.sigmas * out.scale;
     out.threshold_distance = std::exp(out.median + out.threshold);
   }
   out.inliers = detail::indices_where(mean_distance.size(), [&](std::size_t i) {

@@ -13,6 +13,7 @@
 #include <orbis/core/execution.hpp>
 
 #include "cloud/clouds.hpp"
+#include "cloud/reference.hpp"
 #include "support/catch.hpp"
 
 using orbis::cloud::neighbor_table;
