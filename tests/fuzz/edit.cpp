@@ -391,9 +391,7 @@ class session {
         });
         break;
       default:
-        map_.to_maximum_likelihood();
-        for (voxel& v : expected_.all())
-          if (v) v = octree::is_occupied<model>(*v) ? model::clamp_max : model::clamp_min;
+        transform_by([](float v) { return voxel{octree::is_occupied<model>(v) ? model::clamp_max : model::clamp_min}; });
     }
   }
   void evict() {

@@ -54,11 +54,6 @@ integration_summary occupancy_octree<Model>::integrate_depth(const parallel_poli
 }
 
 template <sensor_model Model>
-void occupancy_octree<Model>::to_maximum_likelihood() {
-  transform([](value_type v) { return std::optional{is_occupied<Model>(v) ? Model::clamp_max : Model::clamp_min}; });
-}
-
-template <sensor_model Model>
 void occupancy_octree<Model>::prune() {
   const std::vector<detail::tree_part<value_type>> parts = detail::tree_parts(store_, tree_depth());
   detail::large_leaves<value_type> merged;

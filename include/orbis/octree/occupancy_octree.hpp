@@ -194,9 +194,6 @@ class occupancy_octree {
     });
     if (has_large) lose_track();
   }
-  /// Gives every occupied voxel the model's upper bound and every free one its lower bound, as `.bt` files do.
-  /// O(octants).
-  void to_maximum_likelihood();
   /// A rolling window: removes every brick (8x8x8 voxels) and larger leaf that lies completely outside `box` (metres),
   /// after calling `evict(const leaf&)` for its leaves. `set_unknown_node(leaf.key, leaf.depth, leaf.log_odds)` brings
   /// a leaf back. Returns the number of bricks and larger leaves removed. The change log records what was evicted: it
