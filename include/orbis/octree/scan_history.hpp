@@ -26,7 +26,6 @@
 #include <orbis/core/se3.hpp>
 #include <orbis/octree/change_log.hpp>
 #include <orbis/octree/detail/history/brick_uses.hpp>
-#include <orbis/octree/detail/history/replayed_brick.hpp>
 #include <orbis/octree/detail/points/scan_scratch.hpp>
 #include <orbis/octree/integration.hpp>
 #include <orbis/octree/occupancy_octree.hpp>

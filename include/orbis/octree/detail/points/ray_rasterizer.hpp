@@ -21,7 +21,6 @@
 #include <orbis/core/simd.hpp>
 #include <orbis/octree/detail/points/limit_rays.hpp>
 #include <orbis/octree/detail/points/plane_crossings.hpp>
-#include <orbis/octree/detail/points/plane_masks.hpp>
 #include <orbis/octree/detail/points/ray_setup.hpp>
 #include <orbis/octree/detail/points/ray_traversal.hpp>
 #include <orbis/octree/detail/storage/scan_masks.hpp>
