@@ -15,7 +15,6 @@
 #include <vector>
 
 #include <orbis/cloud/detail/point_view.hpp>
-#include <orbis/cloud/detail/threads_of.hpp>
 #include <orbis/cloud/extract.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/point.hpp>

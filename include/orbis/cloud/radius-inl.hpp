@@ -10,7 +10,6 @@
 
 #include <orbis/cloud/detail/knn/knn_kernels.hpp>
 #include <orbis/cloud/detail/knn/leaf_hierarchy.hpp>
-#include <orbis/cloud/detail/knn/line_vector.hpp>
 #include <orbis/cloud/detail/knn/nearest_search.hpp>
 #include <orbis/cloud/detail/knn/squared_distance.hpp>
 #include <orbis/cloud/detail/select/decision.hpp>

@@ -26,7 +26,6 @@
 
 #include <orbis/camera/model.hpp>
 #include <orbis/cloud/detail/point_view.hpp>
-#include <orbis/cloud/detail/threads_of.hpp>
 #include <orbis/cloud/filter_chain.hpp>
 #include <orbis/cloud/filter_choice.hpp>
 #include <orbis/cloud/ray_evidence_counter.hpp>

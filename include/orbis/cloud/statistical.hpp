@@ -26,7 +26,6 @@
 
 #include <orbis/cloud/all_knn.hpp>
 #include <orbis/cloud/detail/point_view.hpp>
-#include <orbis/cloud/detail/threads_of.hpp>
 #include <orbis/cloud/extract.hpp>
 #include <orbis/cloud/sensor_origins.hpp>
 #include <orbis/core/execution.hpp>
