@@ -25,6 +25,7 @@
 #include <orbis/cloud/detail/voxels/voxel_brick.hpp>
 #include <orbis/cloud/detail/voxels/voxel_key.hpp>
 #include <orbis/core/execution.hpp>
+#include <orbis/core/hash_index.hpp>
 #include <orbis/core/image.hpp>
 #include <orbis/core/point_cloud.hpp>
 #include <orbis/core/rounded.hpp>
