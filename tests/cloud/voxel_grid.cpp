@@ -95,9 +95,7 @@ template <class Points>
   orbis::point_cloud out;
   for (const sum& s : sums) {
     const auto mean = [&](std::size_t a) { return static_cast<float>(s.position[a] / s.count); };
-    const auto channel = [&](std::size_t a) {
-      return static_cast<std::uint8_t>((s.color[a] + s.count / 2) / s.count);
-    };
+    const auto channel = [&](std::size_t a) { return static_cast<std::uint8_t>((s.color[a] + s.count / 2) / s.count); };
     out.points.emplace_back(mean(0), mean(1), mean(2));
     if (!colors.empty()) out.colors.push_back({channel(0), channel(1), channel(2)});
   }

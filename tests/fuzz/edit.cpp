@@ -391,7 +391,8 @@ class session {
         });
         break;
       default:
-        transform_by([](float v) { return voxel{octree::is_occupied<model>(v) ? model::clamp_max : model::clamp_min}; });
+        transform_by(
+            [](float v) { return voxel{octree::is_occupied<model>(v) ? model::clamp_max : model::clamp_min}; });
     }
   }
   void evict() {

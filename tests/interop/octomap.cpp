@@ -11,12 +11,12 @@
 #include <orbis/core/random.hpp>
 #include <orbis/core/types.hpp>
 #include <orbis/interop/octomap.hpp>
-#include <orbis/nav/planning_view.hpp>
 #include <orbis/nav/distance_field.hpp>
 #include <orbis/nav/floor_map-inl.hpp>
 #include <orbis/nav/frontiers.hpp>
 #include <orbis/nav/next_view.hpp>
 #include <orbis/nav/path_search.hpp>
+#include <orbis/nav/planning_view.hpp>
 #include <orbis/nav/replanning.hpp>
 #include <orbis/nav/robot_shape.hpp>
 #include <orbis/nav/robot_trajectory.hpp>

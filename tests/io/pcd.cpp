@@ -66,7 +66,8 @@ std::string file_of(const orbis::point_cloud& cloud, const std::string& encoding
     std::vector<float> numbers(cloud.points[i].begin(), cloud.points[i].end());
     if (cloud.has_colors()) {
       const rgb8& c = cloud.colors[i];
-      numbers.push_back(std::bit_cast<float>(std::uint32_t{c.r} << 16U | std::uint32_t{c.g} << 8U | std::uint32_t{c.b}));
+      numbers.push_back(
+          std::bit_cast<float>(std::uint32_t{c.r} << 16U | std::uint32_t{c.g} << 8U | std::uint32_t{c.b}));
     }
     for (const float v : numbers) {
       if (encoding == "binary") {
@@ -192,8 +193,7 @@ TEST_CASE("an unorganised cloud in binary is read from a real file") {
 
 TEST_CASE("an organised cloud with compression and NaN is read from a real file") {
   ORBIS_NEEDS_DATA("clouds/table_scene_mug_stereo_textured.pcd");
-  const auto read =
-      io::read_pcd(orbis::test::data_dir() / "clouds" / "table_scene_mug_stereo_textured.pcd").value();
+  const auto read = io::read_pcd(orbis::test::data_dir() / "clouds" / "table_scene_mug_stereo_textured.pcd").value();
   CHECK(read.size() == 640 * 480);
   std::size_t finite = 0;
   for (const vec3f& p : read.points) finite += p.allFinite() ? 1 : 0;

@@ -43,7 +43,8 @@ TEST_CASE("Maximum likelihood is OctoMap's") {
     test::insert(theirs, points, origin, {});
   }
   using model = octree::log_odds<>;
-  ours.transform([](float v) { return std::optional{octree::is_occupied<model>(v) ? model::clamp_max : model::clamp_min}; });
+  ours.transform(
+      [](float v) { return std::optional{octree::is_occupied<model>(v) ? model::clamp_max : model::clamp_min}; });
   theirs.toMaxLikelihood();
   theirs.prune();
   CHECK(ot_bytes(ours) == test::ot_of(theirs));

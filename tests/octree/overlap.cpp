@@ -53,7 +53,7 @@ double gap(const capsule& c, const vec3& center, double half) {
 
 struct answer {
   bool occupied = false, unknown = false;
-  bool is_close = false;   ///< rounding may decide
+  bool is_close = false;  ///< rounding may decide
 };
 template <class Shape>
 answer by_brute_force(const occupancy_octree<>& map, const Shape& shape) {

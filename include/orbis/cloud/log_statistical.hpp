@@ -21,8 +21,8 @@
 namespace orbis::cloud {
 
 struct log_statistical_options {
-  std::size_t neighbors = 8;       ///< k, the point itself not counted; > 0
-  double threshold = 1.6;          ///< natural logarithm: outliers are exp(threshold) times sparser than the median
+  std::size_t neighbors = 8;  ///< k, the point itself not counted; > 0
+  double threshold = 1.6;     ///< natural logarithm: outliers are exp(threshold) times sparser than the median
   cloud::non_finite non_finite = cloud::non_finite::drop;
 };
 

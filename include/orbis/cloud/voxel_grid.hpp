@@ -36,9 +36,9 @@ template <execution_policy Policy, std::floating_point S>
 }  // namespace detail
 
 /// One point for each occupied voxel, in the order in which the voxels are first seen: the centroid of its points, with
-/// the mean of their colours where `colors` is not empty; the same for every policy. Points that are not finite are left
-/// out, as are those more than 2^31 voxels from the origin. O(n). Memory meanwhile: about 20 bytes per point, 25 with
-/// colours, and 25 MB, on one thread the latter alone for at most 2^17 points.
+/// the mean of their colours where `colors` is not empty; the same for every policy. Points that are not finite are
+/// left out, as are those more than 2^31 voxels from the origin. O(n). Memory meanwhile: about 20 bytes per point, 25
+/// with colours, and 25 MB, on one thread the latter alone for at most 2^17 points.
 ///
 /// Coordinates are summed in double in the order of the points. Where many voxels are occupied, the points are first
 /// brought into parts whose voxels fit into the cache.

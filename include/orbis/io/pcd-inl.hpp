@@ -62,8 +62,8 @@ ORBIS_INLINE result<void> write_pcd(const std::filesystem::path& path, const poi
   const auto choose = [&](const char* with, const char* without) { return cloud.has_colors() ? with : without; };
   std::string bytes =
       std::string{"# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\nFIELDS x y z"} +
-      choose(" rgb\nSIZE 4 4 4 4\nTYPE F F F F\nCOUNT 1 1 1 1", "\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1") + "\nWIDTH " + n +
-      "\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS " + n + "\nDATA binary_compressed\n";
+      choose(" rgb\nSIZE 4 4 4 4\nTYPE F F F F\nCOUNT 1 1 1 1", "\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1") + "\nWIDTH " +
+      n + "\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS " + n + "\nDATA binary_compressed\n";
   std::string columns;
   for (const int axis : {0, 1, 2})
     for (const vec3f& p : cloud.points) append_little_endian(columns, p[axis]);

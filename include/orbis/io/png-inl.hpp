@@ -45,17 +45,11 @@ ORBIS_INLINE result<image<std::uint16_t>> decode_png_depth(std::string_view byte
   return pixels;
 }
 
-ORBIS_INLINE std::string encode_png(image_view<const rgb8> view) {
-  return detail::encode_png(view);
-}
+ORBIS_INLINE std::string encode_png(image_view<const rgb8> view) { return detail::encode_png(view); }
 
-ORBIS_INLINE std::string encode_png(image_view<const std::uint8_t> view) {
-  return detail::encode_png(view);
-}
+ORBIS_INLINE std::string encode_png(image_view<const std::uint8_t> view) { return detail::encode_png(view); }
 
-ORBIS_INLINE std::string encode_png(image_view<const std::uint16_t> view) {
-  return detail::encode_png(view);
-}
+ORBIS_INLINE std::string encode_png(image_view<const std::uint16_t> view) { return detail::encode_png(view); }
 
 ORBIS_INLINE result<void> write_png(const std::filesystem::path& path, image_view<const rgb8> view) {
   return detail::write_png(path, view);

@@ -23,8 +23,7 @@ constexpr float infinite = std::numeric_limits<float>::infinity();
 [[nodiscard]] bool has(const ray_batch::bits& bits, std::size_t i) { return (bits[i >> 6U] >> (i & 63U) & 1U) != 0; }
 
 /// The rays to some points, one after the other.
-void one_by_one(const ray_frame& f, const point_batch& points, double max_range, std::size_t count,
-                ray_batch& rays) {
+void one_by_one(const ray_frame& f, const point_batch& points, double max_range, std::size_t count, ray_batch& rays) {
   rays.clear();
   for (std::size_t i = 0; i != count; ++i) {
     float3 end{points.x[i], points.y[i], points.z[i]};

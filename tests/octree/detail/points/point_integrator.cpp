@@ -41,8 +41,7 @@ struct reference {
 
   void walk(const float3& end, const voxel_key& to) {
     const auto from = grid.key(origin);
-    if (from)
-      traverse_ray(grid, origin, *from, end, to, [&](const voxel_key& k) { seen.free.insert(tuple_of(k)); });
+    if (from) traverse_ray(grid, origin, *from, end, to, [&](const voxel_key& k) { seen.free.insert(tuple_of(k)); });
   }
   /// Where a ray that is too long ends.
   [[nodiscard]] float3 cut(const float3& p, double limit) const {

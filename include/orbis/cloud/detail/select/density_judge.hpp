@@ -206,17 +206,17 @@ void judge_points(const Policy& policy, surroundings& around, const select_optio
   isolation.offset = local.step.offset;
   evidence.isolated = try_step(isolation);
   if (evidence.isolated > 0)
-    reasons.push_back(joined({percent(evidence.isolated), " are groups of fewer than ",
-                              std::to_string(isolation.min_size), " points further than ", in_words(isolation.reach),
-                              " usual spacings from all others"}));
+    reasons.push_back(
+        joined({percent(evidence.isolated), " are groups of fewer than ", std::to_string(isolation.min_size),
+                " points further than ", in_words(isolation.reach), " usual spacings from all others"}));
   cluster_options cluster;
   cluster.min_size = std::clamp<std::size_t>(around.size() / 125, 30, 300);
   cluster.min_gap = 4;
   evidence.clustered = try_step(cluster);
   if (evidence.clustered > 0)
-    reasons.push_back(joined({percent(evidence.clustered), " are clusters of fewer than ",
-                              std::to_string(cluster.min_size), " points that hang ", in_words(cluster.min_gap),
-                              " spacings or more from the surface"}));
+    reasons.push_back(
+        joined({percent(evidence.clustered), " are clusters of fewer than ", std::to_string(cluster.min_size),
+                " points that hang ", in_words(cluster.min_gap), " spacings or more from the surface"}));
 }
 
 }  // namespace orbis::cloud::detail

@@ -173,8 +173,8 @@ class voxel_parts {
     fold.resize(firsts.count());
     for_each_index(policy, parts(), 8, [&](std::size_t part) {
       for (std::size_t at = starts_[part]; at != starts_[part] + voxels[part]; ++at)
-        fold.put(firsts.number_of(entries_[at].index), {std::bit_cast<std::array<float, 3>>(entries_[at].words),
-                                                        Colored ? colors[at] : rgb8{}});
+        fold.put(firsts.number_of(entries_[at].index),
+                 {std::bit_cast<std::array<float, 3>>(entries_[at].words), Colored ? colors[at] : rgb8{}});
     });
   }
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Where rays from one voxel cross a stack of planes of voxel faces, several rays at a time, and the masks of bricks that
-/// follow from it.
+/// Where rays from one voxel cross a stack of planes of voxel faces, several rays at a time, and the masks of bricks
+/// that follow from it.
 #pragma once
 
 #include <algorithm>

@@ -78,9 +78,8 @@ class point_integrator {
         w.add_points(from, begin, end, point, [](std::size_t, std::size_t) {});
       });
     } else {
-      for_each_with_worker(policy, count, 4096, [&](worker& w, std::size_t begin, std::size_t end) {
-        w.add_ends(grid, begin, end, point);
-      });
+      for_each_with_worker(policy, count, 4096,
+                           [&](worker& w, std::size_t begin, std::size_t end) { w.add_ends(grid, begin, end, point); });
       for (std::size_t i = 1; i != active_.size(); ++i) workers_[0].ends.merge(workers_[i].ends);
       add_centers(policy, from, workers_[0].ends);
     }

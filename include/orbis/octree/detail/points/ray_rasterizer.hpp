@@ -42,8 +42,8 @@ class ray_rasterizer {
     mark_crossings_ = mark_crossings();
   }
 
-  /// Marks in `masks` what traverse_ray visits for the first `count` rays of a batch, now or when `flush` is called, and
-  /// perhaps the end of a ray that is a hit: a voxel that counts as occupied whatever crosses it.
+  /// Marks in `masks` what traverse_ray visits for the first `count` rays of a batch, now or when `flush` is called,
+  /// and perhaps the end of a ray that is a hit: a voxel that counts as occupied whatever crosses it.
   void add(const ray_batch& rays, std::size_t count, scan_masks& masks) {
     for (std::size_t i = 0; i < count; i += ray_batch::lanes) {
       const std::uint32_t cut = ray_batch::eight(rays.cut, i);
@@ -73,9 +73,10 @@ class ray_rasterizer {
     }
   }
   [[nodiscard]] std::size_t memory_bytes() const noexcept {
-    std::size_t bytes =
-        rays_.memory_bytes() + bytes_.capacity() + (counts_.capacity() + buckets_.capacity()) * sizeof(std::uint32_t) +
-        bounds_.capacity() * sizeof(bounds) + doubtful_.capacity() * sizeof(std::uint32_t) + fallback_.capacity() * sizeof(float3);
+    std::size_t bytes = rays_.memory_bytes() + bytes_.capacity() +
+                        (counts_.capacity() + buckets_.capacity()) * sizeof(std::uint32_t) +
+                        bounds_.capacity() * sizeof(bounds) + doubtful_.capacity() * sizeof(std::uint32_t) +
+                        fallback_.capacity() * sizeof(float3);
     for (const auto& q : queues_) bytes += q.capacity() * sizeof(waiting_ray);
     return bytes;
   }
