@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
 
 #include <orbis/camera/cloud.hpp>
 #include <orbis/cloud/voxel_grid.hpp>
@@ -184,16 +185,19 @@ void spoil(std::vector<spoilt_shot>& shots, trouble kind, const surface& surface
 
 /// Merged into voxels; the majority decides on the label.
 void merge(labelled_case& c, double size) {
-  cloud::voxel_accumulator voxels{size};
+  std::map<std::array<double, 3>, std::size_t> numbers;  // in the order of first sight, as those of voxel_grid
   std::vector<std::array<int, 3>> votes;
   std::vector<float> ranges;
   for (std::size_t i = 0; i != c.points.size(); ++i) {
-    const std::uint32_t number = *voxels.add(c.points[i]);
+    std::array<double, 3> cell{};
+    for (std::size_t a = 0; a != 3; ++a)
+      cell[a] = std::floor(static_cast<double>(c.points[i][static_cast<Eigen::Index>(a)]) * (1.0 / size));
+    const std::size_t number = numbers.try_emplace(cell, votes.size()).first->second;
     if (number == votes.size()) votes.emplace_back(), ranges.push_back(c.ranges[i]);
     ++votes[number][static_cast<std::size_t>(c.labels[i])];
     ranges[number] = std::min(ranges[number], c.ranges[i]);
   }
-  c.points = voxels.centroids(false).points;
+  c.points = cloud::voxel_grid(c.points, {.size = size}).points;
   c.ranges = std::move(ranges);
   c.labels.clear();
   for (const auto& v : votes) {

@@ -17,20 +17,16 @@ namespace orbis::cloud::detail {
 
 using policy = parallel_policy;  // that all others become
 
-template result<neighbor_table> find_all_knn(const policy&, const point_view&, std::size_t, const progress&);
-template result<std::vector<float>> find_mean_distances(const policy&, const point_view&, std::size_t, const progress&);
-template result<statistical_result> filter_statistically(const policy&, const point_view&, const statistical_options&,
-                                                         const progress&);
+template neighbor_table find_all_knn(const policy&, const point_view&, std::size_t);
+template std::vector<float> find_mean_distances(const policy&, const point_view&, std::size_t);
+template statistical_result filter_statistically(const policy&, const point_view&, const statistical_options&);
 template range_statistical_result filter_by_range(const policy&, const point_view&, std::span<const float>,
                                                   const range_statistical_options&);
 template log_statistical_result filter_by_logarithm(const policy&, const point_view&, const log_statistical_options&);
-template result<std::vector<std::uint32_t>> find_radius_inliers(const policy&, const point_view&, const radius_options&,
-                                                                const progress&);
+template std::vector<std::uint32_t> find_radius_inliers(const policy&, const point_view&, const radius_options&);
 template cluster_result filter_clusters(const policy&, const point_view&, const cluster_options&);
 template automatic_result choose_and_filter(const policy&, const point_view&, std::span<const float>,
                                             const select_options&, const view_judge&);
-template std::vector<std::uint32_t> apply_chain(const policy&, const point_view&, std::span<const float>,
-                                                const filter_chain&, const select_options&, const view_filter&);
 template flying_pixel_count read_without_flying_pixels(const policy&, const depth_row_reader&, image_view<float>,
                                                        const flying_pixel_options&, flying_pixel_workspace&);
 

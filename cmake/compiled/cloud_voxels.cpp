@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include <cstdint>
 #include <span>
-#include <vector>
 
 #include <orbis/cloud/voxel_grid-inl.hpp>
 
@@ -13,11 +11,5 @@ using view = basic_point_view<S>;
 
 template point_cloud find_centroids(const policy&, const view<float>&, std::span<const rgb8>, double);
 template point_cloud find_centroids(const policy&, const view<double>&, std::span<const rgb8>, double);
-template std::vector<std::uint32_t> choose_in_voxels(const policy&, const view<float>&, double, const voxel_first&);
-template std::vector<std::uint32_t> choose_in_voxels(const policy&, const view<double>&, double, const voxel_first&);
-template std::vector<std::uint32_t> choose_in_voxels(const policy&, const view<float>&, double, const voxel_random&);
-template std::vector<std::uint32_t> choose_in_voxels(const policy&, const view<double>&, double, const voxel_random&);
-template std::vector<std::uint32_t> choose_in_voxels(const policy&, const view<float>&, double, const any_choice&);
-template std::vector<std::uint32_t> choose_in_voxels(const policy&, const view<double>&, double, const any_choice&);
 
 }  // namespace orbis::cloud::detail

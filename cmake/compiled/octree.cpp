@@ -2,8 +2,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
-#include <istream>
-#include <ostream>
 #include <span>
 #include <string>
 
@@ -21,14 +19,10 @@ template class occupancy_octree<>;
 template std::string bt_bytes(const occupancy_octree<>&);
 template std::string ot_bytes(const occupancy_octree<>&);
 template result<void> write_bt(const occupancy_octree<>&, const std::filesystem::path&);
-template result<void> write_bt(const occupancy_octree<>&, std::ostream&);
 template result<void> write_ot(const occupancy_octree<>&, const std::filesystem::path&);
-template result<void> write_ot(const occupancy_octree<>&, std::ostream&);
 template result<occupancy_octree<>> read_bt<log_odds<>>(std::span<const std::byte>, const std::string&);
 template result<occupancy_octree<>> read_bt<log_odds<>>(const std::filesystem::path&);
-template result<occupancy_octree<>> read_bt<log_odds<>>(std::istream&);
 template result<occupancy_octree<>> read_ot<log_odds<>>(std::span<const std::byte>, const std::string&);
 template result<occupancy_octree<>> read_ot<log_odds<>>(const std::filesystem::path&);
-template result<occupancy_octree<>> read_ot<log_odds<>>(std::istream&);
 
 }  // namespace orbis::octree

@@ -12,7 +12,7 @@
 /// | `flying_pixels.hpp`        | depth images without the wrong pixels at edges                              |
 /// | `log_statistical.hpp`      | filter: mean neighbour distance relative to its median                      |
 /// | `nanoflann.hpp`            | neighbours of single points by a k-d tree; included by name, needs nanoflann |
-/// | `neighbors.hpp`            | concepts of a nearest-neighbour search and of what gathers its results      |
+/// | `neighbors.hpp`            | what searches for nearest neighbours find                                   |
 /// | `radius.hpp`               | filter: points with too few neighbours within a radius                      |
 /// | `ray_evidence.hpp`         | filter: points that the rays of depth images pass through                   |
 /// | `ray_evidence_counter.hpp` | the counts behind that filter, image by image                               |

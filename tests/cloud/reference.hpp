@@ -47,6 +47,19 @@ inline std::vector<float> reference_mean_distances(const points& cloud, std::siz
   return out;
 }
 
+/// Mean distances to the first `k` neighbours of each row of a table; NaN where there are none.
+template <class Table>
+[[nodiscard]] std::vector<float> mean_distances_of(const Table& table, std::size_t k) {
+  std::vector<float> means(table.points, std::numeric_limits<float>::quiet_NaN());
+  for (std::size_t i = 0; i != table.points; ++i) {
+    const auto row = table[i].first(std::min(k, table[i].size()));
+    double sum = 0;
+    for (const auto& n : row) sum += n.distance;
+    if (!row.empty()) means[i] = static_cast<float>(sum / static_cast<double>(row.size()));
+  }
+  return means;
+}
+
 /// The decision on given mean distances.
 inline std::vector<std::uint32_t> reference_decision(const points& cloud, const std::vector<float>& d, double alpha,
                                                      bool keep) {

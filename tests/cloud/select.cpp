@@ -149,7 +149,6 @@ TEST_CASE("automatic selection takes any cloud and never removes most of it") {
     CHECK(2 * result.inliers.size() >= finite);
     CHECK(std::is_sorted(result.inliers.begin(), result.inliers.end()));
     if (cloud.size() < 50) CHECK(result.choice.chain.empty());
-    CHECK(orbis::cloud::apply_filter(orbis::seq, cloud, result.choice.chain) == result.inliers);
   }
 }
 
@@ -252,57 +251,17 @@ TEST_CASE("outliers are found whatever the sensor, and the bounds can fail") {
   CHECK(lost / cases < 0.003);
 }
 
-TEST_CASE("a chain does the same when it is applied, and can be changed") {
+TEST_CASE("points that are not finite stay where that is asked for") {
   auto cloud = orbis::test::room_cloud(160, 120, 0.002, 11);
   add_uniform(cloud, 900, 12);
   cloud.emplace_back(std::numeric_limits<float>::quiet_NaN(), 0.0F, 1.0F);
   const orbis::cloud::select_options options{.sensor_origin = orbis::vec3{0, 0, 0}};
   const auto automatic = filter_automatically(orbis::par, cloud, options);
   REQUIRE_FALSE(automatic.choice.chain.empty());
-  CHECK(orbis::cloud::apply_filter(orbis::seq, cloud, automatic.choice.chain, options) == automatic.inliers);
-  CHECK(orbis::cloud::apply_filter(orbis::par.with(3), cloud, automatic.choice.chain, options) == automatic.inliers);
 
   auto keeping = options;
   keeping.non_finite = orbis::cloud::non_finite::keep;
-  const auto with_hole = orbis::cloud::apply_filter(orbis::seq, cloud, automatic.choice.chain, keeping);
-  CHECK(with_hole.size() == automatic.inliers.size() + 1);
-
-  SECTION("a threshold") {
-    auto lenient = automatic.choice.chain;
-    for (auto& step : lenient) {
-      if (auto* density = std::get_if<orbis::cloud::density_step>(&step)) density->threshold = 100;
-      if (auto* isolation = std::get_if<orbis::cloud::isolation_step>(&step)) isolation->min_size = 1;
-      if (auto* cluster = std::get_if<orbis::cloud::cluster_options>(&step)) cluster->min_gap = 1e9;
-    }
-    CHECK(orbis::cloud::apply_filter(orbis::seq, cloud, lenient, options).size() == cloud.size() - 1);
-  }
-  SECTION("a mode that is not wanted") {
-    auto without = options;
-    without.forbidden = {filter_mode::isolation, filter_mode::cluster, filter_mode::local_log_statistical};
-    const auto choice = orbis::cloud::select_filter(orbis::par, cloud, without);
-    REQUIRE_FALSE(choice.chain.empty());
-    for (const auto mode : without.forbidden) CHECK_FALSE(has_step(choice.chain, mode));
-    without.forbidden = {filter_mode::isolation, filter_mode::cluster, filter_mode::log_statistical,
-                         filter_mode::range_log_statistical, filter_mode::local_log_statistical};
-    CHECK(orbis::cloud::select_filter(orbis::par, cloud, without).chain.empty());
-  }
-  SECTION("a test of density of one's own") {
-    const auto judged = orbis::cloud::log_statistical_filter(orbis::seq, cloud, {.neighbors = 8, .threshold = 1.0});
-    const orbis::cloud::density_step own{.usual = {judged.median, 0}, .threshold = judged.threshold};
-    const auto left = orbis::cloud::apply_filter(orbis::par, cloud, {own});
-    CHECK(left.size() >= judged.inliers.size());  // surfaces are spared
-    const auto stray = static_cast<std::uint32_t>(cloud.size() - 900);
-    const auto kept_bad = std::count_if(left.begin(), left.end(), [&](auto i) { return i >= stray; });
-    CHECK(kept_bad < 200);
-  }
-  SECTION("filters of one's own") {
-    const orbis::cloud::statistical_options sor{.neighbors = 20, .sigma_multiplier = 1.5};
-    CHECK(orbis::cloud::apply_filter(orbis::par, cloud, {sor}) ==
-          orbis::cloud::statistical_inliers(orbis::par, cloud, sor));
-    const auto twice =
-        orbis::cloud::apply_filter(orbis::par, cloud, {sor, orbis::cloud::radius_options{.radius = 0.1}});
-    CHECK(twice.size() < orbis::cloud::apply_filter(orbis::par, cloud, {sor}).size());
-  }
+  CHECK(filter_automatically(orbis::seq, cloud, keeping).inliers.size() == automatic.inliers.size() + 1);
 }
 
 TEST_CASE("views show what no density can") {
@@ -320,8 +279,6 @@ TEST_CASE("views show what no density can") {
   CHECK(step.need_support);
   CHECK(result.choice.evidence.views == 8);
 
-  CHECK(orbis::cloud::apply_filter(orbis::seq, seen.points, result.choice.chain, seen.views(), seen.camera,
-                                   {.ranges = seen.ranges}) == result.inliers);
   const auto again = filter_automatically(orbis::seq, seen.points, seen.views(), orbis::camera::any_camera{seen.camera},
                                           {.ranges = seen.ranges});
   CHECK(again.inliers == result.inliers);
@@ -351,16 +308,9 @@ TEST_CASE("views show what no density can") {
       CHECK(calls == n);
       for (const auto& s : judged.choice.chain)
         if (const auto* rays = std::get_if<orbis::cloud::ray_step>(&s)) CHECK(rays->distrusted.empty());
-      CHECK(orbis::cloud::apply_filter(orbis::seq, seen.points, judged.choice.chain, few, seen.camera,
-                                       {.ranges = seen.ranges}) == judged.inliers);
     }
   }
-  SECTION("unless they must not be asked") {
-    const auto silent = filter_automatically(orbis::par, seen.points, seen.views(), seen.camera,
-                                             {.ranges = seen.ranges, .forbidden = {filter_mode::ray_evidence}});
-    CHECK(silent.inliers == alone.inliers);
-  }
-  SECTION("or it is cancelled") {
+  SECTION("unless it is cancelled") {
     int calls = 0;
     const auto stopped = filter_automatically(orbis::par, seen.points, seen.views(), seen.camera, {},
                                               [&](std::size_t, std::size_t) { return ++calls < 5; });

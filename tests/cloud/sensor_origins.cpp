@@ -37,10 +37,8 @@ TEST_CASE("the most specific origin counts") {
   CHECK(sensor_ranges(orbis::seq, cloud)[1] == 1.0F);
   const orbis::vec3 common{0, 0, 0};
   CHECK(sensor_ranges(orbis::seq, cloud, {.common = common})[0] == 5.0F);
-  const std::vector<orbis::vec3f> each{{3, 4, 1}, {0, 0, 0}, {1, 1, 4}};
-  CHECK(sensor_ranges(orbis::seq, cloud, {.common = common, .per_point = each}) == std::vector<float>{1, 2, 3});
   const std::vector<float> given{7, 8, 9};
-  CHECK(sensor_ranges(orbis::seq, cloud, {.common = common, .per_point = each, .ranges = given}) == given);
+  CHECK(sensor_ranges(orbis::seq, cloud, {.common = common, .ranges = given}) == given);
 }
 
 TEST_CASE("a range that cannot be known is no number") {
@@ -51,13 +49,6 @@ TEST_CASE("a range that cannot be known is no number") {
   const auto ranges = sensor_ranges(orbis::seq, cloud, {.ranges = given});
   CHECK(ranges[0] == 0.0F);
   for (std::size_t i = 1; i != 6; ++i) CHECK(std::isnan(ranges[i]));
-  const std::vector<orbis::vec3f> each{{0, 0, 1}, {0, 0, 0}, {nan, 0, 0}, {0, 0, 0}, {inf, 0, 0}, {0, 0, 0}};
-  const auto from_each = sensor_ranges(orbis::seq, cloud, {.per_point = each});
-  CHECK(from_each[0] == 1.0F);
-  CHECK(std::isnan(from_each[1]));
-  CHECK(std::isnan(from_each[2]));
-  CHECK(from_each[3] == 1.0F);
-  CHECK(std::isnan(from_each[4]));
   CHECK(sensor_ranges(orbis::par, std::vector<orbis::vec3f>{}, {.common = orbis::vec3{0, 0, 0}}).empty());
 }
 

@@ -60,108 +60,57 @@ TEST_CASE("points beyond the voxel keys are left out") {
   CHECK(orbis::cloud::voxel_grid(cloud, {.size = 0.01}).size() == 1);
 }
 
-TEST_CASE("one point of each voxel stands for it, by index") {
-  using orbis::cloud::voxel_first;
-  using orbis::cloud::voxel_grid_indices;
-  using orbis::cloud::voxel_random;
-  for (const auto& [name, cloud] : orbis::test::all_clouds()) {
-    INFO(name);
-    const double size = 0.07;
-    std::map<std::array<double, 3>, std::vector<std::uint32_t>> members;
-    std::vector<std::array<double, 3>> seen;
-    for (std::uint32_t i = 0; i != cloud.size(); ++i) {
-      const auto& p = cloud[i];
-      if (!orbis::test::finite(p)) continue;
-      const std::array<double, 3> cell{std::floor(p.x() * (1 / size)), std::floor(p.y() * (1 / size)),
-                                       std::floor(p.z() * (1 / size))};
-      auto& of_cell = members[cell];
-      if (of_cell.empty()) seen.push_back(cell);
-      of_cell.push_back(i);
-    }
-    const auto first = voxel_grid_indices(cloud, {.size = size});
-    const auto random = voxel_grid_indices(cloud, {.size = size}, voxel_random{.seed = 5});
-    REQUIRE(first.size() == seen.size());
-    REQUIRE(random.size() == seen.size());
-    for (std::size_t v = 0; v != seen.size(); ++v) {
-      const auto& of_cell = members[seen[v]];
-      CHECK(first[v] == of_cell.front());
-      CHECK(std::count(of_cell.begin(), of_cell.end(), random[v]) == 1);
-    }
-    CHECK(voxel_grid_indices(cloud, {.size = size}, voxel_random{.seed = 5}) == random);
-    const auto points = orbis::cloud::voxel_grid(cloud, {.size = size}, voxel_first{});
-    REQUIRE(points.size() == first.size());
-    for (std::size_t v = 0; v != first.size(); ++v) CHECK(points.points[v] == cloud[first[v]]);
-  }
-}
-
-TEST_CASE("a random point of a voxel is any of them, evenly") {
-  const orbis::test::points cloud = orbis::test::uniform_cloud(8, 1);
-  std::array<int, 8> chosen{};
-  for (std::uint64_t seed = 0; seed != 4000; ++seed) {
-    const auto indices =
-        orbis::cloud::voxel_grid_indices(cloud, {.size = 1.0}, orbis::cloud::voxel_random{.seed = seed});
-    REQUIRE(indices.size() == 1);
-    ++chosen[indices[0]];
-  }
-  for (const int n : chosen) CHECK(std::abs(n - 500) < 100);  // 4.8 standard deviations
-}
-
-TEST_CASE("colours ride along, and the choice may be anyone's") {
-  const orbis::point_cloud cloud{{{0.1F, 0.1F, 0.1F}, {0.9F, 0.9F, 0.9F}, {-0.1F, 0.1F, 0.1F}},
-                                 {{10, 0, 255}, {21, 100, 255}, {7, 8, 9}}};
-  const auto first = orbis::cloud::voxel_grid(cloud, {.size = 1.0}, orbis::cloud::voxel_first{});
-  REQUIRE(first.size() == 2);
-  CHECK(first.points[0] == cloud.points[0]);
-  CHECK(first.colors[0] == cloud.colors[0]);
-  CHECK(first.colors[1] == cloud.colors[2]);
-  struct last {
-    static bool replaces(std::uint32_t /*kept*/, std::uint32_t /*candidate*/) { return true; }
-  };
-  const auto chosen = orbis::cloud::voxel_grid(cloud.points, cloud.colors, {.size = 1.0}, last{});
-  CHECK(chosen.colors == std::vector<orbis::rgb8>{cloud.colors[1], cloud.colors[2]});
-  const auto random = orbis::cloud::voxel_grid(cloud, {.size = 1.0}, orbis::cloud::voxel_random{});
-  CHECK(random.colors.size() == 2);
-}
-
 namespace {
 
-/// What `voxel_grid` and `voxel_grid_indices` with `voxel_random` must give, bit by bit.
-struct expected_voxels {
-  orbis::point_cloud centroids;
-  std::vector<std::uint32_t> first;
-  std::vector<std::uint32_t> random;
-};
+/// What `voxel_grid` must give, bit by bit.
 template <class Points>
-[[nodiscard]] expected_voxels voxels_one_by_one(const Points& points, std::span<const orbis::rgb8> colors,
-                                                double size) {
-  orbis::cloud::voxel_accumulator voxels{size};
-  expected_voxels out;
-  for (std::uint32_t i = 0; i != points.size(); ++i) {
-    const auto number = voxels.add(points[i], colors.empty() ? orbis::rgb8{} : colors[i]);
-    if (!number) continue;
-    if (*number == out.first.size()) {
-      out.first.push_back(i);
-      out.random.push_back(i);
-    } else if (orbis::cloud::voxel_random{.seed = 3}.replaces(out.random[*number], i)) {
-      out.random[*number] = i;
+[[nodiscard]] orbis::point_cloud voxels_one_by_one(const Points& points, std::span<const orbis::rgb8> colors,
+                                                   double size) {
+  struct sum {
+    std::array<double, 3> position{};
+    std::array<std::uint64_t, 3> color{};
+    std::uint32_t count = 0;
+  };
+  std::map<std::array<double, 3>, std::size_t> numbers;
+  std::vector<sum> sums;
+  for (std::size_t i = 0; i != points.size(); ++i) {
+    const auto p = orbis::coordinates<double>(points[i]);
+    std::array<double, 3> cell{};
+    bool is_cell = true;
+    for (std::size_t a = 0; a != 3; ++a) {
+      cell[a] = std::floor(p[a] * (1.0 / size)) + 0.0;
+      is_cell = is_cell && std::abs(cell[a]) < 2147483647.0;
     }
+    if (!is_cell) continue;
+    const std::size_t number = numbers.try_emplace(cell, sums.size()).first->second;
+    if (number == sums.size()) sums.emplace_back();
+    sum& s = sums[number];
+    for (std::size_t a = 0; a != 3; ++a) s.position[a] += p[a];
+    ++s.count;
+    if (colors.empty()) continue;
+    s.color[0] += colors[i].r;
+    s.color[1] += colors[i].g;
+    s.color[2] += colors[i].b;
   }
-  out.centroids = voxels.centroids(!colors.empty());
+  orbis::point_cloud out;
+  for (const sum& s : sums) {
+    const auto mean = [&](std::size_t a) { return static_cast<float>(s.position[a] / s.count); };
+    const auto channel = [&](std::size_t a) { return static_cast<std::uint8_t>((s.color[a] + s.count / 2) / s.count); };
+    out.points.emplace_back(mean(0), mean(1), mean(2));
+    if (!colors.empty()) out.colors.push_back({channel(0), channel(1), channel(2)});
+  }
   return out;
 }
 
 template <class Points>
 void check_voxels(const Points& points, std::span<const orbis::rgb8> colors, double size) {
-  using orbis::cloud::voxel_random;
-  const expected_voxels expected = voxels_one_by_one(points, colors, size);
+  const orbis::point_cloud expected = voxels_one_by_one(points, colors, size);
   const orbis::cloud::voxel_grid_options options{.size = size};
   const auto check = [&](const auto& policy) {
     const orbis::point_cloud grid = orbis::cloud::voxel_grid(policy, points, colors, options);
-    CHECK(grid.points == expected.centroids.points);
-    CHECK(grid.colors == expected.centroids.colors);
-    CHECK(orbis::cloud::voxel_grid(policy, points, options).points == expected.centroids.points);
-    CHECK(orbis::cloud::voxel_grid_indices(policy, points, options) == expected.first);
-    CHECK(orbis::cloud::voxel_grid_indices(policy, points, options, voxel_random{.seed = 3}) == expected.random);
+    CHECK(grid.points == expected.points);
+    CHECK(grid.colors == expected.colors);
+    CHECK(orbis::cloud::voxel_grid(policy, points, options).points == expected.points);
   };
   check(orbis::seq);
   check(orbis::par.with(2));
@@ -230,5 +179,5 @@ TEST_CASE("cells up to 2^31 from the origin are told apart") {
                                                  {-0.0, -limits::denorm_min(), 0},
                                                  {0, -0.0, limits::denorm_min()}};
   check_voxels(cloud, {}, 1.0);
-  CHECK(orbis::cloud::voxel_grid_indices(cloud, {.size = 1.0}) == std::vector<std::uint32_t>{0, 2, 8, 9});
+  CHECK(orbis::cloud::voxel_grid(cloud, {.size = 1.0}).size() == 4);
 }

@@ -105,12 +105,7 @@ constexpr double infinity = std::numeric_limits<double>::infinity();
   octree::integration_options options;
   const unsigned flags = from.byte();
   if ((flags & 3U) == 3U) options.mode = octree::ray_mode::discretized;
-  options.rays = (flags & 28U) != 28U;
   options.max_range = from.one_of({infinity, base, 0.5 * base, 7.25 * resolution, 0.0, 1e30});
-  if ((flags & 96U) == 96U) {
-    const vec3 low = from.point(resolution, false).cast<double>(), size = from.point(resolution, false).cast<double>();
-    options.bounds = octree::bounding_box{low, low + 2.0 * size.cwiseAbs()};
-  }
   return options;
 }
 
@@ -118,7 +113,7 @@ constexpr double infinity = std::numeric_limits<double>::infinity();
 [[nodiscard]] octree::integration_options affordable(octree::integration_options options,
                                                      const std::vector<vec3f>& points, const vec3f& origin,
                                                      const octree::voxel_grid& grid) {
-  if (!options.rays || points.empty()) return options;
+  if (points.empty()) return options;
   double steps = 0.0;
   for (const vec3f& p : points) {
     const double voxels = (p - origin).cast<double>().norm() / grid.resolution();

@@ -185,8 +185,8 @@ def depth_images():
     some = lambda n: bytes(rng.randrange(256) for _ in range(n))
     PLAIN = 1  # before: nothing
 
-    def start(resolution=0, depth=0, size=0, focal=0, model=b"\0", base=0, flags=0, range_=0, bounds=b"", before=PLAIN):
-        return bytes([resolution, depth, size, size, focal, 0, 0, 0]) + model + bytes([base, flags, range_]) + bounds + bytes([before])
+    def start(resolution=0, depth=0, size=0, focal=0, model=b"\0", base=0, flags=0, range_=0, before=PLAIN):
+        return bytes([resolution, depth, size, size, focal, 0, 0, 0]) + model + bytes([base, flags, range_, before])
 
     def shot(kind, how=1, where=5, more=b"", rotation=b"", pattern=None):
         pattern = some(24) if pattern is None else pattern
@@ -199,8 +199,6 @@ def depth_images():
     write("integrate_depth", "on_corner", start(3) + shot(2, where=53, rotation=bytes([0, 0, 0, 0])) + shot(1, where=53))
     write("integrate_depth", "settled", start(1, base=3, before=32 | 128) + shot(1, how=0) + shot(3, how=8))
     write("integrate_depth", "discretized", start(0, flags=3, range_=1) + shot(2) + shot(3, how=9))
-    write("integrate_depth", "no_rays", start(0, flags=28, range_=2) + shot(4))
-    write("integrate_depth", "bounded", start(1, flags=96, bounds=some(6), base=3) + shot(1) + shot(3))
     write("integrate_depth", "at_border", start(1, 3, base=4) + b"".join(shot(2, where=w) for w in (0, 1, 2)))
     write("integrate_depth", "far_away", start(0) + shot(1, where=4, more=b"\1") + shot(1, where=3, more=some(4)))
     write("integrate_depth", "wide", start(7, focal=5, base=2) + shot(3) + shot(1))

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <iostream>
 #include <limits>
+#include <span>
 #include <sstream>
 #include <vector>
 
@@ -10,12 +11,12 @@
 #include <orbis/core/random.hpp>
 #include <orbis/core/types.hpp>
 #include <orbis/interop/octomap.hpp>
-#include <orbis/nav/planning_view.hpp>
 #include <orbis/nav/distance_field.hpp>
 #include <orbis/nav/floor_map-inl.hpp>
 #include <orbis/nav/frontiers.hpp>
 #include <orbis/nav/next_view.hpp>
 #include <orbis/nav/path_search.hpp>
+#include <orbis/nav/planning_view.hpp>
 #include <orbis/nav/replanning.hpp>
 #include <orbis/nav/robot_shape.hpp>
 #include <orbis/nav/robot_trajectory.hpp>
@@ -103,8 +104,7 @@ TEST_CASE("Leaves of every size survive the conversion") {
         "# Octomap OcTree binary file\nid OcTree\nsize " + std::to_string(depth + 2) + "\nres 0.1\ndata\n";
     for (int d = 1; d != depth; ++d) file += std::string{"\x03\x00", 2};
     file += std::string{"\x06\x00", 2};
-    std::istringstream in{file};
-    const auto map = octree::read_bt(in);
+    const auto map = octree::read_bt(std::as_bytes(std::span{file}));
     REQUIRE(map);
     const auto tree = interop::to_octomap(*map);
     CHECK(ot_of(*tree) == octree::ot_bytes(*map));

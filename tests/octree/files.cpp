@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <array>
 #include <filesystem>
-#include <fstream>
 #include <memory>
 #include <span>
 #include <sstream>
@@ -108,7 +107,7 @@ TEST_CASE("A map that was read can be added to like OctoMap's") {
   CHECK(ot_bytes(*ours) == test::ot_of(theirs));
 }
 
-TEST_CASE("Files go through paths and streams") {
+TEST_CASE("Files go through paths") {
   const auto map = some_map(46, 0.1, 2, 200);
   const auto folder = std::filesystem::temp_directory_path() / "orbis_octree_files";
   std::filesystem::create_directories(folder);
@@ -116,19 +115,11 @@ TEST_CASE("Files go through paths and streams") {
   REQUIRE(write_ot(map, folder / "map.ot"));
   CHECK(bt_bytes(read_bt(folder / "map.bt").value()) == bt_bytes(map));
   CHECK(ot_bytes(read_ot(folder / "map.ot").value()) == ot_bytes(map));
-  std::stringstream bt, ot;
-  REQUIRE(write_bt(map, bt));
-  REQUIRE(write_ot(map, ot));
-  CHECK(bt_bytes(read_bt(bt).value()) == bt_bytes(map));
-  CHECK(ot_bytes(read_ot(ot).value()) == ot_bytes(map));
 
   CHECK(read_bt(folder / "none.bt").error().code == errc::not_found);
   CHECK(read_ot(folder / "map.bt").error().code == errc::malformed);
   CHECK(read_bt(folder / "map.ot").error().code == errc::malformed);
   CHECK(write_bt(map, folder / "no" / "such" / "folder.bt").error().code == errc::write_failed);
-  std::ofstream closed;
-  closed.setstate(std::ios::badbit);
-  CHECK(write_bt(map, closed).error().code == errc::write_failed);
   std::filesystem::remove_all(folder);
 }
 
@@ -363,10 +354,6 @@ TEST_CASE("Octants of any values are written as OctoMap writes them") {
 TEST_CASE("Maps deeper or shallower than OctoMap's are not written in its formats") {
   for (const int depth : {8, 18}) {
     const occupancy_octree<> map{0.1, depth};
-    std::ostringstream out;
-    CHECK(write_bt(map, out).error().code == errc::unsupported);
-    CHECK(write_ot(map, out).error().code == errc::unsupported);
-    CHECK(out.str().empty());
     const auto path = std::filesystem::temp_directory_path() / "orbis_octree_files_deep.bt";
     CHECK(write_bt(map, path).error().code == errc::unsupported);
     CHECK(write_ot(map, path).error().code == errc::unsupported);

@@ -105,29 +105,26 @@ TEST_CASE("Depth images of a real kitchen give OctoMap's map") {
 
 TEST_CASE("A depth image gives the map of its points whatever the options and the number of threads") {
   const auto frames = small_frames(io::synthetic_recording{{.frames = 100}}, 2, 30, 4);
-  const std::optional<bounding_box> box = bounding_box{{-1.0, -0.4, 0.3}, {1.5, 2.0, 1.9}};
   for (const ray_mode mode : {ray_mode::every_ray, ray_mode::discretized})
-    for (const auto& bounds : {std::optional<bounding_box>{}, box})
-      for (const bool rays : {true, false})
-        for (const double range : {no_limit, 2.0}) {
-          const integration_options options{.max_range = range, .mode = mode, .rays = rays, .bounds = bounds};
-          occupancy_octree<> map{0.04}, threads{0.04}, reference{0.04};
-          for (int round = 0; round != 3; ++round)
-            for (const small_frame& f : frames) {
-              const camera::depth_view depth{f.depth};
-              const auto got = map.integrate(depth, f.camera, f.T_world_camera, options);
-              const auto also = threads.integrate(par.with(3), depth, f.camera, f.T_world_camera, options);
-              const auto expected = reference.integrate(points_of(f), f.T_world_camera.translation(), options);
-              REQUIRE(got.used == expected.used);
-              REQUIRE(got.truncated == expected.truncated);
-              REQUIRE(got.rejected == expected.rejected);
-              REQUIRE(got.occupied == expected.occupied);
-              REQUIRE(got.free == expected.free);
-              REQUIRE(also.free == got.free);
-            }
-          CHECK(ot_bytes(map) == ot_bytes(reference));
-          CHECK(ot_bytes(threads) == ot_bytes(reference));
+    for (const double range : {no_limit, 2.0}) {
+      const integration_options options{.max_range = range, .mode = mode};
+      occupancy_octree<> map{0.04}, threads{0.04}, reference{0.04};
+      for (int round = 0; round != 3; ++round)
+        for (const small_frame& f : frames) {
+          const camera::depth_view depth{f.depth};
+          const auto got = map.integrate(depth, f.camera, f.T_world_camera, options);
+          const auto also = threads.integrate(par.with(3), depth, f.camera, f.T_world_camera, options);
+          const auto expected = reference.integrate(points_of(f), f.T_world_camera.translation(), options);
+          REQUIRE(got.used == expected.used);
+          REQUIRE(got.truncated == expected.truncated);
+          REQUIRE(got.rejected == expected.rejected);
+          REQUIRE(got.occupied == expected.occupied);
+          REQUIRE(got.free == expected.free);
+          REQUIRE(also.free == got.free);
         }
+      CHECK(ot_bytes(map) == ot_bytes(reference));
+      CHECK(ot_bytes(threads) == ot_bytes(reference));
+    }
 }
 
 TEST_CASE("A depth image without measurements or with a pose that is no number changes nothing") {

@@ -53,8 +53,7 @@ double gap(const capsule& c, const vec3& center, double half) {
 
 struct answer {
   bool occupied = false, unknown = false;
-  std::size_t voxels = 0;  ///< occupied ones
-  bool is_close = false;   ///< rounding may decide
+  bool is_close = false;  ///< rounding may decide
 };
 template <class Shape>
 answer by_brute_force(const occupancy_octree<>& map, const Shape& shape) {
@@ -70,7 +69,6 @@ answer by_brute_force(const occupancy_octree<>& map, const Shape& shape) {
         const occupancy state = map.state(voxel_key{x, y, z});
         a.occupied = a.occupied || state == occupancy::occupied;
         a.unknown = a.unknown || state == occupancy::unknown;
-        a.voxels += state == occupancy::occupied ? 1 : 0;
       }
   return a;
 }
@@ -80,16 +78,6 @@ bool check(const occupancy_octree<>& map, const Shape& shape) {
   if (expected.is_close) return false;
   REQUIRE(overlaps(map, shape) == expected.occupied);
   REQUIRE(overlaps(map, shape, {.unknown = occupancy::occupied}) == (expected.occupied || expected.unknown));
-  std::size_t voxels = 0;
-  for_each_overlapping_leaf(map, shape, [&](const voxel_key& k, int level, float v) {
-    REQUIRE(v >= 0.0F);
-    const std::uint32_t size = node_cells(level);
-    for (std::uint32_t x = 0; x != size; ++x)
-      for (std::uint32_t y = 0; y != size; ++y)
-        for (std::uint32_t z = 0; z != size; ++z)
-          voxels += gap(shape, map.grid().center(voxel_key{k.x + x, k.y + y, k.z + z}), 0.05) <= 0.0 ? 1 : 0;
-  });
-  REQUIRE(voxels == expected.voxels);
   return expected.occupied;
 }
 

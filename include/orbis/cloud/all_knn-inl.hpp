@@ -3,6 +3,7 @@
 /// The functions of all_knn.hpp.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 
 #include <orbis/cloud/all_knn.hpp>
@@ -10,15 +11,13 @@
 #include <orbis/cloud/detail/knn/leaf_hierarchy.hpp>
 #include <orbis/cloud/detail/knn/nearest_search.hpp>
 #include <orbis/cloud/detail/knn/neighbor_rows.hpp>
-#include <orbis/cloud/detail/knn/reported_chunks.hpp>
 
 namespace orbis::cloud {
 
 namespace detail {
 
 template <execution_policy Policy>
-result<neighbor_table> find_all_knn(const Policy& policy, const point_view& points, std::size_t k,
-                                    const progress& on_progress) {
+neighbor_table find_all_knn(const Policy& policy, const point_view& points, std::size_t k) {
   const std::size_t count = points.size();
   const leaf_hierarchy tree = make_leaves(policy, points, std::min(k, count) + 1);
   neighbor_table out;
@@ -28,12 +27,11 @@ result<neighbor_table> find_all_knn(const Policy& policy, const point_view& poin
   if (out.width == 0) return out;
   const knn_kernels kernels;
   const auto row_of = [&](std::uint32_t i) { return std::span{out.rows}.subspan(i * out.width, out.width); };
-  const bool whole = for_each_reported_chunk(policy, tree.leaves.size(), 128, on_progress, [&](auto begin, auto end) {
+  for_each_chunk(policy, tree.leaves.size(), 128, [&](auto begin, auto end) {
     find_neighbor_rows(
         tree, kernels, out.width, begin, end,
         [&](std::size_t l, std::size_t i) { return row_of(tree.members[l * leaf_width + i]); }, [](std::size_t) {});
   });
-  if (!whole) return fail_cancelled();
   // Those left out have the first of their copies for neighbours.
   for (const surplus_copy& copy : tree.left_out) {
     const auto row = row_of(copy.index);
@@ -71,15 +69,14 @@ result<neighbor_table> find_all_knn(const Policy& policy, const point_view& poin
 }
 
 template <execution_policy Policy>
-result<std::vector<float>> find_mean_distances(const Policy& policy, const point_view& points, std::size_t k,
-                                               const progress& on_progress) {
+std::vector<float> find_mean_distances(const Policy& policy, const point_view& points, std::size_t k) {
   std::vector<float> means(points.size(), std::numeric_limits<float>::quiet_NaN());
   const leaf_hierarchy tree = make_leaves(policy, points, std::min(k, means.size()) + 1);
   const std::size_t wanted = std::min(k, std::max<std::size_t>(tree.finite, 1) - 1) + 1;  // with the point itself
   if (wanted < 2) return means;
   for (const surplus_copy& copy : tree.left_out) means[copy.index] = 0;
   const knn_kernels kernels;
-  const bool whole = for_each_reported_chunk(policy, tree.leaves.size(), 128, on_progress, [&](auto begin, auto end) {
+  for_each_chunk(policy, tree.leaves.size(), 128, [&](auto begin, auto end) {
     nearest_search search{tree, kernels, wanted};
     for (std::size_t l = begin; l != end; ++l) {
       search.visit_sums(l, [&](std::size_t i, std::span<float> found, const nearest_sum& sum) {
@@ -87,7 +84,6 @@ result<std::vector<float>> find_mean_distances(const Policy& policy, const point
       });
     }
   });
-  if (!whole) return fail_cancelled();
   return means;
 }
 

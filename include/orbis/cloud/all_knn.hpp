@@ -3,7 +3,6 @@
 /// The k nearest neighbours of every point of a cloud, and the mean distance to them.
 #pragma once
 
-#include <algorithm>
 #include <cassert>
 #include <cstddef>
 #include <cstdint>
@@ -12,11 +11,9 @@
 #include <vector>
 
 #include <orbis/cloud/detail/point_view.hpp>
-#include <orbis/cloud/detail/threads_of.hpp>
 #include <orbis/cloud/neighbors.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/point.hpp>
-#include <orbis/core/result.hpp>
 
 namespace orbis::cloud {
 
@@ -39,76 +36,38 @@ namespace detail {
 
 /// `all_knn` and `all_mean_knn_distance` for any points.
 template <execution_policy Policy>
-[[nodiscard]] result<neighbor_table> find_all_knn(const Policy& policy, const point_view& points, std::size_t k,
-                                                  const progress& on_progress);
+[[nodiscard]] neighbor_table find_all_knn(const Policy& policy, const point_view& points, std::size_t k);
 template <execution_policy Policy>
-[[nodiscard]] result<std::vector<float>> find_mean_distances(const Policy& policy, const point_view& points,
-                                                             std::size_t k, const progress& on_progress);
+[[nodiscard]] std::vector<float> find_mean_distances(const Policy& policy, const point_view& points, std::size_t k);
 
 }  // namespace detail
 
 /// The `min(k, finite points - 1)` nearest other points of every finite point, nearest first; points
 /// at equal squared distances by index, so that the result is one and the same for every policy and
-/// processor. Identical points are neighbours of each other. `on_progress` counts leaves of sixteen points.
+/// processor. Identical points are neighbours of each other.
 ///
 /// Coordinates are taken as float, distances are computed in float. O(n (log n + k log k)), also where
 /// many points are identical. Memory: 8 k bytes per point for the result, 40 per point meanwhile, and 12 for points
-/// that do not hold floats one point after the other. Errors: `cancelled`, if the callback asks to stop.
+/// that do not hold floats one point after the other.
 /// @pre k > 0, fewer than 2^32 - 1 points
-template <execution_policy Policy, point_range Points>
-[[nodiscard]] result<neighbor_table> all_knn(const Policy& policy, const Points& points, std::size_t k,
-                                             progress on_progress) {
-  assert(k > 0);
-  return detail::find_all_knn(detail::threads_of(policy), detail::viewed_points{points}, k, on_progress);
-}
-/// The nearest neighbours of every point as above, without a callback: cannot fail.
 template <execution_policy Policy, point_range Points>
 [[nodiscard]] neighbor_table all_knn(const Policy& policy, const Points& points, std::size_t k) {
   assert(k > 0);
-  return *detail::find_all_knn(detail::threads_of(policy), detail::viewed_points{points}, k, progress{});
+  return detail::find_all_knn(detail::threads_of(policy), detail::viewed_points{points}, k);
 }
 
 /// For each point the mean distance in metres to its `k` nearest other points; to all others where
 /// there are fewer than `k`. NaN for points that are not finite, and for a point that is alone.
-/// `on_progress` counts leaves of sixteen points.
 ///
 /// Coordinates are taken as float. Squared distances are float, roots and sums double in ascending
 /// order, the mean float: bit for bit the mean distances of the usual statistical outlier filter.
 /// O(n log n) for fixed k, also where many points are identical; the same result for every policy and
 /// processor. Memory: about 40 bytes per point, and 0.45 k + 42 kilobytes per thread.
-/// Errors: `cancelled`, if the callback asks to stop.
 /// @pre k > 0, fewer than 2^32 points
-template <execution_policy Policy, point_range Points>
-[[nodiscard]] result<std::vector<float>> all_mean_knn_distance(const Policy& policy, const Points& points,
-                                                               std::size_t k, progress on_progress) {
-  assert(k > 0);
-  return detail::find_mean_distances(detail::threads_of(policy), detail::viewed_points{points}, k, on_progress);
-}
-/// The mean distances as above, without a callback: cannot fail.
 template <execution_policy Policy, point_range Points>
 [[nodiscard]] std::vector<float> all_mean_knn_distance(const Policy& policy, const Points& points, std::size_t k) {
   assert(k > 0);
-  return *detail::find_mean_distances(detail::threads_of(policy), detail::viewed_points{points}, k, progress{});
-}
-
-/// For each point the mean distance in metres to the first `k` neighbours of its row, or to all of a
-/// shorter row; NaN where there are none. So one table serves every k up to its width. The table holds
-/// rounded roots: the means are those of `all_mean_knn_distance` to within a rounding, not bit for bit.
-/// O(n k). @pre k > 0
-template <execution_policy Policy>
-[[nodiscard]] std::vector<float> mean_knn_distance(const Policy& policy, const neighbor_table& table, std::size_t k) {
-  assert(k > 0);
-  const std::size_t width = std::min(k, table.width);
-  std::vector<float> means(table.points, std::numeric_limits<float>::quiet_NaN());
-  if (width == 0) return means;
-  for_each_index(policy, table.points, 4096, [&](std::size_t i) {
-    const neighbor<float>* const row = table.rows.data() + i * table.width;
-    if (row->index == neighbor_table::none) return;
-    double sum = 0;
-    for (std::size_t n = 0; n != width; ++n) sum += row[n].distance;
-    means[i] = static_cast<float>(sum / static_cast<double>(width));
-  });
-  return means;
+  return detail::find_mean_distances(detail::threads_of(policy), detail::viewed_points{points}, k);
 }
 
 }  // namespace orbis::cloud

@@ -161,9 +161,7 @@ template <execution_policy Policy>
     graph.for_each_neighbor(i, width, [&](std::uint32_t j) {
       if (!takes_part(j)) return;
       const float distance = std::sqrt(squared_distance(at, graph.position(j)));
-      const float limit =
-          options.link == cluster_link::mutual ? std::min(spacing[i], spacing[j]) : std::max(spacing[i], spacing[j]);
-      if (distance <= reach * limit) f(j, distance);
+      if (distance <= reach * std::min(spacing[i], spacing[j])) f(j, distance);
     });
   };
   linked_components out{disjoint_sets{count}, std::vector<std::uint32_t>(count, 0), std::vector<char>(count, 0)};

@@ -15,23 +15,16 @@
 #include <vector>
 
 #include <orbis/cloud/detail/point_view.hpp>
-#include <orbis/cloud/detail/threads_of.hpp>
 #include <orbis/cloud/extract.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/point.hpp>
 
 namespace orbis::cloud {
 
-/// Which of two neighbours' spacings says whether they are linked.
-enum class cluster_link {
-  mutual,  ///< both: a lone point is linked with nothing
-  either   ///< the larger one: a lone point is linked with whatever is nearest to it
-};
-
 struct cluster_options {
   std::size_t neighbors = 12;  ///< of each point that can be linked with it; > 0
-  double reach = 3.0;          ///< linked up to this many times the spacing: the mean distance to the neighbours
-  cluster_link link = cluster_link::mutual;
+  /// Linked up to this many times the spacing of both: the mean distance to the neighbours.
+  double reach = 3.0;
   /// Components of fewer points are small. 0: a 250th of the points, but 30 at least and 200 at most.
   std::size_t min_size = 0;
   /// Small components further from every large one than this many local spacings go: the spacing of the

@@ -1,14 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Several filters in order, with their parameters: what the automatic selection chooses, and what
-/// anyone can write down or change.
-///
-/// @code
-///   auto choice = select_filter(par, points);
-///   for (auto& step : choice.chain)
-///     if (auto* density = std::get_if<density_step>(&step)) density->threshold += 0.5;  // more lenient
-///   auto inliers = apply_filter(par, points, choice.chain);
-/// @endcode
+/// Several filters in order, with their parameters: what the automatic selection chooses.
 #pragma once
 
 #include <cstddef>

@@ -3,7 +3,6 @@
 /// What a cloud is judged by, and what was chosen.
 #pragma once
 
-#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -29,9 +28,6 @@ struct select_options {
   /// once less.
   const view_samples* samples = nullptr;
   cloud::non_finite non_finite = cloud::non_finite::drop;
-  std::vector<filter_mode> forbidden{};  ///< modes that are not to be chosen
-
-  [[nodiscard]] bool allows(filter_mode mode) const noexcept { return std::ranges::count(forbidden, mode) == 0; }
 };
 
 /// What one test of density saw. Natural logarithms of spacing, relative to what is usual.

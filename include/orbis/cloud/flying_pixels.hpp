@@ -23,7 +23,7 @@
 #include <vector>
 
 #include <orbis/camera/depth.hpp>
-#include <orbis/cloud/detail/threads_of.hpp>
+#include <orbis/cloud/detail/point_view.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/image.hpp>
 

@@ -25,16 +25,10 @@ ORBIS_INLINE log_statistical_result log_statistical_decision(std::vector<float> 
   out.judged = values.size();
   out.threshold = options.threshold;
   if (!values.empty()) {
-    // Order is kept by the logarithm: only two values need theirs.
-    float* const first = values.data();
-    float* const middle = first + (values.size() - 1) / 2;
-    std::nth_element(first, middle, first + values.size());
+    // Order is kept by the logarithm: only one value needs its own.
+    float* const middle = values.data() + (values.size() - 1) / 2;
+    std::nth_element(values.data(), middle, values.data() + values.size());
     out.median = std::log(double{*middle});
-    // The median of the distances to it of those below it, and itself, lies at their own median.
-    float* const quarter = first + (middle - first) / 2;
-    std::nth_element(first, quarter, middle + 1);
-    out.scale = std::max(1.4826 * (out.median - std::log(double{*quarter})), options.least_scale);
-    if (options.sigmas.has_value()) out.threshold = *options.sigmas * out.scale;
     out.threshold_distance = std::exp(out.median + out.threshold);
   }
   out.inliers = detail::indices_where(mean_distance.size(), [&](std::size_t i) {
@@ -51,7 +45,7 @@ template <execution_policy Policy>
 log_statistical_result filter_by_logarithm(const Policy& policy, const point_view& points,
                                            const log_statistical_options& options) {
   log_statistical_result out =
-      log_statistical_decision(*find_mean_distances(policy, points, options.neighbors, progress{}), options);
+      log_statistical_decision(find_mean_distances(policy, points, options.neighbors), options);
   out.inliers = inliers_by_score(points, out.mean_distance, options.non_finite,
                                  [&](float d) { return double{d} > out.threshold_distance; });
   return out;

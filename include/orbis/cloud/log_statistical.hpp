@@ -5,19 +5,15 @@
 /// Mean distances to neighbours are spread over orders of magnitude, with a long tail of outliers that
 /// drags mean and standard deviation along. Their logarithms against the median are not dragged, and
 /// the threshold is a factor: what counts as sparse does not depend on the unit or the size of the scene.
-/// Source of the scale: P. J. Rousseeuw, C. Croux, "Alternatives to the median absolute deviation",
-/// JASA 88, 1993; taken from the lower half, which outliers do not reach.
 #pragma once
 
 #include <cassert>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
-#include <optional>
 #include <vector>
 
 #include <orbis/cloud/detail/point_view.hpp>
-#include <orbis/cloud/detail/threads_of.hpp>
 #include <orbis/cloud/extract.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/point.hpp>
@@ -25,10 +21,8 @@
 namespace orbis::cloud {
 
 struct log_statistical_options {
-  std::size_t neighbors = 8;       ///< k, the point itself not counted; > 0
-  double threshold = 1.6;          ///< natural logarithm: outliers are exp(threshold) times sparser than the median
-  std::optional<double> sigmas{};  ///< if given, the threshold is this many scales of the bulk instead
-  double least_scale = 0.01;       ///< such a scale is at least this: that of a regular grid is rounding alone
+  std::size_t neighbors = 8;  ///< k, the point itself not counted; > 0
+  double threshold = 1.6;     ///< natural logarithm: outliers are exp(threshold) times sparser than the median
   cloud::non_finite non_finite = cloud::non_finite::drop;
 };
 
@@ -38,7 +32,6 @@ struct log_statistical_result {
   std::vector<float> mean_distance;    ///< per point, metres; NaN where not finite or alone
   std::size_t judged = 0;              ///< points with a positive, finite mean distance: those that have a logarithm
   double median = 0;                   ///< of their logarithms
-  double scale = 0;                    ///< 1.4826 times the median distance to it of those below; no less than given
   double threshold = 0;                ///< log(mean distance) - median beyond this makes an outlier
   double threshold_distance = std::numeric_limits<double>::infinity();  ///< the same as a mean distance, metres
 };
@@ -66,8 +59,7 @@ template <execution_policy Policy, point_range Points>
 }
 
 /// The indices, ascending, of the points whose mean distance to their `neighbors` nearest neighbours is
-/// at most exp(`threshold`) times the median over the cloud; or, if `sigmas` is given, whose logarithm is
-/// at most `sigmas` robust scales above the median's. Points identical to all their neighbours stay; so
+/// at most exp(`threshold`) times the median over the cloud. Points identical to all their neighbours stay; so
 /// does a point that is alone. O(n log n) for fixed k; the same result for every policy.
 /// @pre neighbors > 0, fewer than 2^32 points
 template <execution_policy Policy, point_range Points>

@@ -7,8 +7,10 @@
 /// asks of result sets is a difference.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cassert>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -32,13 +34,10 @@ namespace orbis::cloud {
 /// a hash), queries wait for memory most of the time.
 /// @pre fewer than 2^32 points
 template <point_range Points>
-class nanoflann_search
-    : public neighbor_queries<nanoflann_search<Points>, point_scalar_t<std::ranges::range_value_t<Points>>> {
-  using queries = neighbor_queries<nanoflann_search<Points>, point_scalar_t<std::ranges::range_value_t<Points>>>;
-
+class nanoflann_search {
  public:
-  using scalar = typename queries::scalar;
-  using query = typename queries::query;
+  using scalar = point_scalar_t<std::ranges::range_value_t<Points>>;
+  using query = std::array<scalar, 3>;
 
   explicit nanoflann_search(const Points& points, std::size_t leaf_size = 12)
       : data_{points}, tree_{3, data_, nanoflann::KDTreeSingleIndexAdaptorParams(leaf_size)} {}
@@ -46,18 +45,69 @@ class nanoflann_search
   nanoflann_search(const nanoflann_search&) = delete;
   nanoflann_search& operator=(const nanoflann_search&) = delete;
 
+  /// How many points are searched.
   [[nodiscard]] std::size_t size() const noexcept { return data_.kdtree_get_point_count(); }
 
-  /// Reports to `sink` every point within its bound, in no particular order (and, harmlessly, some
-  /// that are further).
-  template <neighbor_sink<scalar> Sink>
-  void visit(const query& q, Sink& sink) const {
-    if (size() == 0) return;
-    result_set<Sink> results{&sink, &data_};
-    tree_.findNeighbors(results, q.data(), {});
+  /// The `min(k, size())` points nearest to `q`, nearest first, equal distances by index; if `q` is a point of the
+  /// cloud, it is found as well. Which of several points at exactly the k-th distance is reported is deterministic.
+  /// May be called from several threads at once. @pre q is finite
+  void knn(const query& q, std::size_t k, std::vector<neighbor<scalar>>& out) const {
+    out.clear();
+    if (k != 0) find(q, nearest_sink{k, out}, out);
+  }
+  /// All points within `r` metres of `q`, the border included, nearest first. @pre q is finite, r >= 0
+  void radius(const query& q, scalar r, std::vector<neighbor<scalar>>& out) const {
+    out.clear();
+    find(q, radius_sink{r * r, out}, out);
   }
 
  private:
+  /// Keeps the `k` nearest of what it is given, with squared distances, in a max-heap. @pre k > 0
+  struct nearest_sink {
+    std::size_t k;
+    std::vector<neighbor<scalar>>& out;
+
+    /// Points further than this need not be reported.
+    [[nodiscard]] scalar bound_squared() const noexcept {
+      return out.size() < k ? std::numeric_limits<scalar>::infinity() : out.front().distance;
+    }
+    /// Returns false to end the search.
+    bool add(std::uint32_t index, scalar distance_squared) {
+      const neighbor<scalar> found{index, distance_squared};
+      if (out.size() == k) {
+        if (!is_nearer(found, out.front())) return true;
+        std::pop_heap(out.begin(), out.end(), is_nearer<scalar>);
+        out.back() = found;
+      } else {
+        out.push_back(found);
+      }
+      std::push_heap(out.begin(), out.end(), is_nearer<scalar>);
+      // k identical points: nothing can be nearer.
+      return out.size() < k || out.front().distance > 0;
+    }
+  };
+  /// Keeps everything within a radius.
+  struct radius_sink {
+    scalar bound;  ///< squared
+    std::vector<neighbor<scalar>>& out;
+
+    [[nodiscard]] scalar bound_squared() const noexcept { return bound; }
+    bool add(std::uint32_t index, scalar distance_squared) {
+      if (distance_squared <= bound) out.push_back({index, distance_squared});
+      return true;
+    }
+  };
+  /// Gathers in `out`, by the sink, and takes the roots of what is there.
+  template <class Sink>
+  void find(const query& q, Sink sink, std::vector<neighbor<scalar>>& out) const {
+    if (size() == 0) return;
+    result_set<Sink> results{&sink, &data_};
+    tree_.findNeighbors(results, q.data(), {});
+    for (neighbor<scalar>& n : out) n.distance = std::sqrt(n.distance);
+    // After the roots: different squares can have the same one.
+    std::sort(out.begin(), out.end(), is_nearer<scalar>);
+  }
+
   /// nanoflann's view of the points.
   struct dataset {
     explicit dataset(const Points& p) : points{&p} {
@@ -115,7 +165,7 @@ class nanoflann_search
     using IndexType = std::uint32_t;
     [[nodiscard]] scalar worstDist() const {
       constexpr scalar slack = 64 * std::numeric_limits<scalar>::epsilon();
-      return static_cast<scalar>(sink->bound_squared()) * (1 + slack) + std::numeric_limits<scalar>::min();
+      return sink->bound_squared() * (1 + slack) + std::numeric_limits<scalar>::min();
     }
     bool addPoint(scalar distance_squared, std::uint32_t i) { return sink->add(data->original(i), distance_squared); }
     [[nodiscard]] bool full() const noexcept { return true; }

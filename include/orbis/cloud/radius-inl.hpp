@@ -10,9 +10,7 @@
 
 #include <orbis/cloud/detail/knn/knn_kernels.hpp>
 #include <orbis/cloud/detail/knn/leaf_hierarchy.hpp>
-#include <orbis/cloud/detail/knn/line_vector.hpp>
 #include <orbis/cloud/detail/knn/nearest_search.hpp>
-#include <orbis/cloud/detail/knn/reported_chunks.hpp>
 #include <orbis/cloud/detail/knn/squared_distance.hpp>
 #include <orbis/cloud/detail/select/decision.hpp>
 #include <orbis/cloud/radius.hpp>
@@ -87,21 +85,20 @@ class crowd_search {
 };
 
 template <execution_policy Policy>
-result<std::vector<std::uint32_t>> find_radius_inliers(const Policy& policy, const point_view& points,
-                                                       const radius_options& options, const progress& on_progress) {
+std::vector<std::uint32_t> find_radius_inliers(const Policy& policy, const point_view& points,
+                                               const radius_options& options) {
   const std::size_t count = points.size();
   const std::size_t enough = std::min(options.min_neighbors, count) + 1;  // with the point itself
   const leaf_hierarchy tree = make_leaves(policy, points, enough);
   std::vector<char> kept(count, options.non_finite == cloud::non_finite::keep ? 1 : 0);
   const knn_kernels kernels;
-  const bool whole = for_each_reported_chunk(policy, tree.leaves.size(), 128, on_progress, [&](auto begin, auto end) {
+  for_each_chunk(policy, tree.leaves.size(), 128, [&](auto begin, auto end) {
     crowd_search search{tree, kernels, static_cast<float>(options.radius), enough};
     for (std::size_t l = begin; l != end; ++l) {
       search.visit_leaf(
           l, [&](std::size_t i, bool has_enough) { kept[tree.members[l * leaf_width + i]] = has_enough ? 1 : 0; });
     }
   });
-  if (!whole) return fail_cancelled();
   // Enough copies of those left out are in the leaves.
   for (const surplus_copy& copy : tree.left_out) kept[copy.index] = 1;
   return indices_where(count, [&](std::size_t i) { return kept[i] != 0; });

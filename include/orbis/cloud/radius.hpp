@@ -9,11 +9,9 @@
 #include <vector>
 
 #include <orbis/cloud/detail/point_view.hpp>
-#include <orbis/cloud/detail/threads_of.hpp>
 #include <orbis/cloud/extract.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/point.hpp>
-#include <orbis/core/result.hpp>
 
 namespace orbis::cloud {
 
@@ -27,29 +25,20 @@ namespace detail {
 
 /// `radius_inliers` for any points.
 template <execution_policy Policy>
-[[nodiscard]] result<std::vector<std::uint32_t>> find_radius_inliers(const Policy& policy, const point_view& points,
-                                                                     const radius_options& options,
-                                                                     const progress& on_progress);
+[[nodiscard]] std::vector<std::uint32_t> find_radius_inliers(const Policy& policy, const point_view& points,
+                                                             const radius_options& options);
 
 }  // namespace detail
 
 /// The indices, ascending, of the points with at least `min_neighbors` other points within `radius`.
 /// O(n (log n + min_neighbors)), also where many points are identical; the same result for every policy and
-/// processor. Coordinates are taken as float, squared distances computed in float. `on_progress` counts leaves of
-/// sixteen points. Errors: `cancelled`, if the callback asks to stop.
+/// processor. Coordinates are taken as float, squared distances computed in float.
 /// @pre radius >= 0, fewer than 2^32 points
-template <execution_policy Policy, point_range Points>
-[[nodiscard]] result<std::vector<std::uint32_t>> radius_inliers(const Policy& policy, const Points& points,
-                                                                const radius_options& options, progress on_progress) {
-  assert(options.radius >= 0);
-  return detail::find_radius_inliers(detail::threads_of(policy), detail::viewed_points{points}, options, on_progress);
-}
-/// The inliers as above, without a callback: cannot fail.
 template <execution_policy Policy, point_range Points>
 [[nodiscard]] std::vector<std::uint32_t> radius_inliers(const Policy& policy, const Points& points,
                                                         const radius_options& options = {}) {
   assert(options.radius >= 0);
-  return *detail::find_radius_inliers(detail::threads_of(policy), detail::viewed_points{points}, options, progress{});
+  return detail::find_radius_inliers(detail::threads_of(policy), detail::viewed_points{points}, options);
 }
 
 }  // namespace orbis::cloud

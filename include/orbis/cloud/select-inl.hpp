@@ -4,23 +4,16 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
-#include <optional>
-#include <type_traits>
-#include <utility>
-#include <variant>
 
 #include <orbis/cloud/detail/select/decision.hpp>
 #include <orbis/cloud/detail/select/density_judge.hpp>
 #include <orbis/cloud/detail/select/in_words.hpp>
 #include <orbis/cloud/detail/select/surroundings.hpp>
 #include <orbis/cloud/detail/select/view_judge.hpp>
-#include <orbis/cloud/radius-inl.hpp>
 #include <orbis/cloud/ray_evidence-inl.hpp>
 #include <orbis/cloud/select.hpp>
-#include <orbis/cloud/statistical-inl.hpp>
 
 namespace orbis::cloud {
 
@@ -44,66 +37,6 @@ inline void remove_gone(const surroundings& around, std::span<char> left) {
   for (std::size_t i = 0; i != around.size(); ++i) {
     if (around.gone()[i] != 0) left[around.index(i)] = 0;
   }
-}
-
-/// Runs a filter of its own on what is left, and clears `left` where it removes a point.
-template <class Filter>
-void apply_alone(const point_view& points, std::span<char> left, Filter&& inliers_of) {
-  std::vector<std::uint32_t> index;
-  std::vector<std::array<float, 3>> rest;
-  for (std::size_t i = 0; i != left.size(); ++i) {
-    if (left[i] == 0) continue;
-    index.push_back(static_cast<std::uint32_t>(i));
-    rest.push_back(points[i]);
-    left[i] = 0;
-  }
-  for (const std::uint32_t i : inliers_of(rest)) left[index[i]] = 1;
-}
-
-template <execution_policy Policy>
-std::vector<std::uint32_t> apply_chain(const Policy& policy, const point_view& points, std::span<const float> ranges,
-                                       const filter_chain& chain, const select_options& options,
-                                       const view_filter& views) {
-  std::vector<char> left = finite_points(points);
-  std::optional<surroundings> around;
-  std::size_t averaged = 0;  // neighbours, in `around`
-  const auto settle = [&] {
-    if (around) remove_gone(*around, left);
-    around.reset();
-  };
-  const auto look_around = [&](std::size_t neighbors) -> surroundings& {
-    if (around && averaged != neighbors) settle();
-    if (!around) around.emplace(policy, points, left, ranges, averaged = neighbors);
-    return *around;
-  };
-  for (const filter_step& any : chain) {
-    std::visit(
-        [&](const auto& step) {
-          using Step = std::remove_cvref_t<decltype(step)>;
-          if constexpr (std::is_same_v<Step, ray_step>) {
-            settle();
-            assert(views.run != nullptr && "a ray_step needs views");
-            if (views.run != nullptr) views.run(views.context, step, left);
-          } else if constexpr (std::is_same_v<Step, density_step> || std::is_same_v<Step, isolation_step>) {
-            look_around(step.neighbors).apply(policy, step);
-          } else if constexpr (std::is_same_v<Step, cluster_options>) {
-            look_around(around ? averaged : step.neighbors).apply(policy, step);
-          } else if constexpr (std::is_same_v<Step, statistical_options>) {
-            settle();
-            apply_alone(points, left, [&](const auto& rest) {
-              return filter_statistically(policy, rest, step, progress{})->inliers;
-            });
-          } else {
-            static_assert(std::is_same_v<Step, radius_options>, "a kind of step that is not applied");
-            settle();
-            apply_alone(points, left,
-                        [&](const auto& rest) { return *find_radius_inliers(policy, rest, step, progress{}); });
-          }
-        },
-        any);
-  }
-  settle();
-  return kept_points(points, left, options);
 }
 
 [[nodiscard]] inline std::string sentence_of(const filter_choice& choice, std::span<const std::string> reasons,
@@ -156,18 +89,12 @@ automatic_result choose_and_filter(const Policy& policy, const point_view& point
   return out;
 }
 
-/// The two functions that a choice, or a chain, calls with views.
+/// The function that a choice calls with views.
 template <class F>
 [[nodiscard]] view_judge judge_of(const F& judge) {
   return {&judge,
           [](const void* context, std::span<char> left, filter_choice& choice, std::vector<std::string>& reasons) {
             return (*static_cast<const F*>(context))(left, choice, reasons);
-          }};
-}
-template <class F>
-[[nodiscard]] view_filter filter_of(const F& filter) {
-  return {&filter, [](const void* context, const ray_step& step, std::span<char> left) {
-            (*static_cast<const F*>(context))(step, left);
           }};
 }
 
@@ -185,23 +112,6 @@ automatic_result filter_automatically(const Policy& policy, const Points& points
       return detail::judge_views(threads, all, views, model, options, left, choice, reasons, on_progress);
     };
     return detail::choose_and_filter(threads, all, ranges.all, options, detail::judge_of(judge));
-  });
-}
-
-template <execution_policy Policy, point_range Points, posed_depth_range Views, camera::camera_model Camera>
-std::vector<std::uint32_t> apply_filter(const Policy& policy, const Points& points, const filter_chain& chain,
-                                        const Views& views, const Camera& camera, const select_options& options,
-                                        progress on_progress) {
-  const auto& threads = detail::threads_of(policy);
-  const detail::viewed_points all{points};
-  const detail::known_ranges ranges{threads, points, options};
-  return detail::with_model(camera, [&](const auto& model) {
-    const auto filter = [&](const ray_step& step, std::span<char> left) {
-      assert(std::ranges::size(views) != 0);
-      bool cancelled = false;
-      detail::apply_rays(threads, all, step, views, model, left, cancelled, on_progress);
-    };
-    return detail::apply_chain(threads, all, ranges.all, chain, options, detail::filter_of(filter));
   });
 }
 

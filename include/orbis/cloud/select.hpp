@@ -26,7 +26,6 @@
 
 #include <orbis/camera/model.hpp>
 #include <orbis/cloud/detail/point_view.hpp>
-#include <orbis/cloud/detail/threads_of.hpp>
 #include <orbis/cloud/filter_chain.hpp>
 #include <orbis/cloud/filter_choice.hpp>
 #include <orbis/cloud/ray_evidence_counter.hpp>
@@ -52,24 +51,11 @@ struct view_judge {
               std::vector<std::string>& reasons) = nullptr;
 };
 
-/// How a `ray_step` is applied.
-struct view_filter {
-  const void* context = nullptr;
-  /// Clears what is left where the views exclude a point; null without views.
-  void (*run)(const void* context, const ray_step& step, std::span<char> left) = nullptr;
-};
-
 /// `filter_automatically` for any points and views. `ranges`: of each point, or empty where none is known.
 template <execution_policy Policy>
 [[nodiscard]] automatic_result choose_and_filter(const Policy& policy, const point_view& points,
                                                  std::span<const float> ranges, const select_options& options,
                                                  const view_judge& views);
-/// `apply_filter` for any points and views.
-template <execution_policy Policy>
-[[nodiscard]] std::vector<std::uint32_t> apply_chain(const Policy& policy, const point_view& points,
-                                                     std::span<const float> ranges, const filter_chain& chain,
-                                                     const select_options& options, const view_filter& views);
-
 /// The ranges that are given, or those from the sensor's origin; empty where neither is known.
 struct known_ranges {
   std::vector<float> own{};
@@ -118,32 +104,6 @@ template <execution_policy Policy, point_range Points>
                                           const select_options& options = {}) {
   return filter_automatically(policy, points, options).choice;
 }
-/// Judges the cloud by its points and depth images, see `filter_automatically`.
-template <execution_policy Policy, point_range Points, posed_depth_range Views, camera::camera_model Camera>
-[[nodiscard]] filter_choice select_filter(const Policy& policy, const Points& points, const Views& views,
-                                          const Camera& camera, const select_options& options = {},
-                                          progress on_progress = {}) {
-  return filter_automatically(policy, points, views, camera, options, on_progress).choice;
-}
-
-/// The indices, ascending, of the points that the steps of a chain leave, whoever made it. A chain from
-/// `select_filter` leaves what `filter_automatically` does, point for point, if the ranges are given here as well.
-/// `options`: where the cloud was seen from, and what becomes of points that are not finite.
-/// @pre the chain has no `ray_step`; its steps' own preconditions
-template <execution_policy Policy, point_range Points>
-[[nodiscard]] std::vector<std::uint32_t> apply_filter(const Policy& policy, const Points& points,
-                                                      const filter_chain& chain, const select_options& options = {}) {
-  const auto& threads = detail::threads_of(policy);
-  return detail::apply_chain(threads, detail::viewed_points{points}, detail::known_ranges{threads, points, options}.all,
-                             chain, options, {});
-}
-/// Applies a chain that may ask depth images. If `on_progress`, which counts the views, cancels, what they say is left
-/// out. @pre there are views if the chain has a `ray_step`
-template <execution_policy Policy, point_range Points, posed_depth_range Views, camera::camera_model Camera>
-[[nodiscard]] std::vector<std::uint32_t> apply_filter(const Policy& policy, const Points& points,
-                                                      const filter_chain& chain, const Views& views,
-                                                      const Camera& camera, const select_options& options = {},
-                                                      progress on_progress = {});
 
 }  // namespace orbis::cloud
 

@@ -34,11 +34,10 @@ concept cloud_with_sensor_origin = requires(const std::remove_cvref_t<C>& cloud)
 };
 
 /// Where a cloud was seen from, in the frame of its points. Of what is given, the most specific counts:
-/// `ranges`, else `per_point`, else `common`, else what the cloud itself says (`cloud_traits`).
+/// `ranges`, else `common`, else what the cloud itself says (`cloud_traits`).
 struct sensor_origins {
-  std::optional<vec3> common{};        ///< of all points, metres
-  std::span<const vec3f> per_point{};  ///< of each point, metres; empty or as long as the cloud
-  std::span<const float> ranges{};     ///< of each point, metres from its sensor; empty or as long as the cloud
+  std::optional<vec3> common{};     ///< of all points, metres
+  std::span<const float> ranges{};  ///< of each point, metres from its sensor; empty or as long as the cloud
 };
 
 /// The origin that a cloud itself states.
@@ -54,28 +53,21 @@ template <class C>
 /// For each point its distance in metres from where it was seen; NaN where that is not known, and for
 /// points, origins and given ranges that are not finite or, as a range, negative. O(n); the same result
 /// for every policy.
-/// @pre the spans of `origins` are empty or as long as `points`
+/// @pre `ranges` of `origins` is empty or as long as `points`
 template <execution_policy Policy, point_range Points>
 [[nodiscard]] std::vector<float> sensor_ranges(const Policy& policy, const Points& points,
                                                const sensor_origins& origins = {}) {
   constexpr float unknown = std::numeric_limits<float>::quiet_NaN();
   const std::size_t count = std::ranges::size(points);
   assert(origins.ranges.empty() || origins.ranges.size() == count);
-  assert(origins.per_point.empty() || origins.per_point.size() == count);
   std::vector<float> out(count, unknown);
   const std::optional<vec3> common = origins.common.has_value() ? origins.common : stated_sensor_origin(points);
-  if (origins.ranges.empty() && origins.per_point.empty() && !common.has_value()) return out;
+  if (origins.ranges.empty() && !common.has_value()) return out;
   for_each_index(policy, count, 4096, [&](std::size_t i) {
     const auto p = coordinates<double>(detail::point_at(points, i));
     const vec3 position{p[0], p[1], p[2]};
     if (!all_finite(position)) return;
-    float range = unknown;
-    if (!origins.ranges.empty()) {
-      range = origins.ranges[i];
-    } else {
-      const vec3 origin = origins.per_point.empty() ? *common : vec3{origins.per_point[i].cast<double>()};
-      range = static_cast<float>(norm(position - origin));
-    }
+    const float range = origins.ranges.empty() ? static_cast<float>(norm(position - *common)) : origins.ranges[i];
     if (std::isfinite(range) && range >= 0) out[i] = range;
   });
   return out;

@@ -79,11 +79,9 @@ ORBIS_INLINE range_statistical_result range_statistical_decision(std::span<const
 namespace detail {
 
 template <execution_policy Policy>
-result<statistical_result> filter_statistically(const Policy& policy, const point_view& points,
-                                                const statistical_options& options, const progress& on_progress) {
-  auto mean_distance = find_mean_distances(policy, points, options.neighbors, on_progress);
-  if (!mean_distance) return fail(mean_distance.error());
-  statistical_result out = statistical_decision(*std::move(mean_distance), options);
+statistical_result filter_statistically(const Policy& policy, const point_view& points,
+                                        const statistical_options& options) {
+  statistical_result out = statistical_decision(find_mean_distances(policy, points, options.neighbors), options);
   out.inliers =
       inliers_by_score(points, out.mean_distance, options.non_finite, [&](float d) { return d > out.threshold; });
   return out;
@@ -92,7 +90,7 @@ result<statistical_result> filter_statistically(const Policy& policy, const poin
 template <execution_policy Policy>
 range_statistical_result filter_by_range(const Policy& policy, const point_view& points, std::span<const float> ranges,
                                          const range_statistical_options& options) {
-  const std::vector<float> spacing = *find_mean_distances(policy, points, options.neighbors, progress{});
+  const std::vector<float> spacing = find_mean_distances(policy, points, options.neighbors);
   range_statistical_result out = range_statistical_decision(spacing, ranges, options);
   out.inliers =
       inliers_by_score(points, out.normalised, options.non_finite, [&](float u) { return double{u} > out.threshold; });

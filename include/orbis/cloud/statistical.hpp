@@ -26,12 +26,10 @@
 
 #include <orbis/cloud/all_knn.hpp>
 #include <orbis/cloud/detail/point_view.hpp>
-#include <orbis/cloud/detail/threads_of.hpp>
 #include <orbis/cloud/extract.hpp>
 #include <orbis/cloud/sensor_origins.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/point.hpp>
-#include <orbis/core/result.hpp>
 
 namespace orbis::cloud {
 
@@ -64,9 +62,8 @@ namespace detail {
 
 /// `statistical_filter` for any points.
 template <execution_policy Policy>
-[[nodiscard]] result<statistical_result> filter_statistically(const Policy& policy, const point_view& points,
-                                                              const statistical_options& options,
-                                                              const progress& on_progress);
+[[nodiscard]] statistical_result filter_statistically(const Policy& policy, const point_view& points,
+                                                      const statistical_options& options);
 
 }  // namespace detail
 
@@ -75,17 +72,7 @@ template <execution_policy Policy, point_range Points>
 [[nodiscard]] statistical_result statistical_filter(const Policy& policy, const Points& points,
                                                     const statistical_options& options = {}) {
   assert(options.neighbors > 0);
-  return *detail::filter_statistically(detail::threads_of(policy), detail::viewed_points{points}, options, progress{});
-}
-
-/// Filters as above and reports progress, in leaves of sixteen points. Errors: `cancelled`, if the callback asks to
-/// stop. For other filters give the callback to `all_mean_knn_distance` or `all_knn`, which take all the
-/// time, and decide on their results.
-template <execution_policy Policy, point_range Points>
-[[nodiscard]] result<statistical_result> statistical_filter(const Policy& policy, const Points& points,
-                                                            const statistical_options& options, progress on_progress) {
-  assert(options.neighbors > 0);
-  return detail::filter_statistically(detail::threads_of(policy), detail::viewed_points{points}, options, on_progress);
+  return detail::filter_statistically(detail::threads_of(policy), detail::viewed_points{points}, options);
 }
 
 /// The indices, ascending, of the points whose mean distance to their `neighbors` nearest neighbours

@@ -23,8 +23,9 @@
 #include <vector>
 
 #include <orbis/cloud/detail/voxels/voxel_brick.hpp>
-#include <orbis/cloud/detail/voxels/voxel_hash.hpp>
+#include <orbis/cloud/detail/voxels/voxel_key.hpp>
 #include <orbis/core/execution.hpp>
+#include <orbis/core/hash_index.hpp>
 #include <orbis/core/image.hpp>
 #include <orbis/core/point_cloud.hpp>
 #include <orbis/core/rounded.hpp>

@@ -5,7 +5,6 @@
 
 #include <string>
 #include <string_view>
-#include <utility>
 
 #include <orbis/core/file.hpp>
 #include <orbis/core/inline.hpp>
@@ -21,11 +20,8 @@ ORBIS_INLINE result<point_cloud> read_cloud(const std::filesystem::path& path, c
   const std::string_view start = std::string_view{*bytes}.substr(0, 256);
   if (start.starts_with("ply\n") || start.starts_with("ply\r") || path.extension() == ".ply")
     return parse_ply(*bytes, path.string(), origin);
-  if (path.extension() == ".pcd" || start.starts_with("# .PCD") || start.starts_with("VERSION ")) {
-    auto organized = parse_pcd(*bytes, path.string(), origin);
-    if (!organized) return fail(organized.error());
-    return std::move(organized->cloud);
-  }
+  if (path.extension() == ".pcd" || start.starts_with("# .PCD") || start.starts_with("VERSION "))
+    return parse_pcd(*bytes, path.string(), origin);
   return fail(errc::unsupported, path.string(), "is neither a PLY nor a PCD file");
 }
 

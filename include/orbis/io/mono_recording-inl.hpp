@@ -10,7 +10,6 @@
 #include <orbis/io/camera_file.hpp>
 #include <orbis/io/detail/recordings/one_camera.hpp>
 #include <orbis/io/detail/recordings/recording_folder.hpp>
-#include <orbis/io/detail/recordings/sized_image.hpp>
 #include <orbis/io/image.hpp>
 #include <orbis/io/mono_recording.hpp>
 #include <orbis/io/recording.hpp>

@@ -4,12 +4,9 @@
 #pragma once
 
 #include <algorithm>
-#include <bit>
 #include <cassert>
-#include <charconv>
 #include <cstdint>
 #include <ostream>
-#include <utility>
 
 #include <orbis/core/bytes.hpp>
 #include <orbis/core/file.hpp>
@@ -21,7 +18,7 @@
 
 namespace orbis::io {
 
-ORBIS_INLINE result<organized_cloud> parse_pcd(std::string_view bytes, const std::string& where, const vec3& origin) {
+ORBIS_INLINE result<point_cloud> parse_pcd(std::string_view bytes, const std::string& where, const vec3& origin) {
   using namespace detail;
   const auto header = take_pcd_header(bytes, where);
   if (!header) return fail(header.error());
@@ -32,21 +29,12 @@ ORBIS_INLINE result<organized_cloud> parse_pcd(std::string_view bytes, const std
   if (columns.color != nullptr && (columns.color->size != 4 || columns.color->count != 1)) columns.color = nullptr;
   const auto ends_early = [&] { return fail(errc::malformed, where, "the data end early or are damaged"); };
 
-  organized_cloud out;
-  out.width = static_cast<std::size_t>(header->width);
-  out.height = static_cast<std::size_t>(header->height);
-  if (header->data == pcd_data::ascii) {
-    auto cloud = read_pcd_text(bytes, *header, columns, origin, where);
-    if (!cloud) return fail(cloud.error());
-    out.cloud = *std::move(cloud);
-    return out;
-  }
+  if (header->data == pcd_data::ascii) return read_pcd_text(bytes, *header, columns, origin, where);
   if (header->data == pcd_data::binary) {
     if (header->points > bytes.size() / header->point_size) return ends_early();
-    out.cloud = read_pcd_binary(*header, columns, origin, [&](const pcd_field& f, std::size_t i) {
+    return read_pcd_binary(*header, columns, origin, [&](const pcd_field& f, std::size_t i) {
       return bytes.data() + i * header->point_size + f.offset;
     });
-    return out;
   }
   // Compressed: all x, then all y, ...
   if (bytes.size() < 8) return ends_early();
@@ -57,81 +45,37 @@ ORBIS_INLINE result<organized_cloud> parse_pcd(std::string_view bytes, const std
     return ends_early();
   const auto data = detail::lzf_decompress(bytes.substr(0, compressed_size), size);
   if (!data) return ends_early();
-  out.cloud = read_pcd_binary(*header, columns, origin, [&](const pcd_field& f, std::size_t i) {
+  return read_pcd_binary(*header, columns, origin, [&](const pcd_field& f, std::size_t i) {
     return data->data() + f.offset * header->points + i * f.size * f.count;
   });
-  return out;
 }
 
-ORBIS_INLINE result<organized_cloud> read_organized_pcd(const std::filesystem::path& path) {
+ORBIS_INLINE result<point_cloud> read_pcd(const std::filesystem::path& path) {
   const auto bytes = read_file(path);
   if (!bytes) return fail(bytes.error());
   return parse_pcd(*bytes, path.string());
 }
 
-ORBIS_INLINE result<point_cloud> read_pcd(const std::filesystem::path& path) {
-  auto organized = read_organized_pcd(path);
-  if (!organized) return fail(organized.error());
-  return std::move(organized->cloud);
-}
-
-ORBIS_INLINE result<void> write_pcd(const std::filesystem::path& path, const organized_cloud& organized,
-                                    const pcd_options& options) {
-  const point_cloud& cloud = organized.cloud;
-  const std::size_t n = cloud.size();
-  if (organized.width * organized.height != n)
-    return fail(errc::invalid_argument, path.string(), "width times height is not the number of points");
-  assert(cloud.colors.empty() || cloud.colors.size() == n);
-  const bool colored = cloud.has_colors();
-  const auto choose = [&](const char* with, const char* without) { return colored ? with : without; };
+ORBIS_INLINE result<void> write_pcd(const std::filesystem::path& path, const point_cloud& cloud) {
+  const std::string n = std::to_string(cloud.size());
+  assert(cloud.colors.empty() || cloud.colors.size() == cloud.size());
+  const auto choose = [&](const char* with, const char* without) { return cloud.has_colors() ? with : without; };
   std::string bytes =
       std::string{"# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\nFIELDS x y z"} +
       choose(" rgb\nSIZE 4 4 4 4\nTYPE F F F F\nCOUNT 1 1 1 1", "\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1") + "\nWIDTH " +
-      std::to_string(organized.width) + "\nHEIGHT " + std::to_string(organized.height) +
-      "\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS " + std::to_string(n) + "\nDATA ";
-  switch (options.encoding) {
-    case pcd_encoding::ascii: {
-      bytes += "ascii\n";
-      const auto add = [&](float value) {
-        char buffer[64];
-        bytes.append(buffer, std::to_chars(buffer, buffer + sizeof buffer, value).ptr) += ' ';
-      };
-      for (std::size_t i = 0; i != n; ++i) {
-        for (const float v : cloud.points[i]) add(v);
-        if (colored) add(std::bit_cast<float>(detail::packed_rgb(cloud.colors[i])));
-        bytes.back() = '\n';
-      }
-      break;
-    }
-    case pcd_encoding::binary:
-      bytes += "binary\n";
-      for (std::size_t i = 0; i != n; ++i) {
-        for (const float v : cloud.points[i]) append_little_endian(bytes, v);
-        if (colored) append_little_endian(bytes, detail::packed_rgb(cloud.colors[i]));
-      }
-      break;
-    case pcd_encoding::binary_compressed: {
-      bytes += "binary_compressed\n";
-      std::string columns;
-      for (const int axis : {0, 1, 2})
-        for (const vec3f& p : cloud.points) append_little_endian(columns, p[axis]);
-      for (const rgb8& c : cloud.colors) append_little_endian(columns, detail::packed_rgb(c));
-      const std::string compressed = detail::lzf_compress(columns);
-      if (std::max(columns.size(), compressed.size()) > UINT32_MAX)
-        return fail(errc::invalid_argument, path.string(), "too large for binary_compressed, use binary");
-      append_little_endian(bytes, static_cast<std::uint32_t>(compressed.size()));
-      append_little_endian(bytes, static_cast<std::uint32_t>(columns.size()));
-      bytes += compressed;
-      break;
-    }
-  }
+      n + "\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS " + n + "\nDATA binary_compressed\n";
+  std::string columns;
+  for (const int axis : {0, 1, 2})
+    for (const vec3f& p : cloud.points) append_little_endian(columns, p[axis]);
+  for (const rgb8& c : cloud.colors) append_little_endian(columns, detail::packed_rgb(c));
+  const std::string compressed = detail::lzf_compress(columns);
+  if (std::max(columns.size(), compressed.size()) > UINT32_MAX)
+    return fail(errc::invalid_argument, path.string(), "too large for a PCD file");
+  append_little_endian(bytes, static_cast<std::uint32_t>(compressed.size()));
+  append_little_endian(bytes, static_cast<std::uint32_t>(columns.size()));
+  bytes += compressed;
   return write_file_atomically(
       path, [&](std::ostream& out) { out.write(bytes.data(), static_cast<std::streamsize>(bytes.size())); });
-}
-
-ORBIS_INLINE result<void> write_pcd(const std::filesystem::path& path, point_cloud cloud, const pcd_options& options) {
-  const std::size_t n = cloud.size();
-  return write_pcd(path, organized_cloud{std::move(cloud), n, 1}, options);
 }
 
 }  // namespace orbis::io

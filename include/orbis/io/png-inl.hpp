@@ -45,31 +45,22 @@ ORBIS_INLINE result<image<std::uint16_t>> decode_png_depth(std::string_view byte
   return pixels;
 }
 
-ORBIS_INLINE std::string encode_png(image_view<const rgb8> view, const png_options& options) {
-  return detail::encode_png(view, options.compression);
+ORBIS_INLINE std::string encode_png(image_view<const rgb8> view) { return detail::encode_png(view); }
+
+ORBIS_INLINE std::string encode_png(image_view<const std::uint8_t> view) { return detail::encode_png(view); }
+
+ORBIS_INLINE std::string encode_png(image_view<const std::uint16_t> view) { return detail::encode_png(view); }
+
+ORBIS_INLINE result<void> write_png(const std::filesystem::path& path, image_view<const rgb8> view) {
+  return detail::write_png(path, view);
 }
 
-ORBIS_INLINE std::string encode_png(image_view<const std::uint8_t> view, const png_options& options) {
-  return detail::encode_png(view, options.compression);
+ORBIS_INLINE result<void> write_png(const std::filesystem::path& path, image_view<const std::uint8_t> view) {
+  return detail::write_png(path, view);
 }
 
-ORBIS_INLINE std::string encode_png(image_view<const std::uint16_t> view, const png_options& options) {
-  return detail::encode_png(view, options.compression);
-}
-
-ORBIS_INLINE result<void> write_png(const std::filesystem::path& path, image_view<const rgb8> view,
-                                    const png_options& options) {
-  return detail::write_png(path, view, options.compression);
-}
-
-ORBIS_INLINE result<void> write_png(const std::filesystem::path& path, image_view<const std::uint8_t> view,
-                                    const png_options& options) {
-  return detail::write_png(path, view, options.compression);
-}
-
-ORBIS_INLINE result<void> write_png(const std::filesystem::path& path, image_view<const std::uint16_t> view,
-                                    const png_options& options) {
-  return detail::write_png(path, view, options.compression);
+ORBIS_INLINE result<void> write_png(const std::filesystem::path& path, image_view<const std::uint16_t> view) {
+  return detail::write_png(path, view);
 }
 
 }  // namespace orbis::io

@@ -13,11 +13,6 @@
 
 namespace orbis::io {
 
-/// How hard to compress: 0 (stored) to 9 (smallest, slow).
-struct png_options {
-  int compression = 6;
-};
-
 /// Whether `bytes` begin as a PNG file does.
 [[nodiscard]] inline bool is_png(std::string_view bytes) noexcept { return bytes.starts_with("\x89PNG\r\n\x1a\n"); }
 
@@ -31,16 +26,14 @@ struct png_options {
 
 /// The bytes of a PNG file: 8-bit colour, 8-bit grey or 16-bit grey, as the pixel type says.
 /// For one version of zlib, equal pixels give equal bytes. @pre !view.empty()
-[[nodiscard]] std::string encode_png(image_view<const rgb8> view, const png_options& options = {});
-[[nodiscard]] std::string encode_png(image_view<const std::uint8_t> view, const png_options& options = {});
-[[nodiscard]] std::string encode_png(image_view<const std::uint16_t> view, const png_options& options = {});
+[[nodiscard]] std::string encode_png(image_view<const rgb8> view);
+[[nodiscard]] std::string encode_png(image_view<const std::uint8_t> view);
+[[nodiscard]] std::string encode_png(image_view<const std::uint16_t> view);
 
 /// Writes a PNG file, whole or not at all. Errors: write_failed, invalid_argument (empty image).
-result<void> write_png(const std::filesystem::path& path, image_view<const rgb8> view, const png_options& options = {});
-result<void> write_png(const std::filesystem::path& path, image_view<const std::uint8_t> view,
-                       const png_options& options = {});
-result<void> write_png(const std::filesystem::path& path, image_view<const std::uint16_t> view,
-                       const png_options& options = {});
+result<void> write_png(const std::filesystem::path& path, image_view<const rgb8> view);
+result<void> write_png(const std::filesystem::path& path, image_view<const std::uint8_t> view);
+result<void> write_png(const std::filesystem::path& path, image_view<const std::uint16_t> view);
 
 }  // namespace orbis::io
 

@@ -13,7 +13,6 @@
 #include <orbis/io/detail/recordings/recording_folder.hpp>
 #include <orbis/io/detail/recordings/scannet.hpp>
 #include <orbis/io/detail/recordings/seven_scenes.hpp>
-#include <orbis/io/detail/recordings/sized_image.hpp>
 #include <orbis/io/detail/recordings/tum.hpp>
 #include <orbis/io/image.hpp>
 #include <orbis/io/recording.hpp>

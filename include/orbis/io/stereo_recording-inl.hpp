@@ -11,11 +11,9 @@
 #include <orbis/io/camera_file.hpp>
 #include <orbis/io/detail/recordings/asl.hpp>
 #include <orbis/io/detail/recordings/kitti.hpp>
-#include <orbis/io/detail/recordings/paired_images.hpp>
 #include <orbis/io/detail/recordings/recording_folder.hpp>
 #include <orbis/io/detail/recordings/recording_index.hpp>
 #include <orbis/io/detail/recordings/seven_scenes.hpp>
-#include <orbis/io/detail/recordings/sized_image.hpp>
 #include <orbis/io/detail/recordings/tum.hpp>
 #include <orbis/io/detail/text.hpp>
 #include <orbis/io/image.hpp>

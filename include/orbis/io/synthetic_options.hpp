@@ -18,7 +18,6 @@ struct synthetic_scene_options {
   bool furniture = true;         ///< false: bare walls
   int poor_walls = 1;            ///< how many of the four walls are nearly without texture, 0..4
   double texture_density = 1.0;  ///< scales the number of patches painted on every surface; 0: none
-  bool moving_object = false;    ///< a box that walks through the room
   bool person = false;           ///< somebody who walks round the room, against the camera's way, at 1 m/s
   double wall_period = 0.0;      ///< metres; above 0 all walls bear one picture that repeats itself at this distance
 };
@@ -62,11 +61,9 @@ struct synthetic_sensor_options {
 
   double stereo_baseline = 0.12;  ///< from the camera to the second one of a stereo pair, metres
 
-  double colour_noise = 2.0;    ///< deviation in grey values
-  double vignetting = 0.0;      ///< loss of brightness in the image's corners, 0..1
-  double exposure_jumps = 0.0;  ///< largest relative change of brightness; a new level every second or so
-  int motion_blur = 1;          ///< pictures averaged over the exposure time; 1: none
-  double exposure = 0.015;      ///< seconds; for motion blur
+  double colour_noise = 2.0;  ///< deviation in grey values
+  int motion_blur = 1;        ///< pictures averaged over the exposure time; 1: none
+  double exposure = 0.015;    ///< seconds; for motion blur
 
   /// When the rows of an image are taken; a frame has the pose and the time of its colour image's middle.
   camera::shutter shutter{};

@@ -28,8 +28,7 @@ struct live_map_snapshot {
 /// What a depth image is for.
 enum class depth_use : std::uint8_t {
   keyframe,  ///< add_keyframe
-  frame,     ///< add_frame: between keyframes
-  verdict    ///< set_depth: another image of a keyframe
+  frame      ///< add_frame: between keyframes
 };
 
 /// A keyframe or frame went into the map, and readers see it.
@@ -104,7 +103,6 @@ struct live_map_counters {
   std::size_t frames = 0;             ///< inserted, between keyframes
   std::size_t dropped_keyframes = 0;  ///< left out because too many were waiting
   std::size_t dropped_frames = 0;     ///< the same, between keyframes
-  std::size_t dropped_verdicts = 0;   ///< the same, other depth images of keyframes
   std::size_t refused_frames = 0;     ///< that the map did not take
   std::size_t corrections = 0;        ///< finished
   std::size_t most_waiting = 0;       ///< depth images, at any time

@@ -105,11 +105,6 @@ class live_map_thread {
   bool add_frame(std::uint64_t frame, const depth_view& depth, std::uint64_t keyframe, const se3& T_keyframe_camera) {
     return add_scan({.kind = job::between, .frame = frame, .keyframe_of = keyframe, .T = T_keyframe_camera}, depth);
   }
-  /// Gives a keyframe another depth image, see live_map::set_depth, as above. False if it was left out, as add_keyframe
-  /// does.
-  bool set_depth(std::uint64_t frame, const depth_view& depth) {
-    return add_scan({.kind = job::verdict, .frame = frame}, depth);
-  }
   /// Forgets a keyframe, see live_map::remove.
   void remove(std::uint64_t frame) { push({.kind = job::removal, .frame = frame}); }
   /// Tells the present poses, see live_map::set_poses.
@@ -193,9 +188,7 @@ class live_map_thread {
     changed_.notify_all();
   }
   [[nodiscard]] static depth_use use_of(const job& j) noexcept {
-    return j.kind == job::keyframe  ? depth_use::keyframe
-           : j.kind == job::between ? depth_use::frame
-                                    : depth_use::verdict;
+    return j.kind == job::keyframe ? depth_use::keyframe : depth_use::frame;
   }
   bool add_scan(job j, const depth_view& depth) {
     j.since = clock::now();
@@ -223,9 +216,7 @@ class live_map_thread {
       }
       if (dropped) {
         spare_.push_back(std::move(dropped->pixels));
-        ++(dropped->kind == job::keyframe  ? counters_.dropped_keyframes
-           : dropped->kind == job::between ? counters_.dropped_frames
-                                           : counters_.dropped_verdicts);
+        ++(dropped->kind == job::keyframe ? counters_.dropped_keyframes : counters_.dropped_frames);
       }
     }
     changed_.notify_all();
@@ -341,10 +332,6 @@ class live_map_thread {
       case job::between:
         inserted = map_.add_frame(policy_, j.frame, depth, j.keyframe_of, j.T);
         if (!inserted) tell_refusal(j);
-        break;
-      case job::verdict:
-        if (moving_) moving_->forget(j.frame);
-        if (const auto set = map_.set_depth(policy_, j.frame, depth); !set) report(set.error());
         break;
       case job::removal:
         if (moving_) moving_->forget(j.frame);

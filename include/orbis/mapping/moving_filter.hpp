@@ -92,7 +92,7 @@ class moving_filter {
     }
     return {};
   }
-  /// Judges this keyframe no more, nor by it: it was removed, or has got another verdict from elsewhere.
+  /// Judges this keyframe no more, nor by it: it was removed, or has got another image.
   void forget(std::uint64_t frame) { judge_.forget(frame); }
   /// Which share of a kept keyframe's cells is taken out; empty if it is not kept. O(cells).
   [[nodiscard]] std::optional<double> removed_share(std::uint64_t frame) const {

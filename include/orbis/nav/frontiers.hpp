@@ -47,7 +47,7 @@ struct frontier_octant {
 /// Frontier voxels that hang together: each is one of the 26 neighbours of another one.
 struct frontier_cluster {
   std::size_t size = 0;                    ///< voxels
-  vec3 center = zeros<vec3>();              ///< mean of the voxels' centres, metres
+  vec3 center = zeros<vec3>();             ///< mean of the voxels' centres, metres
   octree::voxel_key voxel;                 ///< the frontier voxel whose centre is nearest to `center`
   std::vector<frontier_octant> octants{};  ///< all of its voxels, in Morton order
 };

@@ -7,7 +7,6 @@
 #include <cassert>
 #include <charconv>
 #include <cmath>
-#include <istream>
 #include <iterator>
 #include <optional>
 #include <ostream>
@@ -114,13 +113,6 @@ template <class Model, class Reader>
 [[nodiscard]] inline std::string_view as_chars(std::span<const std::byte> bytes) noexcept {
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
-[[nodiscard]] inline result<std::string> read_stream(std::istream& in) {
-  std::string bytes;
-  char buffer[65536];
-  while (in.read(buffer, sizeof buffer) || in.gcount() > 0) bytes.append(buffer, static_cast<std::size_t>(in.gcount()));
-  if (in.bad()) return fail(errc::unreadable, "stream", "cannot be read");
-  return bytes;
-}
 [[nodiscard]] inline std::string whole_file(std::string_view magic, const octomap_nodes& nodes,
                                             const voxel_grid& grid) {
   assert(grid.depth() == default_tree_depth);
@@ -129,22 +121,18 @@ template <class Model, class Reader>
   return bytes.append(nodes.bytes.view());
 }
 template <class Writer, class Map>
-[[nodiscard]] result<void> write_octomap(const Map& map, std::string_view magic, std::ostream& out,
-                                         const std::string& where) {
-  if (map.tree_depth() != default_tree_depth)
-    return fail(errc::unsupported, where,
-                "OctoMap's trees have 16 levels, this one " + std::to_string(map.tree_depth()));
-  const octomap_nodes nodes = Writer{map.store(), map.tree_depth()}.write();
-  const std::string header = octomap_header(magic, nodes.nodes, map.resolution());
-  out.write(header.data(), static_cast<std::streamsize>(header.size()));
-  if (!out.write(nodes.bytes.view().data(), static_cast<std::streamsize>(nodes.bytes.size())))
-    return fail(errc::write_failed, where, "cannot be written");
-  return {};
-}
-template <class Writer, class Map>
 [[nodiscard]] result<void> write_octomap(const Map& map, std::string_view magic, const std::filesystem::path& path) {
-  return write_file_atomically(
-      path, [&](std::ostream& out) { return write_octomap<Writer>(map, magic, out, path.string()); });
+  return write_file_atomically(path, [&](std::ostream& out) -> result<void> {
+    if (map.tree_depth() != default_tree_depth)
+      return fail(errc::unsupported, path.string(),
+                  "OctoMap's trees have 16 levels, this one " + std::to_string(map.tree_depth()));
+    const octomap_nodes nodes = Writer{map.store(), map.tree_depth()}.write();
+    const std::string header = octomap_header(magic, nodes.nodes, map.resolution());
+    out.write(header.data(), static_cast<std::streamsize>(header.size()));
+    if (!out.write(nodes.bytes.view().data(), static_cast<std::streamsize>(nodes.bytes.size())))
+      return fail(errc::write_failed, path.string(), "cannot be written");
+    return {};
+  });
 }
 
 }  // namespace detail
@@ -167,18 +155,8 @@ result<void> write_bt(const occupancy_octree<Model>& map, const std::filesystem:
 }
 
 template <octomap_model Model>
-result<void> write_bt(const occupancy_octree<Model>& map, std::ostream& out) {
-  return detail::write_octomap<detail::bt_writer<Model>>(map, detail::bt_magic, out, "stream");
-}
-
-template <octomap_model Model>
 result<void> write_ot(const occupancy_octree<Model>& map, const std::filesystem::path& path) {
   return detail::write_octomap<detail::ot_writer>(map, detail::ot_magic, path);
-}
-
-template <octomap_model Model>
-result<void> write_ot(const occupancy_octree<Model>& map, std::ostream& out) {
-  return detail::write_octomap<detail::ot_writer>(map, detail::ot_magic, out, "stream");
 }
 
 template <octomap_model Model>
@@ -203,20 +181,6 @@ result<occupancy_octree<Model>> read_ot(const std::filesystem::path& path) {
   const auto bytes = read_file(path);
   if (!bytes) return fail(bytes.error());
   return read_ot<Model>(std::as_bytes(std::span{*bytes}), path.string());
-}
-
-template <octomap_model Model>
-result<occupancy_octree<Model>> read_bt(std::istream& in) {
-  const auto bytes = detail::read_stream(in);
-  if (!bytes) return fail(bytes.error());
-  return read_bt<Model>(std::as_bytes(std::span{*bytes}), "stream");
-}
-
-template <octomap_model Model>
-result<occupancy_octree<Model>> read_ot(std::istream& in) {
-  const auto bytes = detail::read_stream(in);
-  if (!bytes) return fail(bytes.error());
-  return read_ot<Model>(std::as_bytes(std::span{*bytes}), "stream");
 }
 
 }  // namespace orbis::octree

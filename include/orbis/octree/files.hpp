@@ -9,7 +9,6 @@
 
 #include <cstddef>
 #include <filesystem>
-#include <iosfwd>
 #include <span>
 #include <string>
 
@@ -33,14 +32,10 @@ template <octomap_model Model>
 /// depth than OctoMap's.
 template <octomap_model Model>
 [[nodiscard]] result<void> write_bt(const occupancy_octree<Model>& map, const std::filesystem::path& path);
-template <octomap_model Model>
-[[nodiscard]] result<void> write_bt(const occupancy_octree<Model>& map, std::ostream& out);
 
 /// Writes an `.ot` file, whole or not at all. Errors: those of write_bt.
 template <octomap_model Model>
 [[nodiscard]] result<void> write_ot(const occupancy_octree<Model>& map, const std::filesystem::path& path);
-template <octomap_model Model>
-[[nodiscard]] result<void> write_ot(const occupancy_octree<Model>& map, std::ostream& out);
 
 /// Reads the bytes of a `.bt` file; `where` names them in errors. Leaves get the model's bounds.
 /// Errors: malformed (damaged, truncated, not such a file), unsupported (another type of tree).
@@ -58,12 +53,6 @@ template <octomap_model Model = log_odds<>>
 [[nodiscard]] result<occupancy_octree<Model>> read_bt(const std::filesystem::path& path);
 template <octomap_model Model = log_odds<>>
 [[nodiscard]] result<occupancy_octree<Model>> read_ot(const std::filesystem::path& path);
-
-/// Reads a stream to its end.
-template <octomap_model Model = log_odds<>>
-[[nodiscard]] result<occupancy_octree<Model>> read_bt(std::istream& in);
-template <octomap_model Model = log_odds<>>
-[[nodiscard]] result<occupancy_octree<Model>> read_ot(std::istream& in);
 
 }  // namespace orbis::octree
 

@@ -5,10 +5,6 @@
 
 #include <cstddef>
 #include <limits>
-#include <optional>
-#include <span>
-
-#include <orbis/octree/key.hpp>
 
 namespace orbis::octree {
 
@@ -24,24 +20,10 @@ struct integration_options {
   /// @pre >= 0
   double max_range = std::numeric_limits<double>::infinity();
   ray_mode mode = ray_mode::every_ray;
-  /// False: points mark their voxels as occupied, no ray is traversed and nothing is observed free.
-  bool rays = true;
-  /// Voxels outside, from the one that contains `min` to the one that contains `max`, are left as they
-  /// are; inside, the result is the same as without bounds; infinity is none. (OctoMap's
-  /// `useBBXLimit` differs: it drops a point outside the box with its whole ray, drops the rays of
-  /// points beyond max_range, and of a ray that enters, leaves and enters the box again keeps the last
-  /// part only.)
-  std::optional<bounding_box> bounds = std::nullopt;
-  /// One range for each point, metres, used where it is less than max_range, and in both modes before
-  /// points are put together in voxels; in mode `discretized` the ray of such a point ends in the
-  /// centre of the voxel where it is cut off. Infinity is no limit; a point whose range is negative or
-  /// NaN is rejected. OctoMap has nothing like it. @pre empty, or as many as there are points
-  std::span<const float> beam_ranges = {};
 };
 
 /// What became of a scan. In mode `discretized`, `used` and `truncated` count the voxels that hold
-/// points instead of the points, and points that share a voxel count once. Bounds have an influence on
-/// `free` and `occupied` alone.
+/// points instead of the points, and points that share a voxel count once.
 struct integration_summary {
   std::size_t used = 0;       ///< points within range
   std::size_t truncated = 0;  ///< points beyond the range

@@ -43,7 +43,6 @@ template <sensor_model Model>
 integration_summary occupancy_octree<Model>::integrate_depth(const parallel_policy& policy,
                                                              const detail::depth_scan& scan, const se3& T_world_camera,
                                                              const integration_options& options) {
-  assert(options.beam_ranges.empty());
   begin_change();
   detail::scan_buffers& buffers = scratch_.get<detail::scan_buffers>();
   integration_summary summary;
@@ -51,11 +50,6 @@ integration_summary occupancy_octree<Model>::integrate_depth(const parallel_poli
                                                        detail::saturated_in<Model>(store_));
   detail::apply_scan<Model>(store_, masks, summary, track_.on ? &track_.log : nullptr);
   return summary;
-}
-
-template <sensor_model Model>
-void occupancy_octree<Model>::to_maximum_likelihood() {
-  transform([](value_type v) { return std::optional{is_occupied<Model>(v) ? Model::clamp_max : Model::clamp_min}; });
 }
 
 template <sensor_model Model>

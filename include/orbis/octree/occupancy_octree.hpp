@@ -113,7 +113,7 @@ class occupancy_octree {
   /// Integrates a depth image (depths in metres along the optical axis). The map is the one that the image's world
   /// points (see append_world_points) make when seen from the camera's centre, but this is many times as fast.
   /// O(pixels + voxels near surfaces).
-  /// @pre depth and camera have the same size; options.beam_ranges is empty
+  /// @pre depth and camera have the same size
   template <execution_policy Policy, camera::depth_source Depth, camera::camera_model Camera>
   integration_summary integrate(const Policy& policy, const Depth& depth, const Camera& camera,
                                 const se3& T_world_camera, const integration_options& options = {}) {
@@ -194,9 +194,6 @@ class occupancy_octree {
     });
     if (has_large) lose_track();
   }
-  /// Gives every occupied voxel the model's upper bound and every free one its lower bound, as `.bt` files do.
-  /// O(octants).
-  void to_maximum_likelihood();
   /// A rolling window: removes every brick (8x8x8 voxels) and larger leaf that lies completely outside `box` (metres),
   /// after calling `evict(const leaf&)` for its leaves. `set_unknown_node(leaf.key, leaf.depth, leaf.log_odds)` brings
   /// a leaf back. Returns the number of bricks and larger leaves removed. The change log records what was evicted: it
@@ -287,20 +284,6 @@ class occupancy_octree {
   void for_each_leaf(Visit&& visit) const {
     detail::visit_leaves(store_, tree_depth(),
                          [&](const voxel_key& key, int level, value_type v) { visit(leaf_of(key, level, v)); });
-  }
-  /// Calls `visit(const leaf&)` for every leaf that has a voxel in `box` (metres; the voxels of both corners belong to
-  /// it), in Morton order. Looks at the part of the map in the box only.
-  template <std::invocable<const leaf&> Visit>
-  void for_each_leaf_in(const bounding_box& box, Visit&& visit) const {
-    if (const auto keys = keys_between(grid_, box.min, box.max))
-      detail::visit_leaves_in(store_, tree_depth(), *keys,
-                              [&](const voxel_key& key, int level, value_type v) { visit(leaf_of(key, level, v)); });
-  }
-  /// Calls `visit(const vec3& center)` (metres) for every occupied voxel, also for each voxel of a larger leaf.
-  /// O(bricks + voxels visited).
-  template <std::invocable<const vec3&> Visit>
-  void for_each_occupied_voxel(Visit&& visit) const {
-    detail::visit_occupied_voxels<Model>(store_, [&](const voxel_key& key, value_type) { visit(grid_.center(key)); });
   }
   /// Numbers of nodes of the pruned octree. O(bricks + octants that are not uniform), as are the four functions below.
   [[nodiscard]] octree_counts counts() const;

@@ -235,18 +235,4 @@ template <octree_map Map, overlap_shape Shape>
   return search{map.store(), map.grid(), shape, options.unknown == occupancy::occupied}.run();
 }
 
-/// Calls `visit(key, level, value)` for every occupied leaf of the pruned octree that the shape has a
-/// point in common with, in Morton order. O(voxels in the chunks around the shape).
-template <octree_map Map, overlap_shape Shape,
-          std::invocable<const voxel_key&, int, typename Map::model::value_type> Visit>
-void for_each_overlapping_leaf(const Map& map, const Shape& shape, Visit&& visit) {
-  const voxel_grid& grid = map.grid();
-  const bounding_box bounds = bounds_of(shape);
-  const auto keys = keys_between(grid, shifted(bounds.min, -grid.resolution()), shifted(bounds.max, grid.resolution()));
-  if (!keys) return;
-  detail::visit_leaves_in(map.store(), grid.depth(), *keys, [&](const voxel_key& k, int level, auto v) {
-    if (is_occupied<typename Map::model>(v) && touches(shape, cube_of(grid, k, level))) visit(k, level, v);
-  });
-}
-
 }  // namespace orbis::octree

@@ -9,7 +9,6 @@
 
 #include <orbis/octree/detail/storage/apply_scan.hpp>
 #include <orbis/octree/detail/storage/brick.hpp>
-#include <orbis/octree/detail/storage/update_block.hpp>
 #include <orbis/octree/occupancy_octree-inl.hpp>
 #include <orbis/octree/scan_history.hpp>
 #include <orbis/octree/scan_voxels-inl.hpp>

@@ -26,7 +26,6 @@
 #include <orbis/core/se3.hpp>
 #include <orbis/octree/change_log.hpp>
 #include <orbis/octree/detail/history/brick_uses.hpp>
-#include <orbis/octree/detail/history/replayed_brick.hpp>
 #include <orbis/octree/detail/points/scan_scratch.hpp>
 #include <orbis/octree/integration.hpp>
 #include <orbis/octree/occupancy_octree.hpp>
@@ -94,7 +93,7 @@ class scan_history {
   /// is one already, this one takes its place: corrected poses and later verdicts of filters (pixels set to 0) come in
   /// this way. The summary is that of `integrate`, with all free voxels counted.
   /// O(marking, see scan_marker) + O(bricks observed before and now).
-  /// @pre depth and camera have the same size; options.beam_ranges is empty
+  /// @pre depth and camera have the same size
   template <execution_policy Policy, camera::depth_source Depth, camera::camera_model Camera>
   integration_summary set(const Policy& policy, std::uint64_t frame, const Depth& depth, const Camera& camera,
                           const se3& T_world_camera, const integration_options& options = {}) {

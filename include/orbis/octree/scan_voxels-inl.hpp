@@ -55,7 +55,6 @@ template <class Policy>
 integration_summary scan_marker::mark_depth(const Policy& policy, const voxel_grid& grid,
                                             const detail::depth_scan& scan, const se3& T_world_camera,
                                             const integration_options& options, scan_voxels& voxels) {
-  assert(options.beam_ranges.empty());
   integration_summary summary;
   const detail::scan_masks& masks =
       detail::mark_depth(policy, scratch_.get<detail::scan_buffers>(), grid, scan, T_world_camera, options, summary);

@@ -109,7 +109,7 @@ class scan_marker {
   /// Marks a depth image (metres along the optical axis). Unlike `integrate`, this leaves out no voxel for being
   /// saturated, so that the scan may be applied to any map. The same voxels for every policy. The summary counts what
   /// `integrate` counts. O(pixels + voxels near surfaces + bricks).
-  /// @pre depth and camera have the same size; options.beam_ranges is empty
+  /// @pre depth and camera have the same size
   template <execution_policy Policy, camera::depth_source Depth, camera::camera_model Camera>
   integration_summary mark(const Policy& policy, const voxel_grid& grid, const Depth& depth, const Camera& camera,
                            const se3& T_world_camera, const integration_options& options, scan_voxels& voxels) {

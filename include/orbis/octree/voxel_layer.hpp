@@ -83,14 +83,6 @@ class voxel_layer {
     const octant& o = octants_[i];
     return (o.known >> (code & 63U) & 1U) != 0 ? &o.value[code & 63U] : nullptr;
   }
-  /// The value of voxel `k` for writing, or null if it has none.
-  [[nodiscard]] T* find_writable(const voxel_key& k) {
-    const std::uint64_t code = morton_code(k);
-    const std::uint32_t i = index_.find(code >> 6U);
-    if (i == hash_index::none || (octants_[i].known >> (code & 63U) & 1U) == 0) return nullptr;
-    return &octants_.writable(i).value[code & 63U];
-  }
-
   /// The value of voxel `k`, value-initialised if it had none.
   [[nodiscard]] T& make(const voxel_key& k) {
     const std::uint64_t code = morton_code(k);

@@ -59,7 +59,7 @@ TEST_CASE("bodies that move are no part of the map") {
 }
 
 TEST_CASE("the world of a scene has the scene's surfaces") {
-  const scene room{{.moving_object = true}, 3};
+  const scene room{{.person = true}, 3};
   const world place{room};
   random_bits bits{4};
   for (int i = 0; i != 300; ++i) {

@@ -3,6 +3,7 @@
 /// Any points as one type: what algorithms that are compiled once take.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <concepts>
 #include <cstddef>
@@ -14,9 +15,19 @@
 #include <type_traits>
 #include <vector>
 
+#include <orbis/core/execution.hpp>
 #include <orbis/core/point.hpp>
 
 namespace orbis::cloud::detail {
+
+/// Any policy as the one that algorithms are compiled for: the result is the same for all of them.
+template <execution_policy Policy>
+[[nodiscard]] parallel_policy threads_of(const Policy& policy) noexcept(noexcept(policy.threads())) {
+  if constexpr (std::same_as<Policy, parallel_policy>)
+    return policy;
+  else
+    return {std::max(1U, static_cast<unsigned>(policy.threads()))};
+}
 
 /// Points whose coordinates are numbers of type `S` at the same places in each of them.
 template <std::floating_point S>

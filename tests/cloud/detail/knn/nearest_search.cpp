@@ -101,11 +101,12 @@ TEST_CASE("mean distances of larger clouds equal those of a k-d tree") {
       std::vector<float> expected;
       for (const orbis::vec3f& p : cloud) {
         std::vector<orbis::cloud::neighbor<float>> nearest;
-        orbis::cloud::nearest_sink<float> sink{k + 1, nearest};
-        search.visit({p.x(), p.y(), p.z()}, sink);  // squares, in a heap
-        std::sort_heap(nearest.begin(), nearest.end(), orbis::cloud::nearest_sink<float>::less);
+        search.knn({p.x(), p.y(), p.z()}, k + 1, nearest);
+        std::vector<float> squares;
+        for (const auto& n : nearest) squares.push_back(orbis::test::squared(p, cloud[n.index]));
+        std::sort(squares.begin(), squares.end());
         double sum = 0;
-        for (const auto& n : nearest) sum += std::sqrt(double{n.distance});
+        for (const float s : squares) sum += std::sqrt(double{s});
         expected.push_back(static_cast<float>(sum / static_cast<double>(k)));
       }
       for (const level l : levels) {

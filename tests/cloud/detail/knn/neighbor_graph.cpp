@@ -13,6 +13,7 @@
 #include <orbis/core/execution.hpp>
 
 #include "cloud/clouds.hpp"
+#include "cloud/reference.hpp"
 #include "support/catch.hpp"
 
 using orbis::cloud::neighbor_table;
@@ -74,7 +75,7 @@ TEST_CASE("the rows of a graph are those of the table, whatever the cloud and th
       CHECK(differences(graph, table) == 0);
       CHECK(differences(graph_of(orbis::par.with(3), cloud, k), table) == 0);
       for (const std::size_t averaged : {std::size_t{1}, k}) {
-        const auto expected = orbis::cloud::mean_knn_distance(orbis::seq, table, averaged);
+        const auto expected = orbis::test::mean_distances_of(table, averaged);
         const auto means = graph.mean_distance(orbis::par.with(2), averaged);
         std::size_t wrong = 0;
         for (std::size_t p = 0; p != graph.size(); ++p)

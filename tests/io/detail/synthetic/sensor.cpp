@@ -172,7 +172,7 @@ TEST_CASE("colour noise has the deviation asked for and no bias") {
   const sensor s{o, focal, 5000.0, 1, 0};
   double sum = 0, squares = 0, product = 0;
   for (int y = 0; y != height; ++y) {
-    s.measure_colour(v.color.row(y), y, width, height, 1.0);
+    s.measure_colour(v.color.row(y), y);
     for (const rgb8 c : v.color.row(y)) {
       sum += c.r - 120;
       squares += square(c.r - 120);
@@ -183,27 +183,4 @@ TEST_CASE("colour noise has the deviation asked for and no bias") {
   CHECK(std::abs(sum / n) < 0.1);
   CHECK(std::sqrt(squares / n) == Approx(std::sqrt(9.0 + 1.0 / 12.0)).epsilon(0.03));
   CHECK(std::abs(product / n) < 0.3);  // the channels are independent
-}
-
-TEST_CASE("vignetting darkens the corners and exposure everything") {
-  auto o = io::synthetic_sensor_options::ideal();
-  o.vignetting = 0.4;
-  exact_view v = step_view(1.0, 1.0, 0);
-  const sensor s{o, focal, 5000.0, 1, 0};
-  for (int y = 0; y != height; ++y) s.measure_colour(v.color.row(y), y, width, height, 0.5);
-  CHECK(v.color(0, 0).r == 36);
-  CHECK(v.color(width / 2, height / 2).r == 60);
-}
-
-TEST_CASE("exposure jumps stay within their limits and are off by default") {
-  io::synthetic_sensor_options o;
-  CHECK(exposure_gain(o, 1, 7.7) == 1.0);
-  o.exposure_jumps = 0.2;
-  bool varies = false;
-  for (int i = 0; i != 300; ++i) {
-    const double g = exposure_gain(o, 1, i / 30.0);
-    CHECK(std::abs(g - 1.0) <= 0.2);
-    varies = varies || std::abs(g - exposure_gain(o, 1, 0.0)) > 0.05;
-  }
-  CHECK(varies);
 }

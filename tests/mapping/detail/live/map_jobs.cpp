@@ -101,7 +101,7 @@ TEST_CASE("Frames between keyframes and the images of keyframes that are gone le
   jobs.push({.kind = map_job::between, .frame = 1});
   jobs.push({.kind = map_job::between, .frame = 2});
   jobs.push({.kind = map_job::keyframe, .frame = 3});
-  jobs.push({.kind = map_job::verdict, .frame = 0});
+  jobs.push({.kind = map_job::keyframe, .frame = 7});
   jobs.push({.kind = map_job::removal, .frame = 3});
   CHECK(jobs.pop_frame()->frame == 1);
   jobs.forget({0, 7});

@@ -62,15 +62,13 @@ struct binned {
   rays.start(s.windows, s.origin, count, workers);
   const auto points = std::make_unique<point_batch>();
   const auto batch = std::make_unique<ray_batch>();
-  std::array<double, point_batch::capacity> limits;
-  limits.fill(2.0);
   const voxel_key from = *s.grid.key(s.origin);
   for (std::size_t w = 0; w != workers; ++w) {
     const auto [begin, end] = range(w);
     for (std::size_t i = begin; i < end; i += point_batch::capacity) {
       const std::size_t n = std::min(end - i, point_batch::capacity);
       load_points(point_view{s.points.data()->data(), s.points.size()}, i, n, *points);
-      limit_rays()({s.grid, s.origin, from}, *points, limits.data(), n, *batch);
+      limit_rays()({s.grid, s.origin, from}, *points, 2.0, n, *batch);
       rays.add(w, *batch, i, n);
       for (std::size_t k = 0; k != n; ++k)
         if (((batch->hit[k >> 6U] | batch->cut[k >> 6U]) >> (k & 63U) & 1U) != 0)

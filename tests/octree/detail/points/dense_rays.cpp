@@ -124,8 +124,7 @@ TEST_CASE("Many rays for the voxels pay and few do not") {
   const scan s = random_scan(random, 0, 1.0, vec3::Zero());
   const auto pays = [&](double voxel, std::size_t count) {
     const auto point = [&](std::size_t i) { return s.points[i]; };
-    const auto limit = [&](std::size_t) { return s.limit; };
-    return rays.plan(voxel_grid{voxel}, s.origin, count, point, limit);
+    return rays.plan(voxel_grid{voxel}, s.origin, count, point, s.limit);
   };
   CHECK(pays(1.0, s.points.size()));
   CHECK_FALSE(pays(0.01, s.points.size()));

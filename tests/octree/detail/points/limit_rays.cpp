@@ -23,17 +23,16 @@ constexpr float infinite = std::numeric_limits<float>::infinity();
 [[nodiscard]] bool has(const ray_batch::bits& bits, std::size_t i) { return (bits[i >> 6U] >> (i & 63U) & 1U) != 0; }
 
 /// The rays to some points, one after the other.
-void one_by_one(const ray_frame& f, const point_batch& points, const double* limits, std::size_t count,
-                ray_batch& rays) {
+void one_by_one(const ray_frame& f, const point_batch& points, double max_range, std::size_t count, ray_batch& rays) {
   rays.clear();
   for (std::size_t i = 0; i != count; ++i) {
     float3 end{points.x[i], points.y[i], points.z[i]};
     const float3 ray = difference(end, f.origin);
     const double distance = length(ray);
-    const bool hit = distance <= limits[i];
+    const bool hit = distance <= max_range;
     if (!hit) {
-      if (!(limits[i] >= 0.0) || !std::isfinite(static_cast<float>(distance))) continue;
-      end = cut_off(f.origin, ray, distance, limits[i]);
+      if (!std::isfinite(static_cast<float>(distance))) continue;
+      end = cut_off(f.origin, ray, distance, max_range);
     }
     if (const auto k = f.grid.key(end))
       rays.set(i, end,
@@ -53,11 +52,8 @@ TEST_CASE("Every instruction set finds the same ends of rays, bit for bit") {
   for (int run = 0; run != 300; ++run) {
     const voxel_grid grid{0.1, 8};  // 25.6 m wide
     const std::size_t count = random.below(point_batch::capacity + 1);
-    std::array<double, point_batch::capacity> limits{};
+    const double max_range = random.below(3) == 0 ? std::numeric_limits<double>::infinity() : random.uniform(0.0, 20.0);
     for (std::size_t i = 0; i != count; ++i) {
-      limits[i] = random.uniform(0.0, 20.0);
-      if (random.below(3) == 0) limits[i] = std::numeric_limits<double>::infinity();
-      if (random.below(30) == 0) limits[i] = random.below(2) == 0 ? -1.0 : std::numeric_limits<double>::quiet_NaN();
       for (auto* axis : {&points->x, &points->y, &points->z}) {
         float& c = (*axis)[i];
         c = static_cast<float>(random.uniform(-13.5, 13.5));
@@ -68,10 +64,10 @@ TEST_CASE("Every instruction set finds the same ends of rays, bit for bit") {
     }
     const float3 origin{static_cast<float>(random.uniform(-2.0, 2.0)), 0.05F, run % 3 == 0 ? 0.0F : 0.3F};
     const octree::detail::ray_frame frame{grid, origin, *grid.key(origin)};
-    one_by_one(frame, *points, limits.data(), count, *want);
+    one_by_one(frame, *points, max_range, count, *want);
     for (const simd::level level : simd::available_levels()) {
       const simd::level_limit limit{level};
-      limit_rays()(frame, *points, limits.data(), count, *got);
+      limit_rays()(frame, *points, max_range, count, *got);
       REQUIRE(got->hit == want->hit);
       REQUIRE(got->cut == want->cut);
       for (std::size_t i = 0; i != count; ++i) {
@@ -94,15 +90,13 @@ TEST_CASE("Every instruction set finds the same ends of rays, bit for bit") {
 TEST_CASE("A ray ends at its point or at its limit") {
   const voxel_grid grid{0.1};
   auto points = std::make_unique<point_batch>();
-  points->x = {1.05F, 2.05F, 3.05F, not_a_number};
+  points->x = {1.05F, 2.05F, not_a_number};
   points->y = points->z = {};
-  std::array<double, point_batch::capacity> limits{2.0, 2.0, -1.0, 2.0};
   const octree::detail::ray_frame frame{grid, {0.05F, 0.0F, 0.0F}, *grid.key(float3{0.05F, 0.0F, 0.0F})};
   auto rays = std::make_unique<ray_batch>();
   for (const simd::level level : simd::available_levels()) {
     const simd::level_limit limit{level};
-    limits[1] = 1.51;
-    limit_rays()(frame, *points, limits.data(), 4, *rays);
+    limit_rays()(frame, *points, 1.51, 3, *rays);
     CHECK(rays->hit == ray_batch::bits{1});
     CHECK(rays->cut == ray_batch::bits{2});
     CHECK(rays->way[0][0] == 10);

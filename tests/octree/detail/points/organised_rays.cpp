@@ -60,8 +60,7 @@ namespace {
 
 [[nodiscard]] bool plan(organised_rays& rays, const scan& s) {
   return rays.plan(
-      s.grid, s.origin, s.points.size(), [&](std::size_t i) { return s.points[i]; },
-      [&](std::size_t) { return s.limit; });
+      s.grid, s.origin, s.points.size(), [&](std::size_t i) { return s.points[i]; }, s.limit);
 }
 
 /// One whose camera is found.
@@ -123,7 +122,7 @@ TEST_CASE("Rays that are as far off their pixels as they may be mark the voxels 
       return s.points[i];
     };
     INFO("run " << run);
-    if (!fit.fit(s.origin, s.points.size(), point, [&](std::size_t) { return s.limit; })) continue;
+    if (!fit.fit(s.origin, s.points.size(), point, s.limit)) continue;
     ++fitting;
     const auto& k = fit.camera().k();
     const double e = random.uniform(0.75, 0.97) * fit.error(), right = sign() * e, down = sign() * e;
@@ -252,34 +251,6 @@ TEST_CASE("Close to the border of the grid an organised cloud is left to others"
   while (0.05 * std::ldexp(1.0, depth) < static_cast<double>(most)) ++depth;
   s.grid = voxel_grid{2.0 * static_cast<double>(most) / std::ldexp(1.0, depth) * 1.001, depth};
   CHECK_FALSE(mark(seq, rays, s, masks));
-}
-
-TEST_CASE("A cloud of points and its integrator agree, organised or not, with ranges of its own") {
-  random_bits random{87};
-  organised_rays any;
-  scan_masks want;
-  point_integrator marker;
-  for (int run = 0; run != 12; ++run) {
-    scan s = fitting_scan(random, any, 0.05);
-    s.limit = std::numeric_limits<double>::infinity();
-    std::vector<float> ranges;
-    for (std::size_t i = 0; i != s.points.size(); ++i)
-      ranges.push_back(random.below(3) == 0 ? static_cast<float>(random.uniform(0.1, 1.0)) : 1e9F);
-    want.clear();
-    const voxel_key from = *s.grid.key(s.origin);
-    for (std::size_t i = 0; i != s.points.size(); ++i) {
-      scan one = s;
-      one.points = {s.points[i]};
-      one.limit = static_cast<double>(ranges[i]);
-      const ray_endpoint e = one.end_of(0);
-      if (!std::isfinite(e.point[0]) || !std::isfinite(e.point[1]) || !std::isfinite(e.point[2])) continue;
-      want.mark_ray(s.grid, s.origin, from, e.point, e.key);
-      if (length(difference(s.points[i], s.origin)) <= one.limit) want.mark_occupied(e.key);
-    }
-    marker.mark(run % 2 == 0 ? par.with(1) : par.with(3), s.grid, point_reader{}.view(s.points), s.origin,
-                {.beam_ranges = ranges});
-    REQUIRE(free_voxels(marker.masks(), nullptr) == free_voxels(want, nullptr));
-  }
 }
 
 TEST_CASE("The next organised cloud takes no memory") {

@@ -60,7 +60,7 @@ struct view {
 
 [[nodiscard]] bool fit(pinhole_fit& f, const float3& origin, const std::vector<float3>& points, double limit = 10.0) {
   return f.fit(
-      origin, points.size(), [&](std::size_t i) { return points[i]; }, [&](std::size_t) { return limit; });
+      origin, points.size(), [&](std::size_t i) { return points[i]; }, limit);
 }
 
 /// The largest way from a point to the middle of a pixel, in pixels, and the share of the points outside the image.

@@ -41,8 +41,7 @@ struct reference {
 
   void walk(const float3& end, const voxel_key& to) {
     const auto from = grid.key(origin);
-    if (from && options.rays)
-      traverse_ray(grid, origin, *from, end, to, [&](const voxel_key& k) { seen.free.insert(tuple_of(k)); });
+    if (from) traverse_ray(grid, origin, *from, end, to, [&](const voxel_key& k) { seen.free.insert(tuple_of(k)); });
   }
   /// Where a ray that is too long ends.
   [[nodiscard]] float3 cut(const float3& p, double limit) const {
@@ -55,12 +54,13 @@ struct reference {
     }
     return end;
   }
-  void add(const float3& p, double limit) {
+  void add(const float3& p) {
+    const double limit = options.max_range;
     const double distance = length(difference(p, origin));
     const bool within = distance <= limit;
     const float3 end = within ? p : cut(p, limit);
     const auto to = grid.key(end);
-    if (!to || !(limit >= 0.0) || !std::isfinite(static_cast<float>(distance))) {
+    if (!to || !std::isfinite(static_cast<float>(distance))) {
       ++seen.rejected;
       return;
     }
@@ -73,40 +73,16 @@ struct reference {
     return {static_cast<float>(c.x()), static_cast<float>(c.y()), static_cast<float>(c.z())};
   }
   void add_all(const std::vector<float3>& points) {
-    std::set<voxel> hits, ends;
-    for (std::size_t i = 0; i != points.size(); ++i) {
-      const double own = options.beam_ranges.empty() ? std::numeric_limits<double>::infinity()
-                                                     : static_cast<double>(options.beam_ranges[i]);
-      if (options.mode == ray_mode::every_ray) {
-        add(points[i], own > options.max_range ? options.max_range : own);
-        continue;
-      }
-      const double distance = length(difference(points[i], origin));
-      const bool hit = own >= options.max_range || distance <= own;
-      const auto to = own >= 0.0 ? grid.key(hit ? points[i] : cut(points[i], own)) : std::nullopt;
-      if (to && (hit || std::isfinite(static_cast<float>(distance))))
-        (hit ? hits : ends).insert(tuple_of(*to));
+    std::set<voxel> hits;
+    for (const float3& p : points) {
+      if (options.mode == ray_mode::every_ray)
+        add(p);
+      else if (const auto to = grid.key(p))
+        hits.insert(tuple_of(*to));
       else
         ++seen.rejected;
     }
-    for (const voxel& v : hits) add(center(v), options.max_range);
-    for (const voxel& v : ends) {
-      walk(center(v), *grid.key(center(v)));
-      ++seen.truncated;
-    }
-    if (!options.bounds) return;
-    const auto outside = [&](const voxel& v) {
-      const std::array<std::uint32_t, 3> k{std::get<0>(v), std::get<1>(v), std::get<2>(v)};
-      for (std::size_t i = 0; i != 3; ++i) {
-        const double cell = static_cast<double>(k[i]) - 0.5 * grid.cells();
-        if (cell < std::floor(options.bounds->min[static_cast<Eigen::Index>(i)] / grid.resolution()) ||
-            cell > std::floor(options.bounds->max[static_cast<Eigen::Index>(i)] / grid.resolution()))
-          return true;
-      }
-      return false;
-    };
-    std::erase_if(seen.free, outside);
-    std::erase_if(seen.occupied, outside);
+    for (const voxel& v : hits) add(center(v));
   }
 };
 
@@ -193,42 +169,6 @@ TEST_CASE("Points that are no numbers or absurd are rejected wherever they are")
   CHECK(nowhere.occupied.empty());
 }
 
-TEST_CASE("Without rays points mark their voxels and nothing is free") {
-  random_bits random{193};
-  const auto points = random_scan(random, 500, 1.0);
-  check(voxel_grid{0.1}, points, {0.1F, 0.1F, 0.1F}, {.max_range = 1.2, .rays = false});
-  point_integrator marker;
-  const auto seen = marked(seq, marker, voxel_grid{0.1}, points, {}, {.rays = false});
-  CHECK(seen.free.empty());
-  CHECK(seen.occupied.size() > 100);
-}
-
-TEST_CASE("Bounds leave what is outside alone and change nothing inside") {
-  random_bits random{194};
-  const auto points = random_scan(random, 500, 1.0);
-  constexpr double inf = std::numeric_limits<double>::infinity();
-  for (const bounding_box& bounds :
-       {bounding_box{{-0.35, -0.2, -0.51}, {0.4, 0.62, 0.1}}, bounding_box{{0.5, 0.5, 0.5}, {0.9, 0.9, 0.9}},
-        bounding_box{{-inf, -inf, -inf}, {inf, 0.05, inf}}, bounding_box{{0.01, 0.01, 0.01}, {0.02, 0.02, 0.02}},
-        bounding_box{{1e9, -1.0, -1.0}, {inf, 1.0, 1.0}}})
-    check(voxel_grid{0.1}, points, {0.1F, -0.1F, 0.7F}, {.max_range = 1.3, .bounds = bounds});
-}
-
-TEST_CASE("Every beam may have a range of its own") {
-  random_bits random{195};
-  auto points = random_scan(random, 900, 1.0);
-  points[50] = {infinite, 0.0F, 0.0F};
-  points[51] = {1e30F, 1e30F, 0.0F};
-  std::vector<float> ranges(points.size());
-  for (float& r : ranges) r = static_cast<float>(random.uniform(0.2, 1.6));
-  for (std::size_t i = 0; i < ranges.size(); i += 9) ranges[i] = infinite;
-  for (std::size_t i = 1; i < ranges.size(); i += 30) ranges[i] = not_a_number;
-  for (std::size_t i = 2; i < ranges.size(); i += 30) ranges[i] = -1.0F;
-  for (std::size_t i = 3; i < ranges.size(); i += 30) ranges[i] = 0.0F;
-  for (const double max_range : {std::numeric_limits<double>::infinity(), 0.8})
-    check(voxel_grid{0.1}, points, {0.1F, 0.2F, 0.3F}, {.max_range = max_range, .beam_ranges = ranges});
-}
-
 TEST_CASE("An origin outside the grid marks points and no rays") {
   check(voxel_grid{0.1}, {{1.0F, 0.0F, 0.0F}, {3000.0F, 0.0F, 0.0F}}, {5000.0F, 0.0F, 0.0F}, {});
 }
@@ -284,22 +224,16 @@ TEST_CASE("The second of two equal scans allocates nothing") {
   random_bits random{198};
   const auto points = random_scan(random, 20000, 2.0);
   const voxel_grid grid{0.05};
-  const std::vector<float> ranges(points.size(), 1.7F);
-  for (const ray_mode mode : {ray_mode::every_ray, ray_mode::discretized})
-    for (const bool with_options : {false, true}) {
-      point_integrator marker;
-      integration_options options{.max_range = 2.5, .mode = mode};
-      if (with_options) {
-        options.bounds = bounding_box{{-1.0, -1.0, -1.0}, {1.0, 1.0, 1.0}};
-        options.beam_ranges = ranges;
-      }
-      const auto scan = [&] { return marker.mark(seq, grid, point_reader{}.view(points), float3{}, options); };
-      scan();
-      const std::size_t bytes = marker.memory_bytes();
-      CHECK(bytes < (std::size_t{32} << 20U));
-      const std::size_t before = test::allocations();
-      scan();
-      if (test::counts_allocations()) CHECK(test::allocations() == before);
-      CHECK(marker.memory_bytes() == bytes);
-    }
+  for (const ray_mode mode : {ray_mode::every_ray, ray_mode::discretized}) {
+    point_integrator marker;
+    const integration_options options{.max_range = 2.5, .mode = mode};
+    const auto scan = [&] { return marker.mark(seq, grid, point_reader{}.view(points), float3{}, options); };
+    scan();
+    const std::size_t bytes = marker.memory_bytes();
+    CHECK(bytes < (std::size_t{32} << 20U));
+    const std::size_t before = test::allocations();
+    scan();
+    if (test::counts_allocations()) CHECK(test::allocations() == before);
+    CHECK(marker.memory_bytes() == bytes);
+  }
 }

@@ -49,9 +49,17 @@ void check(const voxel_grid& grid, const float3& origin, const std::vector<ray>&
     const simd::level_limit limit{level};
     scan_masks swept;
     sweep.start(grid, origin, *from);
+    octree::detail::ray_batch batch;
+    std::size_t waiting = 0;
     for (const ray& r : rays) {
-      sweep.add(r.end, *grid.key(r.end), r.hit, swept);
-      if (r.hit) swept.mark_occupied(*grid.key(r.end));
+      const voxel_key to = *grid.key(r.end);
+      const auto way = [](std::uint32_t a, std::uint32_t b) { return static_cast<std::int32_t>(b - a); };
+      batch.set(waiting, r.end, {way(from->x, to.x), way(from->y, to.y), way(from->z, to.z)}, r.hit);
+      if (r.hit) swept.mark_occupied(to);
+      if (++waiting != octree::detail::ray_batch::capacity && &r != &rays.back()) continue;
+      sweep.add(batch, waiting, swept);
+      batch.clear();
+      waiting = 0;
     }
     sweep.flush(swept);
     INFO(grid.resolution() << " m, level " << static_cast<int>(level));

@@ -70,7 +70,7 @@ template <class Policy, class Rays>
   const std::size_t count = s.points.size();
   const point_view point{s.points.data()->data(), count};
   // Whether it is the fastest way does not matter here.
-  [[maybe_unused]] const bool pays = rays.plan(s.grid, s.origin, count, point, [&](std::size_t) { return s.limit; });
+  [[maybe_unused]] const bool pays = rays.plan(s.grid, s.origin, count, point, s.limit);
   const std::size_t workers = policy.threads(), share = (count / workers + 256) & ~std::size_t{255};
   const auto range = [&](std::size_t w) {
     return std::pair{std::min(count, w * share), std::min(count, (w + 1) * share)};
@@ -78,8 +78,6 @@ template <class Policy, class Rays>
   const voxel_key from = *s.grid.key(s.origin);
   const auto points = std::make_unique<point_batch>();
   const auto batch = std::make_unique<ray_batch>();
-  std::array<double, point_batch::capacity> limits;
-  limits.fill(s.limit);
   masks.clear();
   rays.start(s.origin, count, workers);
   for (std::size_t w = 0; w != workers; ++w) {
@@ -87,7 +85,7 @@ template <class Policy, class Rays>
     for (std::size_t i = begin; i < end; i += point_batch::capacity) {
       const std::size_t n = std::min(end - i, point_batch::capacity);
       load_points(point, i, n, *points);
-      limit_rays()({s.grid, s.origin, from}, *points, limits.data(), n, *batch);
+      limit_rays()({s.grid, s.origin, from}, *points, s.limit, n, *batch);
       for (std::size_t k = 0; k != n; ++k)
         if ((batch->hit[k >> 6U] >> (k & 63U) & 1U) != 0) masks.mark_occupied(s.end_of(i + k).key);
       rays.add(w, *batch, i, n);

@@ -48,32 +48,6 @@ TEST_CASE("What is marked is listed, once") {
   CHECK(masks.bricks().empty());
 }
 
-TEST_CASE("Clipped masks hold what lies inside and can be marked again") {
-  random_bits random{182};
-  for (int run = 0; run != 20; ++run) {
-    scan_masks masks;
-    voxels expected;
-    std::array<std::uint32_t, 3> low, high;
-    for (std::size_t axis = 0; axis != 3; ++axis) {
-      low[axis] = 995 + random.below(30);
-      high[axis] = low[axis] + random.below(30);
-    }
-    for (int i = 0; i != 3000; ++i) {
-      const auto at = [&] { return 1000 + static_cast<std::uint32_t>(random.below(40)); };
-      const voxel_key k{at(), at(), at()};
-      masks.mark_free(k);
-      const auto inside = [&](std::uint32_t c, std::size_t axis) { return low[axis] <= c && c <= high[axis]; };
-      if (inside(k.x, 0) && inside(k.y, 1) && inside(k.z, 2)) expected.emplace(k.x, k.y, k.z);
-    }
-    masks.clip({{low[0], low[1], low[2]}, {high[0], high[1], high[2]}});
-    CHECK(listed(masks, &scan_brick::free) == expected);
-    for (const scan_brick& b : masks.bricks()) CHECK(b.free != decltype(b.free){});
-    masks.mark_free({1003, 1004, 1005});
-    expected.emplace(1003, 1004, 1005);
-    CHECK(listed(masks, &scan_brick::free) == expected);
-  }
-}
-
 TEST_CASE("The memory of a scan is given back once much less is needed") {
   scan_masks masks;
   for (std::uint32_t i = 0; i != 100000; ++i) masks.mark_free({8 * (i % 1000), 8 * (i / 1000), 0});

@@ -15,7 +15,6 @@
 
 #include <orbis/cloud/detail/knn/knn_kernels.hpp>
 #include <orbis/cloud/detail/knn/leaf_hierarchy.hpp>
-#include <orbis/cloud/detail/knn/line_vector.hpp>
 #include <orbis/cloud/detail/knn/squared_distance.hpp>
 
 namespace orbis::cloud::detail {

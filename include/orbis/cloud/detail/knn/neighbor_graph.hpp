@@ -122,7 +122,7 @@ class neighbor_graph {
     }
   }
   /// For each place the mean distance to its first `k` neighbours, or to all where there are fewer, metres; NaN where
-  /// there are none. What `mean_knn_distance` is to a `neighbor_table`. O(n k). @pre k > 0
+  /// there are none. O(n k). @pre k > 0
   template <execution_policy Policy>
   [[nodiscard]] std::vector<float> mean_distance(const Policy& policy, std::size_t k) const {
     const std::size_t count = std::min(k, width_);

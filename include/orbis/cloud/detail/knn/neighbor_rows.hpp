@@ -136,7 +136,7 @@ inline float write_row(rank_sorter& gathered, std::uint32_t self, std::span<neig
     last_squared = distance_squared;
     return written != row.size();
   });
-  if (!in_order) std::sort(row.begin(), row.end(), nearest_sink<float>::less);
+  if (!in_order) std::sort(row.begin(), row.end(), is_nearer<float>);
   return last_squared;
 }
 

@@ -181,7 +181,6 @@ void judge_points(const Policy& policy, surroundings& around, const select_optio
     return share;
   };
   const auto test = [&](reference r, const test_manner& manner) {
-    if (!options.allows(r.step.mode)) return;
     r.step.surface_spacing = usual.step.usual;
     density_evidence found = find_threshold(policy, around, r, manner);
     if (std::isfinite(found.threshold)) {
@@ -201,28 +200,23 @@ void judge_points(const Policy& policy, surroundings& around, const select_optio
   }
   test(local, {.lowest = 1.0, .shoulders = false});
 
-  if (options.allows(filter_mode::isolation)) {
-    isolation_step step;
-    step.neighbors = options.neighbors;
-    step.usual = usual.step.usual;
-    step.offset = local.step.offset;
-    evidence.isolated = try_step(step);
-    if (evidence.isolated > 0) {
-      reasons.push_back(joined({percent(evidence.isolated), " are groups of fewer than ", std::to_string(step.min_size),
-                                " points further than ", in_words(step.reach), " usual spacings from all others"}));
-    }
-  }
-  if (options.allows(filter_mode::cluster)) {
-    cluster_options step;
-    step.min_size = std::clamp<std::size_t>(around.size() / 125, 30, 300);
-    step.min_gap = 4;
-    evidence.clustered = try_step(step);
-    if (evidence.clustered > 0) {
-      reasons.push_back(
-          joined({percent(evidence.clustered), " are clusters of fewer than ", std::to_string(step.min_size),
-                  " points that hang ", in_words(step.min_gap), " spacings or more from the surface"}));
-    }
-  }
+  isolation_step isolation;
+  isolation.neighbors = options.neighbors;
+  isolation.usual = usual.step.usual;
+  isolation.offset = local.step.offset;
+  evidence.isolated = try_step(isolation);
+  if (evidence.isolated > 0)
+    reasons.push_back(
+        joined({percent(evidence.isolated), " are groups of fewer than ", std::to_string(isolation.min_size),
+                " points further than ", in_words(isolation.reach), " usual spacings from all others"}));
+  cluster_options cluster;
+  cluster.min_size = std::clamp<std::size_t>(around.size() / 125, 30, 300);
+  cluster.min_gap = 4;
+  evidence.clustered = try_step(cluster);
+  if (evidence.clustered > 0)
+    reasons.push_back(
+        joined({percent(evidence.clustered), " are clusters of fewer than ", std::to_string(cluster.min_size),
+                " points that hang ", in_words(cluster.min_gap), " spacings or more from the surface"}));
 }
 
 }  // namespace orbis::cloud::detail

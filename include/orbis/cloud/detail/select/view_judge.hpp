@@ -104,7 +104,7 @@ template <execution_policy Policy, posed_depth_range Views, camera::camera_model
                                std::vector<std::string>& reasons, progress on_progress) {
   filter_evidence& evidence = choice.evidence;
   evidence.views = std::ranges::size(views);
-  if (evidence.views == 0 || !options.allows(filter_mode::ray_evidence)) return true;
+  if (evidence.views == 0) return true;
   ray_step step;
   bool cancelled = false;
   const std::size_t count = evidence.views;

@@ -10,7 +10,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
-#include <ranges>
+#include <span>
 #include <type_traits>
 #include <utility>
 #include <vector>
@@ -22,28 +22,65 @@
 #include <orbis/core/execution.hpp>
 #include <orbis/core/image.hpp>
 #include <orbis/core/point.hpp>
+#include <orbis/core/point_cloud.hpp>
 #include <orbis/core/random.hpp>
 #include <orbis/core/table_memory.hpp>
 
 namespace orbis::cloud::detail {
 
-/// What is left of a voxel in the end.
+/// What is left of a voxel in the end: the mean of its points, and of their colours.
 struct voxel_summary {
-  std::array<std::uint32_t, 3> words{};
+  std::array<float, 3> position{};
   rgb8 color;
 };
 
 /// How points become voxels: each voxel has a record, first `empty`, to which its points are added one after another in
 /// the order of the cloud, and `put(number, summary)` is called once for each voxel, numbered in the order in which
 /// they are first seen, after `resize(count)`. Different voxels at the same time.
-template <class F>
-concept voxel_fold = requires(const F& fold, F& out, typename F::record& r, std::uint32_t i) {
-  { F::has_colors } -> std::convertible_to<bool>;
-  { F::empty } -> std::convertible_to<typename F::record>;
-  fold.add(r, i, std::array<double, 3>{});
-  { fold.summary(std::as_const(r)) } -> std::same_as<voxel_summary>;
-  out.resize(std::size_t{});
-  out.put(i, voxel_summary{});
+template <bool Colored>
+struct centroid_fold {
+  struct plain_record {
+    std::array<double, 3> position;
+    std::uint32_t count;
+  };
+  struct colored_record : plain_record {
+    std::array<std::uint64_t, 3> color;
+  };
+  using record = std::conditional_t<Colored, colored_record, plain_record>;
+  static constexpr record empty{};
+
+  std::span<const rgb8> colors;
+  point_cloud& out;
+
+  void add(record& r, std::uint32_t i, const std::array<double, 3>& p) const {
+    for (std::size_t a = 0; a != 3; ++a) r.position[a] += p[a];
+    if constexpr (Colored) {
+      r.color[0] += colors[i].r;
+      r.color[1] += colors[i].g;
+      r.color[2] += colors[i].b;
+    }
+    ++r.count;
+  }
+  [[nodiscard]] voxel_summary summary(const record& r) const {
+    voxel_summary out;
+    const auto mean = [&](double sum) { return r.count == 1 ? sum : sum / r.count; };  // many voxels have one point
+    for (std::size_t a = 0; a != 3; ++a) out.position[a] = static_cast<float>(mean(r.position[a]));
+    if constexpr (Colored) {
+      const auto channel = [&](std::size_t c) {
+        return static_cast<std::uint8_t>((r.color[c] + r.count / 2) / r.count);  // rounded
+      };
+      out.color = {channel(0), channel(1), channel(2)};
+    }
+    return out;
+  }
+  void resize(std::size_t count) {
+    out.points.resize(count);
+    if constexpr (Colored) out.colors.resize(count);
+  }
+  void put(std::uint32_t number, const voxel_summary& s) {
+    out.points[number] = {s.position[0], s.position[1], s.position[2]};
+    if constexpr (Colored) out.colors[number] = s.color;
+  }
 };
 
 /// Takes the points of [begin, end) into `block`, as many at a time as it holds, and calls `f(from, count)` for those
@@ -60,10 +97,10 @@ void for_each_block(point_block<S, CubeBits>& block, const basic_point_view<S>& 
 }
 
 /// One pass with one table, first for `expected` voxels, which gives up at more than `most`: false.
-template <std::floating_point S, voxel_fold Fold>
+template <std::floating_point S, bool Colored>
 [[nodiscard]] bool fold_in_one_table(const basic_point_view<S>& points, double size, std::size_t expected,
-                                     std::size_t most, Fold& fold) {
-  voxel_table<typename Fold::record> table{fold.empty};
+                                     std::size_t most, centroid_fold<Colored>& fold) {
+  voxel_table<typename centroid_fold<Colored>::record> table{fold.empty};
   point_block<S> block{size};
   const std::size_t count = points.size();
   table.clear(expected);
@@ -93,8 +130,11 @@ template <std::floating_point S, voxel_fold Fold>
 ///
 /// Source: Shatdal, Kant, Naughton, "Cache conscious algorithms for relational query processing", VLDB 1994
 /// (partitioning before hashing).
-template <std::floating_point S, voxel_fold Fold>
+template <std::floating_point S, bool Colored>
 class voxel_parts {
+  using fold_type = centroid_fold<Colored>;
+  using table_type = voxel_table<typename fold_type::record>;
+
  public:
   voxel_parts(const basic_point_view<S>& points, double size)
       : points_{points},
@@ -105,16 +145,16 @@ class voxel_parts {
         part_of_{std::make_unique_for_overwrite<std::uint16_t[]>(count_)} {}
 
   template <execution_policy Policy>
-  void fold(const Policy& policy, Fold& fold) {
+  void fold(const Policy& policy, fold_type& fold) {
     distribute(policy);
     std::unique_ptr<rgb8[]> colors;
-    if constexpr (Fold::has_colors) colors = std::make_unique_for_overwrite<rgb8[]>(starts_.back());
+    if constexpr (Colored) colors = std::make_unique_for_overwrite<rgb8[]>(starts_.back());
     std::vector<std::uint32_t> voxels(parts());
     // Few chunks, as each has a table of its own.
     const std::size_t chunks = policy.threads() <= 1 ? 1 : std::size_t{8} * policy.threads();
     const std::size_t width = std::max<std::size_t>(1, parts() / chunks);
     for_each_chunk(policy, parts(), width, [&](std::size_t begin, std::size_t end) {
-      voxel_table<typename Fold::record> table{fold.empty};
+      table_type table{fold.empty};
       point_block<S> block{size_};
       for (std::size_t part = begin; part != end; ++part) {
         table.clear(std::min<std::size_t>(starts_[part + 1] - starts_[part], usual_voxels));
@@ -122,8 +162,8 @@ class voxel_parts {
         std::size_t at = starts_[part];
         for (const auto& row : table.rows()) {  // what is left of them takes the place of the points
           const voxel_summary summary = fold.summary(row.record);
-          if constexpr (Fold::has_colors) colors[at] = summary.color;
-          entries_[at++] = {summary.words, row.first};
+          if constexpr (Colored) colors[at] = summary.color;
+          entries_[at++] = {std::bit_cast<std::array<std::uint32_t, 3>>(summary.position), row.first};
           part_of_[row.first] = first_of_voxel;
         }
         voxels[part] = static_cast<std::uint32_t>(table.rows().size());
@@ -133,7 +173,8 @@ class voxel_parts {
     fold.resize(firsts.count());
     for_each_index(policy, parts(), 8, [&](std::size_t part) {
       for (std::size_t at = starts_[part]; at != starts_[part] + voxels[part]; ++at)
-        fold.put(firsts.number_of(entries_[at].index), {entries_[at].words, Fold::has_colors ? colors[at] : rgb8{}});
+        fold.put(firsts.number_of(entries_[at].index),
+                 {std::bit_cast<std::array<float, 3>>(entries_[at].words), Colored ? colors[at] : rgb8{}});
     });
   }
 
@@ -145,7 +186,7 @@ class voxel_parts {
   static constexpr std::uint16_t first_of_voxel = 0xfffe;
   static constexpr bool keeps_coordinates = std::is_same_v<S, float>;
 
-  /// A point: its coordinates as float, or its key where they are double; later a voxel's words and first point.
+  /// A point: its coordinates as float, or its key where they are double; later a voxel's centroid and first point.
   struct entry {
     std::array<std::uint32_t, 3> words;
     std::uint32_t index;
@@ -225,8 +266,7 @@ class voxel_parts {
     });
   }
 
-  void fill(voxel_table<typename Fold::record>& table, point_block<S>& block, std::size_t part,
-            const Fold& fold) const {
+  void fill(table_type& table, point_block<S>& block, std::size_t part, const fold_type& fold) const {
     const std::size_t end = starts_[part + 1];
     const auto add = [&](const voxel_key& key, std::uint32_t hash, std::uint32_t index,
                          const std::array<double, 3>& p) {
@@ -299,19 +339,19 @@ template <std::floating_point S>
   return twice == 0 ? at_most : std::min(at_most, 2 * table.rows().size() + once * once / twice);
 }
 
-/// Gathers the points of every voxel, see `voxel_fold`; the same for every policy. Points that have no cell are left
+/// Gathers the points of every voxel, see `centroid_fold`; the same for every policy. Points that have no cell are left
 /// out. O(n). Memory: for at most 2^17 points on one thread a table for them, else 20 bytes per point, 25 with
 /// colours; besides, for a while, a table that turns out to be too small, or that of the largest part.
 /// @pre size > 0, fewer than 2^32 - 1 points
-template <execution_policy Policy, std::floating_point S, voxel_fold Fold>
-void fold_voxels(const Policy& policy, const basic_point_view<S>& points, double size, Fold&& fold) {
+template <execution_policy Policy, std::floating_point S, bool Colored>
+void fold_voxels(const Policy& policy, const basic_point_view<S>& points, double size, centroid_fold<Colored> fold) {
   constexpr std::size_t small = std::size_t{1} << 12U, medium = std::size_t{1} << 17U;
   const std::size_t count = points.size();
   if (count <= small || policy.threads() <= 1) {
     const std::size_t expected = count <= small ? count : estimated_voxels(points, size);
     if ((count <= medium || expected <= medium / 2) && fold_in_one_table(points, size, expected, medium, fold)) return;
   }
-  voxel_parts<S, std::remove_cvref_t<Fold>>{points, size}.fold(policy, fold);
+  voxel_parts<S, Colored>{points, size}.fold(policy, fold);
 }
 
 }  // namespace orbis::cloud::detail

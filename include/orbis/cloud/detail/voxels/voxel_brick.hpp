@@ -14,7 +14,7 @@
 #include <utility>
 #include <vector>
 
-#include <orbis/cloud/detail/voxels/voxel_hash.hpp>
+#include <orbis/cloud/detail/voxels/voxel_key.hpp>
 #include <orbis/core/image.hpp>
 
 namespace orbis::cloud::detail {

@@ -4,12 +4,24 @@
 #pragma once
 
 #include <array>
+#include <bit>
 #include <cstdint>
+
+#include <orbis/core/random.hpp>
 
 namespace orbis::cloud::detail {
 
 /// A cell of a grid through the origin.
 using voxel_key = std::array<std::int32_t, 3>;
+
+/// 64 well-mixed bits of a voxel's key.
+struct voxel_key_hash {
+  [[nodiscard]] std::uint64_t operator()(const voxel_key& key) const noexcept {
+    const std::uint64_t low = std::bit_cast<std::uint32_t>(key[0]) | std::uint64_t{std::bit_cast<std::uint32_t>(key[1])}
+                                                                         << 32U;
+    return mix64(low ^ mix64(std::bit_cast<std::uint32_t>(key[2])));
+  }
+};
 
 /// Whether a number of `voxel_cells` is that of a cell.
 [[nodiscard]] constexpr bool is_cell(std::int32_t cell) noexcept { return cell > -2147483647 && cell < 2147483647; }

@@ -147,7 +147,7 @@ struct png_encoder {
   ~png_encoder() { png_destroy_write_struct(&png, &info); }
 
   bool write(std::string* to, const unsigned char* pixels, std::ptrdiff_t stride_bytes, std::uint32_t width,
-             std::uint32_t height, int bits, int color_type, int compression) {
+             std::uint32_t height, int bits, int color_type) {
     if (setjmp(trouble.jump) != 0) return false;
     png = png_create_write_struct(PNG_LIBPNG_VER_STRING, &trouble, png_on_error, png_on_warning);
     if (png == nullptr) return false;
@@ -155,7 +155,7 @@ struct png_encoder {
     if (info == nullptr) return false;
     png_set_write_fn(png, to, png_give, [](png_structp) {});
     png_set_user_limits(png, 0x7fffffff, 0x7fffffff);
-    png_set_compression_level(png, compression);
+    png_set_compression_level(png, 6);
     png_set_IHDR(png, info, width, height, bits, color_type, PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT,
                  PNG_FILTER_TYPE_DEFAULT);
     png_write_info(png, info);
@@ -168,22 +168,22 @@ struct png_encoder {
 };
 
 template <class T>
-std::string encode_png(image_view<const T> view, int compression) {
-  assert(!view.empty() && compression >= 0 && compression <= 9);
+std::string encode_png(image_view<const T> view) {
+  assert(!view.empty());
   std::string bytes;
   png_encoder encoder;
   if (!encoder.write(&bytes, reinterpret_cast<const unsigned char*>(view.data()),
                      view.stride() * static_cast<std::ptrdiff_t>(sizeof(T)), static_cast<std::uint32_t>(view.width()),
                      static_cast<std::uint32_t>(view.height()), std::same_as<T, std::uint16_t> ? 16 : 8,
-                     std::same_as<T, rgb8> ? PNG_COLOR_TYPE_RGB : PNG_COLOR_TYPE_GRAY, compression))
+                     std::same_as<T, rgb8> ? PNG_COLOR_TYPE_RGB : PNG_COLOR_TYPE_GRAY))
     throw std::bad_alloc{};  // nothing else can go wrong in memory
   return bytes;
 }
 
 template <class T>
-result<void> write_png(const std::filesystem::path& path, image_view<const T> view, int compression) {
+result<void> write_png(const std::filesystem::path& path, image_view<const T> view) {
   if (view.empty()) return fail(errc::invalid_argument, path.string(), "an empty image cannot be written as PNG");
-  const std::string bytes = encode_png(view, compression);
+  const std::string bytes = encode_png(view);
   return write_file_atomically(
       path, [&](std::ostream& out) { out.write(bytes.data(), static_cast<std::streamsize>(bytes.size())); });
 }

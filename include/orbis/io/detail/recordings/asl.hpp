@@ -25,7 +25,6 @@
 #include <orbis/core/se3.hpp>
 #include <orbis/core/trajectory.hpp>
 #include <orbis/io/detail/files/plain_yaml.hpp>
-#include <orbis/io/detail/recordings/paired_images.hpp>
 #include <orbis/io/detail/recordings/recording_folder.hpp>
 #include <orbis/io/detail/recordings/recording_index.hpp>
 #include <orbis/io/detail/recordings/seven_scenes.hpp>

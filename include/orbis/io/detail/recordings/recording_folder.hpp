@@ -13,11 +13,21 @@
 #include <system_error>
 #include <vector>
 
+#include <orbis/core/image.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/core/trajectory.hpp>
 #include <orbis/io/detail/recordings/recording_index.hpp>
 
 namespace orbis::io::detail {
+
+/// The image that was read from `path`, if it has the size of its camera. Errors: malformed, and those of `read`.
+template <class T>
+[[nodiscard]] result<image<T>> sized(result<image<T>> read, const std::filesystem::path& path, int width, int height) {
+  if (!read || (read->width() == width && read->height() == height)) return read;
+  return fail(errc::malformed, path.string(),
+              "the image has " + std::to_string(read->width()) + "x" + std::to_string(read->height()) +
+                  " pixels, the camera " + std::to_string(width) + "x" + std::to_string(height));
+}
 
 /// Gives every frame the ground truth's pose at its time: interpolated where poses are at most 0.2 s
 /// apart, else the nearest within `max_distance` seconds.

@@ -89,8 +89,7 @@ struct painted_solids {
   return looks;
 }
 
-/// A furnished room as it looks. Its moving object is lit as in the middle of its way, the
-/// person as at the beginning.
+/// A furnished room as it looks. The person is lit as at the beginning.
 [[nodiscard]] inline painted_solids painted(const scene& room) {
   painted_solids all{room.solids(), {}, {{0.0, 0.0, room.options().height - 0.5}}};
   for (const solid& s : all.solids)

@@ -71,7 +71,6 @@ class scene {
     first_poor_wall_ = static_cast<int>(bits_.below(4));
     if (options.furniture) furnish();
     still_ = solids_.size();
-    if (options.moving_object) add(shape::box, {0.0, 0.0, 0.8}, {0.2, 0.15, 0.8}, material::clutter);
     if (options.person) {
       person_seed_ = bits_();
       for (const solid& s : person_at(0.0)) solids_.push_back(s);
@@ -80,14 +79,9 @@ class scene {
 
   /// The surfaces: first the room itself, then all that stands in it.
   [[nodiscard]] const std::vector<solid>& solids() const noexcept { return solids_; }
-  /// The surfaces `time` seconds after the beginning: only those of the moving object and of the person are elsewhere.
+  /// The surfaces `time` seconds after the beginning: only those of the person are elsewhere.
   [[nodiscard]] std::vector<solid> solids_at(double time) const {
     std::vector<solid> now = solids_;
-    if (options_.moving_object) {
-      const double across = sin_turns(time / 24.0), along = cos_turns(time / 24.0);
-      now[still_].centre.x = 1.6 * across;
-      now[still_].centre.y = 1.3 * along;
-    }
     if (options_.person) {
       const body_parts parts = person_at(time);
       std::copy(parts.begin(), parts.end(), now.end() - static_cast<std::ptrdiff_t>(parts.size()));

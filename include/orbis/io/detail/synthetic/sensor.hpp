@@ -23,13 +23,6 @@ namespace orbis::io::detail::synthetic {
 /// The published deviation (metres) of depth `z` (metres).
 [[nodiscard]] inline double axial_deviation(double z) noexcept { return 0.0012 + 0.0019 * (z - 0.4) * (z - 0.4); }
 
-/// The factor on all colours at `time` seconds: a level that changes every second or so.
-[[nodiscard]] inline double exposure_gain(const synthetic_sensor_options& options, std::uint64_t seed,
-                                          double time) noexcept {
-  const auto level = static_cast<std::uint64_t>(floor_of(0.8 * time));
-  return 1.0 + options.exposure_jumps * (2.0 * upper_fraction(noise_word(seed, 0x65787073ULL, level)) - 1.0);
-}
-
 /// Applies the errors of one frame, row by row; rows do not depend on each other's results.
 class sensor {
  public:
@@ -70,26 +63,20 @@ class sensor {
   }
 
   /// The colours of row `y` as the camera gives them.
-  void measure_colour(std::span<rgb8> row, int y, int width, int height, double exposure_gain) const noexcept {
-    const bool plain = options_.vignetting == 0.0 && exposure_gain == 1.0;
-    if (plain && options_.colour_noise == 0.0) return;
+  void measure_colour(std::span<rgb8> row, int y) const noexcept {
+    if (options_.colour_noise == 0.0) return;
     const auto sigma = static_cast<float>(options_.colour_noise * 0.015625476858987186);  // of the sum below
     const std::uint64_t key = noise_word(seed_, 2, static_cast<std::uint64_t>(y)) << 16U;
-    const double cx = 0.5 * (width - 1), cy = 0.5 * (height - 1), corner = cx * cx + cy * cy;
-    for (int x = 0; x != width; ++x) {
-      float gain = 1.0F;
-      if (!plain)
-        gain = static_cast<float>(exposure_gain *
-                                  (1.0 - options_.vignetting * ((x - cx) * (x - cx) + (y - cy) * (y - cy)) / corner));
-      const std::uint64_t word = mix64(key + static_cast<std::uint64_t>(x));
+    for (std::size_t x = 0; x != row.size(); ++x) {
+      const std::uint64_t word = mix64(key + x);
       const auto channel = [&](std::uint8_t value, unsigned shift) {
         // The sum of three uniforms of 7 bits: close enough to normal for colours.
         const std::uint64_t w = word >> shift;
         const auto sum = static_cast<float>(static_cast<int>((w & 127U) + ((w >> 7U) & 127U) + ((w >> 14U) & 127U)));
-        const float v = gain * static_cast<float>(value) + sigma * (sum - 190.5F);
+        const float v = static_cast<float>(value) + sigma * (sum - 190.5F);
         return static_cast<std::uint8_t>(std::clamp(v, 0.0F, 255.0F) + 0.5F);
       };
-      rgb8& p = row[static_cast<std::size_t>(x)];
+      rgb8& p = row[x];
       p = {channel(p.r, 0), channel(p.g, 21), channel(p.b, 42)};
     }
   }

@@ -91,11 +91,10 @@ class simulator {
     f.T_world_camera = at(time).pose.T_world_camera();
     f.depth = image<std::uint16_t>(k_.width, k_.height);
     const sensor errors{sensor_, k_.fx, depth_scale_, seed_, key};
-    const double gain = exposure_gain(sensor_, seed_, time);
     for_each_index(policy, static_cast<std::size_t>(k_.height), renderer::tile, [&](std::size_t row) {
       const int y = static_cast<int>(row);
       errors.measure_depth(seen, y, f.depth.row(y));
-      errors.measure_colour(seen.color.row(y), y, k_.width, k_.height, gain);
+      errors.measure_colour(seen.color.row(y), y);
     });
     f.color = std::move(seen.color);
     return f;
@@ -110,14 +109,13 @@ class simulator {
       m.pose.position = m.pose.position + baseline * m.pose.right;
       return m;
     };
-    const double gain = exposure_gain(sensor_, seed_, time);
     const auto picture = [&](const auto& from, std::uint64_t noise) {
       image<rgb8> color = color_view(policy, from, time).color;
       if (sensor_.motion_blur > 1) blur(policy, from, time, color);
       const sensor errors{sensor_, k_.fx, depth_scale_, noise, key};
       for_each_index(policy, static_cast<std::size_t>(k_.height), renderer::tile, [&](std::size_t row) {
         const int y = static_cast<int>(row);
-        errors.measure_colour(color.row(y), y, k_.width, k_.height, gain);
+        errors.measure_colour(color.row(y), y);
       });
       return color;
     };

@@ -20,7 +20,7 @@
 namespace orbis::mapping::detail {
 
 struct map_job {
-  enum kind_type : std::uint8_t { keyframe, between, verdict, removal, positions, finish, poll };
+  enum kind_type : std::uint8_t { keyframe, between, removal, positions, finish, poll };
   kind_type kind = keyframe;
   std::uint64_t frame = 0;
   std::uint64_t keyframe_of = 0;
@@ -32,7 +32,7 @@ struct map_job {
   unlisted others = unlisted::keep;
   std::chrono::steady_clock::time_point since{};
 
-  [[nodiscard]] bool has_image() const noexcept { return kind <= verdict; }
+  [[nodiscard]] bool has_image() const noexcept { return kind <= between; }
 };
 
 /// A queue. Whoever bounds the images in it bounds the queue: between two of them, poses are kept once a keyframe, and

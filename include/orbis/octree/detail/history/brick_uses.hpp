@@ -3,6 +3,7 @@
 /// Which scans observe something in which brick, and which octants have to be replayed.
 #pragma once
 
+#include <array>
 #include <bit>
 #include <cassert>
 #include <cstddef>
@@ -12,8 +13,16 @@
 #include <vector>
 
 #include <orbis/core/hash_index.hpp>
+#include <orbis/octree/detail/storage/packed_block.hpp>
 
 namespace orbis::octree::detail {
+
+/// What the scans say about the octants of a brick, and the voxels in which that differs from what is stored.
+template <class T>
+struct replayed_brick {
+  std::array<block<T>, 8> octants;
+  std::array<std::uint64_t, 8> changed{};  ///< zero for octants that were not replayed
+};
 
 /// One scan's part of a brick: the scan's number and the part's place among scan_voxels::parts().
 struct brick_use {

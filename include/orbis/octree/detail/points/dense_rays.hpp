@@ -84,10 +84,10 @@ struct cell_rays {
 class dense_rays {
  public:
   /// Looks at a sample of the scan's points, and says whether there are so many rays for its voxels that this is the
-  /// way to mark them. Nothing is done otherwise. O(1). `limit(i)`: how far the i-th ray goes at most, metres
-  template <class Point, class Limit>
+  /// way to mark them. Nothing is done otherwise. O(1). `limit`: how far rays go at most, metres
+  template <class Point>
   [[nodiscard]] bool plan(const voxel_grid& grid, const float3& origin, std::size_t count, Point&& point,
-                          Limit&& limit) {
+                          double limit) {
     if (count < fewest_rays || count > binned_rays::most_rays) return false;
     sample(origin, count, point, limit);
     if (sample_.directions.size() < most_sampled / 16) return false;
@@ -172,15 +172,15 @@ class dense_rays {
     const double planes = sample_.length / voxel, apart = windows_.spacing * planes;  // apart: voxels, where rays end
     return 6.0 + 1000.0 * apart * apart < 20.0 + 0.5 * planes;
   }
-  template <class Point, class Limit>
-  void sample(const float3& origin, std::size_t count, Point&& point, Limit&& limit) {
+  template <class Point>
+  void sample(const float3& origin, std::size_t count, Point&& point, double limit) {
     sample_.directions.clear();
     sample_.length = 0.0;
     random_bits random{1};
     for (std::size_t k = 0; k != most_sampled; ++k) {
       const std::size_t i = place_in_stretch(k, most_sampled, count - 1, random);
       vec3 d;
-      const auto length = length_of_ray(origin, point(i), limit(i), d);
+      const auto length = length_of_ray(origin, point(i), limit, d);
       if (!length) continue;
       sample_.directions.push_back(d);
       sample_.length += *length;

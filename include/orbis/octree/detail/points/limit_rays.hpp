@@ -95,7 +95,7 @@ struct ray_frame {
 
 struct limit_rays_kernel {
   template <simd::target Target>
-  static ORBIS_ALWAYS_INLINE void run(const ray_frame& f, const point_batch& points, const double* limits,
+  static ORBIS_ALWAYS_INLINE void run(const ray_frame& f, const point_batch& points, double max_range,
                                       std::size_t count, ray_batch& rays) noexcept {
     using floats = simd::native_vec<float, Target>;
     using integers = simd::native_vec<std::int32_t, Target>;
@@ -107,13 +107,13 @@ struct limit_rays_kernel {
     const std::array<std::uint32_t, 3> from{f.from.x, f.from.y, f.from.z};
     const double per_metre = 1.0 / f.grid.resolution(), half = 0.5 * f.grid.cells();
     const auto per_metre_f = static_cast<float>(per_metre), half_f = static_cast<float>(half);
+    const doubles limit(max_range);
     constexpr double less = 1.0 - 0x1p-50;  // than one by more than the rounding of a square and of a root
     for (std::size_t i = 0; i < count; i += n) {
       const auto along = [&](std::size_t axis)
                              ORBIS_INLINE_LAMBDA { return floats::load(at[axis] + i) - floats(f.origin[axis]); };
       const std::array<floats, 3> ray{along(0), along(1), along(2)};
       const floats square = ray[0] * ray[0] + ray[1] * ray[1] + ray[2] * ray[2];
-      const doubles limit = doubles::load(limits + i);
       mask inside = mask::first(count - i), is_cut = mask::first(0);
       mask is_hit = simd::mask_as<4>((simd::convert<double>(square) <= limit * limit * less) & (limit >= 0.0));
       std::array<floats, 3> end{floats::load(at[0] + i), floats::load(at[1] + i), floats::load(at[2] + i)};
@@ -172,10 +172,10 @@ using fresh_kernel = void(const ray_batch&, std::size_t, ray_batch::bits&);
   return simd::kernel<fresh_hits_kernel, fresh_kernel>();
 }
 
-using limit_kernel = void(const ray_frame&, const point_batch&, const double*, std::size_t, ray_batch&);
+using limit_kernel = void(const ray_frame&, const point_batch&, double, std::size_t, ray_batch&);
 
-/// Finds the rays to `count` points, each cut off at its limit in metres. A limit that is negative or NaN, or an end
-/// that lies outside the grid: no ray. @pre points and limits can be read up to a multiple of 16
+/// Finds the rays to `count` points, cut off at a limit in metres. To an end that lies outside the grid there is none.
+/// @pre points can be read up to a multiple of 16; the limit is not negative
 [[nodiscard]] inline limit_kernel* limit_rays() noexcept { return simd::kernel<limit_rays_kernel, limit_kernel>(); }
 
 }  // namespace orbis::octree::detail

@@ -100,10 +100,10 @@ using place_in_pixels = void(const pixel_placement&, const ray_batch&, std::size
 class organised_rays {
  public:
   /// Whether the scan's points are the pixels of a depth image that has so many of them for its voxels that this is the
-  /// way to mark them. Nothing is done otherwise. O(1). `limit(i)`: how far the i-th ray goes at most, metres
-  template <class Point, class Limit>
+  /// way to mark them. Nothing is done otherwise. O(1). `limit`: how far rays go at most, metres
+  template <class Point>
   [[nodiscard]] bool plan(const voxel_grid& grid, const float3& origin, std::size_t count, Point&& point,
-                          Limit&& limit) {
+                          double limit) {
     if (count < fewest_rays || count > most_rays || !fit_.fit(origin, count, point, limit)) return false;
     voxel_ = grid.resolution();
     // Where pixels have no points, here and there, those that have are further apart; holes are less bad. With few of

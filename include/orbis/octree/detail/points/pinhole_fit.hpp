@@ -30,12 +30,12 @@ namespace orbis::octree::detail {
 class pinhole_fit {
  public:
   /// Whether the points were seen by such a camera, but for a few. `point(i)`: the i-th of `count` points as float3;
-  /// `limit(i)`: how far the ray to it goes at most, metres, negative or NaN if there is none.
-  template <class Point, class Limit>
-  [[nodiscard]] bool fit(const float3& origin, std::size_t count, Point&& point, Limit&& limit) {
+  /// `limit`: how far rays go at most, metres.
+  template <class Point>
+  [[nodiscard]] bool fit(const float3& origin, std::size_t count, Point&& point, double limit) {
     if (count < most_runs * run_length) return false;
     const auto direction = [&](std::size_t i, vec3& d) {
-      return length_of_ray(origin, point(i), limit(i), d).value_or(0.0);
+      return length_of_ray(origin, point(i), limit, d).value_or(0.0);
     };
     if (!take_runs(count, direction) || !find_x_axis() || !find_columns() || !find_rows()) return false;
     find_center();

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Where rays from one voxel cross a stack of planes of voxel faces, several rays at a time.
+/// Where rays from one voxel cross a stack of planes of voxel faces, several rays at a time, and the masks of bricks
+/// that follow from it.
 #pragma once
 
 #include <algorithm>
@@ -12,9 +13,62 @@
 #include <vector>
 
 #include <orbis/core/simd.hpp>
-#include <orbis/octree/detail/points/plane_stack.hpp>
+#include <orbis/octree/detail/storage/scan_masks.hpp>
 
 namespace orbis::octree::detail {
+
+/// Rays that go forward along one axis. After its j-th plane (j = 1, 2 ... planes) a ray is in the cell
+/// (floor(u + j * du), floor(v + j * dv)), counted from the one it starts in. @pre |du|, |dv| <= 1
+struct queued_rays {
+  static constexpr std::size_t lanes = 16;
+  std::vector<double> u, du, v, dv;
+  std::vector<std::int32_t> planes;
+  std::vector<std::uint32_t> id;
+
+  /// Room for `count` rays, and for a whole group of lanes after any of them.
+  void fit(std::size_t count) {
+    if (planes.size() >= count + lanes) return;
+    u.resize(count + lanes);
+    du.resize(count + lanes);
+    v.resize(count + lanes);
+    dv.resize(count + lanes);
+    planes.resize(count + lanes);
+    id.resize(count + lanes);
+  }
+  [[nodiscard]] std::size_t memory_bytes() const noexcept {
+    return planes.capacity() * (4 * sizeof(double) + sizeof(std::int32_t) + sizeof(std::uint32_t));
+  }
+};
+
+/// Some consecutive planes and the layers of voxels between them, each a map of bytes in tiles of 8x8,
+/// a tile being a line of the cache and a layer of a brick. A byte of a plane says that a ray passes
+/// through there: the voxels on both sides are crossed. A byte of a layer is a voxel that a ray enters
+/// and leaves between two planes.
+struct plane_stack {
+  static constexpr unsigned fraction = 22;     ///< bits of a coordinate's fraction; ten are left for the cell
+  static constexpr std::uint32_t doubt = 12;   ///< no coordinate is wrong by more, in units of 2^-22 cells
+  static constexpr float order_doubt = 7e-6F;  ///< nor is the order of two crossings, in cells
+  static constexpr std::uint8_t marked = 0xff;
+
+  std::uint8_t* planes = nullptr;
+  std::uint8_t* layers = nullptr;
+  std::size_t size = 0;     ///< cells of a map
+  std::size_t stride = 0;   ///< from map to map; what lies between is for rays that are not there
+  unsigned log2_width = 0;  ///< of a map, in tiles, u being the fast axis
+  std::int32_t low_u = 0;   ///< the map's first cell
+  std::int32_t low_v = 0;
+  std::int32_t first = 0;  ///< number of the first plane; 0 is where the rays start, and nothing is to be done there
+  std::int32_t count = 0;  ///< planes
+
+  /// The number of the cell (u, v).
+  [[nodiscard]] std::uint32_t cell(std::int32_t u, std::int32_t v) const noexcept {
+    return at(static_cast<std::uint32_t>(u - low_u), static_cast<std::uint32_t>(v - low_v));
+  }
+  /// The number of a cell whose u and v are counted from the map's first cell.
+  [[nodiscard]] std::uint32_t at(std::uint32_t u, std::uint32_t v) const noexcept {
+    return ((v >> 3U << log2_width | u >> 3U) << 6U) | (v & 7U) << 3U | (u & 7U);
+  }
+};
 
 /// Coordinates are fixed-point numbers without sign: ten bits of cell, plane_stack::fraction bits of fraction.
 struct mark_crossings_kernel {
@@ -143,6 +197,72 @@ using crossings_kernel = void(const plane_stack&, queued_rays&, std::size_t, std
 /// @pre the cells of the rays lie in the stack
 [[nodiscard]] inline crossings_kernel* mark_crossings() noexcept {
   return simd::kernel<mark_crossings_kernel, crossings_kernel>();
+}
+
+/// Where a window of planes lies in the grid.
+struct stack_placement {
+  std::size_t axis = 0;                 ///< that the planes are across
+  std::int32_t step = 1;                ///< from plane to plane along it
+  std::array<std::int32_t, 3> start{};  ///< the voxel where the rays start
+  std::int32_t last = 0;                ///< the last layer of the window, from the start
+  std::uint32_t width = 0, rows = 0;    ///< of a map, in cells
+
+  [[nodiscard]] std::size_t axis_u() const noexcept { return axis == 0 ? 1 : 0; }
+  [[nodiscard]] std::size_t axis_v() const noexcept { return axis == 2 ? 1 : 2; }
+};
+
+/// Bit i: whether any of the i-th bytes is set.
+[[nodiscard]] inline std::uint64_t marks(const std::uint8_t* a, const std::uint8_t* b, const std::uint8_t* c) noexcept {
+  using bytes = simd::vec<std::uint8_t, 64, simd::portable>;
+  return simd::bits((bytes::load(a) | bytes::load(b) | bytes::load(c)) != bytes(0));
+}
+/// Eight layers of eight rows of eight voxels.
+inline void add_brick(const std::array<std::uint64_t, 8>& layers, std::size_t axis, std::size_t iu, std::size_t iv,
+                      scan_brick& to) noexcept {
+  std::array<std::uint64_t, 16> spread;  // four voxels along u
+  for (std::uint32_t four = 0; four != 16; ++four) {
+    spread[four] = 0;
+    for (std::uint32_t i = 0; i != 4; ++i) spread[four] |= std::uint64_t{four >> i & 1U} << (spread3(i) << iu);
+  }
+  for (std::uint32_t i = 0; i != 8; ++i)
+    for (std::uint32_t k = 0; k != 8; ++k) {
+      const auto row = static_cast<std::uint32_t>(layers[i] >> (8 * k) & 0xffU);
+      if (row == 0) continue;
+      const std::uint32_t place = spread3(i) << axis | spread3(k) << iv;
+      to.free[place >> 6U] |= spread[row & 15U] << (place & 63U);
+      to.free[place >> 6U | 1U << iu] |= spread[row >> 4U] << (place & 63U);
+    }
+}
+
+/// Moves the marks of a window to `masks`, as free voxels.
+inline void move_to_masks(const plane_stack& w, const stack_placement& at, scan_masks& masks) {
+  const std::size_t iu = at.axis_u(), iv = at.axis_v();
+  const std::int32_t start = at.start[at.axis];
+  const std::int32_t end_a = start + at.step * w.first, end_b = start + at.step * at.last;
+  const std::int32_t lowest = std::min(end_a, end_b), highest = std::max(end_a, end_b);
+  std::array<std::uint64_t, 8> layers;
+  for (std::int32_t brick = lowest & ~7; brick <= highest; brick += 8) {
+    for (std::uint32_t v = 0; v != at.rows; v += 8) {
+      for (std::uint32_t u = 0; u != at.width; u += 8) {
+        std::uint64_t any = 0;
+        for (std::int32_t i = 0; i != 8; ++i) {
+          std::uint64_t& layer = layers[static_cast<std::size_t>(i)];
+          layer = 0;
+          if (brick + i < lowest || brick + i > highest) continue;
+          const std::size_t from =
+              static_cast<std::size_t>((brick + i - start) * at.step - w.first) * w.stride + w.at(u, v);
+          layer = marks(w.planes + from, w.planes + from + w.stride, w.layers + from);
+          any |= layer;
+        }
+        if (any == 0) continue;
+        std::array<std::uint32_t, 3> corner;
+        corner[at.axis] = static_cast<std::uint32_t>(brick);
+        corner[iu] = static_cast<std::uint32_t>(at.start[iu] + w.low_u) + u;
+        corner[iv] = static_cast<std::uint32_t>(at.start[iv] + w.low_v) + v;
+        add_brick(layers, at.axis, iu, iv, masks.at({corner[0], corner[1], corner[2]}));
+      }
+    }
+  }
 }
 
 }  // namespace orbis::octree::detail

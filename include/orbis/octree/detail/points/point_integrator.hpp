@@ -43,15 +43,6 @@ struct saturated_voxels {
   }
 };
 
-/// Removes the voxels outside `bounds` from a scan; does nothing without bounds.
-inline void clip(scan_masks& masks, const voxel_grid& grid, const std::optional<bounding_box>& bounds) {
-  if (!bounds) return;
-  if (const auto box = keys_between(grid, bounds->min, bounds->max))
-    masks.clip(*box);
-  else
-    masks.clear();
-}
-
 /// Marks the voxels of one scan. The result depends neither on the order of the points nor on the
 /// number of threads. Keeps its memory from scan to scan.
 class point_integrator {
@@ -69,15 +60,13 @@ class point_integrator {
   integration_summary mark(const Policy& policy, const voxel_grid& grid, const point_view& point, const float3& origin,
                            const integration_options& options, const saturated_voxels& saturated = {}) {
     const std::size_t count = point.count;
-    assert(options.beam_ranges.empty() || options.beam_ranges.size() == count);
     prepare(policy.threads(), count);
     if (!is_finite(origin)) return {.used = 0, .truncated = 0, .rejected = count};
     const sensor from = start(grid, origin, options);
     if (options.mode == ray_mode::every_ray) {
-      const auto limit = [&](std::size_t i) { return from.limit(i); };
       const auto done_by = [&](auto& marker) -> std::optional<integration_summary> {
-        if (!from.key || !marker.plan(grid, origin, count, point, limit)) return std::nullopt;
-        auto done = mark_by(marker, policy, from, point, options, saturated);
+        if (!from.key || !marker.plan(grid, origin, count, point, from.max_range)) return std::nullopt;
+        auto done = mark_by(marker, policy, from, point, saturated);
         if (done) return done;
         for (worker& w : active_) w.clear();
         start(grid, origin, options);
@@ -89,16 +78,12 @@ class point_integrator {
         w.add_points(from, begin, end, point, [](std::size_t, std::size_t) {});
       });
     } else {
-      for_each_with_worker(policy, count, 4096, [&](worker& w, std::size_t begin, std::size_t end) {
-        if (options.beam_ranges.empty())
-          w.add_ends(grid, begin, end, point);
-        else
-          for (std::size_t i = begin; i != end; ++i) w.add_end(from, point(i), options.beam_ranges[i]);
-      });
+      for_each_with_worker(policy, count, 4096,
+                           [&](worker& w, std::size_t begin, std::size_t end) { w.add_ends(grid, begin, end, point); });
       for (std::size_t i = 1; i != active_.size(); ++i) workers_[0].ends.merge(workers_[i].ends);
       add_centers(policy, from, workers_[0].ends);
     }
-    return finish(policy, grid, options);
+    return finish(policy);
   }
 
   /// The second half of mode `discretized` alone: marks the rays to the centres of the voxels that are
@@ -109,7 +94,7 @@ class point_integrator {
     prepare(policy.threads(), 64 * ends.bricks().size());
     if (!is_finite(origin)) return {};
     add_centers(policy, start(grid, origin, options), ends);
-    return finish(policy, grid, options);
+    return finish(policy);
   }
 
   [[nodiscard]] std::size_t memory_bytes() const noexcept {
@@ -124,22 +109,15 @@ class point_integrator {
     float3 origin;
     std::optional<voxel_key> key;  ///< empty: no ray is traversed
     double max_range;
-    std::span<const float> beam_ranges;
     limit_kernel* limit_batch = limit_rays();
     fresh_kernel* fresh_hits = find_fresh_hits();
 
-    /// Of the i-th point; negative or NaN if it is to be rejected.
-    [[nodiscard]] double limit(std::size_t i) const noexcept {
-      if (beam_ranges.empty()) return max_range;
-      const auto own = static_cast<double>(beam_ranges[i]);
-      return own > max_range ? max_range : own;
-    }
     /// Where the ray to a point ends that is known to be one; what limit_rays finds.
-    [[nodiscard]] ray_endpoint end(const float3& p, double limit) const noexcept {
+    [[nodiscard]] ray_endpoint end(const float3& p) const noexcept {
       const float3 ray = difference(p, origin);
       const double distance = length(ray);
       ray_endpoint e;
-      e.point = distance <= limit ? p : cut_off(origin, ray, distance, limit);
+      e.point = distance <= max_range ? p : cut_off(origin, ray, distance, max_range);
       e.key = *grid.key(e.point);
       return e;
     }
@@ -148,12 +126,11 @@ class point_integrator {
   /// What one thread collects.
   struct worker {
     scan_masks masks;
-    scan_masks ends;  ///< mode discretized: voxels that hold points, as occupied, and ends of rays cut off, as free
+    scan_masks ends;  ///< mode discretized: voxels that hold points, as occupied
     integration_summary summary;
     ray_rasterizer sweep;
     point_batch batch;
     std::size_t batched = 0;  ///< centres that are waiting in the batch
-    std::array<double, point_batch::capacity> limits;
     batch_keys keys;
     ray_batch rays;
     std::array<std::uint64_t, 1024> seen;  ///< voxels that are marked: points of the next row of an image end in them
@@ -168,27 +145,19 @@ class point_integrator {
     /// binned_rays::add.
     template <class Take>
     void add_points(const sensor& from, std::size_t begin, std::size_t end, const point_view& point, Take&& take) {
-      if (from.beam_ranges.empty()) limits.fill(from.max_range);
       while (begin != end) {
         const std::size_t n = std::min(end - begin, point_batch::capacity);
         load_points(point, begin, n, batch);
-        if (!from.beam_ranges.empty())
-          for (std::size_t i = 0; i != n; ++i) limits[i] = from.limit(begin + i);
         find_rays(from, n);
         take(begin, n);
         if (from.key) sweep.add(rays, n, masks);
         begin += n;
       }
     }
-    /// The first `count` points of the batch, each with its limit.
-    void add_batch(const sensor& from, std::size_t count) {
-      find_rays(from, count);
-      if (from.key) sweep.add(rays, count, masks);
-    }
     /// The rays of the batch; their points are marked and counted.
     void find_rays(const sensor& from, std::size_t count) {
       const voxel_key base = from.key.value_or(voxel_key{});
-      from.limit_batch({from.grid, from.origin, base}, batch, limits.data(), count, rays);
+      from.limit_batch({from.grid, from.origin, base}, batch, from.max_range, count, rays);
       const std::size_t used = ray_batch::count(rays.hit), cut = ray_batch::count(rays.cut);
       summary.used += used;
       summary.truncated += cut;
@@ -237,49 +206,21 @@ class point_integrator {
         summary.rejected += keys.outside;
       }
     }
-    /// Adds one point that has a range of its own, in mode discretized.
-    void add_end(const sensor& from, const float3& end, float own_range) {
-      const auto limit = static_cast<double>(own_range);
-      const float3 ray = difference(end, from.origin);
-      const double distance = length(ray);
-      if (limit >= from.max_range || distance <= limit) {
-        if (const auto key = from.grid.key(end))
-          ends.mark_occupied(*key);
-        else
-          ++summary.rejected;
-      } else if (limit >= 0.0 && std::isfinite(static_cast<float>(distance))) {
-        if (const auto key = from.grid.key(cut_off(from.origin, ray, distance, limit)))
-          ends.mark_free(*key);
-        else
-          ++summary.rejected;
-      } else {
-        ++summary.rejected;
-      }
-    }
-    /// The centres of a brick's voxels: those occupied like points; to those free there is a ray.
+    /// The centres of a brick's occupied voxels, like points.
     void add_centers(const sensor& from, const scan_brick& b) {
       const voxel_key base = named_key(b.name);
-      const auto centre = [&](std::uint32_t place) {
+      for_each_place(b.occupied, [&](std::uint32_t place) {
         const voxel_key in = voxel_in_brick(place);
         const vec3 c = from.grid.center(voxel_key{base.x + in.x, base.y + in.y, base.z + in.z});
-        return float3{static_cast<float>(c.x()), static_cast<float>(c.y()), static_cast<float>(c.z())};
-      };
-      for_each_place(b.occupied, [&](std::uint32_t place) {
-        const float3 c = centre(place);
-        batch.x[batched] = c[0];
-        batch.y[batched] = c[1];
-        batch.z[batched] = c[2];
+        batch.x[batched] = static_cast<float>(c.x());
+        batch.y[batched] = static_cast<float>(c.y());
+        batch.z[batched] = static_cast<float>(c.z());
         if (++batched == point_batch::capacity) add_batched(from);
-      });
-      for_each_place(b.free, [&](std::uint32_t place) {
-        const voxel_key in = voxel_in_brick(place);
-        if (from.key) sweep.add(centre(place), {base.x + in.x, base.y + in.y, base.z + in.z}, false, masks);
-        ++summary.truncated;
       });
     }
     void add_batched(const sensor& from) {
-      limits.fill(from.max_range);
-      add_batch(from, batched);
+      find_rays(from, batched);
+      if (from.key) sweep.add(rays, batched, masks);
       batched = 0;
     }
   };
@@ -294,8 +235,7 @@ class point_integrator {
   }
   sensor start(const voxel_grid& grid, const float3& origin, const integration_options& options) {
     assert(options.max_range >= 0.0);
-    const sensor from{grid, origin, options.rays ? grid.key(origin) : std::nullopt, options.max_range,
-                      options.beam_ranges};
+    const sensor from{grid, origin, grid.key(origin), options.max_range};
     if (from.key)
       for (worker& w : active_) w.sweep.start(grid, origin, *from.key);
     return from;
@@ -310,8 +250,7 @@ class point_integrator {
   /// A scan for which dense_ or organised_ has a plan; empty if it cannot be done.
   template <class Marker, class Policy>
   std::optional<integration_summary> mark_by(Marker& marker, const Policy& policy, const sensor& from,
-                                             const point_view& point, const integration_options& options,
-                                             const saturated_voxels& saturated) {
+                                             const point_view& point, const saturated_voxels& saturated) {
     const std::size_t count = point.count;
     const std::size_t workers = active_.size();
     marker.start(from.origin, count, workers);
@@ -329,17 +268,14 @@ class point_integrator {
     const se3 pose{so3{}, vec3{static_cast<double>(from.origin[0]), static_cast<double>(from.origin[1]),
                                static_cast<double>(from.origin[2])}};
     const depth_sensor camera{from.grid, pose, from.max_range};
-    const auto end_of = [&](std::uint32_t i) { return from.end(point(i), from.limit(i)); };
+    const auto end_of = [&](std::uint32_t i) { return from.end(point(i)); };
     if (!marker.mark(policy, camera, range, end_of, all.masks, saturated)) return std::nullopt;
-    clip(all.masks, from.grid, options.bounds);
     return all.summary;
   }
   template <class Policy>
-  integration_summary finish(const Policy& policy, const voxel_grid& grid, const integration_options& options) {
+  integration_summary finish(const Policy& policy) {
     for_each_index(policy, active_.size(), 1, [&](std::size_t i) { workers_[i].sweep.flush(workers_[i].masks); });
-    worker& all = join_workers();
-    clip(all.masks, grid, options.bounds);
-    return all.summary;
+    return join_workers().summary;
   }
   /// Adds what the others have to the first one.
   worker& join_workers() {

@@ -19,10 +19,8 @@
 #include <vector>
 
 #include <orbis/core/simd.hpp>
-#include <orbis/octree/detail/points/fallback_rays.hpp>
 #include <orbis/octree/detail/points/limit_rays.hpp>
 #include <orbis/octree/detail/points/plane_crossings.hpp>
-#include <orbis/octree/detail/points/plane_masks.hpp>
 #include <orbis/octree/detail/points/ray_setup.hpp>
 #include <orbis/octree/detail/points/ray_traversal.hpp>
 #include <orbis/octree/detail/storage/scan_masks.hpp>
@@ -39,22 +37,13 @@ class ray_rasterizer {
     source_ = {grid, origin, from};
     for (auto& q : queues_) q.clear();
     fallback_.clear();
-    batch_.clear();
-    batched_ = 0;
     passed_ = 0;
     set_up_ = set_up_rays();
     mark_crossings_ = mark_crossings();
   }
 
-  /// Marks in `masks` what traverse_ray visits, now or when `flush` is called, and perhaps `to` if it is a
-  /// `hit`: a voxel that counts as occupied whatever crosses it. @pre `to` is the key of `end`
-  void add(const float3& end, const voxel_key& to, bool hit, scan_masks& masks) {
-    const auto way = [](std::uint32_t k, std::int32_t from) { return static_cast<std::int32_t>(k) - from; };
-    batch_.set(batched_, end, {way(to.x, source_.from[0]), way(to.y, source_.from[1]), way(to.z, source_.from[2])},
-               hit);
-    if (++batched_ == ray_batch::capacity) add_waiting(masks);
-  }
-  /// Adds the first `count` rays of a batch, as above.
+  /// Marks in `masks` what traverse_ray visits for the first `count` rays of a batch, now or when `flush` is called,
+  /// and perhaps the end of a ray that is a hit: a voxel that counts as occupied whatever crosses it.
   void add(const ray_batch& rays, std::size_t count, scan_masks& masks) {
     for (std::size_t i = 0; i < count; i += ray_batch::lanes) {
       const std::uint32_t cut = ray_batch::eight(rays.cut, i);
@@ -65,7 +54,7 @@ class ray_rasterizer {
         const auto lane = static_cast<std::size_t>(std::countr_zero(left));
         const float3 end{rays.end[0][i + lane], rays.end[1][i + lane], rays.end[2][i + lane]};
         if ((setup_.done >> lane & 1U) == 0)
-          fallback_.add(end);
+          fallback_.push_back(end);
         else
           take(lane, end, (cut >> lane & 1U) != 0, masks);
       }
@@ -76,7 +65,6 @@ class ray_rasterizer {
   /// Marks the rays that are waiting.
   void flush(scan_masks& masks) {
     if (grid_ == nullptr) return;
-    add_waiting(masks);
     for (std::size_t kind = 0; kind != queues_.size(); ++kind) rasterize(kind, masks);
     flush_fallback(masks);
     for (; passed_ != 0; passed_ &= passed_ - 1) {
@@ -85,9 +73,10 @@ class ray_rasterizer {
     }
   }
   [[nodiscard]] std::size_t memory_bytes() const noexcept {
-    std::size_t bytes =
-        rays_.memory_bytes() + bytes_.capacity() + (counts_.capacity() + buckets_.capacity()) * sizeof(std::uint32_t) +
-        bounds_.capacity() * sizeof(bounds) + doubtful_.capacity() * sizeof(std::uint32_t) + fallback_.memory_bytes();
+    std::size_t bytes = rays_.memory_bytes() + bytes_.capacity() +
+                        (counts_.capacity() + buckets_.capacity()) * sizeof(std::uint32_t) +
+                        bounds_.capacity() * sizeof(bounds) + doubtful_.capacity() * sizeof(std::uint32_t) +
+                        fallback_.capacity() * sizeof(float3);
     for (const auto& q : queues_) bytes += q.capacity() * sizeof(waiting_ray);
     return bytes;
   }
@@ -120,11 +109,9 @@ class ray_rasterizer {
             static_cast<std::uint32_t>(source_.from[1] + away[1]),
             static_cast<std::uint32_t>(source_.from[2] + away[2])};
   }
-  void flush_fallback(scan_masks& masks) { fallback_.flush(*grid_, source_.origin, key({}), masks); }
-  void add_waiting(scan_masks& masks) {
-    add(batch_, batched_, masks);
-    batch_.clear();
-    batched_ = 0;
+  void flush_fallback(scan_masks& masks) {
+    for (const float3& end : fallback_) masks.mark_ray(*grid_, source_.origin, key({}), end, *grid_->key(end));
+    fallback_.clear();
   }
 
   /// A ray that has been prepared: to its queue; voxels that no plane marks are marked at once.
@@ -133,7 +120,7 @@ class ray_rasterizer {
     const std::int32_t kind = r.kind[lane], planes = r.planes[lane];
     if (source_.on_edge) {
       const std::uint32_t passed = first_steps(source_, end, ray_setup::down(kind));
-      if (passed == 0) return fallback_.add(end);
+      if (passed == 0) return fallback_.push_back(end);
       passed_ |= passed & ~(1U << 31U);
     }
     const auto is = [lane](std::uint32_t bits) { return (bits >> lane & 1U) != 0; };
@@ -248,7 +235,7 @@ class ray_rasterizer {
         mark_slab(place, static_cast<std::int32_t>(s), planes, bounds_[b], begin, counts_[b], masks);
       }
     }
-    for (const std::uint32_t i : doubtful_) fallback_.add(queue[i].end);
+    for (const std::uint32_t i : doubtful_) fallback_.push_back(queue[i].end);
     queue.clear();
     if (fallback_.size() >= max_waiting) flush_fallback(masks);
   }
@@ -293,8 +280,6 @@ class ray_rasterizer {
 
   const voxel_grid* grid_ = nullptr;
   scan_origin source_;
-  ray_batch batch_;
-  std::size_t batched_ = 0;
   ray_setup setup_;
   std::uint32_t passed_ = 0;  ///< see first_steps
   std::array<std::vector<waiting_ray>, ray_setup::kinds> queues_;
@@ -303,7 +288,7 @@ class ray_rasterizer {
   std::vector<std::uint32_t> counts_, buckets_;
   std::vector<bounds> bounds_;
   std::vector<std::uint32_t> doubtful_;
-  fallback_rays fallback_;
+  std::vector<float3> fallback_;  ///< ends of rays that only the exact traversal can decide
   setup_kernel* set_up_ = nullptr;
   crossings_kernel* mark_crossings_ = nullptr;
 };

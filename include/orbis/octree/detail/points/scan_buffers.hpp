@@ -35,9 +35,7 @@ const scan_masks& mark_depth(const Policy& policy, scan_buffers& buffers, const 
                              integration_summary& summary, const saturated_voxels& saturated = {}) {
   scan_masks& masks = buffers.masks;
   if (options.mode == ray_mode::every_ray) {
-    summary = options.rays ? buffers.depth.mark(policy, grid, scan, T_world_camera, options, masks, saturated)
-                           : buffers.depth.mark_ends(policy, grid, scan, T_world_camera, options, masks);
-    clip(masks, grid, options.bounds);
+    summary = buffers.depth.mark(policy, grid, scan, T_world_camera, options, masks, saturated);
     return masks;
   }
   // Whether a voxel is within range is decided at its centre, not at its points.

@@ -21,14 +21,13 @@ namespace orbis::octree::detail {
   return std::min(static_cast<std::size_t>(place / static_cast<double>(stretches)), last);
 }
 /// The ray to a point: how long it is, at most `limit` (metres), and in `direction` which way it goes (of length 1).
-/// Empty if there is no such ray: the limit is negative or NaN, or the point is the origin, not finite or very far
-/// away.
+/// Empty if there is no such ray: the point is the origin, not finite or very far away.
 [[nodiscard]] inline std::optional<double> length_of_ray(const float3& origin, const float3& p, double limit,
                                                          vec3& direction) {
   for (std::size_t axis = 0; axis != 3; ++axis)
     direction[static_cast<int>(axis)] = static_cast<double>(p[axis]) - static_cast<double>(origin[axis]);
   const double length = norm(direction);
-  if (!(length > 0.0 && length < 1e30 && limit >= 0.0)) return std::nullopt;
+  if (!(length > 0.0 && length < 1e30)) return std::nullopt;
   direction /= length;
   return std::min(length, limit);
 }

@@ -21,7 +21,6 @@
 #include <orbis/core/hash_index.hpp>
 #include <orbis/octree/detail/storage/large_leaves.hpp>
 #include <orbis/octree/detail/storage/node_name.hpp>
-#include <orbis/octree/detail/storage/octant_pools.hpp>
 #include <orbis/octree/detail/storage/octant_record.hpp>
 #include <orbis/octree/detail/storage/packed_block.hpp>
 

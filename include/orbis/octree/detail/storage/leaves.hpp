@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Visits the leaves of the pruned octree, which are found from the bricks alone: all leaves, those in a box, and
-/// single voxels.
+/// Visits the leaves of the pruned octree, which are found from the bricks alone.
 #pragma once
 
 #include <algorithm>
@@ -156,126 +155,6 @@ template <sensor_model Model>
   n.free_leaves = n.leaves - n.occupied_leaves;
   n.nodes += n.leaves;
   return n;
-}
-
-/// Whether everything in the node at `level` >= chunk_level has this value.
-template <class T>
-[[nodiscard]] bool is_one_value(const brick_store<T>& store, const voxel_key& k, int level, T value) {
-  if (const T* const large = store.find_large_value(k)) {
-    const auto found = store.find_large(k);
-    if (found->second >= level) return *large == value;
-  }
-  if (level == chunk_level) {
-    const auto* const c = store.find_chunk(k);
-    for (std::uint32_t place = 0; place != 64; ++place) {
-      const voxel_key offset = brick_in_chunk(place);
-      const brick<T>* const b = c == nullptr ? nullptr : store.find(*c, place);
-      if (b != nullptr && !(b->is_uniform() && b->value[0] == value)) return false;
-      if (b != nullptr) continue;
-      const T* const large = store.find_large_value({k.x + offset.x, k.y + offset.y, k.z + offset.z});
-      if (large == nullptr || *large != value) return false;
-    }
-    return true;
-  }
-  for (unsigned i = 0; i != 8; ++i)
-    if (!is_one_value(store, child_key(k, i, node_cells(level - 1)), level - 1, value)) return false;
-  return true;
-}
-
-/// Calls `visit(key, level, value)` for every leaf of the pruned octree that has a voxel in
-/// `box`, in Morton order. Touches only the chunks in the box.
-/// O(voxels of these chunks + the smaller of chunks of the box and of the store + large leaves).
-template <class T, std::invocable<const voxel_key&, int, T> Visit>
-void visit_leaves_in(const brick_store<T>& store, int root_level, const key_box& box, Visit&& visit) {
-  const auto& [low, high] = box;
-  std::vector<tree_part<T>> parts;
-  const auto add = [&](const typename brick_store<T>::chunk& c) {
-    for (std::uint32_t place = 0; place != 64; ++place)
-      if (const brick<T>* const b = store.find(c, place); b != nullptr && b->is_known()) {
-        const voxel_key key = named_key(b->name);
-        parts.push_back({morton_order(key), key, brick_level, b->is_uniform() ? nullptr : b, b->value[0]});
-      }
-  };
-  const auto chunks_along = [](std::uint32_t a, std::uint32_t b) {
-    return std::uint64_t{(b >> chunk_level) - (a >> chunk_level) + 1};
-  };
-  const std::uint64_t wide = chunks_along(low.x, high.x) * chunks_along(low.y, high.y);  // 2^32 at most
-  if (wide <= store.chunk_count() && wide * chunks_along(low.z, high.z) <= store.chunk_count()) {
-    const std::uint32_t size = node_cells(chunk_level);
-    const voxel_key first = node_key(low, chunk_level);
-    for (std::uint32_t z = first.z; z <= high.z; z += size)
-      for (std::uint32_t y = first.y; y <= high.y; y += size)
-        for (std::uint32_t x = first.x; x <= high.x; x += size)
-          if (const auto* const c = store.find_chunk({x, y, z})) add(*c);
-  } else {
-    store.for_each_chunk([&](const auto& c) {
-      if (box.overlaps(named_key(c.name), chunk_level)) add(c);
-    });
-  }
-  store.for_each_large([&](std::uint64_t name, T v) {
-    const voxel_key key = named_key(name);
-    const int level = std::max(named_level(name), chunk_level);  // with what it may merge with
-    if (box.overlaps(node_key(key, level), level))
-      parts.push_back({morton_order(key), key, named_level(name), nullptr, v});
-  });
-  std::sort(parts.begin(), parts.end(), [](const auto& a, const auto& b) { return a.order < b.order; });
-  merge_parts(parts, root_level);
-
-  block<T> scratch;
-  std::uint64_t done = 0;  // the order up to which everything has been visited
-  for (tree_part<T>& part : parts) {
-    if (part.order < done) continue;
-    if (part.content == nullptr) {
-      // Its siblings may lie outside the box.
-      while (part.level >= chunk_level && part.level < root_level - 1 &&
-             is_one_value(store, node_key(part.key, part.level + 1), part.level + 1, part.value)) {
-        ++part.level;
-        part.key = node_key(part.key, part.level);
-      }
-      done = morton_order(part.key) + (std::uint64_t{1} << 3 * static_cast<unsigned>(part.level - brick_level));
-      if (box.overlaps(part.key, part.level)) visit(part.key, part.level, part.value);
-      continue;
-    }
-    if (!box.overlaps(part.key, brick_level)) continue;
-    for (std::uint32_t o = 0; o != 8; ++o) {
-      const brick<T>& b = *part.content;
-      const voxel_key octant = child_key(part.key, o, node_cells(octant_level));
-      if (!box.overlaps(octant, octant_level)) continue;
-      if ((b.uniform >> o & 1U) != 0) visit(octant, octant_level, b.value[o]);
-      if ((b.dense >> o & 1U) == 0) continue;
-      visit_octant(octant, store.view(b, o), scratch, [&](const voxel_key& k, int level, T v) {
-        if (box.overlaps(k, level)) visit(k, level, v);
-      });
-    }
-  }
-}
-
-/// Calls `visit(key, value)` for every occupied voxel, however large the leaf that it lies in; leaves larger than a
-/// brick come last. O(bricks + voxels visited).
-template <sensor_model Model, std::invocable<const voxel_key&, typename Model::value_type> Visit>
-void visit_occupied_voxels(const brick_store<typename Model::value_type>& store, Visit&& visit) {
-  using T = typename Model::value_type;
-  store.for_each_brick([&](const brick<T>& b) {
-    const voxel_key key = named_key(b.name);
-    for (std::uint32_t o = 0; o != 8; ++o) {
-      // The value of an octant is its largest.
-      if (((b.uniform | b.dense) >> o & 1U) == 0 || !is_occupied<Model>(b.value[o])) continue;
-      const octant_view<T> view = store.view(b, o);
-      const voxel_key octant = child_key(key, o, node_cells(octant_level));
-      for (std::uint64_t rest = store.voxels_where(b, o, is_occupied<Model>); rest != 0; rest &= rest - 1) {
-        const auto i = static_cast<std::uint32_t>(std::countr_zero(rest));
-        visit(voxel_in_octant(octant, i), view.at(i));
-      }
-    }
-  });
-  store.for_each_large([&](std::uint64_t name, T v) {
-    if (!is_occupied<Model>(v)) return;
-    const voxel_key k = named_key(name);
-    const std::uint32_t size = node_cells(named_level(name));
-    for (std::uint32_t z = 0; z != size; ++z)
-      for (std::uint32_t y = 0; y != size; ++y)
-        for (std::uint32_t x = 0; x != size; ++x) visit(voxel_key{k.x + x, k.y + y, k.z + z}, v);
-  });
 }
 
 }  // namespace orbis::octree::detail

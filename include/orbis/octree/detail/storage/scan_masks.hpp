@@ -78,47 +78,11 @@ class scan_masks {
       }
     }
   }
-  /// Forgets all voxels but those from `low` to `high`, both included.
-  void clip(const key_box& box) {
-    const std::array<std::uint32_t, 3> low{box.low.x, box.low.y, box.low.z}, high{box.high.x, box.high.y, box.high.z};
-    std::size_t kept = 0;
-    for (std::size_t i = 0; i != bricks_.size(); ++i) {
-      scan_brick b = bricks_[i];
-      const voxel_key k = named_key(b.name);
-      const std::array<std::uint32_t, 3> at{k.x, k.y, k.z};
-      std::array<std::uint64_t, 8> inside;
-      inside.fill(~std::uint64_t{0});
-      for (std::size_t axis = 0; axis != 3; ++axis) {
-        if (low[axis] <= at[axis] && at[axis] + 7 <= high[axis]) continue;
-        for (std::uint32_t c = 0; c != 8; ++c) {
-          if (low[axis] <= at[axis] + c && at[axis] + c <= high[axis]) continue;
-          for (std::uint32_t octant = 0; octant != 8; ++octant)
-            if ((octant >> axis & 1U) == c >> 2U) inside[octant] &= ~layer_in_octant(axis, c & 3U);
-        }
-      }
-      std::uint64_t any = 0;
-      for (std::size_t octant = 0; octant != 8; ++octant) {
-        b.free[octant] &= inside[octant];
-        b.occupied[octant] &= inside[octant];
-        any |= b.free[octant] | b.occupied[octant];
-      }
-      if (any != 0) bricks_[kept++] = b;
-    }
-    bricks_.resize(kept);
-    index_.clear();
-    for (std::size_t i = 0; i != kept; ++i) index_.set(bricks_[i].name, static_cast<std::uint32_t>(i));
-  }
   [[nodiscard]] std::size_t memory_bytes() const noexcept {
     return index_.memory_bytes() + bricks_.capacity() * sizeof(scan_brick);
   }
 
  private:
-  /// The voxels of an octant whose coordinate along `axis` is `c`.
-  [[nodiscard]] static constexpr std::uint64_t layer_in_octant(std::size_t axis, std::uint32_t c) noexcept {
-    constexpr std::array<std::uint64_t, 3> low{0x5555555555555555, 0x3333333333333333, 0x0f0f0f0f0f0f0f0f};
-    constexpr std::array<std::uint64_t, 3> high{0x00ff00ff00ff00ff, 0x0000ffff0000ffff, 0x00000000ffffffff};
-    return ((c & 1U) != 0 ? ~low[axis] : low[axis]) & ((c & 2U) != 0 ? ~high[axis] : high[axis]);
-  }
   [[nodiscard]] scan_brick& named(std::uint64_t name) {
     if (last_ < bricks_.size() && bricks_[last_].name == name) return bricks_[last_];
     const std::uint32_t i = index_.find(name);

@@ -2,7 +2,7 @@
 #include <array>
 #include <cstdint>
 
-#include <orbis/octree/detail/storage/octant_pools.hpp>
+#include <orbis/octree/detail/storage/octant_record.hpp>
 #include <orbis/octree/detail/storage/palette_kernels.hpp>
 
 #include "support/catch.hpp"

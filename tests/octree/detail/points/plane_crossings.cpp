@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <vector>
 
-#include <orbis/octree/detail/points/plane_stack.hpp>
+#include <orbis/octree/detail/points/plane_crossings.hpp>
 
 #include "support/catch.hpp"
 

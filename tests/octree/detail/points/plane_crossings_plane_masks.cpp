@@ -7,7 +7,7 @@
 #include <vector>
 
 #include <orbis/core/random.hpp>
-#include <orbis/octree/detail/points/plane_masks.hpp>
+#include <orbis/octree/detail/points/plane_crossings.hpp>
 
 #include "support/catch.hpp"
 

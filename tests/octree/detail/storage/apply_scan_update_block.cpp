@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <orbis/core/random.hpp>
-#include <orbis/octree/detail/storage/update_block.hpp>
+#include <orbis/octree/detail/storage/apply_scan.hpp>
 
 #include "support/catch.hpp"
 
