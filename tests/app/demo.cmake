@@ -25,7 +25,7 @@ string(REPLACE "&" "&amp;" escaped "${reason}")
 string(REPLACE "'" "&#39;" escaped "${escaped}")
 string(FIND "${page}" "${escaped}" at)
 check(at GREATER -1)
-check(page MATCHES "T_view_world")  # the pictures' frame is not the world's, and they say so
+check(page MATCHES "T_view_world")  # the frame of the pictures
 summary(points ${WORK}/demo cloud points)
 summary(kept ${WORK}/demo cloud points_filtered)
 math(EXPR difference "${points} - ${kept}")
@@ -121,5 +121,5 @@ endforeach()
 # The world is upright: the true room's, whose z is up; or by gravity, which here pulls along the camera's -x.
 summary(up ${WORK}/demo world up_from)
 check(up STREQUAL "ground truth")
-check(page MATCHES "whose z is up")
+check(page MATCHES "of the ground truth, with z up")
 app_fails(1 "is not a direction" demo --frames 5 --width 160 --gravity 0,0,0 --out never)
