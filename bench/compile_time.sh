@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
 #
-# What it costs to compile against the library: each umbrella header alone, and typical programs header-only and with
-# orbis::compiled. Processor seconds (the least of the runs: what disturbs only adds), peak memory of the compiler, and the
-# lines that it sees. Then the heaviest translation units of the builds that there are, from their .ninja_log.
+# Compile time of the library: each umbrella header alone, and typical programs header-only and with orbis::compiled.
+# Prints processor seconds (the minimum of the runs, as disturbances only add time), peak memory of the compiler, and the
+# number of lines after preprocessing; then the slowest translation units of the existing builds, from their .ninja_log.
 # usage: [CXX=g++] [CXXFLAGS=-O2] [RUNS=3] compile_time.sh [HEADER | FILE.cpp]...
 #        HEADER as after #include, e.g. orbis/features.hpp; without arguments: all of the above
 set -euo pipefail
@@ -23,7 +23,7 @@ if (($# == 0)); then
   while read -r header; do set -- "$@" "orbis/${header##*/}"; done < <(printf '%s\n' "$root"/include/orbis/*.hpp | sort)
 fi
 
-# Seconds of processor time, the least of the runs, and megabytes: measure SOURCE [OPTION]...
+# measure SOURCE [OPTION]...: processor seconds (minimum of the runs) and megabytes.
 measure() {
   local run seconds megabytes best=''
   for ((run = 0; run < runs; ++run)); do
@@ -104,7 +104,7 @@ done
 
 for log in "$root"/build/*/.ninja_log; do
   [[ -f $log ]] || continue
-  printf '\nheaviest of %s (seconds of wall time)\n' "${log#"$root"/}"
+  printf '\nslowest of %s (seconds of wall time)\n' "${log#"$root"/}"
   awk '!/^#/ && $4 ~ /\.o$/ { t[$4] = ($2 - $1) / 1000 } END { for (o in t) printf "%9.1f  %s\n", t[o], o }' "$log" | sort -rn | head -10
 done
 exit $failed

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 #
-# orbis::compiled: a static library of what most programs instantiate, so that they need not compile it themselves. Its
-# sources, cmake/compiled/<component>*.cpp, instantiate templates and kernels of the headers and hold the functions that
-# are no templates. Who links it compiles with ORBIS_COMPILED, which makes the headers declare all of this and changes
-# nothing else: programs with and without it can be linked together.
+# orbis::compiled: a static library of common instantiations, which saves programs compile time. Its sources,
+# cmake/compiled/<component>*.cpp, instantiate templates and kernels of the headers and contain the non-template functions.
+# Its users compile with ORBIS_COMPILED, which makes the headers declare these and changes nothing else: programs with and
+# without it can be linked together.
 if(PROJECT_IS_TOP_LEVEL AND NOT CMAKE_BUILD_TYPE AND NOT CMAKE_CONFIGURATION_TYPES)
   set(CMAKE_BUILD_TYPE Release)
 endif()
@@ -17,7 +17,7 @@ foreach(_orbis_component IN LISTS ORBIS_PROVIDED_COMPONENTS)
     list(APPEND _orbis_sources ${_orbis_found})
   endif()
 endforeach()
-# Who links the library need not have what io needs: io is linked to build it, and by those who ask for io themselves.
+# Users of the library do not need the dependencies of io: io is linked privately, and publicly by users of io only.
 set(ORBIS_COMPILED_NEEDS ${ORBIS_COMPILED_COMPONENTS})
 list(REMOVE_ITEM ORBIS_COMPILED_NEEDS io)
 
@@ -26,7 +26,7 @@ if(_orbis_sources)
   add_library(orbis::compiled ALIAS orbis_compiled)
   set_target_properties(orbis_compiled PROPERTIES EXPORT_NAME compiled OUTPUT_NAME orbis POSITION_INDEPENDENT_CODE ON)
   target_compile_definitions(orbis_compiled PUBLIC ORBIS_COMPILED)
-  target_compile_options(orbis_compiled PRIVATE -ffp-contract=off)  # the same bits as everywhere
+  target_compile_options(orbis_compiled PRIVATE -ffp-contract=off)  # identical results on all machines
   foreach(_orbis_component IN LISTS ORBIS_COMPILED_NEEDS)
     target_link_libraries(orbis_compiled PUBLIC orbis_${_orbis_component})
   endforeach()

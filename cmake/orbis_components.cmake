@@ -3,10 +3,10 @@
 # The table of components. Used by the build itself and, installed, by orbis-config.cmake, so that
 # `find_package(orbis COMPONENTS octree)` looks for exactly what `octree` needs.
 
-# In an order in which everything a component needs stands before it.
+# In topological order: dependencies come first.
 set(ORBIS_ALL_COMPONENTS core camera features places optimize cloud octree io eval slam mapping nav
                          cloud_nanoflann interop_opencv interop_octomap interop_pcl interop_open3d interop_ompl interop_fcl)
-# One header each, for another library: provided where that library is, and asked for by name.
+# One header each for another library: provided if that library is installed, and requested by name.
 set(ORBIS_OPTIONAL_COMPONENTS "^(cloud_nanoflann|interop_.*|compiled)$")
 
 set(ORBIS_core_PACKAGES Eigen3 tl-expected Threads)
@@ -79,8 +79,8 @@ set(ORBIS_PCL_DEBIAN libpcl-dev)
 set(ORBIS_ompl_DEBIAN libompl-dev)
 set(ORBIS_fcl_DEBIAN libfcl-dev)
 
-# orbis_name_targets(): targets for packages that were found and name none. OMPL before 1.6 gives variables; what its
-# library needs itself, it is linked to.
+# orbis_name_targets(): defines targets for packages without any. OMPL before 1.6 defines variables only; its library is
+# linked to its own dependencies.
 macro(orbis_name_targets)
   if(ompl_FOUND AND NOT TARGET ompl::ompl)
     list(GET OMPL_LIBRARIES 0 _orbis_library)
@@ -116,7 +116,7 @@ macro(orbis_find_packages _orbis_out)
   endif()
 endmacro()
 
-# orbis_close_components(<out> <component>...): the components and all they need, in order.
+# orbis_close_components(<out> <component>...): the components and all their dependencies, in order.
 function(orbis_close_components out)
   set(wanted ${ARGN})
   if("all" IN_LIST wanted)
@@ -126,7 +126,7 @@ function(orbis_close_components out)
   while(pending)
     list(POP_FRONT pending component)
     if(NOT component IN_LIST ORBIS_ALL_COMPONENTS)
-      message(FATAL_ERROR "orbis has no component \"${component}\"; there are: ${ORBIS_ALL_COMPONENTS}")
+      message(FATAL_ERROR "orbis has no component \"${component}\"; the components are: ${ORBIS_ALL_COMPONENTS}")
     endif()
     foreach(need IN LISTS ORBIS_${component}_NEEDS)
       if(NOT need IN_LIST wanted)
@@ -144,9 +144,9 @@ function(orbis_close_components out)
   set(${out} ${ordered} PARENT_SCOPE)
 endfunction()
 
-# One INTERFACE target for each of the wanted components, and orbis::orbis for all of them. With "all",
-# the optional components are provided where their libraries are. With ORBIS_HEADERS_ONLY no library is looked for: the
-# targets name them, and find_package(orbis) finds them.
+# Defines one INTERFACE target per requested component, and orbis::orbis for all of them. With "all", optional components
+# are provided if their libraries are found. With ORBIS_HEADERS_ONLY no libraries are searched for: the targets name them,
+# and find_package(orbis) finds them.
 macro(orbis_add_components)
   orbis_close_components(ORBIS_PROVIDED_COMPONENTS ${ARGN})
   if("all" IN_LIST ORBIS_COMPONENTS AND NOT ORBIS_HEADERS_ONLY)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 #
-# Headers, one export set for each component (so that a consumer's find_package pulls in no more
-# than it names), the package files, and a pkg-config file.
+# Installs headers, one export set per component (so that find_package needs only the requested ones), the package files,
+# and a pkg-config file.
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 
@@ -31,8 +31,7 @@ install(FILES ${PROJECT_BINARY_DIR}/orbis-config.cmake ${PROJECT_BINARY_DIR}/orb
               cmake/orbis_components.cmake
         DESTINATION ${_orbis_cmake_dir})
 
-# From the file's own place, so that the installed tree can be moved (or be installed elsewhere
-# than it was configured for).
+# Relative to the file, so that the installed tree can be moved or installed elsewhere than configured.
 file(RELATIVE_PATH _orbis_pc_to_prefix ${CMAKE_INSTALL_FULL_DATADIR}/pkgconfig ${CMAKE_INSTALL_PREFIX})
 string(REGEX REPLACE "/$" "" _orbis_pc_to_prefix "${_orbis_pc_to_prefix}")
 cmake_path(IS_ABSOLUTE CMAKE_INSTALL_INCLUDEDIR _orbis_fixed_include)
@@ -44,7 +43,7 @@ endif()
 configure_file(cmake/orbis.pc.in ${PROJECT_BINARY_DIR}/orbis.pc @ONLY)
 install(FILES ${PROJECT_BINARY_DIR}/orbis.pc DESTINATION ${CMAKE_INSTALL_DATADIR}/pkgconfig)
 if(TARGET orbis_compiled)
-  set(_orbis_pc_private "")  # what a program links that reads recordings: pkg-config --static
+  set(_orbis_pc_private "")  # libraries of programs that read recordings: pkg-config --static
   if("io" IN_LIST ORBIS_COMPILED_COMPONENTS)
     set(_orbis_pc_private "libpng libjpeg tomlplusplus")
   endif()

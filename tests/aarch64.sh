@@ -1,16 +1,16 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
 #
-# For 64-bit ARM: compiles the library (orbis::compiled), the quick tests (tests/quick.cmake) and the tests
-# of the vector kernels, and runs them under qemu-user. The tests of the kernels are header-only and compare each
-# kernel with plain code, bit by bit, here with a compiler that fuses products into sums where it can.
-# With "all", every test of every component instead of the quick ones, which takes hours; without those that compare with
-# PCL, Open3D, OMPL, FCL or Ceres.
+# Compiles the library (orbis::compiled), the quick tests (tests/quick.cmake) and the tests of the vector kernels for
+# 64-bit ARM, and runs them under qemu-user. The kernel tests are header-only and compare each kernel with plain code bit
+# for bit, here with a compiler that contracts products and sums to FMA.
+# "all" runs all tests of all components instead of the quick ones, except those that compare with PCL, Open3D, OMPL, FCL
+# or Ceres; this takes hours.
 #
 # usage: tests/aarch64.sh SYSROOT [all] [Catch2 options]
-# SYSROOT holds libraries for ARM, as bench/board/sysroot.sh unpacks them. Needs g++-aarch64-linux-gnu, qemu-user,
-# libeigen3-dev, libexpected-dev, libtomlplusplus-dev, libnanoflann-dev and catch2, as `./run test-aarch64` installs them.
-# Objects are kept in build/aarch64 and made again only where something has changed.
+# SYSROOT contains ARM libraries, unpacked by bench/board/sysroot.sh. Needs g++-aarch64-linux-gnu, qemu-user,
+# libeigen3-dev, libexpected-dev, libtomlplusplus-dev, libnanoflann-dev and catch2; `./run test-aarch64` installs them.
+# Objects are stored in build/aarch64 and rebuilt only after changes.
 set -euo pipefail
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 if [[ -z ${1:-} || ! -e $1/complete ]]; then
@@ -26,7 +26,7 @@ if [[ ${1:-} == all ]]; then
 fi
 data=${ORBIS_DATA_DIR:-$here/../shared/data}
 data=$(cd "$data" 2>/dev/null && pwd || echo none)
-export ORBIS_DATA_DIR=$data  # the tests read it, from another folder
+export ORBIS_DATA_DIR=$data  # the tests run in another folder
 cd "$here"
 
 compiler=${AARCH64_CXX:-aarch64-linux-gnu-g++}
@@ -34,12 +34,12 @@ jobs=${JOBS:-$(nproc)}
 out=build/aarch64
 mkdir -p "$out/include" "$out/batches"
 
-# Header-only libraries of this machine; the rest of /usr/include is for another processor.
+# Header-only libraries of this machine; the rest of /usr/include is for another architecture.
 for library in eigen3/Eigen eigen3/unsupported tl toml++ catch2 nanoflann.hpp; do
   [[ -e /usr/include/$library ]] && ln -sfn "/usr/include/$library" "$out/include/${library##*/}"
 done
 if [[ ! -e $out/include/catch2/catch.hpp ]]; then
-  echo "tests/aarch64.sh: wants Catch2 2 (catch2/catch.hpp), of which only headers are needed" >&2
+  echo "tests/aarch64.sh: needs the headers of Catch2 2 (catch2/catch.hpp)" >&2
   exit 1
 fi
 lib=$root/usr/lib/aarch64-linux-gnu
@@ -52,16 +52,16 @@ rules=$makefile.rules
 objects=()
 programs=()
 : >"$rules"
-keep() {  # file: what is read becomes this file, whose time stays if nothing has changed
+keep() {  # file: writes stdin to the file; keeps the modification time if the contents are the same
   cat >"$1.new"
   if cmp -s "$1.new" "$1"; then rm "$1.new"; else mv "$1.new" "$1"; fi
 }
-compile() {  # object, source, options...: a rule
+compile() {  # object, source, options...: writes a rule
   objects+=("$1")
   printf '%s: %s %s\n\t@echo "  %s"\n\t@%s %s -MMD -MP -c -o $@ $<\n' "$1" "$2" "$out/flags" "$2" "$compiler" \
     "$(printf '%q ' "${flags[@]}" "${@:3}")" >>"$rules"
 }
-program() {  # name, object...: a rule; made again, too, when it is made of others
+program() {  # name, object...: writes a rule; a change of the list of objects also triggers it
   programs+=("$out/$1")
   printf '%s\n' "${@:2}" | keep "$out/$1.list"
   printf '%s: %s %s\n\t@%s -o $@ $(filter %%.o %%.a,$^) -L%q %s\n' "$out/$1" "${*:2}" "$out/$1.list" "$compiler" "$lib" \
@@ -70,7 +70,7 @@ program() {  # name, object...: a rule; made again, too, when it is made of othe
 }
 printf '%s\n' "$compiler" "${flags[@]}" "${compiled[@]}" | keep "$out/flags"
 
-# Components that count allocations have a file for that, allocations.cpp; the kernels' tests have it here.
+# Components that count allocations have a file allocations.cpp; the kernel tests have it here.
 printf '#define CATCH_CONFIG_MAIN\n#include <catch2/catch.hpp>\n' | keep "$out/main.cpp"
 printf '#include "support/count_allocations.hpp"\n' | keep "$out/counting.cpp"
 compile "$out/main.o" "$out/main.cpp"
@@ -87,7 +87,7 @@ printf '%s\n' "${archive[@]}" | keep "$out/liborbis.list"
 printf '%s: %s %s\n\t@rm -f $@ && %s rcs $@ $(filter %%.o,$^)\n' "$out/liborbis.a" "${archive[*]}" "$out/liborbis.list" \
   "${AARCH64_AR:-aarch64-linux-gnu-ar}" >>"$rules"
 
-# Where the kernels' tests stand.
+# The folders of the kernel tests.
 places=(tests/core/simd.cpp tests/core/simd tests/core/rounded.cpp tests/core/bytes.cpp tests/camera/project_lanes.cpp
   tests/camera/shutter_correction.cpp
   tests/features/detail tests/features/grey_luma_row.cpp tests/places/detail tests/places/vocabulary_descent.cpp
@@ -95,7 +95,7 @@ places=(tests/core/simd.cpp tests/core/simd tests/core/rounded.cpp tests/core/by
   tests/cloud/cluster_visit_near.cpp tests/cloud/detail/select/local_shape.cpp tests/optimize/pnp.cpp
   tests/optimize/detail/bundle tests/optimize/detail/sparse tests/optimize/detail/pose
   tests/optimize/pose_refinement_pose_pieces.cpp
-  tests/optimize/bundle_instances*.cpp  # what those of bundle adjustment share
+  tests/optimize/bundle_instances*.cpp  # shared by the tests of bundle adjustment
   tests/octree/detail/storage tests/octree/detail/points tests/octree/detail/depth tests/nav/detail/floor
   tests/nav/squared_distances.cpp)
 mapfile -t kernels < <(for place in "${places[@]}"; do if [[ -e $place ]]; then find "$place" -name '*.cpp'; fi; done | sort)
@@ -106,7 +106,7 @@ for source in "${kernels[@]}"; do
 done
 program kernels "${parts[@]}" "$out/counting.o" "$out/main.o"
 
-# The other tests, a program for each component.
+# The other tests, one program per component.
 if [[ $tier == quick ]]; then
   mapfile -t sources < <(grep -v '^ *#' tests/quick.cmake | grep -oE '[a-z0-9_]+/[a-z0-9_/]+\.cpp')
 else
@@ -114,12 +114,12 @@ else
     interop -name '*.cpp' | sort | grep -vxFf <(printf '%s\n' "${kernels[@]#tests/}" | grep -v bundle_instances))
 fi
 if ((${#sources[@]} == 0)); then
-  echo "tests/aarch64.sh: finds no tests" >&2
+  echo "tests/aarch64.sh: no tests found" >&2
   exit 1
 fi
 for component in $(printf '%s\n' "${sources[@]%%/*}" | sort -u); do
   parts=()
-  if [[ $tier == all && $component == io ]]; then  # worlds that the tests of several components are made of
+  if [[ $tier == all && $component == io ]]; then  # synthetic worlds that several components use
     for source in tests/support/synthetic/*.cpp; do
       compile "$out/${source//\//_}.o" "$source" "${compiled[@]}"
       parts+=("$out/${source//\//_}.o")
@@ -131,13 +131,13 @@ for component in $(printf '%s\n' "${sources[@]%%/*}" | sort -u); do
   for source in "${sources[@]}" -; do
     if [[ $source == "$component"/* ]]; then
       source=tests/$source
-      # What cannot stand in a namespace, or is switched by the preprocessor, is compiled alone (as in batches.cmake).
+      # Sources that cannot be in a namespace, or depend on macros, are compiled separately (as in batches.cmake).
       if grep -qE '^(namespace [a-z_:]+ *\{|template *<>|struct [a-z_]+::|# *define|#ifdef|# *if defined|int main)' "$source"; then
         compile "$out/${source//\//_}.compiled.o" "$source" "${compiled[@]}"
         parts+=("$out/${source//\//_}.compiled.o")
         continue
       fi
-      files+=("$here/$source")  # found from the folder of the batch, too
+      files+=("$here/$source")  # absolute, for the folder of the batch
       bytes=$((bytes + $(wc -c <"$source")))
     fi
     if ((${#files[@]})) && { ((bytes > 25000)) || [[ $source == - ]]; }; then
@@ -159,7 +159,7 @@ done
 } >"$makefile"
 make -f "$makefile" -j "$jobs" --no-print-directory
 
-# As many at a time as there are processors; what each says is kept until it has ended.
+# Runs one program per core at a time; prints the output of each at its end.
 export QEMU_LD_PREFIX=${AARCH64_ROOT:-/usr/aarch64-linux-gnu}
 export QEMU_SET_ENV=LD_LIBRARY_PATH=$lib:$root/lib/aarch64-linux-gnu:$lib/blas:$lib/lapack
 run() {  # program, Catch2 options...; 0 or 1, as xargs ends at 255

@@ -1,14 +1,14 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
 #
-# Counts Eigen's expression classes in a translation unit: each costs a compiler some 80 ms. The limits keep small-matrix
-# arithmetic eager (core/small_matrix.hpp).
+# Counts Eigen's expression classes in a translation unit: each costs about 80 ms of compile time. The limits ensure that
+# small-matrix arithmetic is eager (core/small_matrix.hpp).
 # usage: compile_cost.sh INCLUDE_DIR COMPILER_OPTION...   (needs clang++; prints "[skipped]" without)
 set -euo pipefail
 include=$1
 shift
 if ! command -v clang++ > /dev/null; then
-  echo "[skipped] clang++ is not here, whose -ftime-trace says what is instantiated"
+  echo "[skipped] clang++ was not found; its -ftime-trace lists instantiations"
   exit 0
 fi
 scratch=$(mktemp -d)
@@ -24,11 +24,11 @@ int main() {
 }
 EOF_PROGRAM
 status=0
-check() {  # name, most classes
+check() {  # name, maximum number of classes
   clang++ -std=c++20 -O0 -ftime-trace -ftime-trace-granularity=0 "-I$include" "${options[@]}" -c "$scratch/$1.cpp" -o "$scratch/$1.o"
   local found
   found=$(grep -o '"name":"InstantiateClass","args":{"detail":"Eigen::DenseBase<[^"]*' "$scratch/$1.json" | grep -vc '>::')
-  echo "$1: $found of Eigen's classes, at most $2"
+  echo "$1: $found classes of Eigen, limit $2"
   ((found <= $2)) || status=1
 }
 options=("$@")

@@ -1,13 +1,13 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
 #
-# includes.sh INCLUDE_DIR: every header includes what it uses of the standard library, by name. (That it has all it needs
-# of the project itself is seen by compiling it alone; for speed, that happens beside precompiled standard headers.)
+# includes.sh INCLUDE_DIR: checks that every header includes the standard headers that it uses. (Compiling each header
+# separately checks the includes of the project, but uses precompiled standard headers for speed.)
 # x-inl.hpp includes x.hpp and relies on its includes.
 set -euo pipefail
 cd "$1"
 status=0
-uses() {  # header, names that stand for it
+uses() {  # header, names that it provides
   local file
   while IFS= read -r file; do
     [[ $file == *-inl.hpp ]] && grep -q "#include <$1>" "${file/-inl/}" && continue

@@ -1,15 +1,14 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
 #
-# Holds the layers: which component may include which, who may include a component's detail/, and who may name a
-# neighbour library.
+# Checks the layers: the includes between components, of a component's detail/, and of optional libraries.
 # usage: layering.sh PROJECT_DIR
 set -euo pipefail
 cd "$1/include/orbis"
 bad=0
 complain() { echo "$1"; bad=1; }
 
-# component: what it may include besides itself, core and camera
+# component: components that it may include in addition to itself, core and camera
 declare -A allowed=(
   [core]="" [camera]="" [features]="" [places]="" [optimize]="" [cloud]="" [octree]="" [io]=""
   [eval]="" [nav]="octree"
@@ -35,8 +34,8 @@ while IFS=: read -r file line text; do
   [[ -n ${allowed[$component]+known} ]] || complain "$file:$line: $component is in no layer"
 done <<<"$(grep -rnE '^ *# *include *<orbis/' --include='*.hpp' . | sed 's|^\./||' | grep '/.*:.*:')"
 
-# The detail/ of a component is its own: no umbrella, no sibling, no document and no example includes it, and no document
-# names it.
+# The detail/ of a component is private: no umbrella header, other component, document or example includes it, and no
+# document mentions it.
 private() {  # <pattern, whose first group is the component> <where>...
   local pattern=$1 hit file component
   while IFS= read -r hit; do
@@ -49,7 +48,7 @@ private() {  # <pattern, whose first group is the component> <where>...
 private '# *include *[<"]orbis/([a-z]+)/([a-z]+/)*detail/' include/orbis README.md docs examples
 private 'orbis::([a-z]+)::detail' README.md docs
 
-# A neighbour's name, and the only files that may include it.
+# An optional library, and the only files that may include it.
 only() {
   local pattern=$1 where=$2 hit
   while IFS= read -r hit; do
@@ -65,12 +64,12 @@ only 'open3d/' '^interop/open3d\.hpp$'
 only 'ompl/' '^interop/ompl\.hpp$'
 only 'fcl/' '^interop/fcl\.hpp$'
 while IFS= read -r hit; do
-  [[ -z $hit ]] || complain "${hit#./}: include the parts that are needed instead"
+  [[ -z $hit ]] || complain "${hit#./}: include the required headers instead"
 done <<<"$(grep -rnE 'include *<opencv2/opencv\.hpp>' --include='*.hpp' . || true)"
 
-# A header names a component's own macros only with our prefix.
+# All macros have the prefix ORBIS_.
 while IFS= read -r hit; do
-  [[ -z $hit ]] || complain "${hit#./}: a macro without the ORBIS_ prefix"
+  [[ -z $hit ]] || complain "${hit#./}: macro without the prefix ORBIS_"
 done <<<"$(grep -rnE '^ *# *define +' --include='*.hpp' . | grep -vE '# *define +ORBIS_' || true)"
 
 ((bad == 0)) && echo "layers hold"

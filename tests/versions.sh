@@ -1,14 +1,14 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
 #
-# versions.sh ROOT: every file that names the project's version names the same one.
+# versions.sh ROOT: checks that all files contain the same version of the project.
 set -euo pipefail
 cd "$1"
 version=$(sed -n 's/^project(orbis VERSION \([0-9.]*\).*/\1/p' CMakeLists.txt)
-[[ -n $version ]] || { echo "CMakeLists.txt names no version" >&2; exit 1; }
+[[ -n $version ]] || { echo "CMakeLists.txt contains no version" >&2; exit 1; }
 status=0
-names() {  # file, line that it must have
-  grep -qF -- "$2" "$1" || { echo "$1: no \"$2\"" >&2; status=1; }
+names() {  # file, required line
+  grep -qF -- "$2" "$1" || { echo "$1: \"$2\" is missing" >&2; status=1; }
 }
 names CITATION.cff "version: $version"
 names CHANGELOG.md "## [$version]"

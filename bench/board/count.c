@@ -1,27 +1,27 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// A plugin for qemu-aarch64 (TCG plugin API, version 1) that counts what a single-threaded program would ask of a
-// Cortex-A72 as on a Raspberry Pi 4: instructions by kind, mispredicted branches, and misses of the data caches. With
-// qemu-x86_64, only the number of instructions and of accesses means something.
+// A plugin for qemu-aarch64 (TCG plugin API, version 1) that counts the work of a single-threaded program on a Cortex-A72
+// as in a Raspberry Pi 4: instructions by kind, mispredicted branches, and misses of the data caches. With qemu-x86_64,
+// only the numbers of instructions and accesses are meaningful.
 //
 //   qemu-aarch64 -plugin libcount.so,out=counts.tsv program
 //
-// A program marks places by system call 0x6f72 with a label of up to 8 characters in its argument (see marks.hpp);
-// reading the clock is a place of its own, labelled "clock". At each, a line with the label and all counts so far is
-// written, as in `heading` below: what lies between two places is the difference of their lines.
+// A program sets marks by system call 0x6f72 with a label of up to 8 characters as argument (see marks.hpp); reading the
+// clock also sets a mark, with the label "clock". At each mark the plugin writes a line with the label and all counts so
+// far, as in `heading` below: the work between two marks is the difference of their lines.
 //
-// What is simulated: data cache of 32 kB, 2 ways; L2 cache of 1 MB, 16 ways; lines of 64 bytes, least recently used
-// goes, a write brings the line in. The program has the L2 cache for itself, and instructions do not enter it. No
-// line is prefetched; instead a miss next to one of the last 16 misses is also counted as `ahead`: one that the
-// A72, which fetches ahead along such streams, would have on its way. Branches: two tables of two-bit counters, by
-// address and by address and history, with a third that chooses; indirect jumps and returns count as predicted.
+// Simulation: data cache of 32 kB, 2 ways; L2 cache of 1 MB, 16 ways; lines of 64 bytes, LRU replacement, write-allocate.
+// The L2 cache is not shared and contains no instructions. There is no prefetching; instead, a miss next to one of the
+// last 16 misses is also counted as `ahead`, because the A72 prefetches along such streams. Branches: two tables of
+// two-bit counters, by address and by address and history, with a third one that selects; indirect jumps and returns
+// count as predicted.
 #include <stdbool.h>
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-// --- what is used of the plugin API, as QEMU's documentation describes it ------------------------
+// --- the used part of the plugin API, from QEMU's documentation ----------------------------------
 
 typedef uint64_t plugin_id;
 struct qemu_plugin_tb;
@@ -63,9 +63,9 @@ static void write_line(const char* label) {
 // --- data caches ---------------------------------------------------------------------------------
 
 enum { line_bits = 6, l1_sets = 256, l1_ways = 2, l2_sets = 1024, l2_ways = 16, streams = 16 };
-static uint64_t l1_lines[l1_sets][l1_ways], l2_lines[l2_sets][l2_ways];  // the last used comes first; 0: none
+static uint64_t l1_lines[l1_sets][l1_ways], l2_lines[l2_sets][l2_ways];  // most recently used first; 0: empty
 
-/// Whether the line is there; it is afterwards.
+/// Returns true if the line is cached; loads it otherwise.
 static bool touch(uint64_t* ways, int count, uint64_t line) {
   int i = 0;
   while (i != count - 1 && ways[i] != line) ++i;
@@ -75,7 +75,7 @@ static bool touch(uint64_t* ways, int count, uint64_t line) {
   return found;
 }
 
-/// Whether the last misses lead to this one.
+/// Returns true if this miss is next to a recent one.
 static bool is_ahead(uint64_t* recent, unsigned* oldest, uint64_t line) {
   for (int i = 0; i != streams; ++i)
     if (recent[i] + 1 == line || recent[i] - 1 == line) {
@@ -103,7 +103,7 @@ static void access_line(uint64_t line) {
 
 static void on_memory(unsigned vcpu, uint32_t info, uint64_t address, void* data) {
   (void)vcpu, (void)data;
-  const uint64_t first = (address >> line_bits) + 1;  // no line is 0
+  const uint64_t first = (address >> line_bits) + 1;  // 0 means empty
   const uint64_t last = ((address + (1u << qemu_plugin_mem_size_shift(info)) - 1) >> line_bits) + 1;
   access_line(first);
   if (last != first) access_line(last);
@@ -168,7 +168,7 @@ static void classify(uint32_t word, struct block* b) {
 
 static void on_translation(plugin_id id, struct qemu_plugin_tb* tb) {
   (void)id;
-  struct block* const b = calloc(1, sizeof *b);  // blocks are translated again now and then; all stay until the end
+  struct block* const b = calloc(1, sizeof *b);  // blocks may be translated again; all are kept until the end
   const size_t n = qemu_plugin_tb_n_insns(tb);
   b->begin = qemu_plugin_tb_vaddr(tb);
   b->end = b->begin + 4 * n;
@@ -182,7 +182,7 @@ static void on_translation(plugin_id id, struct qemu_plugin_tb* tb) {
   qemu_plugin_register_vcpu_tb_exec_cb(tb, on_block, no_registers, b);
 }
 
-// --- places --------------------------------------------------------------------------------------
+// --- marks ---------------------------------------------------------------------------------------
 
 static void on_syscall(plugin_id id, unsigned vcpu, int64_t number, uint64_t a1, uint64_t a2, uint64_t a3, uint64_t a4,
                        uint64_t a5, uint64_t a6, uint64_t a7, uint64_t a8) {

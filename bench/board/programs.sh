@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 #
-# What run.sh and lanes.sh share of making programs; to be sourced.
+# Functions of run.sh and lanes.sh for building programs; source this file.
 
-# Whether a program is older than what it was made of, as the compiler has listed it beside it (-MMD -MF PROGRAM.d).
+# True if a program is older than one of its sources, which the compiler lists in PROGRAM.d (-MMD -MF PROGRAM.d).
 outdated() {  # program
   [[ -e $1 && -e $1.d ]] || return 0
   local source
@@ -10,6 +10,6 @@ outdated() {  # program
   return 1
 }
 
-build_plugin() {  # where it goes
+build_plugin() {  # output file
   "${CC:-gcc}" -O2 -Wall -Wextra -fPIC -shared -fvisibility=hidden -o "$1" bench/board/count.c
 }

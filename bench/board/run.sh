@@ -1,14 +1,14 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
 #
-# What a frame asks of a Raspberry Pi 4, counted under emulation: builds the plugin and the programs of this folder and
+# Cost of a frame on a Raspberry Pi 4, counted under emulation: builds the plugin and the programs of this folder and
 # prints the table. See README.md.
 #
 # usage: bench/board/run.sh SYSROOT [FRAMES]
-# Needs gcc, g++-aarch64-linux-gnu, qemu-user (6 to 8, as in Debian 12: later ones have another plugin API), python3,
+# Needs gcc, g++-aarch64-linux-gnu, qemu-user (6 to 8, as in Debian 12; later versions have another plugin API), python3,
 # libeigen3-dev, libexpected-dev and libtomlplusplus-dev, the recordings of ORBIS_DATA_DIR (../shared/data), and SYSROOT,
-# which bench/board/sysroot.sh makes. The first time takes ten minutes, most of it one compiler run of 4 GB. Results are
-# kept in build/board.
+# which bench/board/sysroot.sh creates. The first run takes ten minutes, most of it for one compiler run with 4 GB.
+# Results are stored in build/board.
 set -euo pipefail
 usage() {
   sed -n '4,12s/^# \{0,1\}//p' "$here/run.sh" >&2
@@ -16,7 +16,7 @@ usage() {
   exit 1
 }
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
-[[ $# -ge 1 ]] || usage "no SYSROOT is given"
+[[ $# -ge 1 ]] || usage "SYSROOT is missing"
 [[ -d $1/usr/include/octomap ]] || usage "$1 has no usr/include/octomap: bench/board/sysroot.sh makes a SYSROOT"
 root=$(cd "$1" && pwd)
 data=${ORBIS_DATA_DIR:-$here/../../../shared/data}

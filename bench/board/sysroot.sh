@@ -1,14 +1,14 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
 #
-# Fetches the libraries of Debian 12 for 64-bit ARM that run.sh and tests/aarch64.sh want, and unpacks them into a folder. Nothing is installed,
-# and the lists of packages of this system stay as they are.
+# Downloads the libraries of Debian 12 for 64-bit ARM that run.sh and tests/aarch64.sh need, and unpacks them into a
+# folder. It installs nothing and does not change the package lists of this system.
 #
 # usage: bench/board/sysroot.sh FOLDER
 set -euo pipefail
 [[ $# == 1 ]] || { sed -n '4,8s/^# \{0,1\}//p' "$0" >&2; exit 1; }
 if ! grep -qs '^VERSION_CODENAME=bookworm' /etc/os-release; then
-  echo "sysroot.sh: wants Debian 12, whose packages it names" >&2
+  echo "sysroot.sh: needs Debian 12, whose package names it uses" >&2
   exit 1
 fi
 mkdir -p "$1"

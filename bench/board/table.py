@@ -1,22 +1,22 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Turns the counts of count.c into a table of work and implied times on a Raspberry Pi 4.
+"""Converts the counts of count.c to a table of work and estimated times on a Raspberry Pi 4.
 
 usage: table.py COUNTS.tsv... [--stages]
        table.py --lanes [--stages] NEON.tsv PORTABLE.tsv AVX2.tsv
 
-Each file is what one program has written. Without --stages a row is the mean over the pieces between a label and "end";
-with it (slam.cpp) the frames are taken apart into the stages of `track`. With --lanes: the instructions of the same program
-in three kinds of vector code, and those of a lane by AVX2's, whose vectors have 256 bits, not 128.
+Each file is the output of one program. Without --stages a row is the mean over the pieces between a label and "end"; with
+--stages (slam.cpp) frames are split into the stages of `track`. With --lanes, the table shows the instructions of the same
+program with three kinds of vector code, and those per lane relative to AVX2, whose vectors have 256 bits instead of 128.
 """
 import csv
 import sys
 
 HERTZ = 1.5e9
-# Cycles; (fast, likely, slow). README.md says where they come from.
+# Cycles (fast, likely, slow). README.md states the sources.
 MODEL = {
     "per instruction": (1 / 2.0, 1 / 1.5, 1 / 1.1),
-    "wide": (0.0, 0.25, 0.5),  # a vector of 128 bits keeps its pipe for longer
+    "wide": (0.0, 0.25, 0.5),  # a vector of 128 bits occupies its pipe for longer
     "slow": (5, 10, 18),  # divisions and roots
     "mispredicted": (11, 14, 17),
     "l2 hit": (6, 12, 19),
@@ -52,7 +52,7 @@ def difference(a, b):
 
 
 def pieces(rows):
-    """By label, the counts between it and the next "end"; a piece in a piece counts for both."""
+    """By label, the counts between it and the next "end"; nested pieces count for both."""
     found, begun = {}, []
     for label, counts in rows:
         if label == "end":
@@ -65,10 +65,10 @@ def pieces(rows):
 
 
 def stages(rows):
-    """The same for slam.cpp: of a frame, the clock is read before and after extraction, after tracking, and in the end.
+    """The same for slam.cpp, which reads the clock before and after extraction, after tracking, and at the end of a frame.
 
-    The first frame begins the map and has nothing to track or to adjust: it is left out. Its depth image meets an empty
-    octree, which has a row of its own.
+    The first frame starts the map and has nothing to track or adjust: it is omitted. The insertion of its depth image
+    into an empty octree has a separate row.
     """
     found = {}
     first = True
@@ -108,7 +108,7 @@ def stages(rows):
 
 
 def lanes(names, taken_apart):
-    """Prints instructions of NEON, portable and AVX2 code, and what a lane costs by AVX2."""
+    """Prints instructions of NEON, portable and AVX2 code, and the cost per lane relative to AVX2."""
     neon, portable, avx2 = (taken_apart(read(name)) for name in names)
     mean = lambda all_of: sum(c["instructions"] for c in all_of) / len(all_of) / 1e6
     print(f"{'':32} {'NEON':>9} {'portable':>9} {'AVX2':>9}   of a lane: {'NEON':>6} {'portable':>9}")

@@ -15,7 +15,7 @@
 
 namespace orbis::cloud::detail {
 
-using policy = parallel_policy;  // that all others become
+using policy = parallel_policy;  // the policy to which all others are converted
 
 template neighbor_table find_all_knn(const policy&, const point_view&, std::size_t);
 template std::vector<float> find_mean_distances(const policy&, const point_view&, std::size_t);

@@ -5,7 +5,7 @@
 
 namespace orbis::cloud::detail {
 
-using policy = parallel_policy;  // that all others become
+using policy = parallel_policy;  // the policy to which all others are converted
 template <class S>
 using view = basic_point_view<S>;
 

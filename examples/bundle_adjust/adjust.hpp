@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// One adjustment with a loss. The solver is compiled for each loss: the sources share them out.
+/// Bundle adjustment with a loss. The solver is compiled for each loss, in two source files.
 #pragma once
 
 #include <cmath>
@@ -24,12 +24,12 @@ struct settings {
   bool json = false;
 };
 
-inline int complain(int code, const std::string& why) {
+inline int report_error(int code, const std::string& why) {
   std::fprintf(stderr, "bundle_adjust: %s\n", why.c_str());
   return code;
 }
 
-/// What a file holds, as the solver wants it.
+/// The problem of a file, as input of the solver.
 struct bundle {
   std::vector<optimize::bal_camera> cameras;
   std::vector<orbis::vec3> points;
@@ -72,7 +72,7 @@ inline optimize::reduced_solver_options solver_named(const std::string& name) {
   return {};
 }
 
-/// One way to step or the other: where that is chosen at run time, one type does for both.
+/// Damping that is chosen at run time, in one type.
 struct chosen_damping {
   bool dogleg = false;
   struct state {
@@ -91,7 +91,7 @@ int adjust(const settings& s, orbis::io::bal_problem& problem, Loss loss) {
   bundle b{problem};
   optimize::bundle_adjuster adjuster{optimize::bal_reprojection{}, loss, chosen_damping{s.damping == "dogleg"},
                                      solver_named(s.solver)};
-  // Of the gradient a step tells where it began: it ends the line before its own. Of the last estimate it is not known.
+  // A step reports the gradient at its start, which belongs to the previous line. It is unknown for the last estimate.
   bool in_line = false;
   const auto print = [&](const optimize::bundle_summary& now) {
     if (s.json) return;
@@ -106,10 +106,10 @@ int adjust(const settings& s, orbis::io::bal_problem& problem, Loss loss) {
                      std::span<const optimize::bundle_observation>{b.observations},
                      {.max_iterations = s.max_iterations, .relative_tolerance = s.tolerance}, {}, print);
   if (in_line) std::printf("\n");
-  if (is_failure(summary.status)) return complain(2, s.input + ": " + to_string(summary));
+  if (is_failure(summary.status)) return report_error(2, s.input + ": " + to_string(summary));
   if (!s.output.empty()) {
     b.write_to(problem);
-    if (const auto done = write_bal(s.output, problem); !done) return complain(2, done.error().to_string());
+    if (const auto done = write_bal(s.output, problem); !done) return report_error(2, done.error().to_string());
   }
   if (s.json) {
     print_json(s, b, summary);
@@ -118,12 +118,12 @@ int adjust(const settings& s, orbis::io::bal_problem& problem, Loss loss) {
   std::printf("%s; half the sum of squares over %zu cameras, %zu points and %zu observations\n",
               to_string(summary).c_str(), b.cameras.size(), b.points.size(), summary.observations);
   if (summary.left_out != 0)
-    std::printf("left out: %zu observations without a projection, the first is number %zu\n", summary.left_out,
+    std::printf("omitted: %zu observations without a projection, the first is number %zu\n", summary.left_out,
                 summary.first_left_out);
   return 0;
 }
 
-/// With a redescending loss, "cauchy" or "tukey".
+/// Adjusts with a redescending loss, "cauchy" or "tukey".
 int adjust_redescending(const settings& s, orbis::io::bal_problem& problem);
-/// With "huber" or "none".
+/// Adjusts with the loss "huber" or "none".
 int adjust_convex(const settings& s, orbis::io::bal_problem& problem);

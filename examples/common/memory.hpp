@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// How much memory there is, so that a program that wants more than that ends with a message, and not the machine.
+// The amount of free memory, so that a program that needs more ends with a message instead of stalling the machine.
 #pragma once
 
 #include <algorithm>
@@ -22,7 +22,7 @@
 
 namespace examples {
 
-/// The first whole number in `text` after `label`; nullopt where there is none. What does not fit is the largest.
+/// The whole number in `text` after the first `label`; nullopt if there is none. Saturates at the largest value.
 [[nodiscard]] inline std::optional<std::uint64_t> number_after(std::string_view text, std::string_view label) {
   const std::size_t at = text.find(label);
   if (at == text.npos) return std::nullopt;
@@ -35,15 +35,14 @@ namespace examples {
   return number;
 }
 
-/// What a control group says of itself; empty where it has none.
+/// The memory files of a control group; empty if there is none.
 struct memory_group {
-  std::string limit;  ///< bytes, or a word where there is none
-  std::string use;    ///< bytes, with files that are kept for the next time
-  std::string stat;   ///< numbers with names, among them those of such files
+  std::string limit;  ///< bytes, or a word if there is no limit
+  std::string use;    ///< bytes, including cached files
+  std::string stat;   ///< named values, including those of cached files
 };
 
-/// Bytes that may still be taken, by the text of /proc/meminfo and a control group; nullopt where the first does not
-/// say.
+/// Free memory in bytes, by the text of /proc/meminfo and a control group; nullopt if the first does not state it.
 [[nodiscard]] inline std::optional<std::uint64_t> free_memory(std::string_view meminfo, const memory_group& group) {
   const auto available = number_after(meminfo, "MemAvailable:");  // kB
   if (!available) return std::nullopt;
@@ -52,34 +51,33 @@ struct memory_group {
   if (!limit) return bytes;
   const std::string stat = "\n" + group.stat;
   const std::uint64_t used = number_after(group.use, "").value_or(0);
-  const std::uint64_t files =
-      number_after(stat, "\ninactive_file ").value_or(0) +  // given back when they are in the way
-      number_after(stat, "\nactive_file ").value_or(0);
+  const std::uint64_t files = number_after(stat, "\ninactive_file ").value_or(0) +  // released under memory pressure
+                              number_after(stat, "\nactive_file ").value_or(0);
   const std::uint64_t taken = used - std::min(used, files);
   return std::min(bytes, *limit - std::min(*limit, taken));
 }
 
-/// The same of this system, with the control group of a container.
+/// Free memory of this system in bytes, with the control group of a container.
 [[nodiscard]] inline std::optional<std::uint64_t> free_memory() {
   const auto text = [](const std::string& path) { return orbis::read_file(path, 65536).value_or(std::string{}); };
   const std::string folder = "/sys/fs/cgroup/";
   memory_group group{text(folder + "memory.max"), text(folder + "memory.current"), text(folder + "memory.stat")};
-  if (group.limit.empty()) {  // the first version
+  if (group.limit.empty()) {  // cgroup version 1
     const std::string first = folder + "memory/memory.";
     group = {text(first + "limit_in_bytes"), text(first + "usage_in_bytes"), text(first + "stat")};
   }
   return free_memory(text("/proc/meminfo"), group);
 }
 
-/// From now on what would take nearly all memory that is free fails with std::bad_alloc, instead of a machine that
-/// swaps and ends some program. Does nothing where the system does not say what is free, or knows no such limit.
+/// Limits the memory of this process to 90 % of the free memory: allocations beyond it throw std::bad_alloc, before the
+/// machine swaps or ends other programs. No effect if the system does not report free memory or has no such limit.
 inline void limit_memory() {
 #ifdef __linux__
   const auto bytes = free_memory();
   const auto pages = orbis::read_file("/proc/self/statm", 4096);
   rlimit limit{};
   if (!bytes || !pages || ::getrlimit(RLIMIT_DATA, &limit) != 0) return;
-  // Of its seven numbers the sixth is what the program has for data, in pages.
+  // The sixth of the seven numbers is the data size in pages.
   std::string_view rest = *pages;
   for (int n = 0; n != 5; ++n) rest.remove_prefix(std::min(rest.find(' '), rest.size() - 1) + 1);
   const auto page = static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
@@ -90,10 +88,10 @@ inline void limit_memory() {
 #endif
 }
 
-/// Why a program gives up that `e` has come to the end of.
-[[nodiscard]] inline std::string why_it_gave_up(const std::exception& e) {
+/// The message of a program that ends with the exception `e`.
+[[nodiscard]] inline std::string describe_exception(const std::exception& e) {
   const bool no_memory = dynamic_cast<const std::bad_alloc*>(&e) != nullptr;
-  return std::string{"gave up: "} + (no_memory ? "there is not enough memory" : e.what());
+  return no_memory ? "out of memory" : e.what();
 }
 
 }  // namespace examples

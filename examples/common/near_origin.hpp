@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// Clouds in coordinates as of maps of a country (UTM): floats and octrees do not do for numbers so large, so such a
-// cloud is taken relative to a place within it.
+// Clouds in geographic coordinates (UTM): the numbers are too large for floats and octrees, so that such a cloud is
+// read relative to an origin within it.
 #pragma once
 
 #include <algorithm>
@@ -18,15 +18,14 @@
 
 namespace examples {
 
-/// `place` in whole metres, or zero where it is so near to the origin that floats and octrees do for it.
+/// `place` rounded to metres, or zero if it is within 1 km of the origin along each axis.
 [[nodiscard]] inline orbis::vec3 nearby_origin(const orbis::vec3& place) {
   constexpr double far = 1000.0;
   if (!place.allFinite() || place.cwiseAbs().maxCoeff() < far) return orbis::vec3::Zero();
   return place.array().round();
 }
 
-/// A point with half of the finite points on either side, along each axis: a few stray ones do not move it. Zero where
-/// there are none.
+/// The median of the finite points along each axis, which outliers do not move. Zero if there are none.
 [[nodiscard]] inline orbis::vec3 middle_of(const std::vector<orbis::vec3f>& points) {
   orbis::vec3 middle = orbis::vec3::Zero();
   std::vector<float> along;
@@ -44,10 +43,10 @@ namespace examples {
 
 struct cloud_near_origin {
   orbis::point_cloud cloud;  ///< relative to `origin`
-  orbis::vec3 origin;        ///< in the coordinates of the file; zero where these are small
+  orbis::vec3 origin;        ///< in the coordinates of the file; zero if these are small
 };
 
-/// Reads a cloud; one far away relative to its middle. Errors: those of `io::read_cloud`.
+/// Reads a cloud, relative to its median if that is far from the origin. Errors: those of `io::read_cloud`.
 [[nodiscard]] inline orbis::result<cloud_near_origin> read_near_origin(const std::filesystem::path& path) {
   auto cloud = orbis::io::read_cloud(path);
   if (!cloud) return orbis::fail(cloud.error());

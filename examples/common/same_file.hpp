@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// Whether a program would write its result over what it reads.
+// Detects that a program would overwrite its input.
 #pragma once
 
 #include <filesystem>
@@ -9,15 +9,15 @@
 
 namespace examples {
 
-/// Whether both names lead to one file that exists, by links as well.
+/// Returns true if both names refer to the same existing file, also by links.
 [[nodiscard]] inline bool is_same_file(const std::filesystem::path& a, const std::filesystem::path& b) {
   std::error_code ignored;
   return std::filesystem::equivalent(a, b, ignored);
 }
 
-/// What to say of `output` if it is `input`.
-[[nodiscard]] inline std::string would_be_lost(const std::string& output, const std::string& input) {
-  return output + ": is an input (" + input + ") and would be written over: give another name for the result";
+/// The error message if `output` is the file `input`.
+[[nodiscard]] inline std::string overwrite_message(const std::string& output, const std::string& input) {
+  return output + ": is an input (" + input + ") and would be overwritten: choose another name for the result";
 }
 
 }  // namespace examples

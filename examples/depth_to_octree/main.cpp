@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// depth_to_octree DEPTH.png MAP.bt: a depth image and the camera's pose as an occupancy octree for octovis.
+// depth_to_octree DEPTH.png MAP.bt: converts a depth image with a camera pose to an occupancy octree for octovis.
 #include <cstdio>
 #include <exception>
 #include <string>
@@ -16,7 +16,7 @@
 #include "../common/same_file.hpp"
 #include "../common/voxel_estimate.hpp"
 
-int complain(int code, const std::string& why) {
+int report_error(int code, const std::string& why) {
   std::fprintf(stderr, "depth_to_octree: %s\n", why.c_str());
   return code;
 }
@@ -33,44 +33,45 @@ orbis::result<orbis::camera::camera_settings> camera_named(const std::string& s,
 int main(int argc, char** argv) try {
   std::string input, output, camera_name = "525,525,319.5,239.5";
   std::vector<double> p{0, 0, 0, 0, 0, 0, 1};
-  double resolution = 0.05, scale = 0.0;  // scale 0: the camera's
-  CLI::App cli{"A depth image and the camera's pose as an occupancy octree", "depth_to_octree"};
+  double resolution = 0.05, scale = 0.0;  // scale 0: that of the camera
+  CLI::App cli{"Convert a depth image with a camera pose to an occupancy octree", "depth_to_octree"};
   cli.add_option("DEPTH", input, "16-bit grey PNG")->required();
-  cli.add_option("MAP", output, "the .bt file to write")->required();
-  cli.add_option("--pose", p, "tx ty tz qx qy qz qw, camera to world")->expected(7)->capture_default_str();
-  cli.add_option("--camera", camera_name, "camera.toml, tum_fr1 ..., or fx,fy,cx,cy")->capture_default_str();
-  cli.add_option("--scale", scale, "stored depth / scale = metres; default: the camera file's, or 1000");
-  cli.add_option("--resolution", resolution, "edge of a voxel, metres")->capture_default_str();
+  cli.add_option("MAP", output, "output .bt file")->required();
+  cli.add_option("--pose", p, "camera to world: tx ty tz qx qy qz qw")->expected(7)->capture_default_str();
+  cli.add_option("--camera", camera_name, "camera.toml, preset (tum_fr1 ...), or fx,fy,cx,cy")->capture_default_str();
+  cli.add_option("--scale", scale, "depth units per metre (that of the camera file, or 1000)");
+  cli.add_option("--resolution", resolution, "voxel size in metres")->capture_default_str();
   try {
     cli.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
-    return e.get_exit_code() == 0 ? cli.exit(e) : complain(1, e.what() + std::string{" (--help shows the usage)"});
+    return e.get_exit_code() == 0 ? cli.exit(e) : report_error(1, e.what() + std::string{" (--help shows the usage)"});
   }
   const orbis::so3::quaternion q{p.data() + 3};  // x y z w
-  if (!(q.norm() > 1e-6 && orbis::vec3{p.data()}.norm() + q.norm() < 1e6)) return complain(1, "--pose: is no pose");
-  if (!(resolution >= 1e-4 && resolution <= 1e3)) return complain(1, "--resolution: is not 0.0001 ... 1000");
-  if (!(scale == 0.0 || (scale >= 1e-3 && scale <= 1e9))) return complain(1, "--scale: is not 0.001 ... 1e9");
+  if (!(q.norm() > 1e-6 && orbis::vec3{p.data()}.norm() + q.norm() < 1e6))
+    return report_error(1, "--pose: is not a valid pose");
+  if (!(resolution >= 1e-4 && resolution <= 1e3)) return report_error(1, "--resolution: must be in 0.0001 ... 1000");
+  if (!(scale == 0.0 || (scale >= 1e-3 && scale <= 1e9))) return report_error(1, "--scale: must be in 0.001 ... 1e9");
   for (const std::string& read : {input, camera_name})
-    if (examples::is_same_file(output, read)) return complain(1, examples::would_be_lost(output, read));
+    if (examples::is_same_file(output, read)) return report_error(1, examples::overwrite_message(output, read));
   examples::limit_memory();
   const auto depth = orbis::io::read_depth(input);
-  if (!depth) return complain(2, depth.error().to_string());
+  if (!depth) return report_error(2, depth.error().to_string());
   const auto camera = camera_named(camera_name, depth->width(), depth->height());
-  if (!camera) return complain(camera.error().where == "--camera" ? 1 : 2, camera.error().to_string());
+  if (!camera) return report_error(camera.error().where == "--camera" ? 1 : 2, camera.error().to_string());
   if (camera->model.width() != depth->width() || camera->model.height() != depth->height())
-    return complain(2, camera_name + ": the camera's images have another size than " + input);
+    return report_error(2, camera_name + ": the image size of the camera differs from that of " + input);
   const double units = scale > 0.0 ? scale : camera->depth_scale;
   const auto voxels =
       examples::voxels_of_depth(camera->model.k(), [&](std::size_t i) { return depth->pixels()[i] / units; });
   if (voxels.is_too_large(resolution, examples::free_memory()))
-    return complain(2, "--resolution: " + voxels.in_words(resolution, "the image") + ", too many");
+    return report_error(2, "--resolution: " + voxels.describe(resolution, "the image") + ", too many");
   if (voxels.takes_long(resolution))
-    std::fprintf(stderr, "depth_to_octree: %s; this takes long\n", voxels.in_words(resolution, "the image").c_str());
+    std::fprintf(stderr, "depth_to_octree: %s; this takes long\n", voxels.describe(resolution, "the image").c_str());
   orbis::octree::occupancy_octree<> map{resolution};
   const orbis::camera::depth_view metres{*depth, units};
   const auto scan = map.integrate(metres, camera->model, orbis::se3{orbis::so3{q}, orbis::vec3{p.data()}});
-  if (scan.used == 0) return complain(2, input + ": no depth in it lies in the map");
-  if (const auto done = write_bt(map, output); !done) return complain(2, done.error().to_string());
-} catch (const std::exception& e) {  // no memory, no threads
-  return complain(2, examples::why_it_gave_up(e));
+  if (scan.used == 0) return report_error(2, input + ": no depth within the bounds of the map");
+  if (const auto done = write_bt(map, output); !done) return report_error(2, done.error().to_string());
+} catch (const std::exception& e) {  // out of memory or threads
+  return report_error(2, examples::describe_exception(e));
 }

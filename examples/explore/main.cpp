@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// explore MAP.bt: a robot that flies through a made-up building of three furnished rooms and maps it by itself, from
-// known poses: it looks where most unknown space is to be seen for a short way, flies there through what it knows to be
-// free, and looks ahead while it flies; until nothing more is worth a view.
+// explore MAP.bt: autonomous mapping of a synthetic building with three furnished rooms, with known poses. A flying
+// robot repeatedly chooses the view that shows the most unknown space for the shortest path, flies there through known
+// free space, and takes views on the way, until no view shows enough.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -27,12 +27,12 @@ using orbis::vec3;
 
 using map_type = orbis::octree::occupancy_octree<>;
 
-int complain(int code, const std::string& why) {
+int report_error(int code, const std::string& why) {
   std::fprintf(stderr, "explore: %s\n", why.c_str());
   return code;
 }
 
-/// A furnished room, divided by two walls with a door each. z is up, the floor is at 0, the middle at the origin.
+/// A furnished room, divided by two walls with a door each. z is up, the floor is at z = 0, the centre at the origin.
 class building {
  public:
   explicit building(std::uint64_t seed)
@@ -47,7 +47,7 @@ class building {
   [[nodiscard]] orbis::octree::bounding_box bounds() const {
     return {{-half.x(), -half.y(), 0.0}, {half.x(), half.y(), 2.6}};
   }
-  /// How far it is to the nearest surface, metres.
+  /// The distance to the nearest surface, metres.
   [[nodiscard]] double distance(const vec3& p) const {
     double d = room_.surface_distance(p);
     for (const auto& w : walls_) {
@@ -56,7 +56,7 @@ class building {
     }
     return d;
   }
-  /// What the camera measures: depths along its axis, metres.
+  /// A depth image of the camera: depth along its axis, metres.
   template <class Camera>
   [[nodiscard]] orbis::image<float> depth(const Camera& camera, const se3& T_world_camera) const {
     auto image = room_.exact_depth(orbis::par, camera, T_world_camera);
@@ -73,7 +73,7 @@ class building {
  private:
   inline static const orbis::vec2 half{6.0, 3.0};
 
-  /// Where a ray enters a box.
+  /// The distance at which a ray enters a box.
   [[nodiscard]] static double enter(const orbis::octree::bounding_box& b, const vec3& origin, const vec3& direction) {
     const vec3 one = (b.min - origin).cwiseQuotient(direction), other = (b.max - origin).cwiseQuotient(direction);
     const double in = one.cwiseMin(other).maxCoeff(), out = one.cwiseMax(other).minCoeff();
@@ -101,7 +101,7 @@ struct explorer {
   orbis::nav::distance_field field;
   orbis::nav::frontiers frontiers;
   vec3 position;
-  std::vector<vec3> trail;  ///< where it was before
+  std::vector<vec3> trail;  ///< previous positions
   double travelled = 0.0;
   int views = 0;
 
@@ -115,7 +115,7 @@ struct explorer {
         frontiers{map.grid()},
         position{start} {
     map.track_changes();
-    // Where the robot is, nothing else is.
+    // The space of the robot is free.
     const vec3 around = vec3::Constant(radius + 2 * resolution);
     for_each_voxel(map.grid(), {start - around, start + around}, [&](const auto& k) {
       map.edit_octant(k, [&](auto& voxels) {
@@ -145,13 +145,13 @@ struct explorer {
     travelled += (next - position).norm();
     position = next;
   }
-  /// A wall that is seen from near may reach into voxels that were free so far: goes back to where there is room.
+  /// Moves back along the trail to a free position: a wall seen from nearby may extend into voxels that were free.
   bool back_out() {
     for (; !view().is_free(position) && !trail.empty(); trail.pop_back()) go(trail.back());
     return view().is_free(position);
   }
-  /// Flies to a place: a second at a time, from rest to rest, and after each it looks ahead. What it sees may lead it
-  /// round another way. False if there is none, or no view is left.
+  /// Flies to a position in steps of a second, from rest to rest, takes a view after each and replans. Returns false if
+  /// there is no path or no view is left.
   bool fly_to(const vec3& goal, int budget) {
     orbis::nav::replanner planner{goal};
     while (views < budget) {
@@ -175,8 +175,8 @@ struct explorer {
   }
 };
 
-/// The share of the building's air that is known to be free: of the voxels that touch no surface and are connected with
-/// the start. `air` is how many there are.
+/// The share of the reachable free space that the map knows to be free: of the voxels that touch no surface and are
+/// connected with the start. `air`: their number.
 double coverage(const explorer& robot, const vec3& start, std::size_t& air) {
   const auto& grid = robot.map.grid();
   const auto keys = *orbis::octree::keys_between(grid, robot.world.bounds().min, robot.world.bounds().max);
@@ -216,24 +216,26 @@ int main(int argc, char** argv) try {
   double resolution = 0.05, radius = 0.2, range = 4.0;
   int budget = 600, width = 160;
   std::uint64_t seed = 1;
-  CLI::App cli{"A robot that maps a made-up building by itself", "explore"};
-  cli.add_option("MAP", output, "the .bt file to write")->required();
-  cli.add_option("--resolution", resolution, "edge of a voxel, metres")
+  CLI::App cli{"Autonomous mapping of a synthetic building", "explore"};
+  cli.add_option("MAP", output, "output .bt file")->required();
+  cli.add_option("--resolution", resolution, "voxel size in metres")
       ->check(CLI::Range(0.02, 0.2))
       ->capture_default_str();
-  cli.add_option("--robot-radius,--radius", radius, "of the robot, metres")
+  cli.add_option("--robot-radius,--radius", radius, "radius of the robot in metres")
       ->check(CLI::Range(0.05, 0.35))
       ->capture_default_str();
-  cli.add_option("--range", range, "how far the camera sees, metres")
+  cli.add_option("--range", range, "range of the camera in metres")
       ->check(CLI::Range(1.0, 10.0))
       ->capture_default_str();
-  cli.add_option("--width", width, "of the depth images, pixels")->check(CLI::Range(40, 640))->capture_default_str();
-  cli.add_option("--views", budget, "how many at most")->check(CLI::Range(16, 100000))->capture_default_str();
-  cli.add_option("--seed", seed, "of the building")->capture_default_str();
+  cli.add_option("--width", width, "width of the depth images in pixels")
+      ->check(CLI::Range(40, 640))
+      ->capture_default_str();
+  cli.add_option("--views", budget, "maximum number of views")->check(CLI::Range(16, 100000))->capture_default_str();
+  cli.add_option("--seed", seed, "seed of the building")->capture_default_str();
   try {
     cli.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
-    return e.get_exit_code() == 0 ? cli.exit(e) : complain(1, e.what() + std::string{" (--help shows the usage)"});
+    return e.get_exit_code() == 0 ? cli.exit(e) : report_error(1, e.what() + std::string{" (--help shows the usage)"});
   }
 
   const building world{seed};
@@ -245,11 +247,11 @@ int main(int argc, char** argv) try {
   orbis::nav::next_view_options options;
   options.gain = {.max_range = range, .pixel_step = std::max(1, width / 40), .bounds = world.bounds()};
   options.min_gain = 0.01;
-  std::vector<vec3> done;  // places that a view has shown nothing of
+  std::vector<vec3> done;  // targets whose unknown space a view did not show
   std::string why = "out of views";
   while (robot.views < budget) {
     if (!robot.back_out()) {
-      why = "no room around the robot";
+      why = "no free space around the robot";
       break;
     }
     auto places = orbis::nav::places_of(robot.frontiers.clusters({.min_size = 10}), robot.map.grid(), spacing);
@@ -259,7 +261,7 @@ int main(int argc, char** argv) try {
     ++options.seed;
     const auto next = orbis::nav::next_best_view(robot.view(), places, robot.camera, robot.position, options);
     if (next.status != orbis::nav::next_view_status::found) {
-      why = next.status == orbis::nav::next_view_status::nothing_to_see ? "nothing more is worth a view"
+      why = next.status == orbis::nav::next_view_status::nothing_to_see ? "no view shows enough unknown space"
                                                                         : std::string{to_string(next.status)};
       break;
     }
@@ -267,7 +269,7 @@ int main(int argc, char** argv) try {
     const auto before = gain(next.T_world_camera);
     if (!robot.fly_to(next.T_world_camera.translation(), budget)) continue;
     robot.look(next.T_world_camera);
-    // Unknown space that stays unknown cannot be seen from here.
+    // Unknown space that stays unknown is not visible from here.
     orbis::nav::view_gain after{robot.map, robot.camera, options.gain};
     if (2 * after(next.T_world_camera) > before) done.push_back(next.place);
   }
@@ -277,7 +279,7 @@ int main(int argc, char** argv) try {
   std::printf("views: %d\npath: %.2f m\ncoverage: %.2f %% of %.1f m3\nfrontier: %zu voxels\nended: %s\n", robot.views,
               robot.travelled, 100.0 * share, static_cast<double>(air) * std::pow(resolution, 3),
               robot.frontiers.size(), why.c_str());
-  if (const auto written = write_bt(robot.map, output); !written) return complain(2, written.error().to_string());
-} catch (const std::exception& e) {  // no memory, no threads
-  return complain(2, examples::why_it_gave_up(e));
+  if (const auto written = write_bt(robot.map, output); !written) return report_error(2, written.error().to_string());
+} catch (const std::exception& e) {  // out of memory or threads
+  return report_error(2, examples::describe_exception(e));
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A start for pose graphs whose odometry is too far off.
+/// Initialisation of pose graphs whose odometry is too inaccurate.
 #pragma once
 
 #include <cstddef>
@@ -18,7 +18,7 @@
 
 namespace examples {
 
-/// N numbers as the vertex of a graph; a step is added. With them a graph is a linear system.
+/// A vector of N numbers as a graph vertex, to which steps are added. A graph of such vertices is a linear system.
 template <int N>
 struct numbers {
   static constexpr int dof = N;
@@ -29,7 +29,7 @@ struct numbers {
   [[nodiscard]] const orbis::matrix<N>& to_matrix() const { return values; }
 };
 
-/// `R_b - R_a * R_a_b` for rotations without their constraints, whose columns are the nine numbers.
+/// The residual `R_b - R_a * R_a_b` of unconstrained matrices, whose columns are the nine numbers.
 struct rotation_difference {
   static constexpr int dimension = 9;
   using vertex = numbers<9>;
@@ -51,7 +51,7 @@ struct rotation_difference {
   }
 };
 
-/// `t_b - t_a - t_a_b`, all in the world frame.
+/// The residual `t_b - t_a - t_a_b` in the world frame.
 struct position_difference {
   static constexpr int dimension = 3;
   using vertex = numbers<3>;
@@ -67,11 +67,11 @@ struct position_difference {
   }
 };
 
-/// Computes all vertices that are not fixed from the edges alone; where they were does not matter. Two linear
-/// least-squares problems: first the rotations without their constraints, each projected to the nearest rotation, then
-/// the positions. Edges weigh by their information. Of the options `fixed`, `hold` and `semidefinite_information`
-/// count. Vertices that are fixed or held stay; on failure all do (`singular`: vertex `where` is not determined, or has
-/// no nearest rotation).
+/// Computes all vertices that are not fixed from the edges alone, independently of their initial poses. Solves two
+/// linear least-squares problems: first for unconstrained matrices, which are projected to the nearest rotations, then
+/// for the positions. Edges are weighted by their information. Of the options, `fixed`, `hold` and
+/// `semidefinite_information` apply. Fixed and held vertices stay unchanged; on failure all do (`singular`: vertex
+/// `where` is not determined, or has no nearest rotation).
 ///
 /// Sources: L. Carlone, R. Tron, K. Daniilidis, F. Dellaert, "Initialization techniques for 3D SLAM: a survey on
 /// rotation estimation and its use in pose graph optimization", ICRA 2015; D. Martinec, T. Pajdla, "Robust rotation and
@@ -81,7 +81,7 @@ template <std::ranges::contiguous_range Edges>
 [[nodiscard]] orbis::optimize::pose_graph_summary start_chordally(std::span<orbis::se3> vertices, const Edges& edges,
                                                                   orbis::optimize::pose_graph_options options = {}) {
   namespace optimize = orbis::optimize;
-  options.max_iterations = 2;  // one solves a linear system; one more shows that it did
+  options.max_iterations = 2;  // the first solves the linear system, the second detects convergence
   const auto solve = [&]<class Difference>(Difference difference, auto& unknowns, const auto& system) {
     using vertex = typename Difference::vertex;
     optimize::pose_graph_solver<vertex, optimize::trivial, optimize::gauss_newton, Difference> solver{
@@ -121,7 +121,7 @@ template <std::ranges::contiguous_range Edges>
   for (const auto& e : edges) {
     const orbis::mat3 r = rotations[e.from].rotation_matrix();
     const orbis::mat3 turned = r * e.measurement.rotation_matrix();
-    // The information is about the translation in the measured frame of `to`.
+    // The information is that of the translation in the measured frame of `to`.
     moves.push_back({e.from,
                      e.to,
                      {r * e.measurement.translation()},

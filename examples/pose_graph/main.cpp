@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// pose_graph FILE.g2o: optimises the poses of a g2o file; iteration table, or --json.
+// pose_graph FILE.g2o: optimises the poses of a g2o file and prints a table of iterations, or JSON (--json).
 #include <cstdio>
 #include <exception>
 #include <string>
@@ -24,7 +24,7 @@ struct settings {
   bool chordal = false, json = false;
 };
 
-int complain(int code, const std::string& why) {
+int report_error(int code, const std::string& why) {
   std::fprintf(stderr, "pose_graph: %s\n", why.c_str());
   return code;
 }
@@ -44,7 +44,7 @@ void print_json(const settings& s, const orbis::io::g2o_graph& graph, const opti
       r.iterations, r.factorizations, t.set_up, t.linearize, t.factor, t.solve, t.evaluate);
 }
 
-/// How to step is chosen at run time: one type does for all, and the solver is compiled once for each loss.
+/// Damping that is chosen at run time, in one type, so that the solver is compiled once for each loss.
 struct chosen_damping {
   std::string name;
   struct state {
@@ -72,9 +72,9 @@ int run(const settings& s, orbis::io::g2o_graph& graph, Loss loss) {
                    {}, [&](const optimize::pose_graph_summary& now) {
                      if (!s.json) std::printf("%9d %20.10g %15d\n", now.iterations, now.final_cost, now.factorizations);
                    });
-  if (is_failure(summary.status)) return complain(2, s.input + ": " + to_string(summary));
+  if (is_failure(summary.status)) return report_error(2, s.input + ": " + to_string(summary));
   if (!s.output.empty())
-    if (const auto done = write_g2o(s.output, graph); !done) return complain(2, done.error().to_string());
+    if (const auto done = write_g2o(s.output, graph); !done) return report_error(2, done.error().to_string());
   if (s.json)
     print_json(s, graph, summary);
   else
@@ -86,35 +86,37 @@ int run(const settings& s, orbis::io::g2o_graph& graph, Loss loss) {
 int main(int argc, char** argv) try {
   examples::limit_memory();
   settings s;
-  CLI::App cli{"Optimises the poses of a g2o file (VERTEX_SE3:QUAT, EDGE_SE3:QUAT, FIX)", "pose_graph"};
-  cli.add_option("FILE", s.input, "the graph")->required();
-  cli.add_option("--output", s.output, "where to write the graph with its new poses");
+  CLI::App cli{"Optimise the poses of a g2o file (VERTEX_SE3:QUAT, EDGE_SE3:QUAT, FIX)", "pose_graph"};
+  cli.add_option("FILE", s.input, "input graph")->required();
+  cli.add_option("--output", s.output, "output graph with the optimised poses");
   cli.add_option("--loss", s.loss, "robust loss")->check(CLI::IsMember({"none", "huber", "cauchy", "tukey"}));
-  cli.add_option("--width", s.width, "of the loss, in sigmas")->check(CLI::PositiveNumber)->capture_default_str();
-  cli.add_option("--damping", s.damping, "how to step")
+  cli.add_option("--width", s.width, "width of the loss in standard deviations")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  cli.add_option("--damping", s.damping, "step policy")
       ->check(CLI::IsMember({"gauss-newton", "levenberg-marquardt", "dogleg"}))
       ->capture_default_str();
   cli.add_option("--max-iterations", s.max_iterations)->check(CLI::NonNegativeNumber)->capture_default_str();
-  cli.add_option("--threads", s.threads, "0: all there are")->capture_default_str();
-  cli.add_flag("--chordal", s.chordal, "start from the edges alone, not from the file's poses");
+  cli.add_option("--threads", s.threads, "number of threads; 0: all cores")->capture_default_str();
+  cli.add_flag("--chordal", s.chordal, "initialise from the edges instead of the file's poses");
   cli.add_flag("--json", s.json, "print the summary as JSON");
   try {
     cli.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
-    return e.get_exit_code() == 0 ? cli.exit(e) : complain(1, e.what() + std::string{" (--help shows the usage)"});
+    return e.get_exit_code() == 0 ? cli.exit(e) : report_error(1, e.what() + std::string{" (--help shows the usage)"});
   }
   auto graph = orbis::io::read_g2o(s.input);
-  if (!graph) return complain(2, graph.error().to_string());
+  if (!graph) return report_error(2, graph.error().to_string());
   if (s.chordal) {
     const auto start =
         examples::start_chordally(std::span{graph->vertices}, graph->edges,
                                   {.fixed = graph->fixed, .hold = optimize::pose_graph_gauge::first_of_each_piece});
-    if (is_failure(start.status)) return complain(2, s.input + ": " + to_string(start));
+    if (is_failure(start.status)) return report_error(2, s.input + ": " + to_string(start));
   }
   if (s.loss == "huber") return run(s, *graph, optimize::huber{s.width});
   if (s.loss == "cauchy") return run(s, *graph, optimize::cauchy{s.width});
   if (s.loss == "tukey") return run(s, *graph, optimize::tukey{s.width});
   return run(s, *graph, optimize::trivial{});
-} catch (const std::exception& e) {  // no memory, no threads
-  return complain(2, examples::why_it_gave_up(e));
+} catch (const std::exception& e) {  // out of memory or threads
+  return report_error(2, examples::describe_exception(e));
 }

@@ -50,7 +50,7 @@ orbis::result<double> map_error(const orbis::point_cloud& cloud, const std::vect
 
 void compare_with_truth(results& r, const frame_source& source, console& console) {
   if (source.ground_truth.empty()) {
-    r.truth_note = "Without ground truth.";
+    r.truth_note = "No ground truth.";
     return;
   }
   console.stage("comparing");
@@ -61,13 +61,12 @@ void compare_with_truth(results& r, const frame_source& source, console& console
     console.warn(compared.error().to_string());
     return;
   }
-  r.truth_note = source.is_monocular()
-                     ? "Compared with ground truth after aligning the trajectories by a motion and a scale."
-                     : "Compared with ground truth after aligning the trajectories by a rigid motion.";
+  r.truth_note = source.is_monocular() ? "Compared with ground truth after similarity alignment of the trajectories."
+                                       : "Compared with ground truth after rigid alignment of the trajectories.";
   if (source.surface_distance && r.map) {
     const auto error = map_error(r.map->cloud, r.map->kept, compared->T_truth_map, source.surface_distance);
     if (error) r.map->error_m = *error;
-    r.truth_note += " The map's error is that of its filtered cloud, brought to the true room by aligning the poses.";
+    r.truth_note += " The map error is that of the filtered cloud, aligned by the poses.";
   }
   r.against_truth = *std::move(compared);
   console.finish("ATE and RPE" + std::string{r.map && r.map->error_m ? ", map error" : ""});

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// How good a trajectory and a map are, where the truth is known.
+/// Accuracy of trajectory and map against ground truth.
 #pragma once
 
 #include <functional>
@@ -13,17 +13,17 @@
 
 namespace app {
 
-/// ATE after alignment by a rigid motion, and RPE from one pose to the next.
+/// ATE after rigid alignment (with scale if `with_scale`), and RPE between consecutive poses.
 [[nodiscard]] orbis::result<accuracy> compare(const orbis::trajectory& estimate, const orbis::trajectory& truth,
                                               bool with_scale = false);
 
-/// RMS distance of a cloud to the true surface, in metres; the cloud is brought into the truth's
-/// world by the alignment of the trajectories.
+/// RMS distance of a cloud from the true surface, in metres; `T_truth_map` transforms the cloud into the world of the
+/// ground truth.
 [[nodiscard]] orbis::result<double> map_error(const orbis::point_cloud& cloud, const std::vector<std::uint32_t>& kept,
                                               const orbis::se3& T_truth_map,
                                               const std::function<double(const orbis::vec3&)>& surface_distance);
 
-/// Fills in what the source's ground truth tells about `r`; says so where it tells nothing.
+/// Compares `r` with the source's ground truth; fills in the results or the reason why there are none.
 void compare_with_truth(results& r, const frame_source& source, console& console);
 
 }  // namespace app

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Work that is done while its caller does something else.
+/// Work in the background.
 #pragma once
 
 #include <future>
@@ -10,8 +10,8 @@
 
 namespace app {
 
-/// Starts `work` on a thread of its own. Without a state (`valid()` is false) if the system gives no thread: the work
-/// is then the caller's.
+/// Starts `work` on a new thread. If no thread can be created, returns a future without state (`valid()` is false), and
+/// the caller does the work.
 template <class Work>
 [[nodiscard]] std::future<std::invoke_result_t<Work>> start_in_background(Work work) {
   try {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// The camera's intrinsics and depth scale from a recording that it made.
+// The command calibrate: intrinsics and depth scale of a camera from a recording.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -27,9 +27,9 @@ namespace {
 
 using orbis::slam::calibrated_parameter;
 
-constexpr double most_scale_deviation = 0.005;  // of a depth scale that is believed
+constexpr double most_scale_deviation = 0.005;  // relative standard deviation of an accepted depth scale
 
-/// The depth scale by the poses of the recording; empty if they do not tell.
+/// The depth scale by the ground-truth poses of the recording; empty if they do not determine it.
 std::optional<calibrated_parameter> find_depth_scale(const frame_source& source, const orbis::trajectory& found) {
   if (source.ground_truth.empty()) return std::nullopt;
   const auto scale = orbis::eval::scale_of(found, source.ground_truth);
@@ -44,27 +44,28 @@ std::string line_of(const calibrated_parameter& p) {
   const int digits = std::max(std::abs(p.before), std::abs(p.after)) < 10.0 ? 5 : 2;
   char text[160];
   if (p.is_held && p.deviation > 0.0 && std::isfinite(p.deviation))
-    std::snprintf(text, sizeof text, "%-12s %12.*f %12s %12.*f  kept: not known better than this", p.name.data(),
+    std::snprintf(text, sizeof text, "%-12s %12.*f %12s %12.*f  kept: not determined more accurately", p.name.data(),
                   digits, p.before, "-", digits, p.deviation);
   else if (p.is_held)
-    std::snprintf(text, sizeof text, "%-12s %12.*f %12s %12s  kept: the motion does not tell", p.name.data(), digits,
-                  p.before, "-", "-");
+    std::snprintf(text, sizeof text, "%-12s %12.*f %12s %12s  kept: not determined by the motion", p.name.data(),
+                  digits, p.before, "-", "-");
   else
     std::snprintf(text, sizeof text, "%-12s %12.*f %12.*f %12.*f", p.name.data(), digits, p.before, digits, p.after,
                   digits, p.deviation);
   return text;
 }
 
-std::optional<orbis::error> find_trouble(const settings& s, const frame_source& source) {
+/// The error if the camera file cannot be written or would overwrite an input other than a camera file.
+std::optional<orbis::error> check_output(const settings& s, const frame_source& source) {
   std::error_code ignored;
   if (s.out.empty()) return std::nullopt;
-  std::vector<std::filesystem::path> kept = source.files;  // but for its camera file, which may be replaced
+  std::vector<std::filesystem::path> kept = source.files;  // without camera files, which may be replaced
   std::erase_if(kept, [](const std::filesystem::path& file) { return file.extension() == ".toml"; });
   if (auto lost = find_overwritten({s.out}, kept)) return lost;
   if (s.out.has_parent_path() && !std::filesystem::is_directory(s.out.parent_path(), ignored))
-    return orbis::error{orbis::errc::invalid_argument, s.out.string(), "would be in a folder that there is not"};
+    return orbis::error{orbis::errc::invalid_argument, s.out.string(), "its folder does not exist"};
   if (std::filesystem::is_directory(s.out, ignored))
-    return orbis::error{orbis::errc::invalid_argument, s.out.string(), "is a folder; a file is wanted"};
+    return orbis::error{orbis::errc::invalid_argument, s.out.string(), "is a folder, not a file"};
   return std::nullopt;
 }
 
@@ -80,9 +81,9 @@ exit_code calibrate(const settings& s, console& console) {
   const auto source = open_source(s, console);
   if (!source) return console.error(source.error()), bad_input;
   if (source->sensor != orbis::slam::sensor_kind::rgbd)
-    return console.error({orbis::errc::unsupported, s.input.string(), "only recordings with depth can be calibrated"}),
+    return console.error({orbis::errc::unsupported, s.input.string(), "calibration needs a recording with depth"}),
            bad_input;
-  if (const auto trouble = find_trouble(s, *source)) return console.error(*trouble), bad_usage;
+  if (const auto problem = check_output(s, *source)) return console.error(*problem), bad_usage;
 
   orbis::camera::camera_settings camera = source->camera;
   if (s.distortion) camera.model = with_lens(camera.model);
@@ -92,25 +93,26 @@ exit_code calibrate(const settings& s, console& console) {
   const auto is_held_distortion = [](const calibrated_parameter& p) { return p.name == "k1" && p.is_held; };
   if (s.distortion && std::ranges::any_of(found->parameters, is_held_distortion))
     return give_up({orbis::errc::degenerate, s.input.string(),
-                    "the motion does not determine the distortion of the lens, and the focal length would make up for "
-                    "it; without --distortion the lens is taken to be as the camera file says"});
+                    "the motion does not determine the distortion of the lens, and the focal length would compensate "
+                    "it; omit --distortion to use the lens of the camera file"});
   camera.model = found->last.camera;
-  if (!is_settled(found->last, 3.0))
-    console.warn("the parameters still change from round to round: do not rely on them");
+  if (!is_settled(found->last, 3.0)) console.warn("the parameters have not converged: do not rely on them");
 
   bool printed = console.print("parameter           given        found    deviation");
   for (const calibrated_parameter& p : found->parameters) printed = console.print(line_of(p)) && printed;
   const auto depth_scale = find_depth_scale(*source, found->trajectory);
   if (depth_scale) camera.depth_scale = depth_scale->after;
   printed = console.print(depth_scale ? line_of(*depth_scale)
-                                      : "depth_scale: images alone do not tell; poses of known size (groundtruth.txt) "
-                                        "would") &&
+                                      : "depth_scale: not determined by images alone; it needs poses in metres "
+                                        "(groundtruth.txt)") &&
             printed;
   if (!found->last.is_complete())
-    console.warn("what was kept needs more motion: turn the camera about all axes, near and far from textured things");
+    console.warn(
+        "parameters marked as kept need more motion: rotate the camera about all axes, near and far from "
+        "textured surfaces");
   const auto& lens = found->lens;
   if (lens && (lens->has_distortion() || (!lens->is_determined && has_other_focal_length(found->parameters))))
-    console.warn(in_words(*lens));
+    console.warn(describe(*lens));
   camera = with_shutter(std::move(camera), shutter);
   if (!s.out.empty()) {
     if (const auto written = orbis::io::write_camera(s.out, camera); !written) return give_up(written.error());

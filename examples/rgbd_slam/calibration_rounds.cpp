@@ -28,13 +28,13 @@ struct refined {
   std::optional<lens_comparison> lens;
 };
 
-/// Whether another round would change nothing.
+/// Returns true if another round would change nothing.
 bool is_last_round(const calibration& c) { return is_settled(c, 1.0); }
 
-/// Tracks all frames with `model` and refines it by the map, the largest one if tracking was lost in between.
-/// `is_last`: there is no round after it, whatever it finds.
+/// Tracks all frames with `model` and calibrates it by the largest map.
+/// `is_last`: no other round follows.
 orbis::result<refined> refine(const any_camera& model, const frame_source& source, const settings& s,
-                              const orbis::camera::shutter& shutter, const calibration_effort& effort, bool is_last,
+                              const orbis::camera::shutter& shutter, const calibration_limits& limits, bool is_last,
                               console& console) {
   orbis::slam::options options = slam_options(model, source.camera.baseline);
   options.shutter = shutter;
@@ -45,7 +45,7 @@ orbis::result<refined> refine(const any_camera& model, const frame_source& sourc
     const auto frame = frames.next();
     if (!frame) return orbis::fail(frame.error());
     if (!begin) begin = frame->timestamp;
-    if (frame->timestamp - *begin > effort.longest) break;
+    if (frame->timestamp - *begin > limits.longest) break;
     slam.track(*frame);
     console.advance(i + 1, source.frames, "tracking");
   }
@@ -57,7 +57,7 @@ orbis::result<refined> refine(const any_camera& model, const frame_source& sourc
   });
   if (!found) return orbis::fail(orbis::errc::degenerate, s.input.string(), found.error().message);
   std::optional<lens_comparison> lens;
-  if (effort.compares_lens && (is_last || is_last_round(*found)))
+  if (limits.compares_lens && (is_last || is_last_round(*found)))
     lens = slam.inspect(
         [&](const orbis::slam::atlas& maps) { return compare_lens(maps.at(map), model, *found, options, {}); });
   return refined{*found, std::move(poses), lens};
@@ -76,7 +76,7 @@ parameter_table table_of(const any_camera& camera) {
   });
 }
 
-/// `camera` with the parameters that stand in a table; as it is if there is no such camera.
+/// `camera` with the parameters of the table; unchanged if these are invalid.
 any_camera with_parameters(const any_camera& camera, const parameter_table& table) {
   return camera.visit([&](const auto& model) -> any_camera {
     using of_model = orbis::camera::parameters_of<std::remove_cvref_t<decltype(model)>>;
@@ -89,8 +89,8 @@ any_camera with_parameters(const any_camera& camera, const parameter_table& tabl
   });
 }
 
-/// The camera that was found, where what was held has the values that were given, not those of an earlier round.
-any_camera with_what_was_given(calibration& found, const parameter_table& given) {
+/// The calibrated camera, with held parameters reset to the given values instead of those of an earlier round.
+any_camera with_held_as_given(calibration& found, const parameter_table& given) {
   parameter_table held;
   for (auto& p : found.parameters)
     if (p.is_held) p.after = held[p.name] = given.at(p.name);
@@ -101,26 +101,26 @@ any_camera with_what_was_given(calibration& found, const parameter_table& given)
 
 bool is_settled(const calibration& c, double deviations) {
   return std::all_of(c.parameters.begin(), c.parameters.end(), [&](const orbis::slam::calibrated_parameter& p) {
-    return std::abs(p.after - p.before) <= deviations * p.deviation;  // 0 for what was held
+    return std::abs(p.after - p.before) <= deviations * p.deviation;  // both 0 for held parameters
   });
 }
 
 orbis::result<calibration_rounds> calibrate_by(const frame_source& source, const settings& s,
                                                const orbis::camera::shutter& shutter, const any_camera& given,
-                                               const calibration_effort& effort, console& console) {
+                                               const calibration_limits& limits, console& console) {
   const parameter_table given_values = table_of(given);
   any_camera camera = given;
   calibration_rounds rounds;
-  for (int round = 1; round <= effort.most_rounds && !(round > 1 && is_last_round(rounds.last)); ++round) {
+  for (int round = 1; round <= limits.most_rounds && !(round > 1 && is_last_round(rounds.last)); ++round) {
     console.stage("calibrating");
-    auto next = refine(camera, source, s, shutter, effort, round == effort.most_rounds, console);
+    auto next = refine(camera, source, s, shutter, limits, round == limits.most_rounds, console);
     if (!next) return orbis::fail(next.error());
     rounds.last = std::move(next->camera);
     rounds.trajectory = std::move(next->trajectory);
     rounds.lens = next->lens;
-    rounds.last.camera = camera = with_what_was_given(rounds.last, given_values);
+    rounds.last.camera = camera = with_held_as_given(rounds.last, given_values);
     char text[160];
-    std::snprintf(text, sizeof text, "round %d: %zu keyframes, %zu observations, their error %.3f -> %.3f deviations",
+    std::snprintf(text, sizeof text, "round %d: %zu keyframes, %zu observations, error %.3f -> %.3f std. deviations",
                   round, rounds.last.keyframes, rounds.last.observations, rounds.last.initial_rms,
                   rounds.last.final_rms);
     console.finish(text);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A camera that is refined by a recording: track, refine the camera by the map, and again with that camera.
+/// Calibration of a camera with a recording: alternates tracking and calibration by the map.
 #pragma once
 
 #include <limits>
@@ -21,26 +21,27 @@
 namespace app {
 
 struct calibration_rounds {
-  orbis::slam::calibration<orbis::camera::any_camera> last;   ///< the last round; what was held has the values given
-  std::vector<orbis::slam::calibrated_parameter> parameters;  ///< over all rounds: `before` is what was given
+  orbis::slam::calibration<orbis::camera::any_camera> last;   ///< the last round; held parameters have the given values
+  std::vector<orbis::slam::calibrated_parameter> parameters;  ///< over all rounds: `before` is the given value
   orbis::trajectory trajectory;                               ///< of the last round
-  std::optional<lens_comparison> lens;                        ///< of the last round, if it was asked for
+  std::optional<lens_comparison> lens;                        ///< of the last round, if requested
 };
 
-struct calibration_effort {
+struct calibration_limits {
   int most_rounds = 5;
-  double longest = std::numeric_limits<double>::infinity();  ///< of the recording, seconds
-  bool compares_lens = false;                                ///< asks for `calibration_rounds::lens`
+  double longest = std::numeric_limits<double>::infinity();  ///< used part of the recording, seconds
+  bool compares_lens = false;                                ///< computes `calibration_rounds::lens`
 };
 
-/// Rounds until nothing changes. Errors: frames that cannot be read, no_data if tracking never starts,
-/// degenerate where the motion does not determine the camera.
+/// Runs rounds until the parameters do not change. Errors: unreadable frames, no_data if tracking never starts,
+/// degenerate if the motion does not determine the camera.
 [[nodiscard]] orbis::result<calibration_rounds> calibrate_by(const frame_source& source, const settings& s,
                                                              const orbis::camera::shutter& shutter,
                                                              const orbis::camera::any_camera& given,
-                                                             const calibration_effort& effort, console& console);
+                                                             const calibration_limits& limits, console& console);
 
-/// Whether the round changed no parameter by more than so many deviations. Not every map has the same landmarks.
+/// Returns true if the round changed no parameter by more than `deviations` standard deviations. Exact equality is not
+/// expected, as the maps of two rounds have different landmarks.
 [[nodiscard]] bool is_settled(const orbis::slam::calibration<orbis::camera::any_camera>& round, double deviations);
 
 }  // namespace app

@@ -9,11 +9,11 @@
 namespace app {
 namespace {
 
-// A focal length makes up for a lens that bends, to some extent: images that such a lens explains better, or that do
-// not tell, say little about the focal length.
-constexpr double somewhat = 0.98, clearly = 0.95;  // of the error
+// A wrong focal length compensates distortion to some extent. If distortion fits the images better, or is not
+// determined, they say little about the focal length.
+constexpr double somewhat = 0.98, clearly = 0.95;  // ratio of the errors
 
-/// What was found of fx; null if it is not among them.
+/// The parameter fx; null if it is missing.
 const orbis::slam::calibrated_parameter* find_focal(std::span<const orbis::slam::calibrated_parameter> found) {
   const auto fx = std::ranges::find(found, "fx", &orbis::slam::calibrated_parameter::name);
   return fx != found.end() ? &*fx : nullptr;
@@ -30,7 +30,7 @@ bool has_other_focal_length(std::span<const orbis::slam::calibrated_parameter> f
   constexpr double least_change = 0.015, sigmas = 6.0;
   const auto* const fx = find_focal(found);
   if (fx == nullptr) return false;
-  const double change = std::abs(fx->after - fx->before);  // 0 where it was held
+  const double change = std::abs(fx->after - fx->before);  // 0 if it was held
   return change > sigmas * fx->deviation && change > least_change * fx->before;
 }
 
@@ -68,23 +68,23 @@ std::optional<lens_comparison> compare_lens(const orbis::slam::map& map, const o
                          as_pinhole.final_rms, bent->final_rms, bent->is_complete()};
 }
 
-std::string in_words(const lens_comparison& lens) {
+std::string describe(const lens_comparison& lens) {
   if (!lens.is_determined)
-    return "the motion does not tell whether the lens has distortion; if it has, the focal length that was found makes "
-           "up for it and is wrong";
+    return "the motion does not determine whether the lens has distortion; if it has, the estimated focal length "
+           "compensates it and is wrong";
   char text[240];
   std::snprintf(text, sizeof text,
-                "a lens with distortion explains the images better (their error is %.3f instead of %.3f deviations), "
-                "and its focal length would be %.0f instead of %.0f pixels: see --distortion",
+                "a lens with distortion fits the images better (error %.3f instead of %.3f standard deviations), with "
+                "a focal length of %.0f instead of %.0f pixels: see --distortion",
                 lens.lens_rms, lens.pinhole_rms, lens.lens_focal, lens.pinhole_focal);
   return text;
 }
 
-std::string in_words(const focal_doubt& doubt) {
+std::string describe(const focal_doubt& doubt) {
   char text[200];
   std::snprintf(text, sizeof text,
-                "the camera's focal length is doubtful: the images fit %.0f pixels better than %.0f (%+.1f %%); "
-                "rgbd_slam calibrate finds a camera for them",
+                "the camera's focal length is doubtful: %.0f pixels fit the images better than %.0f (%+.1f %%); "
+                "rgbd_slam calibrate estimates the camera",
                 doubt.found, doubt.given, 100.0 * (doubt.found - doubt.given) / doubt.given);
   return text;
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Whether the camera's focal length, and its lens, fit what was recorded with it.
+/// Checks of the camera's focal length and lens against a recording.
 #pragma once
 
 #include <optional>
@@ -14,44 +14,45 @@
 
 namespace app {
 
-/// That images fit another focal length clearly better than the camera's, pixels.
+/// Evidence that another focal length fits the images clearly better than the camera's, in pixels.
 struct focal_doubt {
   double given, found;
-  bool is_sure = true;  ///< false where a lens that bends would explain the images a little better
+  bool is_sure = true;  ///< false if a lens with distortion would fit the images slightly better
 };
 
-/// The camera; a pinhole with a lens without distortion, which can be estimated.
+/// Adds zero distortion parameters, which can be estimated, to a pinhole camera; returns other cameras unchanged.
 [[nodiscard]] orbis::camera::any_camera with_lens(const orbis::camera::any_camera& camera);
 
-/// How a pinhole and a lens with distortion explain the images.
+/// The fit of a pinhole camera and of a lens with distortion.
 struct lens_comparison {
   double pinhole_focal, lens_focal;  ///< fx of each, pixels
-  double pinhole_rms, lens_rms;      ///< of the images' errors, standard deviations
-  bool is_determined;                ///< whether the motion determines the distortion
-  /// Whether the images tell that there is some.
+  double pinhole_rms, lens_rms;      ///< RMS reprojection error, in standard deviations
+  bool is_determined;                ///< the motion determines the distortion
+  /// Returns true if the images show distortion.
   [[nodiscard]] bool has_distortion() const;
 };
 
-/// Of the parameters that a calibration found; empty where it does not tell, as where one was held.
+/// The doubt that follows from calibrated parameters; empty if the calibration is inconclusive, as with a held
+/// parameter.
 [[nodiscard]] std::optional<focal_doubt> find_doubt(std::span<const orbis::slam::calibrated_parameter> found);
-/// Of a map made with the camera. Poses of a wrong camera are some percent too near to each other or too far apart, but
-/// distortion that a pinhole does not model moves them as well: empty where that explains the images clearly better, or
-/// where they do not tell. One or two small self-calibrations: some tenths of a second.
+/// The doubt that follows from a map made with the camera. A wrong focal length scales the distances between poses by
+/// some percent, but so does distortion that a pinhole does not model: empty if distortion fits the images clearly
+/// better, or if they are inconclusive. Runs one or two small self-calibrations, in some tenths of a second.
 [[nodiscard]] std::optional<focal_doubt> find_doubt(const orbis::slam::map& map,
                                                     const orbis::camera::any_camera& camera,
                                                     const orbis::slam::options& options);
-/// Whether a calibration found clearly another focal length, whatever of the rest was held.
+/// Returns true if a calibration found a clearly different focal length, even if other parameters were held.
 [[nodiscard]] bool has_other_focal_length(std::span<const orbis::slam::calibrated_parameter> found);
-/// Of a map made with the camera, and a calibration by that map, which was done as `how` says. Empty where the camera
-/// is no pinhole, or the images tell nothing. One self-calibration.
+/// Compares the pinhole calibration of a map, done with the options `how`, with one that includes distortion. Empty if
+/// the camera is no pinhole or the calibration fails. Runs one self-calibration.
 [[nodiscard]] std::optional<lens_comparison> compare_lens(const orbis::slam::map& map,
                                                           const orbis::camera::any_camera& camera,
                                                           const orbis::slam::calibration_summary& as_pinhole,
                                                           const orbis::slam::options& options,
                                                           const orbis::slam::calibration_options& how);
-/// What the user should know.
-[[nodiscard]] std::string in_words(const focal_doubt& doubt);
-/// @pre lens.has_distortion(), or it is not determined
-[[nodiscard]] std::string in_words(const lens_comparison& lens);
+/// The warning for the user.
+[[nodiscard]] std::string describe(const focal_doubt& doubt);
+/// The warning for the user. @pre lens.has_distortion() or !lens.is_determined
+[[nodiscard]] std::string describe(const lens_comparison& lens);
 
 }  // namespace app

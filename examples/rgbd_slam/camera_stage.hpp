@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// What is to be known of the camera before its frames are tracked for good.
+/// Estimation of shutter and camera before tracking.
 #pragma once
 
 #include "console.hpp"
@@ -10,10 +10,11 @@
 
 namespace app {
 
-/// Finds the shutter (`find_shutter`). Where that looked at the first seconds, and they clearly do not fit the camera's
-/// focal length (`focal_doubt::is_sure`), the camera is calibrated by the recording, at most by its first minute, and
-/// replaced if that finds the same focal length, within two percent; unless `--intrinsics given` or `--camera` say
-/// which camera it is, or a map of landmarks is loaded or saved: runs that share one need the same camera.
-[[nodiscard]] shutter_results get_to_know_camera(frame_source& source, const settings& s, console& console);
+/// Determines the shutter (`find_shutter`). If that tracks the first seconds, and they clearly contradict the camera's
+/// focal length (`focal_doubt::is_sure`), calibrates the camera with at most the first minute of the recording. The
+/// result replaces the camera if it confirms the focal length of the first seconds within 2 %. The camera stays
+/// unchanged with `--intrinsics given`, with `--camera`, and if a landmark map is loaded or saved, because runs that
+/// share a map need the same camera.
+[[nodiscard]] shutter_results prepare_camera(frame_source& source, const settings& s, console& console);
 
 }  // namespace app

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The colours of keyframes in a file, so that an image is not decoded, or made, a second time.
+/// A file with the colours of keyframes, so that images are not decoded or rendered twice.
 #pragma once
 
 #include <cstddef>
@@ -17,11 +17,11 @@
 
 namespace app {
 
-/// Colour images by number, all of one size: every `stride`-th pixel of every `stride`-th row, which is what becomes
-/// points. In a file that has no name once it is open.
+/// Stores colour images of one size by number: every `stride`-th pixel of every `stride`-th row, the pixels that become
+/// points. The file is unlinked once it is open.
 class color_file {
  public:
-  /// The file takes no image beyond `most_bytes`. @pre stride > 0
+  /// `most_bytes`: maximum size of the file. @pre stride > 0
   color_file(std::filesystem::path path, int stride, std::uint64_t most_bytes)
       : path_{std::move(path)}, stride_{stride}, most_bytes_{most_bytes} {}
   color_file(color_file&& other) noexcept
@@ -35,7 +35,7 @@ class color_file {
     if (file_ >= 0) ::close(file_);
   }
 
-  /// Whether it was written, in place of the image that had this number. Those that were not have to be had elsewhere.
+  /// Stores an image and replaces a previous one of this number. Returns false if it was not stored.
   bool put(std::uint64_t number, const orbis::image<orbis::rgb8>& color) {
     if (file_ < 0 && at_.empty()) {
       file_ = ::open(path_.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
@@ -51,8 +51,8 @@ class color_file {
     at_[number] = place;
     return true;
   }
-  /// Whether it could be read. `out` has the size of the images; its other pixels stay as they are. Any number of
-  /// threads may call this.
+  /// Reads an image; returns false if that fails. `out` has the size of the images; its other pixels stay unchanged.
+  /// Thread-safe.
   bool get(std::uint64_t number, orbis::image<orbis::rgb8>& out) const {
     const auto found = at_.find(number);
     if (found == at_.end()) return false;

@@ -9,8 +9,8 @@
 
 namespace app {
 
-/// What is asked for, or the code to leave with: after `--help`, or after a line on stderr that
-/// says what is wrong. Options on the command line override those in the file.
+/// Returns the settings, or the exit code after `--help` or after an error was printed on stderr. Options on the
+/// command line override those in the file.
 [[nodiscard]] std::variant<settings, exit_code> read_command_line(int argc, char** argv);
 
 }  // namespace app

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The program's commands.
+/// The commands of the program.
 #pragma once
 
 #include "console.hpp"

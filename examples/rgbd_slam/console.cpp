@@ -48,7 +48,7 @@ void console::advance(std::size_t done, std::size_t total, const std::string& no
   last_shown_ = now;
   const double seconds = elapsed();
   const double rate = seconds > 0 ? static_cast<double>(done) / seconds : 0.0;
-  const bool is_known = total != std::numeric_limits<std::size_t>::max();  // a camera has no last frame
+  const bool is_known = total != std::numeric_limits<std::size_t>::max();  // not for a live camera
   std::string tail = is_known ? fmt::format("{}/{}", done, total) : fmt::format("{}", done);
   if (!note.empty()) tail += fmt::format("  {:.1f} fps  {}", rate, note);
   if (!terminal_) {
@@ -68,9 +68,9 @@ void console::finish(const std::string& outcome) {
   log_->info("{:<10} {:<72} {:6.1f} s", stage_, one_line(outcome), elapsed());
 }
 
-void console::warn(const std::string& what) {
+void console::warn(const std::string& message) {
   clear_bar();
-  log_->warn("rgbd_slam: warning: {}", one_line(what));
+  log_->warn("rgbd_slam: warning: {}", one_line(message));
 }
 
 void console::error(const orbis::error& e) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// What the program says while it works: one line for each stage, with a progress bar while it lasts
-/// if stderr is a terminal. Results go to stdout, everything else to stderr.
+/// Console output: one line per stage, with a progress bar if stderr is a terminal. Results go to stdout, everything
+/// else to stderr.
 #pragma once
 
 #include <chrono>
@@ -24,18 +24,18 @@ class console {
   using clock = std::chrono::steady_clock;
   explicit console(bool quiet);
 
-  /// Begins a stage; the one before is over.
+  /// Begins a stage and ends the previous one.
   void stage(std::string_view name);
-  /// Shows how far the stage is; `note` is free text. Costs next to nothing between redraws.
+  /// Shows the progress of the stage and the text `note`. Costs almost nothing between redraws.
   void advance(std::size_t done, std::size_t total, const std::string& note = {});
-  /// Ends the stage with what it gave.
+  /// Ends the stage and prints its outcome.
   void finish(const std::string& outcome);
-  /// Seconds since the stage began.
+  /// Seconds since the start of the stage.
   [[nodiscard]] double elapsed() const;
-  /// Seconds since the program began.
+  /// Seconds since the start of the program.
   [[nodiscard]] double total() const;
 
-  /// A progress callback for a library call of this stage.
+  /// Returns a progress callback for a library call in this stage.
   [[nodiscard]] auto progress() {
     return [this](std::size_t done, std::size_t total) {
       advance(done, total);
@@ -43,10 +43,10 @@ class console {
     };
   }
 
-  void warn(const std::string& what);
-  /// "rgbd_slam: where: message", in one line.
+  void warn(const std::string& message);
+  /// Prints "rgbd_slam: where: message" in one line.
   void error(const orbis::error& e);
-  /// Prints a line of the results on stdout, unless quiet; false if it could not be written.
+  /// Prints a line on stdout, unless quiet; returns false if that fails.
   bool print(const std::string& line);
   [[nodiscard]] bool quiet() const { return quiet_; }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Frames of a rolling shutter as a global one would have taken them, for the map.
+/// Rolling-shutter correction of frames for the map.
 #pragma once
 
 #include <cstdint>
@@ -18,8 +18,8 @@ class frame_correction {
   frame_correction(orbis::camera::any_camera camera, const orbis::camera::shutter& shutter)
       : shutter_{shutter}, correct_{std::move(camera)} {}
 
-  /// The frame's images at its time; the frame itself where nothing has to be done, or where the camera moved too fast.
-  /// `twist`: during the read-out. Valid until the next call.
+  /// The frame as a global shutter would have taken it; the frame itself if no correction is needed, or if the camera
+  /// moved too fast. `twist`: the motion during the read-out. Valid until the next call.
   [[nodiscard]] const orbis::camera::rgbd_frame& operator()(const orbis::camera::rgbd_frame& frame,
                                                             const orbis::vec6& twist) {
     if (!correct_.is_needed(shutter_, twist)) return frame;
@@ -36,7 +36,7 @@ class frame_correction {
     return done ? corrected_ : frame;
   }
 
-  /// The colours of a frame whose depth was corrected before, corrected in the same way.
+  /// Corrects the colours of a frame whose depth is already corrected.
   void correct_color(const orbis::camera::depth_view<std::uint16_t>& corrected, const orbis::vec6& twist,
                      orbis::image<orbis::rgb8>& color) {
     if (!correct_.is_needed(shutter_, twist)) return;

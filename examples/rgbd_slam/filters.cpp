@@ -48,7 +48,7 @@ orbis::mapping::filter_options filter_options(const settings& s) {
   return options;
 }
 
-std::string filter_in_words(const settings& s) {
+std::string describe_filter(const settings& s) {
   const orbis::mapping::filter_options options = filter_options(s);
   char text[128];
   switch (options.kind) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The filters that can be asked for by name.
+/// The filters of `--filter`.
 #pragma once
 
 #include <string>
@@ -12,11 +12,11 @@
 
 namespace app {
 
-/// What `--filter` takes.
+/// The values of `--filter`.
 [[nodiscard]] std::vector<std::string> filter_names();
-/// The filter that was asked for. @pre s.filter is one of the names
+/// The options of the requested filter. @pre s.filter is one of the names
 [[nodiscard]] orbis::mapping::filter_options filter_options(const settings& s);
-/// The filter that was asked for, in words.
-[[nodiscard]] std::string filter_in_words(const settings& s);
+/// A description of the requested filter.
+[[nodiscard]] std::string describe_filter(const settings& s);
 
 }  // namespace app

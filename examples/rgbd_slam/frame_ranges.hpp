@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Frames as stretches of frames one after the other.
+/// Sets of frames as ranges of consecutive frames.
 #pragma once
 
 #include <algorithm>
@@ -10,7 +10,7 @@
 
 namespace app {
 
-/// Frames one after the other.
+/// Consecutive frames.
 struct frame_range {
   std::size_t first = 0, count = 0;
   friend bool operator==(const frame_range&, const frame_range&) = default;
@@ -23,7 +23,7 @@ class frame_ranges {
     if (ranges_.empty() || ranges_.back().first + ranges_.back().count != frame) ranges_.push_back({frame, 0});
     ++ranges_.back().count;
   }
-  /// Takes a frame out, if it is one of them.
+  /// Removes a frame if it is in the set.
   void remove(std::size_t frame) {
     const auto at = std::find_if(ranges_.begin(), ranges_.end(),
                                  [&](const frame_range& r) { return r.first <= frame && frame < r.first + r.count; });

@@ -15,14 +15,14 @@ namespace app::interrupts {
 namespace {
 
 struct state {
-  std::mutex mutex;  // of the two below
+  std::mutex mutex;  // guards clean_up and notice
   std::function<void()> clean_up;
   std::string notice;
   std::atomic<bool> keeps_results{false};
-  std::atomic<bool> requested{false};
+  std::atomic<bool> stop_requested{false};
 };
 
-/// Never destroyed: the waiting thread may use it until the process is gone.
+/// Never destroyed, as the waiting thread may use it until the process ends.
 state& shared() {
   static state& s = *new state;
   return s;
@@ -48,8 +48,8 @@ sigset_t watched() {
 }
 
 [[noreturn]] void wait_for_signals(const sigset_t& set) {
-  // `timeout` sends its signal to its child, and then to the whole group: the same one twice within a tenth of a second
-  // is one.
+  // `timeout` sends its signal to its child and then to the whole group: the same signal twice within a tenth of a
+  // second counts once.
   constexpr std::chrono::milliseconds together{100};
   std::chrono::steady_clock::time_point first_at{};
   int first = 0;
@@ -59,8 +59,8 @@ sigset_t watched() {
     state& s = shared();
     const std::lock_guard lock{s.mutex};
     const auto now = std::chrono::steady_clock::now();
-    if (s.requested && signal == first && now - first_at < together) continue;
-    if (s.keeps_results && !s.requested.exchange(true)) {
+    if (s.stop_requested && signal == first && now - first_at < together) continue;
+    if (s.keeps_results && !s.stop_requested.exchange(true)) {
       first = signal;
       first_at = now;
       std::fputs(s.notice.c_str(), stderr);
@@ -74,8 +74,8 @@ sigset_t watched() {
 
 }  // namespace
 
-void listen() {
-  for (const int signal : {SIGINT, SIGTERM}) std::signal(signal, SIG_DFL);  // an ignored one would never arrive
+void start() {
+  for (const int signal : {SIGINT, SIGTERM}) std::signal(signal, SIG_DFL);  // an ignored signal would never arrive
   const sigset_t set = watched();
   pthread_sigmask(SIG_BLOCK, &set, nullptr);
   static_cast<void>(shared());
@@ -89,10 +89,10 @@ void keep_results(std::string notice) {
   s.keeps_results = true;
 }
 
-void end_at_once() { shared().keeps_results = false; }
-bool requested() { return shared().requested; }
+void discard_results() { shared().keeps_results = false; }
+bool stop_requested() { return shared().stop_requested; }
 
-void before_end(std::function<void()> clean_up) {
+void set_clean_up(std::function<void()> clean_up) {
   state& s = shared();
   const std::lock_guard lock{s.mutex};
   s.clean_up = std::move(clean_up);

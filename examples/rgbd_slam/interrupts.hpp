@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Ctrl-C (SIGINT), SIGTERM, and the closing of the terminal (SIGHUP).
+/// Handling of SIGINT (Ctrl-C), SIGTERM and SIGHUP (closed terminal).
 ///
-/// As long as nothing is worth keeping, the first signal ends the program. While a run collects results, the first
-/// signal asks it to stop and to write what it has reached; the second one ends the program at once. Before the program
-/// ends by a signal, its temporary files are removed.
+/// Initially the first signal ends the program. While a run collects results, the first signal asks it to stop and to
+/// write its results so far, and the second one ends the program at once. Before a signal ends the program, its
+/// temporary files are removed.
 #pragma once
 
 #include <functional>
@@ -13,17 +13,17 @@
 namespace app::interrupts {
 
 /// Starts the thread that waits for signals. Call it before any other thread starts.
-void listen();
+void start();
 
-/// From now on the first signal only makes `requested` true, and shows `notice` on stderr.
+/// Makes the first signal set `stop_requested` and print `notice` on stderr, instead of ending the program.
 void keep_results(std::string notice);
-/// From now on the next signal ends the program again.
-void end_at_once();
-/// Whether a signal asked for the end since `keep_results`.
-[[nodiscard]] bool requested();
+/// Makes the next signal end the program again.
+void discard_results();
+/// Returns true if a signal arrived after `keep_results`.
+[[nodiscard]] bool stop_requested();
 
-/// Called on the thread that waits for signals before a signal ends the program; empty: nothing. Returns when no call
-/// of the function before is running.
-void before_end(std::function<void()> clean_up);
+/// Sets the function that is called, on the thread that waits for signals, before a signal ends the program; empty:
+/// none. Returns when no call of the previous function is running.
+void set_clean_up(std::function<void()> clean_up);
 
 }  // namespace app::interrupts

@@ -16,9 +16,9 @@ using pixels_view = orbis::camera::depth_view<std::uint16_t>;
 orbis::mapping::live_map_thread_options thread_options(const settings& s) {
   orbis::mapping::live_map_thread_options options;
   options.map.resolution = s.resolution;
-  options.correction_slice = std::chrono::milliseconds{2};  // a keyframe waits for no more than that
+  options.correction_slice = std::chrono::milliseconds{2};  // the maximum time that a keyframe waits
   if (s.map_every_frame) options.map.max_frames = 90;
-  if (s.threads == 1) options.poll_interval = std::chrono::hours{24};  // whoever waits for the map has it ask
+  if (s.threads == 1) options.poll_interval = std::chrono::hours{24};  // callers that wait trigger the poll
   options.moving.emplace();
   return options;
 }
@@ -52,17 +52,17 @@ live_mapping::live_mapping(const frame_source& source, const settings& s, std::f
              .failed =
                  [this](const orbis::error& e) {
                    const std::lock_guard lock{results_mutex_};
-                   results_.trouble = e;
+                   results_.depth_error = e;
                  }},
             orbis::mapping::depth_store{depth_options(s, std::move(spill_file))}} {}
 
-std::vector<live_mapping::made> live_mapping::made_so_far() const {
+std::vector<live_mapping::made> live_mapping::inserted() const {
   const std::lock_guard lock{mutex_};
   return made_;
 }
 
 bool live_mapping::poll(poses& now, bool always) {
-  if (!where_(made_so_far(), now, always)) return false;
+  if (!where_(inserted(), now, always)) return false;
   if (!now.removed.empty()) {
     const std::lock_guard lock{mutex_};
     std::erase_if(made_, [&](const made& k) {
@@ -91,7 +91,7 @@ void live_mapping::add(std::size_t frame, orbis::slam::map_keyframe keyframe, co
     made_.push_back({frame, keyframe});
   }
   live_.add_keyframe(frame, pixels_view{image.depth, depth_scale_}, T_world_camera);
-  // The map's thread may have found it gone before it was there to be removed.
+  // The map's thread may have removed the keyframe from made_ before it was in the map.
   if (!find([&](const made& k) { return k.frame == frame; })) live_.remove(frame);
   if (waits_) live_.wait();
 }
@@ -122,7 +122,7 @@ void live_mapping::stop() {
   live_.wait();
   live_.stop();
   const orbis::mapping::live_map_counters counters = live_.counters();
-  const std::lock_guard lock{results_mutex_};  // of the viewer
+  const std::lock_guard lock{results_mutex_};  // the viewer may read the results
   results_.dropped = counters.dropped_keyframes;
   results_.frames = counters.frames;
   results_.dropped_frames = counters.dropped_frames;
@@ -137,15 +137,14 @@ std::vector<std::string> live_notes(const live_results& live) {
   };
   if (live.dropped != 0)
     notes.push_back(count(live.dropped, "keyframe") +
-                    " came in faster than the live map took them: they are in the map of the end, but were not in it "
-                    "before");
+                    " came in faster than the live map could insert them; the final map contains them");
   if (live.dropped_frames != 0)
     notes.push_back(count(live.dropped_frames, "frame") +
-                    " between keyframes came in faster than the live map took them, and were left out");
+                    " between keyframes came in faster than the live map could insert them, and were omitted");
   if (live.stopped)
-    notes.push_back("the live map stopped growing: " + live.stopped->message + "; it is made in the end instead");
-  else if (live.trouble)
-    notes.push_back(live.trouble->to_string());
+    notes.push_back("the live map stopped: " + live.stopped->message + "; the octree is built at the end instead");
+  else if (live.depth_error)
+    notes.push_back(live.depth_error->to_string());
   return notes;
 }
 

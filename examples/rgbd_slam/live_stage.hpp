@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The octree that grows while the camera moves: keyframes go in as they are made, and every correction of SLAM moves
-/// them.
+/// The live map: an octree into which keyframes are inserted when they are created, and which follows corrections of
+/// SLAM.
 #pragma once
 
 #include <algorithm>
@@ -32,68 +32,68 @@ namespace app {
 class live_mapping {
  public:
   using poses = orbis::mapping::keyframe_poses;
-  /// A keyframe as SLAM knows it, by the index of its frame.
+  /// A keyframe of SLAM and the index of its frame.
   struct made {
     std::uint64_t frame;
     orbis::slam::map_keyframe keyframe;
   };
-  /// Fills in the present poses of the keyframes that are in the active map, and those that are in no map any more, and
-  /// returns true; or false if they are those of the last call and `always` is false.
+  /// Fills in the current poses of the keyframes in the active map and the list of keyframes that no map contains any
+  /// more, and returns true. Returns false if nothing changed since the last call and `always` is false.
   using find_poses = std::function<bool(const std::vector<made>&, poses&, bool always)>;
 
-  /// `where` is called on the map's thread until `stop`. `spill_file`: for depth images beyond what there is room for
-  /// in memory, see `depth_store_options`.
+  /// `where` is called on the map's thread until `stop`. `spill_file`: for depth images beyond the memory budget, see
+  /// `depth_store_options`.
   live_mapping(const frame_source& source, const settings& s, std::filesystem::path spill_file, find_poses where);
 
-  /// Says how far tracking is.
+  /// Reports the number of the last tracked frame.
   void tracked(std::size_t frame) { newest_ = frame; }
-  /// Frame number `frame` has become a keyframe.
+  /// Adds frame number `frame`, which has become a keyframe.
   void add(std::size_t frame, orbis::slam::map_keyframe keyframe, const orbis::se3& T_world_camera,
            const orbis::camera::rgbd_frame& image);
-  /// Frame number `frame` was tracked, and has become no keyframe; its pose follows the keyframe of frame `reference`.
+  /// Adds the tracked frame number `frame`, which is no keyframe; its pose follows the keyframe of frame `reference`.
   void add_frame(std::size_t frame, std::uint64_t reference, const orbis::se3& T_reference_camera,
                  const orbis::camera::rgbd_frame& image);
-  /// The frame of the newest keyframe for which `is_wanted(made)` holds.
+  /// The frame of the newest keyframe for which `is_wanted(made)` is true.
   template <class IsWanted>
   [[nodiscard]] std::optional<std::uint64_t> find(const IsWanted& is_wanted) const {
     const std::lock_guard lock{mutex_};
     const auto k = std::find_if(made_.rbegin(), made_.rend(), is_wanted);
     return k == made_.rend() ? std::nullopt : std::optional{k->frame};
   }
-  /// Waits until the map is the one of the present poses, and ends its thread.
+  /// Waits until the map corresponds to the current poses, and ends its thread.
   void stop();
 
-  /// What was measured so far. From any thread.
+  /// The measurements so far. May be called from any thread.
   [[nodiscard]] live_results so_far() const;
-  /// The occupied leaves of the newest map, without colours, unless it is that of revision `seen`: then false. Sets
-  /// `seen`. From any thread, and without waiting for the map. O(leaves).
+  /// Fills in the occupied leaves of the newest map, without colours, and sets `seen` to its revision. Returns false if
+  /// it is still the revision `seen`. May be called from any thread; does not wait for the map. O(leaves).
   [[nodiscard]] bool occupied_since(std::optional<std::uint64_t>& seen, std::vector<voxel>& cubes) const;
 
-  /// What was measured. @pre stopped
+  /// The measurements. @pre stopped
   [[nodiscard]] const live_results& measured() const { return results_; }
-  /// Nothing if it failed. @pre stopped
+  /// The map; null if it failed. @pre stopped
   [[nodiscard]] live_octree* map() { return results_.stopped ? nullptr : &live_.stop(); }
 
  private:
-  [[nodiscard]] std::vector<made> made_so_far() const;
+  [[nodiscard]] std::vector<made> inserted() const;
   [[nodiscard]] bool poll(poses& now, bool always);
   void note(const orbis::mapping::insertion_event& e);
 
   find_poses where_;
   double depth_scale_;
-  bool waits_;  // with one thread there is one thing after the other
+  bool waits_;  // with one thread, callers wait for the map
   orbis::camera::ray_table rays_;
   orbis::mapping::keyframe_point_options points_;
-  orbis::mapping::keyframe_points reader_;  // of the map's thread
+  orbis::mapping::keyframe_points reader_;  // used by the map's thread
   mutable std::mutex mutex_;
   std::vector<made> made_;  // guarded by mutex_
   std::atomic<std::size_t> newest_{0};
   mutable std::mutex results_mutex_;
   live_results results_;  // written by the map's thread; guarded by results_mutex_ until `stop`
-  orbis::mapping::live_map_thread<live_octree::octree_type, orbis::camera::any_camera> live_;  // the first to go
+  orbis::mapping::live_map_thread<live_octree::octree_type, orbis::camera::any_camera> live_;  // destroyed first
 };
 
-/// What the user should know of it.
+/// Warnings about the live map.
 [[nodiscard]] std::vector<std::string> live_notes(const live_results& live);
 
 }  // namespace app

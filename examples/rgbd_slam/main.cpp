@@ -13,8 +13,8 @@
 
 namespace {
 
-/// Large blocks go back to the system as soon as they are freed, and threads share their heaps: otherwise half of the
-/// memory that the mapping needs would be what the tracking has left, in pieces.
+/// Returns large blocks to the system as soon as they are freed, and makes threads share heaps. Otherwise fragments
+/// left by tracking would be half of the memory during mapping.
 void set_up_memory() {
 #ifdef __GLIBC__
   mallopt(M_MMAP_THRESHOLD, 1 << 20);
@@ -27,10 +27,10 @@ void set_up_memory() {
 
 int main(int argc, char** argv) {
   set_up_memory();
-  const auto asked = app::read_command_line(argc, argv);
-  if (const auto* code = std::get_if<app::exit_code>(&asked)) return *code;
-  app::interrupts::listen();
-  const auto& settings = std::get<app::settings>(asked);
+  const auto parsed = app::read_command_line(argc, argv);
+  if (const auto* code = std::get_if<app::exit_code>(&parsed)) return *code;
+  app::interrupts::start();
+  const auto& settings = std::get<app::settings>(parsed);
   app::console console{settings.quiet};
   try {
     switch (settings.what) {
@@ -42,8 +42,8 @@ int main(int argc, char** argv) {
       case app::command::plan: return app::plan(settings, console);
       case app::command::calibrate: return app::calibrate(settings, console);
     }
-  } catch (const std::exception& e) {  // no memory, no threads
-    console.error({orbis::errc::unreadable, {}, examples::why_it_gave_up(e)});
+  } catch (const std::exception& e) {  // out of memory or threads
+    console.error({orbis::errc::unreadable, {}, examples::describe_exception(e)});
   }
   return app::bad_input;
 }

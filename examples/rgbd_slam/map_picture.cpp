@@ -16,7 +16,7 @@ using orbis::vec3;
 constexpr int oversampling = 2;
 constexpr rgb8 paper{250, 250, 249};
 
-/// A pinhole that looks along `forward`; x right, y down.
+/// A pinhole camera that looks along `forward`; x right, y down.
 struct eye {
   vec3 position, right, down, forward;
   double focal, cx, cy;
@@ -28,7 +28,7 @@ struct eye {
   }
 };
 
-/// Looks at the points from azimuth and elevation (radians), just far enough off to see all of them.
+/// The camera at azimuth and elevation (radians) from the points, at the smallest distance at which all are visible.
 eye look_at(const std::vector<vec3>& points, double azimuth, double elevation, double field, int width, int height) {
   eye e;
   e.forward =
@@ -38,8 +38,7 @@ eye look_at(const std::vector<vec3>& points, double azimuth, double elevation, d
   e.focal = 0.5 * height / std::tan(0.5 * field);
   e.cx = 0.5 * width;
   e.cy = 0.5 * height;
-  // Midway between what is seen farthest left and right, up and down: exact without perspective, and
-  // close enough with it after a few rounds.
+  // The centre of the points' bounds in the image: exact without perspective, close enough with it after a few rounds.
   vec3 middle = vec3::Zero();
   for (const vec3& p : points) middle += p / static_cast<double>(points.size());
   for (int round = 0; round != 4; ++round) {
@@ -74,7 +73,7 @@ class picture {
     triangle(c[0], c[2], c[3], color);
   }
 
-  /// Darkens pixels that lie behind their neighbours (eye-dome lighting: C. Boucheny, "Interactive
+  /// Darkens pixels behind their neighbours (eye-dome lighting: C. Boucheny, "Interactive
   /// scientific visualization of large datasets", 2009), and averages `oversampling` squared pixels.
   [[nodiscard]] orbis::image<rgb8> finish() const {
     orbis::image<rgb8> out(color_.width() / oversampling, color_.height() / oversampling);
@@ -130,7 +129,7 @@ class picture {
       }
   }
 
-  /// Whether nothing was drawn on the pixels that are averaged from (x, y) on.
+  /// Returns true if nothing was drawn on the pixels that are averaged from (x, y) on.
   [[nodiscard]] bool is_empty(int x, int y) const {
     for (int j = 0; j != oversampling; ++j)
       for (int i = 0; i != oversampling; ++i)
@@ -163,10 +162,10 @@ rgb8 lit(rgb8 c, double light) {
   return {byte(c.r), byte(c.g), byte(c.b)};
 }
 
-/// Neither above the cut nor a stray below the floor.
+/// Returns true if the point is neither above the cut nor an outlier below the floor.
 bool is_shown(const vec3& p, const view_frame& frame) { return p.z() <= frame.cut && p.z() >= frame.low.z() - 0.5; }
 
-/// The voxels that decide what a picture frames: those shown, strays aside.
+/// The points that a view must contain: the drawn voxels without outliers.
 std::vector<vec3> framed(const std::vector<voxel>& voxels, const view_frame& frame) {
   std::vector<vec3> points;
   for (const voxel& v : voxels) {
@@ -181,7 +180,7 @@ std::vector<vec3> framed(const std::vector<voxel>& voxels, const view_frame& fra
 orbis::image<rgb8> draw(const std::vector<voxel>& voxels, const view_frame& frame, coloring how, const eye& e,
                         int width, int height) {
   picture canvas{width * oversampling, height * oversampling};
-  // The cubes' axes are the world's; in view they are the columns of the rotation.
+  // Cubes are aligned with the world; the columns of the rotation are their axes in the view.
   const orbis::mat3 axes = frame.T_view_world.rotation_matrix();
   for (const voxel& v : voxels) {
     const vec3 center = frame.T_view_world * v.center.cast<double>();
@@ -190,9 +189,9 @@ orbis::image<rgb8> draw(const std::vector<voxel>& voxels, const view_frame& fram
         how == coloring::camera ? v.color : height_color((center.z() - frame.low.z()) / (frame.cut - frame.low.z()));
     for (int axis = 0; axis != 3; ++axis) {
       const vec3 half = 0.5 * static_cast<double>(v.size) * axes.col(axis);
-      const double side = half.dot(e.position - center) > 0 ? 1.0 : -1.0;  // of two opposite faces one can be seen
+      const double side = half.dot(e.position - center) > 0 ? 1.0 : -1.0;  // only one of two opposite faces is visible
       const vec3 face = center + side * half;
-      if ((e.position - face).dot(side * half) <= 0) continue;  // the eye is between the two
+      if ((e.position - face).dot(side * half) <= 0) continue;  // the camera is between the two
       const vec3 u = 0.5 * static_cast<double>(v.size) * axes.col((axis + 1) % 3);
       const vec3 w = 0.5 * static_cast<double>(v.size) * axes.col((axis + 2) % 3);
       const std::array<vec3, 4> corners{e.see(face + u + w), e.see(face + u - w), e.see(face - u - w),

@@ -14,11 +14,11 @@ namespace app {
 
 enum class coloring { camera, height };
 
-/// From above and aside, in perspective. What lies above `frame.cut` is left away. The picture is as large
-/// as to hold `in_view`: where that is the same, so is the view.
+/// Draws an oblique perspective view. Voxels above `frame.cut` are omitted. The view fits `in_view`: pictures with the
+/// same `in_view` have the same view.
 [[nodiscard]] orbis::image<orbis::rgb8> draw_aslant(const std::vector<voxel>& voxels, const std::vector<voxel>& in_view,
                                                     const view_frame& frame, coloring how, int width, int height);
-/// From straight above, the frame's y axis up.
+/// Draws a view from above; the frame's y axis points up.
 [[nodiscard]] orbis::image<orbis::rgb8> draw_from_above(const std::vector<voxel>& voxels,
                                                         const std::vector<voxel>& in_view, const view_frame& frame,
                                                         coloring how, int width, int height);

@@ -20,14 +20,14 @@ using orbis::result;
 using orbis::vec3f;
 using tree = orbis::octree::occupancy_octree<>;
 
-/// Gives memory back to the system that was freed in small pieces.
+/// Returns memory to the system that was freed in small pieces.
 void give_back_memory() {
 #ifdef __GLIBC__
   malloc_trim(0);
 #endif
 }
 
-std::string in_words(const built_map& map) {
+std::string describe(const built_map& map) {
   return count_text(map.cloud.size()) + " points, " + count_text(map.filter.removed) + " removed by filter " +
          std::string{to_string(map.filter.mode)} + ", octree of " + count_text(map.octree.num_leaves()) + " leaves";
 }
@@ -46,7 +46,7 @@ tree_numbers numbers_of(const tree& map, std::uintmax_t bytes) {
   return {n.leaves, n.occupied_leaves, n.free_leaves, bytes};
 }
 
-/// The occupied leaves, in the mean colour of the points in them; of those of `only`, if it is given.
+/// The occupied leaves with the mean colour of their points; of the points `only`, if given.
 std::vector<voxel> occupied_voxels(const tree& map, const orbis::point_cloud& cloud,
                                    const std::vector<std::uint32_t>* only = nullptr) {
   voxel_colors colors{map.resolution()};
@@ -71,8 +71,8 @@ orbis::mapping::dense_options dense_options(const frame_source& source, const se
   orbis::mapping::dense_options options;
   options.stride = point_stride;
   options.max_depth = static_cast<float>(source.depth_limit(s));
-  // Finer than the octree's voxels, so that these see every surface; memory follows what there is to
-  // see, not how long it was looked at.
+  // Finer than the octree's voxels, so that these contain every surface; memory grows with the visible surface, not
+  // with the duration.
   options.voxel_size = s.resolution / 5;
   options.flying_pixels.emplace();
   return options;
@@ -88,14 +88,14 @@ result<built_map> map_frames(const posed_frames& frames, const frame_source& sou
   const auto policy = orbis::par.on(threads);
   const auto shown = console.progress();
   const auto progress = [&](std::size_t done, std::size_t total) {
-    if (done % frames.size() == 1) give_back_memory();  // of the last pass over the frames
+    if (done % frames.size() == 1) give_back_memory();  // of the previous pass over the frames
     return shown(done, total);
   };
-  give_back_memory();  // of the tracking
+  give_back_memory();  // of tracking
   auto map = live != nullptr ? orbis::mapping::build_map(policy, frames, *live, options, progress)
                              : orbis::mapping::build_map(policy, frames, source.camera.model, options, progress);
-  if (frames.trouble()) return orbis::fail(*frames.trouble());  // a map without an image is not the map
-  if (map) console.finish(in_words(*map));
+  if (frames.read_error()) return orbis::fail(*frames.read_error());  // the map would be incomplete
+  if (map) console.finish(describe(*map));
   return map;
 }
 
@@ -120,7 +120,7 @@ built_map map_cloud(orbis::point_cloud cloud, const settings& s, console& consol
   };
   map.unfiltered_octree = build(map.cloud.points, map.insert_ms_unfiltered);
   map.octree = build(map.filtered_cloud().points, map.insert_ms);
-  console.finish(in_words(map));
+  console.finish(describe(map));
   return map;
 }
 

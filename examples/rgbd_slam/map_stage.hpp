@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Posed frames, or a cloud, to a filtered cloud and an octree; and their files.
+/// Mapping: from posed frames or a cloud to a filtered cloud and an octree, and their files.
 #pragma once
 
 #include <optional>
@@ -19,16 +19,16 @@ namespace app {
 using built_map = orbis::mapping::built_map<orbis::octree::occupancy_octree<>>;
 using live_octree = orbis::mapping::live_map<orbis::octree::occupancy_octree<>, orbis::camera::any_camera>;
 
-/// Which pixels of a keyframe become points, and how dense these are.
+/// The selection of pixels that become points, and the density of the cloud.
 [[nodiscard]] orbis::mapping::dense_options dense_options(const frame_source& source, const settings& s);
-/// Keyframes -> dense cloud -> filter -> octree; by the map that grew while they were made, if there is one.
+/// Keyframes -> dense cloud -> filter -> octree. Uses the live map if `live` is not null.
 [[nodiscard]] orbis::result<built_map> map_frames(const posed_frames& frames, const frame_source& source,
                                                   live_octree* live, const settings& s, console& console);
-/// Cloud -> filter -> octree. With an origin all points are scanned from there; without one their
-/// voxels are occupied and nothing is known of the rest.
+/// Cloud -> filter -> octree. With an origin, rays from there to the points are inserted; without one, the voxels of
+/// the points are occupied and the rest is unknown.
 [[nodiscard]] built_map map_cloud(orbis::point_cloud cloud, const settings& s, console& console);
 
-/// Writes the clouds and octrees into `folder`, and counts what is in them.
+/// Writes the clouds and octrees into `folder` and returns their statistics.
 [[nodiscard]] orbis::result<map_results> write_map(built_map map, const settings& s,
                                                    const std::filesystem::path& folder, console& console);
 

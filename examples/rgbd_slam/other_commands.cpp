@@ -30,7 +30,7 @@
 namespace app {
 namespace {
 
-/// The camera's motion at a time, per second, by the ground truth around it; zero where that does not know.
+/// The camera's motion per second at a time, from the ground truth around it; zero if that is not available.
 orbis::vec6 twist_at(const orbis::trajectory& truth, double time) {
   constexpr double around = 0.02, longest_gap = 0.2;  // seconds
   const auto before = orbis::interpolate(truth, time - around, longest_gap, 0.0);
@@ -39,7 +39,7 @@ orbis::vec6 twist_at(const orbis::trajectory& truth, double time) {
   return (before->inverse() * *after).log() / (2.0 * around);
 }
 
-/// All frames whose pose the ground truth knows.
+/// All frames with a ground-truth pose.
 orbis::result<posed_frames> frames_with_poses(const frame_source& source, const settings& s,
                                               const std::filesystem::path& spill_file,
                                               std::optional<world_results>& world, console& console) {
@@ -56,8 +56,8 @@ orbis::result<posed_frames> frames_with_poses(const frame_source& source, const 
       source.complete(*frame);
       if (posed.size() == 0) {
         upright_worlds worlds{source, s};
-        T_world_truth = worlds.begin_with(*frame, true) * frame->T_world_camera->inverse();
-        world = worlds.begun_at(frame->timestamp);
+        T_world_truth = worlds.start_world(*frame, true) * frame->T_world_camera->inverse();
+        world = worlds.world_starting_at(frame->timestamp);
         if (world->up_from == "ground truth") T_world_truth = {};
       }
       const orbis::vec6 twist = twist_at(source.ground_truth, frame->timestamp);
@@ -93,7 +93,7 @@ orbis::result<mapped> map_recording(const frame_source& source, const settings& 
   return mapped{std::move(r), *std::move(map), posed->trajectory()};
 }
 
-/// Organised clouds have NaN where nothing was measured; those are not points.
+/// Removes NaN points, which organised clouds have at pixels without measurement.
 void keep_finite(orbis::point_cloud& cloud) {
   std::vector<std::uint32_t> finite;
   for (std::size_t i = 0; i != cloud.size(); ++i)
@@ -101,8 +101,7 @@ void keep_finite(orbis::point_cloud& cloud) {
   if (finite.size() != cloud.size()) cloud = orbis::cloud::extract(cloud, finite);
 }
 
-/// Says when the octree's voxels are so small that the rays to the points take long, and refuses those that may fill
-/// gigabytes.
+/// Warns if voxels are so small that the rays to the points take long, and fails if they may fill the memory.
 orbis::result<void> check_resolution(const std::vector<orbis::vec3f>& points, const orbis::vec3& origin,
                                      const settings& s, results& r, console& console) {
   examples::voxel_estimate rays;
@@ -112,9 +111,9 @@ orbis::result<void> check_resolution(const std::vector<orbis::vec3f>& points, co
     rays.add(length, 0.0);
     longest = std::max(longest, length);
   }
-  rays.add(0.0, 4.0 / 3.0 * std::numbers::pi * longest * longest * longest);  // together at most a ball
+  rays.add(0.0, 4.0 / 3.0 * std::numbers::pi * longest * longest * longest);  // all rays are within a ball
   if (!rays.takes_long(s.resolution)) return {};
-  const std::string text = rays.in_words(s.resolution, "the space before the points");
+  const std::string text = rays.describe(s.resolution, "the space between origin and points");
   if (rays.is_too_large(s.resolution, examples::free_memory()))
     return orbis::fail(orbis::errc::invalid_argument, "--resolution", text + ", too many");
   console.warn(r.warnings.emplace_back(text + "; this takes long"));
@@ -124,7 +123,7 @@ orbis::result<void> check_resolution(const std::vector<orbis::vec3f>& points, co
 orbis::result<mapped> map_cloud_file(const settings& s, const std::filesystem::path& folder, console& console) {
   if (filter_options(s).kind == orbis::mapping::filter_kind::ray_evidence)
     return orbis::fail(orbis::errc::invalid_argument, s.input.string(),
-                       "the filter ray-evidence wants a recording: a cloud has no depth images");
+                       "the filter ray-evidence needs a recording: a cloud has no depth images");
   console.stage("reading");
   auto read = examples::read_near_origin(s.input);
   if (!read) return orbis::fail(read.error());
@@ -135,7 +134,7 @@ orbis::result<mapped> map_cloud_file(const settings& s, const std::filesystem::p
   if (cloud.empty()) return orbis::fail(orbis::errc::no_data, s.input.string(), "the cloud has no finite points");
   const std::string name = s.input.filename().string();
   const std::string left_out =
-      in_file == cloud.size() ? "" : ", " + count_text(in_file - cloud.size()) + " without coordinates left out";
+      in_file == cloud.size() ? "" : ", " + count_text(in_file - cloud.size()) + " without coordinates omitted";
   console.finish(name + ": " + count_text(cloud.size()) + " points" + left_out);
   results r = begin_results(s, name, nullptr, folder);
   r.setup.emplace_back("points", count_text(cloud.size()) + left_out);
@@ -175,20 +174,20 @@ exit_code map_without_slam(const settings& s, console& console) {
     auto source = open_source(s, console);
     if (!source) return give_up(source.error());
     if (source->is_monocular())
-      return give_up({orbis::errc::unsupported, s.input.string(), "one camera without depth gives no map"});
+      return give_up({orbis::errc::unsupported, s.input.string(), "a monocular recording gives no map"});
     recording = *std::move(source);
   }
   const auto inputs = inputs_of(s, recording ? recording->files : std::vector<std::filesystem::path>{});
-  if (const auto lost = find_overwritten(s, inputs)) return console.error(*lost), bad_usage;
+  if (const auto conflict = find_overwritten(s, inputs)) return console.error(*conflict), bad_usage;
   auto files = result_files::begin(s);
   if (!files) return give_up(files.error());
 
   auto found =
       recording ? map_recording(*recording, s, files->folder(), console) : map_cloud_file(s, files->folder(), console);
   if (!found) return give_up(found.error());
-  auto usable = navigate(found->map.octree, found->cameras, s, files->folder(), files->floor_map(), console);
-  if (!usable) return give_up(usable.error());
-  const auto& unsaved = found->r.navigation.emplace(*std::move(usable)).unsaved;
+  auto navigation = navigate(found->map.octree, found->cameras, s, files->folder(), files->floor_map(), console);
+  if (!navigation) return give_up(navigation.error());
+  const auto& unsaved = found->r.navigation.emplace(*std::move(navigation)).unsaved;
   if (unsaved) found->r.warnings.push_back(unsaved->to_string());
   auto written = write_map(std::move(found->map), s, files->folder(), console);
   if (!written) return give_up(written.error());

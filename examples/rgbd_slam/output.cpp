@@ -20,14 +20,14 @@ using orbis::result;
 
 namespace {
 
-/// Notes which files this run makes and which ones of earlier runs stay beside them. `coming`: still to be written.
+/// Lists the files of this run and those that remain from earlier runs. `coming`: files that are not written yet.
 void list_files(results& r, const result_files& files, const file_names& coming, console& console) {
   r.files = files.made(coming);
   r.files_of_earlier_runs = files.of_earlier_runs(r.files);
   if (r.files_of_earlier_runs.empty()) return;
   std::string names;
   for (const std::string& name : r.files_of_earlier_runs) names += (names.empty() ? "" : ", ") + name;
-  console.warn(r.warnings.emplace_back("of an earlier run, and left as they are: " + names));
+  console.warn(r.warnings.emplace_back("unchanged files of an earlier run: " + names));
 }
 
 }  // namespace
@@ -52,38 +52,37 @@ results begin_results(const settings& s, const std::string& title, const frame_s
     const auto& k = camera.model.k();
     r.setup.emplace_back("input", source->kind);
     r.images_of = source->images_of;
-    if (!source->images_of.empty()) r.setup.emplace_back("images of", source->images_of);
+    if (!source->images_of.empty()) r.setup.emplace_back("images from", source->images_of);
     r.setup.emplace_back("camera",
                          std::string{camera.model.model_name()} + ", " + std::to_string(k.width) + " x " +
                              std::to_string(k.height) + number(", fx %.1f", k.fx) + number(", fy %.1f", k.fy) +
                              number(", cx %.1f", k.cx) + number(", cy %.1f", k.cy) +
-                             (source->camera_is_refined ? " (refined by the recording)" : "") +
+                             (source->camera_is_refined ? " (calibrated with the recording)" : "") +
                              (source->is_monocular() ? "" : number(", depth / %g = metres", camera.depth_scale)));
-    r.setup.emplace_back("frames", source->is_live
-                                       ? "as they come"
-                                       : std::to_string(source->frames) +
-                                             (s.stride > 1 ? ", every " + std::to_string(s.stride) + "th" : ""));
+    r.setup.emplace_back("frames", source->is_live ? "live"
+                                                   : std::to_string(source->frames) +
+                                                         (s.stride > 1 ? ", stride " + std::to_string(s.stride) : ""));
     if (s.what != command::map) {
       if (!s.load_map.empty())
-        r.setup.emplace_back("map of landmarks", "begun with " + s.load_map.filename().string() +
-                                                     (s.localize_only ? ", which stays as it is" : ""));
-      r.setup.emplace_back("mapping of landmarks", s.localize_only                     ? "none"
-                                                   : s.deterministic || s.threads == 1 ? "between the frames"
-                                                                                       : "beside tracking");
+        r.setup.emplace_back("landmark map",
+                             "loaded from " + s.load_map.filename().string() + (s.localize_only ? ", unchanged" : ""));
+      r.setup.emplace_back("landmark mapping", s.localize_only                     ? "none"
+                                               : s.deterministic || s.threads == 1 ? "between frames"
+                                                                                   : "in parallel with tracking");
     }
     r.warnings = source->notes;
   } else {
     r.setup.emplace_back("input", s.input.filename().string());
     r.setup.emplace_back("rays", s.origin ? number("from %g, ", s.origin->x()) + number("%g, ", s.origin->y()) +
                                                 number("%g", s.origin->z())
-                                          : "none: points are marked occupied, nothing is marked free");
+                                          : "none: points are marked occupied, no space is marked free");
   }
   if (s.profile != "default") r.setup.emplace_back("profile", s.profile);
   if (s.localize_only || (source != nullptr && source->is_monocular())) return r;
   r.setup.emplace_back(
       "octree", number("%g cm voxels", 100 * s.resolution) +
                     number(", measurements up to %g m", source != nullptr ? source->depth_limit(s) : s.depth_limit()));
-  r.setup.emplace_back("filter asked for", filter_in_words(s));
+  r.setup.emplace_back("requested filter", describe_filter(s));
   return r;
 }
 
@@ -124,9 +123,8 @@ orbis::error explain_no_start(const results& r, const settings& s) {
   const std::string frames = std::to_string(r.slam->frames) + " frames ";
   return {orbis::errc::no_data, s.what == command::run ? s.input.string() : r.title,
           r.slam->sensor == orbis::slam::sensor_kind::monocular
-              ? "tracking never started: no two of " + frames +
-                    "show enough of the same texture from places that are surely far enough apart"
-              : "tracking never started: none of " + frames + "shows enough texture with depth"};
+              ? "tracking never started: no two of " + frames + "have enough matching features and parallax"
+              : "tracking never started: none of " + frames + "has enough features with depth"};
 }
 
 exit_code report_no_start(results& r, const orbis::error& why, exit_code code, result_files& files, console& console) {
@@ -150,7 +148,7 @@ void print_results(const results& r, console& console) {
     std::snprintf(buffer, sizeof buffer, "  Map  RMS %.4f m to the true surface\n", *r.map->error_m);
     text.append(buffer);
   }
-  text.append("\n  ").append((r.out / "report.html").string()).append(" shows it all; the files are beside it");
+  text.append("\n  Report  ").append((r.out / "report.html").string());
   console.print(text);
 }
 

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// A way through a map file: for a ball, for a cylinder that stands upright, or for a robot that drives on the floor.
+// Plans a path through a map file for a ball, an upright cylinder, or a robot that drives on the floor.
+#include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <filesystem>
 #include <limits>
 #include <optional>
@@ -23,6 +26,7 @@
 #include <orbis/octree/files.hpp>
 
 #include "commands.hpp"
+#include "formatted_text.hpp"
 #include "navigation.hpp"
 #include "navigation_picture.hpp"
 #include "result_files.hpp"
@@ -32,9 +36,10 @@ namespace {
 
 namespace nav = orbis::nav;
 using octree = orbis::octree::occupancy_octree<>;
+using orbis::vec3;
 using orbis::octree::occupancy;
 
-/// A map of either kind, by what it begins with.
+/// Reads a .bt or .ot map, by its first bytes.
 orbis::result<octree> read_map(const std::filesystem::path& path) {
   const auto bytes = orbis::read_file(path);
   if (!bytes) return orbis::fail(bytes.error());
@@ -42,21 +47,21 @@ orbis::result<octree> read_map(const std::filesystem::path& path) {
   const auto begins_with = [&](std::string_view magic) { return bytes->starts_with(magic); };
   if (begins_with("# Octomap OcTree binary file")) return orbis::octree::read_bt<octree::model>(view, path.string());
   if (begins_with("# Octomap OcTree file")) return orbis::octree::read_ot<octree::model>(view, path.string());
-  return orbis::fail(orbis::errc::unsupported, path.string(), "is no octree map: neither .bt nor .ot");
+  return orbis::fail(orbis::errc::unsupported, path.string(), "is no octree map (.bt or .ot)");
 }
 
-orbis::result<void> write_path(const std::filesystem::path& path, const std::vector<orbis::vec3>& points) {
+orbis::result<void> write_path(const std::filesystem::path& path, const std::vector<vec3>& points) {
   return orbis::write_file_atomically(path, [&](std::ostream& out) {
     out << "# x y z, metres\n";
     char line[128];
-    for (const orbis::vec3& p : points) {
+    for (const vec3& p : points) {
       std::snprintf(line, sizeof line, "%.6f %.6f %.6f\n", p.x(), p.y(), p.z());
       out << line;
     }
   });
 }
 
-/// What would be written over, if anything: the map, or one result by the other.
+/// The error if an output would overwrite the map or the other output; otherwise empty.
 std::optional<orbis::error> find_conflict(const settings& s) {
   const auto are_one = [](const std::filesystem::path& a, const std::filesystem::path& b) {
     std::error_code ignored;
@@ -68,28 +73,143 @@ std::optional<orbis::error> find_conflict(const settings& s) {
   return find_overwritten({s.out, s.picture}, {s.input});
 }
 
-/// Around all that is known and the ends of the way: a search for what cannot be reached ends there.
+/// Contains all known space, the start and the goal, and bounds the search for an unreachable goal.
 orbis::octree::bounding_box box_to_search(const octree& map, const settings& s) {
   constexpr double inf = std::numeric_limits<double>::infinity();
-  orbis::octree::bounding_box box{orbis::vec3::Constant(inf), orbis::vec3::Constant(-inf)};
-  const auto take = [&](const orbis::vec3& p, double half) {
+  orbis::octree::bounding_box box{vec3::Constant(inf), vec3::Constant(-inf)};
+  const auto take = [&](const vec3& p, double half) {
     box.min = box.min.cwiseMin((p.array() - half).matrix());
     box.max = box.max.cwiseMax((p.array() + half).matrix());
   };
   map.for_each_leaf([&](const octree::leaf& leaf) { take(leaf.center, 0.5 * leaf.size); });
-  for (const orbis::vec3& p : {s.from, s.to})
+  for (const vec3& p : {s.from, s.to})
     if (map.grid().key(p)) take(p, 0.0);
   const double margin = 1.0 + 2 * s.robot_radius;
   return {(box.min.array() - margin).matrix(), (box.max.array() + margin).matrix()};
 }
 
-/// Whether it is only what nobody has seen that is in the robot's way there.
-bool is_only_unknown(const octree& map, const settings& s, const orbis::vec3& p) {
+// -- why there is no path
+
+/// Returns true if the robot at `p` touches unknown space and no obstacle.
+bool is_only_unknown(const octree& map, const settings& s, const vec3& p) {
   const orbis::octree::overlap_options known{.unknown = occupancy::free};
-  if (s.unknown_is_free || s.on_floor) return false;
+  if (s.unknown_is_free) return false;
   using standing = nav::swept_shape<nav::vertical_cylinder>;
-  return s.stands ? !overlaps(map, standing{p, p, {s.robot_radius, 0.0, s.robot_height}}, known)
-                  : !overlaps(map, orbis::octree::capsule{p, p, s.robot_radius}, known);
+  return s.is_cylinder ? !overlaps(map, standing{p, p, {s.robot_radius, 0.0, s.robot_height}}, known)
+                       : !overlaps(map, orbis::octree::capsule{p, p, s.robot_radius}, known);
+}
+
+/// Describes what the robot touches at `p`, where it is blocked: the nearest obstacle, or else unknown space.
+std::string describe_blocker(const octree& map, const settings& s, const vec3& p) {
+  if (is_only_unknown(map, s, p)) return " by unknown space alone (--unknown free treats it as free)";
+  double least = std::numeric_limits<double>::infinity();
+  vec3 nearest = p;
+  map.for_each_leaf([&](const octree::leaf& leaf) {
+    if (!leaf.occupied) return;
+    const double top = p.z() + (s.is_cylinder ? s.robot_height : 0.0);
+    const vec3 body{p.x(), p.y(), std::clamp(leaf.center.z(), p.z(), top)};
+    const double distance = ((leaf.center - body).cwiseAbs().array() - 0.5 * leaf.size).max(0.0).matrix().norm();
+    if (distance >= least) return;
+    least = distance;
+    nearest = leaf.center;
+  });
+  return text(" by an obstacle at %.3f,%.3f,%.3f", nearest.x(), nearest.y(), nearest.z());
+}
+
+/// The same for a robot that drives. Cells of the floor are obstacles, unknown, or outside of the floor map.
+std::string describe_blocker(const nav::floor_map& floor, const settings& s, const vec3& p) {
+  struct blocker {
+    double distance = std::numeric_limits<double>::infinity();  // from `p` to the cell
+    orbis::vec2 at = orbis::vec2::Zero();
+  } obstacle, unknown;
+  for (int y = 0; y != floor.states.height(); ++y)
+    for (int x = 0; x != floor.states.width(); ++x) {
+      const nav::floor_state state = floor.states(x, y);
+      if (state == nav::floor_state::free) continue;
+      blocker& nearest = state == nav::floor_state::occupied ? obstacle : unknown;
+      const orbis::vec2 center = floor.center(x, y);
+      const double dx = std::max(0.0, std::abs(p.x() - center.x()) - 0.5 * floor.resolution);
+      const double dy = std::max(0.0, std::abs(p.y() - center.y()) - 0.5 * floor.resolution);
+      if (std::hypot(dx, dy) < nearest.distance) nearest = {std::hypot(dx, dy), center};
+    }
+  constexpr double rounding = 1e-9;
+  const auto touches = [&](const blocker& b) { return b.distance <= s.robot_radius + rounding; };
+  const char* const remedy = " (--unknown free treats it as free)";
+  if (touches(obstacle)) return text(" by an obstacle at %.3f,%.3f", obstacle.at.x(), obstacle.at.y());
+  if (touches(unknown)) return text(" by unknown space alone at %.3f,%.3f%s", unknown.at.x(), unknown.at.y(), remedy);
+  return std::string{" by unknown space alone, outside of the floor map"} + remedy;
+}
+
+/// The free position nearest to `p`, of the centres of cells within 2 m; empty if there is none.
+template <nav::planning_space Space>
+std::optional<vec3> nearest_free(const Space& space, const vec3& p) {
+  const auto middle = space.key(space.clamped(p));
+  if (!middle) return std::nullopt;
+  const double cell = space.resolution();
+  const int farthest = std::clamp(static_cast<int>(2.0 / cell), 1, 40);
+  double least = std::numeric_limits<double>::infinity();
+  std::optional<vec3> nearest;
+  const auto shifted = [](std::uint32_t k, int by) { return k + static_cast<std::uint32_t>(by); };
+  for (int r = 0; r <= farthest && (r - 0.5) * cell < least; ++r) {  // cells on a cube's surface around the middle
+    const int rz = Space::dimensions == 3 ? r : 0;
+    for (int dz = -rz; dz <= rz; ++dz)
+      for (int dy = -r; dy <= r; ++dy) {
+        const bool is_face = std::abs(dy) == r || (rz != 0 && std::abs(dz) == r);
+        for (int dx = -r; dx <= r; dx += is_face ? 1 : 2 * r) {
+          const orbis::octree::voxel_key k{shifted(middle->x, dx), shifted(middle->y, dy), shifted(middle->z, dz)};
+          if (!space.contains(k)) continue;
+          const vec3 center = space.center(k);
+          const double distance = (center - space.placed(p)).norm();
+          if (distance >= least || !space.is_free(k)) continue;
+          least = distance;
+          nearest = center;
+        }
+      }
+  }
+  return nearest;
+}
+
+/// The reason why there is no path, and how near the robot comes to the goal.
+template <nav::planning_space Space, class Map>
+std::string explain(const nav::found_path& path, const Space& space, const Map& map, const settings& s) {
+  using enum nav::path_status;
+  const auto distance = [&](const vec3& a, const vec3& b) { return (space.placed(a) - space.placed(b)).norm(); };
+  std::string why{to_string(path.status)};
+  const bool is_start = path.status == start_blocked;
+  if (is_start || path.status == goal_blocked) {
+    const vec3& end = is_start ? s.from : s.to;
+    why += describe_blocker(map, s, end);
+    if (const auto free = nearest_free(space, end)) {
+      const vec3 p = space.on_ground(*free);
+      why +=
+          text("; the nearest free position is %.3f,%.3f,%.3f, %.3f m away", p.x(), p.y(), p.z(), distance(*free, end));
+    } else {
+      why += "; there is no free position near it";
+    }
+  }
+  if (path.points.size() > 1) {
+    const vec3& p = path.points.back();
+    why += text("; the nearest reachable position is %.3f,%.3f,%.3f, %.3f m from the goal", p.x(), p.y(), p.z(),
+                distance(p, s.to));
+  }
+  return why;
+}
+
+// -- the search
+
+struct planned {
+  nav::found_path path;
+  double ms = 0.0;
+  std::string why;  ///< empty if a path was found
+};
+
+template <nav::planning_space Space, class Map>
+planned plan_in(const Space& space, const Map& map, const settings& s) {
+  const auto start = console::clock::now();
+  planned p{.path = nav::find_path(space, s.from, s.to), .why = {}};
+  p.ms = std::chrono::duration<double, std::milli>(console::clock::now() - start).count();
+  if (p.path.status != nav::path_status::found) p.why = explain(p.path, space, map, s);
+  return p;
 }
 
 }  // namespace
@@ -97,76 +217,58 @@ bool is_only_unknown(const octree& map, const settings& s, const orbis::vec3& p)
 exit_code plan(const settings& s, console& console) {
   const auto give_up = [&](const orbis::error& e) { return console.error(e), bad_input; };
   if (const auto lost = find_conflict(s)) return console.error(*lost), bad_usage;
+
   console.stage("reading");
   const auto map = read_map(s.input);
   if (!map) return give_up(map.error());
   if (map->empty()) return give_up({orbis::errc::no_data, s.input.string(), "the map is empty"});
   const double cell = map->resolution();
-  char text[256];
-  std::snprintf(text, sizeof text, "%s: voxels of %g cm", s.input.filename().string().c_str(), 100 * cell);
-  console.finish(text);
+  console.finish(s.input.filename().string() + text(": voxels of %g cm", 100 * cell));
 
   console.stage("preparing");
   const occupancy unknown = s.unknown_is_free ? occupancy::free : occupancy::occupied;
   std::optional<nav::floor_map> floor;
+  std::optional<nav::distance_field> field;
   if (s.on_floor) {
     auto made = nav::make_floor_map(
         *map, {.radius = s.robot_radius, .height = s.robot_height, .step = s.robot_step.value_or(cell)});
     if (!made) return give_up({made.error().code, s.input.string(), made.error().message});
     floor = *std::move(made);
-  }
-  std::optional<nav::distance_field> field;
-  if (!floor)
+  } else {
     field.emplace(*map, nav::distance_field_options{.reach = field_reach(s.robot_radius, cell), .unknown = unknown});
+  }
   console.finish(floor ? "floor map" : "distance field");
 
   console.stage("planning");
-  const auto start = console::clock::now();
-  const auto planned_in = [&](const auto& space) { return nav::find_path(space, s.from, s.to); };
   const nav::planning_options within{.region = box_to_search(*map, s)};
-  const nav::found_path path =
-      floor      ? planned_in(nav::floor_view{*floor, s.robot_radius, {}, unknown})
-      : s.stands ? planned_in(nav::planning_view{*map, *field,
-                                                 nav::vertical_cylinder{s.robot_radius, 0.0, s.robot_height}, within})
-                 : planned_in(nav::planning_view{*map, *field, nav::ball{s.robot_radius}, within});
-  const double ms = std::chrono::duration<double, std::milli>(console::clock::now() - start).count();
-  const bool found = path.status == nav::path_status::found;
-  const double straight = (s.to - s.from).norm();
-  if (found)
-    std::snprintf(text, sizeof text, "way of %.3f m over %zu points, straight %.3f m, found in %.1f ms", path.length,
-                  path.points.size(), straight, ms);
-  else
-    std::snprintf(text, sizeof text, "no way: %s", std::string{to_string(path.status)}.c_str());
-  console.finish(text);
+  const nav::vertical_cylinder cylinder{s.robot_radius, 0.0, s.robot_height};
+  const planned found = floor ? plan_in(nav::floor_view{*floor, s.robot_radius, {}, unknown}, *floor, s)
+                        : s.is_cylinder
+                            ? plan_in(nav::planning_view{*map, *field, cylinder, within}, *map, s)
+                            : plan_in(nav::planning_view{*map, *field, nav::ball{s.robot_radius}, within}, *map, s);
+  const std::string outcome = found.why.empty()
+                                  ? text("path of %.3f m over %zu points, straight %.3f m, found in %.1f ms",
+                                         found.path.length, found.path.points.size(), (s.to - s.from).norm(), found.ms)
+                                  : "no path: " + std::string{to_string(found.path.status)};
+  console.finish(outcome);
 
   if (!s.picture.empty()) {
     const auto drawn = write_navigation_picture({.title = s.input.filename().string(),
-                                                 .subtitle = text,
+                                                 .subtitle = outcome,
                                                  .map = *map,
                                                  .field = field ? &*field : nullptr,
                                                  .height = s.from.z(),
                                                  .floor = floor ? &*floor : nullptr,
                                                  .radius = s.robot_radius,
-                                                 .path = path.points},
+                                                 .path = found.path.points},
                                                 s.picture);
     if (!drawn) return give_up(drawn.error());
   }
-  if (!found) {
-    std::string why{to_string(path.status)};
-    if ((path.status == nav::path_status::start_blocked && is_only_unknown(*map, s, s.from)) ||
-        (path.status == nav::path_status::goal_blocked && is_only_unknown(*map, s, s.to)))
-      why += " by unknown space alone (--unknown free)";
-    if (path.points.size() > 1) {
-      const orbis::vec3& p = path.points.back();
-      std::snprintf(text, sizeof text, "; the nearest place that is reached is %.3f,%.3f,%.3f", p.x(), p.y(), p.z());
-      why += text;
-    }
-    console.error({orbis::errc::degenerate, s.input.string(), "no way: " + why});
-    return no_path;
-  }
+  if (!found.why.empty())
+    return console.error({orbis::errc::degenerate, s.input.string(), "no path: " + found.why}), no_path;
   if (!s.out.empty())
-    if (auto written = write_path(s.out, path.points); !written) return give_up(written.error());
-  if (!console.print(text)) return give_up({orbis::errc::write_failed, "standard output", "cannot be written"});
+    if (auto written = write_path(s.out, found.path.points); !written) return give_up(written.error());
+  if (!console.print(outcome)) return give_up({orbis::errc::write_failed, "standard output", "cannot be written"});
   return done;
 }
 

@@ -18,6 +18,12 @@ namespace {
 using orbis::vec2;
 using orbis::vec3;
 
+/// Writes the difference to the frame of the files below a picture, if there is one.
+void add_frame_note(sheet& s, const results& r, const view_frame& frame) {
+  const std::string note = view_frame_note(frame, r.slam ? r.slam->unit() : "metres");
+  if (!note.empty()) s.text(note, {60, 806}, faint, 11);
+}
+
 orbis::result<void> write_trajectory_picture(const results& r, const view_frame& frame) {
   if (!r.slam || r.slam->trajectory.empty()) return {};
   const orbis::trajectory& poses = r.slam->trajectory;
@@ -61,7 +67,7 @@ orbis::result<void> write_trajectory_picture(const results& r, const view_frame&
   }
 
   axes plan{s, 80, 125, 640, 630, x.padded(0.06, 0.2), y.padded(0.06, 0.2), true};
-  s.text(view_frame_note, {60, 806}, faint, 11);
+  add_frame_note(s, r, frame);
   const std::string unit = r.slam->unit();
   plan.frame("from above", "x, " + unit, "y, " + unit);
   plan.curve(true_above, truth_color, 2.6);
@@ -80,7 +86,7 @@ orbis::result<void> write_trajectory_picture(const results& r, const view_frame&
   profile.curve(height, estimate_color, 1.5);
   if (compared) {
     axes off{s, 830, 475, 610, 280, time, {0.0, std::max(1.1 * e.high, 0.1)}, false};
-    off.frame("distance to ground truth, after alignment", "time, s", "cm");
+    off.frame("distance to ground truth after alignment", "time, s", "cm");
     off.curve(error, error_color, 1.6);
     const double rmse = 100 * r.against_truth->ate_rmse_m;
     off.curve({{time.low, rmse}, {time.high, rmse}}, faint, 1.0);
@@ -107,13 +113,13 @@ orbis::result<void> write_map_picture(const std::string& name, const std::string
     const orbis::rgb8 c = height_color(i / 199.0);
     s.line({1100.0 + i, 785}, {1100.0 + i, 793}, cv::Scalar(c.r, c.g, c.b), 1.0);
   }
-  s.text(view_frame_note, {60, 806}, faint, 11);
+  add_frame_note(s, r, frame);
   s.text("0", {1092, 794}, faint, 11, 1.0);
   s.text(buffer, {1308, 794}, faint, 11);
   return s.write(r.folder / name);
 }
 
-/// The octree before the filter and after it, side by side in the same view, with the sizes below.
+/// The octree before and after the filter, side by side in the same view, with the sizes below.
 orbis::result<void> write_filter_picture(const results& r, const view_frame& frame) {
   const map_results& m = *r.map;
   const coloring how = m.cloud.has_colors() ? coloring::camera : coloring::height;
@@ -131,14 +137,14 @@ orbis::result<void> write_filter_picture(const results& r, const view_frame& fra
   };
   panel(20, "before", m.voxels_unfiltered, m.unfiltered, m.cloud.size(), m.cloud_bytes);
   panel(760, "after", m.voxels, m.filtered, m.kept.size(), m.filtered_bytes);
-  s.text(view_frame_note, {60, 806}, faint, 11);
+  add_frame_note(s, r, frame);
   return s.write(r.folder / "filter.png");
 }
 
 }  // namespace
 
 orbis::result<void> write_pictures(const results& r, const view_frame& frame) {
-  cv::setNumThreads(0);  // little work, for which a run must not end where there are no threads to be had
+  cv::setNumThreads(0);  // little work; a run must not fail here if no threads can be created
   if (auto done = write_trajectory_picture(r, frame); !done) return done;
   if (!r.map) return {};
   const map_results& m = *r.map;

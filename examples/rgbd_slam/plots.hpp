@@ -10,7 +10,7 @@
 
 namespace app {
 
-/// Writes what there is to draw into `r.out`.
+/// Writes the pictures of the available results into `r.folder`.
 [[nodiscard]] orbis::result<void> write_pictures(const results& r, const view_frame& frame);
 
 }  // namespace app

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The frames that go into the map, as a range of keyframes that can be gone through again and again. Depth is kept
-/// compressed. Colour, which is needed once, and of the pixels that become points only, is kept in a file, or read
-/// again if that is large. One frame at a time is unpacked, and the next one on another thread.
+/// The frames of a map, as a multi-pass range of keyframes. Depth is stored compressed. Colour, which is needed once
+/// and only for the pixels that become points, is stored in a file, or read again if the file would be too large. One
+/// frame at a time is unpacked, and the next one on another thread.
 #pragma once
 
 #include <cstddef>
@@ -20,25 +20,25 @@
 #include <orbis/slam/atlas.hpp>
 
 #include "background.hpp"
+#include "background_depth_store.hpp"
 #include "color_file.hpp"
 #include "corrected_frame.hpp"
-#include "kept_depths.hpp"
 #include "settings.hpp"
 #include "source.hpp"
 
 namespace app {
 
-/// The name of the spill file, in the folder where the files are made. The file has no name once it is open.
+/// The name of the spill file in the folder of new files. The file is unlinked once it is open.
 inline constexpr const char* spill_name = "depth.spill";
 
 /// Every second pixel of every second row becomes a point.
 inline constexpr int point_stride = 2;
 
-/// Of the file of colours, if they can be read again.
+/// The maximum size of the colour file if colours can be read again.
 inline constexpr std::uint64_t most_color_bytes = std::uint64_t{256} << 20U;
 
-/// How a store of keyframes' depth images divides what there is between memory and file. There are two: of the images
-/// as they came, and of those in the live map.
+/// The options of a depth store of keyframes. Two stores share the memory budget: of the original images, and of the
+/// live map.
 [[nodiscard]] inline orbis::mapping::depth_store_options depth_options(const settings& s,
                                                                        std::filesystem::path spill_file) {
   return {.memory_budget = (s.depth_memory << 20U) / 2, .spill_file = std::move(spill_file)};
@@ -47,34 +47,34 @@ inline constexpr std::uint64_t most_color_bytes = std::uint64_t{256} << 20U;
 class posed_frames {
   struct unpacked {
     orbis::image<std::uint16_t> depth;
-    std::optional<orbis::image<orbis::rgb8>> color;  // once it was asked for
-    std::optional<orbis::error> trouble;
+    std::optional<orbis::image<orbis::rgb8>> color;  // after the first access
+    std::optional<orbis::error> error;
   };
 
  public:
-  /// `spill_file`: for depth beyond what there is room for in memory; see `depth_store_options`.
-  /// `shutter`: by which the frames were corrected that are added with a twist.
+  /// `spill_file`: for depth images beyond the memory budget; see `depth_store_options`. `shutter`: of the correction
+  /// of frames that are added with a twist.
   posed_frames(const frame_source& source, const settings& s, const std::filesystem::path& spill_file,
                const orbis::camera::shutter& shutter = {})
       : source_{&source},
         shutter_{shutter},
         background_{s.threads != 1},
-        depths_{std::make_unique<kept_depths>(depth_options(s, spill_file), background_)},
+        depths_{std::make_unique<background_depth_store>(depth_options(s, spill_file), background_)},
         colors_{spill_file.string() + ".colors", point_stride,
                 source.made ? std::numeric_limits<std::uint64_t>::max() : most_color_bytes} {}
 
-  /// Frame number `i` of the source, where the camera was at `T_world_camera`. `twist`: see below.
+  /// Adds frame number `i` of the source with its pose. `twist`: see below.
   void add(std::size_t i, const orbis::se3& T_world_camera, const orbis::vec6& twist,
            const orbis::camera::rgbd_frame& frame) {
     add({i, {}, T_world_camera, twist}, frame);
   }
-  /// Frame number `i` of the source, which has become a keyframe; `place` sets its pose later. `twist`: by which its
-  /// images were corrected; zero: they are those of the source.
+  /// Adds frame number `i` of the source, a keyframe whose pose `place` sets later. `twist`: the motion by which its
+  /// images were corrected; zero: they are the source's images.
   void add(std::size_t i, orbis::slam::map_keyframe keyframe, const orbis::vec6& twist,
            const orbis::camera::rgbd_frame& frame) {
     add({i, keyframe, {}, twist}, frame);
   }
-  /// Gives each frame the pose `where(keyframe)`; frames without a pose are dropped.
+  /// Sets the pose of each frame to `where(keyframe)` and drops frames without a pose.
   template <class Where>
   void place(const Where& where) {
     depths_->finish();
@@ -84,25 +84,24 @@ class posed_frames {
       if (!T_world_camera) depths_->erase(e.index);
       return !T_world_camera;
     });
-    depths_->free_buffers();  // no frame will come
+    depths_->free_buffers();  // no more frames follow
   }
 
   [[nodiscard]] std::size_t size() const { return entries_.size(); }
   [[nodiscard]] orbis::trajectory trajectory() const {
-    orbis::trajectory poses;  // numbers for times: nobody asks for those
+    orbis::trajectory poses;  // frame numbers as timestamps, which are not used
     for (const entry& e : entries_) poses.push_back({static_cast<double>(e.index), e.T_world_camera});
     return poses;
   }
 
-  /// A frame's colours, which are read when they are asked for. Other pixels than those that become points may be
-  /// black.
+  /// The colours of a frame, read on access. Pixels that do not become points may be black.
   class colors {
    public:
     colors(const posed_frames& of, std::size_t entry, std::shared_ptr<unpacked> images)
         : of_{&of}, entry_{entry}, images_{std::move(images)} {}
     operator orbis::image_view<const orbis::rgb8>() const {  // NOLINT(google-explicit-constructor)
       if (!images_->color) of_->read_color(of_->entries_[entry_], *images_);
-      of_->tell(*images_);
+      of_->note_error(*images_);
       return images_->color->view();
     }
 
@@ -111,7 +110,7 @@ class posed_frames {
     std::size_t entry_;
     std::shared_ptr<unpacked> images_;
   };
-  /// What `mapping::keyframe` is. Its images last as long as it does, or a copy of it.
+  /// Models `mapping::keyframe`. Its images live as long as the value or a copy of it.
   struct value {
     orbis::camera::depth_view<std::uint16_t> depth;
     colors color;
@@ -150,7 +149,7 @@ class posed_frames {
    private:
     const posed_frames* of_ = nullptr;
     std::size_t at_ = 0;
-    mutable std::shared_ptr<unpacked> images_;  // what the value points to
+    mutable std::shared_ptr<unpacked> images_;  // owned by the value as well
   };
   [[nodiscard]] iterator begin() const {
     depths_->finish();
@@ -158,13 +157,13 @@ class posed_frames {
   }
   [[nodiscard]] iterator end() const { return {*this, size()}; }
 
-  /// Why depth images that should be in the spill file are in memory instead, if so.
+  /// The error by which depth images are in memory instead of the spill file; empty if there was none.
   [[nodiscard]] const std::optional<orbis::error>& unspilled() const {
     depths_->finish();
     return depths_->unspilled();
   }
-  /// Why an image could not be had again, if so; it then had no pixels.
-  [[nodiscard]] const std::optional<orbis::error>& trouble() const { return trouble_; }
+  /// The last error of reading an image, which then had no pixels; empty if there was none.
+  [[nodiscard]] const std::optional<orbis::error>& read_error() const { return read_error_; }
 
  private:
   struct entry {
@@ -179,7 +178,7 @@ class posed_frames {
     depths_->put(e.index, frame.depth);
     colors_.put(e.index, frame.color);
   }
-  /// The images of entry `number`, from the other thread if that was at them.
+  /// The images of entry `number`, from the other thread if it has read them.
   [[nodiscard]] std::shared_ptr<unpacked> unpack(std::size_t number) const {
     std::shared_ptr<unpacked> images;
     if (ahead_.valid()) {
@@ -187,7 +186,7 @@ class posed_frames {
       if (ahead_number_ != number) images.reset();
     }
     if (!images) images = read(number);
-    tell(*images);
+    note_error(*images);
     if (background_ && number + 1 != entries_.size()) {
       ahead_number_ = number + 1;
       ahead_ = start_in_background([this, next = number + 1] { return read(next); });
@@ -198,7 +197,7 @@ class posed_frames {
     auto images = std::make_shared<unpacked>();
     const std::size_t index = entries_[number].index;
     if (auto done = depths_->get(index, images->depth); !done) {
-      images->trouble = done.error();
+      images->error = done.error();
       images->depth = orbis::image<std::uint16_t>(source_->camera.model.width(), source_->camera.model.height());
     }
     return images;
@@ -207,25 +206,25 @@ class posed_frames {
     images.color.emplace(source_->camera.model.width(), source_->camera.model.height());
     if (colors_.get(e.index, *images.color)) return;
     auto read = source_->color(e.index);
-    if (!read) images.trouble = read.error();
+    if (!read) images.error = read.error();
     images.color = read ? *std::move(read) : orbis::image<orbis::rgb8>{};
     const orbis::camera::depth_view depth{images.depth, source_->camera.depth_scale};
     if (read && !e.twist.isZero(0.0))
       frame_correction{source_->camera.model, shutter_}.correct_color(depth, e.twist, *images.color);
   }
-  void tell(const unpacked& images) const {
-    if (images.trouble) trouble_ = images.trouble;
+  void note_error(const unpacked& images) const {
+    if (images.error) read_error_ = images.error;
   }
 
   const frame_source* source_;
   orbis::camera::shutter shutter_;
   bool background_;
   std::vector<entry> entries_;
-  std::unique_ptr<kept_depths> depths_;
+  std::unique_ptr<background_depth_store> depths_;
   color_file colors_;
-  mutable std::optional<orbis::error> trouble_;
+  mutable std::optional<orbis::error> read_error_;
   mutable std::size_t ahead_number_ = 0;
-  mutable std::future<std::shared_ptr<unpacked>> ahead_;  // the last member: it ends before the others go
+  mutable std::future<std::shared_ptr<unpacked>> ahead_;  // last member: waits before the others are destroyed
 };
 
 }  // namespace app

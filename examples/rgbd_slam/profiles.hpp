@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// `--profile`: settings that go together.
+/// `--profile`: sets of defaults.
 #pragma once
 
 #include <cstddef>
@@ -12,16 +12,16 @@
 
 namespace app {
 
-/// The default and, for boards with four small cores, such as the Raspberry Pi 4, "small".
+/// The names of the profiles. "small" is for boards with four small cores, such as the Raspberry Pi 4.
 [[nodiscard]] inline std::vector<std::string> profile_names() { return {"default", "small"}; }
 
-/// What `--profile small` says of options of the command line that are not given.
+/// The defaults of command-line options with `--profile small`.
 struct small_settings {
   static constexpr double resolution = 0.1;       ///< --resolution, metres
   static constexpr std::size_t depth_memory = 8;  ///< --depth-memory, MB
 };
 
-/// What a profile says of SLAM. bench/board counts what these cost.
+/// Applies a profile to the options of SLAM; bench/board measures the cost.
 inline void set_profile(std::string_view profile, orbis::slam::options& o) {
   if (profile != "small") return;
   o.features.max_features = 600;

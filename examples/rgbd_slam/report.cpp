@@ -38,7 +38,7 @@ std::string escaped(std::string_view text) {
   return out;
 }
 
-/// JSON for a script element: no "</script>" can occur in it.
+/// JSON for a script element; it cannot contain "</script>".
 std::string for_script(const json& j) {
   std::string out;
   for (const char c : j.dump(-1, ' ', true, json::error_handler_t::replace))
@@ -59,14 +59,14 @@ std::string base64(std::string_view bytes) {
   return out;
 }
 
-/// Every how many of `size` things to take so that at most `most` are taken.
+/// The stride that takes at most `most` of `size` elements.
 std::size_t thinning(std::size_t size, std::size_t most) { return std::max<std::size_t>(1, (size + most - 1) / most); }
 
 double rounded(double v, double step) { return std::round(v / step) * step; }
 
 // -- three-dimensional data -------------------------------------------------------------------------
 
-/// Positions as 16 bits for each coordinate within their bounds.
+/// Packs points: coordinates as 16-bit fractions of the bounds, colours, and one extra byte each.
 class packer {
  public:
   void add(const vec3& p, orbis::rgb8 color, std::uint8_t extra) {
@@ -108,7 +108,7 @@ class packer {
 };
 
 json packed_points(const map_results& m, const view_frame& frame) {
-  // Removed points are few, and worth seeing: thinned less.
+  // Removed points are few, and their display is useful: thinned less.
   const std::size_t every_kept = thinning(m.kept.size(), 80'000);
   const std::size_t every_removed = thinning(m.cloud.size() - m.kept.size(), 20'000);
   packer out;
@@ -128,7 +128,7 @@ json packed_points(const map_results& m, const view_frame& frame) {
   return j;
 }
 
-/// Voxels merged into voxels of twice the size until there are few enough.
+/// Merges voxels into voxels of twice the size until their number is below the limit.
 json packed_voxels(std::vector<voxel> voxels, double resolution, const view_frame& frame) {
   constexpr std::size_t most = 45'000;
   const std::size_t total = voxels.size();
@@ -140,7 +140,7 @@ json packed_voxels(std::vector<voxel> voxels, double resolution, const view_fram
       orbis::vec3f center;
       float size = 0;
     };
-    std::map<std::array<long, 3>, sum> merged;  // in an order that does not depend on the machine
+    std::map<std::array<long, 3>, sum> merged;  // ordered, so that the result is the same on all machines
     const auto fsize = static_cast<float>(size);
     for (const voxel& v : voxels) {
       const orbis::vec3f cell = (v.center / fsize).array().floor();
@@ -209,12 +209,12 @@ json script_data(const results& r, const view_frame& frame) {
     j["insert_ms"] = ms;
     j["colors"] = m.cloud.has_colors();
     const orbis::mat3 axes = frame.T_view_world.rotation_matrix();
-    j["axes"] = std::vector<double>(axes.data(), axes.data() + 9);  // column by column, as WebGL wants them
+    j["axes"] = std::vector<double>(axes.data(), axes.data() + 9);  // column-major, as in WebGL
     double top = frame.high.z();
     for (const voxel& v : m.voxels_unfiltered) top = std::max(top, (frame.T_view_world * v.center.cast<double>()).z());
     top = std::min(top, frame.high.z() + 2.0);
     j["points"] = packed_points(m, frame);
-    // Points as large as to touch each other on a surface.
+    // The size at which neighbouring points on a surface touch.
     const vec3 size = frame.high - frame.low;
     const double area = 2 * (size.x() * size.y() + size.x() * size.z() + size.y() * size.z());
     const double shown = std::max(1.0, j["points"]["count"].get<double>());
@@ -230,6 +230,9 @@ json script_data(const results& r, const view_frame& frame) {
 }
 
 // -- the page's static parts -------------------------------------------------------------------------
+
+/// The unit of lengths.
+std::string unit_of(const results& r) { return r.slam ? r.slam->unit() : "metres"; }
 
 std::string card(const std::string& value, const std::string& what) {
   return "<div class=\"card\"><b>" + escaped(value) + "</b><span>" + escaped(what) + "</span></div>\n";
@@ -259,14 +262,14 @@ std::string header(const results& r) {
   return h;
 }
 
-std::string words(const std::vector<std::pair<std::string, std::string>>& rows) {
+std::string text_table(const std::vector<std::pair<std::string, std::string>>& rows) {
   std::string t = "<div class=\"panel\"><table class=\"words\">";
   for (const auto& [what, value] : rows) t += "<tr><td>" + escaped(what) + "</td><td>" + escaped(value) + "</td></tr>";
   return t + "</table></div>\n";
 }
 
-/// "4, 100 ... 120": the first stretches, and how many more there are.
-std::string stretches(std::span<const frame_range> ranges) {
+/// "4, 100 ... 120": the first ranges, and the number of the others.
+std::string list_ranges(std::span<const frame_range> ranges) {
   constexpr std::size_t most = 12;
   std::string list;
   for (std::size_t i = 0; i != std::min(ranges.size(), most); ++i) {
@@ -274,30 +277,29 @@ std::string stretches(std::span<const frame_range> ranges) {
     list += (i == 0 ? "" : ", ") + std::to_string(f.first);
     if (f.count > 1) list += " ... " + std::to_string(f.first + f.count - 1);
   }
-  if (ranges.size() > most) list += " and " + std::to_string(ranges.size() - most) + " stretches more";
+  if (ranges.size() > most) list += " and " + std::to_string(ranges.size() - most) + " more ranges";
   return list;
 }
 
-std::string tracking_words(const slam_results& s) {
+std::string tracking_table(const slam_results& s) {
   std::vector<std::pair<std::string, std::string>> rows;
-  if (!s.shutter.from.empty()) rows.emplace_back("shutter", in_words(s.shutter) + " (" + s.shutter.from + ")");
-  rows.emplace_back("map of landmarks",
-                    count_text(s.landmarks) + " landmarks in " + count_text(s.keyframes.size()) + " keyframes");
+  if (!s.shutter.from.empty()) rows.emplace_back("shutter", describe(s.shutter) + " (" + s.shutter.from + ")");
+  rows.emplace_back("landmark map",
+                    count_text(s.landmarks) + " landmarks, " + count_text(s.keyframes.size()) + " keyframes");
   if (s.keyframes_culled != 0)
-    rows.emplace_back("keyframes culled", count_text(s.keyframes_culled) + ", as others show the same landmarks");
+    rows.emplace_back("keyframes culled", count_text(s.keyframes_culled) + " redundant ones");
   rows.emplace_back("loops closed", count_text(s.loops_closed));
   if (s.maps_merged != 0) rows.emplace_back("maps merged", count_text(s.maps_merged));
-  if (s.dropped) rows.emplace_back("dropped", count_text(*s.dropped) + " frames of the camera, which was ahead");
+  if (s.dropped) rows.emplace_back("dropped", count_text(*s.dropped) + " frames, which arrived during tracking");
   rows.emplace_back("lost", s.lost == 0 ? std::string{"never"}
-                                        : count_text(s.lost) + " frames (" + stretches(s.lost_frames.ranges()) + ")");
-  if (s.relocalized != 0)
-    rows.emplace_back("found by looks", count_text(s.relocalized) + " frames, without a pose before");
-  return "<h2>Tracking</h2>\n" + words(rows);
+                                        : count_text(s.lost) + " frames (" + list_ranges(s.lost_frames.ranges()) + ")");
+  if (s.relocalized != 0) rows.emplace_back("relocalised", count_text(s.relocalized) + " frames");
+  return "<h2>Tracking</h2>\n" + text_table(rows);
 }
 
 std::string tables(const results& r, const view_frame& frame) {
   std::string t;
-  if (r.slam) t += tracking_words(*r.slam);
+  if (r.slam) t += tracking_table(*r.slam);
   if (r.map) {
     const map_results& m = *r.map;
     const auto row = [](const std::string& what, std::uintmax_t count, const char* unit, std::uintmax_t occupied,
@@ -306,23 +308,24 @@ std::string tables(const results& r, const view_frame& frame) {
              (occupied != 0 ? count_text(occupied) : "") + "</td><td>" + bytes_text(bytes) + "</td></tr>";
     };
     const std::string octree = text("octree, %g cm, ", 100 * m.resolution);
-    t += "<h2>Sizes</h2>\n<div class=\"panel\"><table><tr><th></th><th>size</th><th>of them occupied</th><th>on "
+    t += "<h2>Sizes</h2>\n<div class=\"panel\"><table><tr><th></th><th>size</th><th>occupied</th><th>on "
          "disk</th></tr>";
     t += row("point cloud", m.cloud.size(), "points", 0, m.cloud_bytes);
     t += row("point cloud, filtered", m.kept.size(), "points", 0, m.filtered_bytes);
     t += row(octree + "before the filter", m.unfiltered.leaves, "leaves", m.unfiltered.occupied, m.unfiltered.bt_bytes);
     t += row(octree + "after the filter", m.filtered.leaves, "leaves", m.filtered.occupied, m.filtered.bt_bytes);
-    t += "</table></div>\n<h2>The filter</h2>\n";
-    t += words({{"mode", m.filter_mode}, {"removed", removed_text(m)}, {"why", m.filter_reason}});
+    t += "</table></div>\n<h2>Filter</h2>\n";
+    t += text_table({{"mode", m.filter_mode}, {"removed", removed_text(m)}, {"reason", m.filter_reason}});
     if (const auto picture = orbis::read_file(r.folder / "filter.png"))
-      t += "<figure class=\"panel\"><img alt=\"The octree before the filter and after it, in the same view\" "
+      t += "<figure class=\"panel\"><img alt=\"Octree before and after the filter, in the same view\" "
            "src=\"data:image/png;base64," +
            base64(*picture) + "\"></figure>\n";
   }
   if (r.navigation) {
-    t += "<h2>For a robot</h2>\n" + words({{"floor", floor_text(*r.navigation)}, {"path", path_text(*r.navigation)}});
+    t += "<h2>Navigation</h2>\n" +
+         text_table({{"floor", floor_text(*r.navigation)}, {"path", path_text(*r.navigation)}});
     if (const auto picture = orbis::read_file(r.folder / "navigation.png"))
-      t += "<figure class=\"panel\"><img alt=\"The floor map with its costs and the distance to obstacles, from above, "
+      t += "<figure class=\"panel\"><img alt=\"Floor map with costs, and distances to obstacles, from above, "
            "with a path\" src=\"data:image/png;base64," +
            base64(*picture) + "\"></figure>\n";
   }
@@ -334,8 +337,9 @@ std::string tables(const results& r, const view_frame& frame) {
         text("<tr><td>absolute (ATE), mm, over %zu poses</td><td>%.2f</td><td>%.2f</td><td>%.2f</td><td>%.2f</td></tr>",
              a.poses.size(), 1e3 * a.ate_rmse_m, 1e3 * a.ate_mean_m, 1e3 * a.ate_median_m, 1e3 * a.ate_max_m);
     if (a.rpe_trans_rmse_m && a.rpe_rot_rmse_deg) {
-      t += text("<tr><td>relative (RPE), mm, from pose to pose</td><td>%.2f</td><td></td><td></td><td></td></tr>",
-                1e3 * *a.rpe_trans_rmse_m);
+      t += text(
+          "<tr><td>relative (RPE), mm, between consecutive poses</td><td>%.2f</td><td></td><td></td><td></td></tr>",
+          1e3 * *a.rpe_trans_rmse_m);
       t += text("<tr><td>relative (RPE), degrees</td><td>%.3f</td><td></td><td></td><td></td></tr>",
                 *a.rpe_rot_rmse_deg);
     }
@@ -343,12 +347,14 @@ std::string tables(const results& r, const view_frame& frame) {
   }
   auto setup = r.setup;
   if (r.world) setup.emplace_back("world", world_text(*r.world));
-  setup.emplace_back("pictures", std::string{view_frame_note} + "; T_view_world " + view_frame_text(frame));
-  return t + "<h2>What was used</h2>\n" + words(setup);
+  const std::string note = view_frame_note(frame, unit_of(r));
+  setup.emplace_back("pictures", (note.empty() ? "in the world frame of the files" : note) + "; T_view_world " +
+                                     view_frame_text(frame));
+  return t + "<h2>Input and settings</h2>\n" + text_table(setup);
 }
 
 std::string time_table(const std::vector<double>& values) {
-  if (values.empty()) return "<p class=\"soft\">Not measured: no rays were cast.</p>";
+  if (values.empty()) return "<p class=\"soft\">Not measured: no scans were inserted.</p>";
   const spread s = spread_of(values);
   return text(
       "<table><tr><th></th><th>median</th><th>95 %%</th><th>mean</th><th>max</th></tr>"
@@ -357,8 +363,8 @@ std::string time_table(const std::vector<double>& values) {
 }
 
 std::string footer(const results& r) {
-  return "<footer>Made by <code>rgbd_slam " + escaped(r.command) + "</code> of orbis, " + text("in %.1f s.", r.wall_s) +
-         " The numbers are in <a href=\"summary.json\">summary.json</a> beside this page.</footer>\n";
+  return "<footer>Written by <code>rgbd_slam " + escaped(r.command) + "</code> of orbis, " +
+         text("in %.1f s.", r.wall_s) + " The figures are in <a href=\"summary.json\">summary.json</a>.</footer>\n";
 }
 
 // -- filling in ---------------------------------------------------------------------------------------
@@ -377,7 +383,7 @@ void choose(std::string& page, const std::string& name, bool keep) {
   }
 }
 
-/// Fills the gaps in one pass, so that what is filled in is never searched for gaps.
+/// Replaces all {{name}} in one pass, so that values are not searched for them.
 std::string filled(std::string_view page, const std::map<std::string, std::string>& values) {
   std::string out;
   for (std::size_t at = 0;;) {
@@ -398,12 +404,13 @@ orbis::result<void> write_report(const results& r, const view_frame& frame) {
   choose(page, "map", r.map.has_value());
   choose(page, "slam", path);
   choose(page, "truth", r.against_truth.has_value());
+  const std::string note = view_frame_note(frame, unit_of(r));
   const auto picture = orbis::read_file(r.folder / "map.png");
   const std::string html = filled(page, {{"title", escaped(r.title)},
                                          {"header", header(r)},
-                                         {"frame_note", std::string{"Everything is "} + view_frame_note + "."},
+                                         {"frame_note", note.empty() ? "" : "The view is " + note + "."},
                                          {"picture", picture ? "data:image/png;base64," + base64(*picture) : "data:,"},
-                                         {"unit", r.slam ? r.slam->unit() : "metres"},
+                                         {"unit", unit_of(r)},
                                          {"profile_height", r.against_truth ? "185" : "420"},
                                          {"tables", tables(r, frame)},
                                          {"tracking_table", r.slam ? time_table(r.slam->tracking_ms) : ""},

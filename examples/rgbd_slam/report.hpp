@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// report.html: one page that needs nothing but itself.
+/// report.html: a self-contained page.
 #pragma once
 
 #include <orbis/core/result.hpp>
@@ -10,10 +10,10 @@
 
 namespace app {
 
-/// Writes report.html into `r.out`; shows map.png, if it is there, where a browser cannot draw.
+/// Writes report.html into `r.folder`. Browsers without WebGL 2 show map.png, if it exists.
 [[nodiscard]] orbis::result<void> write_report(const results& r, const view_frame& frame);
 
-/// The page with gaps, see report_page.html.
+/// The page template, report_page.html.
 extern const char* const report_page;
 
 }  // namespace app

@@ -48,13 +48,13 @@ bool is_there(const fs::path& path) {
   return fs::exists(fs::symlink_status(path, ignored));
 }
 
-/// The result files in `folder` that this program made, as its summary.json says.
+/// The result files in `folder` that this program wrote, according to its summary.json.
 file_names recorded(const fs::path& folder) {
   const auto text = orbis::read_file(folder / "summary.json");
   if (!text) return {};
   const auto summary = nlohmann::json::parse(*text, nullptr, false);
   if (!summary.is_object() || !summary.contains("tracked") || !summary.contains("octree")) return {};
-  if (!summary.contains("files")) return all_names();  // of a version that kept no list
+  if (!summary.contains("files")) return all_names();  // of a version without the list
   file_names names;
   for (const char* list : {"files", "files_of_earlier_runs"})
     if (const auto found = summary.find(list); found != summary.end() && found->is_array())
@@ -77,18 +77,18 @@ std::optional<identity> identity_of(const fs::path& path) {
   return identity{status.st_dev, status.st_ino};
 }
 
-/// Never destroyed: the thread that waits for signals may use it until the process is gone.
+/// Never destroyed, as the thread that waits for signals may use it until the process ends.
 hidden_folders& hidden() {
   static hidden_folders& folders = *new hidden_folders;
   return folders;
 }
 
-/// What an interrupt leaves to be done.
+/// Cleans up when a signal ends the program.
 void remove_hidden_folders() {
   const std::lock_guard lock{hidden().mutex};
   std::error_code ignored;
-  // A thread that makes a file at this moment makes the removal fail: it is tried again. Once the folder is gone, no
-  // file can be made in it.
+  // Removal fails if another thread creates a file at this moment, and is tried again. Once the folder is gone, no file
+  // can be created in it.
   for (const fs::path& path : hidden().paths)
     for (int i = 0; i != 1000 && fs::exists(path, ignored); ++i) fs::remove_all(path, ignored);
 }
@@ -126,9 +126,9 @@ std::optional<orbis::error> find_overwritten(const std::vector<fs::path>& target
     const auto id = identity_of(input);
     for (const auto& [of_target, target] : there)
       if (id == of_target)
-        return orbis::error{orbis::errc::invalid_argument, target.string(),
-                            "is an input of this run (" + input.string() +
-                                ") and would be written over: give another place for the results"};
+        return orbis::error{
+            orbis::errc::invalid_argument, target.string(),
+            "is an input of this run (" + input.string() + ") and would be overwritten: choose another output"};
   }
   return std::nullopt;
 }
@@ -140,7 +140,7 @@ std::optional<orbis::error> find_overwritten(const settings& s, const std::vecto
     targets.push_back(s.floor_map);
     targets.push_back(fs::path{s.floor_map}.replace_extension(".pgm"));
   }
-  // A map of landmarks may be written over the one that it has grown from, if that is what was asked for.
+  // A landmark map may overwrite the loaded one if the user asks for it.
   if (auto found = find_overwritten(targets, {s.load_map})) return found;
   targets.push_back(s.save_map);
   if (auto found = find_overwritten(targets, inputs)) return found;
@@ -149,8 +149,8 @@ std::optional<orbis::error> find_overwritten(const settings& s, const std::vecto
   for (const std::string& name : result_names(s))
     if (is_there(s.out / name) && !is_among(name, ours))
       return orbis::error{orbis::errc::invalid_argument, (s.out / name).string(),
-                          "is there already, and no summary.json beside it says that rgbd_slam made it: it is not "
-                          "replaced; move it, or give another --out"};
+                          "exists and is not listed as a result of rgbd_slam in summary.json, so it is not replaced: "
+                          "move it, or choose another --out"};
   return std::nullopt;
 }
 
@@ -165,7 +165,7 @@ std::optional<orbis::error> find_unwritable(const settings& s) {
     if (::access(text.c_str(), W_OK | X_OK) == 0) continue;
     const int why = errno;
     return orbis::error{orbis::errc::write_failed, folder.string(),
-                        "no file can be made in " + there.string() + ": " + std::generic_category().message(why)};
+                        "cannot create files in " + there.string() + ": " + std::generic_category().message(why)};
   }
   return std::nullopt;
 }
@@ -182,12 +182,12 @@ result<result_files> result_files::begin(const settings& s) {
     return orbis::fail(orbis::errc::write_failed, path.string(), "the map cannot be saved: " + why);
   };
   std::error_code ec;
-  // A file that may be elsewhere goes to the folder that it lies in. `others`: what is made with it.
+  // Adds a file that may be outside of the output folder. `others`: all files that are created with it.
   const auto add = [&](const fs::path& file, const file_names& others, std::size_t& index) -> result<void> {
     const fs::path folder = folder_of(file);
     for (const fs::path& f : {s.out, folder})
       if (fs::create_directories(f, ec); ec)
-        return orbis::fail(orbis::errc::write_failed, f.string(), "cannot be made: " + ec.message());
+        return orbis::fail(orbis::errc::write_failed, f.string(), "cannot be created: " + ec.message());
     for (index = 0; index != places.size() && !are_one_file(places[index].folder, folder);) ++index;
     if (index == places.size()) places.push_back({folder, {}});
     file_names& names = places[index].names;
@@ -196,14 +196,14 @@ result<result_files> result_files::begin(const settings& s) {
         return fail(file, "another result has this name");
       names.push_back(name);
       if (const auto there = fs::status(folder / name, ec); fs::exists(there) && !fs::is_regular_file(there))
-        return fail(folder / name, "it is not a regular file, and is not replaced by one");
+        return fail(folder / name, "the existing file is not a regular file and is not replaced");
     }
     return {};
   };
   if (!s.save_map.empty()) {
     files.map_name_ = s.save_map.filename().string();
     if (files.map_name_.empty() || files.map_name_ == "." || files.map_name_ == "..")
-      return fail(s.save_map, "this is no name for a file");
+      return fail(s.save_map, "not a file name");
     if (auto added = add(s.save_map, {files.map_name_}, files.map_folder_); !added) return orbis::fail(added.error());
   }
   if (!s.floor_map.empty()) {
@@ -212,7 +212,7 @@ result<result_files> result_files::begin(const settings& s) {
     if (auto added = add(s.floor_map, {files.floor_name_, picture}, files.floor_folder_); !added)
       return orbis::fail(added.error());
   }
-  interrupts::before_end(remove_hidden_folders);
+  interrupts::set_clean_up(remove_hidden_folders);
   for (place& p : places) {
     auto folder = staged_folder::open(p.folder, std::move(p.names), hidden());
     if (!folder) return orbis::fail(folder.error());
@@ -224,7 +224,7 @@ result<result_files> result_files::begin(const settings& s) {
 result_files::~result_files() {
   if (folders_.empty()) return;
   folders_.clear();
-  interrupts::before_end({});
+  interrupts::set_clean_up({});
   const std::lock_guard lock{hidden().mutex};
   hidden().paths.clear();
 }

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The files that a run writes, and how they come into the folder that was asked for.
+/// The files that a run writes to the output folder.
 ///
-/// A run replaces the files that it makes, all together and at its end, and deletes nothing. Files of an earlier run
-/// that it does not make stay; `summary.json` tells which are whose. What is in the folder under a result's name and
-/// was not made by this program is not replaced, nor is any input of the run.
+/// A run replaces the files that it makes, all together at its end, and deletes nothing. Other files of an earlier run
+/// stay; `summary.json` lists both. Files with a result's name that this program did not write are not replaced, nor
+/// are inputs of the run.
 #pragma once
 
 #include <cstddef>
@@ -20,57 +20,55 @@
 
 namespace app {
 
-/// Names of files, in the order in which the documentation lists them.
+/// Names of files, in the order of the documentation.
 using file_names = std::vector<std::string>;
 
-/// The trajectory of a map that was never joined with the main one; the first of them is number 2.
+/// The trajectory file of a map that was not merged with the main one; the first has number 2.
 [[nodiscard]] std::string trajectory_name(std::size_t number);
-/// Of maps with a file of their own, the main one included.
+/// The maximum number of maps with a trajectory file, including the main one.
 inline constexpr std::size_t most_maps = 9;
 
-/// The files that the command may make in the output folder.
+/// The files that the command may write to the output folder.
 [[nodiscard]] file_names result_names(const settings& s);
 
-/// Every file that the run reads; `source_files`: those of the recording.
+/// All files that the run reads; `source_files`: those of the recording.
 [[nodiscard]] std::vector<std::filesystem::path> inputs_of(const settings& s,
                                                            std::vector<std::filesystem::path> source_files);
-/// Whether one of the files `targets` is one of `inputs`, compared as files, so that links do not matter. Nothing if
-/// not. Names may be empty.
+/// Returns an error if one of the files `targets` is one of `inputs`, also by a link. Names may be empty.
 [[nodiscard]] std::optional<orbis::error> find_overwritten(const std::vector<std::filesystem::path>& targets,
                                                            const std::vector<std::filesystem::path>& inputs);
-/// Whether the run would write over a file that is not its to replace: one of `inputs` (compared as files, so that
-/// links do not matter), or one that was not made by this program. Nothing if not. Cost: a look at each input's entry
-/// in its folder, where there is anything that might be replaced.
+/// Returns an error if the run would overwrite one of `inputs`, also by a link, or a file that this program did not
+/// write. Calls stat on each input if a target exists.
 [[nodiscard]] std::optional<orbis::error> find_overwritten(const settings& s,
                                                            const std::vector<std::filesystem::path>& inputs);
 
-/// Whether a folder that the results go to cannot be written or made, as far as that can be told without making it: so
-/// that a user need not wait to be told. Nothing if not. Errors: write_failed.
+/// Returns an error if an output folder can neither be written nor created, as far as this can be checked without
+/// creating it, so that the error is reported before the work. Errors: write_failed.
 [[nodiscard]] std::optional<orbis::error> find_unwritable(const settings& s);
 
 class result_files {
  public:
-  /// Makes the folders, and sees whether files can be made in them. Errors: write_failed.
+  /// Creates the folders and checks that files can be created in them. Errors: write_failed.
   [[nodiscard]] static orbis::result<result_files> begin(const settings& s);
   result_files(result_files&&) noexcept = default;
   result_files& operator=(result_files&&) = delete;
   ~result_files();
 
-  /// Where the files of the output folder are made.
+  /// The folder in which the files of the output folder are created.
   [[nodiscard]] const std::filesystem::path& folder() const { return folders_.front().path(); }
-  /// Where the map of landmarks is made. @pre settings name one
+  /// The path at which the landmark map is created. @pre the settings ask for one
   [[nodiscard]] std::filesystem::path landmark_map() const { return folders_[map_folder_].path() / map_name_; }
-  /// Where the floor map is made, the image beside it; empty if settings name none.
+  /// The path at which the floor map is created, next to its image; empty if the settings ask for none.
   [[nodiscard]] std::filesystem::path floor_map() const {
     return floor_name_.empty() ? std::filesystem::path{} : folders_[floor_folder_].path() / floor_name_;
   }
 
-  /// The files of the output folder: those made so far, with those of `coming` ...
+  /// The files of the output folder: those created so far, and those of `coming`.
   [[nodiscard]] file_names made(const file_names& coming) const;
-  /// ... and those of earlier runs that will stay beside them.
+  /// The files of earlier runs that will stay in the output folder.
   [[nodiscard]] file_names of_earlier_runs(const file_names& made) const;
 
-  /// Replaces the old files by those that were made: all, or none if this fails. Errors: write_failed.
+  /// Replaces the old files by the new ones: all, or none if this fails. Errors: write_failed.
   [[nodiscard]] orbis::result<void> put_in_place();
 
  private:
@@ -79,7 +77,7 @@ class result_files {
   std::filesystem::path out_;
   std::string map_name_, floor_name_;
   std::size_t map_folder_ = 0, floor_folder_ = 0;
-  std::vector<staged_folder> folders_;  ///< the output folder; those of the other files that are elsewhere
+  std::vector<staged_folder> folders_;  ///< the output folder, and the folders of files outside of it
 };
 
 }  // namespace app

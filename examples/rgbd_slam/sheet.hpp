@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A sheet to draw plots on, and axes.
+/// A drawing surface for plots, and axes.
 #pragma once
 
 #include <algorithm>
@@ -21,12 +21,12 @@
 
 namespace app {
 
-inline constexpr int zoom = 2;  // everything is drawn at twice the size and shrunk
+inline constexpr int zoom = 2;  // everything is drawn at twice the size and scaled down
 
 inline const cv::Scalar ink{28, 32, 40}, faint{150, 155, 163}, grid{228, 230, 234}, truth_color{150, 155, 163},
     estimate_color{37, 99, 235}, error_color{200, 60, 50};
 
-/// A sheet to draw on, in pixels of the finished picture.
+/// A drawing surface; coordinates are pixels of the final picture.
 class sheet {
  public:
   sheet(int width, int height) : pixels_(height * zoom, width * zoom, CV_8UC3, cv::Scalar(250, 250, 249)) {}
@@ -37,18 +37,18 @@ class sheet {
   void dot(const orbis::vec2& p, const cv::Scalar& color, double radius) {
     cv::circle(pixels_, at(p), static_cast<int>(radius * zoom * 16), color, cv::FILLED, cv::LINE_AA, 4);
   }
-  /// `align`: 0 the text begins at `p`, 0.5 it is centred there, 1 it ends there.
+  /// `align`: 0: the text begins at `p`; 0.5: it is centred at `p`; 1: it ends at `p`.
   void text(const std::string& what, const orbis::vec2& p, const cv::Scalar& color = ink, double size = 13.0,
             double align = 0.0, bool bold = false) {
     const cv::Point from(static_cast<int>((p.x() - align * width_of(what, size, bold)) * zoom),
                          static_cast<int>(p.y() * zoom));
     cv::putText(pixels_, what, from, cv::FONT_HERSHEY_SIMPLEX, scale_of(size), color, thickness_of(bold), cv::LINE_AA);
   }
-  /// An entry of a legend, which begins at `p`. Returns where the next one does.
+  /// Draws a legend entry that begins at `p`; returns the beginning of the next one.
   orbis::vec2 legend(const orbis::vec2& p, const cv::Scalar& color, const std::string& meaning) {
     constexpr double radius = 5.0, size = 11.5, to_text = 16.0, apart = 20.0;
     const orbis::vec2 middle = p + orbis::vec2(radius, -4.0);
-    dot(middle, faint, radius + 0.5);  // the rim of what is nearly white
+    dot(middle, faint, radius + 0.5);  // a rim, for colours that are almost white
     dot(middle, color, radius);
     text(meaning, p + orbis::vec2(to_text, 0.0), ink, size);
     return p + orbis::vec2(to_text + width_of(meaning, size) + apart, 0.0);
@@ -80,7 +80,7 @@ class sheet {
   cv::Mat pixels_;
 };
 
-/// A step of 1, 2 or 5 times a power of ten that divides `range` into about `parts`.
+/// A step of 1, 2 or 5 times a power of ten that divides `range` into about `parts` parts.
 inline double nice_step(double range, int parts) {
   const double raw = std::max(range, 1e-9) / parts;
   const double power = std::pow(10.0, std::floor(std::log10(raw)));
@@ -95,7 +95,7 @@ inline std::string tick_text(double value, double step) {
   return buffer;
 }
 
-/// Axes on a part of a sheet.
+/// Axes in a part of a sheet.
 class axes {
  public:
   struct range {
@@ -146,7 +146,7 @@ class axes {
   }
 
  private:
-  /// The multiples of `step` in a range: few, also where the step is lost in the size of the numbers.
+  /// The multiples of `step` in a range; few even if rounding makes adding the step ineffective.
   [[nodiscard]] static std::vector<double> ticks(const range& r, double step) {
     std::vector<double> at;
     const double first = std::ceil(r.low / step);

@@ -15,7 +15,7 @@
 namespace app {
 namespace {
 
-constexpr double watched = 10.0;  // seconds
+constexpr double first_seconds = 10.0;
 
 std::string milliseconds(double seconds, const char* format = "%.1f") {
   char buffer[40];
@@ -25,28 +25,28 @@ std::string milliseconds(double seconds, const char* format = "%.1f") {
 
 }  // namespace
 
-first_look find_shutter(const frame_source& source, const settings& s, bool checks_camera, console& console) {
-  first_look look;
-  shutter_results& result = look.shutter;
-  if (source.is_monocular()) {  // what is known of motion while an image is read is in metres
+camera_inspection find_shutter(const frame_source& source, const settings& s, bool checks_camera, console& console) {
+  camera_inspection found;
+  shutter_results& result = found.shutter;
+  if (source.is_monocular()) {  // the correction needs motion in metres
     result.from = "camera";
-    return look;
+    return found;
   }
   if (s.read_out_ms) {
     result.from = "given";
     result.shutter = source.camera.shutter.value_or(orbis::camera::shutter{});
     result.shutter.color_read_out = result.shutter.depth_read_out = 0.001 * *s.read_out_ms;
-    return look;
+    return found;
   }
   if (source.camera.shutter) {
     result.from = "camera";
     result.shutter = *source.camera.shutter;
-    return look;
+    return found;
   }
-  // Only depth tells, and a camera shows its first seconds once.
+  // The estimate needs depth, and the first seconds of a live camera cannot be replayed.
   if (source.sensor != orbis::slam::sensor_kind::rgbd || source.is_live) {
     result.from = "camera";
-    return look;
+    return found;
   }
   result.from = "estimated";
   console.stage("shutter");
@@ -56,24 +56,24 @@ first_look find_shutter(const frame_source& source, const settings& s, bool chec
   orbis::slam::rgbd_system<decltype(orbis::camera::camera_settings::model)> slam{source.camera.model, options};
   read_ahead frames{source, s.threads != 1};
   std::optional<double> begin;
-  for (std::size_t i = 0; frames.has_next() && !interrupts::requested(); ++i) {
+  for (std::size_t i = 0; frames.has_next() && !interrupts::stop_requested(); ++i) {
     const auto frame = frames.next();
-    if (!frame) break;  // it is told when the frame's turn comes
+    if (!frame) break;  // tracking reports the error
     if (!begin) begin = frame->timestamp;
-    if (frame->timestamp - *begin > watched) break;
+    if (frame->timestamp - *begin > first_seconds) break;
     slam.track(*frame);
-    console.advance(i + 1, source.frames, "looking at the first seconds");
+    console.advance(i + 1, source.frames, "tracking the first seconds");
   }
-  const auto found = *slam.estimated_shutter();
-  result.shutter = found.shutter;
-  result.read_out_deviation = found.read_out_deviation;
-  result.delay_deviation = found.delay_deviation;
-  console.finish(in_words(result));
-  if (!checks_camera) return look;
+  const auto estimate = *slam.estimated_shutter();
+  result.shutter = estimate.shutter;
+  result.read_out_deviation = estimate.read_out_deviation;
+  result.delay_deviation = estimate.delay_deviation;
+  console.finish(describe(result));
+  if (!checks_camera) return found;
   const orbis::slam::map_id most = slam.largest_map();
-  look.doubt = slam.inspect(
+  found.doubt = slam.inspect(
       [&](const orbis::slam::atlas& maps) { return find_doubt(maps.at(most), source.camera.model, options); });
-  return look;
+  return found;
 }
 
 orbis::camera::camera_settings with_shutter(orbis::camera::camera_settings camera, const shutter_results& shutter) {
@@ -82,18 +82,18 @@ orbis::camera::camera_settings with_shutter(orbis::camera::camera_settings camer
   return camera;
 }
 
-std::string in_words(const shutter_results& r) {
+std::string describe(const shutter_results& r) {
   const bool estimated = r.from == "estimated";
   if (r.shutter.is_global())
-    return !estimated ? "global" : std::isfinite(r.read_out_deviation) ? "global, or nearly so" : "taken to be global";
+    return !estimated ? "global" : std::isfinite(r.read_out_deviation) ? "global or nearly global" : "assumed global";
   const auto value = [&](double seconds, double deviation) {
     return milliseconds(seconds) + (estimated ? " +- " + milliseconds(deviation) : "") + " ms";
   };
-  std::string text = "images are read out in " + value(r.shutter.color_read_out, r.read_out_deviation);
+  std::string text = "rolling, read-out time " + value(r.shutter.color_read_out, r.read_out_deviation);
   if (r.shutter.depth_read_out != r.shutter.color_read_out)
-    text += ", depth images in " + milliseconds(r.shutter.depth_read_out) + " ms";
+    text += ", depth " + milliseconds(r.shutter.depth_read_out) + " ms";
   if (r.shutter.depth_delay != 0.0)
-    text += ", depth " + value(std::abs(r.shutter.depth_delay), r.delay_deviation) +
+    text += ", depth image " + value(std::abs(r.shutter.depth_delay), r.delay_deviation) +
             (r.shutter.depth_delay > 0.0 ? " after colour" : " before colour");
   return text;
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// When the rows of the camera's images are taken: as it is said, or as the first seconds of the recording tell.
+/// The camera's shutter: given, or estimated from the first seconds of the recording.
 #pragma once
 
 #include <optional>
@@ -14,21 +14,23 @@
 
 namespace app {
 
-struct first_look {
+struct camera_inspection {
   shutter_results shutter;
-  std::optional<focal_doubt> doubt;  ///< of those seconds' map, where they were looked at and it was asked for
+  std::optional<focal_doubt>
+      doubt;  ///< by the map of the first seconds, if they were tracked and a check was requested
 };
 
-/// As `--read-out-ms` says, otherwise as the camera's settings do, otherwise estimated from the first ten seconds,
-/// which are tracked for this alone. Frames that cannot be read end that.
-[[nodiscard]] first_look find_shutter(const frame_source& source, const settings& s, bool checks_camera,
-                                      console& console);
+/// Takes the shutter from `--read-out-ms`, or else from the camera's settings, or else estimates it: tracks the first
+/// ten seconds, up to the first unreadable frame. `checks_camera` asks for a check of the focal length as well.
+[[nodiscard]] camera_inspection find_shutter(const frame_source& source, const settings& s, bool checks_camera,
+                                             console& console);
 
-/// The camera with that shutter, for a camera file. An estimate of zero is left out: another recording may tell more.
+/// The camera with that shutter, for a camera file. An estimate of zero is omitted: another recording may be
+/// conclusive.
 [[nodiscard]] orbis::camera::camera_settings with_shutter(orbis::camera::camera_settings camera,
                                                           const shutter_results& shutter);
 
-/// In words, with its deviation where it was estimated.
-[[nodiscard]] std::string in_words(const shutter_results& shutter);
+/// A description, with the standard deviation of an estimate.
+[[nodiscard]] std::string describe(const shutter_results& shutter);
 
 }  // namespace app

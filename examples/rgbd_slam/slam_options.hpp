@@ -10,7 +10,7 @@
 
 namespace app {
 
-/// For a depth camera; a known `baseline`, metres, says how exact its depth is.
+/// Options for a depth camera; a known `baseline` (metres) determines the accuracy of its depth.
 [[nodiscard]] inline orbis::slam::options slam_options(const orbis::camera::any_camera& camera,
                                                        const std::optional<double>& baseline) {
   orbis::slam::options options;

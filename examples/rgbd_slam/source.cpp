@@ -36,7 +36,7 @@ result<orbis::camera::camera_settings> named_camera(const std::string& name) {
   return is_file_name(name) ? orbis::io::read_camera(name) : orbis::camera::preset(name);
 }
 
-/// Where a reader asks for a camera: by which option it is named.
+/// Adds the name of the option to a reader's request for a camera.
 orbis::error with_option(orbis::error e) {
   if (e.message.ends_with("name a camera")) e.message += " with --camera";
   return e;
@@ -63,8 +63,8 @@ source_frame with_right(orbis::camera::stereo_frame pair) {
   return f;
 }
 
-/// What is taken off all positions, so that results are near their origin; tells the user if that is something.
-void take_origin_off(frame_source& source) {
+/// Subtracts an origin from all positions, so that results are near zero; adds a note if it is not zero.
+void subtract_origin(frame_source& source) {
   if (source.ground_truth.empty()) return;
   const orbis::vec3 origin = examples::nearby_origin(source.ground_truth.front().T_world_camera.translation());
   source.origin = origin;
@@ -73,9 +73,9 @@ void take_origin_off(frame_source& source) {
   if (!origin.isZero()) source.notes.push_back(origin_note(origin));
 }
 
-/// What is the same for recordings of any sensor.
+/// The parts of a source that are the same for recordings of all sensors.
 template <class Recording>
-frame_source describe(const Recording& recording, const char* kind, const settings& s) {
+frame_source make_source(const Recording& recording, const char* kind, const settings& s) {
   frame_source source;
   source.title = std::filesystem::weakly_canonical(s.input).filename().string();
   source.kind = std::string{kind} + " (" + std::string{to_string(recording.format())} + ")";
@@ -110,9 +110,9 @@ result<frame_source> open_stereo_recording(const settings& s) {
   auto opened = orbis::io::open_stereo_recording(s.input, options);
   if (!opened) return fail(with_option(opened.error()));
   const auto recording = std::make_shared<const orbis::io::stereo_recording>(*std::move(opened));
-  frame_source source = describe(*recording, "stereo recording", s);
+  frame_source source = make_source(*recording, "stereo recording", s);
   source.sensor = sensor_kind::stereo;
-  take_origin_off(source);
+  subtract_origin(source);
   source.frame = [recording, origin = source.origin, stride = s.stride](std::size_t i) -> result<source_frame> {
     auto pair = moved(recording->frame(i * stride), origin);
     if (!pair) return fail(pair.error());
@@ -139,7 +139,7 @@ result<frame_source> open_recording(const settings& s) {
     orbis::error e = with_option(opened.error());
     if (e.code == orbis::errc::unsupported && s.sensor == "auto" && s.format == "auto") {
       const auto add = [&](const orbis::error& other) {
-        if (other.message == e.message) return;  // what there is in the folder is said once
+        if (other.message == e.message) return;  // the contents of the folder are listed once
         e.message = e.message.substr(0, e.message.rfind("; the folder ")) + "; and " + other.message;
       };
       if (const auto stereo = orbis::io::open_stereo_recording(s.input); !stereo) add(stereo.error());
@@ -149,8 +149,8 @@ result<frame_source> open_recording(const settings& s) {
   }
 
   const auto recording = std::make_shared<const orbis::io::recording>(*std::move(opened));
-  frame_source source = describe(*recording, "recording", s);
-  take_origin_off(source);
+  frame_source source = make_source(*recording, "recording", s);
+  subtract_origin(source);
   source.frame = [recording, origin = source.origin, stride = s.stride](std::size_t i) -> result<source_frame> {
     auto frame = moved(recording->frame(i * stride), origin);
     if (!frame) return fail(frame.error());
@@ -175,9 +175,9 @@ result<frame_source> open_mono_recording(const settings& s) {
   auto opened = orbis::io::open_mono_recording(s.input, options);
   if (!opened) return fail(with_option(opened.error()));
   const auto recording = std::make_shared<const orbis::io::mono_recording>(*std::move(opened));
-  frame_source source = describe(*recording, "recording of one camera", s);
+  frame_source source = make_source(*recording, "monocular recording", s);
   source.sensor = sensor_kind::monocular;
-  take_origin_off(source);
+  subtract_origin(source);
   source.color = [recording, stride = s.stride](std::size_t i) { return recording->color(i * stride); };
   source.frame = [recording, stride = s.stride](std::size_t i) -> result<source_frame> {
     auto frame = recording->frame(i * stride);
@@ -216,8 +216,8 @@ result<frame_source> open_file(const settings& s) {
   return source;
 }
 
-/// What took the recording, where that is not said. A folder that has depth as well as a second camera is one with
-/// depth.
+/// The sensor of the settings, or else the one that the folder's files indicate. A folder with depth and a second
+/// camera counts as RGB-D.
 sensor_kind sensor_of(const settings& s) {
   if (const auto wanted = wanted_sensor(s)) return *wanted;
   if (s.format == "images") return sensor_kind::monocular;
@@ -226,7 +226,7 @@ sensor_kind sensor_of(const settings& s) {
   for (const char* const depth : {"depth.txt", "associations.txt", "depth"})
     if (std::filesystem::exists(s.input / depth, ignored)) return sensor_kind::rgbd;
   using orbis::io::recording_format;
-  const auto with_depth = orbis::io::detect_format(s.input);  // which of TUM's would have had one of these lists
+  const auto with_depth = orbis::io::detect_format(s.input);  // TUM recordings with depth have one of the lists above
   if (s.format != "auto" || (with_depth != recording_format::automatic && with_depth != recording_format::tum))
     return sensor_kind::rgbd;
   if (orbis::io::detect_stereo_format(s.input) != orbis::io::stereo_format::automatic) return sensor_kind::stereo;
@@ -234,8 +234,8 @@ sensor_kind sensor_of(const settings& s) {
                                                                                      : sensor_kind::rgbd;
 }
 
-/// A folder is played as if it were a camera; numbers and files in /dev are video cameras, and whatever is to be one
-/// without depth; anything else is OpenNI2's.
+/// Opens a camera: a folder is played as a camera; numbers, files in /dev and all devices for sensors without depth are
+/// video cameras; other names are OpenNI2 devices.
 result<std::unique_ptr<camera_device>> open_device(const settings& s) {
   device_options options{.name = s.input.string(), .sensor = wanted_sensor(s)};
   if (!s.camera.empty()) {
@@ -254,8 +254,8 @@ result<std::unique_ptr<camera_device>> open_device(const settings& s) {
   return open_openni(options);
 }
 
-/// A camera, from which frames are taken from the first that is asked for on.
-struct begun_on_demand {
+/// A camera that starts with the first request for a frame.
+struct lazy_live_source {
   std::unique_ptr<camera_device> device;
   std::optional<live_source> live;
 };
@@ -263,7 +263,7 @@ struct begun_on_demand {
 result<frame_source> open_live(const settings& s) {
   auto opened = open_device(s);
   if (!opened) return fail(with_option(opened.error()));
-  const auto feed = std::make_shared<begun_on_demand>();
+  const auto feed = std::make_shared<lazy_live_source>();
   feed->device = *std::move(opened);
   frame_source source;
   source.title = feed->device->name;
@@ -276,16 +276,16 @@ result<frame_source> open_live(const settings& s) {
   source.files = feed->device->files;
   source.frame = [feed](std::size_t) {
     if (!feed->live) feed->live.emplace(std::move(feed->device));
-    return feed->live->next([] { return interrupts::requested(); });
+    return feed->live->next([] { return interrupts::stop_requested(); });
   };
   source.color = [name = source.title](std::size_t) -> result<orbis::image<orbis::rgb8>> {
-    return fail(orbis::errc::unreadable, name, "a camera shows nothing twice");
+    return fail(orbis::errc::unreadable, name, "a frame of a camera cannot be read again");
   };
   source.dropped = [feed] { return feed->live ? feed->live->dropped() : std::size_t{0}; };
   return source;
 }
 
-/// A synthetic recording whose textures, most of its memory, can be dropped.
+/// A synthetic recording whose textures (most of its memory) can be released.
 class renderer {
  public:
   explicit renderer(const orbis::io::synthetic_options& options) : options_{options} {}
@@ -355,15 +355,15 @@ frame_source make_synthetic(const settings& s) {
   return source;
 }
 
-/// Says when the octree's voxels are so small that a frame takes seconds, and refuses those of which one frame alone
-/// may fill the memory. The first frame stands for all; if further ones fill it, the program gives up (`limit_memory`).
+/// Adds a note if voxels are so small that a frame takes seconds, and fails if one frame alone may fill the memory. The
+/// estimate uses the first frame; if later frames fill the memory, the program ends (`limit_memory`).
 result<void> check_resolution(frame_source& source, const settings& s) {
   const orbis::camera::intrinsics& k = source.camera.model.k();
-  if (source.frames == 0 || source.is_monocular() || source.is_live) return {};  // a camera's frames are seen once
+  if (source.frames == 0 || source.is_monocular() || source.is_live) return {};  // live frames cannot be read twice
   if (!examples::voxels_of_depth(k, [&](std::size_t) { return source.depth_limit(s); }).takes_long(s.resolution))
     return {};
   auto first = source.frame(0);
-  if (!first) return {};  // whoever needs it will say why
+  if (!first) return {};  // tracking reports the error
   source.complete(*first);
   const auto pixels = first->depth.pixels();
   const auto voxels = examples::voxels_of_depth(k, [&](std::size_t i) {
@@ -371,7 +371,7 @@ result<void> check_resolution(frame_source& source, const settings& s) {
     return z > source.depth_limit(s) ? 0.0 : z;
   });
   if (!voxels.takes_long(s.resolution)) return {};
-  const std::string text = voxels.in_words(s.resolution, "the first frame alone");
+  const std::string text = voxels.describe(s.resolution, "the first frame alone");
   if (voxels.is_too_large(s.resolution, examples::free_memory()))
     return fail(orbis::errc::invalid_argument, "--resolution", text + ", too many");
   source.notes.push_back(text + "; this takes long");
@@ -379,9 +379,9 @@ result<void> check_resolution(frame_source& source, const settings& s) {
 }
 
 std::string describe(const frame_source& source) {
-  return source.title + ": " + (source.is_live ? "a camera" : std::to_string(source.frames) + " frames") + " of " +
+  return source.title + ": " + (source.is_live ? "live camera" : std::to_string(source.frames) + " frames") + ", " +
          std::to_string(source.camera.model.width()) + " x " + std::to_string(source.camera.model.height()) +
-         (source.images_of.empty() ? "" : ", images of " + source.images_of) +
+         (source.images_of.empty() ? "" : ", images from " + source.images_of) +
          (source.ground_truth.empty() ? "" : ", with ground truth");
 }
 
@@ -402,7 +402,7 @@ result<frame_source> open_source(const settings& s, console& console) {
     if (s.what == command::live) return open_live(s);
     if (!s.topics.empty() && s.input.extension() != ".bag")
       return result<frame_source>{
-          fail(orbis::errc::invalid_argument, "--topics", "is for ROS bags, and " + s.input.string() + " is none")};
+          fail(orbis::errc::invalid_argument, "--topics", "needs a ROS bag; " + s.input.string() + " is none")};
     if (std::filesystem::is_regular_file(s.input, ignored)) return open_file(s);
     switch (sensor_of(s)) {
       case sensor_kind::stereo: return open_stereo_recording(s);
@@ -413,16 +413,16 @@ result<frame_source> open_source(const settings& s, console& console) {
   auto source = s.what == command::demo ? result<frame_source>{make_synthetic(s)} : open();
   if (!source) return source;
   if (source->is_stereo()) {
-    // As far as a quarter of a pixel of disparity is about a hundredth of the depth.
+    // Up to this depth, a quarter of a pixel of disparity corresponds to about 1 % of the depth.
     constexpr double baselines = 20.0;
     source->usual_max_depth = std::max(source->usual_max_depth, baselines * source->camera.baseline.value_or(0.0));
-    // Depth is made here: in millimetres, or in coarser steps where these do not reach as far.
+    // The depth image is in millimetres, or in coarser steps if 16 bits of millimetres do not cover the range.
     source->camera.depth_scale = std::min(1000.0, 65000.0 / source->depth_limit(s));
   }
   if (source->is_monocular()) {
     const bool rolls =
         s.read_out_ms ? *s.read_out_ms != 0.0 : !source->camera.shutter.value_or(orbis::camera::shutter{}).is_global();
-    if (rolls) source->notes.emplace_back("without depth a rolling shutter is not corrected for");
+    if (rolls) source->notes.emplace_back("the rolling shutter of a monocular camera is not corrected");
   }
   if (!s.localize_only)
     if (auto fine = check_resolution(*source, s); !fine) return fail(fine.error());

@@ -44,7 +44,7 @@ descriptor open_folder(const fs::path& folder) {
   return descriptor{::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)};
 }
 
-/// A lock on a folder as long as this lives. File systems without locks let everybody in.
+/// Locks a folder during its lifetime. No effect on file systems without locks.
 class folder_lock {
  public:
   explicit folder_lock(int folder) : folder_{folder} {
@@ -59,20 +59,20 @@ class folder_lock {
   int folder_;
 };
 
-/// A file to be put in place. Strings, as a child process may not allocate memory.
+/// A file to move into place. Strings, because a child process must not allocate memory.
 struct move {
   std::string from, to, old;
-  bool replaces = false;  ///< there is a file at `to`
-  bool has_old = false;   ///< and it is at `old` as well
+  bool replaces = false;  ///< a file exists at `to`
+  bool has_old = false;   ///< it also exists at `old`
 };
 
-/// Puts all files in place, or none: returns 0 or why not. Calls nothing but the system.
+/// Moves all files into place, or none; returns 0 or an errno value. Makes system calls only.
 int rename_all(const std::vector<move>& moves) {
   for (std::size_t i = 0; i != moves.size(); ++i) {
     if (::rename(moves[i].from.c_str(), moves[i].to.c_str()) == 0) continue;
     const int why = errno;
     if (why == ENOENT && ::access(moves[i].from.c_str(), F_OK) != 0 && ::access(moves[i].to.c_str(), F_OK) == 0)
-      continue;  // a child process that was killed had done it
+      continue;  // done by a child process that was killed
     while (i-- != 0)
       if (const move& m = moves[i]; m.has_old)
         ::rename(m.old.c_str(), m.to.c_str());
@@ -83,8 +83,8 @@ int rename_all(const std::vector<move>& moves) {
   return 0;
 }
 
-/// `rename_all` in a process that signals to this one, or its end, do not reach.
-int rename_all_whatever_happens(const std::vector<move>& moves) {
+/// Runs `rename_all` in a child process, which signals to this process or its end do not affect.
+int rename_all_in_child(const std::vector<move>& moves) {
   sigset_t all, before;
   sigfillset(&all);
   pthread_sigmask(SIG_SETMASK, &all, &before);
@@ -108,7 +108,7 @@ bool may_be_replaced(const fs::path& path) {
   return !fs::exists(there) || fs::is_regular_file(there) || fs::is_symlink(there);
 }
 
-/// Of the files in `from` those that have one of the names.
+/// The moves of those files in `from` that have one of the names.
 std::vector<move> moves_to(const fs::path& folder, const fs::path& from, const std::vector<std::string>& names) {
   std::vector<move> moves;
   for (const std::string& name : names) {
@@ -120,7 +120,7 @@ std::vector<move> moves_to(const fs::path& folder, const fs::path& from, const s
   return moves;
 }
 
-/// Finishes or removes what processes that are gone have left in `folder`. @pre it is locked
+/// Finishes or removes the hidden folders of ended processes in `folder`. @pre it is locked
 void clear_leftovers(const fs::path& folder, const std::vector<std::string>& names) {
   std::vector<fs::path> found;
   std::error_code ec;
@@ -129,7 +129,7 @@ void clear_leftovers(const fs::path& folder, const std::vector<std::string>& nam
       found.push_back(it->path());
   for (const fs::path& left : found) {
     const descriptor lock = open_folder(left);
-    if (lock.get() < 0 || ::flock(lock.get(), LOCK_EX | LOCK_NB) != 0) continue;  // of a process that lives
+    if (lock.get() < 0 || ::flock(lock.get(), LOCK_EX | LOCK_NB) != 0) continue;  // of a running process
     if (left.filename().string().ends_with(ready) && rename_all(moves_to(folder, left, names)) != 0) continue;
     fs::remove_all(left, ec);
   }
@@ -141,7 +141,7 @@ result<staged_folder> staged_folder::open(const fs::path& folder, std::vector<st
                                           hidden_folders& hidden) {
   std::error_code ec;
   fs::create_directories(folder, ec);
-  if (ec) return failure(folder, "cannot be made: " + ec.message());
+  if (ec) return failure(folder, "cannot be created: " + ec.message());
   staged_folder made;
   made.folder_ = fs::absolute(folder, ec);
   made.names_ = std::move(names);
@@ -149,14 +149,14 @@ result<staged_folder> staged_folder::open(const fs::path& folder, std::vector<st
   if (made.folder_lock_.get() < 0) return failure(folder, "cannot be opened: " + reason(errno));
   for (const std::string& name : made.names_)
     if (!may_be_replaced(made.folder_ / name))
-      return failure(folder / name, "is not a regular file, and is not replaced by one");
+      return failure(folder / name, "is not a regular file and is not replaced");
 
   const folder_lock lock{made.folder_lock_.get()};
   clear_leftovers(made.folder_, made.names_);
   std::string name = (made.folder_ / (std::string{prefix} + "XXXXXX")).string();
   const std::lock_guard registers{hidden.mutex};
   hidden.paths.emplace_back();
-  if (::mkdtemp(name.data()) == nullptr) return failure(folder, "no file can be made in it: " + reason(errno));
+  if (::mkdtemp(name.data()) == nullptr) return failure(folder, "cannot create files in it: " + reason(errno));
   made.staging_ = hidden.paths.back() = name;
   made.staging_lock_ = open_folder(made.staging_);
   ::flock(made.staging_lock_.get(), LOCK_EX);
@@ -178,7 +178,7 @@ void staged_folder::discard() noexcept {
 }
 
 result<void> staged_folder::put_in_place(std::span<staged_folder* const> folders, hidden_folders& hidden) {
-  // In the order of their numbers, so that two programs never wait for each other.
+  // In the order of their inode numbers, so that two programs never deadlock.
   std::vector<staged_folder*> ordered(folders.begin(), folders.end());
   const auto number = [](const staged_folder* f) {
     struct stat status {};
@@ -195,12 +195,12 @@ result<void> staged_folder::put_in_place(std::span<staged_folder* const> folders
   for (staged_folder* f : folders) {
     for (const std::string& name : f->made())
       if (!may_be_replaced(f->folder_ / name))
-        return failure(f->folder_ / name, "is not a regular file, and is not replaced by one");
+        return failure(f->folder_ / name, "is not a regular file and is not replaced");
     const fs::path marked = f->staging_.string() + std::string{ready};
     fs::create_directory(f->staging_ / backup, ec);
     ::fsync(f->staging_lock_.get());
     fs::rename(f->staging_, marked, ec);
-    if (ec) return failure(f->folder_, "the new files cannot be put in place: " + ec.message());
+    if (ec) return failure(f->folder_, "cannot move the new files into place: " + ec.message());
     std::replace(hidden.paths.begin(), hidden.paths.end(), f->staging_, marked);
     f->staging_ = marked;
     for (move& m : moves_to(f->folder_, marked, f->names_)) {
@@ -209,8 +209,8 @@ result<void> staged_folder::put_in_place(std::span<staged_folder* const> folders
     }
     ::fsync(f->folder_lock_.get());
   }
-  const int why = rename_all_whatever_happens(moves);
-  if (why != 0) return failure(folders.front()->folder_, "the new files cannot be put in place: " + reason(why));
+  const int why = rename_all_in_child(moves);
+  if (why != 0) return failure(folders.front()->folder_, "cannot move the new files into place: " + reason(why));
   for (staged_folder* f : folders) {
     ::fsync(f->folder_lock_.get());
     f->discard();

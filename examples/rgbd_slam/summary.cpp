@@ -47,7 +47,7 @@ spread spread_of(std::vector<double> values) {
 }
 
 std::string summary_json(const results& r) {
-  json j;  // NaN, which stands for "not known", is written as null
+  json j;  // NaN (unknown) is written as null
   const json null = nullptr;
   const auto& s = r.slam;
   const auto& m = r.map;
@@ -201,11 +201,11 @@ std::string size_table(const map_results& m) {
 
 std::string world_text(const world_results& w) {
   const std::string sure = w.confidence ? text(" (confidence %.2f)", *w.confidence) : "";
-  if (w.up_from == "loaded map") return "the loaded map's";
-  if (w.up_from == "ground truth") return "the ground truth's, whose z is up" + sure;
-  if (w.up_from == "gravity") return "z up, by gravity";
-  if (w.up_from == "assumed") return "z up, if the camera was level at the first frame";
-  return "z up, by the " + w.up_from + " of the first depth image" + sure;
+  if (w.up_from == "loaded map") return "of the loaded map";
+  if (w.up_from == "ground truth") return "of the ground truth, with z up" + sure;
+  if (w.up_from == "gravity") return "z up, from --gravity";
+  if (w.up_from == "assumed") return "z up, assuming a level camera at the first frame";
+  return "z up, from the " + w.up_from + " in the first depth image" + sure;
 }
 
 std::string removed_text(const map_results& m) {
@@ -217,7 +217,7 @@ std::string removed_text(const map_results& m) {
 
 std::string filter_lines(const map_results& m) {
   std::string lines = "  Filter  " + m.filter_mode + ", removed " + removed_text(m) + "\n          ";
-  for (std::size_t i = 0; i != m.filter_reason.size(); ++i) {  // a line for each step
+  for (std::size_t i = 0; i != m.filter_reason.size(); ++i) {  // one line per step
     lines += m.filter_reason[i];
     if (m.filter_reason.compare(i, 2, "; ") == 0) lines += "\n         ";
   }
@@ -225,7 +225,7 @@ std::string filter_lines(const map_results& m) {
 }
 
 std::string floor_text(const navigation_results& n) {
-  if (!n.floor_m) return "none was found";
+  if (!n.floor_m) return "not found";
   return text("at a height of %.2f m, %.1f square metres for a robot of radius %g m", *n.floor_m, n.free_m2,
               n.robot_radius);
 }
@@ -245,7 +245,8 @@ std::string accuracy_lines(const accuracy& a) {
   std::string lines = text("  ATE  RMSE %.4f m, mean %.4f, median %.4f, max %.4f, over %zu poses", a.ate_rmse_m,
                            a.ate_mean_m, a.ate_median_m, a.ate_max_m, a.poses.size());
   if (a.rpe_trans_rmse_m && a.rpe_rot_rmse_deg)
-    lines += text("\n  RPE  RMSE %.4f m, %.3f deg, from pose to pose", *a.rpe_trans_rmse_m, *a.rpe_rot_rmse_deg);
+    lines +=
+        text("\n  RPE  RMSE %.4f m, %.3f deg, between consecutive poses", *a.rpe_trans_rmse_m, *a.rpe_rot_rmse_deg);
   if (a.scale != 1.0) lines += text("\n       after scaling by %.4g", a.scale);
   return lines;
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// summary.json, and the tables on the terminal.
+/// summary.json and the tables on the terminal.
 #pragma once
 
 #include <string>
@@ -13,18 +13,19 @@ namespace app {
 
 /// The summary as JSON text; missing values are null.
 [[nodiscard]] std::string summary_json(const results& r);
-/// The comparison with ground truth alone, for `eval --json`.
+/// Only the comparison with ground truth, for `eval --json`.
 [[nodiscard]] std::string accuracy_json(const accuracy& a);
 [[nodiscard]] orbis::result<void> write_summary(const results& r);
 
-/// The table of sizes: point cloud, octree before the filter, octree after it.
+/// The sizes of the point cloud and the octree, before and after the filter.
 [[nodiscard]] std::string size_table(const map_results& m);
-/// "123 of 4,567 points (2.69 %)": what the filter took away.
+/// The axes of the world frame and how they were found.
 [[nodiscard]] std::string world_text(const world_results& w);
+/// The number and share of removed points: "123 of 4,567 points (2.69 %)".
 [[nodiscard]] std::string removed_text(const map_results& m);
-/// Which filter it was, what it removed, and why it was chosen.
+/// The filter, the number of removed points, and the reason for its choice.
 [[nodiscard]] std::string filter_lines(const map_results& m);
-/// The floor, and the path that was planned.
+/// The floor and the planned path.
 [[nodiscard]] std::string navigation_lines(const navigation_results& n);
 [[nodiscard]] std::string floor_text(const navigation_results& n);
 [[nodiscard]] std::string path_text(const navigation_results& n);

@@ -17,7 +17,7 @@
 #include "profiles.hpp"
 #include "result_files.hpp"
 #include "slam_options.hpp"
-#include "standing_frame.hpp"
+#include "static_frame.hpp"
 #include "upright_world.hpp"
 
 namespace app {
@@ -40,30 +40,30 @@ orbis::slam::options options_for(const frame_source& source, const settings& s) 
   return options;
 }
 
-/// A frame for the viewer, which gets its images for good. `took_ms`: tracking up to here.
-handed_frame handed_over(const slam_system& slam, std::size_t i, const orbis::slam::track_result& found, double took_ms,
-                         orbis::camera::rgbd_frame frame) {
-  handed_frame handed{.number = i, .state = std::string{to_string(found.state)}, .tracking_ms = took_ms};
-  handed.T_world_camera = found.T_world_camera;
-  handed.tracked = slam.last_frame();
-  if (found.keyframe) handed.keyframe = {found.map, *found.keyframe};
-  handed.color = std::move(frame.color);
-  handed.depth = std::move(frame.depth);
-  handed.depth_scale = frame.depth_scale;
-  return handed;
+/// Moves a frame's images into a frame for the viewer. `took_ms`: time of tracking so far.
+viewer_frame make_viewer_frame(const slam_system& slam, std::size_t i, const orbis::slam::track_result& found,
+                               double took_ms, orbis::camera::rgbd_frame frame) {
+  viewer_frame shown{.number = i, .state = std::string{to_string(found.state)}, .tracking_ms = took_ms};
+  shown.T_world_camera = found.T_world_camera;
+  shown.tracked = slam.last_frame();
+  if (found.keyframe) shown.keyframe = {found.map, *found.keyframe};
+  shown.color = std::move(frame.color);
+  shown.depth = std::move(frame.depth);
+  shown.depth_scale = frame.depth_scale;
+  return shown;
 }
 
 class camera_pace {
  public:
-  /// Lets time go by until a frame with this time stamp comes from the camera, or the run is interrupted.
+  /// Waits until a camera would deliver the frame with this timestamp, or until the run is interrupted.
   void wait_for(double timestamp) {
     if (!std::exchange(has_begun_, true)) first_ = timestamp;
-    constexpr double longest = 1e6;  // seconds, which a clock can count
+    constexpr double longest = 1e6;  // seconds; the clock cannot represent arbitrary durations
     const std::chrono::duration<double> since_first{std::min(timestamp - first_, longest)};
     const auto due = begin_ + std::chrono::duration_cast<console::clock::duration>(since_first);
-    constexpr std::chrono::milliseconds glance{50};
-    while (!interrupts::requested() && console::clock::now() < due)
-      std::this_thread::sleep_until(std::min(due, console::clock::now() + glance));
+    constexpr std::chrono::milliseconds poll_interval{50};
+    while (!interrupts::stop_requested() && console::clock::now() < due)
+      std::this_thread::sleep_until(std::min(due, console::clock::now() + poll_interval));
   }
 
  private:
@@ -72,9 +72,9 @@ class camera_pace {
   double first_ = 0.0;  // time stamp
 };
 
-/// Hands a tracked frame on to the live map.
-void hand_on(const slam_system& slam, const orbis::slam::track_result& found, std::size_t i,
-             const orbis::camera::rgbd_frame& frame, const settings& s, live_mapping& live) {
+/// Forwards a tracked frame to the live map.
+void forward_to_live_map(const slam_system& slam, const orbis::slam::track_result& found, std::size_t i,
+                         const orbis::camera::rgbd_frame& frame, const settings& s, live_mapping& live) {
   live.tracked(i);
   if (!found.T_world_camera) return;
   if (found.keyframe) return live.add(i, {found.map, *found.keyframe}, *found.T_world_camera, frame);
@@ -93,21 +93,21 @@ orbis::slam::track_result track_frame(slam_system& slam, const frame_source& sou
   return slam.track(f);
 }
 
-/// Whether a camera's frames end as they should: a recording that plays as one is over, or the user ended the run.
+/// Returns true if the frames of a camera ended regularly: end of a played recording, or interruption by the user.
 bool is_planned_end(const orbis::error& e) {
   return e.code == orbis::errc::no_data || e.code == orbis::errc::cancelled;
 }
 
-/// Feeds the frames to SLAM, up to the first that cannot be read, or to Ctrl-C. Every map begins in a world of its own.
+/// Tracks frames up to the first unreadable one or Ctrl-C. Each map starts in a separate world frame.
 void track_frames(slam_system& slam, const frame_source& source, const settings& s,
                   const orbis::camera::shutter& shutter, upright_worlds& worlds, tracked_frames& out, viewer& viewer,
                   console& console) {
   using orbis::slam::track_state;
   read_ahead frames{source, s.threads != 1 && !source.is_live};
   frame_correction correct{source.camera.model, shutter};
-  standing_frames without_moving{source.camera.model};
+  static_frames remove_moving{source.camera.model};
   camera_pace pace;
-  for (std::size_t i = 0; frames.has_next() && !interrupts::requested(); ++i) {
+  for (std::size_t i = 0; frames.has_next() && !interrupts::stop_requested(); ++i) {
     auto frame = frames.next();
     if (!frame) {
       if (!source.is_live || !is_planned_end(frame.error())) out.stopped = frame.error();
@@ -118,7 +118,7 @@ void track_frames(slam_system& slam, const frame_source& source, const settings&
     const auto took = [&] { return std::chrono::duration<double, std::milli>(console::clock::now() - start).count(); };
     slam.set_initial_pose([&, is_first = slam.state() == track_state::not_started] {
       source.complete(*frame);
-      return worlds.begin_with(*frame, is_first);
+      return worlds.start_world(*frame, is_first);
     });
     const orbis::slam::track_result found = track_frame(slam, source, *frame);
     out.slam.slam_ms.push_back(took());
@@ -126,14 +126,14 @@ void track_frames(slam_system& slam, const frame_source& source, const settings&
     const bool is_mapped = has_keyframe || (out.live && s.map_every_frame && found.T_world_camera);
     if (is_mapped) source.complete(*frame);
     const orbis::camera::rgbd_frame& at_once = is_mapped ? correct(*frame, found.twist) : *frame;
-    const orbis::camera::rgbd_frame& for_map = is_mapped ? without_moving(at_once, slam.last_frame()) : at_once;
+    const orbis::camera::rgbd_frame& for_map = is_mapped ? remove_moving(at_once, slam.last_frame()) : at_once;
     if (has_keyframe)
       out.keyframes.add(i, {found.map, *found.keyframe},
                         &at_once == &*frame ? orbis::vec6(orbis::vec6::Zero()) : found.twist, for_map);
-    if (out.live) hand_on(slam, found, i, for_map, s, *out.live);
-    viewer.show([&] { return handed_over(slam, i, found, took(), *std::move(frame)); });
+    if (out.live) forward_to_live_map(slam, found, i, for_map, s, *out.live);
+    viewer.show([&] { return make_viewer_frame(slam, i, found, took(), *std::move(frame)); });
     out.slam.tracking_ms.push_back(took());
-    viewer.tell_trouble(console);
+    viewer.report_error(console);
     if (found.state == track_state::lost) out.slam.lost_frames.add(i);
     console.advance(i + 1, source.frames,
                     std::string{to_string(found.state)} + ", " + std::to_string(out.slam.keyframes_made) +
@@ -143,15 +143,15 @@ void track_frames(slam_system& slam, const frame_source& source, const settings&
   if (source.dropped) out.slam.dropped = source.dropped();
 }
 
-/// The pose of a keyframe that was made in the active map or in one that was merged with it. Keyframes have moved since
-/// they were made; those that were culled were redundant to the landmarks, not to the dense cloud and the octree.
+/// The current pose of a keyframe that was created in the active map or in a map merged with it. Culled keyframes are
+/// included: they are redundant for the landmarks, not for the dense cloud and the octree.
 std::optional<se3> present_pose(const orbis::slam::atlas& maps, const orbis::slam::map_keyframe& made) {
   const orbis::slam::map_keyframe now = maps.current(made);
   if (now.map != maps.active_id() || !maps.active().remembers(now.keyframe)) return std::nullopt;
   return maps.active().pose_of(now.keyframe);
 }
 
-/// How the live map asks for the poses of its keyframes.
+/// The function by which the live map reads the poses of its keyframes.
 live_mapping::find_poses poses_of(const slam_system& slam) {
   return [&slam, seen = orbis::slam::pose_revision{.map = orbis::slam::no_id}](
              const std::vector<live_mapping::made>& keyframes, live_mapping::poses& poses, bool always) mutable {
@@ -169,8 +169,8 @@ live_mapping::find_poses poses_of(const slam_system& slam) {
   };
 }
 
-/// How the viewer asks for the keyframes and their graph. Edges: of the spanning tree, of loops, and between keyframes
-/// that share many landmarks; all that are covisible would hide each other.
+/// The function by which the viewer reads the keyframes and their graph: edges of the spanning tree, loop edges, and
+/// edges between keyframes that share many landmarks. All covisibility edges together would hide each other.
 auto graph_of(const slam_system& slam) {
   return [&slam, seen = orbis::slam::pose_revision{.map = orbis::slam::no_id}](slam_graph& graph, bool always) mutable {
     constexpr std::uint32_t many_shared = 100;
@@ -187,7 +187,7 @@ auto graph_of(const slam_system& slam) {
       }
       graph.keyframes.clear();
       graph.edges.clear();
-      std::unordered_map<std::uint32_t, std::uint32_t> place;  // of each keyframe in the list
+      std::unordered_map<std::uint32_t, std::uint32_t> place;  // keyframe id -> index in graph.keyframes
       for (const auto& k : map.keyframes()) {
         place[k.id.value()] = static_cast<std::uint32_t>(graph.keyframes.size());
         graph.keyframes.push_back(k.T_world_camera);
@@ -207,7 +207,7 @@ auto graph_of(const slam_system& slam) {
   };
 }
 
-/// What the viewer asks while frames are tracked. `live` may be null.
+/// The viewer's data sources during tracking. `live` may be null.
 scene_sources sources_of(const slam_system& slam, const live_mapping* live) {
   scene_sources sources{.graph = graph_of(slam)};
   if (live == nullptr) return sources;
@@ -218,7 +218,7 @@ scene_sources sources_of(const slam_system& slam, const live_mapping* live) {
   return sources;
 }
 
-/// Takes over the active map and what was found out.
+/// Copies trajectories, keyframe poses and counters to `out`.
 void collect(const slam_system& slam, tracked_frames& out) {
   out.slam.trajectory = slam.trajectory();
   out.slam.keyframes = slam.keyframe_trajectory();
@@ -245,7 +245,7 @@ void collect(const slam_system& slam, tracked_frames& out) {
   out.slam.landmarks = slam.landmark_count();
 }
 
-std::string in_words(const slam_results& slam) {
+std::string describe(const slam_results& slam) {
   const auto count = [](std::size_t n, const char* what) {
     return n == 0 ? std::string{} : ", " + std::to_string(n) + " " + what + (n == 1 ? "" : "s");
   };
@@ -278,21 +278,21 @@ orbis::result<tracked_frames> track(const frame_source& source, const shutter_re
   out.slam.sensor = source.sensor;
   if (s.live_map && !s.localize_only && !source.is_monocular())
     out.live = std::make_unique<live_mapping>(source, s, spill_file.string() + ".live", poses_of(slam));
-  const viewer::connection connection{viewer, sources_of(slam, out.live.get())};  // goes before what it asks
+  const viewer::connection connection{viewer, sources_of(slam, out.live.get())};  // destroyed before its sources
   interrupts::keep_results(s.quiet
                                ? ""
-                               : "\nrgbd_slam: stopping; what was reached is mapped and written. Once more: stop at "
-                                 "once, and leave the folder as it was\n");
+                               : "\nrgbd_slam: stopping; the results so far are mapped and written. Interrupt again to "
+                                 "stop at once and leave the folder unchanged\n");
   upright_worlds worlds{source, s};
   slam.listen({.keyframe_made = [&out](const orbis::slam::keyframe_event& made) {
     ++out.slam.keyframes_made;
-    out.slam.lost_frames.remove(made.frame);  // the first of two frames that a map without depth begins with
+    out.slam.lost_frames.remove(made.frame);  // the first of the two frames that initialise a map without depth
   }});
   track_frames(slam, source, s, shutter.shutter, worlds, out, viewer, console);
   slam.wait();
   if (out.live) out.live->stop();
 
-  // The results are about the loaded map where the camera was found in it, else about the one with the most frames.
+  // The results describe the loaded map if the camera was found in it, otherwise the map with the most frames.
   const map_id begun = slam.inspect([&](const orbis::slam::atlas& maps) { return maps.current({first_map, 0}).map; });
   const bool goes_on = !s.load_map.empty() && !slam.trajectory(begun).empty();
   slam.activate(goes_on ? begun : slam.largest_map());
@@ -308,11 +308,11 @@ orbis::result<tracked_frames> track(const frame_source& source, const shutter_re
   if (goes_on)
     out.world = {"loaded map", {}};
   else if (!out.slam.trajectory.empty())
-    out.world = worlds.begun_at(out.slam.trajectory.front().timestamp);
+    out.world = worlds.world_starting_at(out.slam.trajectory.front().timestamp);
   out.slam.seconds = console.elapsed();
-  console.finish(in_words(out.slam));
+  console.finish(describe(out.slam));
 
-  // A map that was missed is not replaced by one without it.
+  // If the camera was not found in the loaded map, that map is not overwritten.
   const bool spares_loaded = out.missed_map && examples::is_same_file(s.load_map, s.save_map);
   if (!s.save_map.empty() && !out.slam.trajectory.empty() && !spares_loaded) {
     console.stage("saving");
@@ -328,14 +328,14 @@ orbis::error explain_stop(const tracked_frames& tracked, const frame_source& sou
   orbis::error e = *tracked.stopped;
   e.message += "; stopped after " + std::to_string(tracked.slam.frames) +
                (source.is_live ? "" : " of " + std::to_string(source.frames)) + " frames, " +
-               (tracked.slam.tracked == 0 ? "of which none could be tracked" : "what they gave is kept");
+               (tracked.slam.tracked == 0 ? "of which none could be tracked" : "whose results are kept");
   return e;
 }
 
 orbis::error explain_miss(const tracked_frames& tracked, const settings& s) {
   std::string message = "the camera was never found in this map: none of " + std::to_string(tracked.slam.frames) +
-                        " frames shows a place that it knows";
-  if (tracked.slam.tracked != 0) message += "; the results are those of a map of their own";
+                        " frames shows a place in it";
+  if (tracked.slam.tracked != 0) message += "; the results are those of a new map";
   if (tracked.slam.tracked != 0 && examples::is_same_file(s.load_map, s.save_map))
     message += ", which was not saved over it";
   return {orbis::errc::no_data, s.load_map.string(), std::move(message)};
@@ -345,8 +345,8 @@ std::vector<std::string> mapping_notes(const posed_frames& frames, const std::op
   std::vector<std::string> notes;
   if (world && world->up_from == "assumed")
     notes.emplace_back(
-        "which way is up is not known: the first frame shows no floor and no two walls, so the camera is "
-        "taken to be level there (--gravity tells)");
+        "the vertical is unknown: the first frame shows neither a floor nor two walls, and the camera is assumed to be "
+        "level there (--gravity specifies it)");
   if (const auto& e = frames.unspilled()) notes.push_back(e->to_string() + "; depth images are kept in memory instead");
   return notes;
 }
@@ -359,22 +359,22 @@ std::vector<std::string> tracking_notes(const tracked_frames& tracked, const set
   if (elsewhere != 0) {
     const std::size_t last = std::min(tracked.slam.other_maps.size() + 1, most_maps);
     notes.push_back(std::to_string(elsewhere) + of_all +
-                    "are in no cloud and no octree: tracking was lost, and where it began anew was never joined with "
-                    "the rest; their poses, in worlds of their own, are in " +
+                    "are not in cloud and octree: tracking was lost, and their maps were never merged with the main "
+                    "map; their poses, in separate world frames, are in " +
                     trajectory_name(2) + (last > 2 ? " ... " + trajectory_name(last) : ""));
   }
   if (const std::size_t dropped = tracked.slam.dropped.value_or(0); dropped > (dropped + tracked.slam.frames) / 10)
     notes.push_back(std::to_string(dropped) + " of " + std::to_string(dropped + tracked.slam.frames) +
-                    " frames of the camera were dropped: tracking was behind");
+                    " frames of the camera were dropped because tracking was too slow");
   if (const std::size_t kept = tracked.slam.trajectory.size() + elsewhere; kept < tracked.slam.tracked)
     notes.push_back(std::to_string(tracked.slam.tracked - kept) + of_all +
-                    "are left out: tracking was lost again before they had made a map");
+                    "are omitted: tracking was lost again before they formed a map");
   if (tracked.slam.sensor == orbis::slam::sensor_kind::monocular && tracked.slam.tracked != 0)
-    notes.emplace_back(
-        "one camera without depth: lengths are in a unit of their own, and there is no cloud and no octree");
+    notes.emplace_back("monocular camera: lengths are in arbitrary units, and there is no cloud and no octree");
   else if (!s.localize_only && tracked.slam.tracked != 0 && tracked.keyframes.size() == 0)
-    notes.emplace_back("no cloud and no octree: the loaded map shows all that was seen, so no frame became a keyframe");
-  if (tracked.camera_doubt) notes.push_back(in_words(*tracked.camera_doubt));
+    notes.emplace_back(
+        "no cloud and no octree: the loaded map contains everything in view, so no keyframe was created");
+  if (tracked.camera_doubt) notes.push_back(describe(*tracked.camera_doubt));
   for (std::string& note : mapping_notes(tracked.keyframes, tracked.world)) notes.push_back(std::move(note));
   return notes;
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Frames in, trajectory and keyframes out.
+/// Tracking: from frames to trajectory and keyframes.
 #pragma once
 
 #include <filesystem>
@@ -24,31 +24,31 @@ namespace app {
 
 struct tracked_frames {
   slam_results slam;
-  std::optional<world_results> world;       ///< of the poses
-  posed_frames keyframes;                   ///< with their images, for the map
-  std::unique_ptr<live_mapping> live;       ///< the octree that grew meanwhile, if that was asked for; stopped
-  std::optional<orbis::error> stopped;      ///< why not all frames were read
-  std::optional<orbis::error> unsaved;      ///< why the map of landmarks could not be saved
-  std::optional<focal_doubt> camera_doubt;  ///< that the camera may be another than it is said to be
-  bool missed_map = false;                  ///< a map was loaded, and the camera never found in it
+  std::optional<world_results> world;       ///< world frame of the poses
+  posed_frames keyframes;                   ///< with images, for the map
+  std::unique_ptr<live_mapping> live;       ///< the live map, if requested; stopped
+  std::optional<orbis::error> stopped;      ///< the error that ended the reading of frames early
+  std::optional<orbis::error> unsaved;      ///< the error of saving the landmark map
+  std::optional<focal_doubt> camera_doubt;  ///< evidence that the focal length is wrong
+  bool missed_map = false;                  ///< the camera was never found in the loaded map
 };
 
-/// Tracks the source's frames, up to the first that cannot be read, or to Ctrl-C. Errors: a map that cannot be loaded.
-/// `viewer` is shown what goes on. `landmark_map`: where the map of landmarks is written, if it is to be saved.
+/// Tracks the frames of the source up to the first unreadable one or Ctrl-C. Errors: a map that cannot be loaded.
+/// `viewer` shows the progress. `landmark_map`: file for the landmark map, if the settings ask for it.
 /// `spill_file`: see posed_frames.
 [[nodiscard]] orbis::result<tracked_frames> track(const frame_source& source, const shutter_results& shutter,
                                                   const settings& s, const std::filesystem::path& landmark_map,
                                                   const std::filesystem::path& spill_file, viewer& viewer,
                                                   console& console);
 
-/// The error that stopped the tracking, with what was reached. @pre tracked.stopped
+/// The error that stopped tracking, with the number of frames before it. @pre tracked.stopped
 [[nodiscard]] orbis::error explain_stop(const tracked_frames& tracked, const frame_source& source);
-/// That the camera was never found in the loaded map, and what that means.
+/// The error that the camera was never found in the loaded map, with the consequences.
 [[nodiscard]] orbis::error explain_miss(const tracked_frames& tracked, const settings& s);
-/// What the user should know of the frames that go into a map, and of its world.
+/// Warnings about the frames of a map and its world frame.
 [[nodiscard]] std::vector<std::string> mapping_notes(const posed_frames& frames,
                                                      const std::optional<world_results>& world);
-/// What else the user should know of.
+/// Warnings about tracking, including those of mapping_notes.
 [[nodiscard]] std::vector<std::string> tracking_notes(const tracked_frames& tracked, const settings& s);
 
 }  // namespace app

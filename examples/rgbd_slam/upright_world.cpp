@@ -19,10 +19,10 @@ using orbis::mapping::upright_source;
 upright_worlds::upright_worlds(const frame_source& source, const settings& s)
     : rays_{source.camera.model}, gravity_{s.gravity} {}
 
-se3 upright_worlds::begin_with(const orbis::camera::rgbd_frame& frame, bool is_first) {
+se3 upright_worlds::start_world(const orbis::camera::rgbd_frame& frame, bool is_first) {
   orbis::mapping::upright_options options;
   if (is_first) options.gravity_camera = gravity_;
-  // One camera sees no floor: as an image without depth.
+  // A monocular frame counts as an image without depth.
   const orbis::image<std::uint16_t> nothing(frame.color.width(), frame.color.height());
   const auto view = orbis::mapping::find_upright(
       frame.depth.empty() ? orbis::camera::depth_view<std::uint16_t>{nothing.view(), 1.0} : frame.depth_metres(), rays_,
@@ -31,7 +31,7 @@ se3 upright_worlds::begin_with(const orbis::camera::rgbd_frame& frame, bool is_f
   how = {std::string{to_string(view.source)}, view.confidence};
   if (!frame.T_world_camera) return {view.R_world_camera, vec3::Zero()};
 
-  // A ground truth whose z is up, as far as the frame can tell, is believed to the last degree.
+  // If the z axis of the ground truth is up within the accuracy of the estimate, the ground truth is taken as exact.
   const double reach = (view.source == upright_source::assumed ? 45.0 : 10.0) * std::numbers::pi / 180.0;
   const vec3 up = frame.T_world_camera->rotation() * view.up_camera();
   if (std::atan2(up.cross(vec3::UnitZ()).norm(), up.z()) <= reach) {
@@ -42,8 +42,8 @@ se3 upright_worlds::begin_with(const orbis::camera::rgbd_frame& frame, bool is_f
   return se3{upright, vec3::Zero()} * *frame.T_world_camera;
 }
 
-std::optional<world_results> upright_worlds::begun_at(double timestamp) const {
-  const auto at = begun_.lower_bound(timestamp);  // one camera begins with two frames, and asks with the second
+std::optional<world_results> upright_worlds::world_starting_at(double timestamp) const {
+  const auto at = begun_.lower_bound(timestamp);  // a monocular map starts with two frames; callers pass the second
   if (at == begun_.end()) return std::nullopt;
   return at->second;
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Worlds with z up, which begin with a frame.
+/// World frames with z up, each defined by a first frame.
 #pragma once
 
 #include <map>
@@ -21,12 +21,12 @@ class upright_worlds {
  public:
   upright_worlds(const frame_source& source, const settings& s);
 
-  /// Where the camera is at `frame`, in the world that begins with it: the ground truth's if its z is up, or that
-  /// turned until z is up; without ground truth the camera is at the origin and looks along x. What gravity the
-  /// settings know is that of the very first frame (`is_first`).
-  [[nodiscard]] orbis::se3 begin_with(const orbis::camera::rgbd_frame& frame, bool is_first);
-  /// How up was found for the world that began with the frame of this time; nothing if none did.
-  [[nodiscard]] std::optional<world_results> begun_at(double timestamp) const;
+  /// The pose of the camera at `frame` in the world that starts with it. With ground truth, this is the world of the
+  /// ground truth, rotated if its z axis is not up; without, the camera is at the origin and looks along x. The gravity
+  /// of the settings applies to the very first frame only (`is_first`).
+  [[nodiscard]] orbis::se3 start_world(const orbis::camera::rgbd_frame& frame, bool is_first);
+  /// The source of the vertical in the world that starts at this time; empty if there is none.
+  [[nodiscard]] std::optional<world_results> world_starting_at(double timestamp) const;
 
  private:
   orbis::camera::ray_table rays_;

@@ -5,17 +5,18 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <cstdio>
 #include <numbers>
 #include <optional>
 #include <utility>
+
+#include "formatted_text.hpp"
 
 namespace app {
 namespace {
 
 using orbis::vec3;
 
-/// How unevenly the points spread along `axis`: large where planes across the axis hold many.
+/// A measure of the concentration of the points along `axis`: large if planes perpendicular to it contain many points.
 double planarity(const std::vector<vec3>& points, const vec3& axis) {
   constexpr double bin = 0.03;
   constexpr int bins = 512;
@@ -39,7 +40,7 @@ double quantile(std::vector<double> values, double q) {
 
 std::optional<double> height_of_floor(const results& r) {
   if (!r.map || !r.navigation || !r.navigation->floor_m) return std::nullopt;
-  // The top of the voxels that the floor lies in: of one layer, or of two if it lies between them.
+  // The floor is in one layer of voxels, or between two; `top` is the upper face.
   const double top = *r.navigation->floor_m, bottom = top - 2 * r.map->resolution;
   std::vector<double> heights;
   for (const std::uint32_t i : r.map->kept)
@@ -97,13 +98,22 @@ view_frame find_view_frame(const std::vector<orbis::vec3f>& points, const orbis:
   return frame;
 }
 
+std::string view_frame_note(const view_frame& frame, const std::string& unit) {
+  constexpr double least_degrees = 0.5, least_shift = 0.005;
+  const orbis::mat3 R = frame.T_view_world.rotation_matrix();
+  const double degrees = std::atan2(R(1, 0), R(0, 0)) * 180.0 / std::numbers::pi;
+  const double shift = frame.T_view_world.translation().z();
+  const bool is_rotated = std::abs(degrees) > least_degrees, is_shifted = std::abs(shift) > least_shift;
+  if (!is_rotated && !is_shifted) return {};
+  const std::string rotation = is_rotated ? text("rotated by %.1f degrees about z", degrees) : "";
+  const std::string offset = is_shifted ? text("shifted by %.2f %s in height", shift, unit.c_str()) : "";
+  return rotation + (is_rotated && is_shifted ? " and " : "") + offset + " relative to the world frame of the files";
+}
+
 std::string view_frame_text(const view_frame& frame) {
   const vec3 t = frame.T_view_world.translation();
   const auto q = frame.T_view_world.rotation().unit_quaternion();
-  char text[160];
-  std::snprintf(text, sizeof text, "%.4f %.4f %.4f %.6f %.6f %.6f %.6f", t.x(), t.y(), t.z(), q.x(), q.y(), q.z(),
-                q.w());
-  return text;
+  return text("%.4f %.4f %.4f %.6f %.6f %.6f %.6f", t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w());
 }
 
 orbis::rgb8 height_color(double t) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A frame to look at a map in: z up, walls along the axes, the floor at zero.
+/// The frame of pictures of a map: z up, walls along the axes, the floor at zero.
 #pragma once
 
 #include <optional>
@@ -15,25 +15,25 @@ namespace app {
 
 struct view_frame {
   orbis::se3 T_view_world;
-  orbis::vec3 low = orbis::vec3::Zero(), high = orbis::vec3::Ones();  ///< bounds of the map in view, outliers aside
-  double cut = 1.0;  ///< what lies higher hides the rest from above: a ceiling
+  orbis::vec3 low = orbis::vec3::Zero(), high = orbis::vec3::Ones();  ///< bounds of the map in view, without outliers
+  double cut = 1.0;  ///< height above which the map is not drawn, as a ceiling would hide the rest
 };
 
-/// Turns the world about its z axis so that walls fall into few, full bins, and puts the floor (its height in the
-/// world, metres) at 0, or where none is known the lowest points. For pictures only; nothing is measured in this frame.
+/// Rotates the world about its z axis so that walls are along x and y, and shifts the floor (its height in the world,
+/// metres) to 0, or the lowest points if no floor is known. For pictures only; no result is in this frame.
 [[nodiscard]] view_frame find_view_frame(const std::vector<orbis::vec3f>& points, const orbis::trajectory& cameras,
                                          std::optional<double> floor);
-/// The height of the floor in the world, metres: the median of the points in the voxels of which it is made. Empty if
-/// no floor was found.
+/// The height of the floor in the world, in metres: the median of the points in its voxels. Empty if no floor was
+/// found.
 [[nodiscard]] std::optional<double> height_of_floor(const results& r);
 
-/// What pictures say about it, since it is not the world's frame, in which the files are.
-inline constexpr const char* view_frame_note =
-    "drawn with walls along x and y and the floor at 0: turned about z against the world frame of the files";
-/// The transform from the world, `tx ty tz qx qy qz qw`.
+/// Describes how pictures differ from the world frame of the files: a rotation about z above 0.5 degrees, a shift in
+/// height above half a centimetre. Empty if neither is the case. `unit`: of lengths.
+[[nodiscard]] std::string view_frame_note(const view_frame& frame, const std::string& unit);
+/// The transform from the world frame, as `tx ty tz qx qy qz qw`.
 [[nodiscard]] std::string view_frame_text(const view_frame& frame);
 
-/// A colour for a height within the bounds, `t` in [0, 1].
+/// The colour of a height, with `t` in [0, 1] from the lowest to the highest.
 [[nodiscard]] orbis::rgb8 height_color(double t);
 
 }  // namespace app

@@ -54,9 +54,10 @@ std::optional<orbis::rgb8> voxel_colors::color_of(const voxel& cube) const {
     const sum& s = sums_[at];
     r += s.r, g += s.g, b += s.b, n += s.n;
   };
-  // A large cube takes the colours along its diagonal.
+  // A large cube uses the voxels along its diagonal.
   for (int i = 0; i != cells; ++i) take(i, i, i);
-  // A voxel may be occupied by pixels whose points, means of several pixels or some of them, lie in the next voxel.
+  // The points, which are means or a subset of the pixels, may be in the voxel next to the one that the pixels
+  // occupied.
   if (n == 0)
     for (int i = 0; i != 27; ++i) take(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1);
   if (n == 0) return std::nullopt;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The colours of voxels: means of the coloured points in them.
+/// Colours of voxels: means of the colours of the points in them.
 #pragma once
 
 #include <cstddef>
@@ -19,17 +19,17 @@ namespace app {
 
 class voxel_colors {
  public:
-  /// `resolution`: the edge of a voxel, metres.
+  /// `resolution`: the edge length of a voxel, metres.
   explicit voxel_colors(double resolution) : grid_{resolution} {}
 
   /// Adds a point (metres, world).
   void add(const orbis::vec3f& point, orbis::rgb8 color);
-  /// Takes out a point that was added. The memory of a voxel that has none left is used again.
+  /// Removes a point that was added. The memory of an empty voxel is reused.
   void remove(const orbis::vec3f& point, orbis::rgb8 color);
-  /// The mean colour of the points in a cube that consists of whole voxels; where it has none, of those in the voxels
-  /// around it; where these have none either, nothing.
+  /// The mean colour of the points in a cube of whole voxels; if there are none, of the points in the neighbouring
+  /// voxels; empty if there are none either.
   [[nodiscard]] std::optional<orbis::rgb8> color_of(const voxel& cube) const;
-  /// The voxels that have a point.
+  /// The number of voxels with points.
   [[nodiscard]] std::size_t size() const { return index_.size(); }
   /// Bytes on the heap.
   [[nodiscard]] std::size_t memory_bytes() const {
@@ -41,12 +41,12 @@ class voxel_colors {
     std::uint64_t r = 0, g = 0, b = 0, n = 0;
   };
   orbis::octree::voxel_grid grid_;
-  orbis::hash_index index_;  // of voxels in sums_; of those that have a point
+  orbis::hash_index index_;  // voxel with points -> index in sums_
   std::vector<sum> sums_;
-  std::vector<std::uint32_t> unused_;  // places in sums_
+  std::vector<std::uint32_t> unused_;  // indices in sums_
 };
 
-/// The colour of what no image shows.
+/// The colour of surfaces that no image shows.
 inline constexpr orbis::rgb8 no_color{176, 178, 182};
 
 }  // namespace app

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Vocabularies in the text format of DBoW2, in which the widespread vocabulary of ORB-SLAM comes.
+/// Vocabularies in the text format of DBoW2, the format of ORB-SLAM's vocabulary.
 ///
-/// The first line has branching, depth, a number of the score (0 to 5; scores are types here, so it is passed over) and
-/// a number of the weighting (0 tf-idf, 1 tf, 2 idf, 3 binary). Each further line is a node, which is called by its
-/// number from 1: the number of its parent (0: the root), 1 for a word and 0 for an inner node, the bytes of its
-/// descriptor, its weight.
+/// The first line contains branching, depth, the score (0 to 5; ignored, as scores are types here) and the weighting
+/// (0 tf-idf, 1 tf, 2 idf, 3 binary). Each further line is a node; nodes are numbered from 1. A line contains the
+/// number of the parent (0: the root), 1 for a word or 0 for an inner node, the bytes of the descriptor, and the
+/// weight.
 #pragma once
 
 #include <charconv>
@@ -34,7 +34,7 @@ using namespace orbis::places;
 
 [[nodiscard]] constexpr bool is_blank(char c) noexcept { return c == ' ' || c == '\t' || c == '\r' || c == '\n'; }
 
-/// Takes the next field, up to a blank, off the front.
+/// Removes and returns the next field, up to a blank.
 [[nodiscard]] inline std::string_view take_field(std::string_view& text) noexcept {
   std::size_t begin = 0;
   while (begin != text.size() && is_blank(text[begin])) ++begin;
@@ -45,7 +45,7 @@ using namespace orbis::places;
   return field;
 }
 
-/// Takes a number off the front; false if there is none.
+/// Removes a number from the front; returns false if there is none.
 template <class T>
 [[nodiscard]] bool take_number(std::string_view& text, T& value) noexcept {
   const std::string_view field = take_field(text);
@@ -53,19 +53,19 @@ template <class T>
   return failure == std::errc{} && end == field.data() + field.size() && !field.empty();
 }
 
-/// Sets byte `i` of a descriptor, as it lies in a row of OpenCV's.
+/// Sets byte `i` of a descriptor, in OpenCV's order.
 template <std::size_t Bits>
 constexpr void set_byte(bit_words<Bits>& descriptor, std::size_t i, std::uint8_t byte) noexcept {
   descriptor[i / 8] |= std::uint64_t{byte} << (8 * (i % 8));
 }
 
-/// A weight that words may have.
+/// Returns true if the weight is valid for a word.
 [[nodiscard]] inline bool good_weight(double weight) noexcept {
   return weight >= 0.0 && weight <= static_cast<double>(largest_weight);
 }
 
-/// The vocabulary in `text`; `where` names it in errors. Words are numbered by our own order; bags and scores are those
-/// of DBoW2. Errors, with the line: malformed.
+/// Parses the vocabulary in `text`; `where` names it in errors. Words are renumbered; bags and scores are the same as
+/// in DBoW2. Errors, with the line: malformed.
 template <std::size_t Bits = 256>
 [[nodiscard]] result<basic_vocabulary<Bits>> parse_dbow_text(std::string_view text, const std::string& where = "text") {
   std::size_t line_number = 0;
@@ -84,10 +84,10 @@ template <std::size_t Bits = 256>
   std::int64_t branching = 0, depth = 0, score = 0, weights_are = 0;
   if (!take_number(head, branching) || !take_number(head, depth) || !take_number(head, score) ||
       !take_number(head, weights_are) || !take_field(head).empty())
-    return bad(1, "the first line is not branching, depth, score and weighting");
-  if (branching < 1 || depth < 1) return bad(1, "branching and depth are at least 1");
-  if (score < 0 || score > 5) return bad(1, "the score is not one of 0 to 5");
-  if (weights_are < 0 || weights_are > 3) return bad(1, "the weighting is not one of 0 to 3");
+    return bad(1, "the first line must contain branching, depth, score and weighting");
+  if (branching < 1 || depth < 1) return bad(1, "branching and depth must be at least 1");
+  if (score < 0 || score > 5) return bad(1, "the score must be in 0 ... 5");
+  if (weights_are < 0 || weights_are > 3) return bad(1, "the weighting must be in 0 ... 3");
 
   parent_list<Bits> list;
   std::vector<bool> is_word{false};
@@ -97,23 +97,23 @@ template <std::size_t Bits = 256>
     int leaf = 0;
     double weight = 0.0;
     if (std::string_view rest = line; take_field(rest).empty()) {
-      if (take_field(text).empty()) break;  // blanks up to the end
+      if (take_field(text).empty()) break;  // trailing blank lines
       return bad(line_number, "a blank line between nodes");
     }
-    if (!take_number(line, parent)) return bad(line_number, "does not begin with the number of a parent");
-    if (parent > list.size()) return bad(line_number, "a parent that does not stand before its child");
+    if (!take_number(line, parent)) return bad(line_number, "does not begin with a parent number");
+    if (parent > list.size()) return bad(line_number, "the parent must precede its child");
     if (!take_number(line, leaf) || leaf < 0 || leaf > 1)
-      return bad(line_number, "the second field is not 1 for a word or 0");
+      return bad(line_number, "the second field must be 1 (word) or 0");
     bit_words<Bits> descriptor{};
     for (std::size_t i = 0; i != Bits / 8; ++i) {
       std::uint8_t byte = 0;
       if (!take_number(line, byte))
-        return bad(line_number, "a descriptor of fewer than " + std::to_string(Bits / 8) + " bytes from 0 to 255");
+        return bad(line_number, "the descriptor has fewer than " + std::to_string(Bits / 8) + " bytes from 0 to 255");
       set_byte<Bits>(descriptor, i, byte);
     }
     if (!take_number(line, weight) || !good_weight(weight))
-      return bad(line_number, "no weight from 0 to 1e20 behind " + std::to_string(Bits / 8) + " bytes");
-    if (!take_field(line).empty()) return bad(line_number, "there is more on the line than a node");
+      return bad(line_number, "no weight from 0 to 1e20 after " + std::to_string(Bits / 8) + " bytes");
+    if (!take_field(line).empty()) return bad(line_number, "extra text after the node");
     list.parents.push_back(parent);
     list.descriptors.push_back(descriptor);
     list.weights.push_back(static_cast<float>(weight));
@@ -124,7 +124,7 @@ template <std::size_t Bits = 256>
   tree.weights_are = static_cast<weighting>(weights_are);
   const auto problem = order_by_level(
       list, [&](std::uint32_t node) { return is_word[node]; }, tree);
-  if (!problem.what.empty())  // node i stands on line i + 1
+  if (!problem.what.empty())  // node i is on line i + 1
     return bad(problem.node + 1, "node " + std::to_string(problem.node) + " " + problem.what);
   return basic_vocabulary<Bits>{std::move(tree)};
 }

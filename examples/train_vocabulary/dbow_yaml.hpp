@@ -13,8 +13,8 @@
 ///        words:
 ///           - { wordId:0, nodeId:31 }
 ///
-/// DBoW3 writes OpenCV's type (0: bytes) and the number of columns before the bytes of a descriptor, newer ones "dbw3"
-/// before those; DBoW2 writes the bytes alone. Only so much of YAML is understood.
+/// DBoW3 writes OpenCV's type (0: bytes) and the number of columns before the bytes of a descriptor, newer versions
+/// "dbw3" before those; DBoW2 writes only the bytes. The parser supports only this subset of YAML.
 #pragma once
 
 #include <array>
@@ -42,7 +42,7 @@ namespace dbow {
 using namespace orbis;
 using namespace orbis::places;
 
-/// The text from front to back, and the line that has been reached.
+/// A scanner that counts lines.
 class yaml_scanner {
  public:
   explicit yaml_scanner(std::string_view text) : text_{text} {}
@@ -55,7 +55,7 @@ class yaml_scanner {
   void skip_line() noexcept {
     while (!text_.empty() && text_.front() != '\n') drop();
   }
-  /// Passes over `c`, behind blanks, if it is what comes.
+  /// Skips blanks and then `c`, if that follows.
   [[nodiscard]] bool take(char c) noexcept {
     skip_blanks();
     if (text_.empty() || text_.front() != c) return false;
@@ -66,7 +66,7 @@ class yaml_scanner {
     skip_blanks();
     return !text_.empty() && text_.front() == c;
   }
-  /// A name and the colon behind it; empty if that is not what comes.
+  /// Reads a name with its colon; empty if something else follows.
   [[nodiscard]] std::string_view take_key() noexcept {
     skip_blanks();
     const std::size_t end = text_.find_first_of(":,{}\n\"");
@@ -75,7 +75,7 @@ class yaml_scanner {
     text_.remove_prefix(end + 1);
     return key;
   }
-  /// What stands behind a key: in quotes, or up to a comma, a brace or (outside of braces) the end of the line.
+  /// Reads the value of a key: in quotes, or up to a comma, a brace or (outside of braces) the end of the line.
   [[nodiscard]] std::string_view take_value(bool in_braces) noexcept {
     while (!text_.empty() && (text_.front() == ' ' || text_.front() == '\t' || (in_braces && is_blank(text_.front()))))
       drop();
@@ -131,7 +131,7 @@ class dbow_yaml_parser {
     return false;
   }
 
-  /// Up to "vocabulary:".
+  /// Reads up to "vocabulary:".
   bool read_head() {
     for (;;) {
       scan_.skip_blanks();
@@ -141,7 +141,7 @@ class dbow_yaml_parser {
         continue;
       }
       if (scan_.take_key() == "vocabulary") return true;
-      return reject("something other than \"vocabulary:\"");
+      return reject("expected \"vocabulary:\"");
     }
   }
 
@@ -151,7 +151,7 @@ class dbow_yaml_parser {
       scan_.skip_blanks();
       if (scan_.at_end()) break;
       const std::string_view key = scan_.take_key();
-      if (key.empty()) return reject("something that is no entry of a vocabulary");
+      if (key.empty()) return reject("expected an entry of the vocabulary");
       if (key == "nodes") {
         nodes = true;
         if (!read_list([&] { return read_node(); })) return false;
@@ -160,9 +160,9 @@ class dbow_yaml_parser {
       } else {
         const std::string_view value = scan_.take_value(false);
         if (key == "weightingType") {
-          if (!number(value, weights_are_) || weights_are_ > 3) return reject("the weighting is not one of 0 to 3");
+          if (!number(value, weights_are_) || weights_are_ > 3) return reject("the weighting must be in 0 ... 3");
         } else if (key == "k" || key == "L" || key == "scoringType") {
-          std::uint32_t ignored = 0;  // the tree says it itself; scores are types
+          std::uint32_t ignored = 0;  // given by the tree; scores are types
           if (!number(value, ignored)) return reject("\"" + std::string{key} + "\" is not a number");
         }
       }
@@ -172,21 +172,21 @@ class dbow_yaml_parser {
 
   template <class Read>
   bool read_list(Read&& read) {
-    if (scan_.take('[')) return scan_.take(']') || reject("a list in brackets");
+    if (scan_.take('[')) return scan_.take(']') || reject("lists in brackets are not supported");
     while (scan_.take('-'))
       if (!read()) return false;
     return true;
   }
 
-  /// Calls `use(key, value)` for what is in braces.
+  /// Calls `use(key, value)` for each entry in braces.
   template <class Use>
   bool read_braces(Use&& use) {
-    if (!scan_.take('{')) return reject("an item of a list that does not begin with a brace");
+    if (!scan_.take('{')) return reject("an item of a list does not begin with a brace");
     while (!scan_.take('}')) {
       const std::string_view key = scan_.take_key();
-      if (key.empty()) return reject("no key where one is due");
+      if (key.empty()) return reject("expected a key");
       if (!use(key, scan_.take_value(true))) return false;
-      if (!scan_.take(',') && !scan_.comes('}')) return reject("neither a comma nor a brace behind a value");
+      if (!scan_.take(',') && !scan_.comes('}')) return reject("expected a comma or a brace after a value");
     }
     return true;
   }
@@ -200,7 +200,7 @@ class dbow_yaml_parser {
       if (key == "nodeId") return number(value, n.id) || reject("the id of a node is not a number");
       if (key == "parentId") return (parent = number(value, n.parent)) || reject("the id of a parent is not a number");
       if (key == "weight")
-        return (number(value, weight) && good_weight(weight)) || reject("a weight that is not from 0 to 1e20");
+        return (number(value, weight) && good_weight(weight)) || reject("a weight is outside 0 ... 1e20");
       if (key == "descriptor") return read_descriptor(value, descriptor);
       return true;
     });
@@ -232,20 +232,21 @@ class dbow_yaml_parser {
     for (;; ++count) {
       if (std::string_view rest = value; take_field(rest).empty()) break;
       if (count == numbers.size() || !take_number(value, numbers[count]))
-        return reject("a descriptor that is not of " + std::to_string(bytes) + " whole numbers", errc::unsupported);
+        return reject("a descriptor does not consist of " + std::to_string(bytes) + " integers", errc::unsupported);
     }
     std::size_t first = 0;
     if (count == bytes + 2) {
       first = 2;
       if (numbers[0] != 0 || numbers[1] != bytes)
-        return reject("a descriptor that is not of " + std::to_string(bytes) + " bytes", errc::unsupported);
+        return reject("a descriptor does not consist of " + std::to_string(bytes) + " bytes", errc::unsupported);
     } else if (count != bytes) {
-      return reject("a descriptor of " + std::to_string(count) + " numbers, not of " + std::to_string(bytes) + " bytes",
-                    errc::unsupported);
+      return reject(
+          "a descriptor has " + std::to_string(count) + " numbers instead of " + std::to_string(bytes) + " bytes",
+          errc::unsupported);
     }
     bit_words<Bits> words{};
     for (std::size_t i = 0; i != bytes; ++i) {
-      if (numbers[first + i] > 255) return reject("a byte of a descriptor is more than 255");
+      if (numbers[first + i] > 255) return reject("a byte of a descriptor is greater than 255");
       set_byte<Bits>(words, i, static_cast<std::uint8_t>(numbers[first + i]));
     }
     descriptor = words;
@@ -257,14 +258,14 @@ class dbow_yaml_parser {
     return take_number(value, to) && take_field(value).empty();
   }
 
-  /// From the order of the file to that of the ids, and from there to ours.
+  /// Converts from the order of the file to that of the ids, and then to ours.
   bool order() {
     const std::size_t n = nodes_.size();
-    std::vector<std::uint32_t> entry(n + 1, 0);  // of an id, from 1
+    std::vector<std::uint32_t> entry(n + 1, 0);  // index by id, from 1
     for (std::size_t i = 0; i != n; ++i) {
       const node& at = nodes_[i];
-      if (at.id > n || at.parent > n) return reject("an id beyond the number of nodes, " + std::to_string(n), at.line);
-      if (entry[at.id] != 0) return reject("node " + std::to_string(at.id) + " is there twice", at.line);
+      if (at.id > n || at.parent > n) return reject("an id exceeds the number of nodes, " + std::to_string(n), at.line);
+      if (entry[at.id] != 0) return reject("node " + std::to_string(at.id) + " is defined twice", at.line);
       entry[at.id] = static_cast<std::uint32_t>(i + 1);
     }
     parent_list<Bits> by_id;
@@ -279,7 +280,8 @@ class dbow_yaml_parser {
       for (const node& at : nodes_) is_word[at.parent] = false;
     }
     for (const node& w : words_) {
-      if (w.id > n || is_word[w.id]) return reject("a word of no node, or of one that has a word already", w.line);
+      if (w.id > n || is_word[w.id])
+        return reject("a word refers to a nonexistent node or to one with another word", w.line);
       is_word[w.id] = true;
     }
     tree_.weights_are = static_cast<weighting>(weights_are_);
@@ -301,14 +303,14 @@ class dbow_yaml_parser {
   std::size_t line_ = 1;
 };
 
-/// The vocabulary in `text`; `where` names it in errors. Words are numbered by our own order.
-/// Errors, with the line: malformed; unsupported (descriptors that are not of `Bits` bits).
+/// Parses the vocabulary in `text`; `where` names it in errors. Words are renumbered.
+/// Errors, with the line: malformed; unsupported (descriptors without `Bits` bits).
 template <std::size_t Bits = 256>
 [[nodiscard]] result<basic_vocabulary<Bits>> parse_dbow_yaml(std::string_view text, const std::string& where = "text") {
   return dbow_yaml_parser<Bits>{text, where}.parse();
 }
 
-/// Reads a file that is not compressed. Errors: not_found, unreadable, malformed, unsupported.
+/// Reads an uncompressed file. Errors: not_found, unreadable, malformed, unsupported.
 template <std::size_t Bits = 256>
 [[nodiscard]] result<basic_vocabulary<Bits>> read_dbow_yaml(const std::filesystem::path& path) {
   const auto text = read_file(path);

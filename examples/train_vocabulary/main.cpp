@@ -2,8 +2,8 @@
 //
 // train_vocabulary train OUT | convert IN OUT | recall [VOCABULARY...]
 //
-// Learns a vocabulary from made-up pictures and rooms, and from recordings if any are named; turns vocabularies of
-// DBoW2 and DBoW3 into ours; measures how well vocabularies recognise places.
+// Trains a vocabulary on synthetic textures and rooms, and on recordings; converts vocabularies of DBoW2 and DBoW3;
+// measures the recall of vocabularies in place recognition.
 #include <algorithm>
 #include <cstdint>
 #include <cstdio>
@@ -37,7 +37,7 @@ struct settings {
   places::training_options training{};
 };
 
-int complain(int code, const std::string& why) {
+int report_error(int code, const std::string& why) {
   std::fprintf(stderr, "train_vocabulary: %s\n", why.c_str());
   return code;
 }
@@ -46,7 +46,7 @@ int write(const settings& s, const places::vocabulary& words) {
   const std::string bytes = places::vocabulary_bytes(words);
   const auto done = orbis::write_file_atomically(
       s.output, [&](std::ostream& out) { out.write(bytes.data(), static_cast<std::streamsize>(bytes.size())); });
-  if (!done) return complain(2, done.error().to_string());
+  if (!done) return report_error(2, done.error().to_string());
   std::printf("%zu words, %zu nodes, %u levels, %zu bytes\n", words.size(), words.nodes(), words.depth(), bytes.size());
   return 0;
 }
@@ -58,18 +58,18 @@ int train(const settings& s) {
       images.push_back(std::move(v.found));
   for (const std::string& folder : s.recordings) {
     auto seen = sources::of_recording(folder, s.stride, s.features, 0);
-    if (!seen) return complain(2, seen.error().to_string());
+    if (!seen) return report_error(2, seen.error().to_string());
     for (sources::view& v : seen->views) images.push_back(std::move(v.found));
   }
   const auto words = places::train(orbis::par, images, s.training);
-  if (!words) return complain(2, words.error().to_string());
+  if (!words) return report_error(2, words.error().to_string());
   return write(s, *words);
 }
 
 int convert(const settings& s) {
-  if (examples::is_same_file(s.output, s.input)) return complain(1, examples::would_be_lost(s.output, s.input));
+  if (examples::is_same_file(s.output, s.input)) return report_error(1, examples::overwrite_message(s.output, s.input));
   const auto words = dbow::load_vocabulary(s.input);
-  if (!words) return complain(2, words.error().to_string());
+  if (!words) return report_error(2, words.error().to_string());
   return write(s, *words);
 }
 
@@ -78,7 +78,7 @@ int judge(const settings& s) {
   if (s.rooms != 0) {
     recall::task rooms{.name = "rooms"};
     for (std::size_t room = 0; room != s.rooms; ++room) {
-      const std::uint64_t seed = 500'000 + room;  // none of those that are trained on
+      const std::uint64_t seed = 500'000 + room;  // different from the training seeds
       auto first = sources::of_room(seed, 60, 1000, room), again = sources::of_room(seed, 60, 1000, room, true);
       rooms.camera = first.camera;
       std::ranges::move(first.views, std::back_inserter(rooms.map));
@@ -88,7 +88,7 @@ int judge(const settings& s) {
   }
   for (const std::string& folder : s.recordings) {
     auto seen = sources::of_recording(folder, s.stride, 1000, 0);
-    if (!seen) return complain(2, seen.error().to_string());
+    if (!seen) return report_error(2, seen.error().to_string());
     tasks.push_back({.name = folder.substr(folder.find_last_of('/') + 1),
                      .camera = seen->camera,
                      .map = std::move(seen->views),
@@ -100,7 +100,7 @@ int judge(const settings& s) {
   std::vector<std::pair<std::string, places::vocabulary>> all{{"(default)", places::default_vocabulary()}};
   for (const std::string& file : s.inputs) {
     auto words = dbow::load_vocabulary(file);
-    if (!words) return complain(2, words.error().to_string());
+    if (!words) return report_error(2, words.error().to_string());
     all.emplace_back(file.substr(file.find_last_of('/') + 1), *std::move(words));
   }
   for (const auto& [name, words] : all)
@@ -115,38 +115,39 @@ int judge(const settings& s) {
 int main(int argc, char** argv) try {
   examples::limit_memory();
   settings s;
-  CLI::App cli{"Vocabularies of visual words: learns, converts and measures them", "train_vocabulary"};
+  CLI::App cli{"Train, convert and measure vocabularies of visual words", "train_vocabulary"};
   cli.require_subcommand(1);
-  auto* const train_command = cli.add_subcommand("train", "learns a vocabulary");
-  train_command->add_option("OUT", s.output, "the file to write")->required();
-  train_command->add_option("--textures", s.textures, "pictures made up")->capture_default_str();
-  train_command->add_option("--rooms", s.rooms, "rooms made up")->capture_default_str();
-  train_command->add_option("--views", s.views, "of each room")->capture_default_str()->check(CLI::Range(1, 1000));
-  train_command->add_option("--features", s.features, "of each image")
+  auto* const train_command = cli.add_subcommand("train", "train a vocabulary");
+  train_command->add_option("OUT", s.output, "output file")->required();
+  train_command->add_option("--textures", s.textures, "number of synthetic textures")->capture_default_str();
+  train_command->add_option("--rooms", s.rooms, "number of synthetic rooms")->capture_default_str();
+  train_command->add_option("--views", s.views, "views per room")->capture_default_str()->check(CLI::Range(1, 1000));
+  train_command->add_option("--features", s.features, "features per image")
       ->capture_default_str()
       ->check(CLI::Range(1, 100'000));
-  train_command->add_option("--recording", s.recordings, "folders of recordings to learn from as well");
+  train_command->add_option("--recording", s.recordings, "folders of recordings for training");
   train_command->add_option("--branching", s.training.branching)->capture_default_str()->check(CLI::Range(2, 65535));
   train_command->add_option("--depth", s.training.depth)->capture_default_str()->check(CLI::Range(1, 16));
   train_command->add_option("--seed", s.training.seed)->capture_default_str();
-  auto* const convert_command = cli.add_subcommand("convert", "reads DBoW2's text, DBoW3's YAML or our own format");
-  convert_command->add_option("IN", s.input, "the vocabulary to read")->required();
-  convert_command->add_option("OUT", s.output, "the file to write")->required();
-  auto* const recall_command = cli.add_subcommand("recall", "how often places are recognised that are seen again");
-  recall_command->add_option("VOCABULARY", s.inputs, "files to compare with the default vocabulary");
-  recall_command->add_option("--rooms", s.rooms, "rooms made up, each gone through twice")->capture_default_str();
+  auto* const convert_command = cli.add_subcommand("convert", "convert DBoW2's text or DBoW3's YAML format");
+  convert_command->add_option("IN", s.input, "input vocabulary")->required();
+  convert_command->add_option("OUT", s.output, "output file")->required();
+  auto* const recall_command = cli.add_subcommand("recall", "measure the recall of revisited places");
+  recall_command->add_option("VOCABULARY", s.inputs, "vocabularies to compare with the default one");
+  recall_command->add_option("--rooms", s.rooms, "number of synthetic rooms, each visited twice")
+      ->capture_default_str();
   recall_command->add_option("--recording", s.recordings, "folders of recordings with ground truth");
   for (auto* const command : {train_command, recall_command})
-    command->add_option("--stride", s.stride, "every which frame of a recording")
+    command->add_option("--stride", s.stride, "use every N-th frame of a recording")
         ->capture_default_str()
         ->check(CLI::Range(1, 10'000));
   try {
     cli.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
-    return e.get_exit_code() == 0 ? cli.exit(e) : complain(1, e.what() + std::string{" (--help shows the usage)"});
+    return e.get_exit_code() == 0 ? cli.exit(e) : report_error(1, e.what() + std::string{" (--help shows the usage)"});
   }
   if (train_command->parsed()) return train(s);
   return convert_command->parsed() ? convert(s) : judge(s);
-} catch (const std::exception& e) {  // no memory, no threads
-  return complain(2, examples::why_it_gave_up(e));
+} catch (const std::exception& e) {  // out of memory or threads
+  return report_error(2, examples::describe_exception(e));
 }

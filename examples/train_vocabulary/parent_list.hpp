@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A tree from a list of nodes that name their parents, as other programs' files have it.
+/// A tree from a list of nodes with parent numbers, the format of other programs.
 #pragma once
 
 #include <algorithm>
@@ -20,7 +20,7 @@ namespace dbow {
 using namespace orbis;
 using namespace orbis::places;
 
-/// Node `i` of the list is called `i + 1`; 0 is the root, which is not listed.
+/// Node `i` of the list has the number `i + 1`; 0 is the root, which is not in the list.
 template <std::size_t Bits>
 struct parent_list {
   std::vector<std::uint32_t> parents;  ///< at most the number of nodes
@@ -30,15 +30,14 @@ struct parent_list {
   [[nodiscard]] std::size_t size() const noexcept { return parents.size(); }
 };
 
-/// What is wrong with a list, and with which node (0: with none of them).
+/// An error of a list, and its node (0: none).
 struct list_problem {
   std::string what;
   std::size_t node = 0;
 };
 
-/// Numbers the nodes level by level; children stay in the order of the list. `is_word(node)` says what the file
-/// says. O(nodes).
-/// @pre one parent, not beyond the number of nodes, one descriptor and one weight for each node
+/// Numbers the nodes level by level; children keep the order of the list. `is_word(node)`: by the file. O(nodes).
+/// @pre one parent (at most the number of nodes), one descriptor and one weight per node
 template <std::size_t Bits, class IsWord>
 [[nodiscard]] list_problem order_by_level(const parent_list<Bits>& list, IsWord&& is_word,
                                           vocabulary_tree<Bits>& tree) {
@@ -47,7 +46,7 @@ template <std::size_t Bits, class IsWord>
   for (const std::uint32_t parent : list.parents) ++begin[parent + 1U];
   for (std::size_t i = 1; i != begin.size(); ++i) begin[i] += begin[i - 1];
   for (std::size_t i = 0; i != list.size(); ++i) {
-    // The end of each parent's children moves up to where the next one's begin.
+    // The end of each parent's children advances to the beginning of the next one's.
     children[begin[list.parents[i]]++] = static_cast<std::uint32_t>(i + 1);
   }
   const auto first_of = [&](std::uint32_t node) { return node == 0 ? 0U : begin[node - 1]; };
@@ -61,7 +60,7 @@ template <std::size_t Bits, class IsWord>
     const std::uint32_t count = begin[node] - first_of(node);
     if (count > std::numeric_limits<std::uint16_t>::max()) return {"has more than 65535 children", node};
     if (node != 0 && is_word(node) != (count == 0))
-      return {count == 0 ? "is neither a word nor has it children" : "is a word, but has children", node};
+      return {count == 0 ? "is not a word and has no children" : "is a word but has children", node};
     child_counts.push_back(static_cast<std::uint16_t>(count));
     if (node != 0) tree.descriptors.values()[i - 1] = list.descriptors[node - 1];
     if (node != 0 && count == 0) tree.weights.push_back(list.weights[node - 1]);
@@ -70,8 +69,7 @@ template <std::size_t Bits, class IsWord>
   if (order.size() != n) {
     std::vector<bool> seen(n);
     for (const std::uint32_t node : order) seen[node] = true;
-    return {"is its own ancestor, or below one that is",
-            static_cast<std::size_t>(std::ranges::find(seen, false) - seen.begin())};
+    return {"is in a cycle or below one", static_cast<std::size_t>(std::ranges::find(seen, false) - seen.begin())};
   }
   while (!child_counts.empty() && child_counts.back() == 0) child_counts.pop_back();
   return {connect_tree(tree, child_counts), 0};

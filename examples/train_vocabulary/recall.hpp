@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// How well a vocabulary recognises places: views seen again, among all others.
+/// Recall of a vocabulary in place recognition.
 #pragma once
 
 #include <algorithm>
@@ -20,22 +20,22 @@ namespace recall {
 
 using sources::view;
 
-/// Views to look among, views to look for, and what counts as seen again.
+/// Database views, query views, and the criterion for the same place.
 struct task {
   std::string name;
   orbis::camera::camera_settings camera{};
   std::vector<view> map{}, queries{};
-  double overlap = 0.6;   ///< of what the two views show, each in the other's picture
-  double turned = 0.6;    ///< radians between the two, at most
-  bool within = false;    ///< the queries are the map's own views
-  std::size_t apart = 0;  ///< then: at least so many views from the query
+  double overlap = 0.6;   ///< minimum share of each view's surface that is visible in the other
+  double turned = 0.6;    ///< maximum rotation between the two, radians
+  bool within = false;    ///< the queries are views of the database
+  std::size_t apart = 0;  ///< in this case, the minimum distance from the query, in views
 };
 
 struct outcome {
-  std::size_t queries = 0;    ///< those whose place is in the map
-  double first = 0.0;         ///< share whose best view is a right one
-  double among_ten = 0.0;     ///< share with a right one among the best ten
-  double candidate = 0.0;     ///< share whose first candidate, by the criteria of a query, is a right one
+  std::size_t queries = 0;    ///< queries whose place is in the database
+  double first = 0.0;         ///< share whose best view is correct
+  double among_ten = 0.0;     ///< share with a correct view among the best ten
+  double candidate = 0.0;     ///< share whose first candidate, by the criteria of a query, is correct
   double transform_ms = 0.0;  ///< median
 };
 
@@ -71,7 +71,7 @@ struct outcome {
     const auto best = database.best(bag, 10, excluded);
     o.first += !best.empty() && right(best.front().id) ? 1.0 : 0.0;
     o.among_ten += std::ranges::any_of(best, [&](const auto& c) { return right(c.id); }) ? 1.0 : 0.0;
-    // The neighbours of a view in time stand for its covisible keyframes.
+    // The temporal neighbours of a view replace its covisible keyframes.
     const auto neighbors = [&](std::uint32_t i) {
       std::vector<std::uint32_t> near;
       for (std::uint32_t j = i < 5 ? 0 : i - 5; j != std::min<std::size_t>(i + 6, t.map.size()); ++j)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Where descriptors come from: pictures made up, rooms made up, recordings.
+/// Sources of descriptors: synthetic textures, synthetic rooms, recordings.
 #pragma once
 
 #include <cstddef>
@@ -23,15 +23,15 @@ namespace sources {
 
 using descriptors = std::vector<orbis::features::binary_descriptor<256>>;
 
-/// A view of a place, as its descriptors.
+/// The descriptors of a view of a place.
 struct view {
-  std::size_t place = 0;  ///< views of different places never show the same
+  std::size_t place = 0;  ///< views of different places never overlap
   orbis::se3 T_world_camera;
-  std::vector<orbis::vec3> surface{};  ///< some points that it shows, in the world
+  std::vector<orbis::vec3> surface{};  ///< some visible points, in the world frame
   descriptors found{};
 };
 
-/// A frame as a view.
+/// The view of a frame.
 [[nodiscard]] inline view view_of(const orbis::features::orb_extractor& extract, const orbis::camera::rgbd_frame& frame,
                                   const orbis::camera::camera_settings& camera, std::size_t place) {
   view v{.place = place, .T_world_camera = frame.T_world_camera.value_or(orbis::se3{})};
@@ -47,7 +47,7 @@ struct view {
   return v;
 }
 
-/// The share of what `a` shows that lies in the picture of `b`.
+/// The share of the points of `a` that are in the image of `b`.
 [[nodiscard]] inline double overlap(const view& a, const view& b, const orbis::camera::camera_settings& camera) {
   if (a.surface.empty()) return 0.0;
   const orbis::se3 T_b_world = b.T_world_camera.inverse();
@@ -62,13 +62,13 @@ struct view {
   return static_cast<double>(inside) / static_cast<double>(a.surface.size());
 }
 
-/// Views that one camera took.
+/// Views of one camera.
 struct tour {
   orbis::camera::camera_settings camera;
   std::vector<view> views{};
 };
 
-/// `count` pictures that show nothing in particular.
+/// `count` synthetic textures.
 [[nodiscard]] inline std::vector<descriptors> of_textures(std::size_t count, std::uint64_t seed, int features) {
   const orbis::features::orb_extractor extract{{.max_features = features}};
   std::vector<descriptors> images(count);
@@ -78,8 +78,8 @@ struct tour {
   return images;
 }
 
-/// Once round a room that `seed` stands for, `views` times; `again`: another way round the same room, in other
-/// light and with other errors of the sensor.
+/// `views` views of a room with the seed `seed`, on a path around it; `again`: on another path, with other light and
+/// sensor noise.
 [[nodiscard]] inline tour of_room(std::uint64_t seed, int views, int features, std::size_t place, bool again = false) {
   orbis::io::synthetic_options options{.frames = views, .seed = seed};
   if (again) {
@@ -104,7 +104,7 @@ struct tour {
   return seen;
 }
 
-/// Every `stride`-th frame of a recording; poses where the recording knows them.
+/// Every `stride`-th frame of a recording, with ground-truth poses if available.
 [[nodiscard]] inline orbis::result<tour> of_recording(const std::string& folder, std::size_t stride, int features,
                                                       std::size_t place) {
   const auto recording = orbis::io::open_recording(folder);

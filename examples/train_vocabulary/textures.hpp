@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Pictures of nothing in particular, with the statistics of pictures in general.
+/// Synthetic textures with the statistics of natural images.
 ///
-/// Leaves of all sizes fall on each other: A. B. Lee, D. Mumford, J. Huang, "Occlusion models for natural images",
-/// IJCV 2001. What is learnt on such pictures serves for real ones: M. Baradad, J. Wulff, T. Wang, P. Isola,
-/// A. Torralba, "Learning to see by looking at noise", NeurIPS 2021.
+/// The dead-leaves model: A. B. Lee, D. Mumford, J. Huang, "Occlusion models for natural images", IJCV 2001. Training
+/// on such images transfers to real ones: M. Baradad, J. Wulff, T. Wang, P. Isola, A. Torralba, "Learning to see by
+/// looking at noise", NeurIPS 2021.
 #pragma once
 
 #include <algorithm>
@@ -27,7 +27,7 @@ using orbis::sin_turns;
 /// Uniform in [lo, hi).
 [[nodiscard]] inline double between(random_bits& bits, double lo, double hi) noexcept { return bits.uniform(lo, hi); }
 
-/// One picture while it is painted; brightness from 0 to 1 or so.
+/// A texture during painting; brightness is about 0 to 1.
 class picture {
  public:
   picture(int width, int height, std::uint64_t seed)
@@ -47,7 +47,7 @@ class picture {
   }
 
  private:
-  /// Where a leaf lies, and how it is turned.
+  /// Position and rotation of a leaf.
   struct frame {
     double x, y, cos, sin;
     [[nodiscard]] double u(double px, double py) const noexcept { return cos * (px - x) + sin * (py - y); }
@@ -59,7 +59,7 @@ class picture {
     return pixels_[static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(x)];
   }
 
-  /// Smooth noise in [-1, 1], one swing for each unit.
+  /// Smooth noise in [-1, 1] with a period of about one unit.
   [[nodiscard]] static double noise(std::uint64_t seed, double u, double v) noexcept {
     const double fu = std::floor(u), fv = std::floor(v);
     const auto cell = [&](double i, double j) {
@@ -73,7 +73,7 @@ class picture {
     const double bottom = cell(0, 1) + s * (cell(1, 1) - cell(0, 1));
     return top + t * (bottom - top);
   }
-  /// The sum of octaves, each half as strong as the one that is twice as wide.
+  /// The sum of octaves; the amplitude is proportional to the period.
   [[nodiscard]] static double cloud(std::uint64_t seed, double u, double v) noexcept {
     return 0.53 * noise(seed, u, v) + 0.27 * noise(seed + 1, 2 * u, 2 * v) + 0.13 * noise(seed + 2, 4 * u, 4 * v) +
            0.07 * noise(seed + 3, 8 * u, 8 * v);
@@ -86,13 +86,13 @@ class picture {
       for (int x = 0; x != width_; ++x) at(x, y) = static_cast<float>(base + swing * cloud(seed, x / size, y / size));
   }
 
-  /// Leaves, the large ones first: the number of those larger than r falls with its square.
+  /// Paints leaves, the large ones first; the number of leaves larger than r is proportional to r^-2.
   void fall() {
     const double smallest = between(bits_, 2.5, 7.0), largest = between(bits_, 60.0, 240.0);
     const double contrast = between(bits_, 0.25, 1.0), middle = between(bits_, 0.35, 0.65);
-    const double cover = between(bits_, 0.3, 2.5);  // how often the smallest would cover the picture alone
+    const double cover = between(bits_, 0.3, 2.5);  // coverage of the image by the smallest leaves alone
     const int count = static_cast<int>(cover * width_ * height_ / (30.0 * smallest * smallest)) + 10;
-    const bool upright = bits_.below(3) == 0;  // as most that is built
+    const bool upright = bits_.below(3) == 0;  // like most man-made objects
     for (int i = 0; i < count; ++i) {
       const double rank = (i + bits_.uniform()) / count;
       const double r = std::min(smallest / std::sqrt(rank + 1e-9), largest);
@@ -160,7 +160,7 @@ class picture {
       }
   }
 
-  /// A block of signs like writing: short strokes on a grid.
+  /// A block of signs that resemble writing: short strokes on a grid.
   void write() {
     const double size = between(bits_, 5.0, 28.0),
                  turn = bits_.below(2) == 0 ? bits_.uniform() : between(bits_, -0.02, 0.02);
@@ -198,7 +198,7 @@ class picture {
            (has(7) && has(9) && std::abs(s + t - 1) < 0.6 * thick);
   }
 
-  /// Light that is not even, and a shadow.
+  /// Uneven light and a shadow.
   void light() {
     const double gx = between(bits_, -0.4, 0.4) / width_, gy = between(bits_, -0.4, 0.4) / height_;
     const double turn = bits_.uniform(), nx = cos_turns(turn), ny = sin_turns(turn);
@@ -211,7 +211,7 @@ class picture {
       }
   }
 
-  /// Binomial, (1 2 1) / 4 in both directions.
+  /// Binomial filter, (1 2 1) / 4 in both directions.
   void blur() {
     std::vector<float> line(static_cast<std::size_t>(std::max(width_, height_)));
     const auto smooth = [&](int n, auto&& pixel) {
@@ -241,7 +241,7 @@ class picture {
   std::vector<float> pixels_;
 };
 
-/// The picture that `seed` stands for.
+/// The texture with the seed `seed`.
 [[nodiscard]] inline orbis::image<std::uint8_t> paint(int width, int height, std::uint64_t seed) {
   return picture{width, height, seed}.paint();
 }

@@ -11,12 +11,13 @@ TEST_CASE("A lens has distortion where it is determined and explains the images 
   app::lens_comparison lens{
       .pinhole_focal = 547.2, .lens_focal = 525.9, .pinhole_rms = 0.223, .lens_rms = 0.215, .is_determined = true};
   CHECK(lens.has_distortion());
-  CHECK(app::in_words(lens) ==
-        "a lens with distortion explains the images better (their error is 0.215 instead of 0.223 deviations), and its "
-        "focal length would be 526 instead of 547 pixels: see --distortion");
+  CHECK(
+      app::describe(lens) ==
+      "a lens with distortion fits the images better (error 0.215 instead of 0.223 standard deviations), with a focal "
+      "length of 526 instead of 547 pixels: see --distortion");
   lens.is_determined = false;
   CHECK_FALSE(lens.has_distortion());
-  CHECK(app::in_words(lens).starts_with("the motion does not tell whether the lens has distortion"));
+  CHECK(app::describe(lens).starts_with("the motion does not determine whether the lens has distortion"));
   lens.is_determined = true;
   lens.lens_rms = 0.221;
   CHECK_FALSE(lens.has_distortion());

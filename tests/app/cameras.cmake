@@ -11,7 +11,7 @@ file(REMOVE ${WORK}/room/groundtruth.txt)
 # To its end. What is tracked and what is dropped are all frames of it.
 app(0 live room --resolution 0.1 --filter none --out out)
 must_exist(${WORK}/out trajectory.txt cloud.ply map.bt summary.json report.html)
-check(err MATCHES "room: a camera of 320 x 240")
+check(err MATCHES "room: live camera, 320 x 240")
 summary(frames ${WORK}/out frames)
 summary(dropped ${WORK}/out dropped)
 math(EXPR all "${frames} + ${dropped}")
@@ -39,7 +39,7 @@ foreach(number RANGE 30 39)
   file(WRITE ${WORK}/room/rgb/0000${number}.png "damaged")
 endforeach()
 app(2 live room --resolution 0.1 --filter none --out out)
-check(err MATCHES "rgbd_slam: [^\n]*000030.png[^\n]*stopped after [0-9]+ frames, what they gave is kept\n$")
+check(err MATCHES "rgbd_slam: [^\n]*000030.png[^\n]*stopped after [0-9]+ frames, whose results are kept\n$")
 must_exist(${WORK}/out trajectory.txt cloud.ply map.bt summary.json report.html)
 
 # A folder without depth is one camera's, though nobody says so.
@@ -77,10 +77,10 @@ summary(frames ${WORK}/paced frames)
 check(frames LESS 10)
 
 # No device, or no library for it.
-app_fails(2 "no depth camera is connected|this build knows no depth cameras: .*libopenni2-dev" live /no/such/device --out none)
-app_fails(2 "the camera is not known: name it with --camera|knows no video cameras: .*libopencv-videoio-dev"
+app_fails(2 "no depth camera is connected|this build has no support for depth cameras: .*libopenni2-dev" live /no/such/device --out none)
+app_fails(2 "unknown camera: name it with --camera|has no support for video cameras: .*libopencv-videoio-dev"
           live /dev/video99 --sensor stereo --out none)
-app_fails(2 "by-id/usb: is no video camera that can be opened|knows no video cameras"
+app_fails(2 "by-id/usb: cannot be opened as a video camera|no support for video cameras"
           live /dev/v4l/by-id/usb --camera kinect --out none)
 app_fails(1 "sonar" live --sensor sonar --out none)
 check(NOT EXISTS ${WORK}/none)

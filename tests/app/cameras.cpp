@@ -182,7 +182,7 @@ TEST_CASE("a camera that is not there or not known to this build is refused in w
   const camera::camera_settings settings{.model = camera::pinhole{8, 6, 7.0, 7.0, 3.5, 2.5}};
   const auto video = message_of(app::open_video_camera({.name = "/dev/none", .camera = settings}));
   CHECK_THAT(video,
-             Contains(app::has_video_cameras() ? "no video camera that can be opened" : "libopencv-videoio-dev"));
+             Contains(app::has_video_cameras() ? "cannot be opened as a video camera" : "libopencv-videoio-dev"));
   if (app::has_video_cameras()) CHECK_THAT(message_of(app::open_video_camera({.name = "0"})), Contains("--camera"));
 }
 

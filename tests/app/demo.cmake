@@ -25,7 +25,7 @@ string(REPLACE "&" "&amp;" escaped "${reason}")
 string(REPLACE "'" "&#39;" escaped "${escaped}")
 string(FIND "${page}" "${escaped}" at)
 check(at GREATER -1)
-check(page MATCHES "T_view_world")  # the pictures' frame is not the world's, and they say so
+check(page MATCHES "T_view_world")  # the frame of the pictures
 summary(points ${WORK}/demo cloud points)
 summary(kept ${WORK}/demo cloud points_filtered)
 math(EXPR difference "${points} - ${kept}")
@@ -104,7 +104,7 @@ summary(map_error ${WORK}/person map_error_m)
 check(map_error LESS 0.02)
 
 # The whole demo has stray depths, which the filter removes, and a person.
-app(0 demo --frames 60 --width 320 --resolution 0.1 --out stray --quiet --threads 1)
+app(0 demo --plain --frames 60 --width 320 --resolution 0.1 --out stray --quiet --threads 1)
 summary(removed ${WORK}/stray filter removed)
 summary(points ${WORK}/stray cloud points)
 math(EXPR tenths "1000 * ${removed} / ${points}")
@@ -134,5 +134,5 @@ endforeach()
 # The world is upright: the true room's, whose z is up; or by gravity, which here pulls along the camera's -x.
 summary(up ${WORK}/demo world up_from)
 check(up STREQUAL "ground truth")
-check(page MATCHES "whose z is up")
+check(page MATCHES "of the ground truth, with z up")
 app_fails(1 "is not a direction" demo --plain --frames 5 --width 160 --gravity 0,0,0 --out never)

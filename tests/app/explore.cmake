@@ -13,7 +13,7 @@ endif()
 check(CMAKE_MATCH_1 LESS 600)
 check(CMAKE_MATCH_2 GREATER 15)  # it was in all three rooms
 check(CMAKE_MATCH_3 EQUAL 100)
-check(out MATCHES "\nended: nothing more is worth a view\n$")
+check(out MATCHES "\nended: no view shows enough unknown space\n$")
 
 foreach(name IN ITEMS one.bt two.bt)
   app(0 ${name} ${small} --views 40)

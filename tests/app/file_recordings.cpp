@@ -104,7 +104,7 @@ TEST_CASE("what is no video or has no camera is refused in words") {
   folder.write("notes.txt", "hello");
   CHECK_THAT(message_of(app::open_video(folder.path() / "notes.txt", {.camera = settings})), Contains("no video that"));
   const auto path = write_video(folder, 2, 32);
-  CHECK_THAT(message_of(app::open_video(path, {})), Contains("put a camera.toml beside the video"));
+  CHECK_THAT(message_of(app::open_video(path, {})), Contains("put a camera.toml next to the video"));
   CHECK_THAT(message_of(app::open_video(path, {.sensor = sensor_kind::rgbd})), Contains("no depth"));
   folder.write("camera.toml", "model = 'pinhole'\nwidth = 32\nheight = 24\nfx = 30\nfy = 30\ncx = 15.5\ncy = 11.5\n");
   const auto video = app::open_video(path, {}).value();
@@ -165,8 +165,8 @@ TEST_CASE("colour and depth of a bag are found and paired by the times in their 
   CHECK_THAT(message_of(app::open_bag(path, {.topics = {"/camera/rgb/image_color", "/camera/depth/image_raw"}})),
              Contains("16x12 pixels, the camera 32x24: depth is not registered"));
   CHECK_THAT(message_of(app::open_bag(path, {.topics = {"/nothing"}})),
-             Contains("has no images in /nothing; there are /camera/depth/image_raw (16UC1)"));
-  CHECK_THAT(message_of(app::open_bag(path, {.sensor = sensor_kind::stereo})), Contains("has not the images"));
+             Contains("has no images in /nothing; it contains /camera/depth/image_raw (16UC1)"));
+  CHECK_THAT(message_of(app::open_bag(path, {.sensor = sensor_kind::stereo})), Contains("has no suitable images"));
 }
 
 TEST_CASE("the images of a stereo camera in a bag are rectified if they are not") {
@@ -289,9 +289,10 @@ TEST_CASE("compressed depth is read, in millimetres and in metres") {
   write("32FC1; compressedDepth png", inverse, 0.0F, true);
   CHECK_THAT(message_of(app::open_bag(path, {})), Contains("the header of a compressed depth image has no scale"));
   write("16UC1; compressedDepth rvl", millimetres, 0.0F, true);
-  CHECK_THAT(message_of(app::open_bag(path, {})), Contains("in the format \"16UC1; compressedDepth rvl\" is not read"));
+  CHECK_THAT(message_of(app::open_bag(path, {})),
+             Contains("compressed depth in the format \"16UC1; compressedDepth rvl\" is not supported"));
   write("png", millimetres, 0.0F, true);  // what is in it is not said
-  CHECK_THAT(message_of(app::open_bag(path, {})), Contains("in the format \"png\" is not read"));
+  CHECK_THAT(message_of(app::open_bag(path, {})), Contains("in the format \"png\" is not supported"));
 }
 
 TEST_CASE("only a name that says so is that of a rectified image") {
@@ -325,7 +326,7 @@ TEST_CASE("bags are read whichever way they are compressed, and refused in words
   const auto size = std::filesystem::file_size(path);
   for (const auto part : {size - 1, size / 2, size / 4, std::uintmax_t{5000}, std::uintmax_t{20}, std::uintmax_t{0}}) {
     std::filesystem::resize_file(path, std::min(part, std::filesystem::file_size(path)));
-    CHECK_THAT(message_of(app::open_bag(path, {})), Contains("is no ROS 1 bag that can be read"));
+    CHECK_THAT(message_of(app::open_bag(path, {})), Contains("is not a readable ROS 1 bag"));
   }
 }
 
@@ -352,20 +353,21 @@ TEST_CASE("damaged bags and images are refused in words") {
   write("rgb8", true, 23);
   CHECK_THAT(message_of(app::open_bag(path, {})), Contains("32x23 pixels, the camera 32x24"));
   write("rgb8", false, 24);
-  CHECK_THAT(message_of(app::open_bag(path, {})), Contains("no sensor_msgs/CameraInfo beside /cam/image_raw"));
+  CHECK_THAT(message_of(app::open_bag(path, {})), Contains("no sensor_msgs/CameraInfo for /cam/image_raw"));
   CHECK(app::open_bag(path, {.camera = settings}));
   write("bayer_rggb16", true, 24);
   CHECK_THAT(message_of(app::open_bag(path, {})),
-             Contains("in an encoding that is read") && Contains("/cam/image_raw (bayer_rggb16)"));
-  CHECK_THAT(message_of(app::open_bag(path, {.topics = {"/cam/image_raw"}})), Contains("in the encoding bayer_rggb16"));
+             Contains("in a supported encoding") && Contains("/cam/image_raw (bayer_rggb16)"));
+  CHECK_THAT(message_of(app::open_bag(path, {.topics = {"/cam/image_raw"}})),
+             Contains("the encoding bayer_rggb16 is not supported"));
   folder.write("b.bag", "#ROSBAG V2.0\nand then nothing");
-  CHECK_THAT(message_of(app::open_bag(folder.path() / "b.bag", {})), Contains("is no ROS 1 bag that can be read"));
+  CHECK_THAT(message_of(app::open_bag(folder.path() / "b.bag", {})), Contains("is not a readable ROS 1 bag"));
   CHECK_THAT(message_of(app::open_bag(folder.path() / "c.bag", {})), Contains("no such file"));
   {
     test::ros_bag_writer bag{path};
     bag.info("/cam/camera_info", 1.0, k);
     bag.close();
   }
-  CHECK_THAT(message_of(app::open_bag(path, {})), Contains("there are no images in this bag"));
+  CHECK_THAT(message_of(app::open_bag(path, {})), Contains("the bag contains no images"));
 }
 #endif

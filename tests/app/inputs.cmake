@@ -42,7 +42,7 @@ must_stay(map hard.ply --out . ${quick})
 check(NOT EXISTS ${WORK}/report.html)
 
 # Files under a result's name that no run has made.
-set(message "cloud.ply: is there already, and no summary.json .* rgbd_slam made it")
+set(message "cloud.ply: exists and is not listed as a result of rgbd_slam in summary.json")
 line_of_points(${WORK}/sub/mine.ply)
 must_stay(map sub/mine.ply --out . ${quick})
 file(WRITE ${WORK}/summary.json "{\"mine\": true}")
@@ -62,7 +62,7 @@ foreach(name IN LISTS others)
 endforeach()
 file(WRITE ${WORK}/out/notes.txt "mine")
 app(0 map cloud.ply --out out --resolution 0.2 --filter none)
-check(err MATCHES "of an earlier run, and left as they are: trajectory.txt, keyframes.txt, camera_used.toml, trajectory.png")
+check(err MATCHES "unchanged files of an earlier run: trajectory.txt, keyframes.txt, camera_used.toml, trajectory.png")
 foreach(name IN LISTS others)
   file(SHA256 ${WORK}/out/${name} after)
   check(after STREQUAL before_${name})
@@ -106,4 +106,4 @@ app(0 run room --out grown ${quick} --load-map out/room.map --save-map out/room.
 
 # A name of a result that a folder has.
 file(MAKE_DIRECTORY ${WORK}/taken/summary.json)
-app_fails(1 "taken/summary.json: is there already" map sub/mine.ply --out taken ${quick})
+app_fails(1 "taken/summary.json: exists and is not listed" map sub/mine.ply --out taken ${quick})

@@ -10,7 +10,7 @@ function(must_be_the_same one other)
   endforeach()
 endfunction()
 
-app_fails(1 "--map-every-frame wants a live map" demo --out never --map-every-frame --batch-map)
+app_fails(1 "--map-every-frame needs a live map" demo --out never --map-every-frame --batch-map)
 
 # Frames between keyframes are in the live map, and not in the files.
 set(room demo --plain --frames 80 --width 160 --resolution 0.1 --deterministic --quiet)
@@ -41,7 +41,7 @@ check(fps LESS_EQUAL 0.75)
 set(fine demo --plain --frames 80 --width 160 --resolution 0.008 --filter none --deterministic)
 app(0 ${fine} --batch-map --quiet --out fine_batch)
 app(0 ${fine} --map-every-frame --out fine)
-check(err MATCHES "[0-9]+ frames? between keyframes came in faster than the live map took them")
+check(err MATCHES "[0-9]+ frames? between keyframes came in faster than the live map could insert them")
 summary(dropped ${WORK}/fine live_map frames dropped)
 check(dropped GREATER 0)
 file(READ ${WORK}/fine/report.html page)

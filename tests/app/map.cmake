@@ -19,7 +19,7 @@ check(free GREATER 100)
 string(REPEAT "5.05 5.05 1.05\n" 40000 points)
 file(WRITE ${WORK}/many.ply "ply\nformat ascii 1.0\nelement vertex 40000\nproperty float x\nproperty float y\n"
      "property float z\nend_header\n${points}")
-app_fails(2 "--resolution: voxels of 1 mm: the space before the points has about .* too many"
+app_fails(2 "--resolution: voxels of 1 mm: the space between origin and points has about .* too many"
           map many.ply --out no --resolution 0.001 --filter none --origin 0,0,0)
 app(0 map many.ply --out fine --resolution 0.001 --filter none)
 
@@ -88,6 +88,7 @@ summary(origin ${WORK}/far world origin_m)
 check(origin MATCHES "45500[01].*543000[01].*1")
 file(READ ${WORK}/far/report.html page)
 check(page MATCHES "far from their origin")
+check(page MATCHES "<td>shifted by -0.05 metres in height relative to the world frame of the files. T_view_world ")
 make_recording(${WORK}/near 6 160)
 file(COPY ${WORK}/near/ DESTINATION ${WORK}/away)
 file(STRINGS ${WORK}/near/groundtruth.txt poses REGEX "^[^#]")

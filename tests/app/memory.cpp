@@ -49,12 +49,12 @@ TEST_CASE("an octree that does not fit is told from the image's rays") {
   CHECK_FALSE(rays.is_too_large(0.001, 3'300'000'000U));
   CHECK(rays.is_too_large(0.001, 3'100'000'000U));
   CHECK(rays.is_too_large(0.0005, std::nullopt));
-  CHECK(rays.in_words(0.001, "it") == "voxels of 1 mm: it has about 0.4 billion of them, 3.2 GB");
+  CHECK(rays.describe(0.001, "it") == "voxels of 1 mm: it has about 0.4 billion of them, 3.2 GB");
 }
 
 TEST_CASE("who gives up says why") {
-  CHECK(examples::why_it_gave_up(std::bad_alloc{}) == "gave up: there is not enough memory");
-  CHECK(examples::why_it_gave_up(std::runtime_error{"no threads"}) == "gave up: no threads");
+  CHECK(examples::describe_exception(std::bad_alloc{}) == "out of memory");
+  CHECK(examples::describe_exception(std::runtime_error{"no threads"}) == "no threads");
 }
 
 #ifdef __linux__

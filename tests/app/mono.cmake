@@ -6,7 +6,7 @@ include(${CMAKE_CURRENT_LIST_DIR}/support.cmake)
 app(0 demo --plain --sensor mono --frames 60 --deterministic --save-map room.map --out demo)
 must_exist(${WORK}/demo trajectory.txt keyframes.txt summary.json report.html trajectory.png)
 must_exist(${WORK} room.map)
-check(err MATCHES "lengths are in a unit of their own, and there is no cloud and no octree")
+check(err MATCHES "lengths are in arbitrary units, and there is no cloud and no octree")
 if(EXISTS ${WORK}/demo/map.bt)
   message(FATAL_ERROR "a map without depth")
 endif()
@@ -21,7 +21,7 @@ check(scale GREATER 1.2)
 
 # What is not corrected for is said.
 app(3 demo --plain --sensor mono --frames 3 --read-out-ms 30 --out rolling)
-check(err MATCHES "without depth a rolling shutter is not corrected for")
+check(err MATCHES "the rolling shutter of a monocular camera is not corrected")
 app(3 demo --plain --sensor mono --frames 3 --read-out-ms 0 --out global)
 check(NOT err MATCHES "rolling shutter")
 
@@ -50,7 +50,7 @@ app(0 eval eval/small.txt eval/large.txt)
 check(out MATCHES "ATE  RMSE [1-9]")
 
 # A camera that sees nothing that could be followed: no start.
-app_fails(3 "tracking never started: no two of 3 frames show enough of the same texture" demo --plain --sensor mono --frames 3 --out still)
+app_fails(3 "tracking never started: no two of 3 frames have enough matching features and parallax" demo --plain --sensor mono --frames 3 --out still)
 
 # A folder of images is one camera's where nothing else is in it.
 file(MAKE_DIRECTORY ${WORK}/nothing)

@@ -14,6 +14,38 @@ function(length_of variable file)  # of the path that was printed last, in milli
   check(out MATCHES "over ${points} points")
 endfunction()
 
+# A cloud of a room of 2 m x 2 m: a floor with its top at 0, walls of 0.6 m, and a pillar at (1.55, 1.05).
+function(make_small_room file)
+  set(points "")
+  set(count 0)
+  macro(add x y z)
+    string(APPEND points "${x} ${y} ${z}\n")
+    math(EXPR count "${count} + 1")
+  endmacro()
+  foreach(i RANGE 39)
+    math(EXPR a "25 + 50 * ${i}")
+    foreach(j RANGE 39)
+      math(EXPR b "25 + 50 * ${j}")
+      add(${a}e-3 ${b}e-3 -0.05)
+    endforeach()
+    foreach(j RANGE 11)
+      math(EXPR b "25 + 50 * ${j}")
+      add(${a}e-3 -0.05 ${b}e-3)
+      add(${a}e-3 2.05 ${b}e-3)
+      add(-0.05 ${a}e-3 ${b}e-3)
+      add(2.05 ${a}e-3 ${b}e-3)
+    endforeach()
+  endforeach()
+  foreach(j RANGE 11)
+    math(EXPR b "25 + 50 * ${j}")
+    foreach(xy 1.525\ 1.025 1.575\ 1.025 1.525\ 1.075 1.575\ 1.075)
+      string(APPEND points "${xy} ${b}e-3\n")
+      math(EXPR count "${count} + 1")
+    endforeach()
+  endforeach()
+  file(WRITE ${file} "ply\nformat ascii 1.0\nelement vertex ${count}\nproperty float x\nproperty float y\nproperty float z\nend_header\n${points}")
+endfunction()
+
 set(room_run demo --frames 90 --stride 4 --width 320 --resolution 0.1 --threads 1 --out room)
 # The rest is unknown.
 make_plate(${WORK}/cloud.ply)
@@ -35,13 +67,30 @@ app_fails(4 "start blocked" plan plate/map.ot --from 0.5,0.5,0.5 --to 0.5,1.6,0.
 app_fails(4 "start blocked by unknown space alone" plan plate/map.bt --from 0.5,0.5,0.5 --to 0.5,0.5,1.6 --out way.txt)
 app_fails(4 "start blocked" plan plate/map.bt --from 0.5,0.5,1.0 --to 0.5,0.5,1.6 --out way.txt)
 check(NOT err MATCHES "unknown")
-app_fails(4 "goal outside; the nearest" plan plate/map.bt --from 0.5,0.5,0.5 --to 1e6,0.5,1.0 --unknown free
+app_fails(4 "goal outside; the nearest reachable position" plan plate/map.bt --from 0.5,0.5,0.5 --to 1e6,0.5,1.0 --unknown free
           --radius 0.1 --out way.txt)
-app_fails(1 "--step is for robots that drive" plan plate/map.bt --from 0.5,0.5,0.5 --to 1,1,1 --step 0.1)
-app_fails(4 "goal blocked; the nearest" plan plate/map.bt --from 0.5,0.5,0.5 --to 0.5,0.5,1.0 --unknown free
+app_fails(1 "--step needs --ground" plan plate/map.bt --from 0.5,0.5,0.5 --to 1,1,1 --step 0.1)
+app_fails(4 "goal blocked by an obstacle at .*; the nearest free position .*; the nearest reachable position" plan plate/map.bt --from 0.5,0.5,0.5 --to 0.5,0.5,1.0 --unknown free
           --radius 0.1 --out way.txt)
 file(SHA256 ${WORK}/way.txt left)
 check(left STREQUAL kept)  # what is not found replaces nothing
+# A robot that drives: the reason why there is no path, and how near it comes.
+make_small_room(${WORK}/small.ply)
+app(0 map small.ply --out small --resolution 0.1 --filter none --origin 0.5,0.5,1.2)
+set(drive plan small/map.bt --ground --robot-radius 0.12 --robot-height 0.3)
+app(0 ${drive} --from 0.5,0.5,0 --to 1.5,0.3,0 --out drive.txt)
+length_of(length drive.txt)
+check(length EQUAL 1020)
+app_fails(4 "no path: start blocked by an obstacle at 1.550,1.050; the nearest free position is [0-9.]+,[0-9.]+,0.000, 0.200 m away"
+          ${drive} --from 1.55,1.05,0 --to 0.5,0.5,0 --out drive.txt)
+app_fails(4 "no path: goal blocked by an obstacle at 1.550,1.050; the nearest free position is .*, 0.200 m away; the nearest reachable position is .*, 0.200 m from the goal"
+          ${drive} --from 0.5,0.5,0 --to 1.55,1.05,0 --out drive.txt)
+app_fails(4 "no path: goal outside; the nearest reachable position is 1.850,0.450,0.000, 7.150 m from the goal"
+          ${drive} --from 0.5,0.5,0 --to 9,0.5,0 --out drive.txt)
+app_fails(4 "no path: start outside" ${drive} --from 9,0.5,0 --to 0.5,0.5,0 --out drive.txt)
+set(tall plan small/map.bt --ground --robot-radius 0.12 --robot-height 0.9 --from 1.75,0.35,0 --to 0.5,0.5,0)
+app_fails(4 "start blocked by unknown space alone at [0-9.]+,[0-9.]+ .--unknown free" ${tall})
+app(0 ${tall} --unknown free)
 app_fails(2 "no floor" plan plate/map.bt --from 0.5,0.5,0.5 --to 0.5,1.5,0.5 --ground)
 app_fails(2 "no octree map" plan cloud.ply --from 0,0,0 --to 1,1,1)
 app_fails(2 "no.such" plan no.such --from 0,0,0 --to 1,1,1)
@@ -51,8 +100,8 @@ app_fails(2 "half.ot" plan half.ot --from 0,0,0 --to 1,1,1)
 # What would write over the map, or over the path.
 file(SHA256 ${WORK}/plate/map.bt kept)
 set(ends --from 0.5,0.5,0.5 --to 0.5,1.6,0.5 --radius 0.1 --unknown free)
-app_fails(1 "would be written over" plan plate/map.bt ${ends} --out plate/map.bt)
-app_fails(1 "would be written over" plan plate/map.bt ${ends} --picture plate/../plate/map.bt)
+app_fails(1 "would be overwritten" plan plate/map.bt ${ends} --out plate/map.bt)
+app_fails(1 "would be overwritten" plan plate/map.bt ${ends} --picture plate/../plate/map.bt)
 app_fails(1 "both the path and the picture" plan plate/map.bt ${ends} --out new --picture ./new)
 file(SHA256 ${WORK}/plate/map.bt left)
 check(left STREQUAL kept)
@@ -91,8 +140,10 @@ check(NOT length LESS straight)
 file(READ ${WORK}/floors/of/room.yaml yaml)
 check(yaml MATCHES "image: \"room.pgm\"\nmode: trinary\nresolution: 0.1\norigin: .-3.[0-9]+, -2.[0-9]+, 0.0.")
 file(READ ${WORK}/room/report.html page)
-check(page MATCHES "<h2>For a robot</h2>")
-check(page MATCHES "T_view_world 0.0000 0.0000 -?0.00[0-9]+ ")  # pictures have the floor at 0, where it is in this world
+check(page MATCHES "<h2>Navigation</h2>")
+# Pictures have the floor at 0; in this world it is there already, and walls are along x and y.
+check(page MATCHES "in the world frame of the files. T_view_world 0.0000 0.0000 -?0.00[0-9]+ ")
+check(NOT page MATCHES "rotated by|shifted by")
 # In a corner of it, on the floor.
 app(0 plan room/map.bt --from 2.6,-2.15,0 --to 1.9,-1.6,3 --ground --robot-radius 0.12 --out way.txt --picture way.png)
 length_of(length way.txt)

@@ -26,7 +26,7 @@
 #include "support/catch.hpp"
 #include "viewer/backend.hpp"
 #include "viewer/bounded_threads.hpp"
-#include "viewer/calls_aside.hpp"
+#include "viewer/call_thread.hpp"
 #include "viewer/scene_builder.hpp"
 #include "viewer/viewer_thread.hpp"
 #include "viewer/web_messages.hpp"
@@ -62,8 +62,8 @@ orbis::camera::ray_table rays() {
 se3 at(double x, double y = 0.0, double z = 0.0) { return {{}, {x, y, z}}; }
 
 /// A frame that hangs at a keyframe; a wall of one colour, two metres away.
-handed_frame frame_at(std::uint64_t number, map_keyframe reference, const se3& T_reference_camera, rgb8 color = {}) {
-  handed_frame f;
+viewer_frame frame_at(std::uint64_t number, map_keyframe reference, const se3& T_reference_camera, rgb8 color = {}) {
+  viewer_frame f;
   f.number = number;
   f.state = "tracking";
   f.tracking_ms = static_cast<double>(number + 1);
@@ -130,7 +130,7 @@ TEST_CASE("The newest frame is shown, the path has those that nobody looked at a
   told_graph told{{at(0)}};
   scene_builder builder{"a run", 10, rays(), 0.05};
   for (std::uint64_t i = 0; i != 5; ++i)
-    builder.hand_over(frame_at(i, {0, 0}, at(0.1 * static_cast<double>(i)), {static_cast<std::uint8_t>(i), 0, 0}));
+    builder.push(frame_at(i, {0, 0}, at(0.1 * static_cast<double>(i)), {static_cast<std::uint8_t>(i), 0, 0}));
   const viewer_scene& scene = builder.update_at_once(told.sources());
   REQUIRE(scene.frame);
   CHECK(scene.title == "a run");
@@ -153,14 +153,14 @@ TEST_CASE("The newest frame is shown, the path has those that nobody looked at a
 TEST_CASE("A camera at rest adds nothing to the path, and a lost one interrupts it") {
   told_graph told{{at(0)}};
   scene_builder builder{"", 0, rays(), 0.05};
-  for (std::uint64_t i = 0; i != 100; ++i) builder.hand_over(frame_at(i, {0, 0}, at(0.0001 * static_cast<double>(i))));
+  for (std::uint64_t i = 0; i != 100; ++i) builder.push(frame_at(i, {0, 0}, at(0.0001 * static_cast<double>(i))));
   CHECK(builder.update_at_once(told.sources()).graph.trail.size() == 1);
-  handed_frame lost = frame_at(100, {0, 0}, at(0));
+  viewer_frame lost = frame_at(100, {0, 0}, at(0));
   lost.tracked.reset();
   lost.T_world_camera.reset();
   lost.state = "lost";
-  builder.hand_over(std::move(lost));
-  builder.hand_over(frame_at(101, {0, 0}, at(1.0)));
+  builder.push(std::move(lost));
+  builder.push(frame_at(101, {0, 0}, at(1.0)));
   const viewer_scene& scene = builder.update_at_once(told.sources());
   REQUIRE(scene.graph.trail.size() == 2);
   CHECK(scene.graph.trail[1].begins);
@@ -169,9 +169,9 @@ TEST_CASE("A camera at rest adds nothing to the path, and a lost one interrupts 
 TEST_CASE("Path and keyframes follow corrections, and what is of another map is left out") {
   told_graph told{{at(0), at(10)}};
   scene_builder builder{"", 0, rays(), 0.05};
-  builder.hand_over(frame_at(0, {0, 0}, at(0.5)));
-  builder.hand_over(frame_at(1, {7, 0}, at(0.5)));  // of a map that is not the active one
-  builder.hand_over(frame_at(2, {0, 1}, at(0.5)));
+  builder.push(frame_at(0, {0, 0}, at(0.5)));
+  builder.push(frame_at(1, {7, 0}, at(0.5)));  // of a map that is not the active one
+  builder.push(frame_at(2, {0, 1}, at(0.5)));
   const viewer_scene& scene = builder.update_at_once(told.sources());
   REQUIRE(positions(scene) == std::vector<vec3f>{{0.5F, 0, 0}, {10.5F, 0, 0}});
   CHECK(scene.graph.trail[1].begins);  // the way through the other map is not drawn as a line
@@ -190,8 +190,8 @@ TEST_CASE("Path and keyframes follow corrections, and what is of another map is 
 TEST_CASE("The path follows corrections of the scale") {
   told_graph told{{at(0), at(10)}};
   scene_builder builder{"", 0, rays(), 0.05};
-  builder.hand_over(frame_at(0, {0, 0}, at(0.5)));
-  builder.hand_over(frame_at(1, {0, 1}, at(0.5)));
+  builder.push(frame_at(0, {0, 0}, at(0.5)));
+  builder.push(frame_at(1, {0, 1}, at(0.5)));
   told.scale = 3.0;
   CHECK(positions(builder.update_at_once(told.sources())) == std::vector<vec3f>{{1.5F, 0, 0}, {11.5F, 0, 0}});
 }
@@ -201,7 +201,7 @@ TEST_CASE("SLAM is asked from time to time only, and at once where that is wante
   scene_builder builder{"", 0, rays(), 0.05};
   const scene_sources sources = told.sources();
   for (std::uint64_t i = 0; i != 50; ++i) {
-    builder.hand_over(frame_at(i, {0, 0}, at(static_cast<double>(i))));
+    builder.push(frame_at(i, {0, 0}, at(static_cast<double>(i))));
     static_cast<void>(builder.update(sources));
   }
   CHECK(told.answers < 10);
@@ -253,10 +253,10 @@ TEST_CASE("Voxels are shown where they are, large ones and those below zero as w
 TEST_CASE("Voxels have the colours of keyframes, which follow their corrections") {
   told_graph told{{at(0)}};
   scene_builder builder{"", 0, rays(), 0.05};
-  handed_frame keyframe = frame_at(0, {0, 0}, at(0), {200, 10, 30});
+  viewer_frame keyframe = frame_at(0, {0, 0}, at(0), {200, 10, 30});
   keyframe.keyframe = map_keyframe{0, 0};
-  builder.hand_over(std::move(keyframe));
-  builder.hand_over(frame_at(1, {0, 0}, at(0), {1, 1, 1}));  // takes the keyframe's place in the box
+  builder.push(std::move(keyframe));
+  builder.push(frame_at(1, {0, 0}, at(0), {1, 1, 1}));  // takes the keyframe's place in the box
   scene_sources sources = told.sources();
   const voxel wall{{0.025F, 0.025F, 2.025F}, 0.05F}, nowhere{{0.025F, 0.025F, -1.025F}, 0.05F},
       later{{5.025F, 0.025F, 2.025F}, 0.05F};
@@ -338,11 +338,11 @@ struct row_of_walls {
           cubes.push_back({vec3f(vec3(x + 0.05 * a + 0.025, y + 0.05 * b + 0.025, 2.025).cast<float>()), 0.05F});
     }
   }
-  void hand_over(std::size_t i) {
-    handed_frame keyframe =
+  void push(std::size_t i) {
+    viewer_frame keyframe =
         frame_at(i, {0, static_cast<std::uint32_t>(i)}, at(0), i + 1 == count ? rgb8{10, 200, 30} : rgb8{200, 10, 30});
     keyframe.keyframe = map_keyframe{0, static_cast<std::uint32_t>(i)};
-    builder.hand_over(std::move(keyframe));
+    builder.push(std::move(keyframe));
   }
   /// The share of the cubes that have a colour.
   [[nodiscard]] static double colored(const shown_voxels& voxels) {
@@ -363,7 +363,7 @@ TEST_CASE("The pixels that are kept for colours have a limit, and what is given 
   for (std::size_t i = 0; i != row_of_walls::count; ++i) {
     row.told.poses.push_back(at(5.0 * static_cast<double>(i)));
     row.told.changed = true;
-    row.hand_over(i);
+    row.push(i);
     static_cast<void>(row.builder.update_at_once(row.sources));
     CHECK(row.builder.color_samples() <= row_of_walls::most);
   }
@@ -391,7 +391,7 @@ TEST_CASE("Keyframes that nobody takes do not pile up, and without a live map no
   row_of_walls row{0.0};
   for (std::size_t i = 0; i != row_of_walls::count; ++i) {
     row.told.poses.push_back(at(5.0 * static_cast<double>(i)));
-    row.hand_over(i);
+    row.push(i);
   }
   static_cast<void>(row.builder.update_at_once(row.sources));
   CHECK(row.builder.color_samples() > 0);
@@ -401,7 +401,7 @@ TEST_CASE("Keyframes that nobody takes do not pile up, and without a live map no
   other.builder.set_no_voxels("no live map");
   for (std::size_t i = 0; i != row_of_walls::count; ++i) {
     other.told.poses.push_back(at(0));
-    other.hand_over(i);
+    other.push(i);
     static_cast<void>(other.builder.update_at_once(other.sources));
     CHECK(other.builder.color_samples() == 0);
   }
@@ -419,7 +419,7 @@ TEST_CASE("Tracking never waits for who looks at the scene") {
   };
   std::thread viewer{[&] { static_cast<void>(builder.update_at_once(slow)); }};
   while (!asked) std::this_thread::yield();
-  for (std::uint64_t i = 0; i != 200; ++i) builder.hand_over(frame_at(i, {0, 0}, at(static_cast<double>(i))));
+  for (std::uint64_t i = 0; i != 200; ++i) builder.push(frame_at(i, {0, 0}, at(static_cast<double>(i))));
   ends = true;  // nothing above could have come this far if it waited
   viewer.join();
   CHECK(builder.update_at_once(told.sources()).frame->number == 199);
@@ -509,7 +509,7 @@ int niceness() { return ::getpriority(PRIO_PROCESS, static_cast<id_t>(::syscall(
 }  // namespace
 
 TEST_CASE("A call aside runs on another thread, and brings back what it throws") {
-  calls_aside aside;
+  call_thread aside;
   std::thread::id where;
   aside.call([&] { where = std::this_thread::get_id(); });
   CHECK(where != std::this_thread::get_id());
@@ -545,7 +545,7 @@ TEST_CASE("The viewer draws what it is shown and what its sources say, until it 
   bool was_asked = false;
   viewer.show([&] { return was_asked = true, frame_at(4, {0, 0}, at(0)); });
   CHECK_FALSE(was_asked);
-  CHECK(viewer.take_trouble().empty());
+  CHECK(viewer.take_error().empty());
 }
 
 TEST_CASE("A viewer that cannot be opened says why") {
@@ -556,7 +556,7 @@ TEST_CASE("A viewer that cannot be opened says why") {
   REQUIRE_FALSE(where);
   CHECK(where.error().message == "there is none");
   CHECK_FALSE(viewer.is_open());
-  CHECK(viewer.take_trouble().empty());
+  CHECK(viewer.take_error().empty());
 }
 
 TEST_CASE("An exception closes the viewer, which says so once, and reaches nobody else") {
@@ -600,9 +600,8 @@ TEST_CASE("An exception closes the viewer, which says so once, and reaches nobod
   viewer.show([&] { return frame_at(1, {0, 0}, at(0)); });
   viewer.disconnect();
   viewer.show_map({});
-  CHECK(viewer.take_trouble() ==
-        (where_it_happens == "draw, unknown" ? "an exception of an unknown kind" : "no more memory"));
-  CHECK(viewer.take_trouble().empty());
+  CHECK(viewer.take_error() == (where_it_happens == "draw, unknown" ? "unknown exception" : "no more memory"));
+  CHECK(viewer.take_error().empty());
 }
 
 #ifdef __GLIBC__
@@ -621,7 +620,7 @@ TEST_CASE("Where the system gives no thread, the viewer is closed and says so") 
   viewer.connect({});
   viewer.show([&] { return frame_at(0, {0, 0}, at(0)); });
   viewer.disconnect();
-  CHECK_FALSE(viewer.take_trouble().empty());
+  CHECK_FALSE(viewer.take_error().empty());
 }
 #endif
 

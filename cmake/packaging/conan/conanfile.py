@@ -9,7 +9,7 @@ from conan.tools.files import copy
 
 required_conan_version = ">=2.0"
 
-# An option of the recipe, the component of the library, what it requires.
+# Option of the recipe, component of the library, requirement.
 OPTIONAL = {
     "with_io": ("io", ["libpng/[>=1.6 <2]", "libjpeg-turbo/[>=2.1 <4]", "tomlplusplus/[>=3.3 <4]"]),
     "with_nanoflann": ("cloud_nanoflann", ["nanoflann/[>=1.4 <2]"]),
@@ -78,7 +78,7 @@ class Orbis(ConanFile):
         CMake(self).install()
 
     def package_info(self):
-        # The project's own package files, which know the components.
+        # The package files of the project, which define the components.
         self.cpp_info.set_property("cmake_find_mode", "none")
         self.cpp_info.builddirs = [os.path.join("share", "cmake", "orbis")]
         if not self.options.compiled:

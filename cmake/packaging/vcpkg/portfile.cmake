@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 #
-# An overlay port: it builds the sources that it stands in.
+# An overlay port that builds the sources containing it.
 #   vcpkg install orbis --overlay-ports=<orbis>/cmake/packaging/vcpkg
 get_filename_component(SOURCE_PATH "${CURRENT_PORT_DIR}/../../.." ABSOLUTE)
 

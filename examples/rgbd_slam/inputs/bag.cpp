@@ -29,11 +29,11 @@ using orbis::result;
 using color_image = orbis::image<orbis::rgb8>;
 using depth_image = orbis::image<std::uint16_t>;
 
-/// The camera of `info`. `rectified`: of images that have been rectified.
+/// The camera of `info`. `rectified`: the images are rectified.
 result<orbis::camera::any_camera> camera_of(const ros_messages::camera_info& info, bool rectified,
                                             const std::string& where) {
   if (info.width == 0 || info.height == 0 || info.width > 65536 || info.height > 65536)
-    return fail(errc::malformed, where, "has no camera whose images have a size: is the camera calibrated?");
+    return fail(errc::malformed, where, "has a camera without image size: is the camera calibrated?");
   const auto width = static_cast<int>(info.width), height = static_cast<int>(info.height);
   const orbis::camera::intrinsics k =
       rectified && info.P[0] > 0.0
@@ -43,7 +43,7 @@ result<orbis::camera::any_camera> camera_of(const ros_messages::camera_info& inf
     return fail(errc::malformed, where, "has no camera matrix: is the camera calibrated?");
   const auto& d = info.D;
   if (!std::all_of(d.begin(), d.end(), [](double v) { return std::isfinite(v); }))
-    return fail(errc::malformed, where, "has a distortion that is no number");
+    return fail(errc::malformed, where, "has a distortion that is not finite");
   const bool is_straight = std::all_of(d.begin(), d.end(), [](double v) { return v == 0.0; });
   if (rectified || is_straight) return orbis::camera::any_camera{orbis::camera::pinhole{k}};
   const auto at = [&](std::size_t i) { return i < d.size() ? d[i] : 0.0; };
@@ -55,18 +55,18 @@ result<orbis::camera::any_camera> camera_of(const ros_messages::camera_info& inf
         orbis::camera::radial_tangential{k, {at(0), at(1), at(2), at(3), at(4), at(5), at(6), at(7)}}};
   return fail(errc::unsupported, where,
               "distortion model \"" + in_short(info.distortion_model) + "\" with " + std::to_string(d.size()) +
-                  " numbers is not one of plumb_bob, rational_polynomial, equidistant");
+                  " numbers is not supported; use plumb_bob, rational_polynomial or equidistant");
 }
 
 /// The messages of a topic.
 struct topic {
-  std::string name, type, encoding;  ///< encoding: of the first image, or its format if it is compressed
+  std::string name, type, encoding;  ///< encoding: of the first image, or the format of a compressed image
   std::vector<double> times;         ///< of their headers, ascending
   std::vector<rosbag::MessageInstance> messages;
   [[nodiscard]] bool is_compressed() const { return type == "sensor_msgs/CompressedImage"; }
   [[nodiscard]] bool is_depth() const { return is_depth_encoding(encoding) || name.ends_with("/compressedDepth"); }
   [[nodiscard]] bool is_read() const { return is_compressed() || is_known_encoding(encoding); }
-  /// The name says that its images are rectified: "image_rect", "rect", but not "direct".
+  /// Returns true if the name indicates rectified images: "image_rect" and "rect", but not "direct".
   [[nodiscard]] bool is_rectified() const {
     for (std::size_t at = name.find("rect"); at != std::string::npos; at = name.find("rect", at + 1))
       if (at == 0 || name[at - 1] == '/' || name[at - 1] == '_') return true;
@@ -76,7 +76,7 @@ struct topic {
 
 bool contains(const std::string& text, std::string_view part) { return text.find(part) != std::string::npos; }
 
-/// Whether two topics are those of a left and a right camera.
+/// Returns true if the topics are those of a left and a right camera.
 bool is_pair(const std::string& left, const std::string& right) {
   for (const auto& [l, r] : {std::pair{"left", "right"}, std::pair{"cam0", "cam1"}, std::pair{"infra1", "infra2"},
                              std::pair{"camera_0", "camera_1"}, std::pair{"camera0", "camera1"}}) {
@@ -99,8 +99,8 @@ class bag_recording final : public file_recording {
     try {
       bag_.open(path_, rosbag::bagmode::Read);
       return set_up(options);
-    } catch (const std::exception& e) {  // of the library: not a bag, or a damaged one
-      return fail(errc::malformed, path_, std::string{"is no ROS 1 bag that can be read: "} + e.what());
+    } catch (const std::exception& e) {  // of the library, for a damaged bag or another file
+      return fail(errc::malformed, path_, std::string{"is not a readable ROS 1 bag: "} + e.what());
     }
   }
   [[nodiscard]] std::size_t size() const override { return frames_.size(); }
@@ -143,7 +143,7 @@ class bag_recording final : public file_recording {
       return fail(errc::no_data, path_,
                   second_ == nullptr
                       ? "no image in " + first_->name
-                      : "no image of " + first_->name + " has a partner in " + second_->name + " at its time");
+                      : "no image of " + first_->name + " has a counterpart in " + second_->name + " at its time");
     images_of = first_->name + (second_ != nullptr ? " and " + second_->name : "");
     if (auto known = find_camera(options); !known) return known;
     if (auto fits = frame(0); !fits) return fail(fits.error());
@@ -169,31 +169,30 @@ class bag_recording final : public file_recording {
     std::erase_if(topics_, [](const auto& t) { return t.second.messages.empty(); });
   }
 
-  [[nodiscard]] std::string topics_in_words() const {
+  [[nodiscard]] std::string describe_topics() const {
     std::string text;
     for (const auto& [name, t] : topics_) text += (text.empty() ? "" : ", ") + name + " (" + in_short(t.encoding) + ")";
-    return text.empty() ? "there are no images in it" : "there are " + text;
+    return text.empty() ? "it contains no images" : "it contains " + text;
   }
 
   result<void> choose(const file_recording_options& options) {
     const auto wrong = [&](const std::string& what) {
-      return fail(errc::invalid_argument, path_, what + "; " + topics_in_words());
+      return fail(errc::invalid_argument, path_, what + "; " + describe_topics());
     };
-    if (topics_.empty()) return fail(errc::no_data, path_, "there are no images in this bag");
+    if (topics_.empty()) return fail(errc::no_data, path_, "the bag contains no images");
     if (!options.topics.empty()) {
       for (const std::string& name : options.topics)
         if (!topics_.contains(name)) return wrong("has no images in " + name);
-      if (options.topics.size() > 2) return wrong("one or two topics are wanted");
+      if (options.topics.size() > 2) return wrong("needs one or two topics");
       first_ = &topics_.at(options.topics[0]);
       if (options.topics.size() == 2) second_ = &topics_.at(options.topics[1]);
       sensor = second_ == nullptr    ? orbis::slam::sensor_kind::monocular
                : second_->is_depth() ? orbis::slam::sensor_kind::rgbd
                                      : orbis::slam::sensor_kind::stereo;
-      if (options.sensor && *options.sensor != sensor) return wrong("these topics are not what the sensor gives");
+      if (options.sensor && *options.sensor != sensor) return wrong("the topics do not match --sensor");
       return {};
     }
-    // Colour before grey, rectified before raw, and before both what is not compressed; depth that says it is
-    // registered.
+    // Preference: uncompressed, then colour over grey, then rectified over raw; depth that is registered by its name.
     topic *color = nullptr, *depth = nullptr, *left = nullptr, *right = nullptr;
     int best_color = -1, best_depth = -1, best_left = -1;
     const auto worth = [](const topic& t) {
@@ -226,8 +225,7 @@ class bag_recording final : public file_recording {
     if (!found || !possible(*found)) {
       const bool any_unread =
           std::any_of(topics_.begin(), topics_.end(), [](const auto& t) { return !t.second.is_read(); });
-      return wrong(any_unread ? "has not the images that are wanted in an encoding that is read"
-                              : "has not the images that are wanted");
+      return wrong(any_unread ? "has no suitable images in a supported encoding" : "has no suitable images");
     }
     sensor = *found;
     first_ = sensor == orbis::slam::sensor_kind::stereo ? left : color;
@@ -237,7 +235,7 @@ class bag_recording final : public file_recording {
     return {};
   }
 
-  /// Of their headers; where these say nothing, when they were recorded.
+  /// Reads the times of the headers, or the recording times if the headers have none.
   static void read_times(topic& t) {
     std::vector<std::pair<double, std::size_t>> order;
     for (const rosbag::MessageInstance& m : t.messages) {
@@ -263,12 +261,12 @@ class bag_recording final : public file_recording {
       return;
     }
     frames_ = orbis::associate(first_->times, second_->times, sensor == orbis::slam::sensor_kind::rgbd ? 0.020 : 0.005);
-    if (const std::size_t lonely = first_->times.size() - frames_.size(); lonely != 0)
-      notes.push_back(std::to_string(lonely) + " of " + std::to_string(first_->times.size()) + " images of " +
-                      first_->name + " have no partner and are left out");
+    if (const std::size_t unpaired = first_->times.size() - frames_.size(); unpaired != 0)
+      notes.push_back(std::to_string(unpaired) + " of " + std::to_string(first_->times.size()) + " images of " +
+                      first_->name + " have no counterpart and are omitted");
   }
 
-  /// The first `CameraInfo` beside the images of `of`; null if there is none.
+  /// The first `CameraInfo` of the camera of `of`; null if there is none.
   boost::shared_ptr<ros_messages::camera_info> info_of(const topic& of) {
     std::string name = of.name;
     if (of.is_compressed()) name = name.substr(0, name.rfind('/'));
@@ -285,28 +283,25 @@ class bag_recording final : public file_recording {
       camera = *options.camera;
       if (in_metres) camera.depth_scale = metres_scale;
       if (sensor == orbis::slam::sensor_kind::stereo && !camera.baseline)
-        return fail(errc::invalid_argument, path_, "a stereo camera wants a baseline");
+        return fail(errc::invalid_argument, path_, "a stereo camera needs a baseline");
       return {};
     }
     const auto info = info_of(*first_);
     if (!info)
-      return fail(
-          errc::invalid_argument, path_,
-          "the camera is not known: there is no sensor_msgs/CameraInfo beside " + first_->name + "; name a camera");
+      return fail(errc::invalid_argument, path_,
+                  "unknown camera: there is no sensor_msgs/CameraInfo for " + first_->name + "; name a camera");
     auto model = camera_of(*info, first_->is_rectified(), where(*first_));
     if (!model) return fail(model.error());
     camera = {.model = *std::move(model), .depth_scale = in_metres ? metres_scale : 1000.0, .fps = rate()};
     if (sensor != orbis::slam::sensor_kind::stereo) return {};
 
     const auto other = info_of(*second_);
-    if (!other)
-      return fail(errc::invalid_argument, path_, "there is no sensor_msgs/CameraInfo beside " + second_->name);
+    if (!other) return fail(errc::invalid_argument, path_, "there is no sensor_msgs/CameraInfo for " + second_->name);
     const auto right = camera_of(*other, second_->is_rectified(), where(*second_));
     if (!right) return fail(right.error());
-    // P of the right camera is that of the left one, moved along x; R turns a camera's rays to the rectified ones.
+    // P of the right camera is that of the left one, shifted along x; R rotates the rays of a camera to rectified ones.
     const double baseline = other->P[0] > 0.0 ? (info->P[3] - other->P[3]) / other->P[0] : 0.0;
-    if (!(baseline > 0.0))
-      return fail(errc::malformed, where(*second_), "P of its CameraInfo does not say how far the cameras are apart");
+    if (!(baseline > 0.0)) return fail(errc::malformed, where(*second_), "P of its CameraInfo has no baseline");
     orbis::se3 T_left_right{orbis::so3{}, orbis::vec3{baseline, 0.0, 0.0}};
     if (!first_->is_rectified()) {
       const auto rotation = [](const auto& R) -> std::optional<orbis::so3> {
@@ -317,7 +312,7 @@ class bag_recording final : public file_recording {
         return orbis::so3{orbis::so3::quaternion(m)};
       };
       const auto l = rotation(info->R), r = rotation(other->R);
-      if (!l || !r) return fail(errc::malformed, path_, "R of a CameraInfo is no rotation");
+      if (!l || !r) return fail(errc::malformed, path_, "R of a CameraInfo is not a rotation");
       T_left_right = orbis::se3{l->inverse(), orbis::vec3::Zero()} * T_left_right * orbis::se3{*r, orbis::vec3::Zero()};
     }
     auto straight = orbis::camera::rectify(
@@ -349,7 +344,7 @@ class bag_recording final : public file_recording {
                 "the image has " + std::to_string(image->width()) + "x" + std::to_string(image->height()) +
                     " pixels, the camera " + std::to_string(k.width) + "x" + std::to_string(k.height) + why);
   }
-  /// `decode` of a message, whichever it is.
+  /// `decode` of a message of either type.
   template <class Decode>
   [[nodiscard]] auto decoded(const topic& of, std::size_t i, const Decode& decode) const
       -> decltype(decode(ros_messages::image{}, std::string{})) {
@@ -358,7 +353,7 @@ class bag_recording final : public file_recording {
     } else if (const auto m = of.messages[i].instantiate<ros_messages::image>()) {
       return decode(*m, where(of));
     }
-    return fail(errc::malformed, where(of), "is no " + of.type);
+    return fail(errc::malformed, where(of), "is not a " + of.type);
   }
   [[nodiscard]] result<color_image> read_color(const topic& of, std::size_t i) const try {
     return sized(decoded(of, i, [](const auto& m, const std::string& from) { return color_of(m, from); }), of);
@@ -374,10 +369,10 @@ class bag_recording final : public file_recording {
 
   std::string path_;
   rosbag::Bag bag_;
-  mutable std::mutex mutex_;  // of the bag, which reads into a buffer of its own
+  mutable std::mutex mutex_;  // guards the bag, which reads into an internal buffer
   std::map<std::string, topic> topics_;
   topic* first_ = nullptr;   // colour, or the left image
-  topic* second_ = nullptr;  // depth, or the right image; null: one camera
+  topic* second_ = nullptr;  // depth, or the right image; null: monocular
   std::vector<orbis::index_pair> frames_;
   std::optional<orbis::camera::rectification> straight_;  // of stereo images that are not rectified yet
   orbis::camera::any_camera raw_left_, raw_right_;
@@ -407,7 +402,8 @@ bool has_bags() { return false; }
 orbis::result<std::unique_ptr<file_recording>> open_bag(const std::filesystem::path& path,
                                                         const file_recording_options&) {
   return orbis::fail(orbis::errc::unsupported, path.string(),
-                     "this build reads no ROS bags: it was made without rosbag_storage (librosbag-storage-dev)");
+                     "this build has no support for ROS bags: it was built without rosbag_storage "
+                     "(librosbag-storage-dev)");
 }
 
 }  // namespace app

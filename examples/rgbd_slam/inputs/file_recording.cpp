@@ -27,9 +27,9 @@ orbis::result<void> check_camera(const orbis::camera::camera_settings& camera, o
                                  int width, int height, const std::string& where) {
   const bool two = sensor == orbis::slam::sensor_kind::stereo;
   if (two && !camera.baseline)
-    return fail(errc::invalid_argument, where, "two images side by side want a camera with a baseline");
+    return fail(errc::invalid_argument, where, "two images side by side need a camera with a baseline");
   if (two && camera.model.model_name() != "pinhole")
-    return fail(errc::invalid_argument, where, "two images side by side must be rectified: a pinhole camera is wanted");
+    return fail(errc::invalid_argument, where, "two images side by side must be rectified, with a pinhole camera");
   const int columns = two ? 2 * camera.model.width() : camera.model.width();
   if (width == columns && height == camera.model.height()) return {};
   return fail(errc::malformed, where,

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Frames of two streams that belong together.
+/// Synchronisation of the frames of two streams.
 #pragma once
 
 #include <algorithm>
@@ -14,11 +14,11 @@
 
 namespace app {
 
-/// Which of the two streams.
+/// The two streams.
 enum class stream : std::size_t { color, depth };
 
-/// Finds the frames of colour and depth that were taken at one time. Either stream may be some frames ahead of the
-/// other one, and either may lose frames.
+/// Pairs frames of colour and depth of the same time. Either stream may be some frames ahead of the other, and either
+/// may lose frames.
 template <class Frame>
 class frame_pairs {
  public:
@@ -26,11 +26,11 @@ class frame_pairs {
     Frame color, depth;
   };
 
-  /// `interval`: of the frames of a stream, seconds. Frames belong together where they are less than half of it apart,
-  /// and at most 20 ms, as in recordings.
+  /// `interval`: time between frames of a stream, seconds. Paired frames are less than half of it apart, and at most
+  /// 20 ms, as in recordings.
   explicit frame_pairs(double interval = 1.0 / 30.0) : most_apart_{std::min(0.020, 0.49 * interval)} {}
 
-  /// The next frame of a stream, with its time in seconds. The pair that it completes, if it does.
+  /// Adds the next frame of a stream with its time in seconds; returns the pair that it completes, if any.
   std::optional<pair> add(stream of, Frame frame, double time) {
     auto& own = waiting_[static_cast<std::size_t>(of)];
     auto& others = waiting_[static_cast<std::size_t>(of == stream::color ? stream::depth : stream::color)];
@@ -42,13 +42,13 @@ class frame_pairs {
       return std::nullopt;
     }
     Frame other = std::move(partner->frame);
-    others.erase(others.begin(), std::next(partner));  // those before wait in vain
+    others.erase(others.begin(), std::next(partner));  // earlier ones have no partner
     own.clear();
     if (of == stream::color) return pair{std::move(frame), std::move(other)};
     return pair{std::move(other), std::move(frame)};
   }
 
-  /// Forgets the frames that wait.
+  /// Discards the waiting frames.
   void clear() noexcept {
     for (auto& frames : waiting_) frames.clear();
   }

@@ -12,8 +12,8 @@ using orbis::errc;
 using orbis::fail;
 
 namespace {
-constexpr auto glance = 50ms;       // how long a wait lasts before it looks whether all is over
-constexpr auto longest_wait = 10s;  // for a frame, before the camera counts as gone
+constexpr auto poll_interval = 50ms;  // between checks for the end
+constexpr auto longest_wait = 10s;    // for a frame, before the camera counts as disconnected
 }  // namespace
 
 live_source::live_source(std::unique_ptr<camera_device> device)
@@ -26,8 +26,8 @@ live_source::~live_source() {
 
 orbis::result<std::optional<source_frame>> live_source::next_of_device() {
   try {
-    return device_->next(glance);
-  } catch (const std::exception& e) {  // of its library, or no memory
+    return device_->next(poll_interval);
+  } catch (const std::exception& e) {  // of the library, or out of memory
     return fail(errc::unreadable, device_->name, e.what());
   }
 }
@@ -53,10 +53,10 @@ orbis::result<source_frame> live_source::next(const std::function<bool()>& is_ov
   std::unique_lock lock{mutex_};
   while (!newest_) {
     if (ended_) return fail(*ended_);
-    if (is_over()) return fail(errc::cancelled, device_->name, "no frame is waited for any more");
+    if (is_over()) return fail(errc::cancelled, device_->name, "interrupted while waiting for a frame");
     if (std::chrono::steady_clock::now() - begin > longest_wait)
-      return fail(errc::unreadable, device_->name, "no frame has come for 10 s");
-    changed_.wait_for(lock, glance);
+      return fail(errc::unreadable, device_->name, "no frame arrived for 10 s");
+    changed_.wait_for(lock, poll_interval);
   }
   return *std::exchange(newest_, std::nullopt);
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The frames of a camera for a program that may be slower than it.
+/// The frames of a camera, for programs that may be slower than it.
 #pragma once
 
 #include <atomic>
@@ -19,8 +19,8 @@
 
 namespace app {
 
-/// Takes frames from a camera on a thread of its own and keeps the newest: whoever asks for the next one gets it. One
-/// that was not asked for before the next came is dropped and counted.
+/// Reads frames from a camera on a separate thread and keeps the newest one for the next request. A frame that is not
+/// requested before the next one arrives is dropped and counted.
 class live_source {
  public:
   explicit live_source(std::unique_ptr<camera_device> device);
@@ -29,11 +29,10 @@ class live_source {
   live_source& operator=(const live_source&) = delete;
 
   [[nodiscard]] const camera_device& device() const { return *device_; }
-  /// Waits for a frame that has not been asked for. Errors: that of the device, which then gives no more, after its
-  /// last frame; cancelled, once `is_over()` holds while none comes, or when none has come for ten seconds
-  /// (unreadable).
+  /// Waits for a new frame. Errors: that of the device, after its last frame; cancelled, if `is_over()` returns true
+  /// during the wait; unreadable, if no frame arrives for ten seconds.
   [[nodiscard]] orbis::result<source_frame> next(const std::function<bool()>& is_over);
-  /// Frames so far that nobody asked for in time. From any thread.
+  /// The number of frames dropped so far. May be called from any thread.
   [[nodiscard]] std::size_t dropped() const { return dropped_; }
 
  private:
@@ -44,7 +43,7 @@ class live_source {
   std::mutex mutex_;
   std::condition_variable changed_;
   std::optional<source_frame> newest_;  // guarded by mutex_
-  std::optional<orbis::error> ended_;   // likewise
+  std::optional<orbis::error> ended_;   // guarded by mutex_
   std::atomic<bool> stops_{false};
   std::atomic<std::size_t> dropped_{0};
   std::thread thread_;

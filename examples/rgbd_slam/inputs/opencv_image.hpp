@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Images as OpenCV's readers give them.
+/// Conversion of images from OpenCV's readers.
 #pragma once
 
 #include <string>
@@ -12,10 +12,10 @@
 
 namespace app {
 
-/// An image in OpenCV's order of colours, or a grey one, 8 bits. Errors: unsupported.
+/// Converts an 8-bit image, BGR or grey. Errors: unsupported.
 [[nodiscard]] inline orbis::result<orbis::image<orbis::rgb8>> rgb_of(const cv::Mat& image, const std::string& where) {
   if (image.empty() || image.depth() != CV_8U || (image.channels() != 3 && image.channels() != 1))
-    return orbis::fail(orbis::errc::unsupported, where, "an image is neither colour nor grey with 8 bits");
+    return orbis::fail(orbis::errc::unsupported, where, "an image is neither 8-bit colour nor 8-bit grey");
   orbis::image<orbis::rgb8> out(image.cols, image.rows);
   for (int y = 0; y != image.rows; ++y) {
     const auto* from = image.ptr<unsigned char>(y);

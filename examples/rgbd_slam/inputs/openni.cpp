@@ -22,14 +22,14 @@ using orbis::errc;
 using orbis::fail;
 using orbis::result;
 
-/// The first line of what the library says went wrong.
+/// The first line of the library's error message.
 std::string reason() {
   const std::string text = openni::OpenNI::getExtendedError();
   const std::size_t begin = std::min(text.find_first_not_of(" \t"), text.size());
   return text.substr(begin, text.find('\n', begin) - begin);
 }
 
-/// The mode of a stream with this pixel format: of the wanted size, else the largest up to it or 640x480, at the
+/// The mode of a stream with this pixel format: of the given width, or else the largest up to it or 640x480, at the
 /// highest rate.
 std::optional<openni::VideoMode> mode_of(const openni::SensorInfo& info, openni::PixelFormat format, int width) {
   std::optional<openni::VideoMode> best;
@@ -47,9 +47,9 @@ double seconds(const openni::VideoFrameRef& f) { return 1e-6 * static_cast<doubl
 
 class openni_camera final : public camera_device {
  public:
-  // Some drivers, that of the device without hardware among them, tell a stream's thread to end and do not wait for it;
-  // it sleeps for as long as a frame takes, and what it uses is kept until then. OpenNI2 itself is left as it is, as to
-  // shut it down unloads the drivers.
+  // Some drivers, such as that of the dummy device, do not wait for the end of a stream's thread, which sleeps for the
+  // duration of a frame; its data is kept until then. OpenNI2 itself is not shut down, because that unloads the
+  // drivers.
   ~openni_camera() override {
     pairs_.clear();
     for (openni::VideoStream* s : {&depth_, &color_})
@@ -73,7 +73,7 @@ class openni_camera final : public camera_device {
       return ok;
     if (depth_.getVideoMode().getResolutionX() != mode.getResolutionX() ||
         depth_.getVideoMode().getResolutionY() != mode.getResolutionY())
-      return fail(errc::unsupported, name, "has no depth of the size of its colour images");
+      return fail(errc::unsupported, name, "has no depth images of the size of its colour images");
     if (device_.isFile()) {
       device_.getPlaybackControl()->setRepeatEnabled(false);
       last_ = std::min(device_.getPlaybackControl()->getNumberOfFrames(color_),
@@ -81,7 +81,7 @@ class openni_camera final : public camera_device {
     } else if (device_.isImageRegistrationModeSupported(openni::IMAGE_REGISTRATION_DEPTH_TO_COLOR)) {
       device_.setImageRegistrationMode(openni::IMAGE_REGISTRATION_DEPTH_TO_COLOR);
     } else {
-      notes.emplace_back("the camera does not register depth to colour: colours may be a little off");
+      notes.emplace_back("the camera does not register depth to colour: colours may be slightly shifted");
     }
     device_.setDepthColorSyncEnabled(true);
     pairs_ = frame_pairs<openni::VideoFrameRef>{interval_};
@@ -93,10 +93,10 @@ class openni_camera final : public camera_device {
     int ready = 0;
     const auto status = openni::OpenNI::waitForAnyStream(streams, 2, &ready, static_cast<int>(patience.count()));
     if (status == openni::STATUS_TIME_OUT) {
-      if (last_ && newest_index_ >= *last_) return fail(errc::no_data, name, "is at its end");
+      if (last_ && newest_index_ >= *last_) return fail(errc::no_data, name, "end of recording");
       return std::optional<source_frame>{};
     }
-    if (status != openni::STATUS_OK) return fail(errc::unreadable, name, "gives no more frames (" + reason() + ")");
+    if (status != openni::STATUS_OK) return fail(errc::unreadable, name, "delivers no more frames (" + reason() + ")");
     openni::VideoFrameRef frame;
     if (streams[ready]->readFrame(&frame) != openni::STATUS_OK || !frame.isValid())
       return fail(errc::unreadable, name, "was disconnected (" + reason() + ")");
@@ -112,17 +112,17 @@ class openni_camera final : public camera_device {
                      const std::string& what) {
     const openni::SensorInfo* info = device_.getSensorInfo(type);
     const auto mode = info != nullptr ? mode_of(*info, format, width) : std::nullopt;
-    if (!mode) return fail(errc::unsupported, name, "gives no " + what + " images of a kind that is known");
+    if (!mode) return fail(errc::unsupported, name, "has no " + what + " images in a supported format");
     if (stream.create(device_, type) != openni::STATUS_OK) return fail(errc::unreadable, name, reason());
     if (!device_.isFile()) stream.setVideoMode(*mode);
-    stream.setMirroringEnabled(false);  // which is how these cameras come
+    stream.setMirroringEnabled(false);  // on by default
     if (stream.start() != openni::STATUS_OK) return fail(errc::unreadable, name, reason());
     is_started_ = true;
     interval_ = std::max(interval_, 1.0 / std::max(1, stream.getVideoMode().getFps()));
     return {};
   }
 
-  /// That of the options, or one without distortion by the field of view.
+  /// The camera of the options, or a pinhole camera by the field of view.
   result<void> choose_camera(const device_options& options, const openni::VideoMode& mode) {
     const int width = mode.getResolutionX(), height = mode.getResolutionY();
     if (options.camera) {
@@ -130,15 +130,15 @@ class openni_camera final : public camera_device {
       camera.depth_scale = 1000.0;
       if (camera.model.width() == width && camera.model.height() == height) return {};
       return fail(errc::invalid_argument, name,
-                  "gives images of " + std::to_string(width) + "x" + std::to_string(height) +
-                      " pixels, the camera has " + std::to_string(camera.model.width()) + "x" +
-                      std::to_string(camera.model.height()));
+                  "has images of " + std::to_string(width) + "x" + std::to_string(height) + " pixels, the camera has " +
+                      std::to_string(camera.model.width()) + "x" + std::to_string(camera.model.height()));
     }
     const double angle = color_.getHorizontalFieldOfView();
     const bool is_known = std::isfinite(angle) && angle > 0.2 && angle < 2.5;
     const double f = is_known ? 0.5 * width / std::tan(0.5 * angle) : 525.0 * width / 640.0;
-    notes.emplace_back(is_known ? "the camera is not calibrated: its field of view gives the focal length (--camera)"
-                                : "the camera is not calibrated, and taken to be like a Kinect (--camera)");
+    notes.emplace_back(is_known
+                           ? "the camera is not calibrated: the focal length is that of its field of view (--camera)"
+                           : "the camera is not calibrated: the intrinsics are those of a Kinect (--camera)");
     camera = {.model = orbis::camera::pinhole{width, height, f, f, 0.5 * (width - 1), 0.5 * (height - 1)},
               .depth_scale = 1000.0,
               .fps = static_cast<double>(std::max(1, mode.getFps()))};
@@ -150,7 +150,7 @@ class openni_camera final : public camera_device {
     const int width = camera.model.width(), height = camera.model.height();
     for (const auto* f : {&both.color, &both.depth})
       if (f->getWidth() != width || f->getHeight() != height)
-        return fail(errc::malformed, name, "gives images of another size than at first");
+        return fail(errc::malformed, name, "changed the size of its images");
     source_frame out;
     out.timestamp = seconds(both.color);
     out.depth_scale = camera.depth_scale;
@@ -170,10 +170,10 @@ class openni_camera final : public camera_device {
   openni::Device device_;
   openni::VideoStream color_, depth_;
   frame_pairs<openni::VideoFrameRef> pairs_;
-  std::optional<int> last_;  // frames of a file
+  std::optional<int> last_;  // number of frames of a file
   int newest_index_ = 0;
-  bool is_started_ = false;  // at least one stream
-  double interval_ = 0.0;    // of the frames of the slower stream, seconds
+  bool is_started_ = false;  // at least one stream is started
+  double interval_ = 0.0;    // time between frames of the slower stream, seconds
 };
 
 }  // namespace
@@ -182,7 +182,7 @@ bool has_openni() { return true; }
 
 result<std::unique_ptr<camera_device>> open_openni(const device_options& options) {
   if (options.sensor && *options.sensor != orbis::slam::sensor_kind::rgbd)
-    return fail(errc::unsupported, options.name.empty() ? "OpenNI2" : options.name, "is a camera with depth");
+    return fail(errc::unsupported, options.name.empty() ? "OpenNI2" : options.name, "is a depth camera");
   auto device = std::make_unique<openni_camera>();
   if (auto opened = device->open(options); !opened) return fail(opened.error());
   return device;
@@ -198,7 +198,7 @@ bool has_openni() { return false; }
 
 orbis::result<std::unique_ptr<camera_device>> open_openni(const device_options& options) {
   return orbis::fail(orbis::errc::unsupported, options.name.empty() ? "OpenNI2" : options.name,
-                     "this build knows no depth cameras: it was made without OpenNI2 (libopenni2-dev)");
+                     "this build has no support for depth cameras: it was built without OpenNI2 (libopenni2-dev)");
 }
 
 }  // namespace app

@@ -16,7 +16,7 @@ using orbis::errc;
 using orbis::fail;
 using orbis::result;
 
-/// `read(i)` gives a frame; `size` of them.
+/// Plays `size` frames; `read(i)` returns a frame.
 template <class Recording, class Read>
 class playback final : public camera_device {
   using clock = std::chrono::steady_clock;
@@ -29,9 +29,9 @@ class playback final : public camera_device {
     files = recording_.files();
   }
   result<std::optional<source_frame>> next(std::chrono::milliseconds patience) override {
-    if (at_ == recording_.size()) return fail(errc::no_data, name, "is at its end");
+    if (at_ == recording_.size()) return fail(errc::no_data, name, "end of recording");
     if (at_ == 0) begin_ = clock::now();
-    constexpr double longest = 1e6;  // seconds, which a clock can count
+    constexpr double longest = 1e6;  // seconds; the clock cannot represent arbitrary durations
     const std::chrono::duration<double> after{std::min(recording_.timestamp(at_) - recording_.timestamp(0), longest)};
     const auto due = begin_ + std::chrono::duration_cast<clock::duration>(after);
     const auto give_up = clock::now() + patience;
@@ -91,7 +91,7 @@ result<std::unique_ptr<camera_device>> open_playback(const device_options& optio
               [](const auto& r, std::size_t i) -> result<source_frame> {
                 auto frame = r.frame(i);
                 if (!frame) return fail(frame.error());
-                frame->T_world_camera.reset();  // as a camera, which does not know it
+                frame->T_world_camera.reset();  // unknown to a camera
                 return source_frame{*std::move(frame), {}};
               });
 }

@@ -27,10 +27,10 @@ using depth_image = orbis::image<std::uint16_t>;
 
 bool contains(std::string_view text, std::string_view part) { return text.find(part) != std::string_view::npos; }
 
-/// What a format says of the image before it was compressed.
+/// The encoding of the image before compression, from the format.
 std::string_view encoding_in(std::string_view format) { return format.substr(0, format.find(';')); }
 
-/// How OpenCV calls the colours of a mosaic.
+/// OpenCV's conversion code for a Bayer mosaic.
 std::optional<int> mosaic_of(std::string_view encoding) {
   for (const auto& [name, code] :
        {std::pair{"bayer_rggb8", cv::COLOR_BayerRGGB2RGB}, std::pair{"bayer_bggr8", cv::COLOR_BayerBGGR2RGB},
@@ -39,7 +39,7 @@ std::optional<int> mosaic_of(std::string_view encoding) {
   return std::nullopt;
 }
 
-/// Bytes of each pixel of an encoding; zero if we do not read it.
+/// Bytes per pixel of an encoding; 0 if it is not supported.
 std::size_t bytes_of(std::string_view encoding) {
   for (const auto& [name, bytes] :
        {std::pair{"mono8", 1U}, std::pair{"8UC1", 1U}, std::pair{"rgb8", 3U}, std::pair{"bgr8", 3U},
@@ -51,11 +51,10 @@ std::size_t bytes_of(std::string_view encoding) {
 
 result<void> check_pixels(const ros_messages::image& m, const std::string& where) {
   const std::size_t bytes = bytes_of(m.encoding);
-  if (bytes == 0)
-    return fail(errc::unsupported, where, "images in the encoding " + in_short(m.encoding) + " are not read");
+  if (bytes == 0) return fail(errc::unsupported, where, "the encoding " + in_short(m.encoding) + " is not supported");
   if (m.width == 0 || m.height == 0 || m.width > 65536 || m.height > 65536 || m.step < m.width * bytes ||
       m.data.size() < std::size_t{m.step} * m.height)
-    return fail(errc::malformed, where, "an image has fewer pixels than its size says");
+    return fail(errc::malformed, where, "an image has fewer pixels than its size indicates");
   return {};
 }
 
@@ -67,7 +66,7 @@ T read_as(const std::uint8_t* p, bool swap) {
   return std::bit_cast<T>(bytes);
 }
 
-/// Depth in metres as it is stored; 0 where it is none, or too far.
+/// The stored value of a depth in metres; 0 if it is invalid or too large.
 std::uint16_t stored_of(float z) {
   const double stored = std::isfinite(z) && z > 0.0F ? metres_scale * static_cast<double>(z) + 0.5 : 0.0;
   return stored < 65535.0 ? static_cast<std::uint16_t>(stored) : std::uint16_t{0};
@@ -88,10 +87,11 @@ bool is_known_encoding(std::string_view encoding) { return bytes_of(encoding) !=
 
 result<color_image> color_of(const ros_messages::image& m, const std::string& where) {
   if (auto ok = check_pixels(m, where); !ok) return fail(ok.error());
-  if (is_depth_encoding(m.encoding)) return fail(errc::unsupported, where, "is depth, and no colour image");
+  if (is_depth_encoding(m.encoding)) return fail(errc::unsupported, where, "is a depth image, not a colour image");
   color_image out(static_cast<int>(m.width), static_cast<int>(m.height));
   if (const auto mosaic = mosaic_of(m.encoding)) {
-    if (m.width < 4 || m.height < 4) return fail(errc::malformed, where, "a mosaic of colours has 4x4 pixels at least");
+    if (m.width < 4 || m.height < 4)
+      return fail(errc::malformed, where, "a Bayer mosaic must have at least 4x4 pixels");
     const cv::Mat from(out.height(), out.width(), CV_8UC1, const_cast<std::uint8_t*>(m.data.data()), m.step);
     cv::Mat to(out.height(), out.width(), CV_8UC3, out.data());
     cv::cvtColor(from, to, *mosaic);
@@ -113,16 +113,17 @@ result<color_image> color_of(const ros_messages::compressed_image& m, const std:
   const std::string_view bytes = bytes_in(m);
   const bool has_colors = contains(m.format, "compressed bgr") || contains(m.format, "compressed rgb");
   if (m.format.starts_with("bayer_") && !has_colors)
-    return fail(errc::unsupported, where, "compressed images in the encoding " + in_short(m.format) + " are not read");
+    return fail(errc::unsupported, where,
+                "the encoding " + in_short(m.format) + " of compressed images is not supported");
   if (orbis::io::is_png(bytes)) return orbis::io::decode_png_color(bytes, where);
   if (orbis::io::is_jpeg(bytes)) return orbis::io::decode_jpeg(bytes, where);
-  return fail(errc::unsupported, where, "is neither PNG nor JPEG; its format says \"" + in_short(m.format) + "\"");
+  return fail(errc::unsupported, where, "is neither PNG nor JPEG (format \"" + in_short(m.format) + "\")");
 }
 
 result<depth_image> depth_of(const ros_messages::image& m, const std::string& where) {
   if (auto ok = check_pixels(m, where); !ok) return fail(ok.error());
   if (!is_depth_encoding(m.encoding))
-    return fail(errc::unsupported, where, "is no depth image: its encoding is " + in_short(m.encoding));
+    return fail(errc::unsupported, where, "is not a depth image: its encoding is " + in_short(m.encoding));
   const bool in_metres = is_in_metres(m.encoding),
              swap = (m.is_bigendian != 0) == (std::endian::native == std::endian::little);
   depth_image out(static_cast<int>(m.width), static_cast<int>(m.height));
@@ -135,16 +136,17 @@ result<depth_image> depth_of(const ros_messages::image& m, const std::string& wh
 }
 
 result<depth_image> depth_of(const ros_messages::compressed_image& m, const std::string& where) {
-  constexpr std::size_t header = 12;  // a number for the kind, and the two that depth was made whole numbers by
+  constexpr std::size_t header = 12;  // the kind, and the two quantisation parameters
   const bool has_header = contains(m.format, "compressedDepth");
   std::string_view bytes = bytes_in(m);
   if (!is_depth_encoding(m.format) || contains(m.format, "rvl") || (is_in_metres(m.format) && !has_header))
-    return fail(errc::unsupported, where, "compressed depth in the format \"" + in_short(m.format) + "\" is not read");
+    return fail(errc::unsupported, where,
+                "compressed depth in the format \"" + in_short(m.format) + "\" is not supported");
   if (has_header) bytes.remove_prefix(std::min(header, bytes.size()));
-  if (!orbis::io::is_png(bytes)) return fail(errc::malformed, where, "a compressed depth image holds no PNG");
+  if (!orbis::io::is_png(bytes)) return fail(errc::malformed, where, "a compressed depth image contains no PNG");
   auto out = orbis::io::decode_png_depth(bytes, where);
   if (!out || !is_in_metres(m.format)) return out;
-  // Stored is a / z + b.
+  // The stored value is a / z + b.
   const bool swap = std::endian::native == std::endian::big;
   const float a = read_as<float>(m.data.data() + 4, swap), b = read_as<float>(m.data.data() + 8, swap);
   if (!(a > 0.0F) || !std::isfinite(a) || !std::isfinite(b))

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The messages in ROS 1 bags that have images, as `sensor_msgs` defines them: their fields, and what rosbag_storage
-/// has to know to read and write them. (The headers that ROS generates for them are not valid C++20.)
+/// The messages of ROS 1 bags for images, as `sensor_msgs` defines them: fields, and the traits that rosbag_storage
+/// needs to read and write them. (The headers that ROS generates for them are not valid C++20.)
 #pragma once
 
 #include <cstdint>
@@ -21,7 +21,7 @@ struct header {
   std::string frame_id;
 };
 
-/// The time of any message that begins with a header; the rest is passed over.
+/// The time of any message that begins with a header; the rest is skipped.
 struct stamp {
   std::uint32_t seq = 0, sec = 0, nsec = 0;
 };
@@ -53,7 +53,7 @@ struct camera_info {
   std::uint8_t roi_do_rectify = 0;
 };
 
-/// Its name and the checksum of its definition.
+/// The name of a message type and the checksum of its definition.
 template <class Message>
 struct identity;
 template <>
@@ -78,7 +78,7 @@ concept known = requires {
   identity<Message>::md5;
 };
 
-/// A list of numbers behind their count. (The library's own serialiser of vectors is not valid C++20.)
+/// A list of numbers, after their count. (The library's serialiser of vectors is not valid C++20.)
 template <class T>
 void list_of(ros::serialization::IStream& s, std::vector<T>& values) {
   std::uint32_t count = 0;
@@ -99,7 +99,7 @@ void list_of(Stream& s, const std::vector<T>& values) {
     if (count != 0) std::memcpy(to, values.data(), bytes);
 }
 
-/// All fields of a message, in their order.
+/// All fields of a message, in order.
 template <class Stream, class Header>
 void fields_of_header(Stream& s, Header& h) {
   s.next(h.seq), s.next(h.sec), s.next(h.nsec), s.next(h.frame_id);

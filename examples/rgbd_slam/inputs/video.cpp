@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// Part of the module for videos; see video_module.hpp.
+// Part of the video module; see video_module.hpp.
 #include <algorithm>
 #include <cmath>
 #include <mutex>
@@ -46,7 +46,7 @@ class video_recording final : public file_recording {
   }
 
  private:
-  /// To seek is exact with few containers: the file is read forwards, and from its beginning where it must go back.
+  /// Few containers support exact seeking: reads the file forwards, and from the beginning for earlier frames.
   [[nodiscard]] result<orbis::image<orbis::rgb8>> read(std::size_t i) const {
     const std::lock_guard lock{mutex_};
     if (i < next_) {
@@ -85,14 +85,14 @@ std::vector<double> times_in(cv::VideoCapture& reader, std::vector<std::string>&
   const double fps = reader.get(cv::CAP_PROP_FPS);
   const double rate = std::isfinite(fps) && fps > 0.0 ? fps : 30.0;
   for (std::size_t i = 0; i != times.size(); ++i) times[i] = static_cast<double>(i) / rate;
-  notes.push_back("the container's time stamps do not ascend: images are taken to come at " + std::to_string(rate) +
-                  " a second");
+  notes.push_back("the container's timestamps do not ascend: a rate of " + std::to_string(rate) +
+                  " images per second is assumed");
   return times;
 }
 
 result<std::unique_ptr<file_recording>> read_video(const std::filesystem::path& path,
                                                    const file_recording_options& options) {
-  cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);  // what is wrong is said here
+  cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);  // errors are reported here
   std::error_code ignored;
   if (!std::filesystem::exists(path, ignored)) return fail(errc::not_found, path.string(), "no such file");
   if (options.sensor == orbis::slam::sensor_kind::rgbd)
@@ -110,10 +110,10 @@ result<std::unique_ptr<file_recording>> read_video(const std::filesystem::path& 
     return fail(errc::unsupported, path.string(), "is no folder, no bag, and no video that OpenCV can read");
   if (!camera)
     return fail(errc::invalid_argument, path.string(),
-                "the camera is not known: put a camera.toml beside the video, or name a camera");
+                "unknown camera: put a camera.toml next to the video, or name a camera");
   std::vector<std::string> notes;
   auto times = times_in(reader, notes);
-  if (times.empty()) return fail(errc::no_data, path.string(), "there is not one image in this video");
+  if (times.empty()) return fail(errc::no_data, path.string(), "the video contains no images");
   reader.open(path.string());
   auto video = std::make_unique<video_recording>(path, std::move(reader), std::move(times));
   video->sensor = options.sensor.value_or(orbis::slam::sensor_kind::monocular);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// Part of the module for videos; see video_module.hpp.
+// Part of the video module; see video_module.hpp.
 #include <algorithm>
 #include <utility>
 
@@ -22,12 +22,12 @@ using orbis::result;
 class video_camera final : public camera_device {
  public:
   explicit video_camera(cv::VideoCapture reader) : reader_{std::move(reader)} {}
-  /// V4L2 waits for a frame by itself, for at most ten seconds.
+  /// V4L2 itself waits for a frame, for at most ten seconds.
   result<std::optional<source_frame>> next(std::chrono::milliseconds) override {
-    if (!reader_.grab()) return fail(errc::unreadable, name, "gives no more images: was it disconnected?");
+    if (!reader_.grab()) return fail(errc::unreadable, name, "delivers no more images; it may be disconnected");
     const double time = opened_at_ + seconds_of<std::chrono::steady_clock>() - opened_;
     cv::Mat image;
-    if (!reader_.retrieve(image)) return std::optional<source_frame>{};  // damaged on its way
+    if (!reader_.retrieve(image)) return std::optional<source_frame>{};  // damaged in transfer
     auto converted = rgb_of(image, name);
     if (!converted) return fail(converted.error());
     if (auto fits = check_camera(camera, sensor, converted->width(), converted->height(), name); !fits)
@@ -46,21 +46,20 @@ class video_camera final : public camera_device {
   }
 
   cv::VideoCapture reader_;
-  // The time of day, which goes on evenly even where that is set anew.
+  // The time of day, continued steadily even if the system clock is set.
   double opened_at_ = seconds_of<std::chrono::system_clock>(), opened_ = seconds_of<std::chrono::steady_clock>();
 };
 
 result<std::unique_ptr<camera_device>> video_camera_of(const device_options& options) {
-  cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);  // what is wrong is said here
+  cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);  // errors are reported here
   const std::string name = options.name.empty() ? "/dev/video0" : options.name;
   if (options.sensor == orbis::slam::sensor_kind::rgbd)
-    return fail(errc::unsupported, name, "a video camera gives no depth");
-  if (!options.camera)
-    return fail(errc::invalid_argument, name, "the camera is not known: name it with --camera camera.toml");
+    return fail(errc::unsupported, name, "a video camera has no depth");
+  if (!options.camera) return fail(errc::invalid_argument, name, "unknown camera: name it with --camera camera.toml");
   const bool is_number = name.find_first_not_of("0123456789") == std::string::npos && name.size() < 4;
   cv::VideoCapture reader;
   const bool opened = is_number ? reader.open(std::stoi(name), cv::CAP_V4L2) : reader.open(name, cv::CAP_V4L2);
-  if (!opened) return fail(errc::not_found, name, "is no video camera that can be opened");
+  if (!opened) return fail(errc::not_found, name, "cannot be opened as a video camera");
   const auto& k = options.camera->model.k();
   reader.set(cv::CAP_PROP_FRAME_WIDTH, options.sensor == orbis::slam::sensor_kind::stereo ? 2 * k.width : k.width);
   reader.set(cv::CAP_PROP_FRAME_HEIGHT, k.height);

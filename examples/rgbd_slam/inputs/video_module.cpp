@@ -12,7 +12,7 @@ namespace {
 using orbis::errc;
 using orbis::fail;
 
-/// A function of the module, which stays loaded.
+/// A function of the module; the module stays loaded.
 template <class Function>
 orbis::result<Function*> find(const char* name) {
   std::error_code ignored;
@@ -22,7 +22,7 @@ orbis::result<Function*> find(const char* name) {
   if (function != nullptr) return reinterpret_cast<Function*>(function);
   const char* const why = dlerror();
   return fail(errc::unsupported, file.string(),
-              std::string{"reads videos, and cannot be loaded: "} + (why != nullptr ? why : "it has no such function"));
+              std::string{"cannot load the video module: "} + (why != nullptr ? why : "it lacks the function"));
 }
 
 }  // namespace
@@ -62,13 +62,14 @@ bool has_video_cameras() { return false; }
 orbis::result<std::unique_ptr<file_recording>> open_video(const std::filesystem::path& path,
                                                           const file_recording_options&) {
   return fail(errc::unsupported, path.string(),
-              "is no folder, and this build reads no videos: it was made without OpenCV's videoio "
+              "is no folder, and this build has no support for videos: it was built without OpenCV's videoio "
               "(libopencv-videoio-dev)");
 }
 
 orbis::result<std::unique_ptr<camera_device>> open_video_camera(const device_options& options) {
   return fail(errc::unsupported, options.name.empty() ? "video camera" : options.name,
-              "this build knows no video cameras: it was made without OpenCV's videoio (libopencv-videoio-dev)");
+              "this build has no support for video cameras: it was built without OpenCV's videoio "
+              "(libopencv-videoio-dev)");
 }
 
 }  // namespace app

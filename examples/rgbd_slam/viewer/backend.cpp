@@ -13,7 +13,7 @@ bool has_viewer(const std::string& name) {
   return name.empty();
 }
 
-std::string how_to_get_viewer(const std::string& name) {
+std::string missing_viewer_message(const std::string& name) {
   const bool is_window = name == "window";
   return "--viewer " + name + ": this program was built without it; install " +
          (is_window ? "libglfw3-dev, libimgui-dev and libgl-dev" : "libcpp-httplib-dev and pkg-config") +
@@ -22,12 +22,12 @@ std::string how_to_get_viewer(const std::string& name) {
 
 #ifndef RGBD_SLAM_WINDOW
 orbis::result<std::unique_ptr<viewer_backend>> open_window() {
-  return orbis::fail(orbis::errc::unsupported, {}, how_to_get_viewer("window"));
+  return orbis::fail(orbis::errc::unsupported, {}, missing_viewer_message("window"));
 }
 #endif
 #ifndef RGBD_SLAM_WEB
 orbis::result<std::unique_ptr<viewer_backend>> open_web(unsigned) {
-  return orbis::fail(orbis::errc::unsupported, {}, how_to_get_viewer("web"));
+  return orbis::fail(orbis::errc::unsupported, {}, missing_viewer_message("web"));
 }
 #endif
 

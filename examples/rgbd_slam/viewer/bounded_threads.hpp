@@ -16,16 +16,17 @@
 
 namespace app {
 
-/// A fixed number of threads for connections. Who comes while too many wait is left to wait in the system's own,
-/// bounded queue. `TaskQueue` is cpp-httplib's, whose `enqueue` returns nothing before version 0.15, and since then
-/// whether the job was taken: here every job is.
+/// A fixed number of threads for connections. If too many connections wait, further ones wait in the system's bounded
+/// queue. `TaskQueue` is cpp-httplib's, whose `enqueue` returns void before version 0.15, and since then true if the
+/// job was accepted: here every job is.
 template <class TaskQueue>
 class bounded_threads final : public TaskQueue {
   using taken = decltype(std::declval<TaskQueue&>().enqueue(std::function<void()>{}));
 
  public:
-  /// `waiting`: jobs that wait at most, before `enqueue` does. `failed` is called on a thread of this object when a job
-  /// has thrown. Where the system gives fewer threads, these do all the work. Throws if it gives none. @pre threads > 0
+  /// `waiting`: maximum number of waiting jobs, above which `enqueue` blocks. `failed` is called on a thread of this
+  /// object if a job throws. If the system provides fewer threads, these do all the work; throws if it provides none.
+  /// @pre threads > 0
   bounded_threads(std::size_t threads, std::size_t waiting, std::function<void(std::exception_ptr)> failed)
       : waiting_{waiting}, failed_{std::move(failed)} {
     threads_.reserve(threads);
@@ -40,7 +41,7 @@ class bounded_threads final : public TaskQueue {
   }
   bounded_threads(const bounded_threads&) = delete;
   bounded_threads& operator=(const bounded_threads&) = delete;
-  ~bounded_threads() override { end(); }  // a server that ends by an exception does not call `shutdown`
+  ~bounded_threads() override { end(); }  // the server does not call `shutdown` if it ends by an exception
 
   taken enqueue(std::function<void()> job) override {
     {
@@ -51,7 +52,7 @@ class bounded_threads final : public TaskQueue {
     changed_.notify_all();
     if constexpr (!std::is_void_v<taken>) return taken{true};
   }
-  /// Does the jobs that wait, and ends.
+  /// Finishes the waiting jobs and ends the threads.
   void shutdown() override { end(); }
 
  private:

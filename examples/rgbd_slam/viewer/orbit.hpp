@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The eye that looks at the scene: it turns about a point that follows the camera.
+/// The viewpoint: it rotates about a target that follows the camera.
 #pragma once
 
 #include <algorithm>
@@ -20,14 +20,15 @@ class orbit {
  public:
   bool follows = true;
 
-  /// Follows the camera; the first pose places the eye behind it. `seconds` since the last call.
+  /// Follows the camera; the first pose places the viewpoint behind it. `seconds` since the last call.
   void follow(const orbis::se3& T_world_camera, double seconds) {
     const orbis::vec3 goal = T_world_camera * orbis::vec3{0.0, 0.0, 1.0};
     if (!is_placed_) {
       is_placed_ = true;
       target_ = goal;
       const orbis::vec3 forward = T_world_camera.rotation() * orbis::vec3::UnitZ();
-      yaw_ = std::atan2(-forward.y(), -forward.x()) + 0.35;  // a little aside, so that the frustum is seen as one
+      yaw_ =
+          std::atan2(-forward.y(), -forward.x()) + 0.35;  // slightly to the side, so that the frustum is recognisable
     } else if (follows) {
       target_ += (1.0 - std::exp(-4.0 * seconds)) * (goal - target_);
     }
@@ -36,7 +37,7 @@ class orbit {
     yaw_ -= 0.006 * dx_pixels;
     pitch_ = std::clamp(pitch_ + 0.006 * dy_pixels, -1.55, 1.55);
   }
-  /// Moves with the mouse what lies at the target. `height`: of the view, pixels.
+  /// Pans so that the point at the target follows the mouse. `height`: of the view, pixels.
   void pan(double dx_pixels, double dy_pixels, double height) {
     const double metres = distance_ * 2.0 * std::tan(0.5 * field_of_view) / height;
     const frame_axes a = axes();
@@ -48,7 +49,7 @@ class orbit {
   [[nodiscard]] double distance() const { return distance_; }
   [[nodiscard]] orbis::vec3 position() const { return target_ + distance_ * axes().back; }
   [[nodiscard]] orbis::vec3 forward() const { return -axes().back; }
-  /// clip_from_world as OpenGL takes it. `aspect`: width by height.
+  /// The matrix clip_from_world in OpenGL's convention. `aspect`: width / height.
   [[nodiscard]] Eigen::Matrix4f clip_from_world(double aspect) const {
     const frame_axes a = axes();
     const orbis::vec3 at = position();

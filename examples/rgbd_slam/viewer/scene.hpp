@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// All that the viewer shows, as plain data. `scene_builder` fills it, a `viewer_backend` draws it.
+/// The contents of the viewer as plain data. `scene_builder` fills it, a `viewer_backend` draws it.
 #pragma once
 
 #include <array>
@@ -18,27 +18,27 @@
 
 namespace app {
 
-/// The camera's pinhole shape, for its frustum: rays through the corners of the image at z = 1, in the camera frame,
-/// clockwise from the top left one.
+/// The corners of the camera's frustum: rays through the corners of the image at z = 1, in the camera frame, clockwise
+/// from the top left.
 using frustum_rays = std::array<orbis::vec3f, 4>;
 
 struct shown_feature {
   float x = 0.0F, y = 0.0F;  ///< pixels
-  bool tracked = false;      ///< observes a landmark that was known before
+  bool tracked = false;      ///< observes a known landmark
 };
 
-/// The newest frame that was handed over.
+/// The newest frame.
 struct shown_frame {
-  std::uint64_t number = 0;  ///< of the frame in the recording
-  std::string state;         ///< of tracking, in words
+  std::uint64_t number = 0;  ///< number of the frame in the recording
+  std::string state;         ///< state of tracking
   std::optional<orbis::se3> T_world_camera;
-  std::shared_ptr<const orbis::image<orbis::rgb8>> image;  ///< never null once a frame was handed over
-  std::vector<shown_feature> features;                     ///< none where the frame was not tracked
+  std::shared_ptr<const orbis::image<orbis::rgb8>> image;  ///< never null
+  std::vector<shown_feature> features;                     ///< empty if the frame was not tracked
 };
 
 enum class edge_kind : std::uint8_t { covisible, tree, loop };
 
-/// An edge between two of the keyframes.
+/// An edge between two keyframes.
 struct shown_edge {
   std::uint32_t a = 0, b = 0;
   edge_kind kind = edge_kind::covisible;
@@ -46,53 +46,53 @@ struct shown_edge {
 
 struct trail_point {
   orbis::vec3f position;
-  bool begins = false;  ///< not joined with the point before: tracking was lost between them
+  bool begins = false;  ///< not connected with the previous point: tracking was lost between them
 };
 
-/// Keyframes and the path of the camera, by their present poses.
+/// Keyframes and the path of the camera at their current poses.
 struct shown_graph {
-  std::uint64_t revision = 0;  ///< grows with every change
+  std::uint64_t revision = 0;  ///< increases with every change
   std::vector<orbis::se3> keyframes;
   std::vector<shown_edge> edges;
   std::vector<trail_point> trail;
 };
 
-/// An occupied cube of 2^level voxels' edge within a block, by its lowest voxel there.
+/// An occupied cube with an edge of 2^level voxels, by the coordinates of its lowest voxel in its block.
 struct shown_voxel {
   std::uint8_t x = 0, y = 0, z = 0, level = 0;
   orbis::rgb8 color{};
   friend bool operator==(const shown_voxel&, const shown_voxel&) = default;
 };
 
-/// The lowest voxel of a block of 32^3 voxels, in blocks; the world's origin is the corner of block (0, 0, 0).
+/// The index of a block of 32^3 voxels; the world's origin is the corner of block (0, 0, 0).
 using block_index = std::array<std::int32_t, 3>;
 inline constexpr int block_voxels = 32;
 
 struct voxel_block {
-  std::uint64_t revision = 0;  ///< of `shown_voxels` when it last changed
+  std::uint64_t revision = 0;  ///< revision of `shown_voxels` at the last change
   std::vector<shown_voxel> voxels;
 };
 
-/// The occupied voxels, in blocks, so that what has not changed need not be sent again. A block that became empty
-/// stays.
+/// The occupied voxels in blocks, so that unchanged blocks are not sent again. Blocks that became empty stay in the
+/// list.
 struct shown_voxels {
   std::uint64_t revision = 0;  ///< grows with every change
   double resolution = 0.0;     ///< metres
-  std::size_t count = 0;       ///< of cubes
-  float floor = 0.0F;          ///< heights that nearly all cubes lie between, metres
+  std::size_t count = 0;       ///< number of cubes
+  float floor = 0.0F;          ///< heights between which nearly all cubes are, metres
   float ceiling = 0.0F;
   std::map<block_index, voxel_block> blocks;
-  std::string absent;  ///< why there are none to be expected; empty: there are
+  std::string absent;  ///< the reason why there are no voxels; empty otherwise
 };
 
 struct shown_numbers {
-  std::size_t frames = 0;  ///< of the recording
+  std::size_t frames = 0;  ///< number of frames of the recording
   double tracking_ms = 0.0, tracking_p95_ms = 0.0;
   std::size_t insertions = 0;
-  double insert_ms = 0.0, insert_p95_ms = 0.0;  ///< of a keyframe into the octree
-  std::size_t behind_frames = 0;                ///< by how many frames tracking was ahead of the last insertion
+  double insert_ms = 0.0, insert_p95_ms = 0.0;  ///< insertion of a keyframe into the octree
+  std::size_t behind_frames = 0;                ///< maximum number of frames tracked before an insertion
   std::size_t corrections = 0;
-  double correction_ms = 0.0;  ///< the last one
+  double correction_ms = 0.0;  ///< of the last correction
 };
 
 struct viewer_scene {
@@ -102,7 +102,7 @@ struct viewer_scene {
   shown_graph graph;
   shown_voxels voxels;
   shown_numbers numbers;
-  bool is_over = false;  ///< no frame comes any more
+  bool is_over = false;  ///< no more frames follow
 };
 
 }  // namespace app

@@ -12,19 +12,19 @@ using orbis::se3;
 using orbis::vec3f;
 
 constexpr float trail_step = 0.02F;              // metres between points of the path
-constexpr std::size_t recent_frames = 300;       // that the percentile of tracking is about
-constexpr std::size_t keyframes_at_a_time = 64;  // whose colours follow a correction before voxels are shown
-constexpr int color_tolerance = 12;              // a voxel that changed its colour by less is not shown anew
+constexpr std::size_t recent_frames = 300;       // for the percentile of the tracking time
+constexpr std::size_t keyframes_at_a_time = 64;  // moved per update after a correction
+constexpr int color_tolerance = 12;              // smaller colour changes of a voxel are not shown
 
 std::uint64_t name_of(orbis::slam::map_keyframe k) { return std::uint64_t{k.map.value()} << 32U | k.keyframe.value(); }
 
-/// How far points two metres in front of the camera moved, metres.
+/// The displacement of points two metres in front of the camera, metres.
 double motion(const se3& from, const se3& to) {
   const auto difference = (from.inverse() * to).log();
   return difference.head<3>().norm() + 2.0 * difference.tail<3>().norm();
 }
 
-/// The value below which `share` of the values lie. @pre there is one
+/// The value below which the fraction `share` of the values is. @pre there is at least one value
 template <class T>
 T percentile(std::vector<T> values, double share) {
   const auto nth = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
@@ -32,8 +32,8 @@ T percentile(std::vector<T> values, double share) {
   return *nth;
 }
 
-/// Whether two lists of cubes look the same.
-bool look_alike(const std::vector<shown_voxel>& a, const std::vector<shown_voxel>& b) {
+/// Returns true if two lists of cubes look the same.
+bool is_similar(const std::vector<shown_voxel>& a, const std::vector<shown_voxel>& b) {
   const auto close = [](std::uint8_t p, std::uint8_t q) { return std::abs(p - q) <= color_tolerance; };
   return std::equal(a.begin(), a.end(), b.begin(), b.end(), [&](const shown_voxel& p, const shown_voxel& q) {
     return p.x == q.x && p.y == q.y && p.z == q.z && p.level == q.level && close(p.color.r, q.color.r) &&
@@ -49,7 +49,7 @@ frustum_rays corner_rays(const orbis::camera::ray_table& rays) {
   const std::array<std::array<int, 2>, 4> at{{{0, 0}, {right, 0}, {right, bottom}, {0, bottom}}};
   for (std::size_t i = 0; i != 4; ++i) {
     corners[i] = rays.at(at[i][0], at[i][1], 1.0F);
-    // A wide lens may see nothing there: a pyramid of 90 degrees stands for it.
+    // The corners of a wide-angle image may have no such rays; a pyramid of 90 degrees replaces them.
     if (!corners[i].allFinite()) corners[i] = {at[i][0] == 0 ? -1.0F : 1.0F, at[i][1] == 0 ? -1.0F : 1.0F, 1.0F};
   }
   return corners;
@@ -59,7 +59,7 @@ scene_builder::scene_builder(std::string title, std::size_t frames, orbis::camer
                              std::size_t max_samples)
     : rays_{std::move(rays)},
       resolution_{resolution},
-      // A sample for each voxel at three metres; each keyframe sees most of the voxels that the others see.
+      // One sample per voxel at a distance of three metres; keyframes mostly see the same voxels.
       step_{std::clamp(static_cast<int>(resolution / 3.0 * 0.8 * rays_.width()), 3, 8)},
       max_samples_{max_samples},
       colors_{resolution} {
@@ -71,9 +71,9 @@ scene_builder::scene_builder(std::string title, std::size_t frames, orbis::camer
 
 scene_builder::~scene_builder() { std::unique_ptr<mailbox>{box_.load()}.reset(); }
 
-// -- the thread that tracks
+// -- tracking thread
 
-std::vector<scene_builder::sample> scene_builder::samples_of(const handed_frame& frame) const {
+std::vector<scene_builder::sample> scene_builder::samples_of(const viewer_frame& frame) const {
   std::vector<sample> samples;
   const int width = std::min({frame.color.width(), frame.depth.width(), rays_.width()});
   const int height = std::min({frame.color.height(), frame.depth.height(), rays_.height()});
@@ -88,8 +88,8 @@ std::vector<scene_builder::sample> scene_builder::samples_of(const handed_frame&
   return samples;
 }
 
-void scene_builder::hand_over(handed_frame frame) {
-  // What the viewer has not taken is taken back, added to and put in again: neither thread can hold the other up.
+void scene_builder::push(viewer_frame frame) {
+  // Takes the unread mail back, adds to it, and puts it in again: neither thread blocks the other.
   std::unique_ptr<mailbox> mail{box_.exchange(nullptr)};
   if (!mail) mail = std::make_unique<mailbox>();
   if (frame.keyframe && takes_colors_ && mail->samples <= max_samples_ / 8) {
@@ -112,7 +112,7 @@ void scene_builder::hand_over(handed_frame frame) {
   box_.store(mail.release());
 }
 
-// -- the viewer's thread
+// -- viewer thread
 
 std::size_t scene_builder::index_of(orbis::slam::map_keyframe k) {
   const auto [at, is_new] = asked_.try_emplace(name_of(k), graph_.asked.size());
@@ -123,7 +123,7 @@ std::size_t scene_builder::index_of(orbis::slam::map_keyframe k) {
   return at->second;
 }
 
-void scene_builder::take_mail() {
+void scene_builder::read_mailbox() {
   const std::unique_ptr<mailbox> taken{box_.exchange(nullptr)};
   if (!taken) return;
   mailbox& mail = *taken;
@@ -145,7 +145,7 @@ void scene_builder::take_mail() {
     }
   make_room();
   if (!mail.newest) return;
-  handed_frame& f = *mail.newest;
+  viewer_frame& f = *mail.newest;
   shown_frame shown{f.number, std::move(f.state), f.T_world_camera, {}, {}};
   shown.image = std::make_shared<const orbis::image<orbis::rgb8>>(std::move(f.color));
   if (f.tracked)
@@ -157,7 +157,7 @@ const viewer_scene& scene_builder::update(const scene_sources& sources) { return
 const viewer_scene& scene_builder::update_at_once(const scene_sources& sources) { return update(sources, true); }
 
 const viewer_scene& scene_builder::update(const scene_sources& sources, bool at_once) {
-  take_mail();
+  read_mailbox();
   auto start = clock::now();
   if (sources.graph && (at_once || graph_pace_.is_due(start))) {
     update_graph(sources, at_once);
@@ -192,7 +192,7 @@ void scene_builder::draw_trail() {
   for (const trail_item& item : trail_) {
     const auto& pose = item.asked < graph_.poses.size() ? graph_.poses[item.asked] : std::nullopt;
     begins = begins || item.begins;
-    if (!pose) {  // of another map
+    if (!pose) {  // in another map
       begins = true;
       continue;
     }
@@ -293,7 +293,7 @@ void scene_builder::show_cubes() {
     for (int i = 0; i != 3; ++i) {
       const auto cell =
           static_cast<std::int32_t>(std::floor((static_cast<double>(v.center[i]) - to_lowest) / resolution_));
-      const std::int32_t b = cell >> 5;  // towards minus infinity
+      const std::int32_t b = cell >> 5;  // rounds towards minus infinity
       block[static_cast<std::size_t>(i)] = b;
       inside[static_cast<std::size_t>(i)] = static_cast<std::uint8_t>(cell - b * block_voxels);
     }
@@ -312,7 +312,7 @@ void scene_builder::show_cubes() {
     }
   for (auto& [index, voxels] : blocks) {
     voxel_block& block = shown.blocks[index];
-    if (look_alike(block.voxels, voxels)) continue;
+    if (is_similar(block.voxels, voxels)) continue;
     block = {revision, std::move(voxels)};
     changed = true;
   }
@@ -320,8 +320,8 @@ void scene_builder::show_cubes() {
   shown.revision = revision;
   shown.count = cubes_.size();
   if (heights.empty()) return;
-  shown.floor =
-      std::floor(10.0F * percentile(heights, 0.01)) / 10.0F;  // in steps, so that colours stay as the map grows
+  shown.floor = std::floor(10.0F * percentile(heights, 0.01)) /
+                10.0F;  // in steps, so that colours are stable while the map grows
   shown.ceiling = std::max(std::ceil(10.0F * percentile(heights, 0.99)) / 10.0F, shown.floor + 0.5F);
 }
 

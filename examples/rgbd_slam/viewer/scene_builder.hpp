@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Fills the scene with what tracking hands over and with what SLAM and the live map say when they are asked.
+/// Builds the scene from frames of tracking and from data of SLAM and the live map.
 #pragma once
 
 #include <algorithm>
@@ -28,94 +28,93 @@
 
 namespace app {
 
-/// A frame as tracking hands it over.
-struct handed_frame {
+/// A frame for the viewer.
+struct viewer_frame {
   std::uint64_t number = 0;  ///< in the recording
   std::string state{};
   double tracking_ms = 0.0;
   std::optional<orbis::se3> T_world_camera{};
-  std::optional<orbis::slam::tracked_frame> tracked{};  ///< empty where it was not
-  std::optional<orbis::slam::map_keyframe> keyframe{};  ///< that it became
+  std::optional<orbis::slam::tracked_frame> tracked{};  ///< empty if it was not tracked
+  std::optional<orbis::slam::map_keyframe> keyframe{};  ///< set if it became a keyframe
   orbis::image<orbis::rgb8> color{};
-  orbis::image<std::uint16_t> depth{};  ///< used of keyframes
+  orbis::image<std::uint16_t> depth{};  ///< used for keyframes only
   double depth_scale = 1.0;
 };
 
-/// Keyframes and their graph, as SLAM has them.
+/// Keyframes of SLAM and their graph.
 struct slam_graph {
-  std::vector<orbis::slam::map_keyframe> asked;  ///< keyframes whose poses are wanted, by the ids that they once had
-  /// Of these, with the scale of what was noted relative to them (1 with depth); empty where they are not in the active
-  /// map.
+  std::vector<orbis::slam::map_keyframe> asked;  ///< requested keyframes, by the ids at their creation
+  /// Their poses, with the scale of data relative to them (1 with depth); empty if they are not in the active map.
   std::vector<std::optional<orbis::sim3>> poses;
-  std::vector<orbis::se3> keyframes;  ///< of the active map
+  std::vector<orbis::se3> keyframes;  ///< poses of the active map
   std::vector<shown_edge> edges;      ///< between them
 };
 
-/// Where the scene comes from besides frames. All are called by `update`; any may be empty.
+/// Data sources of the scene in addition to frames. `update` calls them; each may be empty.
 struct scene_sources {
-  /// Fills in a graph but for `asked` and returns true; or false if the poses are those of the last call and `always`
-  /// is false.
+  /// Fills in a graph, except `asked`, and returns true. Returns false if the poses have not changed since the last
+  /// call and `always` is false.
   std::function<bool(slam_graph& graph, bool always)> graph{};
-  /// Fills in the occupied cubes of the newest map, without colours, and returns true; or false if they are those of
-  /// the last call.
+  /// Fills in the occupied cubes of the newest map, without colours, and returns true. Returns false if they have not
+  /// changed since the last call.
   std::function<bool(std::vector<voxel>& cubes)> voxels{};
   std::function<live_results()> numbers{};
 };
 
 class scene_builder {
  public:
-  /// Pixels of keyframes that are kept for the colours of voxels, by default: 48 MB of them.
+  /// Default maximum number of keyframe pixels that are stored for the colours of voxels: 48 MB.
   static constexpr std::size_t default_max_samples = 4'000'000;
 
-  /// `frames`: of the recording. `resolution`: of the map, metres. `max_samples`: where more pixels would be kept,
-  /// every other one of the keyframe that has most is given up.
+  /// `frames`: of the recording. `resolution`: of the map, metres. `max_samples`: above this number of pixels, every
+  /// other pixel of the keyframe with the most pixels is discarded.
   scene_builder(std::string title, std::size_t frames, orbis::camera::ray_table rays, double resolution,
                 std::size_t max_samples = default_max_samples);
   scene_builder(const scene_builder&) = delete;
   scene_builder& operator=(const scene_builder&) = delete;
   ~scene_builder();
 
-  /// Takes a frame over. Has no lock, and never waits for the other functions: what was not yet taken into the scene is
-  /// replaced by it, but for the path of the camera and the colours of keyframes; of these, those that would be too
-  /// much until they are taken are left out. Of a keyframe it reads the pixels that are kept. For one thread.
-  void hand_over(handed_frame frame);
+  /// Adds a frame. Lock-free; never waits for the other functions. It replaces the previous frame if that is not in the
+  /// scene yet, except for the path and the colours of keyframes, whose number is limited until the next update. Reads
+  /// the stored pixels of a keyframe. For one thread.
+  void push(viewer_frame frame);
 
-  /// Brings the scene up to date, and returns it. SLAM is asked at most every few hundred milliseconds, and at most a
-  /// tenth of the time; the map as well.
+  /// Updates the scene and returns it. Queries SLAM and the map at most every few hundred milliseconds, for at most a
+  /// tenth of the time each.
   const viewer_scene& update(const scene_sources& sources);
-  /// As above, but asks at once.
+  /// As above, but queries at once.
   const viewer_scene& update_at_once(const scene_sources& sources);
-  /// As above, for the last time: no frame comes any more. Frees what was kept to follow corrections.
+  /// As above, for the last time, after the last frame. Frees the data for following corrections.
   void finish(const scene_sources& sources);
-  /// Frees what was kept to follow corrections. The scene stays as it is.
+  /// Frees the data for following corrections. The scene stays unchanged.
   void forget();
-  /// Shows these voxels from now on, instead of the live map's.
+  /// Replaces the voxels of the live map.
   void set_voxels(std::vector<voxel> colored);
-  /// Says why there is no live map whose voxels could be shown. Then no pixels of keyframes are kept.
+  /// Sets the reason why there is no live map. No pixels of keyframes are stored then.
   void set_no_voxels(std::string why) {
     scene_.voxels.absent = std::move(why);
     forget_colors();
   }
-  /// The pixels of keyframes that are kept in the scene for the colours of voxels.
+  /// The number of keyframe pixels that are stored for the colours of voxels.
   [[nodiscard]] std::size_t color_samples() const { return sample_count_; }
 
  private:
   using clock = std::chrono::steady_clock;
 
-  /// What of a keyframe gives voxels their colours: pixels on a grid, with depth.
+  /// A keyframe pixel with depth, on a grid, that colours voxels.
   struct sample {
     std::uint16_t x, y;  // pixels
     float depth;         // metres
     orbis::rgb8 color;
   };
   struct colored_keyframe {
-    std::size_t asked = 0;  // index of its pose
+    std::size_t asked = 0;  // index of its pose in the request
     std::vector<sample> samples;
-    std::optional<orbis::se3> placed;  // where its colours were added
+    std::optional<orbis::se3> placed;  // pose at which its colours were added
   };
   struct passed_point {
     orbis::slam::map_keyframe reference;
-    orbis::vec3f at;  // in the reference's frame, in lengths over its scale
+    orbis::vec3f at;  // in the reference's frame, divided by its scale
     bool begins;
   };
   struct trail_item {
@@ -123,15 +122,15 @@ class scene_builder {
     orbis::vec3f at;
     bool begins;
   };
-  /// What was handed over and is not yet in the scene.
+  /// Frames that are not in the scene yet.
   struct mailbox {
-    std::optional<handed_frame> newest;
+    std::optional<viewer_frame> newest;
     std::vector<passed_point> passed;
     std::vector<std::pair<orbis::slam::map_keyframe, std::vector<sample>>> keyframes;
     std::size_t samples = 0;  // of the keyframes
     std::vector<double> tracking_ms;
   };
-  /// When something is asked next: it may take a tenth of the time.
+  /// The time of the next query: queries may take a tenth of the time.
   struct pace {
     std::chrono::milliseconds least;
     clock::time_point next{};
@@ -141,18 +140,18 @@ class scene_builder {
     }
   };
 
-  [[nodiscard]] std::vector<sample> samples_of(const handed_frame& frame) const;
+  [[nodiscard]] std::vector<sample> samples_of(const viewer_frame& frame) const;
   [[nodiscard]] std::size_t index_of(orbis::slam::map_keyframe k);
   const viewer_scene& update(const scene_sources& sources, bool at_once);
-  void take_mail();
+  void read_mailbox();
   template <class Use>
   void for_each_point(const std::vector<sample>& samples, const orbis::se3& T_world_camera, const Use& use) const;
-  /// Gives up pixels of keyframes until there are no more than are allowed.
+  /// Discards pixels of keyframes until their number is within the limit.
   void make_room();
   void forget_colors();
   void update_graph(const scene_sources& sources, bool at_once);
   void draw_trail();
-  /// Moves the colours of keyframes that have moved; of so many, before it returns. False: some are left.
+  /// Moves the colours of moved keyframes, of a limited number per call; returns false if some are left.
   bool move_colors(std::size_t limit);
   void update_voxels(const scene_sources& sources, bool at_once);
   void show_cubes();
@@ -165,7 +164,7 @@ class scene_builder {
 
   std::atomic<mailbox*> box_{nullptr};  // owned
   std::atomic<bool> takes_colors_{true};
-  std::optional<orbis::slam::map_keyframe> last_reference_;  // of the thread that hands over, as the next two
+  std::optional<orbis::slam::map_keyframe> last_reference_;  // used by the tracking thread, like the next two
   orbis::vec3f last_at_ = orbis::vec3f::Zero();
   bool was_lost_ = true;
 
@@ -174,10 +173,10 @@ class scene_builder {
   std::unordered_map<std::uint64_t, std::size_t> asked_;  // index in graph_.asked, by keyframe
   std::vector<trail_item> trail_;
   std::vector<colored_keyframe> colored_;
-  std::size_t sample_count_ = 0;  // of all in colored_
+  std::size_t sample_count_ = 0;  // total in colored_
   voxel_colors colors_;
   std::vector<voxel> cubes_;
-  std::vector<double> tracking_ms_;  // of the last frames, in a ring
+  std::vector<double> tracking_ms_;  // ring buffer of the last frames
   std::size_t frames_seen_ = 0;
   bool graph_asked_more_ = false, colors_changed_ = false, colors_wait_ = false, has_final_voxels_ = false;
   pace graph_pace_{std::chrono::milliseconds{150}}, voxel_pace_{std::chrono::milliseconds{250}},

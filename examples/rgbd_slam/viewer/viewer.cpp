@@ -12,8 +12,8 @@ namespace app {
 namespace {
 
 std::string why_no_live_map(const settings& s) {
-  if (s.localize_only) return "no voxels: with --localize-only there is no map of them";
-  return s.live_map ? "" : "no voxels yet: with --batch-map they are made when all frames are tracked";
+  if (s.localize_only) return "no voxels: --localize-only makes no octree";
+  return s.live_map ? "" : "no voxels yet: with --batch-map the octree is built at the end";
 }
 
 }  // namespace
@@ -24,7 +24,7 @@ orbis::result<viewer> viewer::open(const settings& s, const frame_source& source
       source.title, source.frames, orbis::camera::ray_table{source.camera.model}, s.resolution, why_no_live_map(s))};
   const auto where = made.thread_->start([&s] { return s.viewer == "web" ? open_web(s.viewer_port) : open_window(); });
   if (!where) return orbis::fail(where.error());
-  made.tell_trouble(console);
+  made.report_error(console);
   if (!where->empty()) {
     console.stage("viewer");
     console.finish(*where);
@@ -44,21 +44,22 @@ void viewer::show_map(const std::vector<voxel>& voxels) {
   if (thread_) thread_->show_map(voxels);
 }
 
-void viewer::tell_trouble(console& console) {
+void viewer::report_error(console& console) {
   if (!thread_ || thread_->is_open()) return;
-  if (const std::string why = thread_->take_trouble(); !why.empty())
-    console.warn("the viewer ended early, and the run goes on without it: " + why);
+  if (const std::string why = thread_->take_error(); !why.empty())
+    console.warn("the viewer failed; the run continues without it: " + why);
 }
 
 void viewer::finish(const settings& s, console& console) {
   if (!thread_) return;
-  if (s.viewer_hold && thread_->is_open() && !interrupts::requested()) {
-    interrupts::keep_results({});  // all is written: Ctrl-C only closes the viewer
+  if (s.viewer_hold && thread_->is_open() && !interrupts::stop_requested()) {
+    interrupts::keep_results({});  // all files are written: Ctrl-C only closes the viewer
     console.stage("viewer");
-    console.finish(s.viewer == "web" ? "stays until Ctrl-C" : "stays until it is closed, or Ctrl-C");
-    while (thread_->is_open() && !interrupts::requested()) std::this_thread::sleep_for(std::chrono::milliseconds{50});
+    console.finish(s.viewer == "web" ? "open until Ctrl-C" : "open until it is closed, or Ctrl-C");
+    while (thread_->is_open() && !interrupts::stop_requested())
+      std::this_thread::sleep_for(std::chrono::milliseconds{50});
   }
-  tell_trouble(console);
+  report_error(console);
 }
 
 }  // namespace app

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The live viewer: what tracking and mapping do, while they do it, in a window or in a browser.
+/// The live viewer: shows tracking and mapping during the run, in a window or in a browser.
 #pragma once
 
 #include <concepts>
@@ -18,21 +18,21 @@
 
 namespace app {
 
-/// Shows a run on a thread of its own, of low priority. Tracking only leaves frames in a box, the newest in place of
-/// the one before; it never waits for drawing, nor for a lock that the viewer's thread holds. When the user closes the
-/// viewer, or it fails, the run goes on. Without `--viewer` all calls do nothing.
+/// Shows a run on a separate low-priority thread. Tracking puts its newest frame into a mailbox; it never waits for
+/// drawing or for a lock of the viewer's thread. If the user closes the viewer, or it fails, the run continues. Without
+/// `--viewer` all calls have no effect.
 class viewer {
  public:
-  /// Opens what the settings ask for, and says where it is to be seen. Errors: no display; the port is taken.
+  /// Opens the viewer of the settings and prints its address. Errors: no display; the port is in use.
   [[nodiscard]] static orbis::result<viewer> open(const settings& s, const frame_source& source, console& console);
 
-  /// Hands the frame over that `make()` returns, if somebody may be looking. For one thread.
+  /// Shows the frame that `make()` returns if the viewer is open. For one thread.
   template <std::invocable Make>
   void show(Make&& make) noexcept {
     if (thread_) thread_->show(std::forward<Make>(make));
   }
 
-  /// As long as this lives, the viewer asks the sources; in the end once more.
+  /// Connects the viewer with its sources during its lifetime; queries them a last time at the end.
   class connection {
    public:
     connection(viewer& v, scene_sources sources);
@@ -44,16 +44,16 @@ class viewer {
     viewer& viewer_;
   };
 
-  /// Shows the map that was made in the end.
+  /// Shows the final map.
   void show_map(const std::vector<voxel>& voxels);
-  /// Tells why the viewer ended, if it did so on its own, and was not told before.
-  void tell_trouble(console& console);
-  /// With `--viewer-hold`, waits until the user has closed the viewer or pressed Ctrl-C.
+  /// Prints the error that ended the viewer, once.
+  void report_error(console& console);
+  /// With `--viewer-hold`, waits until the user closes the viewer or presses Ctrl-C.
   void finish(const settings& s, console& console);
 
  private:
   explicit viewer(std::unique_ptr<viewer_thread> thread) : thread_{std::move(thread)} {}
-  std::unique_ptr<viewer_thread> thread_;  // null: nothing is shown
+  std::unique_ptr<viewer_thread> thread_;  // null: no viewer
 };
 
 }  // namespace app

@@ -25,7 +25,7 @@ viewer_thread::~viewer_thread() {
 
 orbis::result<std::string> viewer_thread::start(open_backend open) {
   try {
-    aside_ = std::make_unique<calls_aside>();
+    aside_ = std::make_unique<call_thread>();
     std::promise<orbis::result<std::string>> opened;
     auto outcome = opened.get_future();
     thread_ = std::thread{[this, open = std::move(open), opened = std::move(opened)]() mutable { run(open, opened); }};
@@ -37,7 +37,7 @@ orbis::result<std::string> viewer_thread::start(open_backend open) {
 }
 
 void viewer_thread::run(const open_backend& open, std::promise<orbis::result<std::string>>& opened) {
-  lower_priority(viewer_niceness);  // and that of the threads which the back end starts
+  lower_priority(viewer_niceness);  // also of the threads that the back end starts
   bool has_opened = false;
   try {
     auto backend = open();
@@ -45,7 +45,7 @@ void viewer_thread::run(const open_backend& open, std::promise<orbis::result<std
     std::string where = (*backend)->where();
     is_open_ = has_opened = true;
     opened.set_value(std::move(where));
-    draw_until_the_end(**backend);
+    draw_until_closed(**backend);
   } catch (...) {
     close(std::current_exception());
     if (!has_opened) opened.set_exception(std::current_exception());
@@ -55,13 +55,13 @@ void viewer_thread::run(const open_backend& open, std::promise<orbis::result<std
   builder_.forget();
 }
 
-void viewer_thread::draw_until_the_end(viewer_backend& backend) {
+void viewer_thread::draw_until_closed(viewer_backend& backend) {
   using clock = std::chrono::steady_clock;
   std::unique_lock lock{mutex_};
   while (!ends_) {
     const auto start = clock::now();
     if (!backend.draw(builder_.update(sources_))) return;
-    // At most a third of the time: a graphics card may be the processor in disguise.
+    // Draws for at most a third of the time, as rendering may run on the processor.
     const auto took = clock::now() - start;
     const auto wait = std::max<clock::duration>(backend.interval() - took, 2 * took);
     changed_.wait_for(lock, wait, [&] { return ends_.load(); });
@@ -70,22 +70,22 @@ void viewer_thread::draw_until_the_end(viewer_backend& backend) {
 
 void viewer_thread::close(std::exception_ptr why) noexcept {
   {
-    const std::lock_guard lock{trouble_mutex_};
-    if (!trouble_) trouble_ = std::move(why);
+    const std::lock_guard lock{error_mutex_};
+    if (!error_) error_ = std::move(why);
   }
   is_open_ = false;
   ends_ = true;
 }
 
-std::string viewer_thread::take_trouble() {
-  const std::lock_guard lock{trouble_mutex_};
-  if (!trouble_ || std::exchange(is_told_, true)) return {};
+std::string viewer_thread::take_error() {
+  const std::lock_guard lock{error_mutex_};
+  if (!error_ || std::exchange(is_reported_, true)) return {};
   try {
-    std::rethrow_exception(trouble_);
+    std::rethrow_exception(error_);
   } catch (const std::exception& e) {
     return e.what();
   } catch (...) {
-    return "an exception of an unknown kind";
+    return "unknown exception";
   }
 }
 

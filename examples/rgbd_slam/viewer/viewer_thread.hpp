@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The thread that draws, and how frames and answers come to it.
+/// The viewer's drawing thread and its data.
 #pragma once
 
 #include <atomic>
@@ -21,67 +21,66 @@
 #include <orbis/core/result.hpp>
 
 #include "viewer/backend.hpp"
-#include "viewer/calls_aside.hpp"
+#include "viewer/call_thread.hpp"
 #include "viewer/scene_builder.hpp"
 
 namespace app {
 
-/// Draws on a thread of low priority. What asks others (`scene_sources::graph` and `numbers`), and so takes their
-/// locks, is called on a second thread, of the priority of the one that made this. An exception in any of this closes
-/// the viewer, and reaches nobody else.
+/// Draws on a low-priority thread. Sources that lock mutexes of others (`scene_sources::graph` and `numbers`) are
+/// called on a second thread with the priority of the creator. An exception on these threads closes the viewer and does
+/// not propagate.
 class viewer_thread {
  public:
   using open_backend = std::function<orbis::result<std::unique_ptr<viewer_backend>>()>;
 
-  /// See scene_builder. `no_voxels`: why there is no live map; empty: there is one.
+  /// See scene_builder. `no_voxels`: the reason why there is no live map; empty if there is one.
   viewer_thread(std::string title, std::size_t frames, orbis::camera::ray_table rays, double resolution,
                 std::string no_voxels = {});
   viewer_thread(const viewer_thread&) = delete;
   viewer_thread& operator=(const viewer_thread&) = delete;
   ~viewer_thread();
 
-  /// Calls `open` on the new thread, which then draws; returns where it is to be seen. Errors: those of `open`. If that
-  /// throws, or the system gives no thread, the viewer is closed, and nothing is returned but an empty string. Call it
-  /// once.
+  /// Calls `open` on the new thread, which then draws; returns the viewer's address. Errors: those of `open`. If `open`
+  /// throws, or no thread can be created, the viewer is closed, and an empty string is returned. Call it once.
   [[nodiscard]] orbis::result<std::string> start(open_backend open);
-  /// Whether somebody may be looking.
+  /// Returns true if the viewer is open.
   [[nodiscard]] bool is_open() const noexcept { return is_open_; }
 
-  /// Hands the frame over that `make()` returns, if somebody may be looking. Waits for no thread. For one thread.
+  /// Shows the frame that `make()` returns if the viewer is open. Does not block. For one thread.
   template <std::invocable Make>
   void show(Make&& make) noexcept {
     if (!is_open()) return;
     try {
-      builder_.hand_over(std::forward<Make>(make)());
+      builder_.push(std::forward<Make>(make)());
     } catch (...) {
       close(std::current_exception());
     }
   }
 
-  /// From now on the sources are asked. Waits for the drawing of a scene, as the next two.
+  /// Connects the sources. Waits for the current drawing, like the next two.
   void connect(scene_sources sources);
-  /// Asks the sources once more, and never again.
+  /// Queries the sources a last time and disconnects them.
   void disconnect();
-  /// Shows the map that was made in the end.
+  /// Shows the final map.
   void show_map(const std::vector<voxel>& voxels);
 
-  /// Why the viewer was closed by an exception; empty if it was not, or if this was told before.
-  [[nodiscard]] std::string take_trouble();
+  /// The message of the exception that closed the viewer; empty if there was none, or if it was returned before.
+  [[nodiscard]] std::string take_error();
 
  private:
   void close(std::exception_ptr why) noexcept;
   void run(const open_backend& open, std::promise<orbis::result<std::string>>& opened);
-  void draw_until_the_end(viewer_backend& backend);
+  void draw_until_closed(viewer_backend& backend);
 
-  scene_builder builder_;  // guarded by mutex_, but for `hand_over`
+  scene_builder builder_;  // guarded by mutex_, except `push`
   std::atomic<bool> is_open_{false}, ends_{false};
-  std::mutex trouble_mutex_;
-  std::exception_ptr trouble_;
-  bool is_told_ = false;
+  std::mutex error_mutex_;
+  std::exception_ptr error_;
+  bool is_reported_ = false;
   std::mutex mutex_;
   std::condition_variable changed_;
   scene_sources sources_;
-  std::unique_ptr<calls_aside> aside_;
+  std::unique_ptr<call_thread> aside_;
   std::thread thread_;
 };
 

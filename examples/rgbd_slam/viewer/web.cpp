@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// The scene in a browser: a server on 127.0.0.1 that gives one page and what the page asks for, and takes nothing.
+// The scene in a browser: a read-only server on 127.0.0.1 with one page and its data.
 #include <atomic>
 #include <charconv>
 #include <chrono>
@@ -22,7 +22,7 @@
 #include "viewer/viewer_page.hpp"
 #include "viewer/web_messages.hpp"
 
-// After Eigen, which uses a name that is a macro in a header of this one (_res, of resolv.h).
+// After Eigen, which uses a name (_res) that resolv.h, included here, defines as a macro.
 #include <httplib.h>
 
 namespace app {
@@ -30,10 +30,10 @@ namespace {
 
 constexpr std::size_t server_threads = 8;
 constexpr std::size_t waiting_connections = 8;
-constexpr std::size_t requests_per_connection = 20;  // then others have a turn
+constexpr std::size_t requests_per_connection = 20;  // then other connections get a thread
 
-/// Whether a request is meant for this machine. A page from elsewhere whose name was made to resolve to 127.0.0.1 sends
-/// that name. The port may be another one: that of a tunnel.
+/// Returns true if the Host of a request is this machine. A foreign page whose name resolves to 127.0.0.1 (DNS
+/// rebinding) sends that name. The port may differ, as with a tunnel.
 bool is_local(const httplib::Request& request) {
   if (request.get_header_value_count("Host") != 1) return false;
   std::string host = request.get_header_value("Host");
@@ -44,7 +44,7 @@ bool is_local(const httplib::Request& request) {
   return host == "127.0.0.1" || host == "localhost";
 }
 
-/// The number after `since=`; 0 without it, nothing if it is none.
+/// The number after `since=`; 0 without it, empty if it is not a number.
 std::optional<std::uint64_t> since_of(const httplib::Request& request) {
   if (!request.has_param("since")) return 0;
   const std::string text = request.get_param_value("since");
@@ -74,7 +74,7 @@ class web_backend final : public viewer_backend {
       port_ = port;
     }
     thread_ = std::thread{[this] { serve(); }};
-    while (!server_.is_running() && !has_ended_)  // `stop` would be overlooked before that
+    while (!server_.is_running() && !has_ended_)  // `stop` has no effect before that
       std::this_thread::sleep_for(std::chrono::milliseconds{1});
     return true;
   }
@@ -87,7 +87,7 @@ class web_backend final : public viewer_backend {
 
  private:
   using bytes = std::shared_ptr<const std::string>;
-  /// A frame, whose image becomes a JPEG when it is asked for, and once.
+  /// A frame whose image is compressed to JPEG once, on request.
   struct published_frame {
     shown_frame frame;
     std::once_flag once;
@@ -102,13 +102,14 @@ class web_backend final : public viewer_backend {
   void set_up();
   void serve() {
     try {
-      if (!server_.listen_after_bind()) throw std::runtime_error{"the page's server takes no more connections"};
+      if (!server_.listen_after_bind())
+        throw std::runtime_error{"the server of the viewer accepts no more connections"};
     } catch (...) {
       note(std::current_exception());
     }
     has_ended_ = true;
   }
-  /// Keeps the first exception of a thread of the server, for `draw`.
+  /// Stores the first exception of a server thread for `draw`.
   void note(std::exception_ptr failure) {
     const std::lock_guard lock{mutex_};
     if (!failure_) failure_ = std::move(failure);
@@ -123,7 +124,7 @@ class web_backend final : public viewer_backend {
   std::thread thread_;
   std::atomic<bool> has_ended_{false};
 
-  std::mutex mutex_;  // of what follows
+  std::mutex mutex_;  // guards the members below
   std::exception_ptr failure_;
   std::string state_ = "{}";
   std::shared_ptr<published_frame> frame_;
@@ -138,7 +139,7 @@ void web_backend::set_up() {
     return new bounded_threads<httplib::TaskQueue>{server_threads, waiting_connections,
                                                    [this](std::exception_ptr e) { note(std::move(e)); }};
   };
-  // Not the library's default, by which two servers may have one port.
+  // Replaces the library's default, which allows two servers on one port.
   server_.set_socket_options([](socket_t socket) {
     const int yes = 1;
     ::setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
@@ -158,8 +159,8 @@ void web_backend::set_up() {
                                 "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
                                 "connect-src 'self'; img-src blob:; base-uri 'none'; form-action 'none'"}});
   server_.set_pre_routing_handler([](const httplib::Request& request, httplib::Response& response) {
-    // The library would make an answer of all ranges together: thousands of times the whole, if so many are asked for.
-    // No body, as it would cut that up as well.
+    // The library would answer all requested ranges together, thousands of times the size of the whole. The answer has
+    // no body, because the library would cut that as well.
     if (request.has_header("Range")) {
       response.status = 416;
       response.set_header("Connection", "close");
@@ -174,7 +175,7 @@ void web_backend::set_up() {
     if (request.method != "GET") {
       response.status = 405;
       response.set_header("Allow", "GET");
-      response.set_header("Connection", "close");  // what it brings is not read
+      response.set_header("Connection", "close");  // the body of the request is not read
       response.set_content("only GET\n", "text/plain");
       return httplib::Server::HandlerResponse::Handled;
     }
@@ -200,7 +201,7 @@ bool web_backend::draw(const viewer_scene& scene) {
   std::shared_ptr<published_frame> frame;
   bytes graph;
   std::vector<std::pair<block_index, published_block>> blocks;
-  // Only this thread changes what is compared here, so it may be read without the lock.
+  // Only this thread changes the compared values, so they can be read without the lock.
   if (scene.frame && (!frame_ || frame_->frame.number != scene.frame->number)) {
     frame = std::make_shared<published_frame>();
     frame->frame = *scene.frame;
@@ -235,7 +236,7 @@ void web_backend::give_frame(std::uint64_t since, httplib::Response& response) {
     state = state_;
     frame = frame_;
   }
-  // Frames are counted from 1 here, so that 0 is who has seen none.
+  // frames are counted from 1; 0: the client has none
   if (frame && frame->frame.number + 1 == since) frame.reset();
   if (frame)
     std::call_once(frame->once, [&] { frame->features_and_jpeg = frame_message({}, &frame->frame).substr(4); });
@@ -277,9 +278,9 @@ void web_backend::give_voxels(std::uint64_t since, httplib::Response& response) 
 orbis::result<std::unique_ptr<viewer_backend>> open_web(unsigned port) {
   auto server = std::make_unique<web_backend>();
   if (!server->listen(port))
-    return orbis::fail(orbis::errc::unreadable, "127.0.0.1:" + std::to_string(port),
-                       "the viewer cannot be served there, the port may be taken: --viewer-port takes another one, or "
-                       "0 for any that is free");
+    return orbis::fail(
+        orbis::errc::unreadable, "127.0.0.1:" + std::to_string(port),
+        "the viewer cannot use this port; choose another one with --viewer-port, or 0 for any free port");
   return server;
 }
 

@@ -13,7 +13,7 @@
 namespace app {
 namespace {
 
-static_assert(std::endian::native == std::endian::little, "the viewer's messages are made on little-endian machines");
+static_assert(std::endian::native == std::endian::little, "the viewer's messages need a little-endian machine");
 
 constexpr int jpeg_quality = 75;
 
@@ -67,7 +67,7 @@ std::string state_json(const viewer_scene& scene, std::uint64_t session) {
                       {"tracked", tracked}};
     if (f->T_world_camera) state["frame"]["T_world_camera"] = matrix_of(*f->T_world_camera);
   }
-  return state.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);  // a title may be no UTF-8
+  return state.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);  // a title may be invalid UTF-8
 }
 
 std::string frame_message(const std::string& json, const shown_frame* frame) {

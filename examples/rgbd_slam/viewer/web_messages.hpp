@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// What the page in the browser is sent. Numbers are little-endian, as the page's typed arrays are on every machine
-/// that has a browser.
+/// Messages to the page in the browser. Numbers are little-endian, like typed arrays on all machines with a browser.
 #pragma once
 
 #include <cstdint>
@@ -11,11 +10,11 @@
 
 namespace app {
 
-/// Numbers, names and revisions of the scene as JSON. `session`: tells this server's revisions from another one's.
+/// Numbers, names and revisions of the scene as JSON. `session`: distinguishes the revisions of different servers.
 [[nodiscard]] std::string state_json(const viewer_scene& scene, std::uint64_t session);
 
 /// u32 length of the JSON, the JSON, u32 number of features, for each u16 x, y (eighths of a pixel) and u16 tracked,
-/// then the image as JPEG. Without features and image where `frame` is null.
+/// then the image as JPEG. Without features and image if `frame` is null.
 [[nodiscard]] std::string frame_message(const std::string& json, const shown_frame* frame);
 
 /// u32 number of keyframes, for each the 3 x 4 matrix T_world_camera (12 f32, row by row); u32 number of edges, for
@@ -23,7 +22,7 @@ namespace app {
 /// begins.
 [[nodiscard]] std::string graph_message(const shown_graph& graph);
 
-/// f32 resolution, floor, ceiling (metres), u32 revision, u32 number of blocks; blocks follow.
+/// f32 resolution, floor, ceiling (metres), u32 revision, u32 number of blocks, then the blocks.
 [[nodiscard]] std::string voxel_header(const shown_voxels& voxels, std::size_t blocks);
 /// i32 x, y, z (in blocks), u32 number of cubes, for each u8 x, y, z, level, r, g, b, 0.
 [[nodiscard]] std::string block_message(const block_index& index, const voxel_block& block);

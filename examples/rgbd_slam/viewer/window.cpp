@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// The scene in a window, by OpenGL 3.3. GLFW wants to be called by one thread; on Linux that may be any, here the
+// The scene in a window with OpenGL 3.3. GLFW must be called from one thread; on Linux this may be any thread, here the
 // viewer's.
 #include <algorithm>
 #include <array>
@@ -61,7 +61,7 @@ void add_frustum(std::vector<line_instance>& lines, const orbis::se3& T_world_ca
     lines.push_back(line(T.translation(), corner[i], color));
     lines.push_back(line(corner[i], corner[(i + 1) % 4], color));
   }
-  // A roof shows which side is up.
+  // A triangle marks the upper side.
   const vec3f roof = 0.5F * (corner[0] + corner[1]) - 0.25F * (corner[3] - corner[0]);
   lines.push_back(line(corner[0], roof, color));
   lines.push_back(line(roof, corner[1], color));
@@ -70,8 +70,8 @@ void add_frustum(std::vector<line_instance>& lines, const orbis::se3& T_world_ca
 class gl_program {
  public:
   gl_program() = default;
-  /// False: `trouble` says why.
-  [[nodiscard]] bool make(const char* vertex, const char* fragment, std::string& trouble) {
+  /// False: `message` is the reason.
+  [[nodiscard]] bool make(const char* vertex, const char* fragment, std::string& message) {
     program_ = glCreateProgram();
     for (const auto& [kind, body] : {std::pair{GL_VERTEX_SHADER, vertex}, std::pair{GL_FRAGMENT_SHADER, fragment}}) {
       const GLuint shader = glCreateShader(static_cast<GLenum>(kind));
@@ -83,7 +83,7 @@ class gl_program {
       if (good == 0) {
         std::array<char, 512> log{};
         glGetShaderInfoLog(shader, static_cast<GLsizei>(log.size()), nullptr, log.data());
-        trouble = log.data();
+        message = log.data();
         return false;
       }
       glAttachShader(program_, shader);
@@ -92,7 +92,7 @@ class gl_program {
     glLinkProgram(program_);
     GLint good = 0;
     glGetProgramiv(program_, GL_LINK_STATUS, &good);
-    if (good == 0) trouble = "the shaders do not fit together";
+    if (good == 0) message = "the shaders cannot be linked";
     return good != 0;
   }
   void use() const { glUseProgram(program_); }
@@ -102,10 +102,10 @@ class gl_program {
   GLuint program_ = 0;
 };
 
-/// Instances on the graphics card: some floats each, then a colour.
+/// Instances on the graphics card: floats and a colour each.
 class instance_list {
  public:
-  /// `sizes`: of the attributes before the colour, in floats.
+  /// `sizes`: number of floats of each attribute before the colour.
   void make(std::initializer_list<int> sizes) {
     glGenVertexArrays(1, &array_);
     glGenBuffers(1, &buffer_);
@@ -143,8 +143,8 @@ class instance_list {
   GLsizei count_ = 0;
 };
 
-/// What GLFW last complained about. GLFW has no other way to say it.
-std::string& last_complaint() {
+/// The last error message of GLFW, which reports errors by a callback only.
+std::string& last_glfw_error() {
   static std::string text;
   return text;
 }
@@ -188,10 +188,10 @@ class window_backend final : public viewer_backend {
   orbit eye_;
   clock::time_point last_draw_ = clock::now();
 
-  // What the graphics card has.
+  // Objects on the graphics card.
   std::uint64_t voxel_revision_ = 0, graph_revision_ = 0, frame_ = ~std::uint64_t{0};
 
-  float scale_ = 1.0F;  // of the panel: more on screens with small pixels
+  float scale_ = 1.0F;  // of the panel; larger on high-resolution screens
   bool by_height_ = false, shows_voxels_ = true, shows_graph_ = true;
   float cut_ = 0.75F, top_cut_ = 1.0F;
 };
@@ -199,22 +199,22 @@ class window_backend final : public viewer_backend {
 orbis::result<void> window_backend::open() {
   const auto no_window = [](const std::string& why) {
     return orbis::fail(orbis::errc::unsupported, "--viewer window",
-                       "no window can be opened: " + why + " (--viewer web shows the same in a browser)");
+                       "no window can be opened: " + why + " (--viewer web uses a browser instead)");
   };
-  glfwSetErrorCallback([](int, const char* text) { last_complaint() = text; });
-  if (glfwInit() == 0) return no_window(last_complaint());
+  glfwSetErrorCallback([](int, const char* text) { last_glfw_error() = text; });
+  if (glfwInit() == 0) return no_window(last_glfw_error());
   glfwWindowHint(GLFW_CONTEXT_VERSION_MAJOR, 3);
   glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, 3);
   glfwWindowHint(GLFW_OPENGL_PROFILE, GLFW_OPENGL_CORE_PROFILE);
   glfwWindowHint(GLFW_FOCUS_ON_SHOW, GLFW_FALSE);
   window_ = glfwCreateWindow(1280, 800, "rgbd_slam", nullptr, nullptr);
-  if (window_ == nullptr) return no_window(last_complaint());
+  if (window_ == nullptr) return no_window(last_glfw_error());
   glfwMakeContextCurrent(window_);
-  glfwSwapInterval(0);  // the viewer's thread has its own pace
+  glfwSwapInterval(0);  // the viewer's thread controls the frame rate
 
   ImGui::CreateContext();
   has_gui_ = true;
-  ImGui::GetIO().IniFilename = nullptr;  // nothing is written where the program was started
+  ImGui::GetIO().IniFilename = nullptr;  // do not write into the current folder
   ImGui::StyleColorsDark();
   ImGuiStyle& style = ImGui::GetStyle();
   float scale_x = 1.0F, scale_y = 1.0F;
@@ -228,10 +228,10 @@ orbis::result<void> window_backend::open() {
   ImGui_ImplGlfw_InitForOpenGL(window_, true);
   ImGui_ImplOpenGL3_Init("#version 330 core");
 
-  std::string trouble;
-  if (!voxel_program_.make(voxel_vertex_shader, voxel_fragment_shader, trouble) ||
-      !line_program_.make(line_vertex_shader, line_fragment_shader, trouble))
-    return no_window(trouble);
+  std::string message;
+  if (!voxel_program_.make(voxel_vertex_shader, voxel_fragment_shader, message) ||
+      !line_program_.make(line_vertex_shader, line_fragment_shader, message))
+    return no_window(message);
   cubes_.make({4});
   for (instance_list* list : {&graph_, &trail_, &camera_, &grid_}) list->make({3, 3});
   glGenTextures(1, &texture_);
@@ -241,7 +241,7 @@ orbis::result<void> window_backend::open() {
   return {};
 }
 
-// -- to the graphics card
+// -- uploads to the graphics card
 
 void window_backend::upload_voxels(const shown_voxels& voxels) {
   std::vector<cube_instance> cubes;
@@ -263,7 +263,7 @@ void window_backend::upload_voxels(const shown_voxels& voxels) {
   }
   cubes_.set(cubes);
 
-  // A grid of metres under the map; of more where that would be too many lines.
+  // A grid under the map with lines every metre, or fewer if these would be too many.
   std::vector<line_instance> lines;
   if (!cubes.empty()) {
     const Eigen::Array2f from = (low.cast<float>() * resolution * static_cast<float>(block_voxels)).floor() - 1.0F;
@@ -317,7 +317,7 @@ void window_backend::upload(const viewer_scene& scene) {
   if (has_new_frame || has_new_graph) upload_camera(scene);
 }
 
-// -- what the user sees and does
+// -- display and user input
 
 void window_backend::move_eye(const viewer_scene& scene) {
   const ImGuiIO& io = ImGui::GetIO();
@@ -369,7 +369,7 @@ void window_backend::draw_world(const viewer_scene& scene, int width, int height
   };
   lines(grid_, 1.0F, 1.0F);
   for (const bool hidden : {false, true}) {
-    if (hidden) glDisable(GL_DEPTH_TEST);  // what is behind voxels shines through
+    if (hidden) glDisable(GL_DEPTH_TEST);  // lines behind voxels are drawn faintly
     const float opacity = hidden ? 0.3F : 1.0F;
     if (shows_graph_) lines(graph_, 1.3F, opacity);
     lines(trail_, 2.5F, opacity);
@@ -407,7 +407,7 @@ void window_backend::draw_panel(const viewer_scene& scene) {
     ImGui::TextColored(scene.is_over      ? dim
                        : f.T_world_camera ? good
                                           : bad,
-                       "%s", scene.is_over ? "over" : f.state.c_str());
+                       "%s", scene.is_over ? "finished" : f.state.c_str());
     ImGui::SameLine();
     ImGui::Text("%s", text("frame %zu of %zu", static_cast<std::size_t>(f.number) + 1, n.frames).c_str());
     ImGui::Text("%s", text("features %zu, tracked %td", f.features.size(), tracked).c_str());
@@ -424,7 +424,7 @@ void window_backend::draw_panel(const viewer_scene& scene) {
   row("keyframes", std::to_string(scene.graph.keyframes.size()));
   if (n.insertions != 0) {
     row("insertion, p95", text("%.1f ms, %.1f ms", n.insert_ms, n.insert_p95_ms));
-    row("behind, at most", text("%zu frames", n.behind_frames));
+    row("maximum lag", text("%zu frames", n.behind_frames));
     row("corrections, last", n.corrections == 0 ? "0" : text("%zu, %.1f ms", n.corrections, n.correction_ms));
   }
   row("voxels", std::to_string(scene.voxels.count));
@@ -435,7 +435,7 @@ void window_backend::draw_panel(const viewer_scene& scene) {
   }
   ImGui::Separator();
   ImGui::Checkbox("follow the camera", &eye_.follows);
-  ImGui::Checkbox("voxels by height", &by_height_);
+  ImGui::Checkbox("colour by height", &by_height_);
   if (by_height_) {
     ImGui::SameLine();
     ImGui::TextColored(dim, "%s", text("%.1f m ... %.1f m", scene.voxels.floor, scene.voxels.ceiling).c_str());
@@ -443,8 +443,8 @@ void window_backend::draw_panel(const viewer_scene& scene) {
   ImGui::Checkbox("voxels", &shows_voxels_);
   ImGui::SameLine();
   ImGui::Checkbox("keyframes and graph", &shows_graph_);
-  ImGui::SliderFloat("cut away", &cut_, 0.0F, 1.0F, "%.2f");
-  ImGui::SliderFloat("up to height", &top_cut_, 0.0F, 1.0F, "%.2f");
+  ImGui::SliderFloat("near cut", &cut_, 0.0F, 1.0F, "%.2f");
+  ImGui::SliderFloat("height cut", &top_cut_, 0.0F, 1.0F, "%.2f");
   ImGui::End();
 }
 

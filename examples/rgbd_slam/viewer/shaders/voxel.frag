@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A face with darker edges, where it is large enough to have any.
+// A face with darker edges if it is large enough on the screen.
 in vec3 shade;
 in vec2 on_face;
 out vec4 pixel;

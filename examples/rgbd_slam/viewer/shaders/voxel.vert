@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A cube for each instance: of its faces the three that look to the eye, 18 vertices without a buffer.
+// One cube per instance: the three faces towards the camera, 18 vertices without a buffer.
 layout(location = 0) in vec4 cube;   // centre and edge, metres
 layout(location = 1) in vec4 color;  // 0 ... 1
 uniform mat4 clip_from_world;
 uniform vec3 eye;
-uniform vec3 forward;     // where the eye looks, of length 1
-uniform float nearest;    // cubes nearer than this along `forward` are left out, metres
-uniform float highest;    // cubes above this are left out, metres
-uniform vec2 heights;     // between which the colours of heights go, metres
+uniform vec3 forward;     // viewing direction, unit vector
+uniform float nearest;    // cubes nearer than this along `forward` are omitted, metres
+uniform float highest;    // cubes above this are omitted, metres
+uniform vec2 heights;     // range of the height colours, metres
 uniform float by_height;  // 1: coloured by height, 0: by images
 out vec3 shade;
 out vec2 on_face;  // -1 ... 1
@@ -24,7 +24,7 @@ void main() {
   on_face = vec2(0.0);
   shade = vec3(0.0);
   if (dot(cube.xyz - eye, forward) < nearest || cube.z > highest) {
-    gl_Position = vec4(2.0, 2.0, 2.0, 1.0);  // outside: nothing is drawn
+    gl_Position = vec4(2.0, 2.0, 2.0, 1.0);  // outside of the view: not drawn
     return;
   }
   int axis = gl_VertexID / 6;

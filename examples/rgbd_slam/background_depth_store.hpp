@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A depth_store that compresses beside its caller: tracking does not wait for it.
+/// A depth_store that compresses in the background, so that tracking does not wait.
 #pragma once
 
 #include <cstddef>
@@ -16,18 +16,18 @@
 
 namespace app {
 
-class kept_depths {
+class background_depth_store {
  public:
   /// Without `in_background` images are compressed in the caller's thread.
-  kept_depths(orbis::mapping::depth_store_options options, bool in_background)
+  background_depth_store(orbis::mapping::depth_store_options options, bool in_background)
       : store_{std::move(options)}, background_{in_background} {}
-  kept_depths(const kept_depths&) = delete;
-  kept_depths& operator=(const kept_depths&) = delete;
-  ~kept_depths() {
+  background_depth_store(const background_depth_store&) = delete;
+  background_depth_store& operator=(const background_depth_store&) = delete;
+  ~background_depth_store() {
     if (ahead_.valid()) ahead_.wait();
   }
 
-  /// Copies the image, and waits where the one before it is not compressed yet.
+  /// Copies the image; waits first if the previous one is not compressed yet.
   void put(std::uint64_t frame, const orbis::image<std::uint16_t>& depth) {
     finish();
     if (background_) {
@@ -38,18 +38,18 @@ class kept_depths {
     }
     if (!ahead_.valid()) keep(frame, depth);
   }
-  /// Waits for the last image, so that the others below may be called. Throws what compressing it has thrown.
+  /// Waits for the last image. Rethrows an exception of its compression.
   void finish() {
     if (ahead_.valid()) ahead_.get();
   }
 
-  /// See depth_store. @pre finished, as for those below
+  /// See depth_store. @pre finish() was called after the last put, as for the functions below
   [[nodiscard]] orbis::result<void> get(std::uint64_t frame, orbis::image<std::uint16_t>& out) const {
     return store_.get(frame, out);
   }
   void erase(std::uint64_t frame) { store_.erase(frame); }
   void free_buffers() { store_.free_buffers(); }
-  /// Why images that should be in the spill file are in memory instead, if so.
+  /// The error by which images are in memory instead of the spill file; empty if there was none.
   [[nodiscard]] const std::optional<orbis::error>& unspilled() const { return unspilled_; }
 
  private:

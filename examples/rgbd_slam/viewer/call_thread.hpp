@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Calls on a thread of another priority.
+/// A thread for calls with another priority.
 #pragma once
 
 #include <condition_variable>
@@ -12,17 +12,17 @@
 
 namespace app {
 
-/// A thread with the priority of the one that makes it. A thread of low priority has those calls done here that take a
-/// lock which a thread of higher priority waits for: where processors are few, the system may leave it without one for
-/// long, and whoever waits for its locks as well.
-class calls_aside {
+/// A thread with the priority of its creator. It makes calls on behalf of a low-priority thread that lock mutexes which
+/// high-priority threads need. This avoids priority inversion: on few cores, a low-priority thread may not run for a
+/// long time while it holds a lock.
+class call_thread {
  public:
-  /// Throws if the system gives no thread.
-  calls_aside() : thread_{[this] { work(); }} {}
-  calls_aside(const calls_aside&) = delete;
-  calls_aside& operator=(const calls_aside&) = delete;
+  /// Throws if no thread can be created.
+  call_thread() : thread_{[this] { work(); }} {}
+  call_thread(const call_thread&) = delete;
+  call_thread& operator=(const call_thread&) = delete;
   /// @pre no call is running
-  ~calls_aside() {
+  ~call_thread() {
     {
       const std::lock_guard lock{mutex_};
       ends_ = true;
@@ -31,7 +31,7 @@ class calls_aside {
     thread_.join();
   }
 
-  /// Calls `f()` on the thread, and waits for it. Throws what it throws. For one thread at a time.
+  /// Calls `f()` on the thread, waits for it, and rethrows its exception. For one caller at a time.
   void call(const std::function<void()>& f) {
     std::unique_lock lock{mutex_};
     call_ = &f;
@@ -61,7 +61,7 @@ class calls_aside {
   const std::function<void()>* call_ = nullptr;
   std::exception_ptr thrown_;
   bool ends_ = false;
-  std::thread thread_;  // the last to begin
+  std::thread thread_;  // last member: starts after the others are initialised
 };
 
 }  // namespace app

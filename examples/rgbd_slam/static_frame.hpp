@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Frames without the depth of what moves, for the map.
+/// Frames without the depth of moving objects, for the map.
 #pragma once
 
 #include <optional>
@@ -13,12 +13,12 @@
 
 namespace app {
 
-class standing_frames {
+class static_frames {
  public:
-  explicit standing_frames(const orbis::camera::any_camera& camera) : regions_{camera} {}
+  explicit static_frames(const orbis::camera::any_camera& camera) : regions_{camera} {}
 
-  /// The frame without what lies on surfaces of features that move; the frame itself if there are none. `tracked`: what
-  /// SLAM knows of it. Valid until the next call.
+  /// The frame without depth on surfaces with moving features; the frame itself if there are none. `tracked`: the
+  /// frame's features in SLAM. Valid until the next call.
   [[nodiscard]] const orbis::camera::rgbd_frame& operator()(const orbis::camera::rgbd_frame& frame,
                                                             const std::optional<orbis::slam::tracked_frame>& tracked) {
     if (!tracked) return frame;
