@@ -104,7 +104,7 @@ summary(map_error ${WORK}/person map_error_m)
 check(map_error LESS 0.02)
 
 # The whole demo has stray depths, which the filter removes, and a person.
-app(0 demo --plain --frames 60 --width 320 --resolution 0.1 --out stray --quiet --threads 1)
+app(0 demo --frames 60 --width 320 --resolution 0.1 --out stray --quiet --threads 1)
 summary(removed ${WORK}/stray filter removed)
 summary(points ${WORK}/stray cloud points)
 math(EXPR tenths "1000 * ${removed} / ${points}")
