@@ -59,6 +59,7 @@ namespace detail {
 /// The function that holds the code of `Kernel` for a target.
 template <class Kernel, class Signature, class Target>
 struct code;
+#ifndef DOXYGEN
 #define ORBIS_KERNEL_CODE(Target, attribute)                                      \
   template <class Kernel, class R, class... Args>                                 \
   struct code<Kernel, R(Args...), Target> {                                       \
@@ -75,6 +76,7 @@ ORBIS_KERNEL_CODE(avx2, ORBIS_TARGET_AVX2)
 ORBIS_KERNEL_CODE(avx512, ORBIS_TARGET_AVX512)
 #endif
 #undef ORBIS_KERNEL_CODE
+#endif
 
 template <class T, class... List>
 inline constexpr bool is_one_of = (std::is_same_v<T, List> || ...);
