@@ -5,7 +5,7 @@
 #include <orbis/camera/pinhole.hpp>
 #include <orbis/camera/radial_tangential.hpp>
 #include <orbis/optimize/triangulation.hpp>
-#include <orbis/optimize/two_view.hpp>
+#include <orbis/optimize/two_view-inl.hpp>
 
 #include "support.hpp"
 #include "support/catch.hpp"

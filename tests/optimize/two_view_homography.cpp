@@ -3,7 +3,7 @@
 #include <vector>
 
 #include <orbis/core/se3.hpp>
-#include <orbis/optimize/two_view.hpp>
+#include <orbis/optimize/two_view-inl.hpp>
 
 #include "support.hpp"
 #include "support/catch.hpp"
