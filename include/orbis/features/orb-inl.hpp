@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The functions of orb.hpp.
+/// Implementation of orb.hpp.
 #pragma once
 
 #include <orbis/features/detail/extract/cover_first.hpp>

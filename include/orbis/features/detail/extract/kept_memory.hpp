@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Workspaces that later calls use again.
+/// Pool of reusable workspaces.
 #pragma once
 
 #include <memory>
@@ -10,8 +10,8 @@
 
 namespace orbis::features::detail {
 
-/// A pool of workspaces: a call takes one and gives it back. Calls that run at the same time have one each; calls that
-/// follow each other share one. A workspace that is not given back (after an exception) is freed. Copies start empty.
+/// A pool of workspaces: a call acquires one and returns it. Concurrent calls use separate workspaces; sequential calls
+/// reuse one. A workspace that is not returned (after an exception) is freed. Copies of the pool are empty.
 template <class Workspace>
 class kept_memory {
  public:
