@@ -30,8 +30,7 @@ struct keypoint_depth_options {
   float edge_sigmas = 4.0F;     ///< a gap of more than this many sigma ...
   float edge_relative = 0.02F;  ///< ... and more than this fraction of the depth is an edge
   float min_share = 0.7F;       ///< minimum fraction of the valid pixels on one side of every edge; > 0.5
-  double position_sigma =
-      0.5;  ///< standard deviation of the keypoint, pixels: contributes to the depth deviation on slopes
+  double position_sigma = 0.5;  ///< of the keypoint, pixels; adds to the depth deviation on slopes
   depth_noise noise{};
 };
 

@@ -24,10 +24,9 @@ namespace orbis::features {
 
 /// Limits of the distance between a match and its epipolar line.
 struct epipolar_rule {
-  float distance = 1.96F;     ///< maximum at the finest level, pixels: 95 % if positions have an error of one pixel
-  float scale_factor = 1.2F;  ///< of the pyramid: the limit grows by this factor per level of the train
-  float epipole_radius =
-      0.0F;  ///< trains within this distance of the epipole (grows likewise) have no parallax and are excluded
+  float distance = 1.96F;       ///< maximum at the finest level, pixels: 95 % if positions have an error of one pixel
+  float scale_factor = 1.2F;    ///< of the pyramid: the limit grows by this factor per level of the train
+  float epipole_radius = 0.0F;  ///< excludes trains this close to the epipole (grows likewise): no parallax
 };
 
 /// Finds for each query the nearest and the second nearest of the trains close to its epipolar line: the search for new

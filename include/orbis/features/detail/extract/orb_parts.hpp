@@ -60,8 +60,7 @@ static_assert(corner_detector<fast9>);
 /// their levels, at any position, because strong corners are more repeatable. A cell contributes one corner in total,
 /// not one per level, which leaves room for these. O(n), and sorting of the chosen corners.
 struct cover_first {
-  double share =
-      0.25;  ///< of the wanted corners, for covering; 0 (none) ... 1: from most repeatable to best distributed
+  double share = 0.25;  ///< of the wanted corners, for covering; 0: most repeatable, 1: best distributed
 
   struct workspace {
     struct candidate {

@@ -52,8 +52,7 @@ inline void make_plan(resize_plan& plan, int from, int to) {
   const int padded = (to + resize_block - 1) / resize_block * resize_block;
   for (int i = 0; i != padded; ++i) {
     const resize_tap t = tap_at(std::min(i, to - 1), from, to);
-    const bool last =
-        t.first == from - 1;  // the last pixel is stored as the one before it, with all the weight on the second
+    const bool last = t.first == from - 1;  // stored as the pixel before it, with all the weight on the second
     plan.first.push_back(last ? from - 2 : t.first);
     plan.weight.push_back(last ? std::uint16_t{256} : t.weight);
   }

@@ -15,9 +15,8 @@ struct resize_plan {
   std::vector<std::int32_t> first;
   std::vector<std::uint16_t> weight;  ///< of the next pixel, in 1/256
   // For each eight pixels of the result; empty if they do not fit into sixteen pixels of the source.
-  std::vector<std::int32_t> base;  ///< start of the sixteen pixels
-  std::vector<std::uint8_t>
-      places;  ///< position of each `first` in them, as the low byte of a word whose high byte selects zero
+  std::vector<std::int32_t> base;    ///< start of the sixteen pixels
+  std::vector<std::uint8_t> places;  ///< of each `first` in the sixteen: low byte of a word; the high byte gives zero
 };
 
 /// Reusable memory of `resize`.

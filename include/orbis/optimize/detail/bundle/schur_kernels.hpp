@@ -191,8 +191,7 @@ ORBIS_ALWAYS_INLINE void add_products(const double* ya, const double* yc, std::s
       unroll<C>([&](auto c) ORBIS_INLINE_LAMBDA { sum[r][c] = row::load(blocks[r] + rows::body * c + width * i); });
     });
     const double *a = ya + width * i, *b = yc;
-    for (std::size_t k = 0; k != columns;
-         ++k, a += rows::size, b += rows::size) {  // unrolled, it would exceed the registers
+    for (std::size_t k = 0; k != columns; ++k, a += rows::size, b += rows::size) {  // unrolling would spill
       row own[Count];
       unroll<Count>([&](auto r) ORBIS_INLINE_LAMBDA { own[r] = row::load(a + r * columns * rows::size); });
       unroll<C>([&](auto c) ORBIS_INLINE_LAMBDA {

@@ -41,8 +41,7 @@ namespace orbis::optimize::detail {
     for (int i = 0; i != 3; ++i) set_column(bases[k], i, weights[k][i] * homogeneous(p[static_cast<std::size_t>(i)]));
   }
   for (int i = 0; i != 3; ++i)
-    if (!(weights[1][i] / weights[0][i] > 0.0))
-      return std::nullopt;  // some points would see the plane from the other side
+    if (!(weights[1][i] / weights[0][i] > 0.0)) return std::nullopt;  // on both sides of the plane
   mat3 out = bases[1] * inverse(bases[0]);
   out /= norm(out);
   if (!all_finite(out)) return std::nullopt;

@@ -273,11 +273,9 @@ class quotient_graph {
   std::uint32_t size_;
   std::vector<std::uint32_t> weight_;  ///< number of blocks that a node represents
   std::vector<range> list_;
-  std::vector<std::uint32_t>
-      degree_;  ///< of variables: an upper bound of the number of blocks that their elimination would connect
+  std::vector<std::uint32_t> degree_;  ///< of variables: an upper bound of the blocks that elimination would connect
   std::vector<kind> state_;
-  std::vector<std::uint64_t>
-      remains_;  ///< of elements: 1 + weight outside the clique; of variables: membership in the clique
+  std::vector<std::uint64_t> remains_;  ///< of elements: 1 + weight outside the clique; of variables: membership
   std::vector<std::uint32_t> bucket_, next_, previous_;  ///< variables by degree
   std::vector<std::uint32_t> merged_, last_merged_;      ///< chains of variables eliminated together
   std::vector<std::uint32_t> pool_, clique_, touched_;
