@@ -57,8 +57,8 @@ namespace detail {
 
 /// Calls `run(context, i)` for every i in [0, count), on the calling thread and `workers - 1` others. Not a template,
 /// to avoid instantiating the thread handling for every loop of a program.
-inline void hand_out(std::size_t count, std::size_t workers, thread_pool* pool, void (*run)(const void*, std::size_t),
-                     const void* context) {
+inline void run_on_workers(std::size_t count, std::size_t workers, thread_pool* pool,
+                           void (*run)(const void*, std::size_t), const void* context) {
   if (workers <= 1) {
     for (std::size_t i = 0; i != count; ++i) run(context, i);
     return;
@@ -111,7 +111,7 @@ void for_each_chunk(const Policy& policy, std::size_t count, std::size_t grain, 
     };
     thread_pool* pool = nullptr;
     if constexpr (std::is_same_v<Policy, parallel_policy>) pool = policy.pool;
-    detail::hand_out(chunks, std::min<std::size_t>(policy.threads(), chunks), pool, run_one, &run);
+    detail::run_on_workers(chunks, std::min<std::size_t>(policy.threads(), chunks), pool, run_one, &run);
   }
 }
 

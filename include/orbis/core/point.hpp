@@ -30,7 +30,7 @@ namespace detail {
 
 /// True if the type is known at compile time to hold fewer than three numbers.
 template <class P>
-[[nodiscard]] consteval bool is_shorter_than_three() {
+[[nodiscard]] consteval bool has_fewer_than_three() {
   if constexpr (std::is_bounded_array_v<P>) {
     return std::extent_v<P> < 3;
   } else if constexpr (requires { P::SizeAtCompileTime; }) {  // Eigen: -1 if only known at run time
@@ -64,7 +64,7 @@ struct point_traits<P> {
 
 template <class P>
 requires(
-    !requires(const P& p) { p.x; } && !detail::is_shorter_than_three<P>() &&
+    !requires(const P& p) { p.x; } && !detail::has_fewer_than_three<P>() &&
     requires(const P& p) {
       { p[0] } -> std::convertible_to<double>;
       { p[2] } -> std::convertible_to<double>;
