@@ -16,8 +16,8 @@
 
 #include <orbis/core/image.hpp>
 #include <orbis/features/descriptor.hpp>
-#include <orbis/features/detail/extract/kept_memory.hpp>
 #include <orbis/features/detail/extract/orb_parts.hpp>
+#include <orbis/features/detail/extract/workspace_pool.hpp>
 #include <orbis/features/extractor.hpp>
 #include <orbis/features/pyramid.hpp>
 
@@ -111,7 +111,7 @@ class basic_orb_extractor {
   [[no_unique_address]] Distribution choose_{};
   [[no_unique_address]] Orientation orient_{};
   [[no_unique_address]] Descriptor describe_{};
-  mutable detail::kept_memory<workspace> kept_;
+  mutable detail::workspace_pool<workspace> workspaces_;
 };
 
 /// ORB features with the default parts.

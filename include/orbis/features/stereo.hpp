@@ -23,7 +23,7 @@
 
 #include <orbis/core/image.hpp>
 #include <orbis/features/descriptor.hpp>
-#include <orbis/features/detail/extract/kept_memory.hpp>
+#include <orbis/features/detail/extract/workspace_pool.hpp>
 #include <orbis/features/detail/match/search_among.hpp>
 #include <orbis/features/hamming.hpp>
 #include <orbis/features/match.hpp>
@@ -107,11 +107,11 @@ class stereo_matcher {
             const stereo_options& options = {}) const {
     assert(options.levels >= 1 && options.scale_factor > 1.0F);
     assert(left_image.width() == right_image.width() && left_image.height() == right_image.height());
-    auto kept = kept_.take();
-    kept->left.build(left_image, options.levels, static_cast<double>(options.scale_factor), 1);
-    kept->right.build(right_image, options.levels, static_cast<double>(options.scale_factor), 1);
-    find(*kept, columns, left, kept->left, right, kept->right, options);
-    kept_.give(std::move(kept));
+    auto memory = workspaces_.acquire();
+    memory->left.build(left_image, options.levels, static_cast<double>(options.scale_factor), 1);
+    memory->right.build(right_image, options.levels, static_cast<double>(options.scale_factor), 1);
+    find(*memory, columns, left, memory->left, right, memory->right, options);
+    workspaces_.release(std::move(memory));
   }
 
   /// As above, with the pyramids of both images from an extractor (`pyramid_extractor`). O(features x features in a
@@ -121,9 +121,9 @@ class stereo_matcher {
   void into(std::vector<float>& columns, const basic_features<D>& left, const image_pyramid& left_pyramid,
             const basic_features<D>& right, const image_pyramid& right_pyramid,
             const stereo_options& options = {}) const {
-    auto kept = kept_.take();
-    find(*kept, columns, left, left_pyramid, right, right_pyramid, options);
-    kept_.give(std::move(kept));
+    auto memory = workspaces_.acquire();
+    find(*memory, columns, left, left_pyramid, right, right_pyramid, options);
+    workspaces_.release(std::move(memory));
   }
 
  private:
@@ -268,7 +268,7 @@ class stereo_matcher {
   }
 
   [[no_unique_address]] Distance distance_{};
-  mutable detail::kept_memory<workspace> kept_;
+  mutable detail::workspace_pool<workspace> workspaces_;
 };
 
 }  // namespace orbis::features

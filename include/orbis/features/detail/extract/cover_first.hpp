@@ -19,7 +19,7 @@ namespace orbis::features::detail {
 
 /// Computes the number of features per level: proportional to the side of its image. Levels with too few corners pass
 /// the remainder to finer levels, and then to any level with more corners.
-inline void share_out(std::span<const level_corners> levels, int wanted, std::vector<int>& quotas) {
+inline void assign_quotas(std::span<const level_corners> levels, int wanted, std::vector<int>& quotas) {
   quotas.resize(levels.size());
   double sides = 0.0;
   for (const level_corners& level : levels) sides += 1.0 / level.scale;
@@ -47,7 +47,7 @@ inline void keep_strongest(std::vector<corner>& corners, int wanted) {
 }
 
 ORBIS_INLINE void cover_first::operator()(std::span<level_corners> levels, int wanted, workspace& memory) const {
-  share_out(levels, wanted, memory.quotas);
+  assign_quotas(levels, wanted, memory.quotas);
   take_covering(levels, wanted, memory);
   for (std::size_t l = 0; l != levels.size(); ++l) {
     std::vector<corner>&corners = levels[l].corners, &covering = memory.covering[l];

@@ -13,32 +13,32 @@ namespace orbis::features::detail {
 /// A pool of workspaces: a call acquires one and returns it. Concurrent calls use separate workspaces; sequential calls
 /// reuse one. A workspace that is not returned (after an exception) is freed. Copies of the pool are empty.
 template <class Workspace>
-class kept_memory {
+class workspace_pool {
  public:
-  kept_memory() = default;
-  kept_memory(const kept_memory&) noexcept : kept_memory{} {}
-  kept_memory& operator=(const kept_memory&) noexcept { return *this; }
-  ~kept_memory() = default;
+  workspace_pool() = default;
+  workspace_pool(const workspace_pool&) noexcept : workspace_pool{} {}
+  workspace_pool& operator=(const workspace_pool&) noexcept { return *this; }
+  ~workspace_pool() = default;
 
-  [[nodiscard]] std::unique_ptr<Workspace> take() {
+  [[nodiscard]] std::unique_ptr<Workspace> acquire() {
     {
       const std::lock_guard lock{mutex_};
-      if (!stock_.empty()) {
-        auto last = std::move(stock_.back());
-        stock_.pop_back();
+      if (!free_.empty()) {
+        auto last = std::move(free_.back());
+        free_.pop_back();
         return last;
       }
     }
     return std::make_unique<Workspace>();
   }
-  void give(std::unique_ptr<Workspace> workspace) {
+  void release(std::unique_ptr<Workspace> workspace) {
     const std::lock_guard lock{mutex_};
-    stock_.push_back(std::move(workspace));
+    free_.push_back(std::move(workspace));
   }
 
  private:
   std::mutex mutex_;
-  std::vector<std::unique_ptr<Workspace>> stock_;
+  std::vector<std::unique_ptr<Workspace>> free_;
 };
 
 }  // namespace orbis::features::detail
