@@ -131,7 +131,7 @@ ORBIS_INLINE std::optional<sim3> align_by_moments(const pair_moments& moments, s
   return transform_between(moments, n, with_scale);
 }
 
-ORBIS_INLINE error why_not_aligned(std::size_t not_finite, std::size_t n) {
+ORBIS_INLINE error alignment_error(std::size_t not_finite, std::size_t n) {
   if (not_finite != n)
     return {errc::degenerate, absolute_orientation_name,
             "a coordinate of pair " + std::to_string(not_finite) + " is not finite"};

@@ -50,7 +50,7 @@ template <point_range Points>
 /// The transform from the moments of n pairs. Empty: they do not determine a rotation.
 [[nodiscard]] std::optional<sim3> align_by_moments(const pair_moments& moments, std::size_t n, bool with_scale);
 /// The error for a failed alignment; `not_finite`: index of the first pair that is not finite, or n.
-[[nodiscard]] error why_not_aligned(std::size_t not_finite, std::size_t n);
+[[nodiscard]] error alignment_error(std::size_t not_finite, std::size_t n);
 
 /// The transform between two lists of points. Without weights all pairs have equal weight.
 template <point_range From, point_range To>
@@ -67,7 +67,7 @@ template <point_range From, point_range To>
   if (const auto found = align_by_moments(moments_of(n, pair), n, with_scale)) return *found;
   std::size_t i = 0;
   while (i != n && all_finite(read_point(from, i)) && all_finite(read_point(to, i))) ++i;
-  return fail(why_not_aligned(i, n));
+  return fail(alignment_error(i, n));
 }
 
 /// `estimate_alignment` for lists of vectors.

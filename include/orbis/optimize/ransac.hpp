@@ -134,7 +134,7 @@ class sequential_test {
   /// Call before scoring a model.
   void begin() noexcept { log_ratio_ = 0.0; }
   /// Returns true to stop scoring, after a block of data with this number of inliers.
-  [[nodiscard]] bool hopeless(std::size_t inliers, std::size_t data) noexcept {
+  [[nodiscard]] bool rejects(std::size_t inliers, std::size_t data) noexcept {
     log_ratio_ += static_cast<double>(inliers) * if_inlier_ + static_cast<double>(data - inliers) * if_outlier_;
     return log_ratio_ > log_threshold_;
   }
@@ -257,7 +257,7 @@ class ransac_run {
       score += cost;
       inliers += inside;
       seen += count;
-      if (score > best_score_ || (seen < n && test_.hopeless(inside, count))) {
+      if (score > best_score_ || (seen < n && test_.rejects(inside, count))) {
         test_.end(inliers, seen);
         return std::numeric_limits<double>::infinity();
       }

@@ -34,7 +34,7 @@ result<self_calibrated<Camera>> self_calibrate(const Camera& start, std::span<se
   for (const int limit : {options.robust_iterations, options.iterations}) {
     if (!problem.descend(limit, options.relative_tolerance, found.iterations, go_on))
       return fail(errc::cancelled, where, "cancelled");
-    problem.leave_out_outliers();
+    problem.update_outliers();
     if (!problem.has_depth()) return fail(errc::degenerate, where, "no observation with depth agrees with the others");
   }
   if (!problem.covariance(found.covariance))

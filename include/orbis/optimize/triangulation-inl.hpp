@@ -21,7 +21,7 @@ ORBIS_INLINE mat3 essential_of(const se3& T_second_first) {
 
 /// Corrects two rays at z = 1 by the least sum of squares so that they intersect. Two steps, which suffice for
 /// convergence.
-ORBIS_INLINE void make_rays_meet(const mat3& essential, vec3& first, vec3& second) {
+ORBIS_INLINE void intersect_rays(const mat3& essential, vec3& first, vec3& second) {
   // `second` is x and `first` is x' in the paper.
   const mat2 e = block<2, 2>(essential, 0, 0);
   vec2 n = head<2>(essential * first), m = head<2>(transposed(essential) * second);
@@ -147,7 +147,7 @@ ORBIS_INLINE triangulation triangulate(const se3& T_world_first, const vec3& fir
   out.parallax = detail::angle_between_directions(T_second_first.rotation() * first, second);
   out.status = triangulation_status::no_parallax;
   if (!(out.parallax >= options.min_parallax)) return out;
-  detail::make_rays_meet(detail::essential_of(T_second_first), first, second);
+  detail::intersect_rays(detail::essential_of(T_second_first), first, second);
   // In the second camera: t + depth_1 u = depth_2 v.
   const vec3 u = T_second_first.rotation() * first;
   const vec3& t = T_second_first.translation();

@@ -27,7 +27,7 @@ result<relative_pose_estimate> essential_of_matches(const std::vector<Match>& ma
   auto found = ransac(estimator, ransac_part(options, essential_estimator::model_cost));
   if (!found) return fail(found.error().code, where, found.error().message);
   const double squared_threshold = options.threshold * options.threshold;
-  const std::size_t by_rotation = explained_by_rotation(matches, found->inliers, squared_threshold);
+  const std::size_t by_rotation = count_rotation_inliers(matches, found->inliers, squared_threshold);
   if (10 * by_rotation >= 9 * found->inliers.size())
     return fail(errc::degenerate, where,
                 "no parallax: a rotation alone explains " + std::to_string(by_rotation) + " of " +

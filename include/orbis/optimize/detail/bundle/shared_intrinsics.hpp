@@ -66,7 +66,7 @@ class shared_intrinsics {
     }
     if (ties) basis_(1, 0) = parameters::get(start)[1] / parameters::get(start)[0];
     choose(observations);
-    keep_what_holds_together();
+    keep_connected();
   }
 
   /// Number of observations used, and outliers.
@@ -114,7 +114,7 @@ class shared_intrinsics {
   }
 
   /// Excludes observations that are inconsistent with the estimate, and restores those that are consistent again.
-  void leave_out_outliers() {
+  void update_outliers() {
     constexpr double gates[] = {13.816, 16.266};  // the chi-squared quantiles of 99.9 %, for two and three coordinates
     set_noise();
     const std::vector<view_type> views = views_of(now_);
@@ -122,7 +122,7 @@ class shared_intrinsics {
       const double gate = gates[std::isnan(observations_[k].right) ? 0 : 1] * noise_ * noise_;
       out_[k] = squared(views, now_.points, k) > gate ? out::outlier : out::no;
     }
-    keep_what_holds_together();
+    keep_connected();
   }
 
   /// Root mean square of the entries of the whitened residuals.
@@ -209,7 +209,7 @@ class shared_intrinsics {
 
   /// Excludes images with too few observations, points with fewer than two observations or not determined by them, and
   /// everything outside the largest connected component.
-  void keep_what_holds_together() {
+  void keep_connected() {
     for (out& o : out_)
       if (o == out::alone) o = out::no;
     views_ = views_of(now_);
@@ -384,7 +384,7 @@ class shared_intrinsics {
   }
 
   /// Adds the terms of the linearised point that do not involve its own unknowns.
-  void add_directly() {
+  void add_direct_terms() {
     const Eigen::Index theta = pose_rows_;
     for (const jacobians& j : rows_) {
       const matrix<6, 3> weighted = j.weight * transposed(j.by_pose);
@@ -426,7 +426,7 @@ class shared_intrinsics {
   }
 
   /// Subtracts the terms that involve the unknowns of `point_`; the lower half of the system.
-  void take_away() {
+  void subtract_eliminated() {
     const Eigen::Index theta = pose_rows_;
     const block_t3 theta_inverse = point_.theta_point * point_.inverse;
     add(removed_, theta, theta, basis_type(theta_inverse * transposed(point_.theta_point)));
@@ -446,7 +446,7 @@ class shared_intrinsics {
     for (std::size_t p = 0; p + 1 < begins_.size(); ++p) {
       linearize_point(p);
       parts_[p].is_determined = eliminate(p, 0.0);
-      if (parts_[p].is_determined) add_directly();
+      if (parts_[p].is_determined) add_direct_terms();
     }
   }
 
@@ -458,7 +458,7 @@ class shared_intrinsics {
     gradient_.assign(static_cast<std::size_t>(size), 0.0);
     for (std::size_t p = 0; p + 1 < begins_.size(); ++p) {
       if (!eliminate(p, damping)) continue;
-      take_away();
+      subtract_eliminated();
       double* const by_theta = gradient_.data() + pose_rows_;
       for (int i = 0; i != count_; ++i) by_theta[i] += point_.theta_gradient[i];
       for (const seen& s : point_.by)

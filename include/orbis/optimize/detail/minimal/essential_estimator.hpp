@@ -135,9 +135,9 @@ class essential_estimator {
 
 /// The number of inliers that a pure rotation of the camera explains. The rotation is estimated with weights that
 /// decrease with the error, because the inliers contain wrong matches that are close to their epipolar lines by chance.
-[[nodiscard]] inline std::size_t explained_by_rotation(const std::vector<image_match>& matches,
-                                                       std::span<const std::uint32_t> inliers,
-                                                       double squared_threshold) {
+[[nodiscard]] inline std::size_t count_rotation_inliers(const std::vector<image_match>& matches,
+                                                        std::span<const std::uint32_t> inliers,
+                                                        double squared_threshold) {
   mat3 rotation = identity<mat3>();
   std::size_t explained = 0;
   for (int round = 0; round != 10; ++round) {

@@ -36,21 +36,21 @@ inline constexpr double line_gate = 3.841, point_gate = 5.991;
 [[nodiscard]] inline double square(double x) { return x * x; }
 
 /// The weight of Geman and McClure's loss, in units of its scale.
-[[nodiscard]] inline double falling_weight(double squared) {
+[[nodiscard]] inline double geman_mcclure_weight(double squared) {
   const double w = 1.0 / (1.0 + squared);
   return w * w;
 }
 
 /// The camera rotation with the largest support among the matches, by weights that decrease with the distance at
 /// successively smaller scales. The identity if there is none.
-[[nodiscard]] inline so3 prevailing_rotation(const std::vector<image_match>& matches) {
+[[nodiscard]] inline so3 dominant_rotation(const std::vector<image_match>& matches) {
   so3 rotation;
   for (const double scale : {100.0, 50.0, 25.0, 12.0, 6.0, 4.0, 3.0, 3.0, 3.0}) {
     mat3 products = zeros<mat3>();
     const mat3 r = rotation.rotation_matrix();
     for (const image_match& m : matches) {
       const vec3 from = m.first.direction();
-      const double weight = falling_weight(squared_transfer(r * from, m.second) / (scale * scale));
+      const double weight = geman_mcclure_weight(squared_transfer(r * from, m.second) / (scale * scale));
       if (weight > 0.0) products += weight * normalized(from) * transposed(normalized(m.second.direction()));
     }
     const auto turn = find_best_rotation(products, 1e-12);
@@ -70,7 +70,7 @@ inline constexpr double line_gate = 3.841, point_gate = 5.991;
     const double inverse = 1.0 / (scale * scale);
     const std::size_t n = std::min(most, matches.size());
     for (std::size_t i = 0; i != n; ++i)
-      sum.add(motion.e, matches[i], [&](double squared) { return falling_weight(squared * inverse); });
+      sum.add(motion.e, matches[i], [&](double squared) { return geman_mcclure_weight(squared * inverse); });
     sum.mirror();
     const auto [h, g] = sum.by_motion(motion);
     small_cholesky<5> factors;

@@ -67,11 +67,12 @@ class two_view_search {
     });
   }
   /// Searches for further motions: from directions of translation over the whole sphere, each with the best rotation.
-  void look_around(const so3& turn) {
+  void add_sampled_motions(const so3& turn) {
     constexpr std::array scales{20.0, 20.0, 10.0, 10.0, 5.0, 5.0};
     constexpr std::size_t few = 150;
     for (const vec3& t : hemisphere<16>())
-      if (const auto rough = refined_motion(matches_, epipolar_motion(turn, t), scales, few); rough && !knows(*rough))
+      if (const auto rough = refined_motion(matches_, epipolar_motion(turn, t), scales, few);
+          rough && !is_known(*rough))
         add(*rough);
   }
 
@@ -110,7 +111,7 @@ class two_view_search {
            angle_between_directions(a.direction, b.direction) < apart;
   }
   /// Returns true if a motion, or its opposite, has already been refined.
-  [[nodiscard]] bool knows(const epipolar_motion& m) const {
+  [[nodiscard]] bool is_known(const epipolar_motion& m) const {
     return std::any_of(all_.begin(), all_.end(), [&](const hypothesis& h) {
       return same(h.motion, m) || same(h.motion, {m.rotation, vec3(-m.direction)});
     });
@@ -144,7 +145,7 @@ struct two_view_inliers {
     if (all.empty()) return;
     rms = std::sqrt(rms / static_cast<double>(all.size()));
     // Does not trust residuals far below the given standard deviation.
-    sigma = std::max(0.5, 1.4826 * std::sqrt(middle_of(squares)));
+    sigma = std::max(0.5, 1.4826 * std::sqrt(median_of(squares)));
     estimate_deviations(motion);
   }
 
@@ -168,7 +169,7 @@ struct two_view_inliers {
       std::sort(first, first + static_cast<std::ptrdiff_t>(n), by(&metric_ray::y));
       for (std::size_t i = 0; i != n; ++i) {
         epipolar_equations& sum = of_part[side * column + i * side / n];
-        sum.add(motion.e, *order[begin + i], [](double squared) { return falling_weight(0.25 * squared); });
+        sum.add(motion.e, *order[begin + i], [](double squared) { return geman_mcclure_weight(0.25 * squared); });
       }
     }
     for (epipolar_equations& part : of_part) {
@@ -200,7 +201,7 @@ struct two_view_inliers {
 
  public:
   /// The median of some values. @pre not empty
-  [[nodiscard]] static double middle_of(std::vector<double>& values) {
+  [[nodiscard]] static double median_of(std::vector<double>& values) {
     const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
     std::nth_element(values.begin(), middle, values.end());
     return *middle;
@@ -221,7 +222,7 @@ result<two_view_reconstruction> reconstruction_of_matches(const std::vector<Matc
                 "only " + of(usable, n) + " matches are usable, " + std::to_string(least) + " are needed");
 
   // The cheapest case first: pure rotation.
-  const so3 turn = prevailing_rotation(matches);
+  const so3 turn = dominant_rotation(matches);
   const mat3 turned = turn.rotation_matrix();
   const auto is_still = [&](const Match& m, double sigma) {
     return squared_disparity(turned, m) < square(least_disparity * sigma);
@@ -303,12 +304,12 @@ result<two_view_reconstruction> reconstruction_of_matches(const std::vector<Matc
     angles.push_back(p.parallax);
   }
   two_view_reconstruction out;
-  out.parallax = two_view_inliers<Match>::middle_of(angles);
+  out.parallax = two_view_inliers<Match>::median_of(angles);
   if (!(out.parallax >= options.min_parallax)) return refuse("too little parallax between the rays of a point");
 
   // Only a motion that would be accepted is compared with all others.
   const double score = best->support.score;
-  search.look_around(turn);
+  search.add_sampled_motions(turn);
   best = search.best();
   if (best->support.score > 1.02 * score || search.has_rival(*best)) return refuse(two);
   constexpr const char* shared = "two motions share the matches";
@@ -323,7 +324,7 @@ result<two_view_reconstruction> reconstruction_of_matches(const std::vector<Matc
     if (second && 2 * second->inliers.size() > inliers.all.size()) return refuse(shared);
   }
 
-  const double unit = 1.0 / two_view_inliers<Match>::middle_of(depths);
+  const double unit = 1.0 / two_view_inliers<Match>::median_of(depths);
   for (const seen_point& p : found) {
     out.matches.push_back(p.match);
     out.points.push_back(unit * p.position);
