@@ -26,7 +26,7 @@ struct projection {
   float distance = 1.0F;      ///< from the camera, metres
   float cosine = 1.0F;        ///< of the angle between the line of sight and the earlier viewing direction
   float min_distance = 0.0F;  ///< minimum distance at which the descriptor is detectable, metres
-  float max_distance = std::numeric_limits<float>::infinity();  ///< distance below which it appears at the finest level
+  float max_distance = std::numeric_limits<float>::infinity();  ///< distance from which on it appears at the finest level
 };
 
 /// Search radius around a projection, and pyramid levels to search.
@@ -41,7 +41,7 @@ struct projection_rule {
   int finer = 1, coarser = 1;     ///< levels to search around the predicted one
 };
 
-/// The predicted pyramid level of a point that appears at the finest level from `max_distance`: log(max_distance /
+/// The predicted pyramid level of a point that appears at the finest level at `max_distance`: log(max_distance /
 /// distance) / log(scale_factor), rounded up, which gives better tracking on real recordings than rounding to the
 /// nearest.
 [[nodiscard]] inline int predicted_octave(float distance, float max_distance, int levels, float scale_factor) noexcept {

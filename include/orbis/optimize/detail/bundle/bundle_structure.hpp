@@ -34,8 +34,8 @@ class bundle_structure {
     std::size_t first_tile = 0;
     std::size_t first_mixed_tile = 0;  ///< the same, counting only tiles of movable cameras
   };
-  /// Points observed by the same `cameras` movable cameras. Observation a of the i-th of them has the number
-  /// `first_mixed + a * points + i`.
+  /// Points observed by the same `cameras` movable cameras. Observation a of the i-th of them by these
+  /// cameras has the number `first_mixed + a * points + i`.
   struct group {
     std::uint32_t first_point = 0, points = 0;
     std::uint32_t first_mixed = 0, cameras = 0;
