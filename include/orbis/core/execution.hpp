@@ -136,7 +136,7 @@ class progress {
            std::is_invocable_r_v<
                bool, F&, std::size_t,
                std::size_t>) constexpr progress(F&& callback) noexcept  // NOLINT(google-explicit-constructor):
-                                                                        // a callback is one
+                                                                        // converts callbacks
       : object_{address_of(callback)}, call_{[](void* object, std::size_t done, std::size_t total) -> bool {
           return (*reinterpret_cast<std::remove_reference_t<F>*>(object))(done, total);
         }} {}

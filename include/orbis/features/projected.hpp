@@ -26,7 +26,7 @@ struct projection {
   float distance = 1.0F;      ///< from the camera, metres
   float cosine = 1.0F;        ///< of the angle between the line of sight and the earlier viewing direction
   float min_distance = 0.0F;  ///< minimum distance at which the descriptor is detectable, metres
-  float max_distance = std::numeric_limits<float>::infinity();  ///< distance from which on it appears at the finest level
+  float max_distance = std::numeric_limits<float>::infinity();  ///< appears at the finest level from there on, metres
 };
 
 /// Search radius around a projection, and pyramid levels to search.

@@ -24,7 +24,7 @@ namespace orbis::simd::detail {
 
 template <class T, std::size_t N>
 struct register_of {
-  typedef T type __attribute__((vector_size(N * sizeof(T))));  // NOLINT(modernize-use-using): using refuses it
+  typedef T type __attribute__((vector_size(N * sizeof(T))));  // NOLINT(modernize-use-using): using rejects it
 };
 /// `N` numbers in one register.
 template <class T, std::size_t N>
