@@ -59,8 +59,8 @@ void slide_differences(const sliding_square& s, int shifts, std::int32_t* sums);
 struct stereo_options {
   int levels = 8;               ///< of the extractor's image pyramid; ignored if the pyramids are given
   float scale_factor = 1.2F;    ///< between two of its levels; likewise
-  float min_disparity = 0.0F;   ///< minimum of left minus right coordinate, pixels; exclusive
-  float max_disparity = 1e9F;   ///< maximum, likewise
+  float min_disparity = 0.0F;   ///< minimum of left minus right coordinate, pixels
+  float max_disparity = 1e9F;   ///< maximum of the same
   float rows = 2.0F;            ///< maximum row difference of both keypoints, pixels of a level
   int octaves = 1;              ///< maximum level difference of both keypoints
   std::uint32_t distance = 75;  ///< maximum descriptor distance

@@ -30,9 +30,8 @@ concept keyframe_id = std::totally_ordered<Id> && std::copyable<Id> && std::defa
 
 /// Acceptance criteria of a query.
 struct query_options {
-  double shared_words =
-      0.8;                 ///< minimum fraction of shared words, relative to the keyframe that shares most; exclusive
-  double min_score = 0.0;  ///< minimum score
+  double shared_words = 0.8;  ///< minimum number of shared words / that of the keyframe that shares most; exclusive
+  double min_score = 0.0;     ///< minimum score
   double group_score = 0.75;  ///< minimum sum of a group's scores, relative to the best group; exclusive
 };
 
