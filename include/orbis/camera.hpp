@@ -2,21 +2,21 @@
 /// @file
 /// Camera models, depth images and rays.
 ///
-/// | header | what it is for |
+/// | header | contents |
 /// | --- | --- |
 /// | `model.hpp` | the concept `camera_model` |
 /// | `intrinsics.hpp` | image size and camera matrix |
 /// | `pinhole.hpp, radial_tangential.hpp, kannala_brandt.hpp` | the camera models |
-/// | `any.hpp` | a camera whose model is known at run time only |
-/// | `parameters.hpp` | parameters of a camera and derivatives by them, for calibration |
-/// | `presets.hpp, settings.hpp` | the cameras of the usual recordings; what `camera.toml` says |
+/// | `any.hpp` | a camera whose model is only known at run time |
+/// | `parameters.hpp` | parameters of a camera and derivatives with respect to them, for calibration |
+/// | `presets.hpp, settings.hpp` | cameras of common public recordings; the contents of `camera.toml` |
 /// | `depth.hpp, rgbd_frame.hpp` | depth images; a colour image with its depth image |
-/// | `rays.hpp, world_point.hpp, cloud.hpp` | rays of pixels; points of pixels in the world; points of a depth image |
-/// | `shutter.hpp, shutter_correction.hpp` | when the rows of the images are taken; images as if that were at once |
-/// | `undistort.hpp` | images without distortion |
-/// | `stereo.hpp, stereo_frame.hpp` | two cameras side by side and their rectification; their two images |
-/// | `mono_frame.hpp` | the image of a single camera |
-/// | `project_lanes.hpp` | eight points at a time, for adjustments; to be included by itself |
+/// | `rays.hpp, world_point.hpp, cloud.hpp` | rays of pixels; world points of pixels; points of a depth image |
+/// | `shutter.hpp, shutter_correction.hpp` | rolling-shutter timing; conversion to global-shutter images |
+/// | `undistort.hpp` | removal of lens distortion from images |
+/// | `stereo.hpp, stereo_frame.hpp` | stereo rigs and their rectification; a pair of stereo images |
+/// | `mono_frame.hpp` | the image of a monocular camera |
+/// | `project_lanes.hpp` | projection of eight points at a time, for optimisers; include it separately |
 #pragma once
 
 #include <orbis/camera/any.hpp>

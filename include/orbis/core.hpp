@@ -1,27 +1,27 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// What all components share.
+/// Types and utilities shared by all components.
 ///
-/// | header | what it is for |
+/// | header | contents |
 /// | --- | --- |
 /// | `types.hpp` | short names for vectors and matrices |
 /// | `so3.hpp, se3.hpp, sim3.hpp` | rotations, poses, similarities: Lie groups with exp and log |
 /// | `small_matrix.hpp` | arithmetic of fixed-size matrices that compiles fast |
-/// | `small_cholesky.hpp` | normal equations of a few unknowns |
-/// | `jacobi.hpp` | eigenvalues and singular values of small matrices, the rotation nearest to a matrix |
-/// | `thread_pool.hpp` | threads that wait for the loops of a policy |
-/// | `trajectory.hpp` | poses with times, poses between them, pairs of time stamps |
-/// | `point.hpp, point_cloud.hpp` | how algorithms read any point type in place; points with colours |
+/// | `small_cholesky.hpp` | Cholesky solver for the normal equations of a few unknowns |
+/// | `jacobi.hpp` | eigenvalues and singular values of small matrices, nearest rotation to a matrix |
+/// | `thread_pool.hpp` | persistent worker threads for parallel loops |
+/// | `trajectory.hpp` | stamped poses, pose interpolation, association of time stamps |
+/// | `point.hpp, point_cloud.hpp` | access to any point type in place; a cloud of points with colours |
 /// | `inline.hpp` | for authors of components: marks the functions of -inl files |
-/// | `image.hpp` | images and views of images |
-/// | `execution.hpp` | policies for threads (`seq`, `par`), progress, cancellation |
-/// | `result.hpp, file.hpp` | values or errors; whole files |
-/// | `random.hpp` | random numbers, the same on every machine |
-/// | `rounded.hpp` | products that no sum is fused with; sines that are the same bits everywhere |
+/// | `image.hpp` | images and image views |
+/// | `execution.hpp` | execution policies (`seq`, `par`), progress, cancellation |
+/// | `result.hpp, file.hpp` | values or errors; reading and writing whole files |
+/// | `random.hpp` | random numbers that are the same on every machine |
+/// | `rounded.hpp` | products that are never fused with a sum; bit-exact sines and cosines |
 /// | `simd.hpp` | vector kernels, written once for every instruction set |
-/// | `hash_index.hpp, cow_pages.hpp` | hash tables from keys to positions; arrays whose copies share pages |
-/// | `bits.hpp, bytes.hpp` | counts and strings of bits; byte orders, checksums, bytes as text |
-/// | `utf8.hpp` | whether bytes are text in UTF-8 |
+/// | `hash_index.hpp, cow_pages.hpp` | hash tables from keys to positions; copy-on-write arrays |
+/// | `bits.hpp, bytes.hpp` | bit counts and bit strings; byte orders, checksums, base-85 text |
+/// | `utf8.hpp` | validation of UTF-8 |
 #pragma once
 
 #include <orbis/core/bits.hpp>

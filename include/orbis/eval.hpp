@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Judging trajectories and maps.
+/// Evaluation of trajectories and maps.
 ///
-/// | header | what it is for |
+/// | header | contents |
 /// | --- | --- |
-/// | `alignment.hpp` | poses of two trajectories that belong together, and the transform between them |
+/// | `alignment.hpp` | pairing of the poses of two trajectories, and the transform between them |
 /// | `ate.hpp` | absolute trajectory error |
 /// | `rpe.hpp` | relative pose error |
-/// | `cloud_error.hpp` | distances of points to the true surface |
-/// | `scale.hpp` | by how much a trajectory is too large or too small |
-/// | `statistics.hpp` | mean, median, RMSE and more of a list of errors |
+/// | `cloud_error.hpp` | distances of points from the true surface |
+/// | `scale.hpp` | scale error of a trajectory |
+/// | `statistics.hpp` | mean, median, RMSE and others of a list of errors |
 #pragma once
 
 #include <orbis/eval/alignment.hpp>

@@ -2,26 +2,26 @@
 /// @file
 /// Keypoints, descriptors and matching.
 ///
-/// | header | what it is for |
+/// | header | contents |
 /// | --- | --- |
 /// | `features/descriptor.hpp` | `keypoint`, `binary_descriptor`, `features` |
-/// | `features/extractor.hpp` | concepts of extractors and of their parts |
-/// | `features/orb.hpp` | `orb_extractor`: ORB features, spread evenly |
+/// | `features/extractor.hpp` | concepts of extractors and their parts |
+/// | `features/orb.hpp` | `orb_extractor`: ORB features, distributed evenly |
 /// | `features/pyramid.hpp` | `image_pyramid`: an image at several scales |
-/// | `features/grey.hpp` | grey images of colour and 16-bit images |
+/// | `features/grey.hpp` | conversion of colour and 16-bit images to 8-bit grey images |
 /// | `features/hamming.hpp` | `hamming`, the distance of binary descriptors |
 /// | `features/match.hpp` | `match`, `candidate`, concepts of sources and stages |
 /// | `features/matcher.hpp` | matchers composed of a source and stages with `\|` |
 /// | `features/stages.hpp` | stages: ratio test, cross check, distance, uniqueness, rotation |
-/// | `features/brute_force.hpp` | the source that compares all pairs |
-/// | `features/windowed.hpp` | the source that looks near predicted positions |
-/// | `features/projected.hpp` | the source that looks where known points project to |
-/// | `features/project_points.hpp` | projections by a camera and its pose, for `projected` |
-/// | `features/epipolar.hpp` | the source that looks along epipolar lines |
-/// | `features/epipolar_geometry.hpp` | epipolar lines of two images of any cameras |
-/// | `features/stereo.hpp` | `stereo_matcher`: the right coordinates of features of a stereo pair |
-/// | `features/grid.hpp` | an index of keypoints by position |
-/// | `features/depth.hpp` | the depth at a keypoint and its standard deviation |
+/// | `features/brute_force.hpp` | source that compares all pairs |
+/// | `features/windowed.hpp` | source that searches near predicted positions |
+/// | `features/projected.hpp` | source that searches near the projections of known points |
+/// | `features/project_points.hpp` | projection by a camera and its pose, for `projected` |
+/// | `features/epipolar.hpp` | source that searches along epipolar lines |
+/// | `features/epipolar_geometry.hpp` | epipolar lines between two images of any cameras |
+/// | `features/stereo.hpp` | `stereo_matcher`: right-image coordinates of features of a stereo pair |
+/// | `features/grid.hpp` | spatial index of keypoints |
+/// | `features/depth.hpp` | depth at a keypoint and its standard deviation |
 #pragma once
 
 #include <orbis/features/brute_force.hpp>

@@ -2,24 +2,24 @@
 /// @file
 /// Estimation: camera poses, structure and transforms from measurements with noise and outliers.
 ///
-/// | header | what it is for |
+/// | header | contents |
 /// | --- | --- |
-/// | alignment.hpp | rigid or similarity transform between two lists of points, closed form or with outliers |
+/// | alignment.hpp | rigid or similarity transform between two lists of points, in closed form or with outliers |
 /// | bundle_adjustment.hpp | bundle adjustment: cameras and points from observations |
 /// | bundle_problem.hpp | observations, residual concepts, options and summary of bundle adjustment |
 /// | pnp.hpp | camera pose from known points and pixels with outliers (P3P in RANSAC) |
 /// | point_to_plane.hpp | distance of a measured point from a plane, as a residual |
 /// | pose_graph.hpp | pose graph optimisation |
 /// | pose_graph_problem.hpp | edges, residuals, options and summary of pose graphs |
-/// | pose_refinement.hpp | camera pose from known points, refined from a start, with outlier rejection |
+/// | pose_refinement.hpp | camera pose from known points, refined from an initial pose, with outlier rejection |
 /// | ransac.hpp | RANSAC for any model |
 /// | reprojection.hpp | reprojection error for any camera model |
-/// | reprojection_with_intrinsics.hpp | the same with intrinsics among the unknowns; the camera of BAL files |
+/// | reprojection_with_intrinsics.hpp | reprojection error with unknown intrinsics; the camera of BAL files |
 /// | robust_loss.hpp | robust losses (Huber, Cauchy, Tukey), chi-squared gates |
-/// | self_calibration.hpp | bundle adjustment of images of one camera whose intrinsics are among the unknowns |
-/// | solver_policies.hpp | damping (Gauss-Newton, Levenberg-Marquardt, dogleg), how the reduced system is solved |
+/// | self_calibration.hpp | bundle adjustment of images of one camera with unknown intrinsics |
+/// | solver_policies.hpp | damping (Gauss-Newton, Levenberg-Marquardt, dogleg), solvers for the reduced system |
 /// | triangulation.hpp | points from two or more rays |
-/// | two_view.hpp | essential matrix, homography and relative pose of two images; scene and motion that they show |
+/// | two_view.hpp | essential matrix, homography and relative pose of two images; initial scene and motion |
 #pragma once
 
 #include <orbis/optimize/alignment.hpp>

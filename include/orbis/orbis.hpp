@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// All of orbis but the interop headers. Include what you use instead where compile time matters.
+/// All of orbis except the interop headers. Include individual headers instead if compile time matters.
 #pragma once
 
 #include <orbis/camera.hpp>

@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Place recognition: images as bags of visual words, and keyframes found by them.
+/// Place recognition: images as bags of visual words, and retrieval of keyframes by them.
 ///
-/// | header | what it is for |
+/// | header | contents |
 /// | --- | --- |
-/// | `places/vocabulary.hpp` | `vocabulary`: descriptors to words, images to bags |
-/// | `places/default_vocabulary.hpp` | a vocabulary for ORB that needs no file |
-/// | `places/train.hpp` | `train`: a vocabulary of your own images |
-/// | `places/vocabulary_file.hpp` | vocabularies in files |
-/// | `places/vocabulary_tree.hpp` | the tree inside, for readers of other formats |
-/// | `places/bag_of_words.hpp` | `bag_of_words`: the words of an image and their values; how alike two are |
-/// | `places/keyframe_database.hpp` | `keyframe_database`: keyframes that may show the same place |
-/// | `places/inverted_index.hpp` | the images that have a word |
+/// | `places/vocabulary.hpp` | `vocabulary`: converts descriptors to words and images to bags of words |
+/// | `places/default_vocabulary.hpp` | a built-in vocabulary for ORB |
+/// | `places/train.hpp` | `train`: trains a vocabulary from images |
+/// | `places/vocabulary_file.hpp` | reading and writing vocabulary files |
+/// | `places/vocabulary_tree.hpp` | the underlying tree, for readers of other formats |
+/// | `places/bag_of_words.hpp` | `bag_of_words`: the words of an image and their values; similarity of two bags |
+/// | `places/keyframe_database.hpp` | `keyframe_database`: retrieval of keyframes that may show the same place |
+/// | `places/inverted_index.hpp` | index from words to images |
 ///
 /// @code
 ///   const auto words = orbis::places::default_vocabulary();

@@ -1,4 +1,4 @@
-// error: orbis: what follows \| must be a matching stage
+// error: orbis: the right operand of \| must be a matching stage
 #include <orbis/features.hpp>
 
 using namespace orbis::features;

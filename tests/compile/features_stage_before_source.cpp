@@ -1,4 +1,4 @@
-// error: orbis: a matcher begins with a source, such as brute_force\(hamming\{\}\), and the stages follow
+// error: orbis: a matcher begins with a source, such as brute_force\(hamming\{\}\), followed by stages
 #include <orbis/features.hpp>
 
 using namespace orbis::features;

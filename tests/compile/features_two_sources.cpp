@@ -1,4 +1,4 @@
-// error: orbis: a matcher has one source, and it stands first
+// error: orbis: a matcher has one source, in the first position
 #include <orbis/features.hpp>
 
 using namespace orbis::features;

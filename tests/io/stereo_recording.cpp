@@ -217,7 +217,7 @@ TEST_CASE("settings of ASL cameras that are damaged or not known are refused in 
   CHECK_THAT(message_of(io::open_stereo_recording(folder.path())), Contains("data.csv:1: a pose has"));
   write_asl(folder);
   folder.write("mav0/cam1/sensor.yaml", sensor_yaml("0.0"));  // both at one place
-  CHECK_THAT(message_of(io::open_stereo_recording(folder.path())), Contains("stand to the right of the left one"));
+  CHECK_THAT(message_of(io::open_stereo_recording(folder.path())), Contains("must be to the right of the left one"));
 }
 
 TEST_CASE("two lists or two folders of images are a stereo recording, rectified or with a second camera") {

@@ -134,9 +134,9 @@ TEST_CASE("Alignment says why it has no answer") {
   std::vector<vec3> line, place(20, vec3(1, 2, 3)), nans(20, vec3(nan, 0, 0));
   for (int i = 0; i != 20; ++i) line.emplace_back(1.0 + i, 2.0 - i, 0.5 * i);
   CHECK(why(line, line).code == errc::degenerate);
-  CHECK(why(line, line).message == "the points all lie on one line or in one place");
-  CHECK(why(place, place).message == "the points all lie on one line or in one place");
-  CHECK(why(nans, line).message == "of 20 pairs 0 are finite, three are needed");
+  CHECK(why(line, line).message == "all points are collinear or coincident");
+  CHECK(why(place, place).message == "all points are collinear or coincident");
+  CHECK(why(nans, line).message == "only 0 of 20 pairs are finite, three are needed");
   CHECK(why(std::vector<vec3>(2, vec3::Zero()), std::vector<vec3>(2, vec3::Zero())).code == errc::no_data);
   CHECK(why(std::vector<vec3>(3, vec3::Zero()), line).code == errc::invalid_argument);
   for (const double bad : test::bad_thresholds)

@@ -202,10 +202,10 @@ TEST_CASE("PnP says why it has no pose") {
   CHECK(optimize::estimate_pose(s.points, s.pixels, pinhole_camera, {.max_iterations = 200}).error().code ==
         errc::degenerate);
   CHECK(optimize::estimate_pose(s.points, s.pixels, pinhole_camera, {.max_iterations = 200}).error().message ==
-        "the points all lie on one line");
+        "all points are collinear");
   for (auto& p : s.points) p = vec3(1, 2, 3);
   CHECK(optimize::estimate_pose(s.points, s.pixels, pinhole_camera, {.max_iterations = 200}).error().message ==
-        "the points all lie in one place");
+        "all points coincide");
   for (auto& p : s.points) p.setConstant(std::numeric_limits<double>::quiet_NaN());
   CHECK(optimize::estimate_pose(s.points, s.pixels, pinhole_camera, {.max_iterations = 200}).error().code ==
         errc::degenerate);

@@ -143,7 +143,7 @@ TEST_CASE("The sequential test lets good models through and most bad ones not") 
       for (int i = 0; i != 32; ++i) inside += random.uniform() < ratio ? 1U : 0U;
       inliers += inside;
       data += 32;
-      if (test.hopeless(inside, 32)) {
+      if (test.rejects(inside, 32)) {
         test.end(inliers, data);
         return false;
       }

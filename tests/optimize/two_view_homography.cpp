@@ -183,10 +183,10 @@ TEST_CASE("The homography says why there is none") {
     CHECK(optimize::estimate_homography(m.first, m.second, {.threshold = bad}).error().code == errc::invalid_argument);
   std::vector<vec2> line, nans(50, vec2::Constant(std::numeric_limits<double>::quiet_NaN()));
   for (int i = 0; i != 50; ++i) line.emplace_back(10.0 + i, 20.0 - 2.0 * i);
-  CHECK(why(line, m.second).message == "the points all lie on one line or in one place");
-  CHECK(why(m.first, line).message == "the points all lie on one line or in one place");
+  CHECK(why(line, m.second).message == "all points are collinear or coincident");
+  CHECK(why(m.first, line).message == "all points are collinear or coincident");
   CHECK(why(std::vector<vec2>(50, vec2(1, 2)), std::vector<vec2>(50, vec2(1, 2))).code == errc::degenerate);
-  CHECK(why(nans, m.second).message == "of 50 matches 0 are finite, four are needed");
+  CHECK(why(nans, m.second).message == "only 0 of 50 matches are finite, four are needed");
   CHECK(why({vec2(0, 0)}, {vec2(0, 0)}).code == errc::no_data);
   CHECK(why({vec2(0, 0)}, m.second).code == errc::invalid_argument);
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A camera whose model is known at run time only.
+/// A camera whose model is only known at run time.
 #pragma once
 
 #include <concepts>
@@ -20,7 +20,7 @@
 
 namespace orbis::camera {
 
-/// One of our models, as a value; the model is switched on at every call. Hot loops switch once:
+/// Holds one of the library's camera models as a value; every call dispatches on the model. Hot loops dispatch once:
 /// `camera.visit([&](const auto& model) { ... })`. Satisfies `camera_model`.
 class any_camera {
  public:
@@ -29,17 +29,17 @@ class any_camera {
   any_camera(const radial_tangential& c) : model_{c} {}  // NOLINT(google-explicit-constructor)
   any_camera(const kannala_brandt& c) : model_{c} {}     // NOLINT(google-explicit-constructor)
 
-  /// `f(model)` for the model that is held.
+  /// Returns `f(model)` for the held model.
   template <class F>
   decltype(auto) visit(F&& f) const {
     return std::visit(std::forward<F>(f), model_);
   }
-  /// The model, if it is an `M`.
+  /// The model, or null if it is not an `M`.
   template <class M>
   [[nodiscard]] const M* get_if() const noexcept {
     return std::get_if<M>(&model_);
   }
-  /// "pinhole", "radtan" or "kannala_brandt", as camera files say it.
+  /// "pinhole", "radtan" or "kannala_brandt", as in camera files.
   [[nodiscard]] std::string_view model_name() const noexcept {
     constexpr std::string_view names[] = {"pinhole", "radtan", "kannala_brandt"};
     static_assert(std::size(names) == std::variant_size_v<decltype(model_)>, "a name for each model");

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Points of a depth image.
+/// Converts depth images to points.
 #pragma once
 
 #include <cassert>
@@ -21,22 +21,22 @@
 
 namespace orbis::camera {
 
-/// Which pixels of a depth image become points.
+/// Selection of the pixels of a depth image that become points.
 struct unproject_options {
   int stride = 1;                                       ///< every stride-th pixel of every stride-th row
   float min_depth = 0.0F;                               ///< metres along the optical axis
   float max_depth = std::numeric_limits<float>::max();  ///< metres along the optical axis
 };
 
-/// Points, and the pixel each of them was seen in.
+/// Points and the pixels that they were observed in.
 struct unprojected_points {
   std::vector<vec3f> points;          ///< metres
-  std::vector<std::uint32_t> pixels;  ///< `y * width + x`, rising; as many as points
+  std::vector<std::uint32_t> pixels;  ///< `y * width + x`, ascending; one per point
 };
 
 namespace detail {
 
-/// `f(x, y, point)` for the valid pixels of row `y`.
+/// Calls `f(x, y, point)` for the valid pixels of row `y`.
 template <depth_source Depth, std::invocable<int, int, const vec3f&> F>
 void for_each_point_of_row(const Depth& depth, const ray_table& rays, int y, const unproject_options& options, F&& f) {
   for (int x = 0; x < rays.width(); x += options.stride) {
@@ -49,8 +49,7 @@ void for_each_point_of_row(const Depth& depth, const ray_table& rays, int y, con
 
 }  // namespace detail
 
-/// The points of a depth image, in the world, in the order of their pixels under every policy.
-/// O(width * height / stride^2).
+/// The points of a depth image in the world frame, in pixel order under every policy. O(width * height / stride^2).
 /// @pre depth and rays have the same size; options.stride > 0
 template <execution_policy Policy, depth_source Depth>
 [[nodiscard]] unprojected_points unproject_depth(const Policy& policy, const Depth& depth, const ray_table& rays,
@@ -61,7 +60,7 @@ template <execution_policy Policy, depth_source Depth>
   const auto row_of = [&](std::size_t i) { return static_cast<int>(i) * options.stride; };
   constexpr std::size_t grain = 16;
 
-  std::vector<std::size_t> first(rows + 1, 0);  // where each row's points begin
+  std::vector<std::size_t> first(rows + 1, 0);  // index of the first point of each row
   for_each_index(policy, rows, grain, [&](std::size_t i) {
     std::size_t count = 0;
     detail::for_each_point_of_row(depth, rays, row_of(i), options, [&](int, int, const vec3f&) { ++count; });
@@ -87,7 +86,7 @@ template <execution_policy Policy, depth_source Depth>
   return out;
 }
 
-/// The points of a single depth image: makes the camera's table of rays first. For several images of one camera, make
+/// The points of a single depth image; computes the camera's ray table first. For several images of one camera, build
 /// the table once and call the function above. O(pixels).
 template <execution_policy Policy, depth_source Depth, camera_model Camera>
 [[nodiscard]] unprojected_points unproject_depth(const Policy& policy, const Depth& depth, const Camera& camera,

@@ -14,8 +14,8 @@
 
 namespace orbis::camera {
 
-/// Depth along the optical axis (z, not range along the ray) for each pixel: `operator()` gives
-/// metres, or 0 where there is no measurement.
+/// A source of depth along the optical axis (z, not range along the ray): `operator()` returns metres, or 0 for pixels
+/// without a measurement.
 template <class D>
 concept depth_source = requires(const D& depth, int x, int y) {
   { depth.width() } -> std::convertible_to<int>;
@@ -23,9 +23,9 @@ concept depth_source = requires(const D& depth, int x, int y) {
   { depth(x, y) } -> std::same_as<float>;
 };
 
-/// A depth image in place. `T` is `std::uint16_t` (value / scale = metres; 0 and 65535 are invalid)
-/// or `float` (metres times scale; NaN, inf, 0 and negative values are invalid). Values outside
-/// `[min_depth, max_depth]` metres are invalid as well.
+/// A depth image in place. `T` is `std::uint16_t` (value / scale = metres; 0 and 65535 are invalid) or `float` (metres
+/// times scale; NaN, inf, 0 and negative values are invalid). Values outside `[min_depth, max_depth]` metres are also
+/// invalid.
 template <class T>
 requires std::same_as<T, std::uint16_t> || std::same_as<T, float>
 class depth_view {
@@ -42,12 +42,12 @@ class depth_view {
   /// The range of valid depths, metres.
   [[nodiscard]] float min_depth() const noexcept { return min_; }
   [[nodiscard]] float max_depth() const noexcept { return max_; }
-  /// A view of these pixels with a narrower range of valid depths, in metres.
+  /// A view of the same pixels with a narrower range of valid depths, in metres.
   [[nodiscard]] depth_view within(float min_depth, float max_depth) const noexcept {
     return depth_view(pixels_, scale_, std::max(min_, min_depth), std::min(max_, max_depth));
   }
 
-  /// Metres, or 0 where invalid.
+  /// Depth in metres, or 0 if invalid.
   [[nodiscard]] float operator()(int x, int y) const noexcept {
     const T stored = pixels_(x, y);
     if constexpr (std::same_as<T, std::uint16_t>) {

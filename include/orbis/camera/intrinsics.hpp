@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The numbers every camera model starts with.
+/// Image size and camera matrix, common to all camera models.
 #pragma once
 
 #include <cmath>
 
 namespace orbis::camera {
 
-/// Image size and camera matrix, in pixels; pixel centres at integers. The default is the
-/// normalised image plane.
+/// Image size and camera matrix, in pixels; pixel centres at integers. The default is the normalised image plane.
 struct intrinsics {
   int width = 0;
   int height = 0;
@@ -20,8 +19,8 @@ struct intrinsics {
   friend bool operator==(const intrinsics&, const intrinsics&) = default;
 };
 
-/// Whether a camera model may be made of `k`: a size that is not negative, focal lengths that are
-/// positive, nothing NaN or infinite.
+/// Returns true if `k` is valid for a camera model: a non-negative size, positive focal lengths, nothing NaN or
+/// infinite.
 [[nodiscard]] inline bool is_valid(const intrinsics& k) noexcept {
   return k.width >= 0 && k.height >= 0 && k.fx > 0.0 && k.fy > 0.0 && std::isfinite(k.fx) && std::isfinite(k.fy) &&
          std::isfinite(k.cx) && std::isfinite(k.cy);

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The fisheye lens, as OpenCV's `cv::fisheye` defines it.
+/// The fisheye lens, as defined by OpenCV's `cv::fisheye`.
 ///
-/// Model: J. Kannala, S. S. Brandt, "A generic camera model and calibration method for conventional,
-/// wide-angle, and fish-eye lenses", PAMI 28(8), 2006, with the radially symmetric part alone.
+/// Model: J. Kannala, S. S. Brandt, "A generic camera model and calibration method for conventional, wide-angle, and
+/// fish-eye lenses", PAMI 28(8), 2006; only the radially symmetric part.
 #pragma once
 
 #include <algorithm>
@@ -20,11 +20,11 @@
 
 namespace orbis::camera {
 
-/// With `theta` the angle between ray and optical axis, a point lies
-/// `theta (1 + k1 theta^2 + k2 theta^4 + k3 theta^6 + k4 theta^8)` focal lengths off the centre.
+/// The Kannala-Brandt fisheye model. With `theta` the angle between ray and optical axis, a point projects to a
+/// distance of `theta (1 + k1 theta^2 + k2 theta^4 + k3 theta^6 + k4 theta^8)` focal lengths from the principal point.
 ///
-/// The domain ends where that polynomial stops growing, and at 90 degrees, since rays are scaled to
-/// z = 1. Satisfies `camera_model`.
+/// The domain ends where that polynomial stops increasing, at most at 90 degrees, since rays are scaled to z = 1.
+/// Satisfies `camera_model`.
 class kannala_brandt {
  public:
   struct coefficients {
@@ -43,11 +43,10 @@ class kannala_brandt {
   /// Image size and camera matrix.
   [[nodiscard]] const intrinsics& k() const noexcept { return k_; }
   [[nodiscard]] const coefficients& distortion() const noexcept { return d_; }
-  /// Rays have to be closer to the optical axis than this; radians, at most pi / 2.
+  /// Upper limit of the angle between a ray and the optical axis; radians, at most pi / 2.
   [[nodiscard]] double max_angle() const noexcept { return max_angle_; }
 
-  /// The pixel of a point in the camera frame (metres); empty at and behind z = 0, outside the
-  /// domain, and for NaN.
+  /// The pixel of a point in the camera frame (metres); empty for z <= 0, outside the domain, and for NaN.
   [[nodiscard]] std::optional<vec2> project(const vec3& p) const {
     if (!(p.z() > 0.0)) return std::nullopt;
     const double r = std::hypot(p.x(), p.y());
@@ -59,7 +58,7 @@ class kannala_brandt {
     if (!std::isfinite(pixel.x()) || !std::isfinite(pixel.y())) return std::nullopt;
     return pixel;
   }
-  /// The pixel of the point, and the derivative of the pixel by the point. Without a pixel `jacobian` is not changed.
+  /// The pixel of the point, and the derivative of the pixel by the point. Without a pixel `jacobian` is unchanged.
   [[nodiscard]] std::optional<vec2> project(const vec3& p, matrix<2, 3>& jacobian) const {
     const auto pixel = project(p);
     if (!pixel) return pixel;
@@ -84,8 +83,7 @@ class kannala_brandt {
     jacobian(1, 2) = k_.fy * by_z * s;
     return pixel;
   }
-  /// The ray through a pixel, scaled to z = 1, by Newton's method on the angle. Empty outside the
-  /// domain, and for NaN.
+  /// The ray through a pixel, scaled to z = 1, by Newton's method on the angle. Empty outside the domain, and for NaN.
   [[nodiscard]] std::optional<vec3> unproject(const vec2& pixel) const {
     const vec2 target{(pixel.x() - k_.cx) / k_.fx, (pixel.y() - k_.cy) / k_.fy};
     const double distorted = std::sqrt(target.x() * target.x() + target.y() * target.y());

@@ -10,13 +10,12 @@
 
 namespace orbis::camera {
 
-/// A central projection. Camera frame: x right, y down, z forward, metres. Pixels: centres at
-/// integers.
+/// A central projection. Camera frame: x right, y down, z forward, metres. Pixels: centres at integers.
 ///
-/// - `project(p)`: the pixel of a point in the camera frame, empty where there is none (behind the
-///   camera, outside the model's domain). Does not test against the image bounds.
+/// - `project(p)`: the pixel of a point in the camera frame, empty if there is none (behind the camera, outside the
+/// model's domain). Does not test against the image bounds.
 /// - `project(p, J)`: the pixel, and the derivative of the pixel by the point (2x3).
-/// - `unproject(pixel)`: the ray through a pixel, scaled to z = 1, empty where the inversion fails.
+/// - `unproject(pixel)`: the ray through a pixel, scaled to z = 1, empty if the inversion fails.
 template <class C>
 concept camera_model = requires(const C& camera, const vec3& point, const vec2& pixel, matrix<2, 3>& jacobian) {
   { camera.width() } -> std::convertible_to<int>;
@@ -26,7 +25,7 @@ concept camera_model = requires(const C& camera, const vec3& point, const vec2& 
   { camera.unproject(pixel) } -> std::same_as<std::optional<vec3>>;
 };
 
-/// Names `C` as `type`. If `C` lacks a member of `camera_model`, the first error of the compiler names that member.
+/// Names `C` as `type`. If `C` lacks a member of `camera_model`, the first compiler error names that member.
 template <class C>
 struct checked_camera {
   static_assert(

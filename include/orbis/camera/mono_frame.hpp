@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// One moment of a single camera.
+/// A frame of a monocular camera.
 #pragma once
 
 #include <optional>
@@ -10,11 +10,11 @@
 
 namespace orbis::camera {
 
-/// The image of a camera without depth.
+/// A time-stamped image of a camera without depth.
 struct mono_frame {
   double timestamp = 0.0;  ///< seconds
   image<rgb8> color;
-  std::optional<se3> T_world_camera;  ///< ground truth, where the recording has it
+  std::optional<se3> T_world_camera;  ///< ground truth, if recorded
 };
 
 }  // namespace orbis::camera

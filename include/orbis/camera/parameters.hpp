@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The numbers a camera model is made of, and how its pixels depend on them: for calibration.
+/// Parameters of a camera model, and the derivatives of pixels with respect to them: for calibration.
 #pragma once
 
 #include <array>
@@ -18,18 +18,18 @@
 
 namespace orbis::camera {
 
-/// What `parametric_camera` asks of a model. Specialise it for models of your own:
+/// Customisation point for `parametric_camera`. Specialise it for user-defined models:
 ///
-/// - `count`: how many parameters there are;
+/// - `count`: the number of parameters;
 /// - `get(camera)`: their values;
-/// - `with(camera, p)`: a camera of the same image size with the parameters `p`, empty where there is no
-///   such camera (a focal length that is not positive, a NaN);
-/// - `project(camera, point, by_point, by_parameters)`: as `camera.project(point, by_point)`, and the
-///   derivative of the pixel by the parameters (2 x count). Both are untouched if empty.
+/// - `with(camera, p)`: a camera of the same image size with the parameters `p`, empty if they are invalid (a focal
+/// length that is not positive, a NaN);
+/// - `project(camera, point, by_point, by_parameters)`: as `camera.project(point, by_point)`, and the derivative of the
+/// pixel by the parameters (2 x count). Both are unchanged if the result is empty.
 template <class Camera>
 struct parameters_of {};
 
-/// A camera model whose parameters can be read, changed and differentiated by.
+/// A camera model whose parameters can be read, changed and differentiated.
 template <class C>
 concept parametric_camera = camera_model<C> && std::copyable<C> &&
     requires(const C& camera, const vec3& point, const matrix<parameters_of<C>::count>& p, matrix<2, 3>& by_point,
@@ -41,7 +41,7 @@ concept parametric_camera = camera_model<C> && std::copyable<C> &&
 
 namespace detail {
 
-/// `k` with the camera matrix that the first four parameters say, where all `count` are good for a camera.
+/// `k` with the camera matrix from the first four parameters; empty if any of the `count` parameters is invalid.
 [[nodiscard]] inline std::optional<intrinsics> with_camera_matrix(intrinsics k, const double* p, int count) {
   k.fx = p[0], k.fy = p[1], k.cx = p[2], k.cy = p[3];
   for (int i = 4; i != count; ++i)
@@ -60,7 +60,7 @@ inline void by_camera_matrix(double x, double y, double* j) {
 
 }  // namespace detail
 
-/// fx, fy, cx, cy.
+/// Parameters: fx, fy, cx, cy.
 template <>
 struct parameters_of<pinhole> {
   static constexpr int count = 4;
@@ -80,7 +80,7 @@ struct parameters_of<pinhole> {
   }
 };
 
-/// fx, fy, cx, cy, then the coefficients in the order of OpenCV: k1, k2, p1, p2, k3, k4, k5, k6.
+/// Parameters: fx, fy, cx, cy, then the coefficients in the order of OpenCV: k1, k2, p1, p2, k3, k4, k5, k6.
 template <>
 struct parameters_of<radial_tangential> {
   static constexpr int count = 12;
@@ -111,7 +111,7 @@ struct parameters_of<radial_tangential> {
     double* const j = by_parameters.data();
     detail::by_camera_matrix(g * x + 2.0 * d.p1 * x * y + d.p2 * (s + 2.0 * x * x),
                              g * y + d.p1 * (s + 2.0 * y * y) + 2.0 * d.p2 * x * y, j);
-    const double u = k.fx * x * inverse, v = k.fy * y * inverse;  // by the numerator of g
+    const double u = k.fx * x * inverse, v = k.fy * y * inverse;  // derivative by the numerator of g
     const double along[8] = {s, ss, 0.0, 0.0, sss, -g * s, -g * ss, -g * sss};
     for (int i = 0; i != 8; ++i) {
       j[8 + 2 * i] = u * along[i];
@@ -125,7 +125,7 @@ struct parameters_of<radial_tangential> {
   }
 };
 
-/// fx, fy, cx, cy, k1, k2, k3, k4.
+/// Parameters: fx, fy, cx, cy, k1, k2, k3, k4.
 template <>
 struct parameters_of<kannala_brandt> {
   static constexpr int count = 8;
@@ -149,7 +149,7 @@ struct parameters_of<kannala_brandt> {
     const auto& d = c.distortion();
     const double r = std::hypot(point.x(), point.y());
     const double theta = std::atan2(r, point.z()), s = theta * theta;
-    const double on_axis = 1.0 / point.z();  // theta / r there
+    const double on_axis = 1.0 / point.z();  // theta / r on the optical axis
     const double x = point.x() * (r > 0.0 ? theta / r : on_axis), y = point.y() * (r > 0.0 ? theta / r : on_axis);
     const double g = 1.0 + s * (d.k1 + s * (d.k2 + s * (d.k3 + s * d.k4)));
     double* const j = by_parameters.data();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The camera without distortion.
+/// The pinhole camera: no distortion.
 #pragma once
 
 #include <cassert>
@@ -12,7 +12,7 @@
 
 namespace orbis::camera {
 
-/// `u = fx x / z + cx`, `v = fy y / z + cy`. Satisfies `camera_model`.
+/// The pinhole model: `u = fx x / z + cx`, `v = fy y / z + cy`. Satisfies `camera_model`.
 class pinhole {
  public:
   pinhole() = default;
@@ -26,14 +26,14 @@ class pinhole {
   /// Image size and camera matrix.
   [[nodiscard]] const intrinsics& k() const noexcept { return k_; }
 
-  /// The pixel of a point in the camera frame (metres); empty at and behind z = 0, and for NaN.
+  /// The pixel of a point in the camera frame (metres); empty for z <= 0, and for NaN.
   [[nodiscard]] std::optional<vec2> project(const vec3& p) const {
     if (!(p.z() > 0.0)) return std::nullopt;
     const vec2 pixel{k_.fx * (p.x() / p.z()) + k_.cx, k_.fy * (p.y() / p.z()) + k_.cy};
     if (!std::isfinite(pixel.x()) || !std::isfinite(pixel.y())) return std::nullopt;
     return pixel;
   }
-  /// The pixel of the point, and the derivative of the pixel by the point. Without a pixel `jacobian` is not changed.
+  /// The pixel of the point, and the derivative of the pixel by the point. Without a pixel `jacobian` is unchanged.
   [[nodiscard]] std::optional<vec2> project(const vec3& p, matrix<2, 3>& jacobian) const {
     const auto pixel = project(p);
     if (pixel) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Cameras of the usual public recordings, by name.
+/// Cameras of common public recordings, by name.
 #pragma once
 
 #include <array>
@@ -12,17 +12,17 @@
 
 namespace orbis::camera {
 
-/// The names that `preset` knows.
+/// The names that `preset` accepts.
 inline constexpr std::array<std::string_view, 5> preset_names{"tum_fr1", "tum_fr2", "tum_fr3", "icl", "kinect"};
 
-/// The camera of the TUM RGB-D benchmark's freiburg1, 2 and 3 sequences (the published calibration
-/// of the colour camera; freiburg3 is already undistorted), of ICL-NUIM, or a Kinect by its nominal
-/// values. All are 640x480 at 30 frames per second.
+/// Returns the camera of the TUM RGB-D benchmark's freiburg1, 2 and 3 sequences (the published calibration of the
+/// colour camera; freiburg3 is already undistorted), of ICL-NUIM, or of a Kinect with nominal values. All are 640x480
+/// at 30 frames per second.
 ///
-/// Sources: J. Sturm et al., "A benchmark for the evaluation of RGB-D SLAM systems", IROS 2012, and
-/// its web page on file formats; A. Handa et al., "A benchmark for RGB-D visual odometry, 3D
-/// reconstruction and SLAM", ICRA 2014 (whose y axis points up, hence its negative fy; ours points
-/// down). Errors: invalid_argument for another name, with the list of those known.
+/// Sources: J. Sturm et al., "A benchmark for the evaluation of RGB-D SLAM systems", IROS 2012, and its web page on
+/// file formats; A. Handa et al., "A benchmark for RGB-D visual odometry, 3D reconstruction and SLAM", ICRA 2014 (its y
+/// axis points up, hence its negative fy; here y points down). Errors: invalid_argument for an unknown name, with the
+/// list of known ones.
 [[nodiscard]] inline result<camera_settings> preset(std::string_view name) {
   if (name == "tum_fr1")
     return camera_settings{

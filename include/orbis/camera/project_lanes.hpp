@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Projects eight points at a time, in vectors of doubles (`core/simd/vec.hpp`): the inner loop of adjustments.
+/// Projects eight points at a time, in vectors of doubles (`core/simd/vec.hpp`): the inner loop of optimisers.
 ///
-/// `lanes_of<Camera>` exists for every camera model. Our models have specialisations that give the same bits on every
-/// instruction set; for any other model, `project` is called eight times.
+/// `lanes_of<Camera>` exists for every camera model. The library's models have specialisations that give the same bits
+/// on every instruction set; any other model uses eight calls of `project`.
 #pragma once
 
 #include <array>
@@ -20,19 +20,19 @@
 
 namespace orbis::camera {
 
-/// Vectors of doubles that projection works on: `simd::vec<double, 8, Target>`.
+/// A vector of doubles for projection: `simd::vec<double, 8, Target>`.
 template <class L>
 concept double_lanes = requires(const L& x, const double* p) {
   { L::load(p) } -> std::same_as<L>;
   { x* x + 1.0 / x } -> std::same_as<L>;
   select(x < x, x, x);
 };
-/// What comparing them gives.
+/// Mask type that comparisons of such vectors return.
 template <double_lanes L>
 using mask_of = decltype(std::declval<L>() < std::declval<L>());
 
 /// The pixels of eight points in the camera frame, and their derivatives by the point, `j[row][column]`, in pixels per
-/// metre. Of no meaning in lanes that are not `valid`.
+/// metre. Unspecified in lanes that are not `valid`.
 template <double_lanes L>
 struct lane_projection {
   L u, v;
@@ -40,7 +40,7 @@ struct lane_projection {
   L j[2][3];
 };
 
-/// Whether both numbers of a lane are finite.
+/// Lanes in which both numbers are finite.
 template <double_lanes L>
 [[nodiscard]] ORBIS_ALWAYS_INLINE mask_of<L> is_finite(const L& u, const L& v) {
   constexpr double most = std::numeric_limits<double>::max();
@@ -49,7 +49,7 @@ template <double_lanes L>
 
 namespace detail {
 
-/// Values of the lanes one after the other.
+/// The values of the lanes as an array.
 using lane_array = std::array<double, 8>;
 
 struct projected_lanes {
@@ -57,7 +57,7 @@ struct projected_lanes {
   std::array<lane_array, 6> j;
 };
 
-/// Kept out of the kernels, which are compiled for instruction sets that might round it otherwise.
+/// Not part of the kernels: these are compiled for instruction sets that might round it differently.
 template <camera_model Camera>
 [[gnu::noinline]] void project_each(const Camera& camera, const lane_array& x, const lane_array& y, const lane_array& z,
                                     bool with_jacobian, projected_lanes& out) {
@@ -73,8 +73,8 @@ template <camera_model Camera>
   }
 }
 
-/// The angle of (z, r), for z > 0 and r >= 0, not both near the ends of the range of double: halved
-/// three times, then by its power series.
+/// The angle of (z, r), for z > 0 and r >= 0, not both near the limits of double: halved three times, then evaluated by
+/// its power series.
 template <double_lanes L>
 [[nodiscard]] ORBIS_ALWAYS_INLINE L angle_off_axis(const L& r, const L& z) {
   L t = r / (z + square_root(r * r + z * z));  // tan(angle / 2), at most 1
@@ -87,9 +87,8 @@ template <double_lanes L>
 
 }  // namespace detail
 
-/// `project<Jacobian>(camera, x, y, z, out)`: what `camera.project` says of eight points in the camera
-/// frame, up to rounding; derivatives only with `Jacobian`. Where `axis_aligned`, u does not depend on y
-/// nor v on x.
+/// `project<Jacobian>(camera, x, y, z, out)`: `camera.project` for eight points in the camera frame, up to rounding;
+/// derivatives only if `Jacobian`. If `axis_aligned`, u does not depend on y nor v on x.
 template <camera_model Camera>
 struct lanes_of {
   static constexpr bool axis_aligned = false;
@@ -177,7 +176,7 @@ struct lanes_of<kannala_brandt> {
     const intrinsics& k = camera.k();
     const kannala_brandt::coefficients& d = camera.distortion();
     const L rr = x * x + y * y, zz = z * z;
-    const auto on_axis = rr <= 1e-18 * zz;  // a pinhole there
+    const auto on_axis = rr <= 1e-18 * zz;  // these points use the pinhole model
     const L root = reciprocal_root(select(on_axis, L(1.0), rr));
     const L r = select(on_axis, L(0.0), rr * root);
     const L theta = detail::angle_off_axis(r, z), s = theta * theta;

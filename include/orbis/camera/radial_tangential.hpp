@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The usual lens: radial and tangential distortion, with OpenCV's 4, 5 or 8 coefficients.
+/// The common lens model: radial and tangential distortion, with OpenCV's 4, 5 or 8 coefficients.
 ///
-/// Model: D. C. Brown, "Decentering distortion of lenses", Photogrammetric Engineering 32(3), 1966;
-/// D. Claus, A. Fitzgibbon, "A rational function lens distortion model for general cameras", CVPR
-/// 2005, for the denominator.
+/// Model: D. C. Brown, "Decentering distortion of lenses", Photogrammetric Engineering 32(3), 1966; the denominator: D.
+/// Claus, A. Fitzgibbon, "A rational function lens distortion model for general cameras", CVPR 2005.
 #pragma once
 
 #include <algorithm>
@@ -22,16 +21,15 @@
 
 namespace orbis::camera {
 
-/// With `x, y` on the plane z = 1 and `s = x^2 + y^2`:
+/// The radial-tangential model. With `x, y` on the plane z = 1 and `s = x^2 + y^2`:
 /// `g = (1 + k1 s + k2 s^2 + k3 s^3) / (1 + k4 s + k5 s^2 + k6 s^3)`,
 /// `x' = g x + 2 p1 x y + p2 (s + 2 x^2)`, `y' = g y + p1 (s + 2 y^2) + 2 p2 x y`.
 ///
-/// The polynomial is good only where it was fitted; far out it may fold back, so that one pixel has
-/// several rays. Points beyond the first fold are outside this model's domain. Satisfies
-/// `camera_model`.
+/// The polynomial is accurate only where it was fitted; at large radii it may fold back, so that one pixel has several
+/// rays. Points beyond the first fold are outside this model's domain. Satisfies `camera_model`.
 class radial_tangential {
  public:
-  /// In the order OpenCV lists them; those not given are 0.
+  /// Coefficients in OpenCV's order; omitted ones are 0.
   struct coefficients {
     double k1 = 0.0, k2 = 0.0, p1 = 0.0, p2 = 0.0, k3 = 0.0, k4 = 0.0, k5 = 0.0, k6 = 0.0;
     friend bool operator==(const coefficients&, const coefficients&) = default;
@@ -48,16 +46,15 @@ class radial_tangential {
   /// Image size and camera matrix.
   [[nodiscard]] const intrinsics& k() const noexcept { return k_; }
   [[nodiscard]] const coefficients& distortion() const noexcept { return d_; }
-  /// `x^2 + y^2` on the plane z = 1 has to be below this; infinite where nothing folds back.
+  /// Upper limit of `x^2 + y^2` on the plane z = 1; infinite if the polynomial never folds back.
   [[nodiscard]] double max_squared_radius() const noexcept { return domain_; }
 
-  /// The pixel of a point in the camera frame (metres); empty at and behind z = 0, outside the
-  /// domain, and for NaN.
+  /// The pixel of a point in the camera frame (metres); empty for z <= 0, outside the domain, and for NaN.
   [[nodiscard]] std::optional<vec2> project(const vec3& p) const {
     if (!(p.z() > 0.0)) return std::nullopt;
     return pixel_of({p.x() / p.z(), p.y() / p.z()});
   }
-  /// The pixel of the point, and the derivative of the pixel by the point. Without a pixel `jacobian` is not changed.
+  /// The pixel of the point, and the derivative of the pixel by the point. Without a pixel `jacobian` is unchanged.
   [[nodiscard]] std::optional<vec2> project(const vec3& p, matrix<2, 3>& jacobian) const {
     const auto pixel = project(p);
     if (pixel) {
@@ -74,9 +71,8 @@ class radial_tangential {
     }
     return pixel;
   }
-  /// The ray through a pixel, scaled to z = 1, by Newton's method: from the distorted position, or
-  /// if that leads nowhere, from where the radial part alone puts it. Empty where there is no ray
-  /// within the domain, and for NaN.
+  /// The ray through a pixel, scaled to z = 1, by Newton's method: starting from the distorted position or, if that
+  /// fails, from the solution of the radial part alone. Empty if there is no ray within the domain, and for NaN.
   [[nodiscard]] std::optional<vec3> unproject(const vec2& pixel) const {
     const vec2 target{(pixel.x() - k_.cx) / k_.fx, (pixel.y() - k_.cy) / k_.fy};
     if (!std::isfinite(target.x()) || !std::isfinite(target.y())) return std::nullopt;
@@ -88,10 +84,10 @@ class radial_tangential {
 
  private:
   static constexpr int max_iterations = 30;
-  /// Squared relative step; Newton's next step would be its square.
+  /// Threshold on the squared relative step; the error after such a step is about its square.
   static constexpr double converged = 1e-20;
 
-  /// The ray that distorts to `target`, from the guess `m`; every step has to stay in the domain.
+  /// The ray that distorts to `target`, from the initial guess `m`; every step must stay in the domain.
   [[nodiscard]] std::optional<vec3> newton(const vec2& target, vec2 m) const {
     for (int i = 0; i != max_iterations; ++i) {
       const vec2 d = distort(m);
@@ -143,7 +139,7 @@ class radial_tangential {
     return j;
   }
 
-  /// The ray that `target` has without tangential distortion, or one on the rim of the domain.
+  /// The ray of `target` without tangential distortion, or one on the rim of the domain.
   [[nodiscard]] vec2 radial_start(const vec2& target) const {
     const double distorted = std::sqrt(target.x() * target.x() + target.y() * target.y());
     if (distorted == 0.0) return target;
@@ -157,8 +153,8 @@ class radial_tangential {
     return {target.x() * scale, target.y() * scale};
   }
 
-  /// The squared radius at which `r g(r^2)` stops growing: with `g = n / q` the first sign change of
-  /// `n q + 2 s (n' q - n q')`, or of `q`.
+  /// The squared radius at which `r g(r^2)` stops increasing: with `g = n / q` the first sign change of `n q + 2 s (n'
+  /// q - n q')`, or of `q`.
   [[nodiscard]] static double domain(const coefficients& d) {
     const std::array<double, 4> n{1.0, d.k1, d.k2, d.k3};
     const std::array<double, 4> q{1.0, d.k4, d.k5, d.k6};

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The rays of a camera, computed once for every pixel.
+/// The rays of a camera, precomputed for every pixel.
 #pragma once
 
 #include <cstddef>
@@ -12,8 +12,8 @@
 
 namespace orbis::camera {
 
-/// For every pixel of any camera the point where its ray meets the plane z = 1, so that
-/// un-projecting a depth costs three multiplications. 8 bytes for each pixel.
+/// For every pixel of a camera the point where its ray meets the plane z = 1, so that un-projecting a depth costs three
+/// multiplications. 8 bytes per pixel.
 class ray_table {
  public:
   ray_table() = default;
@@ -29,7 +29,7 @@ class ray_table {
 
   [[nodiscard]] int width() const noexcept { return rays_.width(); }
   [[nodiscard]] int height() const noexcept { return rays_.height(); }
-  /// x and y of the pixel's ray at z = 1; NaN where it has none. @pre inside the image
+  /// x and y of the pixel's ray at z = 1; NaN if it has none. @pre inside the image
   [[nodiscard]] const vec2f& operator()(int x, int y) const noexcept { return rays_(x, y); }
   /// The point at depth `z` metres on the pixel's ray, in the camera frame.
   [[nodiscard]] vec3f at(int x, int y, float z) const noexcept {

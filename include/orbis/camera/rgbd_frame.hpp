@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// One moment of an RGB-D camera.
+/// A frame of an RGB-D camera.
 #pragma once
 
 #include <cstdint>
@@ -18,7 +18,7 @@ struct rgbd_frame {
   image<rgb8> color;
   image<std::uint16_t> depth;  ///< stored value / depth_scale = metres; 0 and 65535 invalid
   double depth_scale = 1000.0;
-  std::optional<se3> T_world_camera;  ///< ground truth, where the recording has it
+  std::optional<se3> T_world_camera;  ///< ground truth, if recorded
 
   [[nodiscard]] depth_view<std::uint16_t> depth_metres() const {
     return depth_view<std::uint16_t>(depth.view(), depth_scale);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// When the rows of an RGB-D camera's images are taken.
+/// Shutter timing of an RGB-D camera.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -9,29 +9,29 @@
 
 namespace orbis::camera {
 
-/// The times of the rows of a colour image and of its depth image. A rolling shutter reads the rows one after the
-/// other, the top row first, evenly over the read-out time; with a read-out of 0 the shutter is global: all rows are of
-/// one time. Times are relative to that of the frame, which is the middle of the colour image's read-out.
+/// The read-out times of a colour image and of its depth image. A rolling shutter reads the rows sequentially from the
+/// top, evenly over the read-out time; with a read-out of 0 the shutter is global: all rows have the same time. Times
+/// are relative to the time of the frame, which is the middle of the colour image's read-out.
 struct shutter {
   double color_read_out = 0.0;  ///< from the first row to the end of the last one, seconds
-  double depth_read_out = 0.0;  ///< the same of the depth image
+  double depth_read_out = 0.0;  ///< the same for the depth image
   double depth_delay = 0.0;     ///< from the middle of the colour image to that of the depth image, seconds
 
-  /// Whether all rows of both images are taken at one time.
+  /// Returns true if all rows of both images are taken at the same time.
   [[nodiscard]] constexpr bool is_global() const noexcept {
     return color_read_out == 0.0 && depth_read_out == 0.0 && depth_delay == 0.0;
   }
-  /// Whether each row of the depth image is taken together with that of the colour image.
+  /// Returns true if each row of the depth image is taken together with the same row of the colour image.
   [[nodiscard]] constexpr bool is_depth_simultaneous() const noexcept {
     return depth_delay == 0.0 && depth_read_out == color_read_out;
   }
-  /// Whether the depth image is taken before the time of the frame.
+  /// Returns true if the depth image is taken before the time of the frame.
   [[nodiscard]] constexpr bool is_depth_early() const noexcept { return depth_delay < 0.0; }
-  /// When row `v` (the centre of the top row is 0) of a colour image with `height` rows is taken, seconds.
+  /// The time of row `v` (the centre of the top row is 0) of a colour image with `height` rows, seconds.
   [[nodiscard]] constexpr double color_time(double v, int height) const noexcept {
     return color_read_out * share(v, height);
   }
-  /// The same of the depth image.
+  /// The time of row `v` of a depth image with `height` rows, seconds.
   [[nodiscard]] constexpr double depth_time(double v, int height) const noexcept {
     return depth_delay + depth_read_out * share(v, height);
   }
@@ -42,11 +42,11 @@ struct shutter {
   [[nodiscard]] static constexpr double share(double v, int height) noexcept { return (v + 0.5) / height - 0.5; }
 };
 
-/// Where a point of the camera's frame at time `t` is in the camera's frame at time 0, if the camera moves by a
-/// constant twist: `exp(t * twist) p` to second order, of which the rest is below a thousandth of a pixel for the
-/// angles of one read-out (some hundredths of a radian). `twist`: of the camera in its own frame, per second,
-/// translation first. The point is `p / inverse_scale`, and so is the result: with a ray for `p` and its inverse depth,
-/// points at any distance.
+/// Maps a point from the camera frame at time `t` to the camera frame at time 0, if the camera moves by a constant
+/// twist: `exp(t * twist) p` to second order; the remainder is below a thousandth of a pixel for the angles of one
+/// read-out (some hundredths of a radian). `twist`: of the camera in its own frame, per second, translation first. The
+/// point is `p / inverse_scale`, and so is the result: with a ray for `p` and its inverse depth, this covers points at
+/// any distance.
 [[nodiscard]] inline vec3 moved_by(const vec6& twist, double t, const vec3& p, double inverse_scale = 1.0) {
   const vec3 w(t * twist[3], t * twist[4], t * twist[5]);
   const vec3 v(inverse_scale * (t * twist[0]), inverse_scale * (t * twist[1]), inverse_scale * (t * twist[2]));

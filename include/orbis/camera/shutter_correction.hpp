@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Images of a rolling shutter as a global one would have taken them at the frame's time.
+/// Converts rolling-shutter images to the global-shutter images of the frame's time.
 ///
 /// @code
 ///   orbis::camera::shutter_correction<orbis::camera::pinhole> correct{camera};
@@ -10,10 +10,11 @@
 ///   }
 /// @endcode
 ///
-/// While the rows are read the camera moves by a constant twist. Each depth is moved to where it is seen at the frame's
-/// time, the nearest one where several meet; this says which surface a pixel shows. Its depth is then read where the
-/// depth image saw that point of that surface: between pixels, by linear interpolation of inverse depth, which is exact
-/// on planes, over those pixels only that lie on the surface. So planes stay planes, and edges stay between two pixels.
+/// During the read-out the camera moves by a constant twist. Each depth is moved to the pixel that observes it at the
+/// frame's time, and the nearest one wins; this determines the surface that a pixel shows. Its depth is then read at
+/// the position where the depth image observed that point of the surface: interpolated linearly in inverse depth, which
+/// is exact on planes, over only those pixels that lie on the surface. Planes thus stay planes, and edges stay between
+/// two pixels.
 ///
 /// The model of constant velocity during the read-out: J. Hedborg, P.-E. Forssen, M. Felsberg, E. Ringaby, "Rolling
 /// shutter bundle adjustment", CVPR 2012; depth images of a rolling shutter: E. Ringaby, P.-E. Forssen, "Scan
@@ -45,13 +46,13 @@ namespace orbis::camera {
 
 namespace detail {
 
-/// What a depth image stores, if it is one in place; otherwise float metres.
+/// The stored type of a `depth_view`; otherwise float metres.
 template <class Depth>
 struct stored_depth : std::type_identity<float> {};
 template <class T>
 struct stored_depth<depth_view<T>> : std::type_identity<T> {};
 
-/// 0 where there is no depth; nor is there one that has no inverse.
+/// Inverse of a depth in metres; 0 if there is no depth or its inverse is not finite.
 [[nodiscard]] inline float inverse_depth_of(float metres) noexcept {
   const float inverse = metres > 0.0F ? 1.0F / metres : 0.0F;
   return inverse <= std::numeric_limits<float>::max() ? inverse : 0.0F;
@@ -59,12 +60,12 @@ struct stored_depth<depth_view<T>> : std::type_identity<T> {};
 
 }  // namespace detail
 
-/// Corrects the images of one camera. Keeps its working memory: for one camera nothing is allocated after the first
-/// image. For one thread at a time.
+/// Corrects the images of one camera. Reuses its working memory: allocates nothing after the first image. Not
+/// thread-safe.
 template <camera_model Camera>
 class shutter_correction {
  public:
-  /// O(width * height / 256)
+  /// Allocates the tables of the camera. O(width * height / 256)
   explicit shutter_correction(Camera camera)
       : camera_{std::move(camera)},
         to_frame_{camera_, detail::warp_direction::to_frame},
@@ -74,17 +75,17 @@ class shutter_correction {
         index_(to_row_.padded_width()),
         warped_{to_row_.padded_width()} {}
 
-  /// Whether images taken during this motion differ from those of a global shutter. `twist`: of the camera in its own
-  /// frame, per second, translation first.
+  /// Returns true if images taken during this motion differ from those of a global shutter. `twist`: of the camera in
+  /// its own frame, per second, translation first.
   [[nodiscard]] static bool is_needed(const shutter& s, const vec6& twist) noexcept {
     return !s.is_global() && !(twist.array() == 0.0).all();
   }
 
-  /// The depth image of a global shutter at the frame's time. Where nothing was measured, or what was measured is not
-  /// seen from there, `out` is 0. `T` is what `depth` stores if it is a `depth_view` (`out` then has its scale),
-  /// otherwise `float` (metres). Without a motion, or if all its rows are of the frame's time, `out` has the same
-  /// values. Errors: `invalid_argument` for a twist that is not finite, or turns the camera by more than 0.3 radians
-  /// from the frame's time to that of a row; `out` is not touched then. O(pixels).
+  /// Computes the depth image of a global shutter at the frame's time. `out` is 0 where nothing was measured, or where
+  /// the measured point is not visible. `T` is the stored type of `depth` if it is a `depth_view` (`out` then has its
+  /// scale), otherwise `float` (metres). Without a motion, or if all its rows are of the frame's time, `out` has the
+  /// same values. Errors: `invalid_argument` for a twist that is not finite, or turns the camera by more than 0.3
+  /// radians from the frame's time to that of a row; `out` is then unchanged. O(pixels).
   /// @pre the images have the size of the camera and do not overlap
   template <depth_source Depth, class T>
   requires std::same_as<T, typename detail::stored_depth<Depth>::type>
@@ -121,9 +122,10 @@ class shutter_correction {
     return {};
   }
 
-  /// The colour image that belongs to a corrected depth image: of each pixel the colour that was read where its point
-  /// was seen; of a pixel without depth that of something far away; black where the image does not reach. Without a
-  /// motion, or if all rows are of the frame's time, a copy. Errors and preconditions as above. O(pixels).
+  /// Computes the colour image that belongs to a corrected depth image: each pixel gets the colour read at the position
+  /// where its point was observed; a pixel without depth that of a point at a large distance; positions outside the
+  /// image are black. Without a motion, or if all rows are of the frame's time, a copy. Errors and preconditions as
+  /// above. O(pixels).
   template <depth_source Depth>
   [[nodiscard]] result<void> color(const shutter& s, const vec6& twist, const Depth& corrected,
                                    image_view<const rgb8> color, image_view<rgb8> out) {
@@ -157,17 +159,17 @@ class shutter_correction {
   static constexpr float no_depth = std::numeric_limits<float>::max();
 
   [[nodiscard]] result<void> check(const detail::row_time& time, const vec6& twist) const {
-    if (!all_finite(twist)) return fail(errc::invalid_argument, "twist", "it is not finite");
+    if (!all_finite(twist)) return fail(errc::invalid_argument, "twist", "is not finite");
     constexpr double most = 0.3;
     if (!(time.largest(camera_.height()) * norm(tail<3>(twist)) <= most))
-      return fail(errc::invalid_argument, "twist", "the camera turns by more than 0.3 radians while the image is read");
+      return fail(errc::invalid_argument, "twist", "turns the camera by more than 0.3 radians during the read-out");
     return {};
   }
   template <class Image>
   [[nodiscard]] bool has_size(const Image& image) const {
     return image.width() == camera_.width() && image.height() == camera_.height();
   }
-  /// The stored value of `metres`.
+  /// Converts `metres` to the stored value.
   template <class T>
   [[nodiscard]] static T stored(float metres, double scale) noexcept {
     const double value = static_cast<double>(metres) * scale;
@@ -177,7 +179,7 @@ class shutter_correction {
       return value < 65534.5 ? static_cast<std::uint16_t>(value + 0.5) : T{};
   }
 
-  /// Moves each depth to the frame's time, into `nearest_`; and keeps inverse depths in `inverse_`.
+  /// Moves each depth to the frame's time, into `nearest_`, and stores inverse depths in `inverse_`.
   template <class Depth>
   void move_depths(const Depth& depth) {
     const int width = camera_.width(), height = camera_.height();
@@ -203,8 +205,8 @@ class shutter_correction {
       }
     }
   }
-  /// The inverse depths of the surfaces that row `y` shows at the frame's time, 0 where there is none. What is
-  /// stretched has cracks: these lie between two pixels of one surface.
+  /// Computes the inverse depths of the surfaces that row `y` shows at the frame's time, 0 where there is none. Fills
+  /// the cracks of stretched surfaces: pixels between two pixels of one surface.
   void find_surfaces(int y) {
     const auto row = std::as_const(nearest_).row(y);
     for (std::size_t x = 0; x != row.size(); ++x)
@@ -225,8 +227,8 @@ class shutter_correction {
   Camera camera_;
   detail::row_warp<Camera> to_frame_, to_row_;
   image<float> nearest_;  // depth at the frame's time, or no_depth
-  image<float> inverse_;  // as read, with a border of one pixel; 0: none
-  // Of one row, in whole cells.
+  image<float> inverse_;  // as read, with a border of one pixel; 0: no depth
+  // Buffers for one row, in whole cells.
   std::vector<float> surface_, metres_;  // inverse depth, depth
   std::vector<std::int32_t> index_;
   detail::warped_row warped_;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Two cameras side by side, and what makes both look straight ahead: rectification.
+/// Stereo rigs and their rectification.
 ///
 /// @code
 ///   const stereo_rig rig{left_camera, right_camera, T_left_right};
@@ -26,12 +26,12 @@
 
 namespace orbis::camera {
 
-/// Two cameras that do not move against each other and take their images at the same time.
+/// Two rigidly connected cameras that take their images at the same time.
 template <camera_model Left, camera_model Right = Left>
 struct stereo_rig {
   Left left;
   Right right;
-  se3 T_left_right;  ///< from the right camera's frame to the left one's, metres
+  se3 T_left_right;  ///< transforms from the right camera's frame to the left one's, metres
 
   /// The distance between the two centres, metres.
   [[nodiscard]] double baseline() const { return norm(T_left_right.translation()); }
@@ -40,23 +40,24 @@ struct stereo_rig {
 template <class Left, class Right>
 stereo_rig(Left, Right, se3) -> stereo_rig<Left, Right>;
 
-/// How images are rectified.
+/// Options of `rectify`.
 struct rectify_options {
-  int width = 0;                   ///< of the rectified images, pixels; 0: of the left camera
+  int width = 0;                   ///< of the rectified images, pixels; 0: width of the left camera
   int height = 0;                  ///< likewise
   std::optional<double> focal{};   ///< of the rectified camera, pixels; default: see `rectify`
-  double max_magnification = 1.5;  ///< of the default focal length, over that of the cameras in their middle
+  double max_magnification = 1.5;  ///< upper limit of the default focal length / that at the image centres
 };
 
-/// The images of a stereo rig as two equal pinhole cameras would have taken them that stand where the cameras of the
-/// rig do and both look straight ahead: x along the baseline. A point has the same row in both, and its column in the
-/// right image is that in the left one less `camera().k().fx * baseline() / depth`. Build it once (`rectify`), apply it
-/// to each pair: `left().bilinear(image)`. 16 bytes for each pixel.
+/// Maps the images of a stereo rig to those of two identical pinhole cameras at the same positions with parallel
+/// optical axes and x along the baseline. A point has the same row in both images; its column in the right image is
+/// that in the left one minus `camera().k().fx * baseline() / depth`. Build it once (`rectify`), apply it to each pair:
+/// `left().bilinear(image)`. 16 bytes per pixel.
 class rectification {
  public:
-  /// Of images that need no change.
+  /// For images that are already rectified.
   rectification(const pinhole& camera, double baseline) : camera_{camera}, baseline_{baseline} {}
-  /// @pre both are of the size of `camera`; `R_left_rectified` turns rays of the rectified cameras into the left one's
+  /// @pre both have the size of `camera`; `R_left_rectified` rotates rays of the rectified cameras into the left one's
+  /// frame
   rectification(const pinhole& camera, double baseline, const so3& R_left_rectified, undistortion left,
                 undistortion right)
       : camera_{camera}, baseline_{baseline}, R_left_rectified_{R_left_rectified} {
@@ -65,13 +66,13 @@ class rectification {
 
   /// The camera of both rectified images.
   [[nodiscard]] const pinhole& camera() const noexcept { return camera_; }
-  /// Metres.
+  /// Distance of the camera centres in metres.
   [[nodiscard]] double baseline() const noexcept { return baseline_; }
-  /// From the rectified left camera's frame to that of the left camera itself; both have the same origin.
+  /// Rotation from the rectified left camera's frame to that of the left camera itself; both have the same origin.
   [[nodiscard]] const so3& R_left_rectified() const noexcept { return R_left_rectified_; }
-  /// Whether the images are rectified already; then there is nothing to remap.
+  /// Returns true if the images are already rectified and need no remapping.
   [[nodiscard]] bool is_identity() const noexcept { return !maps_; }
-  /// What makes rectified images of those of the left, or of the right camera. @pre !is_identity()
+  /// Remaps images of the left or of the right camera to rectified images. @pre !is_identity()
   [[nodiscard]] const undistortion& left() const { return maps_.value().first; }
   [[nodiscard]] const undistortion& right() const { return maps_.value().second; }
 
@@ -84,8 +85,9 @@ class rectification {
 
 namespace detail {
 
-/// The axes of the rectified cameras as columns, in the left camera's frame: x along the baseline, z as near to the
-/// mean of both cameras' axes as that allows. Empty if the cameras do not stand side by side, or look apart.
+/// The axes of the rectified cameras as columns, in the left camera's frame: x along the baseline, z as close as
+/// possible to the mean of both optical axes. Empty if the cameras are not side by side, or do not look in the same
+/// direction.
 [[nodiscard]] inline std::optional<mat3> rectified_axes(const se3& T_left_right) {
   const vec3 x = normalized(T_left_right.translation());
   const vec3 left = vec3(0.0, 0.0, 1.0), right = T_left_right.rotation() * left;
@@ -97,7 +99,7 @@ namespace detail {
   return axes;
 }
 
-/// The geometric mean of the two focal lengths in the middle of the image, pixels; empty without a ray there.
+/// The geometric mean of the two focal lengths at the image centre, pixels; empty if there is no ray.
 template <camera_model Camera>
 [[nodiscard]] std::optional<double> middle_focal(const Camera& camera) {
   const auto ray = camera.unproject({0.5 * (camera.width() - 1), 0.5 * (camera.height() - 1)});
@@ -107,7 +109,8 @@ template <camera_model Camera>
   return area > 0.0 ? std::optional{std::sqrt(area)} : std::nullopt;
 }
 
-/// Whether `camera` sees all that `ideal`, turned by `R_camera_ideal`, sees along the edge of its image.
+/// Returns true if `camera` sees everything that `ideal`, rotated by `R_camera_ideal`, sees along the edge of its
+/// image.
 template <camera_model Camera>
 [[nodiscard]] bool sees_edge(const Camera& camera, const pinhole& ideal, const mat3& R_camera_ideal) {
   const auto sees = [&](double x, double y) {
@@ -123,7 +126,7 @@ template <camera_model Camera>
   return true;
 }
 
-/// Whether images of these cameras are rectified already.
+/// Returns true if images of these cameras are already rectified.
 template <camera_model Left, camera_model Right>
 [[nodiscard]] bool is_rectified(const stereo_rig<Left, Right>& rig) {
   constexpr double tiny = 1e-9;
@@ -132,7 +135,7 @@ template <camera_model Left, camera_model Right>
     return false;
   const int w = rig.left.width(), h = rig.left.height();
   if (rig.right.width() != w || rig.right.height() != h || w == 0 || h == 0) return false;
-  // Pinhole cameras: rays differ by the same step everywhere. A few pixels tell, whatever the type says.
+  // Pinhole cameras: rays differ by the same step everywhere, so a few pixels suffice, whatever the static type.
   const auto like = [&](const auto& camera, const pinhole& k) {
     for (const double v : {0.0, 0.3, 1.0})
       for (const double u : {0.0, 0.6, 1.0}) {
@@ -151,15 +154,15 @@ template <camera_model Left, camera_model Right>
 
 }  // namespace detail
 
-/// The rectification of a rig of any two camera models. Both cameras are turned by as little as possible: x along the
-/// baseline, z near the mean of both axes. The new camera has one focal length, the smaller of the two cameras' in
-/// their middle, longer by up to `max_magnification` if that leaves no pixel without a source; what is in the middle of
-/// the images stays there. Rigs that are rectified already give an identity. O(pixels) projections.
+/// Computes the rectification of a rig of any two camera models. Both cameras are rotated as little as possible: x
+/// along the baseline, z close to the mean of both axes. The new camera has one focal length: the smaller of the two
+/// cameras' focal lengths at their image centres, increased by up to `max_magnification` if needed to give every pixel
+/// a source. The image centres are preserved. Rigs that are already rectified give an identity. O(pixels) projections.
 ///
 /// After A. Fusiello, E. Trucco, A. Verri, "A compact algorithm for rectification of stereo pairs", Machine Vision and
-/// Applications 12 (2000), who keep one axis of the left camera where this takes the mean of both.
-/// Errors: invalid_argument: the right camera does not stand to the right of the left one, the cameras look apart, or
-/// one has no ray in its middle.
+/// Applications 12 (2000), which keeps one axis of the left camera instead of the mean of both. Errors:
+/// invalid_argument if the right camera is not to the right of the left one, the cameras do not look in the same
+/// direction, or one has no ray at its image centre.
 template <camera_model Left, camera_model Right>
 [[nodiscard]] result<rectification> rectify(const stereo_rig<Left, Right>& rig, const rectify_options& options = {}) {
   const auto reject = [](const char* why) { return fail(errc::invalid_argument, "stereo rig", why); };
@@ -169,14 +172,14 @@ template <camera_model Left, camera_model Right>
     if (as_is && detail::is_rectified(rig)) return rectification{pinhole{rig.left.k()}, rig.baseline()};
   }
   const auto axes = detail::rectified_axes(rig.T_left_right);
-  if (!axes) return reject("the right camera has to stand to the right of the left one and to look the same way");
+  if (!axes) return reject("the right camera must be to the right of the left one and look in the same direction");
   const mat3 left = *axes, right = rig.T_left_right.rotation().inverse().rotation_matrix() * *axes;
   const auto left_focal = detail::middle_focal(rig.left), right_focal = detail::middle_focal(rig.right);
-  if (!left_focal || !right_focal) return reject("a camera has no ray in the middle of its image");
+  if (!left_focal || !right_focal) return reject("a camera has no ray at its image centre");
 
   const int width = options.width > 0 ? options.width : rig.left.width();
   const int height = options.height > 0 ? options.height : rig.left.height();
-  vec2 middle = zeros<vec2>();  // of what both see, on the plane z = 1
+  vec2 middle = zeros<vec2>();  // mean direction of both cameras, on the plane z = 1
   const auto add_middle = [&](const auto& camera, const mat3& R_camera_ideal) {
     const auto ray = camera.unproject({0.5 * (camera.width() - 1), 0.5 * (camera.height() - 1)});
     const vec3 seen = transposed(R_camera_ideal) * *ray;
@@ -184,7 +187,8 @@ template <camera_model Left, camera_model Right>
     middle += 0.5 * head<2>(seen) / seen.z();
     return true;
   };
-  if (!add_middle(rig.left, left) || !add_middle(rig.right, right)) return reject("the cameras look apart");
+  if (!add_middle(rig.left, left) || !add_middle(rig.right, right))
+    return reject("the cameras do not look in the same direction");
   const auto with_focal = [&](double f) {
     return pinhole{width, height, f, f, 0.5 * (width - 1) - f * middle.x(), 0.5 * (height - 1) - f * middle.y()};
   };

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// One moment of a stereo camera.
+/// A frame of a stereo camera.
 #pragma once
 
 #include <optional>
@@ -10,13 +10,12 @@
 
 namespace orbis::camera {
 
-/// The two images of a rectified stereo camera: of the same size, of the same pinhole camera, a row of one is that of
-/// the other.
+/// The images of a rectified stereo camera: of the same size and the same pinhole camera; rows correspond.
 struct stereo_frame {
   double timestamp = 0.0;  ///< of both images, seconds
   image<rgb8> left;
   image<rgb8> right;
-  std::optional<se3> T_world_camera;  ///< ground truth of the rectified left camera, where the recording has it
+  std::optional<se3> T_world_camera;  ///< ground truth of the rectified left camera, if recorded
 };
 
 }  // namespace orbis::camera

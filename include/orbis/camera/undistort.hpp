@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Images of a camera with distortion as an ideal one would have taken them.
+/// Removes lens distortion from images.
 #pragma once
 
 #include <cassert>
@@ -19,18 +19,17 @@
 
 namespace orbis::camera {
 
-/// A camera model with a camera matrix, so that there is a pinhole like it.
+/// A camera model with a camera matrix, and hence with an equivalent pinhole camera.
 template <class C>
 concept has_intrinsics = camera_model<C> && requires(const C& camera) {
   { camera.k() } -> std::convertible_to<intrinsics>;
 };
 
-/// Remaps images of a camera to those an ideal pinhole would have taken from the same place. Build
-/// it once, apply it to every frame. 8 bytes for each pixel.
+/// Remaps images of a camera to those of an ideal pinhole camera at the same position. Build it once, apply it to every
+/// frame. 8 bytes per pixel.
 class undistortion {
  public:
-  /// The ideal camera stands where `camera` does, turned by `R_camera_ideal` (a rotation). O(pixels of `ideal`)
-  /// projections.
+  /// For an ideal camera at the position of `camera`, rotated by `R_camera_ideal`. O(pixels of `ideal`) projections.
   template <camera_model Camera>
   undistortion(const Camera& camera, const pinhole& ideal, const mat3& R_camera_ideal = identity<mat3>())
       : source_width_{camera.width()},
@@ -43,16 +42,16 @@ class undistortion {
           source_(x, y) = pixel->template cast<float>();
       }
   }
-  /// To the pinhole with the camera's own size and matrix.
+  /// For the pinhole with the camera's own size and matrix.
   template <has_intrinsics Camera>
   explicit undistortion(const Camera& camera) : undistortion(camera, pinhole{camera.k()}) {}
 
   [[nodiscard]] int width() const noexcept { return source_.width(); }
   [[nodiscard]] int height() const noexcept { return source_.height(); }
-  /// Where the distorted image has what the ideal one shows at (x, y); NaN if nowhere.
+  /// The position in the distorted image that the ideal one shows at (x, y); NaN if there is none.
   [[nodiscard]] const vec2f& source(int x, int y) const noexcept { return source_(x, y); }
 
-  /// Bilinear interpolation, for `rgb8` and `std::uint8_t`; `outside` where the image has nothing.
+  /// Remaps with bilinear interpolation, for `rgb8` and `std::uint8_t`; `outside` for pixels without a source.
   /// @pre the image has the camera's size
   template <class T>
   requires std::same_as<std::remove_const_t<T>, rgb8> || std::same_as<std::remove_const_t<T>, std::uint8_t>
@@ -66,8 +65,8 @@ class undistortion {
     });
   }
 
-  /// The nearest pixel, for everything that must not be mixed: depth (which lies along the optical
-  /// axis and so needs no change of value), labels.
+  /// Remaps with the nearest pixel, for values that must not be interpolated: labels, and depth (measured along the
+  /// optical axis, so that its value does not change).
   /// @pre the image has the camera's size
   template <class T>
   [[nodiscard]] image<std::remove_const_t<T>> nearest(image_view<T> distorted,

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// From a pixel and its depth to a point in the world. Every component that makes points of depth images uses this
-/// function, so that all of them get the same points, bit for bit.
+/// Converts a pixel and its depth to a point in the world. Every component that converts depth images to points uses
+/// this function, so that all of them get the same points, bit for bit.
 #pragma once
 
 #include <array>
@@ -29,8 +29,8 @@ struct float_pose {
 };
 
 /// The world point (metres) at depth `z` (metres along the optical axis) on the ray through (x, y, 1) in the camera
-/// frame. Float arithmetic in this order, rounded after every operation, so that every compiler and every
-/// instruction set gives the same bits. The error is less than 1 um in a room. O(1).
+/// frame. Float arithmetic in this order, rounded after every operation, so that every compiler and every instruction
+/// set gives the same bits. The error is less than 1 um within a room. O(1).
 [[nodiscard]] inline std::array<float, 3> world_point(const float_pose& pose, float x, float y, float z) noexcept {
   const float cx = rounded_product(x, z), cy = rounded_product(y, z);
   std::array<float, 3> p;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Counts of bits, and strings of bits such as binary descriptors: what they are, their words, their Hamming distance.
+/// Bit counts, and bit strings such as binary descriptors: concept, access by words, Hamming distance.
 #pragma once
 
 #include <array>
@@ -12,8 +12,8 @@
 
 namespace orbis {
 
-/// The number of ones in `x`, by adding neighbouring fields in parallel: without the POPCNT instruction
-/// `std::popcount` is a call into the compiler's library.
+/// Number of ones in `x`, by adding neighbouring fields in parallel: without the POPCNT instruction `std::popcount` is
+/// a call into the compiler's library.
 [[nodiscard]] constexpr std::uint32_t count_ones(std::uint64_t x) noexcept {
   x -= (x >> 1U) & 0x5555555555555555ULL;
   x = (x & 0x3333333333333333ULL) + ((x >> 2U) & 0x3333333333333333ULL);
@@ -21,23 +21,23 @@ namespace orbis {
   return static_cast<std::uint32_t>((x * 0x0101010101010101ULL) >> 56U);
 }
 
-/// A string of bits of any type: trivially copyable, without padding, a whole number of 64-bit words long. Its bits are
+/// A bit string of any type: trivially copyable, without padding, a whole number of 64-bit words long. Its bits are
 /// those of its bytes in memory. `features::binary_descriptor<256>`, `std::array<std::uint64_t, 4>` and, on a
-/// little-endian machine, a row of 32 bytes of OpenCV's are the same string.
+/// little-endian machine, a 32-byte row of an OpenCV descriptor matrix are the same string.
 template <class D>
 concept bit_string = std::is_trivially_copyable_v<D> && std::has_unique_object_representations_v<D> && sizeof(D) % 8 ==
                      0;
 
-/// The number of bits of such a type.
+/// Number of bits of a bit string type.
 template <bit_string D>
 inline constexpr std::size_t bits_of = 8 * sizeof(D);
 
-/// Bit strings side by side in memory.
+/// A contiguous range of bit strings.
 template <class R>
 concept bit_string_range =
     std::ranges::contiguous_range<R> && std::ranges::sized_range<R> && bit_string<std::ranges::range_value_t<R>>;
 
-/// A range of strings of `Bits` bits.
+/// A contiguous range of strings of `Bits` bits.
 template <class R, std::size_t Bits>
 concept bit_string_range_of = bit_string_range<R> && bits_of<std::ranges::range_value_t<R>>
 == Bits;
@@ -52,7 +52,7 @@ template <bit_string D>
   return std::bit_cast<bit_words<bits_of<D>>>(string);
 }
 
-/// The number of bits in which two strings differ.
+/// Hamming distance: the number of bits in which two strings differ.
 template <std::size_t Words>
 [[nodiscard]] constexpr std::uint32_t hamming_distance(const std::array<std::uint64_t, Words>& a,
                                                        const std::array<std::uint64_t, Words>& b) noexcept {

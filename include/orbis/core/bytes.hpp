@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Bytes of files: numbers in either byte order, a checksum, and bytes as text.
+/// Bytes of files: numbers in either byte order, a checksum, and a text encoding.
 #pragma once
 
 #include <algorithm>
@@ -44,7 +44,7 @@ namespace detail {
 
 using crc32c_tables = std::array<std::array<std::uint32_t, 256>, 8>;
 
-/// `tables[k][b]`: what a byte `b` followed by `k` bytes of zero does to the remainder.
+/// `tables[k][b]`: the CRC of a byte `b` followed by `k` zero bytes.
 [[nodiscard]] constexpr crc32c_tables make_crc32c_tables() noexcept {
   crc32c_tables tables{};
   for (std::uint32_t i = 0; i != 256; ++i) {
@@ -61,7 +61,8 @@ using crc32c_tables = std::array<std::array<std::uint32_t, 256>, 8>;
 }
 inline constexpr crc32c_tables crc32c_table = make_crc32c_tables();
 
-/// Eight bytes at a time by tables: M. Kounavis, F. Berry, "A systematic approach to building high performance,
+/// Processes eight bytes at a time by tables: M. Kounavis, F. Berry, "A systematic approach to building high
+/// performance,
 /// software-based, CRC generators", ISCC 2005.
 inline std::uint32_t crc32c_portable(const std::byte* at, std::size_t size, std::uint32_t c) noexcept {
   for (; size >= 8; size -= 8, at += 8) {
@@ -93,8 +94,8 @@ inline std::uint32_t crc32c_sse42(const std::byte* at, std::size_t size, std::ui
 
 }  // namespace detail
 
-/// The checksum CRC-32C of `bytes`, as iSCSI has it; of bytes that follow others whose checksum is `before`. Linear;
-/// about eight bytes a cycle or two with SSE4.2.
+/// The CRC-32C checksum of `bytes`, as in iSCSI; `before` is the checksum of the bytes that precede them. Linear time;
+/// with SSE4.2 eight bytes take one or two cycles.
 ///
 /// Source: G. Castagnoli, S. Bräuer, M. Herrmann, "Optimization of cyclic redundancy-check codes with 24 and 32 parity
 /// bits", IEEE Transactions on Communications 41, 1993.
@@ -107,7 +108,7 @@ inline std::uint32_t crc32c_sse42(const std::byte* at, std::size_t size, std::ui
 
 namespace detail {
 
-/// The 85 characters from '#' on, but for the two that mean something in a literal.
+/// The 85 characters from '#' on, except the two that are special in a literal.
 [[nodiscard]] constexpr char base85_character(std::uint32_t digit) noexcept {
   const char c = static_cast<char>('#' + digit);
   return c == '\\' ? 'x' : c == '?' ? 'y' : c;
@@ -121,8 +122,8 @@ inline constexpr auto base85_digits = [] {
 
 }  // namespace detail
 
-/// Appends the bytes that `text` stands for, which can stand in a string literal: five characters for four bytes, the
-/// first digit first. False, if it is no such text.
+/// Appends the bytes that `text` encodes in base 85: five characters for four bytes, first digit first, using only
+/// characters that are safe in a string literal. Returns false if `text` is not such an encoding.
 [[nodiscard]] inline bool append_base85(std::string& bytes, std::string_view text) {
   if (text.size() % 5 != 0) return false;
   std::size_t to = bytes.size();

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// An array in pages that copies share until one of them writes: copying a map costs a pointer for
-/// each page, and readers keep what they copied while the writer goes on.
+/// A paged copy-on-write array: copies share pages until one of them writes. Copying a map costs one pointer per page,
+/// and readers keep their copy while the writer continues.
 #pragma once
 
 #include <algorithm>
@@ -16,9 +16,8 @@
 
 namespace orbis {
 
-/// Values in pages of about 4 KB. A page that several arrays share is cloned by the one that writes
-/// to it. Each array belongs to one thread at a time; arrays that share pages need no lock between
-/// them.
+/// Values in copy-on-write pages of about 4 KB. A write to a page that several arrays share clones the page first. Each
+/// array belongs to one thread at a time; arrays that share pages need no lock between them.
 template <class T>
 requires std::is_trivially_copyable_v<T>
 class cow_pages {
@@ -44,10 +43,10 @@ class cow_pages {
   [[nodiscard]] bool empty() const noexcept { return size_ == 0; }
   /// @pre i < size()
   [[nodiscard]] const T& operator[](std::size_t i) const noexcept { return pages_[i / per_page]->items[i % per_page]; }
-  /// The i-th value for writing; valid until the next copy of the array. @pre i < size()
+  /// Writable access to the i-th value; valid until the next copy of the array. @pre i < size()
   [[nodiscard]] T& writable(std::size_t i) {
     page*& p = pages_[i / per_page];
-    // Acquire: what other owners read before they let go of the page comes before what we write.
+    // Acquire: reads by other owners before they release the page happen before this write.
     if (p->owners.load(std::memory_order_acquire) != 1) {
       page* const own = new page{{1}, p->items};
       release(std::exchange(p, own));
@@ -61,7 +60,7 @@ class cow_pages {
     }
     writable(size_++) = value;
   }
-  /// Makes the array `n` values long; new ones are value-initialised.
+  /// Resizes the array to `n` values; new ones are value-initialised.
   void resize(std::size_t n) {
     while (size_ < n) push_back(T{});
     size_ = n;
@@ -71,7 +70,7 @@ class cow_pages {
     }
   }
   void clear() noexcept { *this = cow_pages{}; }
-  /// Bytes on the heap, those shared with copies included.
+  /// Bytes on the heap, including pages shared with copies.
   [[nodiscard]] std::size_t memory_bytes() const noexcept {
     return pages_.capacity() * sizeof(page*) + pages_.size() * sizeof(page);
   }

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// How algorithms run: execution policies and the two loops that everything parallel is made of; callbacks for progress
-/// and cancellation.
+/// Execution policies, the two parallel loops that all parallel algorithms use, and callbacks for progress and
+/// cancellation.
 ///
-/// The work is cut into chunks whose bounds depend on the problem alone, never on the number of
-/// threads; an algorithm that writes per element, or combines per-chunk results in chunk order,
-/// gives the same bytes under every policy.
+/// The work is split into chunks whose bounds depend only on the problem, never on the number of threads. An algorithm
+/// that writes per element, or combines per-chunk results in chunk order, gives the same bytes under every policy.
 #pragma once
 
 #include <algorithm>
@@ -25,19 +24,19 @@
 
 namespace orbis {
 
-/// Everything on the calling thread.
+/// Runs everything on the calling thread.
 struct sequential_policy {
   [[nodiscard]] static constexpr unsigned threads() noexcept { return 1; }
 };
 
-/// On several threads: as many as the machine has, or the number given to `with`. They are started for each loop, or
-/// are those of a pool.
+/// Runs on several threads: the number of hardware threads, or the number passed to `with`. Threads are started for
+/// each loop, or belong to a pool.
 struct parallel_policy {
   unsigned count = 0;           ///< 0: one thread for each hardware thread
-  thread_pool* pool = nullptr;  ///< whose threads do the work; outlives the policy
+  thread_pool* pool = nullptr;  ///< provides the threads; must outlive the policy
 
   [[nodiscard]] constexpr parallel_policy with(unsigned n) const noexcept { return {n, pool}; }
-  /// On the threads of `pool`, all of them if no number is given.
+  /// Uses the threads of `pool`; all of them if no number is given.
   [[nodiscard]] constexpr parallel_policy on(thread_pool& threads) const noexcept { return {count, &threads}; }
   [[nodiscard]] unsigned threads() const noexcept {
     if (count == 0 && pool != nullptr) return pool->threads();
@@ -48,7 +47,7 @@ struct parallel_policy {
 inline constexpr sequential_policy seq{};
 inline constexpr parallel_policy par{};
 
-/// What may stand as the first argument of an algorithm: it says how many threads may work.
+/// Execution policy: the first argument of a parallel algorithm; specifies the number of threads.
 template <class P>
 concept execution_policy = requires(const std::remove_cvref_t<P>& p) {
   { p.threads() } -> std::convertible_to<unsigned>;
@@ -56,10 +55,10 @@ concept execution_policy = requires(const std::remove_cvref_t<P>& p) {
 
 namespace detail {
 
-/// Calls `run(context, i)` for every i in [0, count), on the calling thread and `workers - 1` others. A function and
-/// not a template, so that not every loop of a program brings the handling of threads with it.
-inline void hand_out(std::size_t count, std::size_t workers, thread_pool* pool, void (*run)(const void*, std::size_t),
-                     const void* context) {
+/// Calls `run(context, i)` for every i in [0, count), on the calling thread and `workers - 1` others. Not a template,
+/// to avoid instantiating the thread handling for every loop of a program.
+inline void run_on_workers(std::size_t count, std::size_t workers, thread_pool* pool,
+                           void (*run)(const void*, std::size_t), const void* context) {
   if (workers <= 1) {
     for (std::size_t i = 0; i != count; ++i) run(context, i);
     return;
@@ -86,7 +85,7 @@ inline void hand_out(std::size_t count, std::size_t workers, thread_pool* pool, 
     try {
       for (std::size_t i = 1; i != workers; ++i) others.emplace_back(work);
     } catch (const std::system_error&) {
-      // The system gives no more threads: those there are do the work, with the same result.
+      // The system provides no more threads: the existing ones do the work, with the same result.
     }
     work();
   }
@@ -95,10 +94,10 @@ inline void hand_out(std::size_t count, std::size_t workers, thread_pool* pool, 
 
 }  // namespace detail
 
-/// Calls `body(begin, end)` on the consecutive chunks `[i * grain, min((i + 1) * grain, count))` of
-/// `[0, count)`, on the policy's threads, in no particular order. An exception thrown by `body`
-/// stops the handing out of chunks and is rethrown on the calling thread. Where the system gives
-/// fewer threads than the policy asks for, those do all of the work.
+/// Calls `body(begin, end)` on the consecutive chunks `[i * grain, min((i + 1) * grain, count))` of `[0, count)`, on
+/// the policy's threads, in no particular order. An exception thrown by `body` stops the distribution of chunks and is
+/// rethrown on the calling thread. If the system provides fewer threads than the policy requests, those do all of the
+/// work.
 /// @pre grain > 0
 template <execution_policy Policy, std::invocable<std::size_t, std::size_t> Body>
 void for_each_chunk(const Policy& policy, std::size_t count, std::size_t grain, Body&& body) {
@@ -112,7 +111,7 @@ void for_each_chunk(const Policy& policy, std::size_t count, std::size_t grain, 
     };
     thread_pool* pool = nullptr;
     if constexpr (std::is_same_v<Policy, parallel_policy>) pool = policy.pool;
-    detail::hand_out(chunks, std::min<std::size_t>(policy.threads(), chunks), pool, run_one, &run);
+    detail::run_on_workers(chunks, std::min<std::size_t>(policy.threads(), chunks), pool, run_one, &run);
   }
 }
 
@@ -124,8 +123,8 @@ void for_each_index(const Policy& policy, std::size_t count, std::size_t grain, 
   });
 }
 
-/// A non-owning reference to a callable `bool(std::size_t done, std::size_t total)`, called now and
-/// then by algorithms that can run long. It returns true to go on, false to cancel. Default: none.
+/// A non-owning reference to a callable `bool(std::size_t done, std::size_t total)`, called periodically by
+/// long-running algorithms. It returns true to continue, false to cancel. Default: none.
 ///
 /// The callable must outlive the call it is passed to. Algorithms call it from one thread at a time.
 class progress {
@@ -137,12 +136,12 @@ class progress {
            std::is_invocable_r_v<
                bool, F&, std::size_t,
                std::size_t>) constexpr progress(F&& callback) noexcept  // NOLINT(google-explicit-constructor):
-                                                                        // a callback is one
+                                                                        // converts callbacks
       : object_{address_of(callback)}, call_{[](void* object, std::size_t done, std::size_t total) -> bool {
           return (*reinterpret_cast<std::remove_reference_t<F>*>(object))(done, total);
         }} {}
 
-  /// Reports `done` of `total`; false if the caller asked to stop.
+  /// Reports `done` of `total`; returns false if the caller requested cancellation.
   [[nodiscard]] bool operator()(std::size_t done, std::size_t total) const {
     return call_ == nullptr || call_(object_, done, total);
   }
@@ -153,7 +152,7 @@ class progress {
   template <class F>
   [[nodiscard]] static constexpr void* address_of(F& callback) noexcept {
     if constexpr (std::is_function_v<F>)
-      return reinterpret_cast<void*>(&callback);  // POSIX has them in the same size
+      return reinterpret_cast<void*>(&callback);  // POSIX guarantees the same size
     else
       return const_cast<void*>(static_cast<const void*>(std::addressof(callback)));
   }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Reads and writes whole files. Who reads a file while it is written never sees a part of it.
+/// Reads and writes whole files. Writes are atomic: readers see the old file or the new one.
 #pragma once
 
 #include <atomic>
@@ -28,20 +28,20 @@
 
 namespace orbis::detail {
 
-/// An empty file that did not exist before, which becomes the wanted file by one rename; removed by the destructor
-/// unless it was put in place.
+/// A newly created empty file that replaces the target file by one rename; the destructor removes it unless it was
+/// renamed.
 ///
-/// Its name is hidden and unique for the process and the call, so writers of the same file do not meet, neither those
-/// of one process nor those of several.
+/// Its name is hidden and unique per process and call, so that concurrent writers of the same file, in one process or
+/// in several, do not conflict.
 class temporary_file {
  public:
-  /// Creates the file in the folder of `target`. Where that fails, `exists` is false and `errno` says why.
+  /// Creates the file in the folder of `target`. If that fails, `exists()` is false and `errno` holds the reason.
   explicit temporary_file(const std::filesystem::path& target) {
     static std::atomic<std::uint32_t> calls{0};
     for (int attempt = 0; attempt != 100; ++attempt) {
       path_ = target.parent_path() / (".orbis-" + process() + "-" + std::to_string(calls.fetch_add(1)) + ".part");
       exists_ = create();
-      if (exists_ || errno != EEXIST) return;  // EEXIST: left behind by a process of the same number
+      if (exists_ || errno != EEXIST) return;  // EEXIST: left by an earlier process with the same number
     }
   }
   ~temporary_file() {
@@ -55,7 +55,7 @@ class temporary_file {
   [[nodiscard]] bool exists() const noexcept { return exists_; }
   [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }
 
-  /// Brings the file's bytes to the disk; false and `errno` if that fails.
+  /// Flushes the file to the disk; returns false and sets `errno` if that fails.
   [[nodiscard]] bool sync() {
 #ifdef ORBIS_HAS_POSIX_FILES
     return ::fsync(file_) == 0 || errno == EINVAL || errno == ENOTSUP;  // some file systems have no fsync
@@ -64,7 +64,7 @@ class temporary_file {
 #endif
   }
 
-  /// Renames the file to `target`, which it replaces, and brings the new name to the disk.
+  /// Renames the file to `target`, replacing it, and flushes the new name to the disk.
   [[nodiscard]] std::error_code rename_to(const std::filesystem::path& target) {
     close();
     std::error_code failure;
@@ -72,7 +72,7 @@ class temporary_file {
     if (failure) return failure;
     exists_ = false;
 #ifdef ORBIS_HAS_POSIX_FILES
-    // The file is whole and in place: a folder that cannot be synced (one that may not be listed) is no failure.
+    // The file is complete and in place: a folder that cannot be synced (e.g. without read permission) is no failure.
     const std::filesystem::path folder = target.has_parent_path() ? target.parent_path() : ".";
     if (const int names = ::open(folder.c_str(), O_RDONLY | O_CLOEXEC); names >= 0) {
       static_cast<void>(::fsync(names));
@@ -112,20 +112,20 @@ class temporary_file {
 
 namespace orbis {
 
-/// The bytes of a regular file: what has no end (a device) or may wait for ever (a pipe) is refused, and so is a file
-/// of more than `max_bytes`. Errors: not_found, unreadable; malformed (too large).
+/// Reads a regular file. Refuses endless files (devices), files that may block (pipes), and files of more than
+/// `max_bytes`. Errors: not_found, unreadable; malformed (too large).
 [[nodiscard]] inline result<std::string> read_file(const std::filesystem::path& path,
                                                    std::uintmax_t max_bytes = std::numeric_limits<std::size_t>::max()) {
   std::error_code ec;
   const auto status = std::filesystem::status(path, ec);
-  if (status.type() == std::filesystem::file_type::none)  // no permission to look, or no name for a file
-    return fail(errc::unreadable, path.string(), "cannot be looked up: " + ec.message());
+  if (status.type() == std::filesystem::file_type::none)  // no permission, or not a valid file name
+    return fail(errc::unreadable, path.string(), "cannot access: " + ec.message());
   if (!std::filesystem::exists(status)) return fail(errc::not_found, path.string(), "no such file");
   if (std::filesystem::is_directory(status)) return fail(errc::unreadable, path.string(), "is a directory");
   if (!std::filesystem::is_regular_file(status)) return fail(errc::unreadable, path.string(), "is not a regular file");
   const auto too_large = [&] {
     return fail(errc::malformed, path.string(),
-                "is larger than " + std::to_string(max_bytes) + " bytes, and no such file is");
+                "is larger than " + std::to_string(max_bytes) + " bytes, the limit for such files");
   };
   std::ifstream in{path, std::ios::binary};
   if (!in) return fail(errc::unreadable, path.string(), "cannot be opened: " + std::generic_category().message(errno));
@@ -138,7 +138,7 @@ namespace orbis {
   char buffer[65536];
   while (in.read(buffer, sizeof buffer) || in.gcount() > 0) {
     const auto count = static_cast<std::size_t>(in.gcount());
-    if (count > max_bytes - bytes.size()) return too_large();  // it grows, or does not tell its size
+    if (count > max_bytes - bytes.size()) return too_large();  // the file grows, or does not report its size
     bytes.append(buffer, count);
   }
   if (in.bad())
@@ -146,14 +146,14 @@ namespace orbis {
   return bytes;
 }
 
-/// Calls `write(std::ostream&)` on a temporary file beside `path`, brings it to the disk (fsync) and renames it to
-/// `path`. If anything fails (an exception from `write` included), the temporary file is removed and `path` stays as it
-/// was. A reader, and the next start after a crash, finds the old file or the new one, never a part of it.
+/// Calls `write(std::ostream&)` on a temporary file next to `path`, flushes it to the disk (fsync) and renames it to
+/// `path`. If anything fails (including an exception from `write`), the temporary file is removed and `path` is
+/// unchanged. Readers, and the next start after a crash, find the old file or the new one, never a partial file.
 ///
 /// The temporary file has a unique name: two threads or two programs may write the same file at once; the last one
-/// wins. What exists at `path` and is no regular file (a device, a folder) is not replaced; a symbolic link is replaced
-/// itself, not what it points to. `write` returns `void`, or `result<void>` to give up. Errors: write_failed, or
-/// `write`'s own.
+/// wins. A `path` that is not a regular file (a device, a folder) is not replaced; a symbolic link itself is replaced,
+/// not its target. `write` returns `void`, or `result<void>` to report an error. Errors: write_failed, or those of
+/// `write`.
 template <class Write>
 [[nodiscard]] result<void> write_file_atomically(const std::filesystem::path& path, Write&& write) {
   const auto reason = [] { return std::generic_category().message(errno != 0 ? errno : EIO); };
@@ -162,7 +162,7 @@ template <class Write>
   std::error_code ec;
   if (const auto existing = std::filesystem::status(path, ec);
       std::filesystem::exists(existing) && !std::filesystem::is_regular_file(existing))
-    return cannot("is not a regular file, and is not replaced by one");
+    return cannot("is not a regular file and cannot be replaced");
   detail::temporary_file temporary{path};
   if (!temporary.exists()) return cannot("cannot be created: " + reason());
   errno = 0;
@@ -176,7 +176,7 @@ template <class Write>
   out.close();
   if (!out || !temporary.sync()) return cannot("cannot be written: " + reason());
   if (const std::error_code failure = temporary.rename_to(path))
-    return cannot("cannot be put in place: " + failure.message());
+    return cannot("cannot be renamed into place: " + failure.message());
   return {};
 }
 

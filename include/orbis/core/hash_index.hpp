@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Hash tables from keys to 32-bit positions: where in an array something lies.
+/// Hash tables from keys to 32-bit positions in an array.
 #pragma once
 
 #include <algorithm>
@@ -11,9 +11,9 @@
 
 namespace orbis {
 
-/// The table of both: open addressing with linear probing, at most half full. Erasing moves back what follows, so that
-/// a table from which as much is erased as is put in does not grow. A `Slot` that is default-constructed is empty, as
-/// its `is_empty()` says. Hashes are given with every call; a place is found by their highest bits.
+/// The common hash table: open addressing with linear probing, at most half full. Erasing shifts the following entries
+/// back, so that a table with as many erasures as insertions does not grow. A default-constructed `Slot` is empty, as
+/// its `is_empty()` reports. Every call takes the hash; its highest bits select the slot.
 ///
 /// Source: D. E. Knuth, "The Art of Computer Programming", vol. 3, 6.4, algorithm R.
 template <class Slot>
@@ -31,15 +31,15 @@ class probe_table {
   }
   ~probe_table() = default;
 
-  /// The slot of this hash for which `matches(slot)`, or null. O(1) on average.
+  /// Returns the slot of this hash for which `matches(slot)` is true, or null. O(1) on average.
   template <class Matches>
   [[nodiscard]] const Slot* find(std::uint64_t hash, const Matches& matches) const {
     if (slots_.empty()) return nullptr;
     const Slot& s = slots_[place(hash, matches)];
     return s.is_empty() ? nullptr : &s;
   }
-  /// The slot of this hash for which `matches(slot)`, or an empty one, which the caller must fill. `hash_of(slot)` is
-  /// asked for the hashes of others when the table grows. O(1) on average.
+  /// Returns the slot of this hash for which `matches(slot)` is true, or an empty one, which the caller must fill.
+  /// `hash_of(slot)` provides the hashes of other slots when the table grows. O(1) on average.
   template <class Matches, class HashOf>
   [[nodiscard]] Slot& find_or_insert(std::uint64_t hash, const Matches& matches, const HashOf& hash_of) {
     if (2 * (used_ + 1) > slots_.size()) resize(std::max<std::size_t>(16, 2 * slots_.size()), hash_of);
@@ -47,14 +47,14 @@ class probe_table {
     used_ += s.is_empty() ? 1 : 0;
     return s;
   }
-  /// Empties the slot of this hash for which `matches(slot)`, if there is one. O(1) on average.
+  /// Empties the slot of this hash for which `matches(slot)` is true, if any. O(1) on average.
   template <class Matches, class HashOf>
   void erase(std::uint64_t hash, const Matches& matches, const HashOf& hash_of) {
     if (slots_.empty()) return;
     const std::size_t mask = slots_.size() - 1;
     std::size_t gap = place(hash, matches);
     if (slots_[gap].is_empty()) return;
-    // What stands behind the gap moves into it unless it would come before where its search begins.
+    // An entry after the gap moves into it unless it would then precede the start of its own probe sequence.
     for (std::size_t i = (gap + 1) & mask; !slots_[i].is_empty(); i = (i + 1) & mask) {
       if (((i - home(hash_of(slots_[i]))) & mask) < ((i - gap) & mask)) continue;
       slots_[gap] = slots_[i];
@@ -63,12 +63,12 @@ class probe_table {
     slots_[gap] = {};
     --used_;
   }
-  /// Gives memory back if less than an eighth is used.
+  /// Releases memory if less than an eighth is used.
   template <class HashOf>
   void shrink(const HashOf& hash_of) {
     if (slots_.size() > 64 && 8 * used_ < slots_.size()) resize(slots_.size() / 2, hash_of);
   }
-  /// Empties all slots, keeps the memory.
+  /// Empties all slots; keeps the memory.
   void clear() noexcept {
     if (used_ != 0) std::fill(slots_.begin(), slots_.end(), Slot{});
     used_ = 0;
@@ -80,7 +80,7 @@ class probe_table {
 
  private:
   [[nodiscard]] std::size_t home(std::uint64_t hash) const noexcept { return static_cast<std::size_t>(hash >> shift_); }
-  /// Where it is, or would be.
+  /// Index of the matching slot, or of the empty slot for its insertion.
   template <class Matches>
   [[nodiscard]] std::size_t place(std::uint64_t hash, const Matches& matches) const {
     const std::size_t mask = slots_.size() - 1;
@@ -96,28 +96,28 @@ class probe_table {
       if (!s.is_empty()) slots_[place(hash_of(s), [](const Slot&) { return false; })] = s;
   }
 
-  std::vector<Slot> slots_;  ///< 2^(64 - shift_) of them, or none
+  std::vector<Slot> slots_;  ///< 2^(64 - shift_) slots, or none
   std::size_t used_ = 0;
   unsigned shift_ = 64;
 };
 
-/// A map from 64-bit names to 32-bit positions.
+/// A map from 64-bit keys to 32-bit positions.
 class hash_index {
  public:
   static constexpr std::uint32_t none = ~std::uint32_t{0};
 
-  /// The position stored for `name`, or `none`. @pre name != ~0, as for those below
+  /// The position stored for `name`, or `none`. @pre name != ~0, also for the functions below
   [[nodiscard]] std::uint32_t find(std::uint64_t name) const noexcept {
     const slot* const s = table_.find(hash(name), is_named{name});
     return s == nullptr ? none : s->position;
   }
-  /// Stores `position` for `name`, new or not.
+  /// Stores `position` for `name`, replacing an existing entry.
   void set(std::uint64_t name, std::uint32_t position) {
     table_.find_or_insert(hash(name), is_named{name}, hash_of) = {name, position};
   }
-  /// Forgets `name`, if it is there.
+  /// Removes `name` if present.
   void erase(std::uint64_t name) noexcept { table_.erase(hash(name), is_named{name}, hash_of); }
-  /// Forgets everything, keeps the memory.
+  /// Removes all entries; keeps the memory.
   void clear() noexcept { table_.clear(); }
   [[nodiscard]] std::size_t size() const noexcept { return table_.size(); }
   [[nodiscard]] bool empty() const noexcept { return table_.empty(); }
@@ -134,34 +134,34 @@ class hash_index {
     std::uint64_t name;
     [[nodiscard]] bool operator()(const slot& s) const noexcept { return s.name == name; }
   };
-  /// Multiplicative: names that follow each other are spread.
+  /// Multiplicative hash: spreads consecutive keys.
   [[nodiscard]] static std::uint64_t hash(std::uint64_t name) noexcept { return name * 0x9e3779b97f4a7c15ULL; }
   static constexpr auto hash_of = [](const slot& s) { return hash(s.name); };
 
   probe_table<slot> table_;
 };
 
-/// The numbers of things whose keys are kept elsewhere: 4 bytes for each slot. `key_of(number)` gives a key, which is
-/// compared, and `Hash{}(key)` 64 well-mixed bits.
+/// A map from keys to the positions of the keys in an array of the caller: 4 bytes per slot. `key_of(number)` returns a
+/// key for comparison, and `Hash{}(key)` 64 well-mixed bits.
 template <class Key, class Hash>
 class number_index {
  public:
   static constexpr std::uint32_t none = ~std::uint32_t{0};
 
-  /// The number of `key`, or `none`.
+  /// The position of `key`, or `none`.
   template <class KeyOf>
   [[nodiscard]] std::uint32_t find(const Key& key, const KeyOf& key_of) const {
     const slot* const s = table_.find(Hash{}(key), matches(key, key_of));
     return s == nullptr ? none : s->number;
   }
-  /// The number of `key`, which becomes `number` if it has none yet. Then key_of(number) must be `key` from now on.
+  /// The position of `key`; stores `number` if it has none yet. Then key_of(number) must return `key` from now on.
   template <class KeyOf>
   std::uint32_t find_or_insert(const Key& key, std::uint32_t number, const KeyOf& key_of) {
     slot& s = table_.find_or_insert(Hash{}(key), matches(key, key_of), hash_of(key_of));
     if (s.is_empty()) s.number = number;
     return s.number;
   }
-  /// Forgets `key`, if it is there; key_of(its number) must still be known.
+  /// Removes `key` if present; key_of(its number) must still return it.
   template <class KeyOf>
   void erase(const Key& key, const KeyOf& key_of) {
     table_.erase(Hash{}(key), matches(key, key_of), hash_of(key_of));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Images as pointer, size and stride; pixel centres at integers, (0, 0) is the top left one.
+/// Images as pointer, size and stride. Pixel centres are at integers; (0, 0) is the top left pixel.
 #pragma once
 
 #include <algorithm>
@@ -14,28 +14,28 @@
 
 namespace orbis {
 
-/// One colour pixel, in the order the bytes lie in memory.
+/// One colour pixel, in memory order.
 struct rgb8 {
   std::uint8_t r = 0, g = 0, b = 0;
   friend bool operator==(const rgb8&, const rgb8&) = default;
 };
 static_assert(sizeof(rgb8) == 3);
 
-/// A view of a rectangle of pixels; it does not own them.
+/// A non-owning view of a rectangle of pixels.
 template <class T>
 class image_view {
  public:
   using value_type = std::remove_const_t<T>;
 
   constexpr image_view() noexcept = default;
-  /// `stride`: from one row to the next, in elements of `T`.
+  /// `stride`: distance between rows, in elements of `T`.
   /// @pre stride >= width, and `data` holds `(height - 1) * stride + width` pixels
   constexpr image_view(T* data, int width, int height, std::ptrdiff_t stride) noexcept
       : data_{data}, width_{width}, height_{height}, stride_{stride} {
     assert(width >= 0 && height >= 0 && stride >= width);
   }
   constexpr image_view(T* data, int width, int height) noexcept : image_view(data, width, height, width) {}
-  /// From mutable to const. A template, so that it never stands in for the copy constructor.
+  /// Converts a mutable view to a const view. A template, so that it never replaces the copy constructor.
   template <class U>
   requires(std::is_const_v<T>&& std::same_as<U, value_type>) constexpr image_view(const image_view<U>& other) noexcept
       : image_view(other.data(), other.width(), other.height(), other.stride()) {}
@@ -65,7 +65,7 @@ class image_view {
   std::ptrdiff_t stride_ = 0;
 };
 
-/// An image that owns its pixels, row after row without gaps.
+/// An image that owns its pixels; rows are contiguous.
 template <class T>
 class image {
  public:
@@ -102,8 +102,8 @@ class image {
   std::vector<T> pixels_;
 };
 
-/// Makes `to` a copy of what a view shows, in the memory that it has if it is of that size. O(pixels).
-/// @pre `from` does not show pixels of `to`
+/// Copies the pixels of a view into `to`, reusing its memory if the size matches. O(pixels).
+/// @pre `from` does not alias `to`
 template <class T>
 void copy_pixels(std::type_identity_t<image_view<const T>> from, image<T>& to) {
   if (to.width() != from.width() || to.height() != from.height()) to = image<T>(from.width(), from.height());

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Eigenvalues and singular values of small matrices by Jacobi's rotations, and the rotation nearest to a matrix:
-/// accurate to rounding, and far cheaper to compile than a general decomposition.
+/// Eigenvalues and singular values of small matrices by Jacobi rotations, and the nearest rotation to a matrix.
+/// Accurate to rounding, and much cheaper to compile than a general decomposition.
 ///
 /// Sources: G. Golub, C. Van Loan, "Matrix computations", 4th edition, 2013, sections 8.5 and 8.6.3;
 /// M. Hestenes, "Inversion of matrices by biorthogonalization and related results", 1958.
@@ -33,8 +33,8 @@ struct singular_decomposition {
 
 namespace detail {
 
-/// Cosine and sine of the turn that makes two columns, or rows and columns, orthogonal, where these
-/// have the squares (or diagonal entries) `a` and `b` and the product (or off-diagonal entry) `c`.
+/// Cosine and sine of the rotation that makes two columns (or rows and columns) orthogonal. `a` and `b`: their squared
+/// norms (or diagonal entries); `c`: their dot product (or off-diagonal entry).
 struct jacobi_turn {
   double cosine = 1.0, sine = 0.0;
   jacobi_turn(double a, double b, double c) {
@@ -57,7 +57,7 @@ void swap_columns(matrix<N, N>& m, int i, int k) {
 
 }  // namespace detail
 
-/// Of the symmetric matrix of which `a` has the lower triangle. O(n^3) for each of a few sweeps. N may be
+/// Eigen-decomposition of the symmetric matrix whose lower triangle is in `a`. O(n^3) per sweep, a few sweeps. N may be
 /// `Eigen::Dynamic`.
 /// @pre `a` is square and finite
 template <int N>
@@ -77,7 +77,7 @@ template <int N>
       for (int q = p + 1; q != n; ++q) {
         const double apart = a(p, q);
         if (std::abs(apart) <= std::numeric_limits<double>::min()) continue;
-        // Entries that no longer change the diagonal are done with.
+        // Entries too small to change the diagonal are treated as zero.
         if (std::abs(apart) < 0.1 * std::numeric_limits<double>::epsilon() * std::sqrt(std::abs(a(p, p))) *
                                   std::sqrt(std::abs(a(q, q)))) {
           a(p, q) = a(q, p) = 0.0;
@@ -104,19 +104,19 @@ template <int N>
   return out;
 }
 
-/// Of any finite square matrix, singular ones included. O(N^3) for each of a few sweeps.
+/// Singular value decomposition of any finite square matrix, including singular ones. O(N^3) per sweep, a few sweeps.
 template <int N>
 [[nodiscard]] singular_decomposition<N> singular_values_of(const matrix<N, N>& m) {
   constexpr double epsilon = std::numeric_limits<double>::epsilon();
   singular_decomposition<N> out;
-  matrix<N, N>& u = out.u;  // the columns of m, turned until they are orthogonal
+  matrix<N, N>& u = out.u;  // the columns of m, rotated until they are orthogonal
   double largest = 0.0;
   for (int i = 0; i != N; ++i)
     for (int k = 0; k != N; ++k) {
       largest = std::max(largest, std::abs(m(i, k)));
       out.v(i, k) = i == k ? 1.0 : 0.0;
     }
-  const double scale = largest > 0.0 ? largest : 1.0;  // so that no square overflows or vanishes
+  const double scale = largest > 0.0 ? largest : 1.0;  // prevents overflow and underflow of squares
   for (int i = 0; i != N; ++i)
     for (int k = 0; k != N; ++k) u(i, k) = m(i, k) / scale;
 
@@ -152,7 +152,7 @@ template <int N>
     detail::swap_columns(u, i, most);
     detail::swap_columns(out.v, i, most);
   }
-  // Columns of length 1; those that rounding made are replaced by any that are orthogonal to the others.
+  // Normalise the columns; replace columns that are only rounding noise by any that are orthogonal to the others.
   for (int i = 0; i != N; ++i) {
     const bool made = !(out.values[i] > epsilon * out.values[0]);
     for (int axis = 0; made && axis != N; ++axis) {
@@ -165,7 +165,7 @@ template <int N>
         }
       double left = 0.0;
       for (int k = 0; k != N; ++k) left += u(k, i) * u(k, i);
-      if (left >= 0.5 / N) break;  // one of the axes is always this far from the others' span
+      if (left >= 0.5 / N) break;  // at least one axis is this far from the span of the others
     }
     double length = 0.0;
     for (int k = 0; k != N; ++k) length += u(k, i) * u(k, i);
@@ -176,8 +176,8 @@ template <int N>
   return out;
 }
 
-/// The rotation whose matrix is closest to `m` (least sum of squared differences). Errors:
-/// degenerate, where `m` mirrors (determinant below 0), is singular to rounding, or is not finite.
+/// The rotation matrix closest to `m` (least sum of squared differences). Errors: degenerate if `m` contains a
+/// reflection (determinant below 0), is singular to rounding, or is not finite.
 ///
 /// Source: S. Umeyama, "Least-squares estimation of transformation parameters between two point
 /// patterns", PAMI 13(4), 1991.
@@ -185,7 +185,7 @@ template <int N>
   const double size = largest_magnitude(m);
   if (!all_finite(m)) return fail(errc::degenerate, "rotation matrix", "is not finite");
   const double volume = size > 0.0 ? determinant(m / size) : 0.0;
-  if (volume < 0.0) return fail(errc::degenerate, "rotation matrix", "mirrors: its determinant is negative");
+  if (volume < 0.0) return fail(errc::degenerate, "rotation matrix", "is a reflection: its determinant is negative");
   if (!(volume > 16.0 * std::numeric_limits<double>::epsilon()))
     return fail(errc::degenerate, "rotation matrix", "is singular");
   const auto [u, values, v] = singular_values_of<3>(m);

@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// How algorithms read a user's own point type: by a trait, in place.
+/// Access to user-defined point types: by a trait, in place.
 ///
-/// Anything with members `x`, `y`, `z` (PCL's points, plain structs) and anything indexable with
-/// `p[0], p[1], p[2]` (Eigen vectors, `std::array`, `float[3]`) is a point already. For other types
-/// specialise `point_traits`:
+/// Any type with members `x`, `y`, `z` (PCL's points, plain structs) and any type indexable with `p[0], p[1], p[2]`
+/// (Eigen vectors, `std::array`, `float[3]`) works without further code. For other types specialise `point_traits`:
 ///
 /// @code
 ///   template <> struct orbis::point_traits<my_point> {
@@ -29,12 +28,12 @@ namespace orbis {
 
 namespace detail {
 
-/// Whether the type itself says that it holds fewer than three numbers.
+/// True if the type is known at compile time to hold fewer than three numbers.
 template <class P>
-[[nodiscard]] consteval bool is_shorter_than_three() {
+[[nodiscard]] consteval bool has_fewer_than_three() {
   if constexpr (std::is_bounded_array_v<P>) {
     return std::extent_v<P> < 3;
-  } else if constexpr (requires { P::SizeAtCompileTime; }) {  // Eigen's; -1 where only the run will tell
+  } else if constexpr (requires { P::SizeAtCompileTime; }) {  // Eigen: -1 if only known at run time
     return int{P::SizeAtCompileTime} >= 0 && int{P::SizeAtCompileTime} < 3;
   } else if constexpr (requires { std::tuple_size<P>::value; }) {
     return std::tuple_size<P>::value < 3;
@@ -45,7 +44,7 @@ template <class P>
 
 }  // namespace detail
 
-/// The customisation point; the primary template is empty so that `point_like` fails softly.
+/// Customisation point; the primary template is empty so that `point_like` is false without an error.
 template <class P>
 struct point_traits {};
 
@@ -57,7 +56,7 @@ requires requires(const P& p) {
 }
 struct point_traits<P> {
   using scalar = std::remove_cvref_t<decltype(std::declval<const P&>().x)>;
-  using is_default = void;  ///< not a user's own
+  using is_default = void;  ///< marks the default implementation
   static constexpr scalar x(const P& p) noexcept { return p.x; }
   static constexpr scalar y(const P& p) noexcept { return p.y; }
   static constexpr scalar z(const P& p) noexcept { return p.z; }
@@ -65,7 +64,7 @@ struct point_traits<P> {
 
 template <class P>
 requires(
-    !requires(const P& p) { p.x; } && !detail::is_shorter_than_three<P>() &&
+    !requires(const P& p) { p.x; } && !detail::has_fewer_than_three<P>() &&
     requires(const P& p) {
       { p[0] } -> std::convertible_to<double>;
       { p[2] } -> std::convertible_to<double>;
@@ -87,7 +86,7 @@ concept point_like = requires(const std::remove_cvref_t<P>& p) {
   { point_traits<std::remove_cvref_t<P>>::z(p) } -> std::same_as<typename point_traits<std::remove_cvref_t<P>>::scalar>;
 };
 
-/// A sized random-access range of points: a cloud, in place.
+/// A sized random-access range of points: a cloud, read in place.
 template <class R>
 concept point_range =
     std::ranges::random_access_range<R> && std::ranges::sized_range<R> && point_like<std::ranges::range_value_t<R>>;
@@ -96,14 +95,14 @@ concept point_range =
 template <point_like P>
 using point_scalar_t = typename point_traits<std::remove_cvref_t<P>>::scalar;
 
-/// The coordinates of `p` as the number type `S`.
+/// The coordinates of `p` converted to `S`.
 template <std::floating_point S, point_like P>
 [[nodiscard]] constexpr std::array<S, 3> coordinates(const P& p) noexcept {
   using traits = point_traits<P>;
   return {static_cast<S>(traits::x(p)), static_cast<S>(traits::y(p)), static_cast<S>(traits::z(p))};
 }
 
-/// Whether all three coordinates are finite.
+/// Returns true if all three coordinates are finite.
 template <point_like P>
 [[nodiscard]] bool is_finite(const P& p) noexcept {
   using traits = point_traits<P>;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The cloud that readers and mappers return. Algorithms take any `point_range`.
+/// The point cloud that readers and mappers return. Algorithms take any `point_range`.
 #pragma once
 
 #include <vector>
@@ -10,10 +10,10 @@
 
 namespace orbis {
 
-/// Points in metres, and a colour for each of them or none at all.
+/// Points in metres, with optional colours.
 struct point_cloud {
   std::vector<vec3f> points;
-  std::vector<rgb8> colors;  ///< empty, or as many as points
+  std::vector<rgb8> colors;  ///< empty, or one per point
 
   [[nodiscard]] std::size_t size() const noexcept { return points.size(); }
   [[nodiscard]] bool empty() const noexcept { return points.empty(); }

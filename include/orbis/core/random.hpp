@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Deterministic random numbers: the same seed gives the same numbers with every standard library
-/// (`std::normal_distribution` and friends do not).
+/// Deterministic random numbers: the same seed gives the same numbers with every standard library, unlike
+/// `std::normal_distribution`.
 #pragma once
 
 #include <bit>
@@ -12,8 +12,8 @@
 
 namespace orbis {
 
-/// SplitMix64's finaliser: a well-mixed 64-bit hash of `x`. Counter-based noise is
-/// `mix64(seed ^ mix64(index))`, which needs no state and no order.
+/// SplitMix64's finaliser: a well-mixed 64-bit hash of `x`. Counter-based noise is `mix64(seed ^ mix64(index))`; it
+/// needs no state and no order.
 /// Source: Steele, Lea, Flood, "Fast splittable pseudorandom number generators", OOPSLA 2014.
 [[nodiscard]] constexpr std::uint64_t mix64(std::uint64_t x) noexcept {
   x += 0x9e3779b97f4a7c15ULL;
@@ -44,14 +44,14 @@ class random_bits {
   [[nodiscard]] constexpr std::uint32_t below(std::uint32_t n) noexcept {
     return static_cast<std::uint32_t>((((*this)() >> 32U) * n) >> 32U);
   }
-  /// Mean 0, standard deviation 1, close to normal out to four sigma: a centred binomial of 64
-  /// coin flips, smoothed by a uniform of its own step width. Uses no function of libm.
+  /// Approximately normal with mean 0 and standard deviation 1, accurate out to four sigma: a centred binomial of 64
+  /// coin flips, smoothed by a uniform of its own step width. Uses no libm function.
   [[nodiscard]] constexpr double normal() noexcept {
-    const result_type first = (*this)();  // named, since the order of arguments is the compiler's choice
+    const result_type first = (*this)();  // named, since the evaluation order of arguments is unspecified
     return normal_of(first, (*this)());
   }
 
-  /// `normal()` of two given random words, for counter-based noise.
+  /// `normal()` computed from two random words, for counter-based noise.
   [[nodiscard]] static constexpr double normal_of(std::uint64_t a, std::uint64_t b) noexcept {
     // Binomial(64, 1/2) has variance 16, the uniform of width 1 adds 1/12.
     constexpr double inverse_deviation = 0.24935149047701481;  // 1 / sqrt(16 + 1/12)
@@ -64,8 +64,8 @@ class random_bits {
   std::uint64_t state_;
 };
 
-/// Puts the entries of `list` (of fewer than 2^32) in any order, all orders as likely. Source: R. Durstenfeld,
-/// "Algorithm 235: random permutation", CACM 7(7), 1964.
+/// Shuffles `list` (fewer than 2^32 entries); all orders are equally likely. Source: R. Durstenfeld, "Algorithm 235:
+/// random permutation", CACM 7(7), 1964.
 template <class List>
 constexpr void shuffle(List& list, random_bits& random) noexcept {
   for (std::size_t i = list.size(); i > 1; --i)

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// `result<T>`: a value, or an `error` that says what went wrong and where.
+/// `result<T>`: a value, or an `error` with a reason and a location.
 ///
-/// Broken preconditions assert; bad *data* comes back through this type. The library never prints,
-/// exits or aborts.
+/// Broken preconditions assert; invalid *data* is reported through this type. The library never prints, exits or
+/// aborts.
 #pragma once
 
 #include <string>
@@ -14,21 +14,21 @@
 
 namespace orbis {
 
-/// The kinds of failure a caller may want to tell apart.
+/// Error categories that a caller may need to distinguish.
 enum class errc {
-  not_found,         ///< a file or directory that does not exist
+  not_found,         ///< file or directory does not exist
   unreadable,        ///< exists, but cannot be opened or read
-  malformed,         ///< read, but damaged, truncated or contradicting itself
-  unsupported,       ///< well-formed, but of a kind we do not handle
+  malformed,         ///< read, but damaged, truncated or inconsistent
+  unsupported,       ///< well-formed, but of an unsupported kind
   write_failed,      ///< no space, no permission, I/O error while writing
-  invalid_argument,  ///< a value outside what the function accepts
-  no_data,           ///< nothing to work on: an empty cloud, list or trajectory
-  degenerate,        ///< geometry that does not determine the answer
-  cancelled,         ///< the progress callback asked to stop
-  exception          ///< an exception ended the work: want of memory, or one that a callback threw
+  invalid_argument,  ///< a value outside the accepted range
+  no_data,           ///< empty input: cloud, list or trajectory
+  degenerate,        ///< geometry does not determine the result
+  cancelled,         ///< the progress callback requested cancellation
+  exception          ///< an exception ended the work: out of memory, or thrown by a callback
 };
 
-/// The name of a kind of failure, e.g. "malformed".
+/// The name of an error category, e.g. "malformed".
 [[nodiscard]] constexpr std::string_view to_string(errc code) noexcept {
   switch (code) {
     case errc::not_found: return "not found";
@@ -45,19 +45,18 @@ enum class errc {
   return "unknown";
 }
 
-/// What failed, where (a file with an optional line, or a field), and why.
+/// An error: category, location (a file with an optional line, or a field), and reason.
 struct error {
   errc code{};
-  std::string where;    ///< "path/to/file.txt:17", an option's name, or empty
+  std::string where;    ///< "path/to/file.txt:17", the name of an option, or empty
   std::string message;  ///< one sentence without a full stop
 
-  /// "where: message", in one line.
+  /// "where: message", on one line.
   [[nodiscard]] std::string to_string() const { return where.empty() ? message : where + ": " + message; }
 };
 
-/// A `T`, or the reason why there is none: `tl::expected<T, error>` with one difference. Taking the
-/// value out of a temporary gives it by value, so that
-/// `for (const auto& frame : open_recording(path).value())` does not iterate over a dead object.
+/// A `T`, or an error: `tl::expected<T, error>` with one difference. `value()` of a temporary returns by value, so that
+/// `for (const auto& frame : open_recording(path).value())` does not iterate over a destroyed object.
 template <class T>
 class [[nodiscard]] result : public tl::expected<T, orbis::error> {
   using base = tl::expected<T, orbis::error>;
@@ -77,7 +76,7 @@ class [[nodiscard]] result : public tl::expected<T, orbis::error> {
   [[nodiscard]] T operator*() && { return std::move(base::operator*()); }
 };
 
-/// Done, or the reason why not.
+/// Success, or an error.
 template <>
 class [[nodiscard]] result<void> : public tl::expected<void, orbis::error> {
   using base = tl::expected<void, orbis::error>;
@@ -86,7 +85,7 @@ class [[nodiscard]] result<void> : public tl::expected<void, orbis::error> {
   using base::base;
   result(base&& other) : base{std::move(other)} {}  // NOLINT(google-explicit-constructor)
 
-  /// Throws `tl::bad_expected_access` unless done, as the other results do.
+  /// Throws `tl::bad_expected_access` on error, as for other results.
   void value() const {
     if (!has_value()) throw tl::bad_expected_access<orbis::error>(error());
   }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Arithmetic that gives the same bits on every machine and under every compiler flag: products that no sum is fused
-/// with, sines and cosines.
+/// Arithmetic that gives the same bits on every machine and under every compiler flag: products that are never fused
+/// with a sum, sines and cosines.
 #pragma once
 
 #include <concepts>
@@ -9,8 +9,8 @@
 
 namespace orbis {
 
-/// `a * b`, rounded: never the first half of a fused multiply-add, which `-march=native` and ARM
-/// compilers would otherwise make of a product that is summed.
+/// `a * b`, rounded: never contracted into a fused multiply-add, as compilers otherwise do for sums of products with
+/// `-march=native` and on ARM.
 template <std::floating_point S>
 [[nodiscard]] inline S rounded_product(S a, S b) noexcept {
 #if defined(__clang__)
@@ -34,8 +34,9 @@ template <std::floating_point S>
 
 }  // namespace orbis
 
-// Between the two, products and sums are rounded each on its own, whatever the target could fuse (`-march=native`).
-// Functions in between are no templates: those would be compiled elsewhere, under other options.
+// Between these two macros, every product and sum is rounded separately, even if the target can fuse them
+// (`-march=native`). Functions between them must not be templates: those would be instantiated elsewhere, under other
+// options.
 #if defined(__clang__)
 #define ORBIS_BEGIN_UNFUSED _Pragma("float_control(push)") _Pragma("clang fp contract(off)")
 #define ORBIS_END_UNFUSED _Pragma("float_control(pop)")
@@ -51,8 +52,8 @@ ORBIS_BEGIN_UNFUSED
 
 namespace orbis {
 
-/// The sine of an angle of `turns` full turns (2 pi each), to about 1e-14 for |turns| < 1e6. Only operations that
-/// IEEE 754 defines to the last bit are used: a Taylor series after reduction to a quarter turn.
+/// The sine of an angle of `turns` full turns (2 pi each), to about 1e-14 for |turns| < 1e6. Uses only operations that
+/// IEEE 754 defines exactly: a Taylor series after reduction to a quarter turn.
 [[nodiscard]] inline double sin_turns(double turns) noexcept {
   double r = turns - static_cast<double>(static_cast<std::int64_t>(turns));  // (-1, 1)
   if (r > 0.5) r -= 1.0;
@@ -65,7 +66,7 @@ namespace orbis {
   for (int n = 18; n >= 2; n -= 2) sum = 1.0 - sum * (s / static_cast<double>(n * (n + 1)));
   return a * sum;
 }
-/// The cosine of an angle of `turns` full turns, as `sin_turns`.
+/// The cosine of an angle of `turns` full turns; accuracy as for `sin_turns`.
 [[nodiscard]] inline double cos_turns(double turns) noexcept { return sin_turns(turns + 0.25); }
 
 }  // namespace orbis

@@ -13,8 +13,8 @@
 
 namespace orbis {
 
-/// A rigid transform. `T_a_b * p_b == p_a`: the pose of frame b in frame a. Tangent vectors are
-/// `(rho, phi)`, translation (metres) first, then rotation (radians).
+/// A rigid transform. `T_a_b * p_b == p_a`: the pose of frame b in frame a. Tangent vectors are `(rho, phi)`:
+/// translation (metres) first, then rotation (radians).
 template <std::floating_point S = double>
 class basic_se3 {
  public:
@@ -100,14 +100,14 @@ class basic_se3 {
     return m;
   }
 
-  /// How the translation's tangent depends on the rotation: Barfoot's Q_l, equation 7.86.
+  /// Coupling between translation and rotation in the left Jacobian: Barfoot's Q_l, equation 7.86.
   [[nodiscard]] static matrix<3, 3, S> q_matrix(const tangent& xi) {
     const matrix<3, 3, S> p = hat<S>(head<3>(xi));
     const matrix<3, 3, S> k = hat<S>(tail<3>(xi));
     const S t2 = squared_norm(tail<3>(xi));
     // (t - sin t) / t^3, (t^2 + 2 cos t - 2) / (2 t^4), (2 t - 3 sin t + t cos t) / (2 t^5)
     S a = S(0), b = S(0), c = S(0);
-    if (t2 < S(1)) {  // the closed forms cancel to nothing here
+    if (t2 < S(1)) {  // the closed forms cancel here
       S term = S(1) / S(6);
       for (int n = 0; n != 10; ++n) {  // term = (-t^2)^n / (2 n + 3)!
         a += term;

@@ -2,10 +2,9 @@
 /// @file
 /// Similarity transforms in three dimensions: the Lie group Sim(3).
 ///
-/// Formulas: H. Strasdat, "Local accuracy and global consistency for efficient visual SLAM", PhD
-/// thesis, Imperial College London, 2012, chapter 2; the integrals are taken by Taylor series and
-/// doubling (N. J. Higham, "Functions of Matrices", 2008, section 10.7.4), which has no special
-/// cases where angle or log scale vanish.
+/// Formulas: H. Strasdat, "Local accuracy and global consistency for efficient visual SLAM", PhD thesis, Imperial
+/// College London, 2012, chapter 2. The integrals are computed by Taylor series and doubling (N. J. Higham, "Functions
+/// of Matrices", 2008, section 10.7.4), which needs no special cases for a zero angle or log scale.
 #pragma once
 
 #include <algorithm>
@@ -22,7 +21,7 @@ namespace orbis {
 
 namespace detail {
 
-/// The sum of `a^n / (n + 1)!`, that is the integral of `exp(t a)` for `t` from 0 to 1.
+/// The sum of `a^n / (n + 1)!`, i.e. the integral of `exp(t a)` for `t` from 0 to 1.
 template <int N, class S>
 [[nodiscard]] matrix<N, N, S> exponential_integral(const matrix<N, N, S>& a) {
   using square = matrix<N, N, S>;
@@ -51,8 +50,8 @@ template <int N, class S>
 
 }  // namespace detail
 
-/// Scaling, rotation, translation: `S_a_b * p_b == scale * (R * p_b) + t == p_a`. Tangent vectors
-/// are `(rho, phi, sigma)`: translation, rotation (radians), logarithm of the scale.
+/// A similarity transform: `S_a_b * p_b == scale * (R * p_b) + t == p_a`. Tangent vectors are `(rho, phi, sigma)`:
+/// translation, rotation (radians), logarithm of the scale.
 template <std::floating_point S = double>
 class basic_sim3 {
  public:
@@ -68,7 +67,7 @@ class basic_sim3 {
       : r_{rotation}, t_{translation}, scale_{scale} {
     assert(!(scale < S(0)));
   }
-  /// The rigid transform, of scale 1.
+  /// A rigid transform, with scale 1.
   explicit basic_sim3(const basic_se3<S>& rigid) : basic_sim3(rigid.rotation(), rigid.translation(), S(1)) {}
 
   [[nodiscard]] static basic_sim3 exp(const tangent& xi) {
@@ -133,7 +132,7 @@ class basic_sim3 {
   [[nodiscard]] static matrix<7, 7, S> right_jacobian_inverse(const tangent& xi) { return left_jacobian_inverse(-xi); }
 
  private:
-  /// What takes `rho` to the translation of `exp`.
+  /// The matrix that maps `rho` to the translation of `exp`.
   [[nodiscard]] static matrix<3, 3, S> translation_integral(const point& phi, S sigma) {
     return detail::exponential_integral<3, S>(hat<S>(phi) + sigma * identity<matrix<3, 3, S>>());
   }

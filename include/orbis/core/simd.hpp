@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Kernels that are written once and run on every instruction set.
+/// SIMD kernels that are written once and run on every instruction set.
 ///
 /// A kernel is a static member template over the target. It works on `vec<T, N, Target>`, which is split into the
-/// registers that the target has, and is compiled for each target and chosen at run time:
+/// registers of the target. It is compiled for each target and selected at run time:
 ///
 /// @code
 ///   struct sum_of_squares {
@@ -21,18 +21,18 @@
 ///   double total = orbis::simd::kernel<sum_of_squares, double(std::span<const double>)>()(values);
 /// @endcode
 ///
-/// What a kernel calls with vectors is ORBIS_ALWAYS_INLINE, and a lambda in it `[&](auto& v) ORBIS_INLINE_LAMBDA
-/// {...}`: code that is not inlined is compiled for the baseline. N stays the same for all targets where the order of
-/// sums matters; where it does not, `native_vec<T, Target>` has one register.
+/// Functions that a kernel calls with vectors must be ORBIS_ALWAYS_INLINE, and lambdas in it `[&](auto& v)
+/// ORBIS_INLINE_LAMBDA {...}`: code that is not inlined is compiled for the baseline. Use the same N for all targets if
+/// the order of sums matters; otherwise `native_vec<T, Target>` has one register.
 ///
-/// | header | what it has |
+/// | header | contents |
 /// | --- | --- |
-/// | core/simd/level.hpp | the processor's instruction sets; how tests force a lower one |
-/// | core/simd/dispatch.hpp | targets; `kernel`: the code of a kernel for the best of them |
+/// | core/simd/level.hpp | the processor's instruction sets; a limit on them for tests |
+/// | core/simd/dispatch.hpp | targets; `kernel`: selects the code for the best target |
 /// | core/simd/mask.hpp | `mask`, `bits`, `any`, `all`, `number_of` |
 /// | core/simd/vec.hpp | `vec`: memory, arithmetic, comparisons, `select`, `min`, `max`, bits, shifts |
 /// | core/simd/math.hpp | `abs`, `sqrt`, `floor`, approximate roots, sums over lanes |
-/// | core/simd/convert.hpp | conversions between kinds of numbers, wider and narrower |
+/// | core/simd/convert.hpp | conversions between number types, wider and narrower |
 /// | core/simd/memory.hpp | gather and compress |
 /// | core/simd/shuffle.hpp | constant shuffles, interleaving, look-up by lanes |
 /// | core/simd/integer.hpp | saturated sums, averages, sums of products, counts of bits |

@@ -10,15 +10,15 @@
 
 namespace orbis {
 
-/// `H = L D L^T` of a symmetric N x N matrix that is first scaled to a unit diagonal, so that its pivots do not depend
-/// on the units of the unknowns or on the number of residuals. O(N^3), for N up to about ten.
+/// The factorisation `H = L D L^T` of a symmetric N x N matrix, scaled to a unit diagonal first, so that its pivots do
+/// not depend on the units of the unknowns or on the number of residuals. O(N^3), for N up to about ten.
 template <int N>
 class small_cholesky {
  public:
   using vector = matrix<N>;
   using square = matrix<N, N>;
 
-  /// Reads the lower triangle. False if an entry on the diagonal is not positive and finite.
+  /// Reads the lower triangle. Returns false if an entry on the diagonal is not positive and finite.
   [[nodiscard]] bool set(const square& h) {
     for (int i = 0; i != N; ++i) {
       if (!(h(i, i) > 0.0) || !std::isfinite(h(i, i))) return false;
@@ -29,8 +29,8 @@ class small_cholesky {
     return true;
   }
 
-  /// Factors H with its diagonal multiplied by `1 + damping`. Returns the smallest pivot of the scaled matrix: 1 for
-  /// independent unknowns; about the rounding of double, below it or NaN if some are not determined.
+  /// Factorises H with its diagonal multiplied by `1 + damping`. Returns the smallest pivot of the scaled matrix: 1 for
+  /// independent unknowns; close to or below the rounding of double, or NaN, if some are not determined.
   [[nodiscard]] double factor(double damping) {
     double least = 1.0 + damping;
     for (int j = 0; j != N; ++j) {
@@ -48,7 +48,7 @@ class small_cholesky {
     return least;
   }
 
-  /// The solution of `H x = b` for the matrix last factored. @pre its smallest pivot was positive
+  /// Solves `H x = b` for the most recently factorised matrix. @pre its smallest pivot was positive
   [[nodiscard]] vector solve(const vector& b) const {
     vector x;
     for (int i = 0; i != N; ++i) {
@@ -66,7 +66,7 @@ class small_cholesky {
     return x;
   }
 
-  /// The inverse of the matrix last factored. @pre its smallest pivot was positive
+  /// The inverse of the most recently factorised matrix. @pre its smallest pivot was positive
   [[nodiscard]] square inverse() const {
     square out;
     for (int j = 0; j != N; ++j) {
@@ -77,7 +77,7 @@ class small_cholesky {
     return out;
   }
 
-  /// If the smallest pivot of the undamped matrix is below this, some direction is not determined.
+  /// Threshold on the smallest pivot of the undamped matrix; below it some direction is not determined.
   static constexpr double determined = 1e-11;
 
  private:
@@ -85,8 +85,8 @@ class small_cholesky {
   double scaled_[N][N] = {}, l_[N][N] = {};  // the lower triangles
 };
 
-/// The solution of `h x = b` for a positive semidefinite matrix, damped by the least factor that makes its pivots
-/// positive, 1e-12 or more. Empty if an entry on the diagonal is not positive and finite.
+/// Solves `h x = b` for a positive semidefinite matrix, damped by the smallest factor that makes its pivots positive,
+/// at least 1e-12. Empty if an entry on the diagonal is not positive and finite.
 template <int N>
 [[nodiscard]] std::optional<matrix<N>> solve_semidefinite(const matrix<N, N>& h, const matrix<N>& b) {
   small_cholesky<N> factors;

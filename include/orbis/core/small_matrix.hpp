@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Arithmetic of fixed-size Eigen matrices that compiles fast: every operation returns a plain matrix at once, without
-/// Eigen's expression classes, which cost a compiler ten times as much per formula.
+/// Arithmetic of fixed-size Eigen matrices that compiles fast: every operation returns a plain matrix, without Eigen's
+/// expression templates, which take about ten times as long to compile.
 ///
-/// Code inside namespace orbis (and below a `using namespace orbis`) finds these operators by ordinary lookup, and they
-/// match better than Eigen's members, so that a formula reads as with Eigen. A sum or product is then a temporary
-/// matrix: no `auto` may hold an expression of Eigen's on it, as in `auto t = (a - b).transpose()`. Other code keeps
-/// Eigen's operators. Operands of which one is an Eigen expression or of dynamic size fall back to Eigen.
+/// Code in namespace orbis (and after `using namespace orbis`) finds these operators by ordinary lookup. They match
+/// better than Eigen's members, so formulas look the same as with Eigen. A sum or product is then a temporary matrix:
+/// do not store an Eigen expression of it in an `auto` variable, as in `auto t = (a - b).transpose()`. Other code keeps
+/// Eigen's operators. If an operand is an Eigen expression or of dynamic size, Eigen's operator is used.
 ///
-/// Sums of products run from the first entry to the last, as those of Eigen's vectors of three do; elsewhere the last
-/// bits may differ from its results.
+/// Sums of products run from the first entry to the last, as in Eigen for vectors of three; in other cases the last
+/// bits may differ from Eigen's results.
 #pragma once
 
 #include <cmath>
@@ -21,8 +21,8 @@
 
 namespace orbis {
 
-/// An `R x C` matrix of `S`; the same layout under every `-m` flag. Sizes that Eigen never aligns
-/// stay the plain Eigen type, so `vec3` *is* `Eigen::Vector3d`.
+/// An `R x C` matrix of `S` with the same layout under every `-m` flag. Sizes that Eigen never aligns remain the plain
+/// Eigen type, so `vec3` *is* `Eigen::Vector3d`.
 template <int R, int C = 1, class S = double>
 using matrix =
     Eigen::Matrix<S, R, C,
@@ -31,15 +31,15 @@ using matrix =
 
 namespace detail {
 
-/// A scalar that multiplies a matrix of `S` without a loss that Eigen refuses.
+/// A scalar type that multiplies a matrix of `S` without a narrowing that Eigen rejects.
 template <class T, class S>
 concept factor_of = std::same_as<T, S> || std::integral<T>;
 
-/// True where loops are unrolled and functions inlined.
+/// True if loops are unrolled and functions inlined.
 template <int Operations>
 inline constexpr bool is_small = Operations <= 64;
 
-/// `out[i] = f(a[i], b[i * Step])`. A `Step` of 0 is for a scalar.
+/// `out[i] = f(a[i], b[i * Step])`. A `Step` of 0 broadcasts a scalar.
 template <int N, int Step, class S, class F>
 inline void entrywise(const S* a, const S* b, S* out, F f) {
   if constexpr (N <= 12) {
@@ -50,7 +50,7 @@ inline void entrywise(const S* a, const S* b, S* out, F f) {
   }
 }
 
-/// The sum of `N` products of entries `step_a` and `step_b` apart.
+/// The sum of `N` products; consecutive factors are `step_a` and `step_b` entries apart.
 template <int N, class S>
 [[nodiscard]] inline S sum_of_products(const S* a, int step_a, const S* b, int step_b) {
   S sum = a[0] * b[0];
@@ -59,8 +59,8 @@ template <int N, class S>
   return sum;
 }
 
-/// The product of an `R x K` and a `K x C` matrix, column by column. `a_row`, `a_column`, `b_row`, `b_column`: how far
-/// apart the entries of neighbouring rows and columns are.
+/// The product of an `R x K` and a `K x C` matrix, column by column. `a_row`, `a_column`, `b_row`, `b_column`:
+/// distances between entries of neighbouring rows and columns.
 template <int R, int K, int C, class S>
 inline void multiply_inline(const S* a, int a_row, int a_column, const S* b, int b_row, int b_column, S* out) {
 #pragma GCC unroll 12
@@ -68,7 +68,7 @@ inline void multiply_inline(const S* a, int a_row, int a_column, const S* b, int
 #pragma GCC unroll 12
     for (int r = 0; r < R; ++r) out[c * R + r] = sum_of_products<K>(a + r * a_row, a_column, b + c * b_column, b_row);
 }
-/// As above, for more entries: not inlined, and with rows in the inner loop.
+/// The same for larger matrices: not inlined, with rows in the inner loop.
 template <int R, int K, int C, class S>
 [[gnu::noinline]] void multiply(const S* a, int a_row, int a_column, const S* b, int b_row, int b_column, S* out) {
   for (int c = 0; c < C; ++c) {
@@ -186,7 +186,7 @@ requires(R > 0 && C > 0) [[nodiscard]] inline matrix<C, R, S> transposed(const E
   return out;
 }
 
-/// `transposed(a) * b`, without the copy.
+/// `transposed(a) * b`, without a copy.
 template <class S, int K, int R, int C, int OA, int OB>
 requires(R > 0 && K > 0 && C > 0)
     [[nodiscard]] inline matrix<R, C, S> transposed_product(const Eigen::Matrix<S, K, R, OA, K, R>& a,
@@ -228,13 +228,13 @@ requires(R > 0 && C > 0) [[nodiscard]] inline S squared_norm(const Eigen::Matrix
   return detail::sum_of_products<R * C>(a.data(), 1, a.data(), 1);
 }
 
-/// The root of the sum of the squares of all entries.
+/// The square root of the sum of the squares of all entries.
 template <class S, int R, int C, int O>
 requires(R > 0 && C > 0) [[nodiscard]] inline S norm(const Eigen::Matrix<S, R, C, O, R, C>& a) {
   return std::sqrt(squared_norm(a));
 }
 
-/// The vector of length 1 in the same direction; one of length 0 as it is.
+/// The vector scaled to length 1; a zero vector is returned unchanged.
 template <class S, int R, int C, int O>
 requires(R > 0 && C > 0)
     [[nodiscard]] inline Eigen::Matrix<S, R, C, O> normalized(const Eigen::Matrix<S, R, C, O, R, C>& a) {
@@ -245,7 +245,7 @@ requires(R > 0 && C > 0)
 
 /// @name Parts
 /// @{
-/// `N` entries of a vector from entry `first` on.
+/// `N` entries of a vector, starting at `first`.
 template <int N, class S, int R, int O>
 requires(N > 0 && N <= R)
     [[nodiscard]] inline matrix<N, 1, S> segment(const Eigen::Matrix<S, R, 1, O, R, 1>& v, int first) {
@@ -421,7 +421,7 @@ requires(R > 0 && C > 0) [[nodiscard]] inline S largest_of(const Eigen::Matrix<S
     if (a.data()[i] > most) most = a.data()[i];
   return most;
 }
-/// True if each entry of `a` is at most that of `b`.
+/// True if each entry of `a` is at most the corresponding entry of `b`.
 template <class S, int R, int C, int O>
 requires(R > 0 && C > 0) [[nodiscard]] inline bool all_at_most(const Eigen::Matrix<S, R, C, O, R, C>& a,
                                                                const Eigen::Matrix<S, R, C, O, R, C>& b) {
@@ -429,7 +429,7 @@ requires(R > 0 && C > 0) [[nodiscard]] inline bool all_at_most(const Eigen::Matr
     if (!(a.data()[i] <= b.data()[i])) return false;
   return true;
 }
-/// True if an entry of `a` is greater than that of `b`.
+/// True if any entry of `a` is greater than the corresponding entry of `b`.
 template <class S, int R, int C, int O>
 requires(R > 0 && C > 0) [[nodiscard]] inline bool any_greater(const Eigen::Matrix<S, R, C, O, R, C>& a,
                                                                const Eigen::Matrix<S, R, C, O, R, C>& b) {
@@ -459,7 +459,7 @@ template <class S, int O>
 [[nodiscard]] inline matrix<3, 1, S> homogeneous(const Eigen::Matrix<S, 2, 1, O, 2, 1>& p) {
   return {p.data()[0], p.data()[1], S(1)};
 }
-/// The largest absolute value of an entry; not a number where an entry is none.
+/// The largest absolute value of an entry; NaN if an entry is NaN.
 template <class S, int R, int C, int O>
 requires(R > 0 && C > 0) [[nodiscard]] inline S largest_magnitude(const Eigen::Matrix<S, R, C, O, R, C>& a) {
   S most = std::abs(a.data()[0]);
@@ -469,7 +469,7 @@ requires(R > 0 && C > 0) [[nodiscard]] inline S largest_magnitude(const Eigen::M
   }
   return most;
 }
-/// Entry by entry, the product.
+/// Element-wise product.
 template <class S, int R, int C, int O>
 requires(R > 0 && C > 0)
     [[nodiscard]] inline Eigen::Matrix<S, R, C, O> entrywise_product(const Eigen::Matrix<S, R, C, O, R, C>& a,
@@ -478,7 +478,7 @@ requires(R > 0 && C > 0)
   detail::entrywise<R * C, 1>(a.data(), b.data(), out.data(), [](S x, S y) { return x * y; });
   return out;
 }
-/// Entry by entry, the smaller value.
+/// Element-wise minimum.
 template <class S, int R, int C, int O>
 requires(R > 0 && C > 0)
     [[nodiscard]] inline Eigen::Matrix<S, R, C, O> entrywise_min(const Eigen::Matrix<S, R, C, O, R, C>& a,
@@ -487,7 +487,7 @@ requires(R > 0 && C > 0)
   detail::entrywise<R * C, 1>(a.data(), b.data(), out.data(), [](S x, S y) { return y < x ? y : x; });
   return out;
 }
-/// Entry by entry, the larger value.
+/// Element-wise maximum.
 template <class S, int R, int C, int O>
 requires(R > 0 && C > 0)
     [[nodiscard]] inline Eigen::Matrix<S, R, C, O> entrywise_max(const Eigen::Matrix<S, R, C, O, R, C>& a,
@@ -496,7 +496,7 @@ requires(R > 0 && C > 0)
   detail::entrywise<R * C, 1>(a.data(), b.data(), out.data(), [](S x, S y) { return x < y ? y : x; });
   return out;
 }
-/// The same entries as another scalar.
+/// Casts the entries to another scalar type.
 template <class T, class S, int R, int C, int O>
 requires(R > 0 && C > 0) [[nodiscard]] inline matrix<R, C, T> converted(const Eigen::Matrix<S, R, C, O, R, C>& a) {
   matrix<R, C, T> out;
@@ -506,7 +506,7 @@ requires(R > 0 && C > 0) [[nodiscard]] inline matrix<R, C, T> converted(const Ei
 }
 /// @}
 
-/// @name Expressions of Eigen's, and matrices of dynamic size: by Eigen
+/// @name Eigen expressions and matrices of dynamic size: evaluated by Eigen
 /// @{
 template <class D>
 [[nodiscard]] inline auto transposed(const Eigen::MatrixBase<D>& a) {
@@ -547,7 +547,7 @@ template <class S, int O>
   return m(0, 0) * (m(1, 1) * m(2, 2) - m(1, 2) * m(2, 1)) - m(0, 1) * (m(1, 0) * m(2, 2) - m(1, 2) * m(2, 0)) +
          m(0, 2) * (m(1, 0) * m(2, 1) - m(1, 1) * m(2, 0));
 }
-/// The inverse by cofactors. Entries are not finite where the matrix is singular.
+/// The inverse by cofactors. Entries are not finite if the matrix is singular.
 template <class S, int O>
 [[nodiscard]] inline Eigen::Matrix<S, 2, 2, O> inverse(const Eigen::Matrix<S, 2, 2, O, 2, 2>& m) {
   const S scale = S(1) / determinant(m);
@@ -567,7 +567,7 @@ template <class S, int O>
   const S scale = S(1) / (out(0, 0) * m(0, 0) + (out(0, 1) * m(1, 0) + out(0, 2) * m(2, 0)));
   return out * scale;
 }
-/// The inverse by elimination with row pivots. Entries are not finite where the matrix is singular.
+/// The inverse by elimination with row pivoting. Entries are not finite if the matrix is singular.
 template <class S, int N, int O>
 requires(N > 3) [[nodiscard]] inline Eigen::Matrix<S, N, N, O> inverse(Eigen::Matrix<S, N, N, O, N, N> m) {
   Eigen::Matrix<S, N, N, O> out = identity<Eigen::Matrix<S, N, N, O>>();

@@ -26,8 +26,8 @@ template <class S>
   return m;
 }
 
-/// A rotation, kept as a unit quaternion. Tangent vectors are rotation vectors (axis times angle,
-/// radians). `R_a_b * p_b == p_a`.
+/// A rotation, stored as a unit quaternion. Tangent vectors are rotation vectors (axis times angle, radians). `R_a_b *
+/// p_b == p_a`.
 template <std::floating_point S = double>
 class basic_so3 {
  public:
@@ -42,14 +42,13 @@ class basic_so3 {
   /// From a quaternion of any positive norm; normalises it.
   explicit basic_so3(const Eigen::Quaternion<S>& q) : q_{unit(q.x(), q.y(), q.z(), q.w())} {}
   explicit basic_so3(const quaternion& q) : q_{unit(q.x(), q.y(), q.z(), q.w())} {}
-  /// From a quaternion that is of unit norm already, up to rounding: bit for bit, as `unit_quaternion()` gave it.
+  /// From a quaternion of unit norm up to rounding, stored unchanged: inverse of `unit_quaternion()`, bit for bit.
   [[nodiscard]] static basic_so3 from_unit_quaternion(const quaternion& q) {
     basic_so3 r;
     r.q_ = q;
     return r;
   }
-  /// From a matrix that is a rotation up to rounding. For matrices that are further off use
-  /// `nearest_rotation`.
+  /// From a matrix that is a rotation up to rounding. For matrices with larger errors use `nearest_rotation`.
   explicit basic_so3(const matrix<3, 3, S>& r) : basic_so3(quaternion_of(r)) {}
 
   /// The rotation by `|phi|` radians about `phi`.
@@ -76,7 +75,7 @@ class basic_so3 {
       factor = S(2) / w - S(2) * n2 / (S(3) * w * w * w);
     } else {
       const S n = std::sqrt(n2);
-      // atan2 with both signs flipped where w < 0 picks the shorter way round.
+      // atan2 with both signs flipped for w < 0 selects the shorter rotation.
       factor = S(2) * (w < S(0) ? std::atan2(-n, -w) : std::atan2(n, w)) / n;
     }
     return {factor * q_.x(), factor * q_.y(), factor * q_.z()};
@@ -89,7 +88,7 @@ class basic_so3 {
   }
   [[nodiscard]] friend basic_so3 operator*(const basic_so3& a, const basic_so3& b) {
     const quaternion &p = a.q_, &q = b.q_;
-    // Sums in pairs round less than one after the other.
+    // Pairwise sums have smaller rounding errors than sequential ones.
     return basic_so3(quaternion((p.w() * q.w() - p.x() * q.x()) - (p.y() * q.y() + p.z() * q.z()),
                                 (p.w() * q.x() + p.x() * q.w()) + (p.y() * q.z() - p.z() * q.y()),
                                 (p.w() * q.y() + p.y() * q.w()) + (p.z() * q.x() - p.x() * q.z()),
@@ -160,7 +159,7 @@ class basic_so3 {
   /// Below this squared angle the series is exact to rounding.
   static constexpr S small = std::same_as<S, float> ? S(1e-4) : S(1e-8);
 
-  // By hand: what every includer has compiled should not cost expression templates.
+  // Written out, to spare every includer the cost of expression templates.
   [[nodiscard]] static S square_of(S x, S y, S z) { return x * x + y * y + z * z; }
   [[nodiscard]] static quaternion unit(S x, S y, S z, S w) {
     const S square = (x * x + z * z) + (y * y + w * w);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Memory for a large table that is read or written all over the place.
+/// Memory for large tables with random access.
 #pragma once
 
 #include <cstddef>
@@ -15,9 +15,8 @@
 
 namespace orbis {
 
-/// `count` values of `T`, not initialised, at an address that is a multiple of a cache line; a large table is on huge
-/// pages where the system has them to give, so that addresses are found without a miss of their own, and memory that is
-/// used for the first time costs little.
+/// `count` uninitialised values of `T`, aligned to a cache line. Large tables use huge pages where the system provides
+/// them, which reduces TLB misses and the cost of first use.
 template <class T>
 requires std::is_trivially_copyable_v<T>
 class table_memory {
@@ -37,7 +36,7 @@ class table_memory {
     const std::align_val_t alignment{large ? huge_page : line};
     values_ = std::unique_ptr<T, release>(static_cast<T*>(::operator new(bytes, alignment)), release{alignment});
 #if defined(__linux__) && defined(MADV_HUGEPAGE)
-    if (large) static_cast<void>(madvise(static_cast<void*>(values_.get()), bytes, MADV_HUGEPAGE));  // only a wish
+    if (large) static_cast<void>(madvise(static_cast<void*>(values_.get()), bytes, MADV_HUGEPAGE));  // a hint; may fail
 #endif
   }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Threads that wait for work, for a parallel_policy: to start one takes as long as many a small loop does.
+/// Persistent threads for a parallel_policy: starting a thread takes as long as many a small loop.
 #pragma once
 
 #include <algorithm>
@@ -14,22 +14,23 @@
 
 namespace orbis {
 
-/// Threads that work for one loop at a time, whoever comes first: the loops of others that come meanwhile, and loops
-/// inside of loops, run on their callers' threads alone. Owned by the caller, who hands it to policies:
+/// Threads that serve one loop at a time, first come, first served. Loops that start meanwhile, and nested loops, run
+/// on their callers' threads alone. The caller owns the pool and passes it to policies:
 /// @code
 ///   orbis::thread_pool pool{4};
 ///   cloud::statistical_filter(orbis::par.on(pool), points);
 /// @endcode
-/// Any number of threads may use it. Threads look for work for some microseconds before they sleep. A process that is
-/// forked has none of them: there a pool made before may be used, on the caller's thread alone, but not destroyed.
+/// Any number of threads may use it. Threads poll for work for some microseconds before they sleep. After a fork, the
+/// child process has none of the threads: it may use a pool made before, on the caller's thread alone, but must not
+/// destroy it.
 class thread_pool {
  public:
-  /// `threads`: with the caller's, so that one less is started; 0: as many as the machine has. Where the system gives
-  /// fewer there are fewer, and never more than 65536.
+  /// `threads`: including the caller's, so that one fewer is started; 0: the number of hardware threads. The pool has
+  /// fewer if the system provides fewer, and at most 65536.
   explicit thread_pool(unsigned threads = 0) {
     if (threads == 0) threads = std::thread::hardware_concurrency();
     threads = std::min(threads, static_cast<unsigned>(inside) + 1);
-    workers_.reserve(threads);  // where this fails no thread waits yet
+    workers_.reserve(threads);  // if this throws, no thread is waiting yet
     try {
       for (unsigned i = 1; i < threads; ++i) workers_.emplace_back([this] { wait_for_work(); });
     } catch (const std::system_error&) {
@@ -44,11 +45,11 @@ class thread_pool {
     state_.notify_all();
   }
 
-  /// The number of threads, with the caller's.
+  /// The number of threads, including the caller's.
   [[nodiscard]] unsigned threads() const noexcept { return static_cast<unsigned>(workers_.size()) + 1; }
 
-  /// Calls `work(context)` on the calling thread, and on up to `helpers` others as long as it has not returned there.
-  /// Returns when all calls have. @pre `work` does not throw
+  /// Calls `work(context)` on the calling thread and, until it returns there, on up to `helpers` others. Returns when
+  /// all calls have returned. @pre `work` does not throw
   void run(std::size_t helpers, void (*work)(const void*), const void* context) {
     if (helpers == 0 || workers_.empty() || is_busy_.exchange(true, std::memory_order_acquire)) {
       work(context);
@@ -69,13 +70,13 @@ class thread_pool {
   }
 
  private:
-  // The bits of the state: how many helpers are inside of the job, whether others may come, the end, the job's number.
+  // Bits of the state: the number of helpers inside the job, open for more helpers, stopped, the number of the job.
   static constexpr std::uint64_t inside = 0xffff, open = std::uint64_t{1} << 16U, stopped = std::uint64_t{1} << 17U,
                                  one_job = std::uint64_t{1} << 18U;
-  static constexpr int patience = 2000;  ///< looks at the state, some 20 us
+  static constexpr int patience = 2000;  ///< number of polls of the state, some 20 us
 
   void wait_for_work() {
-    std::uint64_t done = 0;  // the last job that this thread has looked at
+    std::uint64_t done = 0;  // the last job that this thread has seen
     int spins = 0;
     for (;;) {
       std::uint64_t now = state_.load();
@@ -98,10 +99,10 @@ class thread_pool {
 
   std::atomic<std::uint64_t> state_{0};
   std::atomic<bool> is_busy_{false};
-  void (*work_)(const void*) = nullptr;  // of the job; these are read by who is inside
+  void (*work_)(const void*) = nullptr;  // of the current job; read by the threads inside it
   const void* context_ = nullptr;
   std::size_t helpers_ = 0;
-  std::vector<std::jthread> workers_;  // the last member: they end before the others go
+  std::vector<std::jthread> workers_;  // the last member: the threads end before the other members are destroyed
 };
 
 }  // namespace orbis

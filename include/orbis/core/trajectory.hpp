@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Trajectories: time-stamped poses, poses between them, and which time stamps of two sensors belong together.
+/// Trajectories: stamped poses, interpolation between them, and association of the time stamps of two sensors.
 #pragma once
 
 #include <algorithm>
@@ -17,18 +17,18 @@
 
 namespace orbis {
 
-/// Where the camera was at a moment: `T_world_camera` at `timestamp` seconds.
+/// The pose of the camera at a time: `T_world_camera` at `timestamp` seconds.
 struct stamped_pose {
   double timestamp = 0.0;
   se3 T_world_camera;
 };
 
-/// Poses in the order of their time stamps.
+/// Poses sorted by time stamp.
 using trajectory = std::vector<stamped_pose>;
 
-/// The pose at `timestamp` seconds: between two poses at most `max_gap` seconds apart, the position
-/// linearly and the rotation along the shortest way; outside of those, the nearest pose if it is at
-/// most `max_distance` seconds away; otherwise none. O(log n). @pre `poses` is sorted by time
+/// The pose at `timestamp` seconds. Between two poses at most `max_gap` seconds apart: interpolates the position
+/// linearly and the rotation along the shortest path; otherwise the nearest pose if it is at most `max_distance`
+/// seconds away, else none. O(log n). @pre `poses` is sorted by time
 [[nodiscard]] inline std::optional<se3> interpolate(const trajectory& poses, double timestamp, double max_gap,
                                                     double max_distance) {
   const auto after = std::lower_bound(poses.begin(), poses.end(), timestamp,
@@ -54,17 +54,16 @@ using trajectory = std::vector<stamped_pose>;
   return nearest->T_world_camera;
 }
 
-/// Indices into two lists.
+/// A pair of indices into two lists.
 struct index_pair {
   std::uint32_t first = 0;
   std::uint32_t second = 0;
   friend bool operator==(const index_pair&, const index_pair&) = default;
 };
 
-/// Pairs the time stamps (seconds) of two sorted lists, nearest pair first, each used at most once
-/// and none further apart than `max_difference`. The pairs come in the order of `a`; equal
-/// differences are settled in favour of the earlier stamp. Only the `max_candidates` nearest
-/// neighbours on either side are considered for each stamp. O(n log n).
+/// Pairs the time stamps (seconds) of two sorted lists, nearest pair first. Each is used at most once, and pairs are at
+/// most `max_difference` apart. The pairs are returned in the order of `a`; ties go to the earlier stamp. Only the
+/// `max_candidates` nearest neighbours on either side are considered for each stamp. O(n log n).
 /// @pre both lists are sorted and free of NaN
 [[nodiscard]] inline std::vector<index_pair> associate(std::span<const double> a, std::span<const double> b,
                                                        double max_difference, std::size_t max_candidates = 8) {
@@ -74,7 +73,7 @@ struct index_pair {
     index_pair pair;
   };
   std::vector<candidate> candidates;
-  std::size_t after = 0;  // the first of b that is not before a[i]
+  std::size_t after = 0;  // the first stamp of b that is not before a[i]
   for (std::size_t i = 0; i != a.size(); ++i) {
     while (after != b.size() && b[after] < a[i]) ++after;
     const std::size_t begin = after - std::min(after, max_candidates);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Whether bytes are text in UTF-8, for readers that rely on it.
+/// Validation of UTF-8, for readers that rely on it.
 #pragma once
 
 #include <cstddef>
@@ -9,7 +9,8 @@
 
 namespace orbis {
 
-/// Whether `text` is well-formed UTF-8 (RFC 3629): no overlong forms, no surrogates, nothing cut off. O(bytes).
+/// Returns true if `text` is well-formed UTF-8 (RFC 3629): no overlong forms, no surrogates, no truncated characters.
+/// O(bytes).
 [[nodiscard]] constexpr bool is_utf8(std::string_view text) noexcept {
   for (std::size_t i = 0; i != text.size();) {
     const auto first = static_cast<unsigned char>(text[i]);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Bringing an estimated trajectory into the frame of its reference.
+/// Alignment of an estimated trajectory with its reference.
 ///
 /// Source: S. Umeyama, "Least-squares estimation of transformation parameters between two point
 /// patterns", PAMI 13(4), 1991.
@@ -20,15 +20,15 @@
 
 namespace orbis::eval {
 
-/// An estimated pose and the reference pose of the same moment.
+/// An estimated pose and the reference pose of the same time.
 struct pose_pair {
   double timestamp = 0.0;  ///< of the estimate, seconds
   se3 estimate;
   se3 reference;
 };
 
-/// The poses of two trajectories that belong together by their time stamps (nearest first, each used
-/// once). @pre both are sorted by time
+/// Pairs the poses of two trajectories by their time stamps (nearest first, each used once). @pre both are sorted by
+/// time
 [[nodiscard]] inline std::vector<pose_pair> pair_poses(const trajectory& estimate, const trajectory& reference,
                                                        double max_time_difference) {
   const auto stamps = [](const trajectory& poses) {
@@ -44,29 +44,28 @@ struct pose_pair {
 }
 
 struct alignment_options {
-  bool with_scale = false;            ///< also estimate a scale, for trajectories without one
-  double max_time_difference = 0.02;  ///< between poses that belong together, seconds
+  bool with_scale = false;            ///< also estimate a scale, for trajectories of unknown scale
+  double max_time_difference = 0.02;  ///< between paired poses, seconds
 };
 
-/// `reference ~ scale * rotation * estimate + translation`.
+/// The transform `reference ~ scale * rotation * estimate + translation`.
 struct alignment {
   double scale = 1.0;
   se3 T_reference_estimate;  ///< the rotation and the translation
-  std::size_t pairs = 0;     ///< poses it was computed from
+  std::size_t pairs = 0;     ///< number of poses that it was computed from
 
-  /// A position in the estimate's frame, in the reference's.
+  /// Transforms a position from the estimate's frame to the reference's.
   [[nodiscard]] vec3 operator*(const vec3& p) const {
     return T_reference_estimate.rotation() * vec3(scale * p) + T_reference_estimate.translation();
   }
-  /// A pose in the estimate's frame, in the reference's.
+  /// Transforms a pose from the estimate's frame to the reference's.
   [[nodiscard]] se3 operator*(const se3& pose) const {
     return {T_reference_estimate.rotation() * pose.rotation(), *this * pose.translation()};
   }
 };
 
-/// The alignment of pairs of poses that is best for their positions (least squares).
-/// Errors: no_data (fewer than 3 pairs), degenerate (all positions on one line: the rotation about it
-/// is not determined; not finite). O(n).
+/// The least-squares alignment of the positions of pose pairs. Errors: no_data (fewer than 3 pairs), degenerate (all
+/// positions on one line, so that the rotation about it is not determined; not finite). O(n).
 [[nodiscard]] inline result<alignment> align(const std::vector<pose_pair>& pairs, bool with_scale = false) {
   constexpr const char* where = "trajectory alignment";
   if (pairs.size() < 3)
@@ -91,8 +90,9 @@ struct alignment {
     return fail(errc::degenerate, where, "a position is not finite");
   auto [u, s, v] = singular_values_of<3>(covariance);
   if (!(s[1] > 1e-9 * std::sqrt(variance_e * variance_r)) || !(s[1] > 0.0))
-    return fail(errc::degenerate, where, "all positions lie on one line, the rotation about it is not determined");
-  // Where the best orthogonal matrix mirrors, the best rotation flips the weakest direction.
+    return fail(errc::degenerate, where,
+                "all positions are collinear, the rotation about their line is not determined");
+  // If the best orthogonal matrix is a reflection, the best rotation flips the weakest direction.
   if (determinant(u) * determinant(v) < 0.0) {
     s[2] = -s[2];
     set_column(u, 2, vec3(-column_of(u, 2)));
@@ -102,10 +102,10 @@ struct alignment {
   return alignment{scale, se3(rotation, mean_r - rotation * vec3(scale * mean_e)), pairs.size()};
 }
 
-/// The rigid alignment that is best for the orientations (chordal mean) and, given that, for the
-/// positions. Determined by a single pair, and well determined where the positions hardly differ or
-/// lie on a line: the way to bring a map into the reference's world. `align` is the one for ATE.
-/// Errors: no_data (no pairs), degenerate (orientations all over the sphere; not finite). O(n).
+/// The rigid alignment that is best for the orientations (chordal mean) and, given that, for the positions. Determined
+/// by a single pair, and well determined if the positions hardly differ or are collinear: use it to transform a map
+/// into the reference's world frame, and `align` for the ATE. Errors: no_data (no pairs), degenerate (orientations
+/// without a mean; not finite). O(n).
 ///
 /// Source: R. Hartley, J. Trumpf, Y. Dai, H. Li, "Rotation averaging", IJCV 103, 2013, section 5.2.
 [[nodiscard]] inline result<alignment> align_poses(const std::vector<pose_pair>& pairs) {
@@ -125,7 +125,7 @@ struct alignment {
   return alignment{1.0, se3(*rotation, translation), pairs.size()};
 }
 
-/// The alignment of two trajectories: poses are paired by time, then aligned. Errors: as above.
+/// The alignment of two trajectories: pairs poses by time, then aligns them. Errors: as above.
 /// @pre both are sorted by time
 [[nodiscard]] inline result<alignment> align(const trajectory& estimate, const trajectory& reference,
                                              const alignment_options& options = {}) {

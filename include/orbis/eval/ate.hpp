@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Absolute trajectory error: how far the estimated positions are off after alignment.
+/// Absolute trajectory error: the error of the estimated positions after alignment.
 ///
 /// Source: J. Sturm et al., "A benchmark for the evaluation of RGB-D SLAM systems", IROS 2012.
 #pragma once
@@ -21,8 +21,8 @@ struct absolute_trajectory_error {
   alignment aligned;             ///< of the estimate to the reference
 };
 
-/// Aligns `estimate` to `reference` and compares the positions of the poses that belong together.
-/// Errors: no_data (fewer than 3 such poses), degenerate (all on one line). O(n log n).
+/// Aligns `estimate` to `reference` and compares the positions of paired poses. Errors: no_data (fewer than 3 pairs),
+/// degenerate (all on one line). O(n log n).
 /// @pre both are sorted by time
 [[nodiscard]] inline result<absolute_trajectory_error> ate(const trajectory& estimate, const trajectory& reference,
                                                            const alignment_options& options = {}) {

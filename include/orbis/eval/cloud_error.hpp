@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// How far the points of a map are from the true surface.
+/// Distances between the points of a map and the true surface.
 #pragma once
 
 #include <cmath>
@@ -18,8 +18,8 @@
 
 namespace orbis::eval {
 
-/// A callable that gives the distance (metres, its sign is dropped) from a point to the surface.
-/// Called from several threads at once.
+/// A callable that returns the distance (metres, the sign is ignored) from a point to the surface. Called from several
+/// threads at once.
 template <class F>
 concept distance_function = requires(const F& distance, const vec3& point) {
   { distance(point) } -> std::convertible_to<double>;
@@ -31,12 +31,12 @@ struct cloud_error_options {
 
 struct cloud_error {
   error_statistics distance;    ///< metres
-  double percent_within = 0.0;  ///< points at most `tolerance` from the surface
-  std::size_t skipped = 0;      ///< points, or distances, that are not finite
+  double percent_within = 0.0;  ///< percentage of points at most `tolerance` from the surface
+  std::size_t skipped = 0;      ///< points with non-finite coordinates or distances
 };
 
-/// The distances of `points` to the surface that `distance` describes. The same result for every
-/// policy. Errors: no_data (no point is finite). O(n log n) beside the calls.
+/// Statistics of the distances from `points` to the surface that `distance` describes. The same result for every
+/// policy. Errors: no_data (no point is finite). O(n log n) in addition to the calls.
 template <execution_policy Policy, point_range Points, distance_function Distance>
 [[nodiscard]] result<cloud_error> cloud_to_surface(const Policy& policy, const Points& points, const Distance& distance,
                                                    const cloud_error_options& options = {}) {
@@ -49,7 +49,7 @@ template <execution_policy Policy, point_range Points, distance_function Distanc
     distances[i] = all_finite(p) ? std::abs(static_cast<double>(distance(p))) : HUGE_VAL;
   });
   std::erase_if(distances, [](double d) { return !std::isfinite(d); });
-  if (distances.empty()) return fail(errc::no_data, "cloud error", "there is no finite point to measure");
+  if (distances.empty()) return fail(errc::no_data, "cloud error", "there is no finite point");
   std::size_t within = 0;
   for (const double d : distances) within += d <= options.tolerance ? 1 : 0;
   const std::size_t measured = distances.size();

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Relative pose error: how far the estimated motion is off over a short while. Independent of the
-/// frames that the trajectories are in.
+/// Relative pose error: the error of the estimated motion over a short interval. Independent of the frames of the
+/// trajectories.
 ///
 /// Source: J. Sturm et al., "A benchmark for the evaluation of RGB-D SLAM systems", IROS 2012.
 #pragma once
@@ -22,9 +22,9 @@
 namespace orbis::eval {
 
 struct rpe_options {
-  std::size_t delta_frames = 1;           ///< motion from one paired pose to the n-th after it ...
-  std::optional<double> delta_seconds{};  ///< ... or, if set, to the one nearest to that much later
-  double max_time_difference = 0.02;      ///< between poses that belong together, seconds
+  std::size_t delta_frames = 1;           ///< motion from one paired pose to the n-th pose after it ...
+  std::optional<double> delta_seconds{};  ///< ... or, if set, to the pose nearest to this time later
+  double max_time_difference = 0.02;      ///< between paired poses, seconds
 };
 
 struct relative_pose_error {
@@ -32,9 +32,9 @@ struct relative_pose_error {
   error_statistics rotation;     ///< degrees
 };
 
-/// Compares the motions of `estimate` and `reference` over a delta of frames or seconds. With a delta
-/// of seconds, motions whose length is off by more than a quarter of it (across a gap) are left out.
-/// Errors: no_data (not one motion to compare), invalid_argument (a delta of 0 or less). O(n log n).
+/// Compares the motions of `estimate` and `reference` over a delta of frames or seconds. With a delta of seconds,
+/// excludes motions whose duration differs from it by more than a quarter (across a gap). Errors: no_data (no motion to
+/// compare), invalid_argument (a delta of 0 or less). O(n log n).
 /// @pre both are sorted by time
 [[nodiscard]] inline result<relative_pose_error> rpe(const trajectory& estimate, const trajectory& reference,
                                                      const rpe_options& options = {}) {
@@ -50,7 +50,7 @@ struct relative_pose_error {
     const auto after = std::lower_bound(pairs.begin(), pairs.end(), wanted,
                                         [](const pose_pair& p, double t) { return p.timestamp < t; });
     auto j = static_cast<std::size_t>(after - pairs.begin());
-    if (j <= i) return std::nullopt;  // a delta below the resolution of the time stamps
+    if (j <= i) return std::nullopt;  // the delta is below the resolution of the time stamps
     if (j == pairs.size() || (wanted - pairs[j - 1].timestamp < pairs[j].timestamp - wanted)) --j;
     const bool close = std::abs(pairs[j].timestamp - wanted) <= 0.25 * *options.delta_seconds;
     return j > i && close ? std::optional{j} : std::nullopt;
@@ -66,7 +66,7 @@ struct relative_pose_error {
     metres.push_back(norm(error.translation()));
     degrees.push_back(error.rotation().angle() * 180.0 / std::numbers::pi);
   }
-  if (metres.empty()) return fail(errc::no_data, where, "no two poses that far apart have a reference pose each");
+  if (metres.empty()) return fail(errc::no_data, where, "no two paired poses have this time difference");
   return relative_pose_error{summarize(std::move(metres)), summarize(std::move(degrees))};
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// How much larger a trajectory is than its reference says, and how certain that is.
+/// Scale of a trajectory relative to its reference, and its uncertainty.
 #pragma once
 
 #include <algorithm>
@@ -17,14 +17,14 @@ namespace orbis::eval {
 
 struct trajectory_scale {
   double scale = 1.0;      ///< lengths of the reference over those of the estimate
-  double deviation = 0.0;  ///< one standard deviation; infinite where it cannot be told
-  std::size_t pairs = 0;   ///< poses that it was computed from
+  double deviation = 0.0;  ///< one standard deviation; infinite if it cannot be estimated
+  std::size_t pairs = 0;   ///< number of poses that it was computed from
 };
 
-/// The scale of the similarity that aligns `estimate` with `reference` best. Its deviation comes from leaving out one
-/// tenth of the poses after the other (jackknife), as errors of poses that follow each other are alike. For a depth
-/// camera whose depth is `stored / depth_scale`, the true depth scale is `depth_scale / scale`.
-/// Errors: as `align`. O(n log n).
+/// The scale of the similarity that best aligns `estimate` with `reference`. Its deviation is estimated by leaving out
+/// consecutive tenths of the poses (jackknife), since the errors of successive poses are correlated. For a depth camera
+/// whose depth is `stored / depth_scale`, the true depth scale is `depth_scale / scale`. Errors: as `align`. O(n log
+/// n).
 /// Source: B. Efron, "The jackknife, the bootstrap and other resampling plans", SIAM 1982.
 /// @pre both are sorted by time
 [[nodiscard]] inline result<trajectory_scale> scale_of(const trajectory& estimate, const trajectory& reference,

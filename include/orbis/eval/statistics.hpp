@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A list of errors in a few numbers.
+/// Summary statistics of a list of errors.
 #pragma once
 
 #include <algorithm>
@@ -11,7 +11,7 @@
 
 namespace orbis::eval {
 
-/// In the unit of the errors. `median` and `p95` interpolate between neighbours.
+/// Error statistics in the unit of the errors. `median` and `p95` interpolate between neighbours.
 struct error_statistics {
   std::size_t count = 0;
   double rmse = 0.0;
@@ -21,7 +21,7 @@ struct error_statistics {
   double max = 0.0;
 };
 
-/// The value below which the share `q` (0 to 1) of `sorted` lies, linear between neighbours.
+/// The `q`-quantile (0 to 1) of `sorted`, interpolated linearly between neighbours.
 /// @pre !sorted.empty(), sorted
 [[nodiscard]] inline double quantile(std::span<const double> sorted, double q) {
   const double at = q * static_cast<double>(sorted.size() - 1);
@@ -30,7 +30,7 @@ struct error_statistics {
   return sorted[below] + (at - static_cast<double>(below)) * (sorted[above] - sorted[below]);
 }
 
-/// Statistics of errors that are not negative; all 0 for none. O(n log n).
+/// Statistics of non-negative errors; all 0 for an empty list. O(n log n).
 [[nodiscard]] inline error_statistics summarize(std::vector<double> errors) {
   if (errors.empty()) return {};
   std::sort(errors.begin(), errors.end());

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The functions of brute_force.hpp.
+/// Implementation of brute_force.hpp.
 #pragma once
 
 #include <orbis/features/brute_force.hpp>

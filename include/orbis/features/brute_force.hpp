@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The source that compares every query with every train.
+/// Brute-force source: compares every query with every train.
 #pragma once
 
 #include <concepts>
@@ -16,8 +16,8 @@
 
 namespace orbis::features {
 
-/// Finds for each query the nearest and the second nearest train, and on request for each train the
-/// nearest query, in one pass over all pairs. Made by `brute_force(distance)`.
+/// Finds the nearest and the second nearest train of each query and, on request, the nearest query of each train, in
+/// one pass over all pairs. Created by `brute_force(distance)`.
 template <class Distance>
 struct brute_force_source {
   using match_source_tag = void;
@@ -29,7 +29,7 @@ struct brute_force_source {
     detail::hamming_workspace search;
   };
 
-  /// One candidate for each query; none if there are no trains. O(queries x trains).
+  /// Returns one candidate for each query; none if there are no trains. O(queries x trains).
   template <class Descriptor>
   requires descriptor_distance<Distance, Descriptor>
   void search(std::vector<candidate>& candidates, workspace& memory, const feature_view<Descriptor>& queries,
@@ -58,7 +58,7 @@ struct brute_force_source {
   }
 };
 
-/// A source that compares every query with every train: `brute_force(hamming{})`.
+/// Creates a brute-force source: `brute_force(hamming{})`.
 template <class Distance>
 [[nodiscard]] constexpr brute_force_source<Distance> brute_force(Distance distance) {
   return {distance};

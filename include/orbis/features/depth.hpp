@@ -23,14 +23,14 @@ struct depth_noise {
   [[nodiscard]] constexpr double operator()(double z) const noexcept { return constant + quadratic * z * z; }
 };
 
-/// How the depth of a keypoint is found in its neighbourhood.
+/// Options for the estimation of a keypoint's depth from its neighbourhood.
 struct keypoint_depth_options {
-  int radius = 1;               ///< of the window: 1 is 3x3, 2 is 5x5; at most 3
-  int min_valid = 3;            ///< pixels with a depth in the window
+  int radius = 1;               ///< of the window: 1 is 3x3, 2 is 5x5; maximum 3
+  int min_valid = 3;            ///< minimum number of pixels with a depth in the window
   float edge_sigmas = 4.0F;     ///< a gap of more than this many sigma ...
-  float edge_relative = 0.02F;  ///< ... and more than this share of the depth is an edge
-  float min_share = 0.7F;       ///< of the valid pixels on one side of every edge; > 0.5
-  double position_sigma = 0.5;  ///< of the keypoint, pixels: on a slope it is a deviation of the depth
+  float edge_relative = 0.02F;  ///< ... and more than this fraction of the depth is an edge
+  float min_share = 0.7F;       ///< minimum fraction of the valid pixels on one side of every edge; > 0.5
+  double position_sigma = 0.5;  ///< of the keypoint, pixels; adds to the depth deviation on slopes
   depth_noise noise{};
 };
 
@@ -40,22 +40,22 @@ struct keypoint_depth {
   double sigma = 0.0;
 };
 
-/// A plane through the depths of a window, by least squares. `depth_at` uses it.
+/// Least-squares plane through the depths of a window. Used by `depth_at`.
 class depth_plane {
  public:
-  /// A pixel, relative to where the depth is wanted.
+  /// Adds a pixel, relative to the position of the requested depth.
   void add(double u, double v, double z) noexcept {
     ++n_;
     u_ += u, v_ += v, z_ += z;
     uu_ += u * u, uv_ += u * v, vv_ += v * v;
     uz_ += u * z, vz_ += v * z, zz_ += z * z;
   }
-  /// Whether the pixels determine a plane: at least six that do not lie on a line.
+  /// Returns true if the pixels determine a plane: at least six that are not collinear.
   [[nodiscard]] bool determined() const noexcept {
     return n_ >= 6 && spread_uu() * spread_vv() - sq(spread_uv()) > 1.0;
   }
 
-  /// The plane's depth, the variance around it, and its slope, metres per pixel. @pre determined()
+  /// The plane's depth, the residual variance, and its slope, metres per pixel. @pre determined()
   struct fit {
     double z, variance, slope;
   };
@@ -76,13 +76,13 @@ class depth_plane {
   double n_ = 0.0, u_ = 0.0, v_ = 0.0, z_ = 0.0, uu_ = 0.0, uv_ = 0.0, vv_ = 0.0, uz_ = 0.0, vz_ = 0.0, zz_ = 0.0;
 };
 
-/// Depth along the optical axis at pixel `(x, y)`, between pixels as well: that of a plane through the valid
-/// depths around it, or where these are too few for a plane their median. Its deviation is made of
-/// the sensor's noise, what the surface departs from the plane, and on a slope the keypoint's own position.
+/// Depth along the optical axis at pixel `(x, y)`, including subpixel positions: that of a plane fitted to the valid
+/// depths around it, or their median if there are too few for a plane. Its deviation combines the sensor's noise, the
+/// residual of the plane, and on slopes the keypoint's position error.
 ///
-/// Empty where too little is valid, where `(x, y)` lies outside the image or is not finite, and where the
-/// window straddles a depth edge: there the pixel may belong to either side, and a wrong
-/// choice would be wrong by decimetres. A few flying pixels beyond an edge are ignored.
+/// Empty if there are too few valid depths, if `(x, y)` is outside the image or not finite, or if the window straddles
+/// a depth edge: the pixel may then belong to either side, and a wrong choice causes errors of decimetres. Ignores a
+/// few flying pixels beyond an edge.
 /// @pre 0 <= radius <= 3
 template <camera::depth_source Depth>
 [[nodiscard]] std::optional<keypoint_depth> depth_at(const Depth& depth, float x, float y,
@@ -106,7 +106,7 @@ template <camera::depth_source Depth>
   if (count == 0 || static_cast<int>(count) < options.min_valid) return std::nullopt;
   std::sort(z.begin(), z.begin() + static_cast<std::ptrdiff_t>(count));
 
-  // The largest run without a gap: a slope has none, however steep.
+  // The largest run without a gap; even a steep slope has no gaps.
   const auto is_edge = [&](float near, float far) {
     const double gap = static_cast<double>(far) - static_cast<double>(near);
     return gap > static_cast<double>(options.edge_sigmas) * options.noise(static_cast<double>(near)) &&
@@ -133,7 +133,7 @@ template <camera::depth_source Depth>
   });
   if (plane.determined()) {
     const auto fit = plane.solve();
-    const double at = std::clamp(fit.z, nearest, farthest);  // a hole must not make it guess far
+    const double at = std::clamp(fit.z, nearest, farthest);  // prevents extrapolation into a hole
     const double noise = options.noise(at), shift = fit.slope * options.position_sigma;
     return keypoint_depth{at, std::sqrt(noise * noise + fit.variance + shift * shift)};
   }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Keypoints, descriptors, and the two together.
+/// Keypoints, descriptors, and their combination.
 #pragma once
 
 #include <array>
@@ -12,13 +12,13 @@
 
 namespace orbis::features {
 
-/// A descriptor of a keypoint: any value that can be copied. A `descriptor_distance` says how alike two of them are.
-/// Place recognition wants a `bit_string`, and for these `hamming` is fast.
+/// A descriptor of a keypoint: any copyable value. A `descriptor_distance` compares two of them. Place recognition
+/// requires a `bit_string`; `hamming` is fast for these.
 template <class D>
 concept feature_descriptor = std::semiregular<D>;
 
-/// A string of bits that describes the neighbourhood of a keypoint. Bit `i` is bit `i % 64` of word
-/// `i / 64`; on a little-endian machine these are the bytes OpenCV stores in a descriptor's row.
+/// A bit string that describes the neighbourhood of a keypoint. Bit `i` is bit `i % 64` of word `i / 64`; on a
+/// little-endian machine these are the bytes of a row of an OpenCV descriptor matrix.
 template <std::size_t Bits>
 requires(Bits > 0 && Bits % 64 == 0) struct binary_descriptor {
   static constexpr std::size_t bits = Bits;
@@ -30,7 +30,7 @@ requires(Bits > 0 && Bits % 64 == 0) struct binary_descriptor {
 };
 static_assert(sizeof(binary_descriptor<256>) == 32 && std::is_trivially_copyable_v<binary_descriptor<256>>);
 
-/// A point of an image that can be found again in other images.
+/// An image point that can be detected again in other images.
 struct keypoint {
   float x = 0.0F, y = 0.0F;  ///< pixels of the full image, pixel centres at integers
   float size = 0.0F;         ///< diameter of the described neighbourhood, pixels of the full image
@@ -40,7 +40,7 @@ struct keypoint {
   friend constexpr bool operator==(const keypoint&, const keypoint&) = default;
 };
 
-/// What an extractor finds: `descriptors[i]` describes `keypoints[i]`.
+/// The output of an extractor: `descriptors[i]` describes `keypoints[i]`.
 template <feature_descriptor Descriptor>
 struct basic_features {
   std::vector<keypoint> keypoints;
@@ -51,7 +51,7 @@ struct basic_features {
   friend bool operator==(const basic_features&, const basic_features&) = default;
 };
 
-/// The features of ORB.
+/// ORB features.
 using features = basic_features<binary_descriptor<256>>;
 
 }  // namespace orbis::features

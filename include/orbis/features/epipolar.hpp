@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The source that looks along epipolar lines.
+/// Epipolar source: searches along epipolar lines.
 #pragma once
 
 #include <array>
@@ -22,23 +22,23 @@
 
 namespace orbis::features {
 
-/// How far from its line a match may lie.
+/// Limits of the distance between a match and its epipolar line.
 struct epipolar_rule {
-  float distance = 1.96F;       ///< at the finest level, pixels: 95 % where positions are good to a pixel
-  float scale_factor = 1.2F;    ///< of the pyramid: by so much per level of the train the distance grows
-  float epipole_radius = 0.0F;  ///< trains so close to the epipole (grows likewise) show no parallax: left out
+  float distance = 1.96F;       ///< maximum at the finest level, pixels: 95 % if positions have an error of one pixel
+  float scale_factor = 1.2F;    ///< of the pyramid: the limit grows by this factor per level of the train
+  float epipole_radius = 0.0F;  ///< excludes trains this close to the epipole (grows likewise): no parallax
 };
 
-/// Finds for each query the nearest and the second nearest of the trains close to its epipolar line: the search for
-/// new landmarks to triangulate between two images of known pose. Made by `epipolar(distance, rule)`;
-/// a chain that begins with it is called with the geometry of the two images:
+/// Finds for each query the nearest and the second nearest of the trains close to its epipolar line: the search for new
+/// landmarks to triangulate between two images of known pose. Created by `epipolar(distance, rule)`; call a chain that
+/// begins with it with the geometry of the two images:
 ///
 /// @code
 ///   constexpr auto matcher = epipolar(hamming{}, {.epipole_radius = 10.0F}) | ratio_test{0.8f} | cross_check{};
 ///   std::vector<match> found = matcher(f1, f2, ray_geometry{rays1, rays2, T_camera2_camera1, focal});
 /// @endcode
 ///
-/// The reverse neighbour of a train is the nearest of the queries whose line it lies close to.
+/// The reverse neighbour of a train is the nearest of the queries to whose line it is close.
 template <class Distance>
 struct epipolar_source {
   using match_source_tag = void;
@@ -50,17 +50,17 @@ struct epipolar_source {
     std::vector<float> x, y, limit;  ///< of the trains, in whole blocks
   };
 
-  /// Says in one sentence what is asked for where something else is given.
+  /// Reports invalid arguments with a single compiler error.
   template <class Descriptor, class Other>
   requires descriptor_distance<Distance, Descriptor> &&
       (!epipolar_geometry<Other>)void search(std::vector<candidate>& /*candidates*/, workspace& /*memory*/,
                                              const feature_view<Descriptor>& /*queries*/,
                                              const feature_view<Descriptor>& /*trains*/, search_needs /*needs*/,
                                              const Other& /*geometry*/) const {
-    static_assert(epipolar_geometry<Other>, "orbis: epipolar(...) wants an epipolar_geometry, such as ray_geometry");
+    static_assert(epipolar_geometry<Other>, "orbis: epipolar(...) requires an epipolar_geometry, such as ray_geometry");
   }
 
-  /// One candidate for each query that has a train close to its line. O(queries x trains) distances to lines.
+  /// Returns one candidate for each query that has a train close to its line. O(queries x trains) distances to lines.
   /// @pre one keypoint for each descriptor on both sides
   template <class Descriptor, epipolar_geometry Geometry>
   requires descriptor_distance<Distance, Descriptor>
@@ -85,7 +85,7 @@ struct epipolar_source {
  private:
   static constexpr std::size_t block = 16;
 
-  /// A limit that is not a number, or negative, is close to no line.
+  /// Limit of the distance to the line; a NaN or negative limit matches no line.
   template <class Geometry>
   void place_trains(workspace& memory, std::span<const keypoint> keypoints, const Geometry& geometry) const {
     constexpr float nowhere = std::numeric_limits<float>::quiet_NaN();
@@ -104,7 +104,7 @@ struct epipolar_source {
     }
   }
 
-  /// A loop of fixed length without branches, for the vector unit.
+  /// A branch-free loop of fixed length, for the vectoriser.
   [[nodiscard]] static bool any_close(const epipolar_line& line, const float* x, const float* y, const float* limit,
                                       std::array<std::uint32_t, block>& close) noexcept {
     std::uint32_t any = 0;
@@ -116,7 +116,7 @@ struct epipolar_source {
   }
 };
 
-/// A source that looks along epipolar lines: `epipolar(hamming{})`.
+/// Creates an epipolar source: `epipolar(hamming{})`.
 template <class Distance>
 [[nodiscard]] constexpr epipolar_source<Distance> epipolar(Distance distance, epipolar_rule rule = {}) {
   return {distance, rule};

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Epipolar lines: where the match of a keypoint must lie when the relative pose of two images is known.
+/// Epipolar lines: loci of the matches of a keypoint for a known relative pose of two images.
 #pragma once
 
 #include <cassert>
@@ -17,16 +17,16 @@
 
 namespace orbis::features {
 
-/// The points with `a x + b y + c = 0`, where `a^2 + b^2 = 1`: the left side is the distance of others.
+/// A line `a x + b y + c = 0` with `a^2 + b^2 = 1`: the left side is the distance of a point.
 struct epipolar_line {
   float a = 0.0F, b = 0.0F, c = 0.0F;
 };
 
-/// What relates the keypoints of two images:
-/// - `line(i, k)`: the line in the train image that belongs to query `i` with keypoint `k`, if it has one;
-/// - `point(i, k)`: where train `i` with keypoint `k` lies, pixels; NaN where nowhere;
-/// - `epipole()`: where all lines of the train image meet, if they do.
-/// Lines and points are of one plane, which need not be the image itself.
+/// Epipolar geometry of the keypoints of two images:
+/// - `line(i, k)`: the line in the train image that belongs to query `i` with keypoint `k`, or none;
+/// - `point(i, k)`: position of train `i` with keypoint `k`, pixels; NaN if it has none;
+/// - `epipole()`: intersection of all lines of the train image, or none.
+/// Lines and points are in one plane, which need not be the image itself.
 template <class G>
 concept epipolar_geometry = requires(const G& geometry, std::size_t i, const keypoint& k) {
   { geometry.line(i, k) } -> std::same_as<std::optional<epipolar_line>>;
@@ -34,7 +34,7 @@ concept epipolar_geometry = requires(const G& geometry, std::size_t i, const key
   { geometry.epipole() } -> std::same_as<std::optional<vec2f>>;
 };
 
-/// The line of a homogeneous vector, if it is one.
+/// The line of a homogeneous vector, empty if it is degenerate.
 [[nodiscard]] inline std::optional<epipolar_line> line_of(const vec3& l) noexcept {
   const double norm = std::hypot(l.x(), l.y());
   if (!(norm > 0.0) || !std::isfinite(norm) || !std::isfinite(l.z())) return std::nullopt;
@@ -42,15 +42,15 @@ concept epipolar_geometry = requires(const G& geometry, std::size_t i, const key
                        static_cast<float>(l.z() / norm)};
 }
 
-/// The pixel of a homogeneous vector, if it is not at infinity.
+/// The pixel of a homogeneous vector, empty if it is at infinity.
 [[nodiscard]] inline std::optional<vec2f> pixel_of(const vec3& p) noexcept {
   if (!(std::abs(p.z()) > 1e-12 * norm(p))) return std::nullopt;
   return vec2f{static_cast<float>(p.x() / p.z()), static_cast<float>(p.y() / p.z())};
 }
 
-/// Two images of any central camera, by the rays through their keypoints: lines and points are of
-/// the plane z = 1 of the train's camera, in pixels of a pinhole camera with this focal length.
-/// Refers to the rays; one that is NaN, or does not point forward, has no match.
+/// Epipolar geometry of two images of any central camera, by the rays through their keypoints: lines and points are in
+/// the plane z = 1 of the train's camera, in pixels of a pinhole camera with this focal length. Refers to the rays; a
+/// ray that is NaN, or does not point forward, has no match.
 class ray_geometry {
  public:
   /// @pre one ray for each keypoint of its side; focal > 0 (pixels)

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// What a feature extractor is, and the parts that `basic_orb_extractor` is made of.
+/// Concepts of feature extractors and of the parts of `basic_orb_extractor`.
 ///
-/// | concept | what it does | ours |
+/// | concept | purpose | implementation |
 /// | --- | --- | --- |
 /// | `feature_extractor` | finds and describes the keypoints of an image | `orb_extractor` |
-/// | `pyramid_extractor` | hands out the image pyramid as well | `orb_extractor` |
+/// | `pyramid_extractor` | also returns the image pyramid | `orb_extractor` |
 /// | `corner_detector` | finds the corners of a pyramid level | `fast9` |
-/// | `corner_selection` | chooses among the corners of all levels | `cover_first` |
-/// | `orientation_estimator` | gives a keypoint its direction | `intensity_centroid` |
+/// | `corner_selection` | selects among the corners of all levels | `cover_first` |
+/// | `orientation_estimator` | estimates the direction of a keypoint | `intensity_centroid` |
 /// | `patch_descriptor` | describes the pixels around a keypoint | `steered_brief` |
 #pragma once
 
@@ -33,15 +33,15 @@ template <class D>
 inline constexpr bool is_features<basic_features<D>> = true;
 }  // namespace detail
 
-/// Finds features in a colour image: a callable that returns `basic_features<D>` for any `feature_descriptor` D. Calls
-/// on a const object may run at the same time.
+/// Finds features in a colour image: a callable that returns `basic_features<D>` for any `feature_descriptor` D.
+/// Concurrent calls on a const object are allowed.
 template <class E>
 concept feature_extractor = requires(const E& extract, image_view<const rgb8> image) {
   requires detail::is_features<decltype(extract(image))>;
 };
 
-/// An extractor that takes grey images and leaves the pyramid that it makes of an image to its caller, who needs not
-/// make it again: `extract.into(found, pyramid, image)`. The octave of a keypoint is its level there.
+/// An extractor for grey images that also returns the pyramid of the image, so that the caller need not rebuild it:
+/// `extract.into(found, pyramid, image)`. The octave of a keypoint is its level in the pyramid.
 template <class E>
 concept pyramid_extractor = feature_extractor<E> &&
     requires(const E& extract, std::remove_cvref_t<decltype(extract(std::declval<image_view<const rgb8>>()))>& found,
@@ -49,12 +49,12 @@ concept pyramid_extractor = feature_extractor<E> &&
   extract.into(found, pyramid, image);
 };
 
-/// The type of the descriptors that an extractor makes.
+/// The type of an extractor's descriptors.
 template <feature_extractor E>
 using extracted_descriptor =
     typename decltype(std::declval<const E&>()(std::declval<image_view<const rgb8>>()).descriptors)::value_type;
 
-/// A corner of one pyramid level: a pixel, its strength, and where in the pixel the corner lies.
+/// A corner of one pyramid level: a pixel, its response, and the subpixel offset.
 struct corner {
   int x = 0;              ///< column, pixels of the level
   int y = 0;              ///< row
@@ -64,11 +64,11 @@ struct corner {
   friend constexpr bool operator==(const corner&, const corner&) = default;
 };
 
-/// The order in which corners are stored: by row, then by column.
+/// Order of stored corners: by row, then by column.
 [[nodiscard]] constexpr bool before_in_image(const corner& a, const corner& b) noexcept {
   return a.y != b.y ? a.y < b.y : a.x < b.x;
 }
-/// Stronger corners first, equal ones by place: a total order, so that no choice depends on the order of the input.
+/// Stronger corners first, ties by position: a total order, so that no choice depends on the order of the input.
 [[nodiscard]] constexpr bool stronger(const corner& a, const corner& b) noexcept {
   return a.response != b.response ? a.response > b.response : before_in_image(a, b);
 }
@@ -80,15 +80,15 @@ struct region {
   friend constexpr bool operator==(const region&, const region&) = default;
 };
 
-/// Brightness steps: a detector returns the corners of at least `strong`, and where a neighbourhood has none of these,
+/// Brightness differences: a detector returns the corners of at least `strong`, and in neighbourhoods without any,
 /// those of at least `weak`. 0 <= weak <= strong <= 254.
 struct corner_thresholds {
   int strong = 20;
   int weak = 7;
 };
 
-/// `detect(image, area, thresholds, memory, corners)` replaces `corners` by those of `image` that lie in `area`,
-/// ordered by `before_in_image`. `memory` is a `D::workspace` that later calls use again.
+/// `detect(image, area, thresholds, memory, corners)` replaces `corners` by those of `image` that are in `area`,
+/// ordered by `before_in_image`. `memory` is a reusable `D::workspace`.
 template <class D>
 concept corner_detector = std::default_initializable<typename D::workspace> &&
     requires(const D& detect, image_view<const std::uint8_t> image, const region& area,
@@ -99,11 +99,11 @@ concept corner_detector = std::default_initializable<typename D::workspace> &&
 /// The corners of one pyramid level.
 struct level_corners {
   std::vector<corner> corners;
-  region area;         ///< in which they lie, pixels of the level
+  region area;         ///< that contains them, pixels of the level
   double scale = 1.0;  ///< pixels of the full image per pixel of the level
 };
 
-/// `choose(levels, wanted, memory)` erases corners until at most `wanted` are left on all levels together, on each
+/// `choose(levels, wanted, memory)` erases corners until at most `wanted` are left on all levels together, each level
 /// ordered by `before_in_image`. Level 0 is the finest.
 template <class D>
 concept corner_selection = std::default_initializable<typename D::workspace> &&
@@ -118,18 +118,17 @@ struct orientation {
   float sine = 0.0F;
 };
 
-/// `orient(image, x, y)` gives the direction at a pixel of a pyramid level that lies at least `O::radius` pixels
-/// from the left, upper and lower edges and `O::radius` + 1 pixels from the right one.
+/// `orient(image, x, y)` returns the direction at a pixel of a pyramid level that is at least `O::radius` pixels from
+/// the left, upper and lower edges and `O::radius` + 1 pixels from the right one.
 template <class O>
 concept orientation_estimator = requires(const O& orient, image_view<const std::uint8_t> image, int at) {
   { O::radius } -> std::convertible_to<int>;
   { orient(image, at, at) } -> std::same_as<orientation>;
 };
 
-/// Describes the pixels around a keypoint. `describe.prepare(image, first, last, memory)` sees a pyramid level
-/// and the rows [first, last) of its keypoints once; then `describe(memory, x, y, orientation)` returns a
-/// `D::descriptor` of a pixel that lies at least `D::reach` pixels from the edge. `D::diameter` (pixels) becomes
-/// `keypoint::size`.
+/// Describes the pixels around a keypoint. Call `describe.prepare(image, first, last, memory)` once per pyramid level
+/// with the rows [first, last) of its keypoints; then `describe(memory, x, y, orientation)` returns a `D::descriptor`
+/// of a pixel that is at least `D::reach` pixels from the edge. `D::diameter` (pixels) becomes `keypoint::size`.
 template <class D>
 concept patch_descriptor = std::default_initializable<typename D::workspace> &&
     requires(const D& describe, image_view<const std::uint8_t> image, typename D::workspace& memory,

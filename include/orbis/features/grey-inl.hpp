@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The functions of grey.hpp.
+/// Implementation of grey.hpp.
 #pragma once
 
 #include <cstddef>
@@ -28,7 +28,7 @@ template <class Target, std::size_t N = Target::bytes>
     return {blocks_of_16<Target, N / 2>(p, step), blocks_of_16<Target, N / 2>(p + N / 32 * step, step)};
 }
 
-/// As many pixels at a time as a register has bytes; returns how many are done, all but the last few.
+/// Processes one register of pixels at a time; returns the number processed, all except the last few.
 template <class Target>
 [[nodiscard]] ORBIS_ALWAYS_INLINE int luma_blocks(const rgb8* from, int count, std::uint8_t* to) {
   constexpr int pixels = Target::bytes;
@@ -36,7 +36,7 @@ template <class Target>
   using words = simd::native_vec<std::int16_t, Target>;
   using numbers = simd::native_vec<std::int32_t, Target>;
   constexpr std::uint8_t zero = 128;
-  // Of four pixels red and green as words side by side; blue and zero.
+  // Selects red and green of four pixels as adjacent words; blue and zero.
   const bytes red_green = bytes::generate([](std::size_t i) ORBIS_INLINE_LAMBDA {
     return i % 2 == 1 ? zero : static_cast<std::uint8_t>(i % 16 / 4 * 3 + i % 4 / 2);
   });
@@ -47,7 +47,7 @@ template <class Target>
       words::generate([](std::size_t i) ORBIS_INLINE_LAMBDA { return i % 2 == 0 ? luma_red : luma_green; });
   const words blue_weight =
       words::generate([](std::size_t i) ORBIS_INLINE_LAMBDA { return i % 2 == 0 ? luma_blue : 0; });
-  // Four pixels at p and four of each 16 that follow; reads four bytes beyond them.
+  // Four pixels at p and at each following 16-byte block; reads four bytes beyond them.
   const auto fours = [&](const std::uint8_t* p) ORBIS_INLINE_LAMBDA {
     const bytes v = blocks_of_16<Target>(p, 48);
     const numbers sum =

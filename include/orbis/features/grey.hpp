@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Grey images of 8 bits, which extractors look at, made of colour and of 16-bit images.
+/// Conversion of colour and 16-bit images to 8-bit grey images, the input of extractors.
 #pragma once
 
 #include <algorithm>
@@ -11,14 +11,14 @@
 
 namespace orbis::features {
 
-/// Writes the luma of a colour image (Rec. 601, rounded to the nearest): the same bits as OpenCV's COLOR_RGB2GRAY.
+/// Converts a colour image to luma (Rec. 601, rounded to the nearest): the same bits as OpenCV's COLOR_RGB2GRAY.
 /// O(pixels).
 /// @pre both images have the same size
 void luma(image_view<const rgb8> from, image_view<std::uint8_t> to);
 
-/// Writes a 16-bit image (infrared, thermal, raw) as 8 bits: values up to `low` become 0, values from `high` on become
-/// 255, those between are scaled linearly and rounded. Use the same `low` and `high` for a whole recording; otherwise
-/// the brightness flickers. O(pixels).
+/// Converts a 16-bit image (infrared, thermal, raw) to 8 bits: values up to `low` become 0, values from `high` on
+/// become 255, those between are scaled linearly and rounded. Use the same `low` and `high` for a whole recording;
+/// otherwise the brightness flickers. O(pixels).
 /// @pre low < high; both images have the same size
 inline void narrow(image_view<const std::uint16_t> from, image_view<std::uint8_t> to, std::uint16_t low,
                    std::uint16_t high) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// An index of keypoints by position.
+/// A spatial index of keypoints.
 #pragma once
 
 #include <algorithm>
@@ -16,17 +16,17 @@
 
 namespace orbis::features {
 
-/// Finds the keypoints near a pixel, in time proportional to their number. Holds a copy of the
-/// positions; queries may run at the same time.
+/// Finds the keypoints near a pixel, in time proportional to their number. Holds a copy of the positions; concurrent
+/// queries are allowed.
 class keypoint_grid {
  public:
   keypoint_grid() = default;
 
-  /// Keypoints whose position is not finite are never found. O(n).
+  /// Builds the grid. Keypoints with non-finite positions are never found. O(n).
   /// @pre cell_size > 0 (pixels)
   explicit keypoint_grid(std::span<const keypoint> keypoints, float cell_size = 20.0F) { assign(keypoints, cell_size); }
 
-  /// Replaces the contents of the grid, whose memory is used again. O(n).
+  /// Rebuilds the grid, reusing its memory. O(n).
   /// @pre cell_size > 0 (pixels)
   void assign(std::span<const keypoint> keypoints, float cell_size = 20.0F) {
     assert(cell_size > 0.0F);
@@ -46,7 +46,7 @@ class keypoint_grid {
       ++finite;
     }
     if (finite == 0) return;
-    // Far-away outliers coarsen the grid instead of filling the memory.
+    // Distant outliers coarsen the grid instead of exhausting the memory.
     const double most_cells = 4096.0 + 4.0 * static_cast<double>(finite);
     const double width = static_cast<double>(right) - static_cast<double>(left_);
     const double height = static_cast<double>(bottom) - static_cast<double>(top_);
@@ -56,7 +56,7 @@ class keypoint_grid {
     columns_ = static_cast<int>(std::floor(width * inverse_cell_)) + 1;
     rows_ = static_cast<int>(std::floor(height * inverse_cell_)) + 1;
 
-    // Counting sort by cell, from the back: first_[c] is where cell c ends, in the end where it begins in entries_.
+    // Counting sort by cell, from the back: first_[c] is the end of cell c, and finally its beginning in entries_.
     first_.assign(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_) + 1, 0);
     for (const keypoint& k : keypoints)
       if (is_finite(k)) ++first_[cell_of(k)];
@@ -68,8 +68,8 @@ class keypoint_grid {
     }
   }
 
-  /// Calls `visit(index)` for every keypoint within `radius` pixels (inclusive) of `(x, y)` whose octave lies
-  /// in `[min_octave, max_octave]`, in an order that depends on the keypoints alone.
+  /// Calls `visit(index)` for every keypoint within `radius` pixels (inclusive) of `(x, y)` whose octave is in
+  /// `[min_octave, max_octave]`, in an order that depends only on the keypoints.
   template <std::invocable<std::uint32_t> Visit>
   void for_each_near(float x, float y, float radius, int min_octave, int max_octave, Visit&& visit) const {
     if (entries_.empty() || !(radius >= 0.0F) || !std::isfinite(x) || !std::isfinite(y)) return;

@@ -12,14 +12,15 @@
 
 namespace orbis::features {
 
-/// A distance between two descriptors: a whole number, smaller means more alike.
+/// A distance between two descriptors: an integer, smaller for more similar descriptors.
 template <class F, class Descriptor>
 concept descriptor_distance = std::regular_invocable<const F&, const Descriptor&, const Descriptor&> &&
     std::convertible_to<std::invoke_result_t<const F&, const Descriptor&, const Descriptor&>, std::uint32_t>;
 
-/// The number of bits in which two descriptors differ, for any `bit_string`. Matchers compare many pairs at once with
-/// vector instructions where their distance is of this type. The library orbis::compiled holds this for strings of 256
-/// bits; with others, its users include brute_force-inl.hpp, windowed-inl.hpp, epipolar-inl.hpp or stereo-inl.hpp.
+/// Hamming distance: the number of bits in which two descriptors differ, for any `bit_string`. Matchers with this
+/// distance type compare many pairs at once with vector instructions. The library orbis::compiled contains this for
+/// strings of 256 bits; for other lengths include brute_force-inl.hpp, windowed-inl.hpp, epipolar-inl.hpp or
+/// stereo-inl.hpp.
 struct hamming {
   template <bit_string Descriptor>
   [[nodiscard]] constexpr std::uint32_t operator()(const Descriptor& a, const Descriptor& b) const noexcept {

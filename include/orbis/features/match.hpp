@@ -16,7 +16,7 @@
 
 namespace orbis::features {
 
-/// Query `query` and train `train` (indices) look alike, at descriptor distance `distance`.
+/// A pair of similar descriptors: indices `query` and `train`, and their descriptor distance.
 struct match {
   std::uint32_t query = 0;
   std::uint32_t train = 0;
@@ -24,28 +24,28 @@ struct match {
   friend constexpr bool operator==(const match&, const match&) = default;
 };
 
-/// In place of an index or a distance that does not exist.
+/// Placeholder for an index or a distance that does not exist.
 inline constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
 
-/// What a source finds for one query; stages accept or reject it.
+/// The result of a source for one query; stages accept or reject it.
 struct candidate {
   std::uint32_t query = 0;
-  std::uint32_t train = 0;               ///< the nearest; the lowest index where several are equally near
+  std::uint32_t train = 0;               ///< the nearest; the lowest index on ties
   std::uint32_t distance = 0;            ///< to the nearest
-  std::uint32_t second_distance = none;  ///< to the second nearest, `none` where there is only one
-  std::uint32_t reverse_query = none;    ///< the query nearest to `train` (lowest index on ties), if asked for
+  std::uint32_t second_distance = none;  ///< to the second nearest, `none` if there is only one
+  std::uint32_t reverse_query = none;    ///< the query nearest to `train` (lowest index on ties), if requested
   friend constexpr bool operator==(const candidate&, const candidate&) = default;
 };
 
-/// Descriptors with their keypoints, if these are known, in place. What a matcher is called with:
-/// made of `features` or of any contiguous range of descriptors.
+/// Descriptors with optional keypoints, in place: the arguments of a matcher. Constructed from `features` or any
+/// contiguous range of descriptors.
 template <class Descriptor>
 struct feature_view {
-  std::span<const keypoint> keypoints;  ///< empty, or one for each descriptor
+  std::span<const keypoint> keypoints;  ///< empty, or one per descriptor
   std::span<const Descriptor> descriptors;
 };
 
-/// A view of what a matcher can be called with: `basic_features`, a `feature_view`, a contiguous range of descriptors.
+/// Views any valid argument of a matcher: `basic_features`, a `feature_view`, a contiguous range of descriptors.
 template <class Descriptor>
 [[nodiscard]] feature_view<Descriptor> view_of(const basic_features<Descriptor>& f) noexcept {
   return {f.keypoints, f.descriptors};
@@ -67,16 +67,16 @@ template <describable T>
 using descriptor_of =
     std::remove_const_t<typename decltype(decltype(view_of(std::declval<const T&>()))::descriptors)::element_type>;
 
-/// What the stages behind a source need beyond the nearest neighbour.
+/// Requirements of the stages after a source beyond the nearest neighbour.
 struct search_needs {
   bool reverse = false;    ///< `candidate::reverse_query`
-  bool keypoints = false;  ///< the keypoints of both sides, of the caller
+  bool keypoints = false;  ///< the keypoints of both sides, provided by the caller
   [[nodiscard]] constexpr search_needs operator|(search_needs other) const noexcept {
     return {reverse || other.reverse, keypoints || other.keypoints};
   }
 };
 
-/// The workspace of a part that has none.
+/// The workspace of a part without one.
 struct no_workspace {};
 
 namespace detail {
@@ -91,18 +91,18 @@ struct workspace_of_part<Part> {
 };
 }  // namespace detail
 
-/// The memory that a part of a matcher uses again in the next call: its member type `workspace`, if it has one.
+/// The reusable memory of a part of a matcher: its member type `workspace`, if it has one.
 template <class Part>
 using workspace_of = typename detail::workspace_of_part<Part>::type;
 
-/// The first part of a matcher. It gives the candidates in ascending order of their query, at most one for
-/// each, by `search(candidates, workspace, queries, trains, needs, where...)`.
+/// The first part of a matcher. It returns the candidates in ascending order of their query, at most one per query, by
+/// `search(candidates, workspace, queries, trains, needs, where...)`.
 template <class S>
 concept match_source = requires {
   typename S::match_source_tag;
 };
 
-/// A source that searches among descriptors of this type. `Where` are its further arguments, e.g. the windows of
+/// A source that searches descriptors of this type. `Where` are its additional arguments, e.g. the windows of
 /// `windowed`.
 template <class S, class Descriptor, class... Where>
 concept searches = match_source<S> &&
@@ -111,23 +111,23 @@ concept searches = match_source<S> &&
   source.search(candidates, memory, view, view, needs, where...);
 };
 
-/// A stage that judges each candidate on its own: any callable `bool(const candidate&)`.
+/// A stage that judges each candidate individually: any callable `bool(const candidate&)`.
 template <class S>
 concept match_predicate = std::predicate<const S&, const candidate&>;
 
-/// A stage that judges the candidates together, with the keypoints (empty if the caller gave none): any callable
+/// A stage that judges the candidates together, with the keypoints (empty if the caller passed none): any callable
 /// `void(std::vector<candidate>&, std::span<const keypoint>, std::span<const keypoint>, workspace_of<S>&)` that erases
-/// what it rejects and keeps the order.
+/// rejected candidates and keeps the order.
 template <class S>
 concept match_filter = std::invocable < const S&,
         std::vector<candidate>
 &, std::span<const keypoint>, std::span<const keypoint>, workspace_of<S>& > ;
 
-/// Any stage. It may ask for more than the nearest neighbour with a static member `needs`.
+/// Any stage. It may request more than the nearest neighbour with a static member `needs`.
 template <class S>
 concept match_stage = (match_predicate<S> || match_filter<S>)&&!match_source<S>;
 
-/// What a stage needs.
+/// The requirements of a stage.
 template <match_stage S>
 [[nodiscard]] constexpr search_needs needs_of() noexcept {
   if constexpr (requires {

@@ -1,18 +1,18 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Matchers as values: a source and the stages behind it, composed with `|`.
+/// Matchers as values: a source followed by stages, composed with `|`.
 ///
 /// @code
 ///   constexpr auto matcher = brute_force(hamming{}) | ratio_test{0.7f} | cross_check{} | max_distance{50};
 ///   std::vector<match> matches = matcher(f1.descriptors, f2.descriptors);
 /// @endcode
 ///
-/// A chain begins with one source (`brute_force`, `windowed`, `projected`, `epipolar`); a stage is
-/// anything that satisfies `match_stage`, a lambda `bool(const candidate&)` for example. Stages judge candidates in
-/// their order; each knows the nearest neighbour, the second distance and the reverse neighbour as the source found
-/// them among *all* descriptors, not among what earlier stages left over.
+/// A chain begins with one source (`brute_force`, `windowed`, `projected`, `epipolar`); a stage is anything that
+/// satisfies `match_stage`, for example a lambda `bool(const candidate&)`. Stages judge candidates in order; each sees
+/// the nearest neighbour, the second distance and the reverse neighbour that the source found among *all* descriptors,
+/// not among those left by earlier stages.
 ///
-/// Called every frame, a matcher keeps its memory in a workspace:
+/// A matcher that is called every frame can keep its memory in a workspace:
 ///
 /// @code
 ///   decltype(matcher)::workspace memory;
@@ -32,7 +32,7 @@
 
 namespace orbis::features {
 
-/// A source with its stages. Made by `|`, called with queries and trains.
+/// A source with its stages. Created by `|`, called with queries and trains.
 template <match_source Source, match_stage... Stages>
 class match_chain {
  public:
@@ -40,15 +40,15 @@ class match_chain {
 
   constexpr match_chain(Source source, std::tuple<Stages...> stages) : source_{source}, stages_{std::move(stages)} {}
 
-  /// Memory for `match_into`, which a later call uses again.
+  /// Reusable memory for `match_into`.
   struct workspace {
     std::vector<candidate> candidates;
     workspace_of<Source> source;
     std::tuple<workspace_of<Stages>...> stages;
   };
 
-  /// The matches in ascending order of their query, at most one for each. `where`: what the source
-  /// wants to know in addition, e.g. the windows of `windowed`.
+  /// Returns the matches in ascending order of their query, at most one per query. `where`: additional arguments of the
+  /// source, e.g. the windows of `windowed`.
   /// @pre queries and trains come with keypoints if a stage needs them
   template <describable Queries, describable Trains, class... Where>
   requires std::same_as<descriptor_of<Queries>, descriptor_of<Trains>> &&
@@ -61,8 +61,8 @@ class match_chain {
     return matches;
   }
 
-  /// Replaces the contents of `matches` by the matches. With memory that has served for a call of this size
-  /// before, nothing is allocated (by our own parts).
+  /// Replaces the contents of `matches` by the matches. Once the memory has been used for a call of this size, the
+  /// library's own parts allocate nothing.
   template <describable Queries, describable Trains, class... Where>
   requires std::same_as<descriptor_of<Queries>, descriptor_of<Trains>> &&
       searches<Source, descriptor_of<Queries>, Where...>
@@ -117,24 +117,25 @@ inline constexpr bool is_chain<match_chain<Parts...>> = true;
 template <class T>
 concept chain_part = is_chain<T> || match_source<T> || match_stage<T>;
 
-/// What a wrong composition gives, so that the compiler complains about nothing else.
+/// Placeholder result of an invalid composition, to avoid further compiler errors.
 struct no_matcher {
   std::vector<match> operator()(const auto&...) const { return {}; }
 };
 
 }  // namespace detail
 
-/// Puts a stage behind a source or a chain.
+/// Appends a stage to a source or a chain.
 template <class Left, class Right>
 requires(detail::chain_part<Left> || detail::chain_part<Right>) [[nodiscard]] constexpr auto operator|(Left left,
                                                                                                        Right right) {
   constexpr bool begins_well = detail::is_chain<Left> || match_source<Left>;
   constexpr bool one_source = !detail::is_chain<Right> && !match_source<Right>;
   static_assert(begins_well,
-                "orbis: a matcher begins with a source, such as brute_force(hamming{}), and the stages follow");
-  static_assert(!begins_well || one_source, "orbis: a matcher has one source, and it stands first");
-  static_assert(!begins_well || !one_source || match_stage<Right>,
-                "orbis: what follows | must be a matching stage, such as ratio_test{0.7f} or bool(const candidate&)");
+                "orbis: a matcher begins with a source, such as brute_force(hamming{}), followed by stages");
+  static_assert(!begins_well || one_source, "orbis: a matcher has one source, in the first position");
+  static_assert(
+      !begins_well || !one_source || match_stage<Right>,
+      "orbis: the right operand of | must be a matching stage, such as ratio_test{0.7f} or bool(const candidate&)");
   if constexpr (!begins_well || !one_source || !match_stage<Right>) {
     return detail::no_matcher{};
   } else if constexpr (detail::is_chain<Left>) {

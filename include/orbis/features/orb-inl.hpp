@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The functions of orb.hpp.
+/// Implementation of orb.hpp.
 #pragma once
 
 #include <orbis/features/detail/extract/cover_first.hpp>
@@ -16,31 +16,31 @@ template <corner_detector Detector, corner_selection Distribution, orientation_e
           patch_descriptor Descriptor>
 void basic_orb_extractor<Detector, Distribution, Orientation, Descriptor>::into(
     features_type& found, image_view<const std::uint8_t> image) const {
-  auto memory = kept_.take();
+  auto memory = workspaces_.acquire();
   extract(found, *memory, memory->pyramid, image);
-  kept_.give(std::move(memory));
+  workspaces_.release(std::move(memory));
 }
 
 template <corner_detector Detector, corner_selection Distribution, orientation_estimator Orientation,
           patch_descriptor Descriptor>
 void basic_orb_extractor<Detector, Distribution, Orientation, Descriptor>::into(
     features_type& found, image_pyramid& pyramid, image_view<const std::uint8_t> image) const {
-  auto memory = kept_.take();
+  auto memory = workspaces_.acquire();
   extract(found, *memory, pyramid, image);
-  kept_.give(std::move(memory));
+  workspaces_.release(std::move(memory));
 }
 
 template <corner_detector Detector, corner_selection Distribution, orientation_estimator Orientation,
           patch_descriptor Descriptor>
 void basic_orb_extractor<Detector, Distribution, Orientation, Descriptor>::into(features_type& found,
                                                                                 image_view<const rgb8> image) const {
-  auto memory = kept_.take();
+  auto memory = workspaces_.acquire();
   const auto pixels = static_cast<std::size_t>(image.width()) * static_cast<std::size_t>(image.height());
   if (memory->grey.size() < pixels) memory->grey.resize(pixels);
   const image_view<std::uint8_t> grey{memory->grey.data(), image.width(), image.height()};
   luma(image, grey);
   extract(found, *memory, memory->pyramid, grey);
-  kept_.give(std::move(memory));
+  workspaces_.release(std::move(memory));
 }
 
 template <corner_detector Detector, corner_selection Distribution, orientation_estimator Orientation,

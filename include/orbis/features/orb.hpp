@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// ORB features that are spread evenly over the image.
+/// ORB features that are distributed evenly over the image.
 ///
-/// Source: Rublee, Rabaud, Konolige, Bradski, "ORB: an efficient alternative to SIFT or SURF", ICCV
-/// 2011. They take the strongest corners, which cluster; this one covers the image first.
+/// Source: Rublee, Rabaud, Konolige, Bradski, "ORB: an efficient alternative to SIFT or SURF", ICCV 2011. The paper
+/// selects the strongest corners, which cluster; this extractor covers the image first.
 #pragma once
 
 #include <algorithm>
@@ -16,33 +16,33 @@
 
 #include <orbis/core/image.hpp>
 #include <orbis/features/descriptor.hpp>
-#include <orbis/features/detail/extract/kept_memory.hpp>
 #include <orbis/features/detail/extract/orb_parts.hpp>
+#include <orbis/features/detail/extract/workspace_pool.hpp>
 #include <orbis/features/extractor.hpp>
 #include <orbis/features/pyramid.hpp>
 
 namespace orbis::features {
 
-/// The parts of `orb_extractor`; see `extractor.hpp` for the concepts of others that can stand in for them.
+/// The parts of `orb_extractor`; see `extractor.hpp` for the concepts of replacements.
 /// - `fast9` finds FAST-9/16 corners;
 /// - `cover_first` chooses corners that cover the image, then the strongest;
-/// - `intensity_centroid` turns keypoints towards the centre of brightness;
-/// - `steered_brief` describes keypoints by ORB's pattern, turned to their direction.
+/// - `intensity_centroid` orients keypoints towards the intensity centroid;
+/// - `steered_brief` describes keypoints by ORB's pattern, rotated to their direction.
 using detail::fast9, detail::cover_first, detail::intensity_centroid, detail::steered_brief;
 
 /// Options of an ORB extractor.
 struct orb_options {
-  int max_features = 1000;    ///< at most so many
-  int levels = 8;             ///< of the image pyramid; levels that are too small for a patch are left out
+  int max_features = 1000;    ///< maximum number of features
+  int levels = 8;             ///< of the image pyramid; omits levels that are too small for a patch
   float scale_factor = 1.2F;  ///< between two levels, > 1
-  int threshold = 14;         ///< brightness step of a corner (of the slightly smoothed image)
-  int min_threshold = 3;      ///< where no corner reaches `threshold`; equal to it: no weaker corners at all
+  int threshold = 14;         ///< brightness difference of a corner (in the slightly smoothed image)
+  int min_threshold = 3;      ///< used in cells without a corner of `threshold`; equal to it: no weaker corners
 };
 
-/// Finds keypoints on the levels of an image pyramid and describes them. The parts that find corners, choose among
-/// them, give them a direction and describe them are types. Calls on a const object may run at the same time. The
-/// extractor keeps its working memory for the next call, one piece for each call that ran at the same time.
-/// The library orbis::compiled holds it with the default parts; with others, its users include orb-inl.hpp.
+/// Finds keypoints on the levels of an image pyramid and describes them. Detection, selection, orientation and
+/// description are template parameters. Concurrent calls on a const object are allowed. The extractor reuses its
+/// working memory, one workspace per concurrent call. The library orbis::compiled contains it with the default parts;
+/// for other parts include orb-inl.hpp.
 template <corner_detector Detector = fast9, corner_selection Distribution = cover_first,
           orientation_estimator Orientation = intensity_centroid, patch_descriptor Descriptor = steered_brief>
 class basic_orb_extractor {
@@ -50,7 +50,7 @@ class basic_orb_extractor {
   using descriptor = typename Descriptor::descriptor;
   using features_type = basic_features<descriptor>;
 
-  /// The least distance of a keypoint from the edge, pixels of its level.
+  /// Minimum distance of a keypoint from the edge, pixels of its level.
   static constexpr int border = std::max<int>(Orientation::radius, Descriptor::reach) + 1;
 
   basic_orb_extractor() = default;
@@ -68,27 +68,27 @@ class basic_orb_extractor {
 
   [[nodiscard]] const orb_options& options() const noexcept { return options_; }
 
-  /// The features of a grey image, ordered by level, then from top to bottom. An image with a side of less than
+  /// Returns the features of a grey image, ordered by level, then from top to bottom. An image with a side of less than
   /// 2 `border` + 1 pixels (39 by default) has no features. O(pixels + features).
   [[nodiscard]] features_type operator()(image_view<const std::uint8_t> image) const {
     features_type found;
     into(found, image);
     return found;
   }
-  /// The features of the luma of a colour image (`luma`).
+  /// Returns the features of the luma of a colour image (`luma`).
   [[nodiscard]] features_type operator()(image_view<const rgb8> image) const {
     features_type found;
     into(found, image);
     return found;
   }
-  /// Deleted: make 8 bits of a 16-bit image by `narrow` first, which needs its range of values.
+  /// Deleted: convert a 16-bit image with `narrow` first, which needs its range of values.
   features_type operator()(image_view<const std::uint16_t> image) const = delete;
 
-  /// Replaces the contents of `found` by the features of an image. Allocates nothing once an image of this size with as
-  /// many corners has been seen.
+  /// Replaces the contents of `found` by the features of an image. Allocates nothing after an image of the same size
+  /// and number of corners.
   void into(features_type& found, image_view<const std::uint8_t> image) const;
   void into(features_type& found, image_view<const rgb8> image) const;
-  /// As above, with the image's pyramid left in `pyramid` for others to use: a keypoint's octave is its level there.
+  /// As above; also returns the image's pyramid in `pyramid`: a keypoint's octave is its level there.
   void into(features_type& found, image_pyramid& pyramid, image_view<const std::uint8_t> image) const;
 
  private:
@@ -111,7 +111,7 @@ class basic_orb_extractor {
   [[no_unique_address]] Distribution choose_{};
   [[no_unique_address]] Orientation orient_{};
   [[no_unique_address]] Descriptor describe_{};
-  mutable detail::kept_memory<workspace> kept_;
+  mutable detail::workspace_pool<workspace> workspaces_;
 };
 
 /// ORB features with the default parts.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// What a camera should see of known points, for the source `projected`.
+/// Predicted projections of known points into a camera, for the source `projected`.
 #pragma once
 
 #include <concepts>
@@ -15,16 +15,16 @@
 
 namespace orbis::features {
 
-/// A point of the world (metres): a `vec3`, or something with one as member `position`.
+/// A world point (metres): a `vec3`, or a type with a `vec3` member `position`.
 template <class P>
 concept world_point = std::convertible_to<const P&, const vec3&> || requires(const P& p) {
   { p.position } -> std::convertible_to<const vec3&>;
 };
 
-/// Projects points of the world into the image of a camera at a pose. Nothing where the point lies behind the camera
-/// or outside the image. Members that a point may have beside `position`:
-/// - `normal`: the unit vector from the point towards where it was seen from, gates the angle of view;
-/// - `min_distance`, `max_distance`: the range of distances it can be found from, predicts the level.
+/// Projects world points into the image of a camera at a given pose. Empty if the point is behind the camera or outside
+/// the image. Optional members of a point in addition to `position`:
+/// - `normal`: the unit vector from the point towards its earlier viewpoints; gates the viewing angle;
+/// - `min_distance`, `max_distance`: the range of distances for detection; predicts the level.
 template <camera::camera_model Camera>
 class camera_projection {
  public:

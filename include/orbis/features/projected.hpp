@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The source that looks for known points where they project into the image.
+/// Projected source: searches for known points near their projections into the image.
 #pragma once
 
 #include <algorithm>
@@ -20,29 +20,29 @@
 
 namespace orbis::features {
 
-/// Where a known point should appear in an image, and how it is seen.
+/// Predicted position and appearance of a known point in an image.
 struct projection {
   float x = 0.0F, y = 0.0F;   ///< pixels
   float distance = 1.0F;      ///< from the camera, metres
-  float cosine = 1.0F;        ///< of the angle between the line of sight and the one the point was seen along before
-  float min_distance = 0.0F;  ///< from which the descriptor was or could be seen, metres
-  float max_distance = std::numeric_limits<float>::infinity();  ///< from which it appears at the finest level
+  float cosine = 1.0F;        ///< of the angle between the line of sight and the earlier viewing direction
+  float min_distance = 0.0F;  ///< minimum distance at which the descriptor is detectable, metres
+  float max_distance = std::numeric_limits<float>::infinity();  ///< appears at the finest level from there on, metres
 };
 
-/// How far to search around a projection, and at which pyramid levels.
+/// Search radius around a projection, and pyramid levels to search.
 struct projection_rule {
-  float radius = 4.0F;            ///< of the window around what should appear at the finest level, pixels
-  float slanted = 1.6F;           ///< factor of the radius where the direction of view differs from the earlier one
-  float frontal_cosine = 0.998F;  ///< cosine of the angle from which on it differs
+  float radius = 4.0F;            ///< of the window for points predicted at the finest level, pixels
+  float slanted = 1.6F;           ///< factor of the radius if the viewing direction differs from the earlier one
+  float frontal_cosine = 0.998F;  ///< the viewing direction differs if its cosine is below this
   float min_cosine = 0.5F;        ///< below it, the point is not searched; -1: always searched
-  float range_tolerance = 0.2F;   ///< share by which the distance may leave the point's range
+  float range_tolerance = 0.2F;   ///< fraction by which the distance may leave the point's range
   int levels = 8;                 ///< of the extractor's pyramid
   float scale_factor = 1.2F;      ///< between them
-  int finer = 1, coarser = 1;     ///< levels to look at around the predicted one
+  int finer = 1, coarser = 1;     ///< levels to search around the predicted one
 };
 
-/// The pyramid level at which to look for a point that is at the finest from `max_distance`:
-/// log(max_distance / distance) / log(scale_factor), rounded up, which tracks real recordings better than to the
+/// The predicted pyramid level of a point that appears at the finest level at `max_distance`: log(max_distance /
+/// distance) / log(scale_factor), rounded up, which gives better tracking on real recordings than rounding to the
 /// nearest.
 [[nodiscard]] inline int predicted_octave(float distance, float max_distance, int levels, float scale_factor) noexcept {
   assert(levels > 0 && scale_factor > 1.0F);
@@ -51,9 +51,9 @@ struct projection_rule {
   return static_cast<int>(std::clamp(octave, 0.0, static_cast<double>(levels - 1)));
 }
 
-/// The window in which to look for a point; one of negative radius where it should not be visible:
-/// out of its range of distances, from too different a side, or with values that are not finite. The radius grows with
-/// the predicted level. A point of unknown range (`max_distance` infinite) is looked for at all levels.
+/// The search window of a point; its radius is negative if the point should not be visible: out of its range of
+/// distances, viewed from too different a direction, or with non-finite values. The radius grows with the predicted
+/// level. A point of unknown range (`max_distance` infinite) is searched at all levels.
 [[nodiscard]] inline window window_of(const projection& p, const projection_rule& rule) noexcept {
   const float most = p.max_distance * (1.0F + rule.range_tolerance);
   const float least = p.min_distance * (1.0F - rule.range_tolerance);
@@ -67,7 +67,7 @@ struct projection_rule {
           std::min(rule.levels - 1, octave + rule.coarser)};
 }
 
-/// Tells for a point where it should appear; nothing where it does not. See `project_points.hpp` for one made of
+/// Predicts the projection of a point; empty if it is not visible. See `project_points.hpp` for an implementation with
 /// a camera and its pose.
 template <class F, class Points>
 concept projects = std::ranges::random_access_range<const Points> && std::ranges::sized_range<const Points> &&
@@ -88,10 +88,9 @@ void predict_windows(std::vector<window>& windows, const Points& points, const P
 }
 }  // namespace detail
 
-/// Finds for each query, the descriptor of a known point, the nearest and the second nearest train
-/// where the point should appear. Made by `projected(distance, rule)`; a chain that begins with it is
-/// called with the points, one for each query, with what projects them, and optionally with the
-/// grid over the trains' keypoints:
+/// Finds for each query, the descriptor of a known point, the nearest and the second nearest train near the point's
+/// projection. Created by `projected(distance, rule)`; call a chain that begins with it with the points (one per
+/// query), the projection function, and optionally a grid of the trains' keypoints:
 ///
 /// @code
 ///   constexpr auto matcher = projected(hamming{}, {.radius = 3.0F}) | max_distance{100} | unique{};
@@ -111,8 +110,8 @@ struct projected_source {
     typename windowed_source<Distance>::workspace search;
   };
 
-  /// One candidate for each query that has a train in its window.
-  /// @pre one point for each query; one keypoint for each train; `grid` is made of these keypoints
+  /// Returns one candidate for each query that has a train in its window.
+  /// @pre one point per query; one keypoint per train; `grid` was built from these keypoints
   template <class Descriptor, class Points, class Project>
   requires descriptor_distance<Distance, Descriptor> && projects<Project, Points>
   void search(std::vector<candidate>& candidates, workspace& memory, const feature_view<Descriptor>& queries,
@@ -122,7 +121,7 @@ struct projected_source {
     windowed(distance).search(candidates, memory.search, queries, trains, needs, memory.windows, grid);
   }
 
-  /// One candidate for each query that has a train in its window; makes the grid itself, in its workspace.
+  /// Returns one candidate for each query that has a train in its window; builds the grid in its workspace.
   template <class Descriptor, class Points, class Project>
   requires descriptor_distance<Distance, Descriptor> && projects<Project, Points>
   void search(std::vector<candidate>& candidates, workspace& memory, const feature_view<Descriptor>& queries,
@@ -133,7 +132,7 @@ struct projected_source {
   }
 };
 
-/// A source that looks where points project to: `projected(hamming{})`.
+/// Creates a projected source: `projected(hamming{})`.
 template <class Distance>
 [[nodiscard]] constexpr projected_source<Distance> projected(Distance distance, projection_rule rule = {}) {
   return {distance, rule};

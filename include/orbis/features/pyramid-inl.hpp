@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The functions of pyramid.hpp.
+/// Implementation of pyramid.hpp.
 #pragma once
 
 #include <cmath>

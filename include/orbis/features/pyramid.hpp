@@ -13,34 +13,34 @@
 
 namespace orbis::features {
 
-/// A grey image and its shrunk copies, each made of the one before it by bilinear interpolation. Level k is
-/// `scale_factor`^k times smaller than the image, sides rounded to whole pixels. Keeps its memory from image to image.
+/// A grey image and its shrunk copies, each computed from the previous one by bilinear interpolation. Level k is
+/// `scale_factor`^k times smaller than the image, sides rounded to whole pixels. Reuses its memory from image to image.
 class image_pyramid {
  public:
   image_pyramid() = default;
   image_pyramid(image_pyramid&&) noexcept = default;
   image_pyramid& operator=(image_pyramid&&) noexcept = default;
-  image_pyramid(const image_pyramid&) = delete;  // a copy's levels would be those of the other one
+  image_pyramid(const image_pyramid&) = delete;  // the levels of a copy would refer to the original
   image_pyramid& operator=(const image_pyramid&) = delete;
   ~image_pyramid() = default;
 
-  /// Level 0 is `image` itself, not a copy: it must live as long as the levels are used. Levels with a side of less
-  /// than `min_side` pixels, and what follows them, are left out. O(pixels). Allocates nothing once an image of this
-  /// size has been seen.
+  /// Builds the pyramid. Level 0 is `image` itself, not a copy: it must outlive the use of the levels. Omits levels
+  /// with a side of less than `min_side` pixels and all coarser ones. O(pixels). Allocates nothing after an image of
+  /// the same size.
   /// @pre levels >= 0, scale_factor > 1, min_side >= 1
   void build(image_view<const std::uint8_t> image, int levels, double scale_factor, int min_side);
 
   /// The number of levels.
   [[nodiscard]] std::size_t size() const noexcept { return views_.size(); }
   [[nodiscard]] bool empty() const noexcept { return views_.empty(); }
-  /// A level, 0 being the image. @pre level < size()
+  /// A level; level 0 is the image. @pre level < size()
   [[nodiscard]] image_view<const std::uint8_t> operator[](std::size_t level) const {
     assert(level < views_.size());
     return views_[level];
   }
 
-  /// From a coordinate of a level to that of the image, pixels, or back if the sizes are exchanged: pixels are areas
-  /// whose centres lie at integers, so that plain multiplication would shift coarse keypoints by up to a pixel.
+  /// Converts a coordinate of a level to that of the full image, pixels, or back with exchanged sizes. Pixels are areas
+  /// whose centres are at integers, so that plain multiplication would shift coarse keypoints by up to a pixel.
   [[nodiscard]] static double full_coordinate(double at, int level_size, int full_size) noexcept {
     return (at + 0.5) * full_size / level_size - 0.5;
   }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The stages a matcher is composed of: each rejects candidates for one reason.
+/// The stages of a matcher: each rejects candidates by one criterion.
 #pragma once
 
 #include <algorithm>
@@ -17,9 +17,9 @@
 
 namespace orbis::features {
 
-/// Keeps a candidate whose distance is below `ratio` times the second nearest's. One that has no
-/// rival stays; two equally near ones never do. Source: Lowe, "Distinctive image features from
-/// scale-invariant keypoints", IJCV 2004, section 7.1.
+/// Keeps a candidate whose distance is below `ratio` times that of the second nearest. A candidate without a second
+/// nearest is kept; two equal distances never pass. Source: Lowe, "Distinctive image features from scale-invariant
+/// keypoints", IJCV 2004, section 7.1.
 struct ratio_test {
   float ratio = 0.8F;
   [[nodiscard]] constexpr bool operator()(const candidate& c) const noexcept {
@@ -33,16 +33,16 @@ struct cross_check {
   [[nodiscard]] constexpr bool operator()(const candidate& c) const noexcept { return c.reverse_query == c.query; }
 };
 
-/// Keeps a candidate at most `distance` away.
+/// Keeps a candidate with a distance of at most `distance`.
 struct max_distance {
   std::uint32_t distance = 50;
   [[nodiscard]] constexpr bool operator()(const candidate& c) const noexcept { return c.distance <= distance; }
 };
 
-/// Keeps, of the candidates that share a train, the nearest (the lowest query on ties). Unlike
-/// `cross_check`, only those that earlier stages left over compete.
+/// Keeps the nearest of the candidates that share a train (the lowest query on ties). Unlike `cross_check`, only
+/// candidates left by earlier stages compete.
 struct unique {
-  using workspace = std::vector<std::uint32_t>;  ///< by train: the distance of the best
+  using workspace = std::vector<std::uint32_t>;  ///< by train: the smallest distance
 
   void operator()(std::vector<candidate>& candidates, std::span<const keypoint>, std::span<const keypoint>,
                   workspace& nearest) const {
@@ -52,16 +52,15 @@ struct unique {
     for (const candidate& c : candidates) nearest[c.train] = std::min(nearest[c.train], c.distance);
     std::erase_if(candidates, [&](const candidate& c) {
       if (c.distance != nearest[c.train]) return true;
-      nearest[c.train] = none;  // taken: equally near ones that follow lose
+      nearest[c.train] = none;  // taken: later candidates with equal distance lose
       return false;
     });
   }
 };
 
-/// Keeps the candidates whose change of orientation is among the most frequent: between two images
-/// that are turned against each other as a whole, true matches turn alike. The differences of the
-/// angles fill `bins` equal bins around the circle; those of the `peaks` fullest stay (the lowest
-/// bins on ties), but none below `weakest` of the fullest.
+/// Keeps the candidates whose change of orientation is among the most frequent: between two images with a relative
+/// rotation, the keypoints of true matches rotate alike. The angle differences fill `bins` equal bins around the
+/// circle; the `peaks` fullest bins are kept (the lowest on ties), except those below `weakest` times the fullest.
 struct rotation_consistency {
   static constexpr search_needs needs{.keypoints = true};
   int bins = 30;
@@ -72,7 +71,7 @@ struct rotation_consistency {
     std::vector<char> kept;
   };
 
-  /// @pre one keypoint for each descriptor on both sides; bins > 0
+  /// @pre one keypoint per descriptor on both sides; bins > 0
   void operator()(std::vector<candidate>& candidates, std::span<const keypoint> queries,
                   std::span<const keypoint> trains, workspace& memory) const {
     assert(bins > 0);
@@ -81,7 +80,7 @@ struct rotation_consistency {
       const float difference = (queries[c.query].angle - trains[c.train].angle) / turn;
       const float fraction = difference - std::floor(difference);  // [0, 1]: may round up
       if (!std::isfinite(fraction)) return std::size_t{0};
-      // Bins are centred on their angle, so that "not turned" lies in the middle of one.
+      // Bins are centred on their angle, so that no rotation falls in the middle of one.
       return static_cast<std::size_t>(fraction * static_cast<float>(bins) + 0.5F) % static_cast<std::size_t>(bins);
     };
     auto& [counts, order, kept] = memory;

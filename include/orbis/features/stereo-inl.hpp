@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The functions of stereo.hpp.
+/// Implementation of stereo.hpp.
 #pragma once
 
 #include <orbis/core/inline.hpp>
@@ -15,7 +15,7 @@ namespace orbis::features::detail {
 struct slide_differences_kernel {
   using signature = void(const sliding_square&, int shifts, std::int32_t* sums);
 
-  /// Lanes are shifts. Pixels are taken four times, so that means are whole numbers to a quarter of a grey value.
+  /// Lanes are shifts. Pixels are multiplied by four, so that means are integers to a quarter of a grey value.
   template <class Target>
   static ORBIS_ALWAYS_INLINE void run(const sliding_square& s, int shifts, std::int32_t* sums) {
     using bytes = simd::vec<std::uint8_t, 16, Target>;
@@ -23,12 +23,12 @@ struct slide_differences_kernel {
     using numbers = simd::vec<std::int32_t, 16, Target>;
     constexpr int max_side = sliding_square::max_side;
     constexpr int square_stride = 32, strip_stride = 64;  // the largest sides, rounded up
-    constexpr int flush = 16;                             // so many terms of at most 2040 fit into a word
+    constexpr int flush = 16;                             // number of terms of at most 2040 that fit into a word
     alignas(64) std::array<std::int16_t, max_side * square_stride> square;
     alignas(64) std::array<std::int16_t, max_side * strip_stride> strip;
-    alignas(64) std::array<std::int16_t, strip_stride> columns;  // sums of the strip's, at most 31620
+    alignas(64) std::array<std::int16_t, strip_stride> columns;  // sums over the strip, at most 31620
     const int side = s.side, n = side * side;
-    // What lies beyond the readable pixels belongs to no shift that is asked for.
+    // Values beyond the readable pixels affect only shifts that are not requested.
     const auto widen = [side](const pixel_rows& from, int width, int stride, std::int16_t* to,
                               auto&& sum_up) ORBIS_INLINE_LAMBDA {
       for (int u = 0; u < width; u += 16) {

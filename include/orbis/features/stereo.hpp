@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The right coordinates of features of a rectified stereo pair, between pixels.
+/// Subpixel right-image coordinates of features of a rectified stereo pair.
 ///
 /// @code
 ///   const stereo_matcher match;
@@ -23,7 +23,7 @@
 
 #include <orbis/core/image.hpp>
 #include <orbis/features/descriptor.hpp>
-#include <orbis/features/detail/extract/kept_memory.hpp>
+#include <orbis/features/detail/extract/workspace_pool.hpp>
 #include <orbis/features/detail/match/search_among.hpp>
 #include <orbis/features/hamming.hpp>
 #include <orbis/features/match.hpp>
@@ -35,11 +35,11 @@ namespace detail {
 /// Rows of pixels in an image.
 struct pixel_rows {
   const std::uint8_t* first = nullptr;
-  std::ptrdiff_t stride = 0;  ///< from row to row
-  int readable = 0;           ///< pixels of each row, what lies behind those that are asked for included
+  std::ptrdiff_t stride = 0;  ///< distance between rows
+  int readable = 0;           ///< pixels of each row, including those after the requested ones
 };
 
-/// A square of `side` x `side` pixels, and the strip of as many rows along which it slides.
+/// A square of `side` x `side` pixels, and the strip of the same height along which it slides.
 struct sliding_square {
   static constexpr int max_side = 31, max_shifts = 32;
 
@@ -48,36 +48,36 @@ struct sliding_square {
   pixel_rows strip;   ///< likewise `side` + `shifts` - 1
 };
 
-/// `sums[k]` becomes four times the sum of absolute differences between the square and the strip from column `k` on,
-/// each less its mean (to a quarter of a grey value), for k < `shifts`. Writes a multiple of 16 sums, of which those
-/// from `shifts` on mean nothing. @pre 1 <= side <= max_side, 1 <= shifts <= max_shifts
+/// Sets `sums[k]` to four times the sum of absolute differences between the square and the strip from column `k` on,
+/// each minus its mean (to a quarter of a grey value), for k < `shifts`. Writes a multiple of 16 sums; those from
+/// `shifts` on are unspecified. @pre 1 <= side <= max_side, 1 <= shifts <= max_shifts
 void slide_differences(const sliding_square& s, int shifts, std::int32_t* sums);
 
 }  // namespace detail
 
-/// How `stereo_matcher` looks for the right coordinates. "Pixels of a level": of the keypoint's level of the pyramid.
+/// Options of `stereo_matcher`. "Pixels of a level" refers to the keypoint's pyramid level.
 struct stereo_options {
-  int levels = 8;               ///< of the extractor's image pyramid; not used where the pyramids are given
+  int levels = 8;               ///< of the extractor's image pyramid; ignored if the pyramids are given
   float scale_factor = 1.2F;    ///< between two of its levels; likewise
-  float min_disparity = 0.0F;   ///< left less right coordinate, pixels; what is found has to be larger
-  float max_disparity = 1e9F;   ///< likewise, at most
-  float rows = 2.0F;            ///< between the rows of both keypoints, pixels of a level, at most
-  int octaves = 1;              ///< between the levels of both keypoints, at most
-  std::uint32_t distance = 75;  ///< of descriptors, at most
-  int radius = 5;               ///< of the square that is compared, pixels of a level; at most 15
-  int slide = 5;                ///< to either side of the right keypoint, pixels of a level; at most 15
-  float outlier = 3.0F;         ///< matches whose difference is more than so many times the median are dropped
+  float min_disparity = 0.0F;   ///< minimum of left minus right coordinate, pixels
+  float max_disparity = 1e9F;   ///< maximum of the same
+  float rows = 2.0F;            ///< maximum row difference of both keypoints, pixels of a level
+  int octaves = 1;              ///< maximum level difference of both keypoints
+  std::uint32_t distance = 75;  ///< maximum descriptor distance
+  int radius = 5;               ///< of the compared square, pixels of a level; maximum 15
+  int slide = 5;                ///< shift to either side of the right keypoint, pixels of a level; maximum 15
+  float outlier = 3.0F;         ///< drops matches whose difference exceeds this multiple of the median
 };
 
-/// Finds where the right image of a rectified pair shows the features of the left one. A feature is compared with those
-/// of the right image that lie in the band of rows around it, by descriptor; then a square around it slides along the
-/// row around the best one, at the feature's pyramid level, and two lines of equal slope through the least differences
-/// place it between pixels. The differences are free of what makes one image brighter than the other. Calls on a const
-/// object may run at the same time.
+/// Finds the right-image coordinates of the features of the left image of a rectified pair. A feature is compared by
+/// descriptor with those of the right image in the band of rows around it; then a square around it slides along the row
+/// around the best match, at the feature's pyramid level, and two lines of equal slope through the smallest differences
+/// give the subpixel position. The differences are invariant to a brightness offset. Concurrent calls on a const object
+/// are allowed.
 ///
 /// After R. Mur-Artal, J. D. Tardos, "ORB-SLAM2: an open-source SLAM system for monocular, stereo and RGB-D cameras",
 /// T-RO 33 (2017), section III.A. The lines are those of M. Shimizu, M. Okutomi, "Precise sub-pixel estimation on
-/// area-based matching", ICCV 2001: sums of absolute differences are no parabola, through which errors are 1.4 times as
+/// area-based matching", ICCV 2001: sums of absolute differences are not parabolic; a parabola has errors 1.4 times as
 /// large.
 template <class Distance = hamming>
 class stereo_matcher {
@@ -85,8 +85,8 @@ class stereo_matcher {
   stereo_matcher() = default;
   explicit stereo_matcher(Distance distance) : distance_{std::move(distance)} {}
 
-  /// For each feature of the left image its column in the right image, pixels; NaN where there is none.
-  /// O(pixels + features x features in a band of rows).
+  /// Returns for each feature of the left image its column in the right image, pixels; NaN if not found. O(pixels +
+  /// features x features in a band of rows).
   /// @pre both images have the same size; levels >= 1, scale_factor > 1, 0 <= radius <= 15, 1 <= slide <= 15
   template <feature_descriptor D>
   requires descriptor_distance<Distance, D>
@@ -99,7 +99,7 @@ class stereo_matcher {
     return columns;
   }
 
-  /// As above, into `columns`. Allocates nothing once images of this size with as many features have been seen.
+  /// As above, into `columns`. Allocates nothing after images of the same size and number of features.
   template <feature_descriptor D>
   requires descriptor_distance<Distance, D>
   void into(std::vector<float>& columns, const basic_features<D>& left, image_view<const std::uint8_t> left_image,
@@ -107,23 +107,23 @@ class stereo_matcher {
             const stereo_options& options = {}) const {
     assert(options.levels >= 1 && options.scale_factor > 1.0F);
     assert(left_image.width() == right_image.width() && left_image.height() == right_image.height());
-    auto kept = kept_.take();
-    kept->left.build(left_image, options.levels, static_cast<double>(options.scale_factor), 1);
-    kept->right.build(right_image, options.levels, static_cast<double>(options.scale_factor), 1);
-    find(*kept, columns, left, kept->left, right, kept->right, options);
-    kept_.give(std::move(kept));
+    auto memory = workspaces_.acquire();
+    memory->left.build(left_image, options.levels, static_cast<double>(options.scale_factor), 1);
+    memory->right.build(right_image, options.levels, static_cast<double>(options.scale_factor), 1);
+    find(*memory, columns, left, memory->left, right, memory->right, options);
+    workspaces_.release(std::move(memory));
   }
 
-  /// As above, with the pyramids of both images that an extractor has made (`pyramid_extractor`). O(features x features
-  /// in a band of rows). @pre both pyramids are of images of the same size, and made alike
+  /// As above, with the pyramids of both images from an extractor (`pyramid_extractor`). O(features x features in a
+  /// band of rows). @pre both pyramids are of images of the same size, with the same options
   template <feature_descriptor D>
   requires descriptor_distance<Distance, D>
   void into(std::vector<float>& columns, const basic_features<D>& left, const image_pyramid& left_pyramid,
             const basic_features<D>& right, const image_pyramid& right_pyramid,
             const stereo_options& options = {}) const {
-    auto kept = kept_.take();
-    find(*kept, columns, left, left_pyramid, right, right_pyramid, options);
-    kept_.give(std::move(kept));
+    auto memory = workspaces_.acquire();
+    find(*memory, columns, left, left_pyramid, right, right_pyramid, options);
+    workspaces_.release(std::move(memory));
   }
 
  private:
@@ -132,20 +132,20 @@ class stereo_matcher {
   struct match_found {
     std::uint32_t query;
     float column;
-    float difference;  ///< a pixel
+    float difference;  ///< per pixel
   };
   struct placed {
     float column = std::numeric_limits<float>::quiet_NaN();
     float difference = 0.0F;
   };
-  /// A right keypoint, in the order of rows.
+  /// A right keypoint, in row order.
   struct right_place {
     float x, y;
     std::int32_t octave;
     std::uint32_t index;
   };
   struct workspace {
-    image_pyramid left, right;                ///< where none are given
+    image_pyramid left, right;                ///< used if none are given
     std::vector<double> scales;               ///< pixels of the image per pixel of a level
     std::vector<std::uint32_t> first_in_row;  ///< of `rows`
     std::vector<right_place> rows;            ///< right keypoints by row
@@ -189,11 +189,11 @@ class stereo_matcher {
     for (std::size_t level = 0; level != pyramid.size(); ++level)
       memory.scales.push_back(static_cast<double>(pyramid[0].width()) / pyramid[level].width());
   }
-  [[nodiscard]] static int row_of(float y, int height) noexcept {  // rows outside of the image are those of its edge
+  [[nodiscard]] static int row_of(float y, int height) noexcept {  // clamps rows outside the image
     return static_cast<int>(std::clamp(std::floor(y + 0.5F), 0.0F, static_cast<float>(height - 1)));
   }
 
-  /// Counting sort, as `keypoint_grid` does it.
+  /// Counting sort, as in `keypoint_grid`.
   static void sort_by_row(workspace& memory, std::span<const keypoint> right, int height) {
     std::vector<std::uint32_t>& first = memory.first_in_row;
     first.assign(static_cast<std::size_t>(height) + 1, 0);
@@ -205,7 +205,7 @@ class stereo_matcher {
           right[i].x, right[i].y, right[i].octave, static_cast<std::uint32_t>(i)};
   }
 
-  /// The right keypoints that a left one is compared with.
+  /// Lists the right keypoints to compare a left one with.
   template <class Add>
   static void list_band(const stereo_options& options, const workspace& memory, int height, const keypoint& k,
                         Add&& add) {
@@ -225,7 +225,7 @@ class stereo_matcher {
         add(r->index);
   }
 
-  /// Where the right image shows the square around the left keypoint: levels `a` and `b` of both images, `scale` pixels
+  /// Locates the square around the left keypoint in the right image: levels `a` and `b` of both images, `scale` pixels
   /// of the `full` image per pixel of these.
   [[nodiscard]] static placed place(const stereo_options& options, image_view<const std::uint8_t> a,
                                     image_view<const std::uint8_t> full, const keypoint& left,
@@ -247,7 +247,7 @@ class stereo_matcher {
     detail::slide_differences(sliding, shifts, sums.data());
     const auto least = std::min_element(sums.begin(), sums.begin() + shifts);
     const int best = first + static_cast<int>(least - sums.begin());
-    if (best == first || best == last) return {};  // the least may lie outside
+    if (best == first || best == last) return {};  // the minimum may be outside
     const auto sum = [&](int at) { return static_cast<double>(sums[static_cast<std::size_t>(at - first)]); };
     const double before = sum(best - 1), after = sum(best + 1), bend = std::max(before, after) - sum(best);
     const double within = bend > 0.0 ? 0.5 * (before - after) / bend : 0.0;
@@ -268,7 +268,7 @@ class stereo_matcher {
   }
 
   [[no_unique_address]] Distance distance_{};
-  mutable detail::kept_memory<workspace> kept_;
+  mutable detail::workspace_pool<workspace> workspaces_;
 };
 
 }  // namespace orbis::features

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The functions of windowed.hpp.
+/// Implementation of windowed.hpp.
 #pragma once
 
 #include <orbis/features/detail/match/hamming_listed.hpp>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The functions of alignment.hpp.
+/// Implementation of alignment.hpp.
 #pragma once
 
 #include <algorithm>
@@ -22,7 +22,7 @@
 namespace orbis::optimize {
 namespace detail {
 
-/// Pairs of points about their centres, in random order.
+/// Pairs of points relative to their centres, in random order.
 template <class Transform>
 class alignment_estimator {
  public:
@@ -118,7 +118,7 @@ ORBIS_INLINE result<void> check_pairs(std::size_t from, std::size_t to, std::spa
   constexpr const char* where = absolute_orientation_name;
   if (from != to) return fail(errc::invalid_argument, where, "the two lists of points differ in length");
   if (!weights.empty() && weights.size() != from)
-    return fail(errc::invalid_argument, where, "there are not as many weights as pairs");
+    return fail(errc::invalid_argument, where, "the number of weights differs from the number of pairs");
   for (std::size_t i = 0; i != weights.size(); ++i)
     if (!(weights[i] >= 0.0 && std::isfinite(weights[i])))
       return fail(errc::invalid_argument, where,
@@ -131,12 +131,12 @@ ORBIS_INLINE std::optional<sim3> align_by_moments(const pair_moments& moments, s
   return transform_between(moments, n, with_scale);
 }
 
-ORBIS_INLINE error why_not_aligned(std::size_t not_finite, std::size_t n) {
+ORBIS_INLINE error alignment_error(std::size_t not_finite, std::size_t n) {
   if (not_finite != n)
     return {errc::degenerate, absolute_orientation_name,
             "a coordinate of pair " + std::to_string(not_finite) + " is not finite"};
   return {errc::degenerate, absolute_orientation_name,
-          "the points do not determine a rotation: they lie on a line or in one place"};
+          "the points do not determine a rotation: they are collinear or coincident"};
 }
 
 template <class Transform>
@@ -147,7 +147,7 @@ result<alignment_estimate<Transform>> alignment_of(std::span<const vec3> from, s
   const std::size_t n = from.size();
   if (n != to.size()) return fail(errc::invalid_argument, where, "the two lists of points differ in length");
   if (!options.deviations.empty() && options.deviations.size() != n)
-    return fail(errc::invalid_argument, where, "there are not as many deviations as pairs");
+    return fail(errc::invalid_argument, where, "the number of deviations differs from the number of pairs");
   const ransac_options asked = detail::ransac_part(options);
   if (const char* const fault = detail::fault_of(asked)) return fail(errc::invalid_argument, where, fault);
   if (n < 3) return fail(errc::no_data, where, "fewer than three pairs of points");
@@ -165,8 +165,9 @@ result<alignment_estimate<Transform>> alignment_of(std::span<const vec3> from, s
     to_centre += p.to;
   }
   if (pairs.size() < 3)
-    return fail(errc::degenerate, where,
-                "of " + std::to_string(n) + " pairs " + std::to_string(pairs.size()) + " are finite, three are needed");
+    return fail(
+        errc::degenerate, where,
+        "only " + std::to_string(pairs.size()) + " of " + std::to_string(n) + " pairs are finite, three are needed");
   from_centre /= static_cast<double>(pairs.size());
   to_centre /= static_cast<double>(pairs.size());
   mat3 spread = zeros<mat3>(), spread_to = zeros<mat3>();
@@ -186,11 +187,11 @@ result<alignment_estimate<Transform>> alignment_of(std::span<const vec3> from, s
       for (const mat3& s : {spread, spread_to}) {
         const vec3 sizes = eigen_of_symmetric<3>(s).values;
         if (!(sizes[1] > 1e-12 * sizes[2]))
-          return fail(errc::degenerate, where, "the points all lie on one line or in one place");
+          return fail(errc::degenerate, where, "all points are collinear or coincident");
       }
     return fail(found.error());
   }
-  // Back from the centres.
+  // Undo the centring.
   const auto& centred = found->model.transform;
   Transform transform;
   if constexpr (estimator_type::with_scale)

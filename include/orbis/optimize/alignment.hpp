@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The rigid or similarity transform between two lists of points: in closed form, or robustly where many pairs may be
+/// The rigid or similarity transform between two lists of points: in closed form, or robustly if many pairs may be
 /// wrong.
 ///
 /// Sources: B. K. P. Horn, "Closed-form solution of absolute orientation using unit quaternions", JOSA A 4 (1987);
@@ -31,7 +31,7 @@ struct alignment_estimate;
 
 namespace detail {
 
-/// The point `i` of a list.
+/// Point `i` of a list.
 template <point_range Points>
 [[nodiscard]] vec3 read_point(const Points& points, std::size_t i) {
   const auto c =
@@ -45,14 +45,14 @@ template <point_range Points>
   return out;
 }
 
-/// Whether lists of this length can be aligned.
+/// Returns an error unless lists of these lengths can be aligned.
 [[nodiscard]] result<void> check_pairs(std::size_t from, std::size_t to, std::span<const double> weights);
-/// What the moments of n pairs tell. Empty: they do not determine a rotation.
+/// The transform from the moments of n pairs. Empty: they do not determine a rotation.
 [[nodiscard]] std::optional<sim3> align_by_moments(const pair_moments& moments, std::size_t n, bool with_scale);
-/// Why there is none; `not_finite`: the first pair that is not finite, or n.
-[[nodiscard]] error why_not_aligned(std::size_t not_finite, std::size_t n);
+/// The error for a failed alignment; `not_finite`: index of the first pair that is not finite, or n.
+[[nodiscard]] error alignment_error(std::size_t not_finite, std::size_t n);
 
-/// The transform between two lists of points. Without weights all pairs are equal.
+/// The transform between two lists of points. Without weights all pairs have equal weight.
 template <point_range From, point_range To>
 [[nodiscard]] result<sim3> align(const From& from, const To& to, bool with_scale,
                                  std::span<const double> weights = {}) {
@@ -67,7 +67,7 @@ template <point_range From, point_range To>
   if (const auto found = align_by_moments(moments_of(n, pair), n, with_scale)) return *found;
   std::size_t i = 0;
   while (i != n && all_finite(read_point(from, i)) && all_finite(read_point(to, i))) ++i;
-  return fail(why_not_aligned(i, n));
+  return fail(alignment_error(i, n));
 }
 
 /// `estimate_alignment` for lists of vectors.
@@ -78,9 +78,8 @@ template <class Transform>
 }  // namespace detail
 
 /// Absolute orientation: the `T_to_from` that minimises the sum of `|T_to_from * from[i] - to[i]|^2`, in closed form.
-/// Every pair counts; see `estimate_alignment` for pairs that may be wrong. O(n).
-/// Errors: `invalid_argument` for lists of different length; `no_data` below three pairs; `degenerate` for collinear,
-/// coincident or non-finite points.
+/// Not robust; see `estimate_alignment` for pairs that may be wrong. O(n). Errors: `invalid_argument` for lists of
+/// different length; `no_data` below three pairs; `degenerate` for collinear, coincident or non-finite points.
 template <point_range From, point_range To>
 [[nodiscard]] result<se3> absolute_orientation(const From& from, const To& to) {
   const auto s = detail::align(from, to, false);
@@ -88,9 +87,9 @@ template <point_range From, point_range To>
   return se3(s->rotation(), s->translation());
 }
 
-/// Absolute orientation with a free scale: minimises the sum of `|s R from[i] + t - to[i]|^2`, each times `weights[i]`
-/// if there are weights. O(n). Errors as above; `invalid_argument` also unless there is a weight for each pair, finite
-/// and not negative.
+/// Absolute orientation with unknown scale: minimises the sum of `|s R from[i] + t - to[i]|^2`, weighted by
+/// `weights[i]` unless these are empty. O(n). Errors as above; `invalid_argument` also unless there is one finite
+/// non-negative weight per pair.
 template <point_range From, point_range To>
 [[nodiscard]] result<sim3> absolute_orientation_with_scale(const From& from, const To& to,
                                                            std::span<const double> weights = {}) {
@@ -98,16 +97,16 @@ template <point_range From, point_range To>
 }
 
 struct alignment_options {
-  /// Largest distance between the transformed point and its partner for an inlier: metres, or units of `deviations`
-  /// where those are given.
+  /// Maximum distance between the transformed point and its partner for an inlier: metres, or units of `deviations` if
+  /// these are given.
   double threshold = 0.05;
   double confidence = 0.9999;
   std::size_t min_iterations = 10;
   std::size_t max_iterations = 10000;
-  std::size_t min_inliers = 6;  ///< fewer than this is a failure
+  std::size_t min_inliers = 6;  ///< minimum number of inliers for success
   std::uint64_t seed = 1;
   /// Standard deviation of the distance of each pair, metres; for a depth camera it grows with the square of the depth.
-  /// Pairs weigh by 1 / deviation^2. Empty: all pairs are equal.
+  /// Pairs are weighted by 1 / deviation^2. Empty: all pairs have equal weight.
   std::span<const double> deviations = {};
 };
 
@@ -119,11 +118,11 @@ struct alignment_estimate {
   std::size_t iterations = 0;
 };
 
-/// The transform `T_to_from` (`se3` or `sim3`) that takes most of `from[i]` near `to[i]`: three pairs in RANSAC, each
-/// new best transform refined on its inliers. Pairs that are not finite, and those with a deviation of 0 or one that is
-/// not finite, are outliers. Deterministic by `options.seed`. Errors: `invalid_argument` for lists of different length
-/// or options out of range; `no_data` below three pairs; `degenerate` if all points lie on a line or in one place, or
-/// no transform has `min_inliers` inliers. The message says which.
+/// Estimates the transform `T_to_from` (`se3` or `sim3`) that brings most of `from[i]` close to `to[i]`: three pairs in
+/// RANSAC, each new best transform refined on its inliers. Non-finite pairs, and those with a zero or non-finite
+/// deviation, are outliers. Deterministic for a given `options.seed`. Errors: `invalid_argument` for lists of different
+/// length or options out of range; `no_data` below three pairs; `degenerate` if all points are collinear or coincide,
+/// or no transform has `min_inliers` inliers. The message gives the reason.
 template <class Transform = se3, point_range From, point_range To>
 requires(std::same_as<Transform, se3> || std::same_as<Transform, sim3>)
     [[nodiscard]] result<alignment_estimate<Transform>> estimate_alignment(const From& from, const To& to,

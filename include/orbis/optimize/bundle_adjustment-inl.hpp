@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The functions of bundle_adjustment.hpp.
+/// Implementation of bundle_adjustment.hpp.
 #pragma once
 
 #include <utility>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Bundle adjustment: the cameras and points that together best explain all observations.
+/// Bundle adjustment: estimates the cameras and points that jointly minimise the robust cost of all observations.
 ///
 /// Source: B. Triggs, P. McLauchlan, R. Hartley, A. Fitzgibbon, "Bundle adjustment - a modern
 /// synthesis", Vision Algorithms 2000.
@@ -22,7 +22,7 @@
 namespace orbis::optimize {
 
 namespace detail {
-/// Bundle adjustment starts with more damping than pose graphs.
+/// The initial damping of bundle adjustment, stronger than that of pose graphs.
 template <class Damping>
 [[nodiscard]] Damping default_bundle_damping() {
   Damping damping{};
@@ -33,7 +33,7 @@ template <class Residual, class Loss, class Damping>
 class bundle_solver;
 }  // namespace detail
 
-/// A solver made of a residual, a robust loss and a damping policy, each a type:
+/// Bundle adjustment with a residual, a robust loss and a damping policy, each a type:
 ///
 /// @code
 ///   bundle_adjuster ba{reprojection{camera}, huber{2.45}};
@@ -41,12 +41,13 @@ class bundle_solver;
 /// @endcode
 ///
 /// The points are eliminated by the Schur complement. One step costs O(observations + sum over the points of the square
-/// of the number of cameras that see them), and the solution of the reduced system of the cameras. Keeps its memory: a
-/// second problem of the same size allocates nothing (with `orbis::seq`, unless its reduced system is factored as a
-/// sparse one). Every policy, number of threads and instruction set gives the same bits. Not thread-safe.
+/// of the number of cameras that observe them), plus the solution of the reduced system of the cameras. Reuses its
+/// memory: a second problem of the same size allocates nothing (with `orbis::seq`, unless its reduced system is
+/// factorised as a sparse one). Every policy, number of threads and instruction set gives the same bits. Not
+/// thread-safe.
 ///
-/// The library orbis::compiled holds it for `reprojection` of `camera::pinhole` and `camera::any_camera` with the
-/// default loss and policies and without a report; for anything else, its users include bundle_adjustment-inl.hpp.
+/// The library orbis::compiled contains it for `reprojection` of `camera::pinhole` and `camera::any_camera` with the
+/// default loss and policies and without a report; for anything else include bundle_adjustment-inl.hpp.
 template <bundle_residual Residual, robust_loss Loss = huber, damping_policy Damping = levenberg_marquardt>
 class bundle_adjuster {
  public:
@@ -61,27 +62,26 @@ class bundle_adjuster {
   /// projection.
   [[nodiscard]] double chi2(const camera_state& camera, const vec3& point, const observation& o) const;
 
-  /// The chi-squared errors of all observations: `out[k]` of `observations[k]`.
+  /// Computes the chi-squared errors of all observations: `out[k]` of `observations[k]`.
   /// @pre the observations' indices are in range; `out` has room for all
   void chi2(std::span<const camera_state> cameras, std::span<const vec3> points,
             std::span<const observation> observations, std::span<double> out);
 
-  /// Moves `cameras` and `points` so that the robust cost falls. They are never left with a higher cost than they had,
-  /// and are unchanged if the status is a failure of the input. Observations that are not finite, or have no projection
-  /// at the start, take no part; the summary counts them.
-  ///
-  /// `callback(iteration, max_iterations)` is asked before each step whether to go on. `report(summary)` is called
-  /// before the first step and after each one.
+  /// Minimises the robust cost over `cameras` and `points`. Their final cost is never higher than the initial one, and
+  /// they are unchanged if the status is a failure of the input. Observations that are not finite, or have no
+  /// projection at the start, are excluded; the summary counts them.
+  /// `callback(iteration, max_iterations)` is called before each step and returns false to stop. `report(summary)` is
+  /// called before the first step and after each one.
   /// @pre the options' spans are empty or of matching length
   template <execution_policy Policy, class Report = detail::no_report>
   bundle_summary solve(const Policy& policy, std::span<camera_state> cameras, std::span<vec3> points,
                        std::span<const observation> observations, const bundle_options& options = {},
                        progress callback = {}, Report&& report = {});
 
-  /// Solves for the observations of the last call of `solve` again, from these estimates and with these options; other
-  /// observations may be ignored, and other poses or points fixed. Ordering and structure are reused unless other poses
-  /// are fixed.
-  /// @pre as many cameras and points as in that call, and its observations unchanged and still in the same memory
+  /// Solves again for the observations of the last call of `solve`, from these estimates and with these options; other
+  /// observations may be ignored, and other poses or points fixed. Ordering and structure are reused unless the fixed
+  /// poses change.
+  /// @pre the same number of cameras and points as in that call; its observations are unchanged and in the same memory
   template <execution_policy Policy, class Report = detail::no_report>
   bundle_summary solve_again(const Policy& policy, std::span<camera_state> cameras, std::span<vec3> points,
                              const bundle_options& options = {}, progress callback = {}, Report&& report = {});

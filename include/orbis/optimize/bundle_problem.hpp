@@ -25,8 +25,8 @@ struct bundle_observation {
   double information = 1.0;                                 ///< 1 / sigma^2 of the pixel, 1 / pixel^2
 };
 
-/// The type of what is estimated for a camera, and how a step changes it: `m.retract(p, d)` is the estimate that the
-/// step `d` leads to from `p`, with `retract(p, 0) == p`. A step has `M::dimension` entries.
+/// Manifold of the state of a camera: its type, and the effect of a step. `m.retract(p, d)` is the estimate after the
+/// step `d` from `p`, with `retract(p, 0) == p`. A step has `M::dimension` entries.
 template <class M>
 concept camera_manifold = std::copyable<M> &&
     requires(const M& m, const typename M::point& p, const typename M::tangent& d) {
@@ -43,7 +43,7 @@ struct lie_group {
   [[nodiscard]] static point retract(const point& p, const tangent& d) { return p * T::exp(d); }
 };
 
-/// An observation names its camera `pose` and its `point` by index. `information` is 1 / sigma^2, the weight of its
+/// An observation refers to its camera `pose` and its `point` by index. `information` is 1 / sigma^2, the weight of its
 /// squared residual.
 template <class O>
 concept observation_of_a_point = std::copyable<O> && requires(const O& o) {
@@ -54,15 +54,15 @@ concept observation_of_a_point = std::copyable<O> && requires(const O& o) {
 
 /// The residual of one observation of a point by a camera.
 ///
-/// - `R::camera_state` is what is estimated for each camera (a pose, or a pose with intrinsics);
-///   `R::camera_manifold` says how steps change it;
-/// - `r.prepare(state)` computes what all observations by one camera share, an `R::view`; it is called once per
-///   camera and linearisation;
-/// - `r.is_usable(o)` is false for an observation that must be left out, for example one that is not finite;
-/// - `r.residual(view, point, o)` is a vector of `R::dimension` numbers, not yet whitened, or empty where the point has
-///   no projection. `point` is in the world frame;
-/// - `r.linearize(view, point, o, by_camera, by_point)` returns the same vector and writes its derivatives by a step
-///   of the camera and by the point.
+/// - `R::camera_state` is the estimated state of each camera (a pose, or a pose with intrinsics); `R::camera_manifold`
+/// defines its steps;
+/// - `r.prepare(state)` computes an `R::view`, the values shared by all observations of one camera; it is called once
+/// per camera and linearisation;
+/// - `r.is_usable(o)` is false for an observation that must be excluded, for example a non-finite one;
+/// - `r.residual(view, point, o)` is a vector of `R::dimension` numbers, not yet whitened, or empty if the point has no
+/// projection. `point` is in the world frame;
+/// - `r.linearize(view, point, o, by_camera, by_point)` returns the same vector and writes its derivatives by a step of
+/// the camera and by the point.
 template <class R>
 concept bundle_residual = std::copyable<R> && camera_manifold<typename R::camera_manifold> &&
     observation_of_a_point<typename R::observation> &&
@@ -76,10 +76,10 @@ concept bundle_residual = std::copyable<R> && camera_manifold<typename R::camera
   { r.linearize(view, point, o, by_camera, by_point) } -> std::same_as<std::optional<matrix<R::dimension>>>;
 };
 
-/// A residual that depends on the point only through its coordinates q in the camera frame. Its camera is a pose
-/// with steps `T_world_camera * exp(d)`, followed by `R::intrinsic_dimension` more parameters. All derivatives are
-/// then products of the derivative by q with R_camera_world and with (-I, hat(q)), and the solver needs half the
-/// arithmetic. The view has the members `rotation` (R_camera_world) and `translation`.
+/// A residual that depends on the point only through its coordinates q in the camera frame. Its camera is a pose with
+/// steps `T_world_camera * exp(d)`, followed by `R::intrinsic_dimension` more parameters. All derivatives are then
+/// products of the derivative by q with R_camera_world and with (-I, hat(q)), which halves the solver's arithmetic. The
+/// view has the members `rotation` (R_camera_world) and `translation`.
 template <class R>
 concept camera_frame_residual =
     bundle_residual<R> && R::camera_manifold::dimension ==
@@ -92,34 +92,34 @@ concept camera_frame_residual =
   { r.linearize_in_camera(view, q, o, by_q, by_intrinsics) } -> std::same_as<std::optional<matrix<R::dimension>>>;
 };
 
-/// Directions that neither the observations nor what is fixed determine (position and rotation of the whole and,
-/// without depth, its scale) are held by the damping of the steps.
+/// Options of bundle adjustment. The damping of the steps holds directions that neither the observations nor the fixed
+/// poses and points determine (the gauge: position and rotation of the whole and, without depth, its scale).
 struct bundle_options {
   int max_iterations = 10;
   double relative_tolerance = 1e-6;              ///< stop when a step lowers the cost by less than this fraction
-  double gradient_tolerance = 0.0;               ///< stop when no entry of the gradient is larger
+  double gradient_tolerance = 0.0;               ///< stop when no gradient entry exceeds this
   std::span<const std::uint8_t> fixed_poses{};   ///< empty, or one entry per pose: nonzero keeps the pose fixed
   std::span<const std::uint8_t> fixed_points{};  ///< empty, or one entry per point: nonzero keeps the point fixed
-  std::span<const std::uint8_t> ignored{};       ///< empty, or one entry per observation: nonzero leaves it out
+  std::span<const std::uint8_t> ignored{};       ///< empty, or one entry per observation: nonzero excludes it
 };
 
 enum class bundle_status {
   converged,
   iteration_limit,
   cancelled,
-  no_progress,       ///< no step lowers the cost, although the model predicts that one should
-  nothing_to_do,     ///< no usable observation, or nothing that may move
-  missing_pose,      ///< observation `where` names a pose that does not exist
-  missing_point,     ///< observation `where` names a point that does not exist
+  no_progress,       ///< no step lowers the cost, although the model predicts a decrease
+  nothing_to_do,     ///< no usable observation, or nothing movable
+  missing_pose,      ///< observation `where` refers to a nonexistent pose
+  missing_point,     ///< observation `where` refers to a nonexistent point
   bad_pose,          ///< pose `where` has observations and is not finite
-  undetermined_pose  ///< pose `where`, or a point it sees, is not determined by the observations and not damped
+  undetermined_pose  ///< pose `where`, or a point it observes, is neither determined by the observations nor damped
 };
 
-/// Whether the input was at fault. The caller's arrays are then unchanged, except for the steps taken before a pose
-/// proved to be `undetermined_pose`.
+/// Returns true if the input is invalid. The caller's arrays are then unchanged, except for steps taken before
+/// `undetermined_pose` was detected.
 [[nodiscard]] constexpr bool is_failure(bundle_status status) noexcept { return status >= bundle_status::missing_pose; }
 
-/// The status in words.
+/// The status as text.
 [[nodiscard]] constexpr std::string_view to_string(bundle_status status) noexcept {
   switch (status) {
     case bundle_status::converged: return "converged";
@@ -127,8 +127,8 @@ enum class bundle_status {
     case bundle_status::cancelled: return "cancelled";
     case bundle_status::no_progress: return "no progress";
     case bundle_status::nothing_to_do: return "nothing to do";
-    case bundle_status::missing_pose: return "an observation names a pose that there is not";
-    case bundle_status::missing_point: return "an observation names a point that there is not";
+    case bundle_status::missing_pose: return "an observation refers to a nonexistent pose";
+    case bundle_status::missing_point: return "an observation refers to a nonexistent point";
     case bundle_status::bad_pose: return "a pose is not finite";
     case bundle_status::undetermined_pose: return "a pose is not determined by the observations";
   }
@@ -143,25 +143,25 @@ struct bundle_times {
   double factor = 0.0;           ///< factorisation of the reduced system
   double solve = 0.0;            ///< solution of the reduced system
   double back_substitute = 0.0;  ///< steps of the points
-  double evaluate = 0.0;         ///< cost of each step that was tried
+  double evaluate = 0.0;         ///< cost of each attempted step
 };
 
 struct bundle_summary {
   bundle_status status = bundle_status::nothing_to_do;
-  std::size_t where = 0;           ///< the observation or pose that a failure is about
+  std::size_t where = 0;           ///< index of the observation or pose that caused a failure
   double initial_cost = 0.0;       ///< half the sum of the robust loss over the observations
   double final_cost = 0.0;         ///< never above `initial_cost`
-  double gradient = 0.0;           ///< largest entry of the gradient where the last step began
+  double gradient = 0.0;           ///< largest gradient entry at the start of the last step
   int iterations = 0;              ///< steps taken
   int steps_tried = 0;             ///< steps taken and steps rejected
   int linear_iterations = 0;       ///< iterations of an iterative solver of the reduced system
-  std::size_t observations = 0;    ///< observations that took part
-  std::size_t left_out = 0;        ///< not ignored, but not finite or without a projection at the start
+  std::size_t observations = 0;    ///< number of observations used
+  std::size_t left_out = 0;        ///< neither ignored nor usable: not finite or without a projection at the start
   std::size_t first_left_out = 0;  ///< the first of these
   bundle_times seconds;
 };
 
-/// The status in words, for a failure with the number of the observation or pose.
+/// The status as text; for a failure with the index of the observation or pose.
 [[nodiscard]] inline std::string to_string(const bundle_summary& s) {
   std::string text{to_string(s.status)};
   if (is_failure(s.status)) {

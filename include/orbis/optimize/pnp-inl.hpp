@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The functions of pnp.hpp.
+/// Implementation of pnp.hpp.
 #pragma once
 
 #include <cmath>
@@ -23,15 +23,15 @@ result<pose_estimate> estimate_pose(std::span<const vec3> points_world, std::spa
   if (n != pixels.size()) return fail(errc::invalid_argument, where, "the lists of points and pixels differ in length");
   ransac_options asked = detail::ransac_part(options);
   if (const char* const fault = detail::fault_of(asked)) return fail(errc::invalid_argument, where, fault);
-  asked.min_inliers = 0;  // inliers are counted at the end, with the camera itself
+  asked.min_inliers = 0;  // inliers are counted at the end, with the exact camera model
   if (n < 3) return fail(errc::no_data, where, "fewer than three matches");
 
   detail::pnp_matches& matches = workspace.matches;
   matches.assign(points_world, pixels, camera, options.seed);
   if (matches.size() < 3)
     return fail(errc::degenerate, where,
-                "of " + std::to_string(n) + " matches " + std::to_string(matches.size()) +
-                    " are finite and in the camera's view, three are needed");
+                "only " + std::to_string(matches.size()) + " of " + std::to_string(n) +
+                    " matches are finite and in the camera's view, three are needed");
   using estimator_type = detail::pnp_estimator<detail::pnp_matches>;
   const estimator_type estimator(matches);
   const result<ransac_estimate<estimator_type::model>> found = ransac(estimator, asked, workspace.ransac);
@@ -41,7 +41,7 @@ result<pose_estimate> estimate_pose(std::span<const vec3> points_world, std::spa
     return fail(errc::degenerate, where, why.empty() ? found.error().message : why);
   }
 
-  // From here on with the camera itself: the pose with the least truncated squared error, and its inliers.
+  // From here on with the exact camera model: the pose with the least truncated squared error, and its inliers.
   const double squared_threshold = options.threshold * options.threshold;
   const auto error_at = [&](const se3& T_camera_world, std::size_t i) {
     const auto pixel = camera.project(T_camera_world * points_world[i]);
@@ -50,7 +50,7 @@ result<pose_estimate> estimate_pose(std::span<const vec3> points_world, std::spa
   std::vector<std::uint32_t> inliers;
   inliers.reserve(n);
   double sum = 0.0;
-  const auto judge = [&](const se3& T_world_camera) {  // the score; the inliers and their sum of squares
+  const auto judge = [&](const se3& T_world_camera) {  // computes the score, the inliers and their sum of squares
     const se3 T_camera_world = T_world_camera.inverse();
     inliers.clear();
     sum = 0.0;
@@ -70,7 +70,7 @@ result<pose_estimate> estimate_pose(std::span<const vec3> points_world, std::spa
   if (const auto polished = estimator.refine(model, found->inliers, 10)) model = *polished;
   se3 pose = in_world(model.pose);
   double score = judge(pose);
-  if constexpr (!std::same_as<Camera, camera::pinhole>) {  // for which the loops above are exact
+  if constexpr (!std::same_as<Camera, camera::pinhole>) {  // the loops above are exact for a pinhole camera
     for (int k = 0; k != 3 && inliers.size() >= 3; ++k) {
       workspace.part.assign(inliers.begin(), inliers.end());
       const auto sum_up = [&](const detail::centred_pose& at, detail::pose_equations& e) {
@@ -99,7 +99,7 @@ result<pose_estimate> estimate_pose(std::span<const vec3> points_world, std::spa
       pose = in_world(model.pose);
     }
   }
-  judge(pose);  // again: the last pose judged may not be the one that was kept
+  judge(pose);  // again: the last evaluated pose may not be the best one
   if (auto enough = detail::enough_inliers(where, inliers.size(), n, options.min_inliers, 3); !enough)
     return fail(std::move(enough.error()));
   const double rmse = std::sqrt(sum / static_cast<double>(inliers.size()));

@@ -2,7 +2,7 @@
 /// @file
 /// Perspective-n-point: the camera pose from known points and their pixels, many of which may be wrongly matched.
 ///
-/// Sources: M. Fischler, R. Bolles, CACM 24 (1981) for P3P in RANSAC; `ransac.hpp` names those of its parts.
+/// Sources: M. Fischler, R. Bolles, CACM 24 (1981) for P3P in RANSAC; see `ransac.hpp` for its parts.
 #pragma once
 
 #include <array>
@@ -21,11 +21,11 @@
 namespace orbis::optimize {
 
 struct pnp_options {
-  double threshold = 3.0;  ///< largest reprojection error of an inlier, pixels
+  double threshold = 3.0;  ///< maximum reprojection error of an inlier, pixels
   double confidence = 0.9999;
   std::size_t min_iterations = 10;
   std::size_t max_iterations = 10000;
-  std::size_t min_inliers = 6;  ///< fewer than this is a failure
+  std::size_t min_inliers = 6;  ///< minimum number of inliers for success
   std::uint64_t seed = 1;
 };
 
@@ -36,26 +36,26 @@ struct pose_estimate {
   std::size_t iterations = 0;
 };
 
-/// Memory that calls may share one after the other: once it is large enough, an estimate allocates only its inliers.
+/// Reusable memory, not for concurrent calls: once it is large enough, an estimate allocates only its inliers.
 struct pnp_workspace {
   detail::pnp_matches matches;
   ransac_workspace ransac;
   std::vector<std::uint32_t> part;
 };
 
-/// The pose from which most of `points_world[i]` (metres) project to `pixels[i]`: P3P in RANSAC with a sequential test
-/// of the models; each new best pose is refined on its inliers. Matches that are not finite are outliers, as are pixels
-/// that the camera cannot unproject. Deterministic by `options.seed`. O(matches) for each sample that is scored to the
-/// end. Errors: `invalid_argument` for spans of different length or options out of range; `no_data` below three
-/// matches; `degenerate` if fewer than three can be used, all points lie on a line or in one place, or no pose has
-/// `min_inliers` inliers. The message says which. The library orbis::compiled holds it for `pinhole`,
-/// `radial_tangential` and `any_camera`; for others, its users include pnp-inl.hpp.
+/// Estimates the pose from which most of `points_world[i]` (metres) project to `pixels[i]`: P3P in RANSAC with a
+/// sequential test of the models; each new best pose is refined on its inliers. Non-finite matches, and pixels that the
+/// camera cannot unproject, are outliers. Deterministic for a given `options.seed`. O(matches) for each sample that is
+/// scored completely. Errors: `invalid_argument` for spans of different length or options out of range; `no_data` below
+/// three matches; `degenerate` if fewer than three are usable, all points are collinear or coincide, or no pose has
+/// `min_inliers` inliers. The message gives the reason. The library orbis::compiled contains it for `pinhole`,
+/// `radial_tangential` and `any_camera`; for others include pnp-inl.hpp.
 template <camera::camera_model Camera>
 [[nodiscard]] result<pose_estimate> estimate_pose(std::span<const vec3> points_world, std::span<const vec2> pixels,
                                                   const Camera& camera, const pnp_options& options,
                                                   pnp_workspace& workspace);
 
-/// As above, with memory of its own.
+/// As above, with its own memory.
 template <camera::camera_model Camera>
 [[nodiscard]] result<pose_estimate> estimate_pose(std::span<const vec3> points_world, std::span<const vec2> pixels,
                                                   const Camera& camera, const pnp_options& options = {}) {

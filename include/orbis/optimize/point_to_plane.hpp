@@ -16,16 +16,16 @@
 
 namespace orbis::optimize {
 
-/// A point, measured in the camera frame, that lies on a plane of the world. The whitened residual of the pose
-/// `T_world_camera` is `sqrt(information) * n . (T_world_camera * q - p)`. Use it only if `is_usable()`.
+/// A point, measured in the camera frame, on a plane in the world. The whitened residual of the pose `T_world_camera`
+/// is `sqrt(information) * n . (T_world_camera * q - p)`. Use it only if `is_usable()`.
 struct point_to_plane {
   using point = se3;
   static constexpr int dimension = 1;
 
-  vec3 measured = zeros<vec3>();  ///< q, in the camera frame, metres
-  vec3 on_plane = zeros<vec3>();  ///< p, in the world frame, metres
-  vec3 normal = vec3(0.0, 0.0, 1.0);   ///< n, in the world frame, of unit length
-  double information = 1.0;      ///< 1 / sigma^2 along the normal, 1 / m^2
+  vec3 measured = zeros<vec3>();      ///< q, in the camera frame, metres
+  vec3 on_plane = zeros<vec3>();      ///< p, in the world frame, metres
+  vec3 normal = vec3(0.0, 0.0, 1.0);  ///< n, in the world frame, of unit length
+  double information = 1.0;           ///< 1 / sigma^2 along the normal, 1 / m^2
 
   [[nodiscard]] bool is_usable() const {
     return all_finite(measured) && all_finite(on_plane) && std::abs(squared_norm(normal) - 1.0) < 1e-6 &&
@@ -38,8 +38,8 @@ struct point_to_plane {
     if (!std::isfinite(r[0])) return std::nullopt;
     return r;
   }
-  /// The residual and its derivative by a step `T_world_camera * exp(d)`, which is unchanged where the residual is
-  /// empty.
+  /// The residual and its derivative by a step `T_world_camera * exp(d)`; the derivative is unchanged if the residual
+  /// is empty.
   [[nodiscard]] std::optional<matrix<1>> linearize(const se3& T_world_camera, matrix<1, 6>& jacobian) const {
     const auto r = residual(T_world_camera);
     if (!r) return r;
@@ -59,12 +59,12 @@ struct point_to_plane {
 struct plane_observation {
   std::uint32_t pose = 0;
   std::uint32_t point = 0;
-  vec3 measured = zeros<vec3>();  ///< in the camera frame, metres
-  vec3 normal = vec3(0.0, 0.0, 1.0);   ///< of the plane, in the world frame, of unit length
-  double information = 1.0;      ///< 1 / sigma^2 along the normal, 1 / m^2
+  vec3 measured = zeros<vec3>();      ///< in the camera frame, metres
+  vec3 normal = vec3(0.0, 0.0, 1.0);  ///< of the plane, in the world frame, of unit length
+  double information = 1.0;           ///< 1 / sigma^2 along the normal, 1 / m^2
 };
 
-/// The point-to-plane residual for bundle adjustment: estimates a point of the plane; the normal is given. Only the
+/// The point-to-plane residual for bundle adjustment: estimates a point of the plane; the normal is fixed. Only the
 /// position of that point along the normal is determined. Satisfies `bundle_residual`.
 struct point_to_plane_adjustment {
   using camera_state = se3;

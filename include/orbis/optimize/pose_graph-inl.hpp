@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The functions of pose_graph.hpp.
+/// Implementation of pose_graph.hpp.
 #pragma once
 
 #include <algorithm>
@@ -43,7 +43,7 @@ class pose_graph_descent {
  private:
   using equations_type = pose_graph_equations<T, Loss, Between>;
 
-  /// The graph as the damping policies see it.
+  /// The interface of the graph for damping policies.
   template <class Policy, class Edges>
   struct problem {
     equations_type& equations;

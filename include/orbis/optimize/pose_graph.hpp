@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Pose graph optimisation: the poses that agree best with measured relative poses.
+/// Pose graph optimisation: the poses that best agree with measured relative poses.
 ///
 /// Sources: F. Lu, E. Milios, "Globally consistent range scan alignment for environment mapping", Autonomous Robots 4,
 /// 1997; G. Grisetti, R. Kuemmerle, C. Stachniss, W. Burgard, "A tutorial on graph-based SLAM", IEEE ITS Magazine 2(4),
@@ -22,7 +22,7 @@
 
 namespace orbis::optimize {
 
-/// The residual that graphs of `T` are solved with by default. For `se3` it is that of g2o.
+/// The default residual of graphs of `T`. For `se3` it is that of g2o.
 template <class T>
 using default_between_t = std::conditional_t<std::same_as<T, se3>, quaternion_between, logarithm_between<T>>;
 
@@ -31,26 +31,26 @@ template <class T, class Loss, class Damping, class Between>
 class pose_graph_descent;
 }  // namespace detail
 
-/// Solver of pose graphs with vertices of type T (`se3`, `sim3`, `so3`), made of a robust loss, a damping policy and a
-/// residual, for example `pose_graph_solver<se3, huber, levenberg_marquardt> solver{huber{1.0}}`. Keeps its memory:
+/// Solver of pose graphs with vertices of type T (`se3`, `sim3`, `so3`), with a robust loss, a damping policy and a
+/// residual, for example `pose_graph_solver<se3, huber, levenberg_marquardt> solver{huber{1.0}}`. Reuses its memory:
 /// solving a graph with the same edges again allocates nothing (with `orbis::seq`). Not thread-safe.
 ///
-/// The library orbis::compiled holds it for graphs of `se3` with the default policies and `pose_graph_edge`, without a
-/// report; for anything else, its users include pose_graph-inl.hpp.
+/// The library orbis::compiled contains it for graphs of `se3` with the default policies and `pose_graph_edge`, without
+/// a report; for anything else include pose_graph-inl.hpp.
 template <class T, robust_loss Loss = trivial, damping_policy Damping = dogleg,
           between_factor<T> Between = default_between_t<T>>
 class pose_graph_solver {
  public:
   explicit pose_graph_solver(Loss loss = {}, Damping damping = {}, Between between = {});
 
-  /// Moves `vertices` so that half the sum of the robust loss over the edges falls. The vertices are never left with a
-  /// higher cost than they had, and are unchanged if the status is a failure. Vertices without edges stay; so do
-  /// directions that the edges do not determine, except with `gauss_newton`, which stops there with `singular`. Every
-  /// execution policy gives the same result. One step costs O(blocks of the factor).
+  /// Minimises half the sum of the robust loss over the edges by moving `vertices`. The final cost is never higher than
+  /// the initial one, and the vertices are unchanged if the status is a failure. Vertices without edges do not move,
+  /// nor do directions that the edges do not determine, except with `gauss_newton`, which then stops with `singular`.
+  /// Every execution policy gives the same result. One step costs O(blocks of the factor).
   ///
-  /// `callback(iteration, max_iterations)` is asked before each step whether to go on. `report(summary)` is called
-  /// before the first step and after each one.
-  /// @pre `options.fixed` is empty or has one entry for each vertex
+  /// `callback(iteration, max_iterations)` is called before each step and returns false to stop. `report(summary)` is
+  /// called before the first step and after each one.
+  /// @pre `options.fixed` is empty or has one entry per vertex
   template <execution_policy Policy, std::ranges::contiguous_range Edges, class Report = detail::no_report>
   requires relative_measurement<std::ranges::range_value_t<Edges>, T> pose_graph_summary
   solve(const Policy& policy, std::span<T> vertices, const Edges& edges, const pose_graph_options& options = {},

@@ -17,7 +17,7 @@
 namespace orbis::optimize {
 
 /// A measured relative pose `T_from_to` between two vertices, which are indices into the caller's array. `information`
-/// is the inverse covariance of the residual that the graph is solved with.
+/// is the inverse covariance of the solver's residual.
 template <class T, int Dimension = T::dof>
 struct pose_graph_edge {
   std::uint32_t from = 0;
@@ -35,9 +35,9 @@ concept relative_measurement = requires(const E& e) {
   { e.information(0, 0) } -> std::convertible_to<double>;
 };
 
-/// A residual of an edge: a vector made of `D = T_a_b^-1 * (T_world_a^-1 * T_world_b)`, where `T_a_b` is measured and D
-/// is the identity if all agree. `linearize` returns it and writes its derivatives by a step of each pose, on the
-/// right: `T * exp(d)`.
+/// A residual of an edge: a vector computed from `D = T_a_b^-1 * (T_world_a^-1 * T_world_b)`, where `T_a_b` is measured
+/// and D is the identity for a perfect fit. `linearize` returns it and writes its derivatives by a step of each pose,
+/// on the right: `T * exp(d)`.
 template <class F, class T>
 concept between_factor = std::copyable<F> &&
     requires(const F& f, const T& pose, matrix<F::dimension, T::dof>& jacobian) {
@@ -66,8 +66,8 @@ struct logarithm_between {
 };
 
 /// The translation of `D` and the vector part of its quaternion, with a positive real part. This is the residual of
-/// g2o's `EDGE_SE3:QUAT`: information matrices and chi-squared values of g2o files keep their meaning. It is cheaper
-/// than the logarithm, and for small angles its rotational part is half as large.
+/// g2o's `EDGE_SE3:QUAT`, compatible with the information matrices and chi-squared values of g2o files. It is cheaper
+/// than the logarithm; for small angles its rotational part is half as large.
 ///
 /// Source: R. Kuemmerle, G. Grisetti, H. Strasdat, K. Konolige, W. Burgard, "g2o: a general framework for
 /// graph optimization", ICRA 2011.
@@ -116,8 +116,8 @@ struct quaternion_between {
 static_assert(between_factor<quaternion_between, se3> && between_factor<logarithm_between<se3>, se3> &&
               between_factor<logarithm_between<sim3>, sim3> && between_factor<logarithm_between<so3>, so3>);
 
-/// Which vertices are held, so that the others are determined: relative poses alone do not say where the graph is in
-/// the world.
+/// Vertices to hold fixed, so that the others are determined: relative poses do not determine the position of the graph
+/// in the world.
 enum class pose_graph_gauge {
   automatic,            ///< the fixed vertices; in a connected graph without any, its first vertex
   first_of_each_piece,  ///< the fixed vertices; in each connected component without any, its first vertex
@@ -128,23 +128,23 @@ enum class pose_graph_status {
   converged,
   iteration_limit,
   cancelled,
-  no_progress,      ///< no step lowers the cost, although the model predicts that one should
-  nothing_to_do,    ///< no edge at a vertex that may move
+  no_progress,      ///< no step lowers the cost, although the model predicts a decrease
+  nothing_to_do,    ///< no edge at a movable vertex
   bad_vertex,       ///< vertex `where` is not finite
-  missing_vertex,   ///< edge `where` names a vertex that does not exist
-  self_edge,        ///< edge `where` joins a vertex with itself
+  missing_vertex,   ///< edge `where` refers to a nonexistent vertex
+  self_edge,        ///< edge `where` connects a vertex with itself
   bad_measurement,  ///< edge `where`: the measurement is not finite
   bad_information,  ///< edge `where`: the information is not finite, not symmetric or not positive definite
   no_gauge,         ///< vertex `where` is in a connected component without a fixed vertex
   singular          ///< the edges do not determine vertex `where`
 };
 
-/// Whether the input was at fault. The vertices are then unchanged.
+/// Returns true if the input is invalid. The vertices are then unchanged.
 [[nodiscard]] constexpr bool is_failure(pose_graph_status status) noexcept {
   return status >= pose_graph_status::bad_vertex;
 }
 
-/// The status in words, with the number `where` of the edge or vertex.
+/// The status as text, with the index `where` of the edge or vertex.
 [[nodiscard]] inline std::string describe(pose_graph_status status, std::size_t where) {
   const auto vertex = [&](const char* what) { return "vertex " + std::to_string(where) + " " + what; };
   const auto edge = [&](const char* what) { return "edge " + std::to_string(where) + " " + what; };
@@ -155,12 +155,12 @@ enum class pose_graph_status {
     case pose_graph_status::no_progress: return "no progress";
     case pose_graph_status::nothing_to_do: return "nothing to do";
     case pose_graph_status::bad_vertex: return vertex("is not finite");
-    case pose_graph_status::missing_vertex: return edge("names a vertex that there is not");
-    case pose_graph_status::self_edge: return edge("joins a vertex with itself");
+    case pose_graph_status::missing_vertex: return edge("refers to a nonexistent vertex");
+    case pose_graph_status::self_edge: return edge("connects a vertex with itself");
     case pose_graph_status::bad_measurement: return edge("has a measurement that is not finite");
     case pose_graph_status::bad_information:
       return edge("has an information matrix that is not symmetric and positive definite");
-    case pose_graph_status::no_gauge: return vertex("is in a piece of the graph in which no vertex is fixed");
+    case pose_graph_status::no_gauge: return vertex("is in a connected component without a fixed vertex");
     case pose_graph_status::singular: return vertex("is not determined by the edges");
   }
   return "unknown";
@@ -180,12 +180,12 @@ struct pose_graph_times {
   double linearize = 0.0;  ///< residuals, Jacobians, normal equations
   double factor = 0.0;
   double solve = 0.0;
-  double evaluate = 0.0;  ///< cost of each step that was tried
+  double evaluate = 0.0;  ///< cost of each attempted step
 };
 
 struct pose_graph_summary {
   pose_graph_status status = pose_graph_status::nothing_to_do;
-  std::size_t where = 0;      ///< the edge or vertex that a failure is about
+  std::size_t where = 0;      ///< index of the edge or vertex that caused a failure
   double initial_cost = 0.0;  ///< half the sum of the robust loss over the edges
   double final_cost = 0.0;    ///< never above `initial_cost`
   int iterations = 0;         ///< steps taken
@@ -193,7 +193,7 @@ struct pose_graph_summary {
   pose_graph_times seconds;
 };
 
-/// The status in words.
+/// The status as text.
 [[nodiscard]] inline std::string to_string(const pose_graph_summary& s) { return describe(s.status, s.where); }
 
 }  // namespace orbis::optimize

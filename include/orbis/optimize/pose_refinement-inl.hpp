@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The functions of pose_refinement.hpp.
+/// Implementation of pose_refinement.hpp.
 #pragma once
 
 #include <algorithm>
@@ -17,8 +17,8 @@
 namespace orbis::optimize {
 namespace detail {
 
-/// The observations of a refinement as a structure of arrays: packed once if they fit, else piece by piece in every
-/// pass. Active are those that are not outliers.
+/// The observations of a refinement as a structure of arrays: packed once if they fit, otherwise piece by piece in
+/// every pass. Observations that are not outliers are active.
 class pose_pieces {
  public:
   pose_pieces(std::span<const pose_observation> observations, std::span<const std::uint8_t> outliers)
@@ -26,7 +26,7 @@ class pose_pieces {
     if (fits()) pack(0);
   }
 
-  /// Whether an observation has information and numbers that are finite when squared.
+  /// Returns true if an observation has information and numbers that are finite when squared.
   [[nodiscard]] static bool usable(const pose_observation& o) {
     constexpr double most = 1e100;
     const double size = std::abs(o.point.x()) + std::abs(o.point.y()) + std::abs(o.point.z()) + std::abs(o.pixel.x()) +
@@ -44,7 +44,7 @@ class pose_pieces {
     }
   }
 
-  /// Call this when the outliers have changed.
+  /// Call this after the outliers have changed.
   void update() {
     if (!fits()) return;
     for (std::size_t i = 0; i != observations_.size(); ++i)
@@ -100,7 +100,7 @@ class pose_refiner {
         options_{options},
         pieces_{observations, outliers} {}
 
-  /// Steps until a step lowers the cost by less than the fraction `enough`.
+  /// Iterates until a step lowers the cost by less than the fraction `enough`.
   [[nodiscard]] refinement_status run_round(const huber& loss, double enough) {
     double lambda = 1e-6;
     pose_normal_equations now = linearize(T_camera_world_, loss);
@@ -113,7 +113,7 @@ class pose_refiner {
         if (!(cholesky.factor(lambda) > 0.0)) continue;
         const vec6 step = cholesky.solve(-now.g);
         if (!all_finite(step)) continue;
-        // What the step gains by the model is at least half of this.
+        // The model predicts a decrease of at least half of this.
         if (-dot(now.g, step) <= negligible * now.cost || squared_norm(step) < 1e-20)
           return refinement_status::converged;
         const se3 there = se3::exp(step) * T_camera_world_;
@@ -132,7 +132,7 @@ class pose_refiner {
     return refinement_status::iteration_limit;
   }
 
-  /// Decides for every observation at the current pose whether it is an outlier. Returns whether any decision changed.
+  /// Classifies every observation at the current pose as inlier or outlier. Returns true if any classification changed.
   bool apply_gates() {
     bool changed = false;
     inliers_ = 0;
@@ -161,7 +161,7 @@ class pose_refiner {
   [[nodiscard]] int steps() const noexcept { return steps_; }
 
  private:
-  /// Relative to the cost, below what a sum of squares resolves in practice.
+  /// Relative decrease of the cost below the practical resolution of a sum of squares.
   static constexpr double negligible = 1e-13;
 
   [[nodiscard]] pose_at at_pose(const se3& pose) const {
@@ -223,17 +223,17 @@ pose_refinement refine_pose(std::span<const pose_observation> observations, cons
   bool changed = true;
   for (int round = 0; round < options.rounds; ++round) {
     const bool last = round + 1 == options.rounds;
-    if (last)  // least squares: a width without a bound gives its bits
+    if (last)  // least squares: an unbounded width gives the same bits
       out.status = refiner.run_round(huber{std::numeric_limits<double>::infinity()}, 1e-9);
     else if (changed || out.status != refinement_status::converged)
-      out.status = refiner.run_round(loss, 1e-6);  // it only has to tell the outliers
+      out.status = refiner.run_round(loss, 1e-6);  // only needs to identify the outliers
     else
-      continue;  // the same problem as the last round solved
+      continue;  // the same problem as solved in the last round
     if (out.status == refinement_status::degenerate) return give_up(out.status);
     changed = refiner.apply_gates();
     if (refiner.inliers() < 3) return give_up(refinement_status::too_few_observations);
   }
-  if (options.rounds <= 0) {  // judged only
+  if (options.rounds <= 0) {  // classification only
     out.status = refinement_status::iteration_limit;
     refiner.apply_gates();
     if (refiner.inliers() < 3) return give_up(refinement_status::too_few_observations);

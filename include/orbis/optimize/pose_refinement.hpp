@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Pose-only refinement: the camera pose that best explains observations of known points.
+/// Pose-only refinement: the camera pose that minimises the reprojection errors of known points.
 ///
-/// Levenberg-Marquardt on SE(3) in rounds. After each round every observation becomes an inlier or an outlier by its
-/// chi-squared error at the current pose; the last round is without the robust loss. Eight observations are processed
-/// at once. Needs about 80 kB of stack and never allocates.
+/// Levenberg-Marquardt on SE(3) in rounds. After each round every observation is classified as an inlier or an outlier
+/// by its chi-squared error at the current pose; the last round is without the robust loss. Eight observations are
+/// processed at once. Needs about 80 kB of stack and never allocates.
 ///
 /// Source of the rounds: R. Mur-Artal, J. D. Tardos, "ORB-SLAM2", T-RO 33 (2017).
 #pragma once
@@ -24,10 +24,10 @@ namespace orbis::optimize {
 
 enum class refinement_status {
   converged,             ///< the last round ended because no step improved the pose
-  iteration_limit,       ///< the last round ended by its number of iterations
+  iteration_limit,       ///< the last round reached its maximum number of iterations
   too_few_observations,  ///< fewer than three usable observations, from the start or after the gates
-  degenerate,            ///< the observations leave a direction of the pose free (collinear points, say)
-  invalid_start          ///< the starting pose is not finite
+  degenerate,            ///< the observations do not determine the pose (for example collinear points)
+  invalid_start          ///< the initial pose is not finite
 };
 
 [[nodiscard]] constexpr std::string_view to_string(refinement_status status) noexcept {
@@ -44,13 +44,13 @@ enum class refinement_status {
 struct pose_refinement_options {
   int rounds = 4;
   int iterations = 10;  ///< per round
-  /// Largest chi-squared error of an inlier without depth, and with depth.
+  /// Maximum chi-squared error of an inlier without depth, and with depth.
   double gate_mono = chi_squared_gate(2), gate_depth = chi_squared_gate(3);
 };
 
 struct pose_refinement {
   refinement_status status = refinement_status::too_few_observations;
-  se3 T_world_camera;  ///< the starting pose where `!ok()`
+  se3 T_world_camera;  ///< the initial pose if `!ok()`
   std::size_t inliers = 0;
   double cost = 0.0;   ///< half the sum of chi-squared over the inliers
   int iterations = 0;  ///< accepted steps, over all rounds
@@ -61,7 +61,7 @@ struct pose_refinement {
 
 namespace detail {
 
-/// A camera whose model is known only at run time.
+/// A camera whose model is only known at run time.
 template <class Camera>
 concept holds_a_model = requires(const Camera& camera) {
   {camera.visit([](const auto&) {})};
@@ -74,10 +74,10 @@ template <class Camera>
 
 }  // namespace detail
 
-/// Refines `T_world_camera`, starting there, and writes for each observation whether it is an outlier (1) or not (0).
-/// Observations that are not finite, have no information or no projection are outliers. O(observations) for each step.
-/// Every instruction set gives the same bits. The camera models of the library are faster than models of your own. The
-/// library orbis::compiled holds it for these models; for others, its users include pose_refinement-inl.hpp.
+/// Refines `T_world_camera` from an initial pose, and sets for each observation whether it is an outlier (1) or not
+/// (0). Observations that are not finite, or have no information or no projection, are outliers. O(observations) per
+/// step. Every instruction set gives the same bits. The library's camera models are faster than user-defined ones. The
+/// library orbis::compiled contains it for these models; for others include pose_refinement-inl.hpp.
 /// @pre outliers.size() == observations.size()
 template <camera::camera_model Camera>
 [[nodiscard]] pose_refinement refine_pose(std::span<const pose_observation> observations,

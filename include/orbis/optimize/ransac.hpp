@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// RANSAC for any model, deterministic by seed: models are scored by the truncated squared error, and each new best one
-/// is refined on its inliers.
+/// RANSAC for any model, deterministic for a given seed: models are scored by the truncated squared error, and each new
+/// best one is refined on its inliers.
 ///
-/// Sources: M. Fischler, R. Bolles, CACM 24 (1981); P. Torr, A. Zisserman, "MLESAC", CVIU 78 (2000), for the score;
-/// J. Matas, O. Chum, "Randomized RANSAC with sequential probability ratio test", ICCV 2005; R. Raguram et al., "USAC:
-/// a universal framework for random sample consensus", PAMI 35 (2013), for the parts and how they go together.
+/// Sources: M. Fischler, R. Bolles, CACM 24 (1981); P. Torr, A. Zisserman, "MLESAC", CVIU 78 (2000), for the score; J.
+/// Matas, O. Chum, "Randomized RANSAC with sequential probability ratio test", ICCV 2005; R. Raguram et al., "USAC: a
+/// universal framework for random sample consensus", PAMI 35 (2013), for the combination of the parts.
 #pragma once
 
 #include <algorithm>
@@ -26,15 +26,15 @@
 
 namespace orbis::optimize {
 
-/// A model and its data, as RANSAC needs them.
+/// A model and its data, as required by RANSAC.
 ///
 /// - `E::sample_size`: the number of data that determine the model up to a few solutions.
 /// - `size()`: the number of data.
-/// - `fit(sample)`: a range of candidate models from `sample_size` data; empty where these are degenerate.
+/// - `fit(sample)`: a range of candidate models from `sample_size` data; empty if these are degenerate.
 /// - `squared_error(model, i)`: the squared error of datum `i`, in squared units of the threshold; infinite or NaN if
 ///   it has none.
 /// - `refine(model, inliers)`: a better model from many data, starting at `model`; empty if that fails. Return the
-///   model itself to go without refinement.
+/// model itself to disable refinement.
 template <class E>
 concept model_estimator = requires(const E& estimator, const typename E::model& model,
                                    std::span<const std::uint32_t> indices, std::size_t i,
@@ -46,7 +46,7 @@ concept model_estimator = requires(const E& estimator, const typename E::model& 
   { estimator.refine(model, indices) } -> std::same_as<std::optional<typename E::model>>;
 };
 
-/// What `fit` may return where a sample determines one model at most.
+/// Return type of `fit` if a sample determines at most one model.
 template <class Model>
 struct one_or_none {
   std::optional<Model> found;
@@ -54,12 +54,12 @@ struct one_or_none {
   [[nodiscard]] const Model* end() const noexcept { return found ? &*found + 1 : nullptr; }
 };
 
-/// The number of data that are scored at a time.
+/// The number of data scored at a time.
 inline constexpr std::size_t consensus_block = 32;
 
-/// An estimator with errors of many data at once: `squared_errors(model, first, out)` writes those of `consensus_block`
-/// data from `first` on, a multiple of it; what it writes for data beyond the last does not matter. Models are ranked
-/// by these; whether a datum is an inlier is decided by `squared_error`.
+/// An estimator with batched errors: `squared_errors(model, first, out)` writes those of `consensus_block` data from
+/// `first` on, a multiple of it; the values for data beyond the last are ignored. They rank the models; `squared_error`
+/// decides about inliers.
 template <class E>
 concept block_estimator = model_estimator<E> && requires(const E& estimator, const typename E::model& model,
                                                          std::size_t first, std::span<float, consensus_block> out) {
@@ -67,20 +67,20 @@ concept block_estimator = model_estimator<E> && requires(const E& estimator, con
 };
 
 struct ransac_options {
-  double threshold = 1.0;  ///< largest error of an inlier, in the estimator's units (not squared); positive, finite
+  double threshold = 1.0;  ///< maximum error of an inlier, in the estimator's units (not squared); positive, finite
   double confidence = 0.9999;
   std::size_t min_iterations = 10;
   std::size_t max_iterations = 10000;
-  std::size_t min_inliers = 0;  ///< fewer than this is a failure
-  std::size_t refinements = 4;  ///< largest number, for each new best model
-  /// If positive, bad models are recognised by a sequential probability ratio test, which sometimes rejects a good one;
+  std::size_t min_inliers = 0;  ///< minimum number of inliers for success
+  std::size_t refinements = 4;  ///< maximum number, for each new best model
+  /// If positive, bad models are rejected by a sequential probability ratio test, which sometimes rejects a good one;
   /// the number of iterations accounts for that. The value is the time to compute a model from a sample, divided by the
-  /// time to score one datum. The data must be in random order then.
+  /// time to score one datum. It requires data in random order.
   double model_cost = 0.0;
   std::uint64_t seed = 1;
 };
 
-/// Memory that calls may share one after the other: with it only the inliers of the result are allocated.
+/// Reusable memory, not for concurrent calls: with it only the inliers of the result are allocated.
 struct ransac_workspace {
   std::vector<std::uint32_t> inliers;
 };
@@ -95,7 +95,7 @@ struct ransac_estimate {
 
 namespace detail {
 
-/// The truncated squared error: what a datum adds to the score, of which the least is the best; NaN costs the limit.
+/// The truncated squared error: the contribution of a datum to the score (smaller is better); NaN costs the limit.
 template <std::floating_point S>
 [[nodiscard]] constexpr S msac_cost(S squared, S limit) noexcept {
   return squared < limit ? squared : limit;
@@ -115,7 +115,7 @@ template <std::size_t N>
 }
 
 /// The number of samples after which one of them is without outliers, with probability `confidence`; `recognised` is
-/// the probability that such a sample is recognised.
+/// the probability that such a sample is accepted by the sequential test.
 [[nodiscard]] inline double wanted_iterations(double confidence, double inlier_ratio, std::size_t sample_size,
                                               double recognised) {
   const double clean = std::pow(inlier_ratio, static_cast<double>(sample_size)) * recognised;
@@ -124,34 +124,34 @@ template <std::size_t N>
   return std::log(1.0 - confidence) / std::log1p(-clean);
 }
 
-/// Sequential probability ratio test: scoring stops as soon as the data seen are much more likely for a bad model than
-/// for one as good as the best so far.
+/// Sequential probability ratio test: scoring stops as soon as the evaluated data are much more likely under a bad
+/// model than under one as good as the best so far.
 class sequential_test {
  public:
-  /// `model_cost` as in `ransac_options`; 0: nothing is hopeless.
+  /// `model_cost` as in `ransac_options`; 0: no model is rejected.
   explicit sequential_test(double model_cost) noexcept : model_cost_{model_cost} {}
 
-  /// Before a model is scored.
+  /// Call before scoring a model.
   void begin() noexcept { log_ratio_ = 0.0; }
-  /// Whether to stop, after a block of data with so many inliers.
-  [[nodiscard]] bool hopeless(std::size_t inliers, std::size_t data) noexcept {
+  /// Returns true to stop scoring, after a block of data with this number of inliers.
+  [[nodiscard]] bool rejects(std::size_t inliers, std::size_t data) noexcept {
     log_ratio_ += static_cast<double>(inliers) * if_inlier_ + static_cast<double>(data - inliers) * if_outlier_;
     return log_ratio_ > log_threshold_;
   }
-  /// The model has so many inliers among the data seen.
+  /// Call after scoring a model, with the number of inliers among the evaluated data.
   void end(std::size_t inliers, std::size_t data) noexcept {
-    // Nearly all models are bad: their mean ratio of inliers is the one of bad models.
+    // Nearly all models are bad: their mean inlier ratio estimates that of bad models.
     const double ratio = static_cast<double>(inliers) / static_cast<double>(std::max<std::size_t>(1, data));
     ++seen_;
     bad_ += (std::min(ratio, 0.5) - bad_) / std::min(500.0, 10.0 + seen_);
     if (std::abs(bad_ - designed_for_) > 0.1 * designed_for_) design();
   }
-  /// The inlier ratio of a new best model.
+  /// Sets the inlier ratio of a new best model.
   void adopted(double inlier_ratio) noexcept {
     good_ = inlier_ratio;
     design();
   }
-  /// The probability that a model as good as the best is scored to the end.
+  /// The probability that a model as good as the best is scored completely.
   [[nodiscard]] double recognised() const noexcept {
     return std::isfinite(log_threshold_) ? 1.0 - std::exp(-log_threshold_) : 1.0;
   }
@@ -160,7 +160,7 @@ class sequential_test {
   void design() noexcept {
     designed_for_ = bad_;
     const double bad = std::clamp(bad_, 1e-3, 0.9), good = std::min(good_, 0.99);
-    if (model_cost_ == 0.0 || !(good > 1.5 * bad)) {  // nothing to tell good models by, yet
+    if (model_cost_ == 0.0 || !(good > 1.5 * bad)) {  // good models cannot be distinguished yet
       log_threshold_ = std::numeric_limits<double>::infinity();
       if_inlier_ = if_outlier_ = 0.0;
       return;
@@ -202,7 +202,7 @@ class ransac_run {
     workspace.inliers.reserve(estimator.size());
   }
 
-  /// Scores a candidate; whether it is the new best.
+  /// Scores a candidate; returns true if it is the new best.
   bool propose(const model& candidate) {
     const double score = score_of(candidate);
     if (!(score < best_score_)) return false;
@@ -210,7 +210,7 @@ class ransac_run {
     return true;
   }
   [[nodiscard]] std::span<const std::uint32_t> inliers() const noexcept { return workspace_.inliers; }
-  /// Refines the best model on its inliers, then on those of the outcome, as long as the score improves.
+  /// Refines the best model on its inliers, then on those of the result, while the score improves.
   void refine() {
     for (std::size_t k = 0; k < options_.refinements && workspace_.inliers.size() > sample_size; ++k) {
       const std::optional<model> refined = estimator_.refine(*best_, workspace_.inliers);
@@ -218,14 +218,14 @@ class ransac_run {
     }
   }
   [[nodiscard]] const std::optional<model>& best() const noexcept { return best_; }
-  /// The number of samples that are enough if the best model is right.
+  /// The required number of samples if the best model is correct.
   [[nodiscard]] double wanted() const {
     return wanted_iterations(options_.confidence,
                              static_cast<double>(workspace_.inliers.size()) / static_cast<double>(estimator_.size()),
                              sample_size, test_.recognised());
   }
 
-  /// The score of the best by `squared_error`.
+  /// The score of the best model by `squared_error`.
   [[nodiscard]] double exact_score() const {
     double sum = 0.0;
     for (std::size_t i = 0; i < estimator_.size(); ++i)
@@ -245,7 +245,7 @@ class ransac_run {
     test_.adopted(static_cast<double>(workspace_.inliers.size()) / static_cast<double>(n));
   }
 
-  /// Infinite for a model whose scoring stopped early.
+  /// Scores a candidate; infinite if the sequential test stopped the scoring.
   [[nodiscard]] double score_of(const model& candidate) {
     const std::size_t n = estimator_.size();
     double score = 0.0;
@@ -257,7 +257,7 @@ class ransac_run {
       score += cost;
       inliers += inside;
       seen += count;
-      if (score > best_score_ || (seen < n && test_.hopeless(inside, count))) {
+      if (score > best_score_ || (seen < n && test_.rejects(inside, count))) {
         test_.end(inliers, seen);
         return std::numeric_limits<double>::infinity();
       }
@@ -276,7 +276,7 @@ class ransac_run {
       std::array<float, consensus_block> errors;
       estimator_.squared_errors(candidate, first, std::span<float, consensus_block>(errors));
       const auto limit = static_cast<float>(squared_threshold_);
-      if (count == consensus_block) {  // eight sums side by side, which stay in registers
+      if (count == consensus_block) {  // eight partial sums, which stay in registers
         std::array<float, 8> cost{};
         std::array<std::int32_t, 8> inside{};
         for (std::size_t i = 0; i != consensus_block; i += 8)
@@ -312,7 +312,7 @@ class ransac_run {
   double best_score_ = std::numeric_limits<double>::infinity();
 };
 
-/// The options of RANSAC among those of an estimator, which have the same names everywhere.
+/// The RANSAC options among the options of an estimator, which have the same names.
 template <class Options>
 [[nodiscard]] ransac_options ransac_part(const Options& options, double model_cost = 200.0) {
   return {.threshold = options.threshold,
@@ -324,15 +324,15 @@ template <class Options>
           .seed = options.seed};
 }
 
-/// What is wrong with the options; null if nothing is.
+/// The reason why the options are invalid; null if they are valid.
 [[nodiscard]] inline const char* fault_of(const ransac_options& options) noexcept {
   if (!(options.threshold > 0.0) || !std::isfinite(options.threshold))
     return "the threshold must be positive and finite";
-  if (!(options.confidence > 0.0 && options.confidence < 1.0)) return "the confidence must lie between 0 and 1";
+  if (!(options.confidence > 0.0 && options.confidence < 1.0)) return "the confidence must be between 0 and 1";
   return nullptr;
 }
 
-/// An error if `have` inliers of `n` data are fewer than asked for, or fewer than a sample.
+/// Returns an error if `have` inliers of `n` data are fewer than `min_inliers`, or fewer than a sample.
 [[nodiscard]] inline result<void> enough_inliers(const char* where, std::size_t have, std::size_t n,
                                                  std::size_t min_inliers, std::size_t sample_size) {
   const std::size_t needed = std::max(min_inliers, sample_size);
@@ -343,7 +343,7 @@ template <class Options>
 }
 
 /// The model of `found` after ten refinement steps on its inliers, if that improves its score and keeps `min_inliers`;
-/// else the model itself.
+/// otherwise the model itself.
 template <class E>
 [[nodiscard]] typename E::model polished(const E& estimator, const ransac_estimate<typename E::model>& found,
                                          double squared_threshold, std::size_t min_inliers) {
@@ -361,10 +361,10 @@ template <class E>
 
 }  // namespace detail
 
-/// The model that most of the data agree with. The same data, options and seed give the same result. O(data) for each
-/// model that is scored to the end. Errors: `invalid_argument` for options out of range; `no_data` for fewer data than
-/// a sample; `degenerate` if no sample gives a model, or no model has `min_inliers` inliers and at least as many as a
-/// sample.
+/// Estimates the model that agrees with most of the data. The same data, options and seed give the same result. O(data)
+/// for each model that is scored completely. Errors: `invalid_argument` for options out of range; `no_data` for fewer
+/// data than a sample; `degenerate` if no sample gives a model, or no model has `min_inliers` inliers and at least as
+/// many as a sample.
 template <model_estimator E>
 [[nodiscard]] result<ransac_estimate<typename E::model>> ransac(const E& estimator, const ransac_options& options,
                                                                 ransac_workspace& workspace) {
@@ -396,7 +396,7 @@ template <model_estimator E>
       *run.best(), {run.inliers().begin(), run.inliers().end()}, run.exact_score(), iteration};
 }
 
-/// As above, with memory of its own.
+/// As above, with its own memory.
 template <model_estimator E>
 [[nodiscard]] result<ransac_estimate<typename E::model>> ransac(const E& estimator, const ransac_options& options) {
   ransac_workspace workspace;

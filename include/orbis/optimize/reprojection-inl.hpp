@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The functions of reprojection.hpp.
+/// Implementation of reprojection.hpp.
 #pragma once
 
 #include <orbis/camera/project_lanes.hpp>

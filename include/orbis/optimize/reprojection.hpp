@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The reprojection error of an observation, for any camera model, in the image and, with depth, in a virtual right
+/// The reprojection error of an observation, for any camera model: in the image and, with depth, in a virtual right
 /// image.
 #pragma once
 
@@ -20,23 +20,22 @@ namespace orbis::optimize {
 struct pose_observation {
   vec3 point = zeros<vec3>();  ///< in the world, metres
   vec2 pixel = zeros<vec2>();
-  /// The virtual right coordinate `u - bf / depth` of an RGB-D or stereo camera, pixels; NaN where the depth is
-  /// unknown.
+  /// The virtual right coordinate `u - bf / depth` of an RGB-D or stereo camera, pixels; NaN if the depth is unknown.
   double right = std::numeric_limits<double>::quiet_NaN();
   double information = 1.0;  ///< 1 / sigma^2 of the pixel, 1 / pixel^2
   [[nodiscard]] bool has_depth() const noexcept { return !std::isnan(right); }
 };
 
-/// A pose in the form that residuals use: from the world to the camera.
+/// A pose in the form used by residuals: from the world to the camera.
 struct camera_view {
   mat3 rotation = identity<mat3>();
   vec3 translation = zeros<vec3>();
 };
 
 /// The reprojection error, projected minus observed, in pixels: two coordinates, and with depth a third, `u - bf / z`,
-/// which a camera displaced by the baseline would see. In this unit the error of a disparity-based depth sensor is
-/// nearly constant, as the error of the pixel is. Satisfies `camera_frame_residual`; what is estimated for a camera is
-/// its pose `T_world_camera`. Source: R. Mur-Artal, J. D. Tardos, "ORB-SLAM2", T-RO 33 (2017).
+/// the coordinate in a camera displaced by the baseline. In this unit the error of a disparity-based depth sensor is
+/// nearly constant, like that of the pixel. Satisfies `camera_frame_residual`; the estimated camera state is the pose
+/// `T_world_camera`. Source: R. Mur-Artal, J. D. Tardos, "ORB-SLAM2", T-RO 33 (2017).
 template <camera::camera_model Camera>
 struct reprojection {
   Camera camera;
@@ -52,7 +51,7 @@ struct reprojection {
   /// The virtual right coordinate of a pixel with the coordinate `u`, at `depth` metres.
   [[nodiscard]] double right(double u, double depth) const noexcept { return u - bf / depth; }
 
-  /// The residual at a point in the camera frame. The third entry is 0 without depth. Empty where the point has no
+  /// The residual at a point in the camera frame. The third entry is 0 without depth. Empty if the point has no
   /// projection.
   [[nodiscard]] std::optional<vec3> residual(const vec3& point_camera, const pose_observation& o) const {
     const auto pixel = camera.project(point_camera);
@@ -74,7 +73,7 @@ struct reprojection {
     return difference(*pixel, point_camera.z(), o);
   }
 
-  // As `bundle_residual` and `camera_frame_residual` describe.
+  // The interface of `bundle_residual` and `camera_frame_residual`.
   [[nodiscard]] static view prepare(const se3& T_world_camera) {
     const se3 inverse = T_world_camera.inverse();
     return {inverse.rotation_matrix(), inverse.translation()};
@@ -97,7 +96,7 @@ struct reprojection {
     return residual(q, as_pose_observation(o), by_q);
   }
 
-  // Eight observations at once; see detail/bundle/lane_residual.hpp.
+  // Evaluates eight observations at once; see detail/bundle/lane_residual.hpp.
   static constexpr int measured = 4;
   static void measure(const observation& o, double* to) {
     to[0] = o.pixel.x();

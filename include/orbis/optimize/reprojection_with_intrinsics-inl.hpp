@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The functions of reprojection_with_intrinsics.hpp.
+/// Implementation of reprojection_with_intrinsics.hpp.
 #pragma once
 
 #include <orbis/camera/project_lanes.hpp>

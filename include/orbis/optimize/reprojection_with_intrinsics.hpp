@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Reprojection errors of cameras whose intrinsic parameters are estimated together with their poses: for any camera
-/// model with parameters, and for the model of "Bundle adjustment in the large".
+/// Reprojection errors of cameras whose intrinsic parameters are estimated together with their poses: for any
+/// parametric camera model, and for the model of "Bundle adjustment in the large".
 #pragma once
 
 #include <array>
@@ -20,7 +20,7 @@
 
 namespace orbis::optimize {
 
-/// A pose and the camera that took the image there.
+/// A pose and the camera of its image.
 template <camera::parametric_camera Camera>
 struct posed_camera {
   se3 T_world_camera;
@@ -29,7 +29,7 @@ struct posed_camera {
 
 namespace detail {
 
-/// The parameters of a camera that are estimated; all if none is named.
+/// The indices of the estimated parameters; all if `Free` is empty.
 template <class Camera, int... Free>
 inline constexpr auto estimated_parameters = [] {
   constexpr int count = camera::parameters_of<Camera>::count;
@@ -39,7 +39,7 @@ inline constexpr auto estimated_parameters = [] {
   return which;
 }();
 
-/// Whether the numbers are in range and ascending.
+/// Returns true if the indices are in range and ascending.
 template <class Camera, int... Free>
 [[nodiscard]] consteval bool names_parameters() {
   int last = -1;
@@ -52,13 +52,13 @@ template <class Camera, int... Free>
 
 }  // namespace detail
 
-/// A step moves the pose in its own frame, as `T_world_camera * exp(d)`, and adds to the parameters named (in the order
-/// of `camera::parameters_of`; to all if none is named). If no camera has the new parameters, a focal length below 0
-/// for example, the step of the parameters is halved until one has.
+/// A step moves the pose in its own frame, as `T_world_camera * exp(d)`, and is added to the estimated parameters (in
+/// the order of `camera::parameters_of`; to all if `Free` is empty). If the new parameters are invalid, for example a
+/// focal length below 0, the step of the parameters is halved until they are valid.
 template <camera::parametric_camera Camera, int... Free>
 struct posed_camera_manifold {
   static_assert(detail::names_parameters<Camera, Free...>(),
-                "the parameters to be estimated: numbers that the camera has, ascending");
+                "the estimated parameters must be valid indices in ascending order");
   using point = posed_camera<Camera>;
   static constexpr auto free = detail::estimated_parameters<Camera, Free...>;
   static constexpr int dimension = 6 + static_cast<int>(free.size());
@@ -79,8 +79,8 @@ struct posed_camera_manifold {
   }
 };
 
-/// The reprojection error as in `reprojection`, with the intrinsic parameters of every camera among the unknowns: what
-/// is estimated for a camera is a `posed_camera<Camera>`. Satisfies `camera_frame_residual`.
+/// The reprojection error as in `reprojection`, with the intrinsic parameters of every camera among the unknowns: the
+/// estimated state of a camera is a `posed_camera<Camera>`. Satisfies `camera_frame_residual`.
 ///
 /// @code
 ///   using model = reprojection_with_intrinsics<camera::radial_tangential, 0, 1, 4, 5>;  // fx, fy, k1, k2
@@ -88,11 +88,11 @@ struct posed_camera_manifold {
 ///   ba.solve(seq, cameras, points, observations);  // cameras: a span of model::camera_state
 /// @endcode
 ///
-/// The numbers name the parameters that are estimated, in the order of `camera::parameters_of<Camera>`; the others keep
-/// their values. Without numbers all are estimated. For `radial_tangential` name fewer: its numerator and denominator
-/// are determined only together.
+/// The template arguments are the indices of the estimated parameters, in the order of `camera::parameters_of<Camera>`;
+/// the others keep their values. Without indices all are estimated. For `radial_tangential` estimate only some: its
+/// numerator and denominator are correlated.
 ///
-/// Each camera has its own intrinsics, as photographs of unknown origin have; several cameras cannot share them.
+/// Each camera has its own intrinsics, as for photographs of unknown origin; several cameras cannot share them.
 /// `bundle_options::fixed_poses` fixes the intrinsics of a camera together with its pose. For images of one known
 /// camera use `reprojection`.
 ///
@@ -161,10 +161,10 @@ struct reprojection_with_intrinsics {
   }
 };
 
-/// The camera of "Bundle adjustment in the large": a pose, a focal length and two radial distortions. With p = R X + t
-/// the pixel of a point is `-f (1 + k1 r^2 + k2 r^4) (p.x, p.y) / p.z`, r^2 = (p.x^2 + p.y^2) / p.z^2, from the centre
-/// of the image, x right, y up: the camera looks along -z. Source: S. Agarwal, N. Snavely, S. M. Seitz, R. Szeliski,
-/// "Bundle adjustment in the large", ECCV 2010.
+/// The camera of "Bundle adjustment in the large": a pose, a focal length and two radial distortion coefficients. With
+/// p = R X + t the pixel of a point is `-f (1 + k1 r^2 + k2 r^4) (p.x, p.y) / p.z`, r^2 = (p.x^2 + p.y^2) / p.z^2, from
+/// the centre of the image, x right, y up: the camera looks along -z. Source: S. Agarwal, N. Snavely, S. M. Seitz, R.
+/// Szeliski, "Bundle adjustment in the large", ECCV 2010.
 struct bal_camera {
   se3 T_camera_world;
   double focal = 1.0;  ///< pixels
@@ -181,7 +181,7 @@ struct bal_camera {
   }
 };
 
-/// A step moves and turns the camera in its own frame, and adds to focal length, k1 and k2.
+/// A step moves and rotates the camera in its own frame, and is added to focal length, k1 and k2.
 struct bal_manifold {
   using point = bal_camera;
   using tangent = matrix<9>;
@@ -198,8 +198,8 @@ struct bal_view : camera_view {
   double focal = 1.0, k1 = 0.0, k2 = 0.0;
 };
 
-/// The reprojection error of a `bal_camera`, projected minus observed, pixels. `right` of the observations is ignored.
-/// Points behind the camera are projected by the formula, too. Satisfies `camera_frame_residual`.
+/// The reprojection error of a `bal_camera`, projected minus observed, pixels. Ignores `right` of the observations.
+/// Points behind the camera are also projected by the formula. Satisfies `camera_frame_residual`.
 struct bal_reprojection {
   using camera_state = bal_camera;
   using camera_manifold = bal_manifold;
@@ -250,7 +250,7 @@ struct bal_reprojection {
     return r;
   }
 
-  // Eight observations at once; see detail/bundle/lane_residual.hpp.
+  // Evaluates eight observations at once; see detail/bundle/lane_residual.hpp.
   static constexpr int measured = 2;
   static void measure(const observation& o, double* to) {
     to[0] = o.pixel.x();

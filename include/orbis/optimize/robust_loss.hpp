@@ -4,8 +4,7 @@
 ///
 /// A loss maps the *squared* norm `s` of a whitened residual to `rho(s)`, with `rho(s) ~ s` near 0. The cost of a
 /// problem is half the sum of `rho`. Widths are positive and in units of the residual, not of its square: `huber{2.0}`
-/// becomes linear where the norm of the residual is 2. Iteratively reweighted least squares weighs a residual by
-/// `rho'(s)`.
+/// becomes linear at a residual norm of 2. Iteratively reweighted least squares weights a residual by `rho'(s)`.
 ///
 /// Sources: Z. Zhang, "Parameter estimation techniques: a tutorial with application to conic
 /// fitting", Image and Vision Computing 15 (1997); M. J. Black, A. Rangarajan, "On the unification of
@@ -41,7 +40,7 @@ struct huber {
   }
 };
 
-/// Logarithmic: the influence of large residuals goes to zero, but never reaches it.
+/// Logarithmic: the influence of large residuals tends to zero without reaching it.
 struct cauchy {
   double width = 1.0;
   [[nodiscard]] double cost(double squared) const noexcept {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The functions of self_calibration.hpp.
+/// Implementation of self_calibration.hpp.
 #pragma once
 
 #include <cassert>
@@ -20,7 +20,7 @@ result<self_calibrated<Camera>> self_calibrate(const Camera& start, std::span<se
   for (std::size_t k = 0; k != observations.size(); ++k)
     if (observations[k].pose >= poses.size() || observations[k].point >= points.size())
       return fail(errc::invalid_argument, where,
-                  "observation " + std::to_string(k) + " names an image or a point that there is not");
+                  "observation " + std::to_string(k) + " refers to a nonexistent image or point");
   detail::shared_intrinsics<Camera> problem{start, options.bf, options.free, options.keeps_aspect,
                                             poses, points,     observations};
   if (problem.observations() == 0)
@@ -34,7 +34,7 @@ result<self_calibrated<Camera>> self_calibrate(const Camera& start, std::span<se
   for (const int limit : {options.robust_iterations, options.iterations}) {
     if (!problem.descend(limit, options.relative_tolerance, found.iterations, go_on))
       return fail(errc::cancelled, where, "cancelled");
-    problem.leave_out_outliers();
+    problem.update_outliers();
     if (!problem.has_depth()) return fail(errc::degenerate, where, "no observation with depth agrees with the others");
   }
   if (!problem.covariance(found.covariance))

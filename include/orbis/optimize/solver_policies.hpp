@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// What the solvers of bundle adjustment and pose graphs are made of: how they step (Gauss-Newton, Levenberg-Marquardt,
-/// dogleg), and how bundle adjustment solves its reduced system (dense, sparse, iterative).
+/// Policies of the solvers of bundle adjustment and pose graphs: step strategies (Gauss-Newton, Levenberg-Marquardt,
+/// dogleg), and solvers for the reduced system of bundle adjustment (dense, sparse, iterative).
 ///
 /// Sources: K. Madsen, H. B. Nielsen, O. Tingleff, "Methods for non-linear least squares problems",
 /// 2nd edition, DTU 2004; M. J. D. Powell, "A hybrid method for nonlinear equations", 1970.
@@ -19,10 +19,10 @@
 
 namespace orbis::optimize {
 
-/// A problem that is linearised at its current estimate: it has the cost there, its gradient `g`, and the positive
-/// semidefinite `H` of the model `cost + g^T s + s^T H s / 2`. `factor(d)` factors `H + diag(d)` (an empty `d` is 0)
-/// and returns whether it is positive definite; `newton_step(x)` then sets `x` to the solution for the right-hand side
-/// `-g`. `try_step(s)` is the true cost one step away, and not finite where there is none.
+/// A problem linearised at its current estimate: it provides the cost there, its gradient `g`, and the positive
+/// semidefinite `H` of the model `cost + g^T s + s^T H s / 2`. `factor(d)` factorises `H + diag(d)` (an empty `d` is 0)
+/// and returns true if it is positive definite; `newton_step(x)` then sets `x` to the solution for the right-hand side
+/// `-g`. `try_step(s)` is the true cost after a step; not finite if it is undefined.
 template <class P>
 concept stepped_problem = requires(P& problem, const Eigen::VectorXd& in, Eigen::VectorXd& out) {
   { problem.cost() } -> std::same_as<double>;
@@ -35,19 +35,19 @@ concept stepped_problem = requires(P& problem, const Eigen::VectorXd& in, Eigen:
 };
 
 enum class step_outcome {
-  taken,       ///< keep the step tried last
-  stationary,  ///< the model predicts a decrease that rounding cannot tell from 0
+  taken,       ///< accept the last attempted step
+  stationary,  ///< the predicted decrease is below rounding
   exhausted,   ///< no step lowers the cost
   singular     ///< H is not positive definite
 };
 
-/// Memory of the policies, kept between steps.
+/// Reusable memory of the policies.
 struct step_workspace {
   Eigen::VectorXd step, damping, metric, newton, cauchy, scratch;
 };
 
 namespace detail {
-/// The members that a policy may use, for the concept below; never constructed.
+/// The members available to a policy, for the concept below; never constructed.
 struct any_stepped_problem {
   double cost() const;
   const Eigen::VectorXd& gradient() const;
@@ -59,7 +59,7 @@ struct any_stepped_problem {
 };
 }  // namespace detail
 
-/// A way to choose steps, for every `stepped_problem`. `state` is what it keeps between the steps of one solution.
+/// A step strategy for any `stepped_problem`. `state` is kept between the steps of one solution.
 template <class D>
 concept damping_policy = std::copyable<D> && std::default_initializable<typename D::state> &&
     requires(const D& d, typename D::state& s, detail::any_stepped_problem& problem, step_workspace& w) {
@@ -68,11 +68,11 @@ concept damping_policy = std::copyable<D> && std::default_initializable<typename
 
 namespace detail {
 
-/// Whether a decrease is below the rounding of a sum of squares.
+/// Returns true if a decrease is below the rounding of a sum of squares.
 [[nodiscard]] inline bool is_rounding(double decrease, double cost) { return decrease <= 1e-14 * cost; }
 
-/// The outcome when the predicted decrease is below rounding: `stationary`, unless only the damping keeps the step
-/// short. Judged by the diagonal of H, which bounds the decrease.
+/// The outcome when the predicted decrease is below rounding: `stationary`, unless the step is short only because of
+/// the damping. Uses the diagonal of H, which bounds the decrease.
 template <class P>
 [[nodiscard]] step_outcome bottom_or_stuck(P& problem) {
   double promise = 0.0;
@@ -81,7 +81,7 @@ template <class P>
   return promise <= 1e-12 * problem.cost() ? step_outcome::stationary : step_outcome::exhausted;
 }
 
-/// `out[i] = value(i)` for every unknown.
+/// Sets `out[i] = value(i)` for every unknown.
 template <class Value>
 void set_each(Eigen::VectorXd& out, Eigen::Index size, const Value& value) {
   if (out.size() != size) out.resize(size);
@@ -105,7 +105,7 @@ void set_metric(P& problem, Eigen::VectorXd& out) {
 
 }  // namespace detail
 
-/// Steps to the minimum of the model, even where the true cost rises.
+/// Steps to the minimum of the model, even if the true cost increases.
 struct gauss_newton {
   struct state {};
 
@@ -120,8 +120,8 @@ struct gauss_newton {
   }
 };
 
-/// Steps to the minimum of the model with `lambda * diag(H)` added to H; `lambda` falls where the model was good, and
-/// rises where it was not.
+/// Steps to the minimum of the model with `lambda * diag(H)` added to H; `lambda` decreases after accurate predictions
+/// and increases after inaccurate ones.
 struct levenberg_marquardt {
   double initial = 1e-5;  ///< first lambda
   int max_attempts = 16;  ///< rejected steps before giving up
@@ -161,8 +161,8 @@ struct levenberg_marquardt {
   }
 };
 
-/// Steps between steepest descent and the minimum of the model, within a radius in which the model holds. A rejected
-/// step costs no factorisation.
+/// Steps between steepest descent and the minimum of the model, within a trust region. A rejected step costs no
+/// factorisation.
 struct dogleg {
   double initial_radius = 0.0;  ///< 0: the length of the first Gauss-Newton step
   int max_attempts = 30;        ///< rejected steps before giving up
@@ -190,7 +190,7 @@ struct dogleg {
       } else if (cauchy >= s.radius) {
         const double part = s.radius / cauchy;
         detail::set_each(w.step, n, [&](Eigen::Index i) { return part * w.cauchy[i]; });
-      } else {  // where does the leg leave the region?
+      } else {  // intersection of the leg with the trust region
         detail::set_each(w.scratch, n, [&](Eigen::Index i) { return w.newton[i] - w.cauchy[i]; });
         const double a = square(w.scratch, w);
         const double b = weighted_dot(w.scratch, w.metric, w.cauchy);
@@ -221,7 +221,7 @@ struct dogleg {
   [[nodiscard]] static double length(const Eigen::VectorXd& x, const step_workspace& w) {
     return std::sqrt(square(x, w));
   }
-  /// The Gauss-Newton step, with the least damping that makes H positive definite.
+  /// The Gauss-Newton step, with the smallest damping that makes H positive definite.
   template <stepped_problem P>
   [[nodiscard]] static bool find_newton(P& problem, step_workspace& w) {
     const Eigen::VectorXd none;
@@ -236,14 +236,14 @@ struct dogleg {
   }
 };
 
-/// How bundle adjustment solves its reduced system: densely up to `dense_limit` cameras, best up to about a hundred
-/// with many points in common ((C cameras)^3 / 3 multiplications); by a block-sparse factorisation in a fill-reducing
-/// order while the factor has at most `fill_limit` blocks, as for thousands of cameras along a path; beyond by
-/// conjugate gradients, preconditioned with the diagonal blocks, where inexact steps have to do.
+/// Solver for the reduced system of bundle adjustment: dense up to `dense_limit` cameras, fastest for up to about a
+/// hundred with many common points ((C cameras)^3 / 3 multiplications); a block-sparse factorisation in a fill-reducing
+/// order while the factor has at most `fill_limit` blocks, as for thousands of cameras along a path; otherwise
+/// conjugate gradients, preconditioned with the diagonal blocks, with inexact steps.
 struct reduced_solver_options {
   std::size_t dense_limit = 100;
   std::size_t fill_limit = 2'000'000;
-  double relative_tolerance = 1e-6;  ///< of the iteration: norm of the residual over that of the right side
+  double relative_tolerance = 1e-6;  ///< of the iteration: norm of the residual divided by that of the right-hand side
   int max_iterations = 500;          ///< of the iteration
 };
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The functions of triangulation.hpp.
+/// Implementation of triangulation.hpp.
 #pragma once
 
 #include <algorithm>
@@ -19,15 +19,16 @@ ORBIS_INLINE mat3 essential_of(const se3& T_second_first) {
   return hat<double>(T_second_first.translation()) * T_second_first.rotation_matrix();
 }
 
-/// Moves two rays at z = 1 by the least sum of squares so that they meet. Two steps, after which nothing changes.
-ORBIS_INLINE void make_rays_meet(const mat3& essential, vec3& first, vec3& second) {
+/// Corrects two rays at z = 1 by the least sum of squares so that they intersect. Two steps, which suffice for
+/// convergence.
+ORBIS_INLINE void intersect_rays(const mat3& essential, vec3& first, vec3& second) {
   // `second` is x and `first` is x' in the paper.
   const mat2 e = block<2, 2>(essential, 0, 0);
   vec2 n = head<2>(essential * first), m = head<2>(transposed(essential) * second);
   const double a = dot(n, e * m), b = 0.5 * (squared_norm(n) + squared_norm(m));
   const double c = dot(second, essential * first);
   const double d = std::sqrt(std::fmax(0.0, b * b - a * c));
-  if (!(b + d > 0.0)) return;  // along the baseline: they meet anyway
+  if (!(b + d > 0.0)) return;  // along the baseline: they intersect anyway
   double lambda = c / (b + d);
   const vec2 moved_second = lambda * n, moved_first = lambda * m;
   n -= e * moved_first;
@@ -47,7 +48,7 @@ triangulation triangulate_all(std::span<const basic_se3<S>> T_world_camera, std:
   const std::size_t n = rays.size();
   if (n < 2) return out;
   const auto direction = [&](std::size_t i) { return vec3(normalized(T_world_camera[i].rotation() * rays[i])); };
-  // The point nearest to all rays, about their first camera for the sake of digits.
+  // The point nearest to all rays, relative to the first camera to preserve precision.
   const vec3 origin = T_world_camera[0].translation();
   mat3 a = zeros<mat3>();
   vec3 b = zeros<vec3>();
@@ -62,7 +63,7 @@ triangulation triangulate_all(std::span<const basic_se3<S>> T_world_camera, std:
     b += across * from_origin;
     baseline = std::max(baseline, norm(from_origin));
   }
-  // Two rays that are far apart: the one farthest from the first, and the one farthest from that.
+  // Two distant rays: the one farthest from the first, and the one farthest from that.
   const auto farthest_from = [&](std::size_t k) {
     std::size_t farthest = k;
     double angle = 0.0;
@@ -146,7 +147,7 @@ ORBIS_INLINE triangulation triangulate(const se3& T_world_first, const vec3& fir
   out.parallax = detail::angle_between_directions(T_second_first.rotation() * first, second);
   out.status = triangulation_status::no_parallax;
   if (!(out.parallax >= options.min_parallax)) return out;
-  detail::make_rays_meet(detail::essential_of(T_second_first), first, second);
+  detail::intersect_rays(detail::essential_of(T_second_first), first, second);
   // In the second camera: t + depth_1 u = depth_2 v.
   const vec3 u = T_second_first.rotation() * first;
   const vec3& t = T_second_first.translation();

@@ -2,7 +2,7 @@
 /// @file
 /// Triangulation: a point from the rays of two or more cameras with known poses.
 ///
-/// Rays are in the camera frame, as cameras unproject pixels; errors are distances in the plane z = 1.
+/// Rays are in the camera frame, as returned by `unproject`; errors are distances in the plane z = 1.
 ///
 /// Sources: P. Lindstrom, "Triangulation made easy", CVPR 2010, for two views; R. Hartley, P. Sturm, "Triangulation",
 /// CVIU 68 (1997), for the optimality criterion.
@@ -23,11 +23,11 @@ enum class triangulation_status {
   ok,
   too_few_views,  ///< fewer than two
   not_finite,     ///< a pose or a ray is not finite
-  no_parallax,    ///< the rays are nearly parallel or start in one place: the depth is not determined
-  behind_camera   ///< the rays meet behind a camera
+  no_parallax,    ///< the rays are nearly parallel or start at one point: the depth is not determined
+  behind_camera   ///< the rays intersect behind a camera
 };
 
-/// The status in words.
+/// The status as text.
 [[nodiscard]] constexpr std::string_view to_string(triangulation_status status) noexcept {
   switch (status) {
     case triangulation_status::ok: return "ok";
@@ -40,14 +40,14 @@ enum class triangulation_status {
 }
 
 struct triangulation_options {
-  double min_parallax = 1e-4;  ///< smallest angle between rays, radians
+  double min_parallax = 1e-4;  ///< minimum angle between rays, radians
 };
 
 struct triangulation {
   triangulation_status status = triangulation_status::too_few_views;
   vec3 point = zeros<vec3>();  ///< in the world frame, metres; valid only if `ok()`
-  double parallax = 0.0;  ///< the angle between the rays (for more than two views between two distant ones), radians
-  double error = 0.0;     ///< root mean square distance from the rays at z = 1
+  double parallax = 0.0;       ///< angle between the rays (for more than two views between two distant ones), radians
+  double error = 0.0;          ///< root mean square distance from the rays at z = 1
   [[nodiscard]] bool ok() const noexcept { return status == triangulation_status::ok; }
 };
 
@@ -74,8 +74,8 @@ template <class S>
                                         const vec3& second_ray, const triangulation_options& options = {});
 
 /// The point whose projections to z = 1 have the least sum of squared distances from all rays: starts at the point
-/// nearest to the rays and refines it by Levenberg-Marquardt. O(views) for each of a few steps.
-/// `poses` are the cameras' `T_world_camera`. @pre poses and rays are as many
+/// nearest to the rays and refines it by Levenberg-Marquardt. O(views) per step, a few steps. `poses` are the cameras'
+/// `T_world_camera`. @pre poses.size() == rays.size()
 template <std::ranges::contiguous_range Poses, std::ranges::contiguous_range Rays>
 requires std::same_as<std::ranges::range_value_t<Poses>, se3> && std::same_as<std::ranges::range_value_t<Rays>, vec3>
 [[nodiscard]] triangulation triangulate(const Poses& poses, const Rays& directions,

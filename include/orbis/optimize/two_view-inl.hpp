@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The functions of two_view.hpp.
+/// Implementation of two_view.hpp.
 #pragma once
 
 #include <algorithm>
@@ -27,7 +27,7 @@ result<relative_pose_estimate> essential_of_matches(const std::vector<Match>& ma
   auto found = ransac(estimator, ransac_part(options, essential_estimator::model_cost));
   if (!found) return fail(found.error().code, where, found.error().message);
   const double squared_threshold = options.threshold * options.threshold;
-  const std::size_t by_rotation = explained_by_rotation(matches, found->inliers, squared_threshold);
+  const std::size_t by_rotation = count_rotation_inliers(matches, found->inliers, squared_threshold);
   if (10 * by_rotation >= 9 * found->inliers.size())
     return fail(errc::degenerate, where,
                 "no parallax: a rotation alone explains " + std::to_string(by_rotation) + " of " +
@@ -51,7 +51,7 @@ result<relative_pose_estimate> essential_of_matches(const std::vector<Match>& ma
   if (auto enough = enough_inliers(where, inside.size(), n, options.min_inliers, 5); !enough)
     return fail(std::move(enough.error()));
   out.rmse = std::sqrt(sum / static_cast<double>(inside.size()));
-  // Of the four poses, the one from which the most points are in front of both cameras.
+  // Of the four poses, choose the one with the most points in front of both cameras.
   std::vector<double> angles;
   for (const se3& T_second_first : decompose_essential(essential)) {
     std::size_t in_front = 0;
@@ -98,10 +98,10 @@ result<homography_estimate> estimate_homography(std::span<const vec2> first, std
   if (matches.size() < 4)
     return fail(
         errc::degenerate, where,
-        "of " + std::to_string(n) + " matches " + std::to_string(matches.size()) + " are finite, four are needed");
+        "only " + std::to_string(matches.size()) + " of " + std::to_string(n) + " matches are finite, four are needed");
   first_centre /= static_cast<double>(matches.size());
   second_centre /= static_cast<double>(matches.size());
-  // About the centres and in units of the size of the images, so that the entries of H have one magnitude.
+  // Relative to the centres and in units of the size of the images, so that the entries of H have similar magnitude.
   double size = 0.0;
   mat2 first_spread = zeros<mat2>(), second_spread = zeros<mat2>();
   for (auto& m : matches) {
@@ -113,7 +113,7 @@ result<homography_estimate> estimate_homography(std::span<const vec2> first, std
   size = std::sqrt((trace(first_spread) + trace(second_spread)) / static_cast<double>(2 * matches.size()));
   const double threshold = options.threshold / size;
   if (!(size > 0.0) || !std::isfinite(threshold))
-    return fail(errc::degenerate, where, "the points all lie on one line or in one place");
+    return fail(errc::degenerate, where, "all points are collinear or coincident");
   for (auto& m : matches) {
     m.first /= size;
     m.second /= size;
@@ -129,7 +129,7 @@ result<homography_estimate> estimate_homography(std::span<const vec2> first, std
       return !(determinant(spread) > 1e-12 * trace(spread) * trace(spread));
     };
     if (found.error().code == errc::degenerate && (is_line(first_spread) || is_line(second_spread)))
-      return fail(errc::degenerate, where, "the points all lie on one line or in one place");
+      return fail(errc::degenerate, where, "all points are collinear or coincident");
     return fail(found.error().code, where, found.error().message);
   }
   const typename estimator_type::model model =
@@ -147,7 +147,7 @@ result<homography_estimate> estimate_homography(std::span<const vec2> first, std
   if (auto enough = detail::enough_inliers(where, out.inliers.size(), n, options.min_inliers, 4); !enough)
     return fail(std::move(enough.error()));
   out.rmse = size * std::sqrt(sum / static_cast<double>(out.inliers.size()));
-  // Back from the centres.
+  // Undo the centring.
   mat3 to_centre = identity<mat3>(), from_centre = identity<mat3>();
   for (int i = 0; i != 2; ++i) {
     to_centre(i, i) = 1.0 / size;
@@ -167,7 +167,7 @@ ORBIS_INLINE result<std::vector<plane_motion>> decompose_homography(const mat3& 
   const auto [squares, vectors] = eigen_of_symmetric<3>(mat3(transposed(h) * h));
   const double middle = std::sqrt(std::fmax(0.0, squares[1]));
   if (!(squares[0] > 1e-20 * squares[2])) return fail(errc::degenerate, where, "is singular");
-  // R + t n^T has the middle singular value 1, and a positive determinant where camera and plane are on proper sides.
+  // R + t n^T has the middle singular value 1, and a positive determinant if the plane is in front of both cameras.
   h /= middle;
   if (determinant(h) < 0.0) h = -h;
   const double s1 = squares[2] / (middle * middle), s3 = squares[0] / (middle * middle);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
 /// Two-view geometry: essential matrix and homography of two images from matched pixels, many of which may be wrong,
-/// the relative poses that they stand for, and the reconstruction of a scene from two images, or why there is none.
+/// the corresponding relative poses, and the reconstruction of a scene from two images, or the reason for its failure.
 ///
 /// Sources: D. Nister, PAMI 26(6), 2004, for five points and the choice among four decompositions; P. Sampson, "Fitting
 /// conic sections to very scattered data", CGIP 18 (1982), for the error; R. Hartley, A. Zisserman, "Multiple View
@@ -27,19 +27,19 @@
 namespace orbis::optimize {
 
 struct essential_options {
-  double threshold = 1.5;  ///< largest Sampson distance of an inlier, pixels
+  double threshold = 1.5;  ///< maximum Sampson distance of an inlier, pixels
   double confidence = 0.9999;
   std::size_t min_iterations = 10;
   std::size_t max_iterations = 10000;
-  std::size_t min_inliers = 15;  ///< fewer than this is a failure
+  std::size_t min_inliers = 15;  ///< minimum number of inliers for success
   std::uint64_t seed = 1;
 };
 
 struct relative_pose_estimate {
-  se3 T_first_second;                  ///< the second camera in the first; the translation has length 1
+  se3 T_first_second;                  ///< pose of the second camera in the first; the translation has length 1
   mat3 essential;                      ///< `second^T E first = 0` for rays, of norm sqrt(2)
   std::vector<std::uint32_t> inliers;  ///< exactly the matches within the threshold, ascending
-  std::size_t in_front = 0;            ///< inliers whose rays meet in front of both cameras
+  std::size_t in_front = 0;            ///< number of inliers whose rays intersect in front of both cameras
   double parallax = 0.0;               ///< median angle between the rays of an inlier, radians
   double rmse = 0.0;                   ///< of the inliers' Sampson distances, pixels
   std::size_t iterations = 0;
@@ -47,19 +47,19 @@ struct relative_pose_estimate {
 
 namespace detail {
 
-/// What `estimate_essential` does with the usable matches of `n`.
+/// Implements `estimate_essential` for the usable matches of `n`.
 template <class Match>
 [[nodiscard]] result<relative_pose_estimate> essential_of_matches(const std::vector<Match>& matches, std::size_t n,
                                                                   const essential_options& options);
 
 }  // namespace detail
 
-/// The essential matrix, and the relative pose, that most matches agree with: five points in RANSAC, each new best
-/// matrix refined on its inliers. `first_pixels[i]` matches `second_pixels[i]`. Matches that are not finite or cannot
-/// be unprojected are outliers. Deterministic by `options.seed`. Errors: `invalid_argument` for spans of different
-/// length or options out of range; `no_data` below five matches; `degenerate` if fewer than five can be used, no matrix
-/// has `min_inliers` inliers, or a rotation alone explains nearly all inliers, so that the translation is not
-/// determined. The message says which.
+/// Estimates the essential matrix, and the relative pose, that agrees with most matches: five points in RANSAC, each
+/// new best matrix refined on its inliers. `first_pixels[i]` matches `second_pixels[i]`. Matches that are not finite or
+/// cannot be unprojected are outliers. Deterministic for a given `options.seed`. Errors: `invalid_argument` for spans
+/// of different length or options out of range; `no_data` below five matches; `degenerate` if fewer than five are
+/// usable, no matrix has `min_inliers` inliers, or a rotation alone explains nearly all inliers, so that the
+/// translation is not determined. The message gives the reason.
 template <camera::camera_model Camera>
 [[nodiscard]] result<relative_pose_estimate> estimate_essential(std::span<const vec2> first_pixels,
                                                                 std::span<const vec2> second_pixels,
@@ -75,17 +75,17 @@ template <camera::camera_model Camera>
       detail::read_matches(first_pixels, second_pixels, camera, options.seed);
   if (matches.size() < 5)
     return fail(errc::degenerate, where,
-                "of " + std::to_string(n) + " matches " + std::to_string(matches.size()) +
-                    " are finite and in the camera's view, five are needed");
+                "only " + std::to_string(matches.size()) + " of " + std::to_string(n) +
+                    " matches are finite and in the camera's view, five are needed");
   return detail::essential_of_matches(matches, n, options);
 }
 
 struct homography_options {
-  double threshold = 3.0;  ///< largest error of an inlier, pixels: root mean square of the transfers both ways
+  double threshold = 3.0;  ///< maximum error of an inlier, pixels: root mean square of the transfers both ways
   double confidence = 0.9999;
   std::size_t min_iterations = 10;
   std::size_t max_iterations = 10000;
-  std::size_t min_inliers = 8;  ///< fewer than this is a failure
+  std::size_t min_inliers = 8;  ///< minimum number of inliers for success
   std::uint64_t seed = 1;
 };
 
@@ -105,29 +105,29 @@ struct plane_motion {
   vec3 normal = vec3(0.0, 0.0, 1.0);
 };
 
-/// The homography that most matches agree with: four points in RANSAC, each new best one refined on its inliers (least
-/// squares of the transfer errors in both images). `first[i]` matches `second[i]`, in undistorted pixels. Matches that
-/// are not finite are outliers. Deterministic by `options.seed`.
-/// Errors: `invalid_argument` for spans of different length or options out of range; `no_data` below four matches;
-/// `degenerate` if fewer than four are finite, all points of an image lie on one line, or no homography has
-/// `min_inliers` inliers. The message says which.
+/// Estimates the homography that agrees with most matches: four points in RANSAC, each new best one refined on its
+/// inliers (least squares of the transfer errors in both images). `first[i]` matches `second[i]`, in undistorted
+/// pixels. Matches that are not finite are outliers. Deterministic for a given `options.seed`. Errors:
+/// `invalid_argument` for spans of different length or options out of range; `no_data` below four matches; `degenerate`
+/// if fewer than four are finite, all points of an image are collinear, or no homography has `min_inliers` inliers. The
+/// message gives the reason.
 template <std::same_as<homography_options> Options = homography_options>
 [[nodiscard]] result<homography_estimate> estimate_homography(std::span<const vec2> first, std::span<const vec2> second,
                                                               const Options& options = {});
 
-/// The motions that a homography between rays at z = 1 may stand for, whatever its scale and sign: two, or one if there
-/// is no translation. (Two more would have the plane behind the first camera.) `ray` is any matched ray of the first
-/// camera, which lies in front of it. Errors: `degenerate` if the homography is singular or not finite.
+/// The motions that a homography between rays at z = 1 may represent, independent of its scale and sign: two, or one if
+/// there is no translation. (Two more would have the plane behind the first camera.) `ray` is any matched ray of the
+/// first camera, in front of it. Errors: `degenerate` if the homography is singular or not finite.
 [[nodiscard]] result<std::vector<plane_motion>> decompose_homography(const mat3& homography,
                                                                      const vec3& ray = vec3(0.0, 0.0, 1.0));
 
 struct two_view_options {
   double deviation = 1.0;            ///< standard deviation of a matched pixel, along each axis, pixels
-  std::size_t min_points = 50;       ///< that a reconstruction must have
-  double min_parallax = 0.02;        ///< median angle between the rays of its points, at least, radians
-  double max_rotation = 0.01;        ///< largest standard deviation of its rotation, radians ...
+  std::size_t min_points = 50;       ///< minimum number of points of a reconstruction
+  double min_parallax = 0.02;        ///< minimum median angle between the rays of its points, radians
+  double max_rotation = 0.01;        ///< maximum standard deviation of its rotation, radians ...
   double max_direction = 0.035;      ///< ... and of the direction of its translation, radians
-  double max_depth = 0.3;            ///< largest standard deviation of a point's depth, relative to the depth
+  double max_depth = 0.3;            ///< maximum standard deviation of a point's depth, relative to the depth
   double confidence = 0.999;         ///< of RANSAC
   std::size_t max_iterations = 500;  ///< of RANSAC, for either model
   std::uint64_t seed = 1;
@@ -135,34 +135,34 @@ struct two_view_options {
 
 /// A scene and the motion between two images of it. The unit of length is the median depth of `points`.
 struct two_view_reconstruction {
-  se3 T_first_second;                  ///< the second camera in the first
+  se3 T_first_second;                  ///< pose of the second camera in the first
   std::vector<vec3> points;            ///< in the first camera; their median z is 1
-  std::vector<std::uint32_t> matches;  ///< which match each point belongs to, ascending
-  std::size_t inliers = 0;             ///< matches that agree with the motion; far ones among them give no point
-  double parallax = 0.0;               ///< median angle between the rays of a point, radians
-  double rmse = 0.0;                   ///< of the inliers' distances from their epipolar lines, pixels
-  double rotation_deviation = 0.0;     ///< standard deviation of the rotation, radians ...
-  double direction_deviation = 0.0;    ///< ... and of the direction of the translation, radians
-  bool from_homography = false;        ///< whether a homography described the images better than epipolar geometry
+  std::vector<std::uint32_t> matches;  ///< index of the match of each point, ascending
+  std::size_t inliers = 0;           ///< matches that agree with the motion, including distant ones that give no point
+  double parallax = 0.0;             ///< median angle between the rays of a point, radians
+  double rmse = 0.0;                 ///< of the inliers' distances from their epipolar lines, pixels
+  double rotation_deviation = 0.0;   ///< standard deviation of the rotation, radians ...
+  double direction_deviation = 0.0;  ///< ... and of the direction of the translation, radians
+  bool from_homography = false;      ///< true if a homography described the images better than epipolar geometry
 };
 
 namespace detail {
 
-/// What `reconstruct_two_views` does with the usable matches of `n`.
+/// Implements `reconstruct_two_views` for the usable matches of `n`.
 template <class Match>
 [[nodiscard]] result<two_view_reconstruction> reconstruction_of_matches(const std::vector<Match>& matches,
                                                                         std::size_t n, const two_view_options& options);
 
 }  // namespace detail
 
-/// The scene and the motion that matched pixels show, or why they do not show it. `first_pixels[i]` matches
-/// `second_pixels[i]`; many may be wrong. `deviations`: how much more or less exact than `options.deviation` each match
-/// is, as a factor (the scale of a keypoint's level); empty: all are alike. Made to be asked again with the next image:
-/// an answer is to be relied on, where there could be two there is none.
-/// Deterministic by `options.seed`. Errors: `invalid_argument` for spans of different length or options out of range;
-/// `no_data` if fewer matches than `min_points` can be used; `degenerate` where the motion is not determined: by
-/// rotation alone, too little parallax, two motions that explain the matches about as well (as those of a plane do),
-/// too few points or too large deviations. The message says which.
+/// Reconstructs the scene and the motion from matched pixels, or returns the reason for failure. `first_pixels[i]`
+/// matches `second_pixels[i]`; many may be wrong. `deviations`: standard deviation of each match relative to
+/// `options.deviation` (the scale of a keypoint's level); empty: all are equal. Intended to be retried with the next
+/// image: a result is reliable, and ambiguous cases are rejected. Deterministic for a given `options.seed`. Errors:
+/// `invalid_argument` for spans of different length or options out of range; `no_data` if fewer than `min_points`
+/// matches are usable; `degenerate` if the motion is not determined: pure rotation, too little parallax, two motions
+/// that explain the matches about equally well (as for a plane), too few points or too large deviations. The message
+/// gives the reason.
 template <camera::camera_model Camera>
 [[nodiscard]] result<two_view_reconstruction> reconstruct_two_views(std::span<const vec2> first_pixels,
                                                                     std::span<const vec2> second_pixels,
@@ -176,7 +176,7 @@ template <camera::camera_model Camera>
   if (!(options.deviation > 0.0) || !std::isfinite(options.deviation))
     return fail(errc::invalid_argument, where, "the deviation must be positive and finite");
   if (!(options.confidence > 0.0 && options.confidence < 1.0))
-    return fail(errc::invalid_argument, where, "the confidence must lie between 0 and 1");
+    return fail(errc::invalid_argument, where, "the confidence must be between 0 and 1");
   std::vector<detail::image_match> matches = detail::read_matches(first_pixels, second_pixels, camera, options.seed);
   for (detail::image_match& m : matches) {
     const double deviation = options.deviation * (deviations.empty() ? 1.0 : deviations[m.original]);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// An image as a bag of visual words: the words that occur in it, with their values.
+/// Bags of visual words: the words that occur in an image, with their values.
 #pragma once
 
 #include <algorithm>
@@ -10,11 +10,11 @@
 
 namespace orbis::places {
 
-/// How the value of a word in an image is computed.
+/// Weighting scheme: the value of a word in an image.
 enum class weighting : std::uint8_t {
-  tf_idf,  ///< how often it occurs, times how rare it is among images
-  tf,      ///< how often it occurs
-  idf,     ///< how rare it is
+  tf_idf,  ///< term frequency times inverse document frequency
+  tf,      ///< term frequency: number of occurrences in the image
+  idf,     ///< inverse document frequency: rarity among images
   binary   ///< one
 };
 
@@ -34,10 +34,10 @@ struct bag_of_words {
   friend bool operator==(const bag_of_words&, const bag_of_words&) = default;
 };
 
-/// The largest weight of a word, so that values and their sums stay finite.
+/// Maximum weight of a word; keeps values and their sums finite.
 inline constexpr float largest_weight = 1e20F;
 
-/// Scales the values to a sum of 1; words whose value underflows to zero are erased. Does nothing for an empty bag.
+/// Scales the values to a sum of 1; erases words whose value underflows to zero. Does nothing for an empty bag.
 /// O(words).
 inline void normalize(bag_of_words& bag) noexcept {
   double sum = 0.0;
@@ -48,8 +48,8 @@ inline void normalize(bag_of_words& bag) noexcept {
   std::erase_if(bag.words, [](const word_value& w) { return !(w.value > 0.0F); });
 }
 
-/// How alike two normalised bags are, from 0 (nothing in common) to 1 (equal): the sum of what both have, which is
-/// 1 - |a - b| / 2 in the sum of absolute values. Symmetric to the last bit. O(words).
+/// Similarity of two normalised bags, from 0 (no common words) to 1 (equal): the sum of the smaller of both values of
+/// each word, which equals 1 - |a - b| / 2 with the L1 norm. Symmetric to the last bit. O(words).
 /// Source: D. Nister, H. Stewenius, "Scalable recognition with a vocabulary tree", CVPR 2006; D. Galvez-Lopez, J. D.
 /// Tardos, "Bags of binary words for fast place recognition in image sequences", IEEE T-RO 2012.
 [[nodiscard]] inline double similarity(const bag_of_words& a, const bag_of_words& b) noexcept {
@@ -59,14 +59,14 @@ inline void normalize(bag_of_words& bag) noexcept {
   while (i != end_i && j != end_j) {
     const std::uint32_t x = i->word, y = j->word;
     if (x == y) sum += std::min(static_cast<double>(i->value), static_cast<double>(j->value));
-    // Which one is less cannot be predicted: no branches.
+    // The comparison is unpredictable: no branches.
     i += x <= y ? 1 : 0;
     j += y <= x ? 1 : 0;
   }
   return std::clamp(sum, 0.0, 1.0);
 }
 
-/// How many words two bags share. O(words).
+/// Number of words that two bags share. O(words).
 [[nodiscard]] inline std::size_t shared_words(const bag_of_words& a, const bag_of_words& b) noexcept {
   std::size_t shared = 0;
   for (std::size_t i = 0, j = 0; i != a.size() && j != b.size();) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The functions of default_vocabulary.hpp.
+/// Implementation of default_vocabulary.hpp.
 #pragma once
 
 #include <span>
@@ -19,7 +19,7 @@ requires(Bits == 256) basic_vocabulary<Bits> default_vocabulary() {
   std::string bytes;
   bytes.reserve(detail::default_vocabulary_size + 4);
   for (const std::string_view text : detail::default_vocabulary_text)
-    if (!append_base85(bytes, text)) return {};  // never: tests read it
+    if (!append_base85(bytes, text)) return {};  // unreachable: covered by tests
   bytes.resize(detail::default_vocabulary_size);
   return parse_vocabulary<Bits>(std::as_bytes(std::span{bytes}), "default vocabulary").value();
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A vocabulary for ORB descriptors that needs no file.
+/// A built-in vocabulary for ORB descriptors.
 #pragma once
 
 #include <cstddef>
@@ -10,10 +10,10 @@
 namespace orbis::places {
 
 /// A vocabulary of 10,000 words for the descriptors of `features::orb_extractor`, trained on synthetic pictures and
-/// rooms. Takes a few milliseconds: keep the result, whose copies share the tree. A vocabulary that is trained on
-/// recordings of your own places, or a larger one, recognises more.
+/// rooms. Takes a few milliseconds: keep the result, whose copies share the tree. A larger vocabulary, or one trained
+/// on recordings of the target environment, has a higher recall.
 ///
-/// The example `train_vocabulary` makes the same bytes again: see the head of detail/default_vocabulary_data.hpp.
+/// The example `train_vocabulary` reproduces the same bytes: see the head of detail/default_vocabulary_data.hpp.
 template <std::size_t Bits = 256>
 requires(Bits == 256) [[nodiscard]] basic_vocabulary<Bits> default_vocabulary();
 

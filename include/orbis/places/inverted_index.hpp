@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// An inverted index: the images that have a word.
+/// An inverted index: from words to the images that contain them.
 #pragma once
 
 #include <algorithm>
@@ -15,13 +15,14 @@
 
 namespace orbis::places {
 
-/// For each word the images it occurs in, by their numbers, in no order. Words that no image has cost four bytes;
-/// lists give back what they no longer need, so that memory does not grow while as much is erased as added.
+/// For each word the numbers of the images that contain it, unordered. Unused words cost four bytes; lists release
+/// memory that they no longer need, so that memory does not grow while images are erased at the rate at which they are
+/// added.
 class inverted_index {
   static constexpr std::uint32_t nothing = ~std::uint32_t{0};
 
  public:
-  /// @pre `image` is not there yet
+  /// @pre `image` is not in the index
   void add(std::uint32_t image, const bag_of_words& bag) {
     if (!bag.empty() && bag.words.back().word >= list_of_.size())
       list_of_.resize(std::size_t{bag.words.back().word} + 1, nothing);
@@ -58,13 +59,13 @@ class inverted_index {
     unused_.clear();
   }
 
-  /// The images that have the word.
+  /// The images that contain the word.
   [[nodiscard]] std::span<const std::uint32_t> images_with(std::uint32_t word) const noexcept {
     if (word >= list_of_.size() || list_of_[word] == nothing) return {};
     return lists_[list_of_[word]];
   }
 
-  /// Bytes held. O(words).
+  /// Memory in bytes. O(words).
   [[nodiscard]] std::size_t memory() const noexcept {
     std::size_t bytes = (list_of_.capacity() + unused_.capacity()) * sizeof(std::uint32_t) +
                         lists_.capacity() * sizeof(std::vector<std::uint32_t>);
@@ -85,7 +86,7 @@ class inverted_index {
 
   std::vector<std::uint32_t> list_of_;  // by word
   std::vector<std::vector<std::uint32_t>> lists_;
-  std::vector<std::uint32_t> unused_;  // lists of no word
+  std::vector<std::uint32_t> unused_;  // free lists
 };
 
 }  // namespace orbis::places

@@ -21,43 +21,41 @@
 
 namespace orbis::places {
 
-/// The name of a keyframe: any ordered value that can be hashed.
+/// The id of a keyframe: any ordered, hashable value.
 template <class Id>
 concept keyframe_id = std::totally_ordered<Id> && std::copyable<Id> && std::default_initializable<Id> &&
     requires(const Id& id) {
   { std::hash<Id>{}(id) } -> std::convertible_to<std::size_t>;
 };
 
-/// Which keyframes a query accepts.
+/// Acceptance criteria of a query.
 struct query_options {
-  double shared_words =
-      0.8;                 ///< a candidate shares more words with the image than this part of the most that one shares
-  double min_score = 0.0;  ///< and reaches this score
-  double group_score = 0.75;  ///< and the scores of its group add up to more than this part of the best group's sum
+  double shared_words = 0.8;  ///< minimum number of shared words / that of the keyframe that shares most; exclusive
+  double min_score = 0.0;     ///< minimum score
+  double group_score = 0.75;  ///< minimum sum of a group's scores, relative to the best group; exclusive
 };
 
-/// A keyframe that may show what the image shows.
+/// A keyframe that may show the same place as the image.
 template <class Id>
 struct place_candidate {
   Id id{};
   std::uint32_t shared_words = 0;
   double score = 0.0;
-  double group_score = 0.0;  ///< the sum over its group
+  double group_score = 0.0;  ///< sum over its group
   friend bool operator==(const place_candidate&, const place_candidate&) = default;
 };
 
-/// Memory of queries, which the next one uses again: of as much as the most keyframes there ever were, and the most
-/// candidates.
+/// Reusable memory of queries: proportional to the largest number of keyframes so far and of candidates.
 template <class Id>
 struct query_workspace {
-  std::vector<std::uint32_t> shared;   ///< words, by slot
+  std::vector<std::uint32_t> shared;   ///< number of shared words, by slot
   std::vector<std::uint32_t> touched;  ///< slots that share a word
   std::vector<double> scores;          ///< by slot, of those scored in the current query
   std::vector<std::uint32_t> scored;
   std::vector<place_candidate<Id>> groups;
 };
 
-/// The default callables of queries: no keyframe is excluded, and none has neighbours.
+/// Default callables of queries: exclude no keyframe, and return no neighbours.
 struct none_excluded {
   template <class Id>
   [[nodiscard]] constexpr bool operator()(const Id&) const noexcept {
@@ -69,9 +67,9 @@ struct no_neighbors {
   [[nodiscard]] std::span<const Id> operator()(const Id&) const noexcept { return {}; }
 };
 
-/// Keyframes and their bags of words, with an inverted index. The caller chooses the ids. Results depend on the
-/// contents only, not on the order in which keyframes were added and erased. Queries on a const object may run at the
-/// same time, each with memory of its own; adding and erasing needs the object alone.
+/// Keyframes and their bags of words, with an inverted index. The caller chooses the ids. Results depend only on the
+/// contents, not on the order in which keyframes were added and erased. Concurrent queries on a const object are
+/// allowed, each with separate memory; adding and erasing need exclusive access.
 ///
 /// Source of the criteria: R. Mur-Artal, J. D. Tardos, "ORB-SLAM: a versatile and accurate monocular SLAM system",
 /// IEEE T-RO 2015, sections III.E and VII.A.
@@ -92,8 +90,8 @@ class basic_keyframe_database {
     return keyframes_[at->second].bag;
   }
 
-  /// Adds a keyframe; false, and nothing changes, if the id is in use. O(words).
-  /// @pre the bag is normalised, and of the same vocabulary as all others
+  /// Adds a keyframe; returns false, without changes, if the id is in use. O(words).
+  /// @pre the bag is normalised, and uses the same vocabulary as all others
   bool add(const Id& id, const bag_of_words& bag) {
     const bool reuse = !free_.empty();
     const auto slot = reuse ? free_.back() : static_cast<std::uint32_t>(keyframes_.size());
@@ -109,7 +107,7 @@ class basic_keyframe_database {
     return true;
   }
 
-  /// Erases a keyframe; false if there is none of this id. O(keyframes that share its words).
+  /// Erases a keyframe; returns false if the id is unknown. O(keyframes that share its words).
   bool erase(const Id& id) {
     const auto at = slots_.find(id);
     if (at == slots_.end()) return false;
@@ -121,7 +119,7 @@ class basic_keyframe_database {
     return true;
   }
 
-  /// Gives a keyframe another id; false, and nothing changes, if there is none of this id, or `to` is in use. O(1).
+  /// Changes the id of a keyframe; returns false, without changes, if the id is unknown or `to` is in use. O(1).
   bool rename(const Id& from, const Id& to) {
     if (!contains(from) || contains(to)) return false;
     auto renamed = slots_.extract(from);
@@ -137,20 +135,20 @@ class basic_keyframe_database {
     index_.clear();
   }
 
-  /// How alike an image and a keyframe are. @pre contains(id)
+  /// Similarity of an image and a keyframe. @pre contains(id)
   [[nodiscard]] double score(const bag_of_words& image, const Id& id) const { return similarity(image, bag(id)); }
 
-  /// The keyframes that may show what an image shows, the best group first, by id where groups are equal.
+  /// Finds the keyframes that may show the same place as an image, the best group first, ties by id.
   ///
-  /// Considered are the keyframes that share words with the image, but for those that `exclude(id)` names (the
-  /// image's own surroundings, when a loop is to be closed). Of those that share enough words the scores are
-  /// computed, and a score that is high enough makes a group: the keyframe and those of its neighbours
-  /// (`neighbors(id)`, a range of ids: the keyframes that see most of the same landmarks) that were scored as well. A
-  /// group stands for a place; from each group whose scores add up to enough, its best keyframe becomes a candidate,
-  /// once. Neighbours that are not in the database are passed over.
+  /// Considers the keyframes that share words with the image, except those for which `exclude(id)` is true (the
+  /// surroundings of the image itself, for loop closure). Computes the scores of those that share enough words; each
+  /// score that is high enough forms a group: the keyframe and those of its neighbours (`neighbors(id)`, a range of
+  /// ids: the keyframes that observe most of the same landmarks) that were also scored. A group represents a place;
+  /// from each group with a sufficient sum of scores, its best keyframe becomes a candidate, once. Neighbours that are
+  /// not in the database are ignored.
   ///
-  /// O(keyframes + keyframes that share a word, word by word + candidates x words); in steady state nothing is
-  /// allocated, but by the callables.
+  /// O(keyframes + keyframes that share a word, word by word + candidates x words); in steady state only the callables
+  /// allocate memory.
   template <std::predicate<const Id&> Exclude = none_excluded, class Neighbors = no_neighbors<Id>>
   requires std::ranges::input_range<std::invoke_result_t<Neighbors&, const Id&>> &&
       std::convertible_to<std::ranges::range_reference_t<std::invoke_result_t<Neighbors&, const Id&>>, Id>
@@ -172,8 +170,8 @@ class basic_keyframe_database {
     return found;
   }
 
-  /// The `count` keyframes of the highest score, by id where scores are equal; fewer, if fewer share a word with the
-  /// image. O(keyframes that share a word x words).
+  /// The `count` keyframes of the highest score, ties by id; fewer if fewer share a word with the image. O(keyframes
+  /// that share a word x words).
   template <std::predicate<const Id&> Exclude = none_excluded>
   void best(const bag_of_words& image, std::size_t count, std::vector<candidate>& found, workspace& memory,
             Exclude&& exclude = {}) const {
@@ -196,7 +194,7 @@ class basic_keyframe_database {
     return found;
   }
 
-  /// Bytes held, about.
+  /// Approximate memory in bytes.
   [[nodiscard]] std::size_t memory() const noexcept {
     std::size_t bytes = index_.memory() + keyframes_.capacity() * sizeof(keyframe) +
                         slots_.size() * (sizeof(Id) + 3 * sizeof(void*)) + slots_.bucket_count() * sizeof(void*);
@@ -221,7 +219,7 @@ class basic_keyframe_database {
     memory.touched.clear();
     for (std::size_t i = 0; i != image.size(); ++i) {
 #if defined(__GNUC__)
-      // The next list is on its way while this one is counted.
+      // Prefetch the next list while this one is counted.
       if (i + 1 != image.size()) __builtin_prefetch(index_.images_with(image.words[i + 1].word).data());
 #endif
       for (const std::uint32_t slot : index_.images_with(image.words[i].word))
@@ -271,7 +269,7 @@ class basic_keyframe_database {
     for (const candidate& group : memory.groups) most = std::max(most, group.group_score);
     for (const candidate& group : memory.groups)
       if (group.group_score > options.group_score * most) found.push_back(group);
-    // Each keyframe once, with its best group.
+    // Keep each keyframe once, with its best group.
     std::sort(found.begin(), found.end(), [](const candidate& a, const candidate& b) {
       return a.id != b.id ? a.id < b.id : a.group_score > b.group_score;
     });
@@ -287,7 +285,7 @@ class basic_keyframe_database {
   inverted_index index_;
 };
 
-/// Keyframes with numbers as ids.
+/// A keyframe database with integer ids.
 using keyframe_database = basic_keyframe_database<>;
 
 }  // namespace orbis::places

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The functions of train.hpp.
+/// Implementation of train.hpp.
 #pragma once
 
 #include <algorithm>
@@ -19,7 +19,7 @@ namespace orbis::places {
 
 namespace detail {
 
-/// Level after level; each node's descriptors lie side by side, in the order of their images.
+/// Trains level by level; each node's descriptors are contiguous, in the order of their images.
 template <std::size_t Bits>
 class vocabulary_trainer {
   using words = bit_words<Bits>;
@@ -28,7 +28,7 @@ class vocabulary_trainer {
     std::uint64_t seed;
     [[nodiscard]] std::size_t size() const noexcept { return end - begin; }
   };
-  /// Nodes of more descriptors are split one after the other by all threads, the others side by side.
+  /// Nodes with more descriptors are split sequentially by all threads, the others in parallel.
   static constexpr std::size_t large = 65536;
 
  public:
@@ -41,12 +41,12 @@ class vocabulary_trainer {
 
   template <execution_policy Policy>
   [[nodiscard]] result<basic_vocabulary<Bits>> train(const Policy& policy) {
-    if (descriptors_.empty()) return fail(errc::no_data, "images", "there are no descriptors to learn from");
+    if (descriptors_.empty()) return fail(errc::no_data, "images", "there are no descriptors");
     if (descriptors_.size() > std::numeric_limits<std::uint32_t>::max() / 2)
       return fail(errc::invalid_argument, "images", "more than 2^31 descriptors");
     const bool by_rarity = options_.weighting == weighting::tf_idf || options_.weighting == weighting::idf;
     if (by_rarity && image_count_ < 2)
-      return fail(errc::invalid_argument, "images", "how rare a word is among images takes at least two of them");
+      return fail(errc::invalid_argument, "images", "idf weighting needs at least two images");
     total_ = descriptors_.size() * options_.depth;
     std::vector<segment> level{{0, descriptors_.size(), mix64(options_.seed)}};
     for (std::uint32_t depth = 0; depth != options_.depth && !level.empty(); ++depth) {
@@ -91,7 +91,7 @@ class vocabulary_trainer {
     return next;
   }
 
-  /// Nothing where all descriptors are the same.
+  /// Does nothing if all descriptors are equal.
   template <execution_policy Policy>
   [[nodiscard]] clustering<Bits> split(const Policy& policy, const segment& node) const {
     const auto part = std::span{descriptors_}.subspan(node.begin, node.size());
@@ -133,7 +133,7 @@ class vocabulary_trainer {
     return basic_vocabulary<Bits>{std::move(tree)};
   }
 
-  /// The logarithm of the number of images over that of those in which the word occurs: K. Sparck Jones, "A
+  /// The logarithm of the number of images divided by the number of images that contain the word: K. Sparck Jones, "A
   /// statistical interpretation of term specificity and its application in retrieval", 1972.
   [[nodiscard]] float weight_of(const segment& leaf) const {
     if (options_.weighting == weighting::tf || options_.weighting == weighting::binary) return 1.0F;
@@ -149,7 +149,7 @@ class vocabulary_trainer {
   std::vector<std::uint32_t> images_;  // of the descriptors
   std::uint32_t image_count_ = 0;
   std::vector<std::uint16_t> child_counts_;  // of the nodes
-  std::vector<words> centres_;               // of the nodes but the root
+  std::vector<words> centres_;               // of the nodes except the root
   struct ended {
     std::size_t node;
     segment part;

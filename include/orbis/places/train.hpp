@@ -18,44 +18,43 @@
 
 namespace orbis::places {
 
-/// The shape of the vocabulary, its weights and the effort of training.
+/// The shape of the vocabulary, its weighting, and the training effort.
 struct training_options {
-  std::uint32_t branching = 10;  ///< children of a node, at most; from 2 to 65535
-  std::uint32_t depth = 4;       ///< levels below the root, at least 1; branching^depth is the most words there can be
+  std::uint32_t branching = 10;  ///< maximum number of children of a node; from 2 to 65535
+  std::uint32_t depth = 4;       ///< levels below the root, at least 1; branching^depth is the maximum number of words
   places::weighting weighting = places::weighting::tf_idf;
   std::uint64_t seed = 1;
   int max_iterations = 10;  ///< of each clustering
 };
 
-/// Images, as the ranges of their descriptors.
+/// A range of images, each a range of descriptors.
 template <class R>
 concept training_images = std::ranges::forward_range<R> && bit_string_range<std::ranges::range_value_t<R>>;
 
 namespace detail {
 
-/// The descriptors of images, one after the other.
+/// The descriptors of images, concatenated.
 template <std::size_t Bits>
 struct training_data {
   std::vector<bit_words<Bits>> descriptors;
-  std::vector<std::uint32_t> images;  ///< of the descriptors
+  std::vector<std::uint32_t> images;  ///< the image of each descriptor
   std::uint32_t image_count = 0;
 };
 
-/// `train` for any images.
+/// `train` for any type of images.
 template <std::size_t Bits, execution_policy Policy>
 [[nodiscard]] result<basic_vocabulary<Bits>> train_by(const Policy& policy, training_data<Bits> data,
                                                       const training_options& options, const progress& report);
 
 }  // namespace detail
 
-/// Learns a vocabulary from the descriptors of images that should show what there is to see, each no more than a few
-/// times. The same seed gives the same vocabulary under every policy. A node whose descriptors are all the same is not
-/// split. O(descriptors x depth x branching x iterations) time; memory for two copies of the descriptors.
-/// `report` counts descriptors times levels.
+/// Trains a vocabulary from the descriptors of representative images, each part of the environment shown at most a few
+/// times. The same seed gives the same vocabulary under every policy. A node whose descriptors are all equal is not
+/// split. O(descriptors x depth x branching x iterations) time; memory for two copies of the descriptors. `report`
+/// counts descriptors times levels.
 ///
-/// Errors: no_data, invalid_argument (weights by rarity among fewer than two images), cancelled.
-/// The library orbis::compiled holds it for descriptors of 256 bits, `seq` and `par`; users of others include
-/// train-inl.hpp.
+/// Errors: no_data, invalid_argument (idf weighting with fewer than two images), cancelled. The library orbis::compiled
+/// contains it for descriptors of 256 bits, `seq` and `par`; for others include train-inl.hpp.
 /// @pre 2 <= branching < 65536, depth >= 1, max_iterations >= 0
 template <execution_policy Policy, training_images Images>
 [[nodiscard]] auto train(const Policy& policy, const Images& images, const training_options& options = {},

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The functions of vocabulary.hpp.
+/// Implementation of vocabulary.hpp.
 #pragma once
 
 #include <array>
@@ -16,10 +16,10 @@ namespace detail {
 
 // Finds the words of many descriptors in a vocabulary's tree at once.
 //
-// In a large tree each level costs a cache miss. So several descriptors descend together, level by level: while one is
-// compared with the children of its node, the children of the other nodes are fetched from memory.
+// In a large tree each level costs a cache miss. Several descriptors therefore descend together, level by level: while
+// one is compared with the children of its node, the children of the other nodes are prefetched.
 
-/// Descriptors as bytes, and where to write their leaves.
+/// Descriptors as bytes, and the output array for their leaves.
 struct descent {
   const std::byte* descriptors;
   std::size_t count;
@@ -28,7 +28,7 @@ struct descent {
 
 template <class Target, std::size_t Bits>
 ORBIS_ALWAYS_INLINE void descend(const vocabulary_tree<Bits>& tree, const descent& d) {
-  constexpr std::size_t together = 8;  // with a few lines each, about as many as a core can fetch at once
+  constexpr std::size_t together = 8;  // at a few lines each, about the number of concurrent fetches of a core
   constexpr std::size_t line = 64;
   const tree_node* const nodes = tree.nodes.data();
   const std::uint32_t inner_end = tree.inner_end();
@@ -48,7 +48,7 @@ ORBIS_ALWAYS_INLINE void descend(const vocabulary_tree<Bits>& tree, const descen
       t.at = static_cast<std::uint32_t>(begin + i);
     }
     while (active != 0) {
-      // Drop those that are at a leaf; fetch the children of the others.
+      // Drop those that reached a leaf; fetch the children of the others.
       std::size_t kept = 0;
       for (std::size_t i = 0; i != active; ++i) {
         query_state& t = states[i];

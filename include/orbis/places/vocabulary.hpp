@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A vocabulary tree: turns descriptors into visual words and images into bags of words.
+/// A vocabulary tree: converts descriptors to visual words and images to bags of words.
 #pragma once
 
 #include <algorithm>
@@ -19,7 +19,7 @@
 
 namespace orbis::places {
 
-/// Memory of `transform`, which the next call uses again.
+/// Reusable memory of `transform`.
 struct transform_workspace {
   std::vector<std::uint32_t> words, sorted;
 };
@@ -27,10 +27,10 @@ struct transform_workspace {
 /// A tree of descriptors of `Bits` bits. A descriptor descends from the root to the nearest child at each node; the
 /// leaf that it reaches is its word.
 ///
-/// The library orbis::compiled holds that of 256 bits; users of others include vocabulary-inl.hpp.
+/// The library orbis::compiled contains the one for 256 bits; for others include vocabulary-inl.hpp.
 ///
-/// Immutable, and cheap to copy: copies share the tree. Made by `train`, `read_vocabulary`, `default_vocabulary`
-/// and the readers of other formats. A default-constructed vocabulary has no words.
+/// Immutable, and cheap to copy: copies share the tree. Created by `train`, `read_vocabulary`, `default_vocabulary` and
+/// the readers of other formats. A default-constructed vocabulary has no words.
 ///
 /// Source: D. Nister, H. Stewenius, "Scalable recognition with a vocabulary tree", CVPR 2006; D. Galvez-Lopez,
 /// J. D. Tardos, "Bags of binary words for fast place recognition in image sequences", IEEE T-RO 2012.
@@ -43,7 +43,7 @@ class basic_vocabulary {
   basic_vocabulary() : tree_{std::make_shared<tree_type>(empty_tree())} {}
   /// @pre a connected tree, see `connect_tree`
   explicit basic_vocabulary(tree_type&& tree) : tree_{std::make_shared<tree_type>(std::move(tree))} {}
-  // A move copies the pointer, so that a vocabulary that was moved from keeps its words.
+  // A move copies the pointer, so that a moved-from vocabulary keeps its words.
   basic_vocabulary(const basic_vocabulary&) noexcept = default;
   basic_vocabulary& operator=(const basic_vocabulary&) noexcept = default;
   ~basic_vocabulary() = default;
@@ -51,14 +51,14 @@ class basic_vocabulary {
   /// The number of words.
   [[nodiscard]] std::size_t size() const noexcept { return tree_->word_count(); }
   [[nodiscard]] bool empty() const noexcept { return size() == 0; }
-  /// The number of nodes, the root among them.
+  /// The number of nodes, including the root.
   [[nodiscard]] std::size_t nodes() const noexcept { return tree_->node_count; }
-  /// Levels below the root.
+  /// Number of levels below the root.
   [[nodiscard]] std::uint32_t depth() const noexcept { return tree_->depth; }
-  /// The most children that a node has.
+  /// Maximum number of children of a node.
   [[nodiscard]] std::uint32_t branching() const noexcept { return tree_->branching; }
   [[nodiscard]] places::weighting weighting() const noexcept { return tree_->weights_are; }
-  /// How much a word counts (the part that does not depend on the image). @pre word < size()
+  /// The weight of a word (the part that does not depend on the image). @pre word < size()
   [[nodiscard]] float weight(std::uint32_t word) const noexcept { return tree_->weights[word]; }
   [[nodiscard]] const tree_type& tree() const noexcept { return *tree_; }
 
@@ -69,8 +69,9 @@ class basic_vocabulary {
     return word_of_bytes(reinterpret_cast<const std::byte*>(&descriptor));
   }
 
-  /// The words of an image's descriptors as a normalised bag. Once there was an image of as many descriptors, nothing
-  /// is allocated. O(descriptors x depth x branching); safe to call from several threads, each with its own memory.
+  /// Computes the normalised bag of words of an image's descriptors. Allocates nothing after an image with the same
+  /// number of descriptors. O(descriptors x depth x branching); safe to call from several threads, each with separate
+  /// memory.
   template <bit_string_range_of<Bits> Descriptors>
   void transform(const Descriptors& descriptors, bag_of_words& bag, transform_workspace& memory) const {
     transform_bytes(reinterpret_cast<const std::byte*>(std::ranges::data(descriptors)), std::ranges::size(descriptors),

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The functions of vocabulary_file.hpp.
+/// Implementation of vocabulary_file.hpp.
 #pragma once
 
 #include <array>
@@ -28,14 +28,14 @@ namespace detail {
 inline constexpr std::uint32_t vocabulary_version = 1;
 inline constexpr std::size_t vocabulary_header = 64, vocabulary_checked_from = 16;
 
-/// The words of all descriptors, one after the other.
+/// The words of all descriptors, concatenated.
 template <std::size_t Bits>
 [[nodiscard]] std::span<std::uint64_t> all_words(std::span<bit_words<Bits>> descriptors) noexcept {
   return descriptors.empty() ? std::span<std::uint64_t>{}
                              : std::span{descriptors.front().data(), descriptors.size() * (Bits / 64)};
 }
 
-/// Reads a vocabulary of `size` bytes by `read(span)`, which fills the span or returns why it could not.
+/// Reads a vocabulary of `size` bytes by `read(span)`, which fills the span or returns an error.
 template <std::size_t Bits, class Read>
 [[nodiscard]] result<basic_vocabulary<Bits>> read_vocabulary_by(Read&& read, std::uint64_t size,
                                                                 const std::string& where) {
@@ -44,15 +44,15 @@ template <std::size_t Bits, class Read>
   if (size < header.size()) return bad("too short for a vocabulary");
   if (auto done = read(std::as_writable_bytes(std::span{header})); !done) return fail(done.error());
   if (std::memcmp(header.data(), vocabulary_magic.data(), vocabulary_magic.size()) != 0)
-    return bad("not a vocabulary of orbis: it does not begin with \"orbisvoc\"");
+    return bad("not an orbis vocabulary: it does not begin with \"orbisvoc\"");
   const auto field = [&](std::size_t at) { return load_number<std::uint32_t>(header.data() + at); };
   if (field(8) != vocabulary_version)
-    return fail(errc::unsupported, where, "version " + std::to_string(field(8)) + ", this reads version 1");
+    return fail(errc::unsupported, where, "version " + std::to_string(field(8)) + ", only version 1 is supported");
   if (field(16) != Bits)
     return fail(errc::unsupported, where,
                 "descriptors of " + std::to_string(field(16)) + " bits, not of " + std::to_string(Bits));
   const std::uint32_t nodes = field(24), inner_end = field(28), words = field(32);
-  if (field(20) > 3) return bad("weighting " + std::to_string(field(20)) + ", of which there are 0 to 3");
+  if (field(20) > 3) return bad("weighting " + std::to_string(field(20)) + ", must be 0 to 3");
   if (nodes == 0 || inner_end > nodes || words > nodes) return bad("more inner nodes or words than nodes");
   const std::uint64_t expected =
       header.size() + std::uint64_t{nodes - 1} * (Bits / 8) + std::uint64_t{words} * 4 + std::uint64_t{inner_end} * 2;
@@ -76,7 +76,7 @@ template <std::size_t Bits, class Read>
   if (auto done = read_all(std::span{tree.weights}); !done) return fail(done.error());
   std::vector<std::uint16_t> child_counts(inner_end);
   if (auto done = read_all(std::span{child_counts}); !done) return fail(done.error());
-  if (sum != field(12)) return bad("the checksum does not fit: it is damaged");
+  if (sum != field(12)) return bad("checksum mismatch: the file is damaged");
   if (std::string problem = connect_tree(tree, child_counts); !problem.empty()) return bad(std::move(problem));
   return basic_vocabulary<Bits>{std::move(tree)};
 }
@@ -124,7 +124,7 @@ result<basic_vocabulary<Bits>> read_vocabulary(const std::filesystem::path& path
   std::ifstream in{path, std::ios::binary};
   if (!in) return fail(errc::unreadable, path.string(), "cannot be opened: " + std::generic_category().message(errno));
   const auto size = std::filesystem::file_size(path, ec);
-  if (ec) return fail(errc::unreadable, path.string(), "has no size: " + ec.message());
+  if (ec) return fail(errc::unreadable, path.string(), "cannot determine the size: " + ec.message());
   const auto read = [&](std::span<std::byte> to) -> result<void> {
     if (in.read(reinterpret_cast<char*>(to.data()), static_cast<std::streamsize>(to.size()))) return {};
     return fail(errc::unreadable, path.string(), "ends while it is being read");

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Vocabularies in files, in the layout that they have in memory: a million words are read in milliseconds.
+/// Vocabulary files, in the layout of the memory: a million words are read in milliseconds.
 ///
-/// A file is little-endian and the same bytes for the same vocabulary on every machine:
+/// A file is little-endian; the same vocabulary gives the same bytes on every machine:
 ///
 ///     0   "orbisvoc"
 ///     8   version (u32), 1
@@ -14,7 +14,7 @@
 ///         the weights of the words (f32), which are the leaves in that order
 ///         the number of children (u16) of each node up to the last that has any
 ///
-/// The library orbis::compiled holds what is for 256 bits; users of others include vocabulary_file-inl.hpp.
+/// The library orbis::compiled contains the functions for 256 bits; for others include vocabulary_file-inl.hpp.
 #pragma once
 
 #include <cstddef>
@@ -31,21 +31,21 @@ namespace orbis::places {
 /// The first eight bytes of such a file.
 inline constexpr std::string_view vocabulary_magic = "orbisvoc";
 
-/// A vocabulary as the bytes of a file.
+/// Serialises a vocabulary to the bytes of a file.
 template <std::size_t Bits>
 [[nodiscard]] std::string vocabulary_bytes(const basic_vocabulary<Bits>& vocabulary);
 
-/// The vocabulary in `bytes`; `where` names them in errors. Takes no more memory than three times the bytes.
-/// Errors: malformed (with what is wrong), unsupported (another version or descriptors of other size).
+/// Parses the vocabulary in `bytes`; `where` is the location in errors. Uses at most three times the memory of the
+/// bytes. Errors: malformed (with the reason), unsupported (another version or descriptor size).
 template <std::size_t Bits = 256>
 [[nodiscard]] result<basic_vocabulary<Bits>> parse_vocabulary(std::span<const std::byte> bytes,
                                                               const std::string& where = "bytes");
 
-/// Reads a file, straight to where it stays. Errors: not_found, unreadable, malformed, unsupported.
+/// Reads a file directly into its final memory. Errors: not_found, unreadable, malformed, unsupported.
 template <std::size_t Bits = 256>
 [[nodiscard]] result<basic_vocabulary<Bits>> read_vocabulary(const std::filesystem::path& path);
 
-/// Writes a file, whole or not at all. Errors: write_failed.
+/// Writes a file atomically. Errors: write_failed.
 template <std::size_t Bits>
 [[nodiscard]] result<void> write_vocabulary(const std::filesystem::path& path,
                                             const basic_vocabulary<Bits>& vocabulary);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The tree of a vocabulary: what readers of other formats fill in.
+/// The tree of a vocabulary, constructed by readers of other formats.
 #pragma once
 
 #include <algorithm>
@@ -18,34 +18,34 @@
 
 namespace orbis::places {
 
-/// What the search needs to know of a node besides its descriptor.
+/// Links of a node, stored separately from its descriptor.
 struct tree_node {
-  std::uint32_t first_child = 0;   ///< the children end where those of the next node begin
+  std::uint32_t first_child = 0;   ///< the children end at the first child of the next node
   std::uint32_t inner_before = 0;  ///< number of nodes before this one that have children
 };
 
 /// A tree of descriptors of `Bits` bits. Nodes are numbered level by level from the root, 0; those of a level in the
-/// order of their parents, so that the children of a node stand side by side. Words are the leaves in that order.
+/// order of their parents, so that the children of a node are contiguous. Words are the leaves in that order.
 ///
-/// To make one: `resize`, fill in `descriptors` and `weights`, then call `connect_tree`.
+/// To build one: call `resize`, fill in `descriptors` and `weights`, then call `connect_tree`.
 template <std::size_t Bits>
 struct vocabulary_tree {
-  table_memory<bit_words<Bits>> descriptors;  ///< that of node i at i - 1: the root has none
-  std::vector<tree_node> nodes;               ///< up to the last that has children, and one more; all others are leaves
+  table_memory<bit_words<Bits>> descriptors;  ///< that of node i is at i - 1: the root has none
+  std::vector<tree_node> nodes;               ///< up to the last node with children, plus one; all others are leaves
   std::vector<float> weights;                 ///< of the words
   std::uint32_t node_count = 1;
-  std::uint32_t branching = 0;  ///< the most children of a node
+  std::uint32_t branching = 0;  ///< maximum number of children of a node
   std::uint32_t depth = 0;      ///< levels below the root
   weighting weights_are = weighting::tf_idf;
 
-  /// Makes room for so many nodes, the root among them. Their descriptors have no values yet. @pre > 0
+  /// Allocates `nodes_with_root` nodes; their descriptors are uninitialised. @pre > 0
   void resize(std::uint32_t nodes_with_root) {
     node_count = nodes_with_root;
     descriptors = table_memory<bit_words<Bits>>(nodes_with_root - 1);
   }
 
   [[nodiscard]] std::uint32_t word_count() const noexcept { return static_cast<std::uint32_t>(weights.size()); }
-  /// All nodes from this one on are leaves.
+  /// Number of the first node after the last one with children; all nodes from it on are leaves.
   [[nodiscard]] std::uint32_t inner_end() const noexcept { return static_cast<std::uint32_t>(nodes.size() - 1); }
   [[nodiscard]] bool is_leaf(std::uint32_t node) const noexcept {
     return node >= inner_end() || nodes[node].first_child == nodes[node + 1].first_child;
@@ -57,14 +57,14 @@ struct vocabulary_tree {
 };
 
 /// Completes a tree that has its descriptors and weights: `child_counts[i]` is the number of children of node i, for
-/// the nodes up to the last that has any. Returns what is wrong, or an empty string. O(nodes).
+/// the nodes up to the last one with children. Returns the reason of failure, or an empty string. O(nodes).
 template <std::size_t Bits>
 [[nodiscard]] std::string connect_tree(vocabulary_tree<Bits>& tree, std::span<const std::uint16_t> child_counts) {
   tree.nodes.assign(child_counts.size() + 1, {});
   tree.branching = tree.depth = 0;
   std::uint64_t next = 1;
   std::uint32_t inner = 0;
-  std::uint64_t level_end = 1;  // first node behind the level of node i
+  std::uint64_t level_end = 1;  // first node after the level of node i
   for (std::size_t i = 0; i != child_counts.size(); ++i) {
     if (i >= next) return "node " + std::to_string(i) + " has no parent";
     if (i == level_end) level_end = next;
@@ -81,7 +81,7 @@ template <std::size_t Bits>
   if (tree.node_count - inner != (tree.word_count() == 0 ? 1 : tree.word_count()))
     return std::to_string(tree.node_count - inner) + " leaves, but " + std::to_string(tree.word_count()) + " words";
   for (const float weight : tree.weights)
-    if (!(weight >= 0.0F && weight <= largest_weight)) return "a weight that is negative, beyond 1e20 or no number";
+    if (!(weight >= 0.0F && weight <= largest_weight)) return "a weight is negative, above 1e20 or NaN";
   return {};
 }
 

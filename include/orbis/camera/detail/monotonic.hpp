@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Where a distortion polynomial stops growing, and its inversion up to there.
+/// The interval in which a distortion polynomial is increasing, and its inverse there.
 #pragma once
 
 #include <algorithm>
@@ -22,9 +22,9 @@ template <std::size_t N>
   return value;
 }
 
-/// The smallest `x > 0` at which the polynomial changes sign; infinity if there is none. Exact to
-/// rounding: between neighbouring roots of its derivative, found the same way, it is monotonic.
-/// O(N^2) bisections.
+/// The smallest `x > 0` at which the polynomial changes sign; infinity if there is none. Exact to rounding: the
+/// polynomial is monotonic between neighbouring roots of its derivative, which are found recursively. O(N^2)
+/// bisections.
 template <std::size_t N>
 [[nodiscard]] double smallest_positive_root(const std::array<double, N>& c) {
   static_assert(N > 0);
@@ -63,9 +63,9 @@ template <std::size_t N>
   return count > 0 ? roots[0] : infinity;
 }
 
-/// Solves `f(x) == target` for `x` in `[0, end)`, where `f(0) == 0` and `f` grows; `f` returns value
-/// and derivative. Newton's method, kept inside a bracket by bisection. Empty if `target` is not
-/// reached. `end` may be infinite.
+/// Solves `f(x) == target` for `x` in `[0, end)`, where `f(0) == 0` and `f` is increasing; `f` returns value and
+/// derivative. Newton's method within a bracket maintained by bisection. Empty if `target` is not reached. `end` may be
+/// infinite.
 template <std::invocable<double> F>
 [[nodiscard]] std::optional<double> invert_growing(F&& f, double target, double end) {
   if (!(target >= 0.0) || !std::isfinite(target)) return std::nullopt;
@@ -83,7 +83,7 @@ template <std::invocable<double> F>
     if (value == target) break;
     (value < target ? lo : hi) = x;
     double next = x - (value - target) / slope;
-    // Before the bracket is looked at: at the root Newton's step ends on its border.
+    // Test before the bracket: at the root, Newton's step ends on the border of the bracket.
     if (std::abs(next - x) <= 4.0 * std::numeric_limits<double>::epsilon() * x) return std::clamp(next, lo, hi);
     if (!(next > lo && next < hi)) next = 0.5 * (lo + hi);
     x = next;

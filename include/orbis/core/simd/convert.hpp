@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Conversions between vectors of different kinds of numbers.
+/// Conversions between vectors of different number types.
 #pragma once
 
 #include <cstddef>
@@ -15,7 +15,7 @@ namespace orbis::simd {
 namespace detail {
 
 #if ORBIS_X86
-/// Widening, of which g++ 12 makes several instructions where there is one. V and U are registers of as many lanes.
+/// Widening, for which g++ 12 emits several instructions instead of one. V and U have the same number of lanes.
 template <class U, class V>
 ORBIS_ALWAYS_INLINE void widen_16(U& out, const V& v) noexcept {
   using T = element_of<V>;
@@ -91,7 +91,7 @@ ORBIS_TARGET_AVX512 inline void widen_64(U& out, const V& v) noexcept {
 }
 #endif
 
-/// Whether `widen_` above has it.
+/// True if `widen_` above supports the conversion.
 template <class T, class U>
 inline constexpr bool widens = ORBIS_X86 != 0 && sizeof(U) > sizeof(T) &&
                                ((std::is_integral_v<T> && std::is_integral_v<U>) ||
@@ -99,8 +99,8 @@ inline constexpr bool widens = ORBIS_X86 != 0 && sizeof(U) > sizeof(T) &&
 
 }  // namespace detail
 
-/// Each lane as a U, as static_cast does it: integers modulo 2^bits, floating-point numbers towards zero. Of those that
-/// do not fit into an integer any number comes out.
+/// Converts each lane to U as static_cast does: integers modulo 2^bits, floating-point numbers towards zero. The result
+/// is unspecified for values outside the range of an integer U.
 template <class U, class T, std::size_t N, target Target>
 [[nodiscard]] ORBIS_ALWAYS_INLINE vec<U, N, Target> convert(const vec<T, N, Target>& a) noexcept {
   using out = vec<U, N, Target>;
@@ -113,7 +113,7 @@ template <class U, class T, std::size_t N, target Target>
   } else if constexpr (std::is_integral_v<U> && std::is_floating_point_v<T> && sizeof(U) < 4) {
     return convert<U>(convert<std::int32_t>(a));
   } else if constexpr (std::is_integral_v<T> && std::is_integral_v<U> && sizeof(T) > 2 * sizeof(U)) {
-    return convert<U>(convert<detail::signed_of_size<sizeof(T) / 2>>(a));  // g++ 12 would go lane by lane
+    return convert<U>(convert<detail::signed_of_size<sizeof(T) / 2>>(a));  // g++ 12 would convert lane by lane
   } else {
     out r;
 #if ORBIS_X86
@@ -130,7 +130,7 @@ template <class U, class T, std::size_t N, target Target>
   }
 }
 
-/// A mask of these lanes for vectors whose numbers have `Size` bytes.
+/// Converts a mask to one for vectors whose numbers have `Size` bytes.
 template <std::size_t Size, std::size_t From, std::size_t N, class Target>
 [[nodiscard]] ORBIS_ALWAYS_INLINE mask<Size, N, Target> mask_as(const mask<From, N, Target>& m) noexcept {
   using out = mask<Size, N, Target>;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Compiles a kernel once for every instruction set and chooses one of them at run time.
+/// Compiles a kernel once for every instruction set and selects one at run time.
 #pragma once
 
 #include <algorithm>
@@ -10,28 +10,29 @@
 
 #include <orbis/core/simd/level.hpp>
 
-/// A kernel and everything that it calls with vectors: inlined into the function that is compiled for a target.
+/// Marks a kernel and every function that it calls with vectors: inlined into the function that is compiled for a
+/// target.
 #define ORBIS_ALWAYS_INLINE __attribute__((always_inline)) inline
-/// Behind the parameters of a lambda in a kernel.
+/// Follows the parameters of a lambda in a kernel.
 #define ORBIS_INLINE_LAMBDA __attribute__((always_inline))
 #define ORBIS_TARGET_POPCNT ORBIS_TARGET("sse4.2,popcnt")
 #define ORBIS_TARGET_AVX2 ORBIS_TARGET("avx2,fma,bmi,bmi2,popcnt")
 #define ORBIS_TARGET_AVX512 ORBIS_TARGET("avx512f,avx512bw,avx512dq,avx512vl,avx2,fma,bmi,bmi2,popcnt")
-/// A function whose products are rounded before they are summed, with all that is inlined into it. Vectors do so
-/// anyway; this is for the scalars beside them.
+/// Marks a function whose products are rounded before they are summed, including all inlined code. Vectors do so
+/// anyway; this covers the scalars next to them.
 #if defined(__clang__)
-#define ORBIS_UNFUSED  // clang fuses within one expression only, where rounded_product serves
+#define ORBIS_UNFUSED  // clang fuses within one expression only; rounded_product prevents that
 #else
 #define ORBIS_UNFUSED __attribute__((optimize("fp-contract=off")))
 #endif
 
 namespace orbis::simd {
 
-// What a kernel is compiled for: the template argument `Target` of kernels and of `vec`.
+// Targets of compilation: the template argument `Target` of kernels and of `vec`.
 
-/// What the compiler was told to assume: SSE2, NEON.
+/// The baseline of the compiler flags: SSE2, NEON.
 struct portable {
-  static constexpr std::size_t bytes = 16;  ///< of a register
+  static constexpr std::size_t bytes = 16;  ///< size of a register
   static constexpr level needs = level::portable;
 };
 /// SSE4.2 and POPCNT, for kernels that count bits.
@@ -56,7 +57,7 @@ concept target = requires {
 
 namespace detail {
 
-/// The function that holds the code of `Kernel` for a target.
+/// The function that contains the code of `Kernel` for a target.
 template <class Kernel, class Signature, class Target>
 struct code;
 #ifndef DOXYGEN
@@ -83,11 +84,11 @@ inline constexpr bool is_one_of = (std::is_same_v<T, List> || ...);
 
 }  // namespace detail
 
-/// The code of a kernel for the best of `Targets` that neither `highest` nor the processor excludes.
+/// Selects the code of a kernel for the best of `Targets` that `highest` and the processor allow.
 ///
-/// `Kernel` has a static member template `run<Target>`, declared ORBIS_ALWAYS_INLINE, that can be called as
-/// `Signature` says; no parameter is a vector. It is compiled for `portable` always and for every other one of
-/// `Targets`; where none is named: `avx2` and `avx512`.
+/// `Kernel` has a static member template `run<Target>`, declared ORBIS_ALWAYS_INLINE, with the signature `Signature`;
+/// no parameter is a vector. It is always compiled for `portable`, and for each of `Targets`; the default is `avx2` and
+/// `avx512`.
 template <class Kernel, class Signature, target... Targets>
 [[nodiscard]] Signature* kernel(level highest = level::avx512) noexcept {
   if constexpr (sizeof...(Targets) == 0) {

@@ -17,8 +17,8 @@ namespace orbis::simd {
 namespace detail {
 
 #if ORBIS_X86
-// Intrinsics of registers of 16, 32 and 64 bytes, one for bytes and one for wider numbers. SSE2 is the baseline, so
-// that 16 bytes need no attribute.
+// Intrinsics for registers of 16, 32 and 64 bytes, one for bytes and one for wider numbers. SSE2 is the baseline, so 16
+// bytes need no attribute.
 #define ORBIS_SIMD_BINARY(name, of_bytes, of_words)                                                     \
   template <class Out, class A, class B>                                                                \
   ORBIS_ALWAYS_INLINE void name##_16(Out& out, const A& a, const B& b) noexcept {                       \
@@ -91,7 +91,7 @@ ORBIS_TARGET_AVX512 inline void count_bits_64(V& out, const V& v) noexcept {
 }
 #endif
 
-/// `instruction` for registers of at least 16 bytes on x86, elsewhere `plain`.
+/// Calls `instruction` for registers of at least 16 bytes on x86, otherwise `plain`.
 template <class V, class I, class F>
 [[nodiscard]] ORBIS_ALWAYS_INLINE V binary(const V& a, const V& b, const I& instruction, const F& plain) noexcept {
   if constexpr (!V::is_native) {
@@ -110,7 +110,7 @@ concept small_unsigned = std::same_as<T, std::uint8_t> || std::same_as<T, std::u
 
 }  // namespace detail
 
-/// a + b, at most the largest number.
+/// Saturated sum: a + b, at most the largest number.
 template <detail::small_unsigned T, std::size_t N, target Target>
 [[nodiscard]] ORBIS_ALWAYS_INLINE vec<T, N, Target> add_saturated(const vec<T, N, Target>& a,
                                                                   const vec<T, N, Target>& b) noexcept {
@@ -118,7 +118,7 @@ template <detail::small_unsigned T, std::size_t N, target Target>
       a, b, [](auto& out, const auto& x, const auto& y) ORBIS_INLINE_LAMBDA { detail::add_small(out, x, y); },
       [](const auto& x, const auto& y) ORBIS_INLINE_LAMBDA { return x + min(y, ~x); });
 }
-/// a - b, at least zero.
+/// Saturated difference: a - b, at least zero.
 template <detail::small_unsigned T, std::size_t N, target Target>
 [[nodiscard]] ORBIS_ALWAYS_INLINE vec<T, N, Target> subtract_saturated(const vec<T, N, Target>& a,
                                                                        const vec<T, N, Target>& b) noexcept {
@@ -126,7 +126,7 @@ template <detail::small_unsigned T, std::size_t N, target Target>
       a, b, [](auto& out, const auto& x, const auto& y) ORBIS_INLINE_LAMBDA { detail::subtract_small(out, x, y); },
       [](const auto& x, const auto& y) ORBIS_INLINE_LAMBDA { return max(x, y) - y; });
 }
-/// (a + b + 1) / 2, rounded down, without overflow.
+/// Rounded average: (a + b + 1) / 2, rounded down, without overflow.
 template <detail::small_unsigned T, std::size_t N, target Target>
 [[nodiscard]] ORBIS_ALWAYS_INLINE vec<T, N, Target> average(const vec<T, N, Target>& a,
                                                             const vec<T, N, Target>& b) noexcept {
@@ -154,7 +154,7 @@ template <std::size_t N, target Target>
     return low + high;
   }
 }
-/// Lane i is a[2 i] * b[2 i] + a[2 i + 1] * b[2 i + 1]. Vectors of at least 16 bytes. @pre this fits into 16 bits
+/// Lane i is a[2 i] * b[2 i] + a[2 i + 1] * b[2 i + 1]. Vectors of at least 16 bytes. @pre the result fits into 16 bits
 template <std::size_t N, target Target>
 [[nodiscard]] ORBIS_ALWAYS_INLINE vec<std::int16_t, N / 2, Target> multiply_add_pairs(
     const vec<std::uint8_t, N, Target>& a, const vec<std::int8_t, N, Target>& b) noexcept {
@@ -180,8 +180,8 @@ template <std::size_t N, target Target>
   }
 }
 
-/// In each 16 bytes: the eight lanes of a, then the eight of b, as bytes between 0 and 255. One instruction. Undoes
-/// zip_low_in_blocks and zip_high_in_blocks. Vectors of at least 16 bytes.
+/// Packs each 16 bytes: the eight lanes of a, then the eight of b, clamped to bytes in [0, 255]. One instruction.
+/// Inverse of zip_low_in_blocks and zip_high_in_blocks. Vectors of at least 16 bytes.
 template <std::size_t N, target Target>
 [[nodiscard]] ORBIS_ALWAYS_INLINE vec<std::uint8_t, 2 * N, Target> narrow_in_blocks(
     const vec<std::int16_t, N, Target>& a, const vec<std::int16_t, N, Target>& b) noexcept {
@@ -203,8 +203,8 @@ template <std::size_t N, target Target>
   }
 }
 
-/// For each lane the number of its ones (W. Mula, N. Kurz, D. Lemire, "Faster population counts using AVX2
-/// instructions", The Computer Journal 2018). A few instructions for each register.
+/// Number of ones in each lane (W. Mula, N. Kurz, D. Lemire, "Faster population counts using AVX2 instructions", The
+/// Computer Journal 2018). A few instructions per register.
 template <std::size_t N, target Target>
 [[nodiscard]] ORBIS_ALWAYS_INLINE vec<std::uint64_t, N, Target> count_bits(
     const vec<std::uint64_t, N, Target>& a) noexcept {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Which instruction sets the processor has, and how a test forces a lower one.
+/// Detection of the processor's instruction sets, and a limit on them for tests.
 ///
 /// Public interfaces do not name a level: every kernel runs at `simd::best_level()`, and all levels give the same
 /// bits. A test of a component checks that by running the same public call under a `simd::level_limit`:
@@ -12,8 +12,8 @@
 ///   }
 /// @endcode
 ///
-/// An object that chooses its kernels when it is constructed must be constructed under the limit. The limit is the
-/// only thing that is shared between threads here; the library itself never sets it.
+/// An object that selects its kernels when it is constructed must be constructed under the limit. The limit is the only
+/// state shared between threads here; the library itself never sets it.
 #pragma once
 
 #include <algorithm>
@@ -22,7 +22,7 @@
 
 #if defined(__x86_64__) && (defined(__GNUC__) || defined(__clang__))
 #define ORBIS_X86 1
-/// Compiles one function for more than the baseline instruction set.
+/// Compiles one function for an instruction set above the baseline.
 #define ORBIS_TARGET(features) __attribute__((target(features)))
 #else
 #define ORBIS_X86 0
@@ -31,15 +31,15 @@
 
 namespace orbis::simd {
 
-/// Instruction sets that kernels are compiled for, each including the ones before it.
+/// Instruction sets that kernels are compiled for; each includes the previous ones.
 enum class level {
-  portable,  ///< what the compiler was told to assume; SSE2 on x86-64, NEON on ARM
+  portable,  ///< the baseline of the compiler flags; SSE2 on x86-64, NEON on ARM
   popcnt,    ///< + SSE4.2, POPCNT
   avx2,      ///< + AVX2, FMA, BMI
   avx512     ///< + AVX-512 F, BW, DQ, VL
 };
 
-/// The best level that this processor has. Cheap (a few loads) after the first call.
+/// The best level that this processor supports. Cheap (a few loads) after the first call.
 [[nodiscard]] inline level detected() noexcept {
 #if ORBIS_X86
   static const level best = [] {
@@ -59,21 +59,21 @@ enum class level {
 }
 
 namespace detail {
-/// What best_level() returns, as a number; negative until it is first asked.
+/// The result of best_level() as a number; negative before the first call.
 inline std::atomic<int> chosen_level{-1};
 }  // namespace detail
 
-/// The level that kernels run at: the processor's best one, unless a test limits it. Costs one load.
+/// The level that kernels run at: the best one of the processor, unless a test limits it. Costs one load.
 [[nodiscard]] inline level best_level() noexcept {
   const int chosen = detail::chosen_level.load(std::memory_order_relaxed);
   if (chosen >= 0) return static_cast<level>(chosen);
-  int unknown = -1;  // a limit may have been set meanwhile
+  int unknown = -1;  // a limit may have been set concurrently
   detail::chosen_level.compare_exchange_strong(unknown, static_cast<int>(detected()));
   return static_cast<level>(detail::chosen_level.load(std::memory_order_relaxed));
 }
 
-/// For tests: while it lives, `best_level()` is at most `highest`, in all threads. Limits nest; they must end in the
-/// reverse order.
+/// For tests: limits `best_level()` to at most `highest` in all threads during its lifetime. Limits nest; they must be
+/// destroyed in reverse order.
 class level_limit {
  public:
   explicit level_limit(level highest) noexcept : before_{best_level()} {
@@ -87,7 +87,7 @@ class level_limit {
   level before_;
 };
 
-/// For tests: all levels that this processor has, from `portable` up.
+/// For tests: all levels that this processor supports, ascending from `portable`.
 [[nodiscard]] inline std::vector<level> available_levels() {
   std::vector<level> levels;
   for (const level l : {level::portable, level::popcnt, level::avx2, level::avx512})

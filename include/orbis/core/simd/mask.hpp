@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Masks: which lanes of a vector a comparison holds for.
+/// Masks: the lanes of a vector for which a comparison is true.
 #pragma once
 
 #include <bit>
@@ -16,17 +16,17 @@ namespace orbis::simd {
 
 namespace detail {
 
-/// Two halves of what does not fit into one register.
+/// Two halves of a mask that does not fit into one register.
 template <class Half>
 struct halves {
   Half low, high;
 };
 
-/// Whether masks are bits in a register of their own: for 64 bytes on x86.
+/// True if masks are bits in a separate mask register: for 64 bytes on x86.
 template <std::size_t Bytes>
 inline constexpr bool masks_are_bits = ORBIS_X86 != 0 && Bytes == 64;
 
-/// The sign bits of the lanes of one register.
+/// Sign bits of the lanes of one register.
 template <class V>
 [[nodiscard]] ORBIS_ALWAYS_INLINE std::uint32_t sign_bits(const V& v) noexcept {
   constexpr std::size_t size = sizeof(element_of<V>);
@@ -62,7 +62,7 @@ template <class V>
 
 }  // namespace detail
 
-/// For each of `N` lanes of `Size` bytes, whether it is set. Made by comparisons; used by `select` and the like.
+/// A set of `N` lanes of `Size` bytes. Comparisons return it; `select` and similar functions take it.
 template <std::size_t Size, std::size_t N, class Target>
 struct mask {
   static constexpr std::size_t count = N;
@@ -70,12 +70,12 @@ struct mask {
   static constexpr bool is_bits = is_native && detail::masks_are_bits<Size * N>;
   using half = mask<Size, N / 2, Target>;
   using word = detail::word_of_bits<N>;
-  using lane = detail::signed_of_size<Size>;  ///< of a native mask that is no word: -1 where set, else 0
+  using lane = detail::signed_of_size<Size>;  ///< of a native mask that is not a word: -1 if set, else 0
   using storage =
       std::conditional_t<!is_native, detail::halves<half>, std::conditional_t<is_bits, word, detail::reg<lane, N>>>;
   storage v;
 
-  /// Bit i of `bits` says whether lane i is set.
+  /// Lane i is set if bit i of `bits` is set.
   [[nodiscard]] static ORBIS_ALWAYS_INLINE mask from_bits(std::uint64_t bits) noexcept {
     mask out;
     if constexpr (!is_native) {
@@ -89,7 +89,7 @@ struct mask {
         out.v = ((storage{} + static_cast<lane>(bits)) & each) == each;
       }
       (std::make_index_sequence<N>{});
-    } else {  // bytes, of which eight share one of the word
+    } else {  // bytes: eight of them share one byte of the word
       [&]<std::size_t... I>(std::index_sequence<I...>) ORBIS_INLINE_LAMBDA {
         constexpr storage each{static_cast<lane>(1U << (I % 8))...};
         const storage spread{static_cast<lane>(bits >> (I / 8 * 8))...};
@@ -99,7 +99,7 @@ struct mask {
     }
     return out;
   }
-  /// The first `n` lanes; all where n >= N.
+  /// Sets the first `n` lanes; all if n >= N.
   [[nodiscard]] static ORBIS_ALWAYS_INLINE mask first(std::size_t n) noexcept {
     return from_bits(n >= 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << n) - 1);
   }
@@ -137,7 +137,7 @@ template <std::size_t Size, std::size_t N, class Target>
   return a & !b;
 }
 
-/// Bit i says whether lane i is set; the bits above are zero.
+/// Bit i is set if lane i is set; the bits above are zero.
 template <std::size_t Size, std::size_t N, class Target>
 [[nodiscard]] ORBIS_ALWAYS_INLINE std::conditional_t<(N > 32), std::uint64_t, std::uint32_t> bits(
     const mask<Size, N, Target>& m) noexcept {
@@ -175,7 +175,7 @@ template <std::size_t Size, std::size_t N, class Target>
   return bits(m) == static_cast<word>(~word{0} >> (8 * sizeof(word) - N));
 }
 
-/// The number of ones in a word, by POPCNT where the target has it.
+/// Number of ones in a word, by POPCNT if the target has it.
 template <target Target>
 [[nodiscard]] ORBIS_ALWAYS_INLINE std::uint32_t ones(std::uint64_t word) noexcept {
   if constexpr (Target::needs == level::portable)
@@ -183,7 +183,7 @@ template <target Target>
   else
     return static_cast<std::uint32_t>(__builtin_popcountll(word));
 }
-/// The number of lanes that are set.
+/// Number of lanes that are set.
 template <std::size_t Size, std::size_t N, class Target>
 [[nodiscard]] ORBIS_ALWAYS_INLINE std::uint32_t number_of(const mask<Size, N, Target>& m) noexcept {
   return ones<Target>(bits(m));

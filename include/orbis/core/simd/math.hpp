@@ -13,7 +13,7 @@
 
 namespace orbis::simd {
 
-/// The magnitude; of the least signed integer itself.
+/// Absolute value; the least signed integer is returned unchanged.
 template <class T, std::size_t N, target Target>
 [[nodiscard]] ORBIS_ALWAYS_INLINE vec<T, N, Target> abs(const vec<T, N, Target>& a) noexcept {
   using V = vec<T, N, Target>;
@@ -26,7 +26,7 @@ template <class T, std::size_t N, target Target>
     return max(a, -a);
   }
 }
-/// The other sign, also of zero.
+/// Negation, including the sign of zero.
 template <class T, std::size_t N, target Target>
 [[nodiscard]] ORBIS_ALWAYS_INLINE vec<T, N, Target> operator-(const vec<T, N, Target>& a) noexcept {
   using V = vec<T, N, Target>;
@@ -36,7 +36,7 @@ template <class T, std::size_t N, target Target>
     return {-a.v.low, -a.v.high};
 }
 
-/// The correctly rounded root. About 10 to 20 cycles for each register.
+/// Correctly rounded square root. About 10 to 20 cycles per register.
 template <class T, std::size_t N, target Target>
 [[nodiscard]] ORBIS_ALWAYS_INLINE vec<T, N, Target> sqrt(const vec<T, N, Target>& a) noexcept {
   using V = vec<T, N, Target>;
@@ -59,7 +59,7 @@ template <class T, std::size_t N, target Target>
     return out;
   }
 }
-/// The largest integers that are not larger. Lane by lane on SSE2.
+/// Floor: the largest integer that is not larger. Lane by lane on SSE2.
 template <class T, std::size_t N, target Target>
 [[nodiscard]] ORBIS_ALWAYS_INLINE vec<T, N, Target> floor(const vec<T, N, Target>& a) noexcept {
   using V = vec<T, N, Target>;
@@ -79,8 +79,8 @@ template <class T, std::size_t N, target Target>
   }
 }
 
-/// a * b + c with one rounding where the target has an instruction for it (AVX2 and above) and with two elsewhere: for
-/// bounds and first guesses only, since targets differ.
+/// a * b + c with one rounding on targets with a fused instruction (AVX2 and above) and with two elsewhere. Use it only
+/// for bounds and initial guesses, since targets differ.
 template <class T, std::size_t N, target Target>
 [[nodiscard]] ORBIS_ALWAYS_INLINE vec<T, N, Target> approximate_multiply_add(const vec<T, N, Target>& a,
                                                                              const vec<T, N, Target>& b,
@@ -105,8 +105,8 @@ template <class T, std::size_t N, target Target>
 }
 
 /// 1 / sqrt(x) to about two units in the last place, for x > 0 that are neither denormal nor infinite; other lanes are
-/// of no use. Four steps of Newton's method, whose error is squared in each, from a guess that halves and negates the
-/// exponent. Many times faster than a root and a division, and the same bits on every target.
+/// unspecified. Four steps of Newton's method, each of which squares the error, from an initial guess that halves and
+/// negates the exponent. Many times faster than a root and a division; the same bits on every target.
 template <std::size_t N, target Target>
 [[nodiscard]] ORBIS_ALWAYS_INLINE vec<double, N, Target> reciprocal_root(const vec<double, N, Target>& x) noexcept {
   using V = vec<double, N, Target>;
@@ -124,7 +124,7 @@ template <std::size_t N, target Target>
   return select(x == 0.0, x, x * reciprocal_root(x));
 }
 
-/// The sum over the lanes: halves are added to each other until one number is left, on every target in the same order.
+/// Sum over the lanes: halves are added until one number is left, in the same order on every target.
 template <class T, std::size_t N, target Target>
 [[nodiscard]] ORBIS_ALWAYS_INLINE T sum(const vec<T, N, Target>& a) noexcept {
   if constexpr (N == 2)
@@ -132,7 +132,7 @@ template <class T, std::size_t N, target Target>
   else
     return sum(a.low() + a.high());
 }
-/// The least lane; which zero or NaN is not said.
+/// Minimum over the lanes; unspecified between zeros of either sign and for NaN.
 template <class T, std::size_t N, target Target>
 [[nodiscard]] ORBIS_ALWAYS_INLINE T least(const vec<T, N, Target>& a) noexcept {
   if constexpr (N == 2)
@@ -140,7 +140,7 @@ template <class T, std::size_t N, target Target>
   else
     return least(min(a.low(), a.high()));
 }
-/// The greatest lane; which zero or NaN is not said.
+/// Maximum over the lanes; unspecified between zeros of either sign and for NaN.
 template <class T, std::size_t N, target Target>
 [[nodiscard]] ORBIS_ALWAYS_INLINE T greatest(const vec<T, N, Target>& a) noexcept {
   if constexpr (N == 2)

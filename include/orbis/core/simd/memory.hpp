@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Lanes from scattered places (gather), and lanes moved together (compress).
+/// Gather (lanes from scattered addresses) and compress (selected lanes stored contiguously).
 #pragma once
 
 #include <array>
@@ -15,7 +15,7 @@ namespace orbis::simd {
 namespace detail {
 
 #if ORBIS_X86
-/// For each of eight bits a byte: entry m holds the numbers of the bits that are set in m, in their order.
+/// Entry m: the indices of the bits set in m, in order, one per byte.
 inline constexpr std::array<std::uint64_t, 256> set_bits = [] {
   std::array<std::uint64_t, 256> all{};
   for (std::size_t m = 0; m != all.size(); ++m)
@@ -24,7 +24,7 @@ inline constexpr std::array<std::uint64_t, 256> set_bits = [] {
   return all;
 }();
 
-/// Eight numbers of four bytes, or four of eight.
+/// Eight four-byte numbers, or four eight-byte numbers.
 template <class V>
 ORBIS_TARGET_AVX2 inline void compress_32(V& out, const V& v, std::uint32_t bits) noexcept {
   if constexpr (sizeof(v[0]) == 8) bits = _pdep_u32(bits, 0x55U) * 3U;
@@ -78,8 +78,8 @@ ORBIS_TARGET_AVX512 inline void gather_64(V& out, const element_of<V>* from, con
 
 }  // namespace detail
 
-/// Lane i is from[at[i]] where m is set, and that of `otherwise` elsewhere, where nothing is read. With instructions of
-/// its own for numbers of four and eight bytes on AVX2 and AVX-512 (a few cycles for each lane); else lane by lane.
+/// Lane i is from[at[i]] where m is set, else lane i of `otherwise`, without a read. Uses gather instructions for four-
+/// and eight-byte numbers on AVX2 and AVX-512 (a few cycles per lane); otherwise lane by lane.
 template <class T, std::size_t N, target Target>
 [[nodiscard]] ORBIS_ALWAYS_INLINE vec<T, N, Target> gather(const T* from, const vec<std::int32_t, N, Target>& at,
                                                            const typename vec<T, N, Target>::mask_type& m,
@@ -125,9 +125,9 @@ template <class T, std::size_t N, target Target>
   }
 }
 
-/// Writes the lanes that are set in m one after the other to `to`, and returns how many they are. Behind them there
-/// must be room for N in all, whose contents afterwards are not said. One permutation for each register of numbers of
-/// four or eight bytes on AVX2 and AVX-512; else lane by lane, without branches.
+/// Writes the lanes that are set in m contiguously to `to` and returns their number. `to` must have room for N numbers;
+/// those after the written ones are unspecified. One permutation per register for four- and eight-byte numbers on AVX2
+/// and AVX-512; otherwise lane by lane, without branches.
 template <class T, std::size_t N, target Target>
 ORBIS_ALWAYS_INLINE std::size_t compress_store(T* to, const vec<T, N, Target>& a,
                                                const typename vec<T, N, Target>::mask_type& m) noexcept {

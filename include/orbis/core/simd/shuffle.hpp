@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Lanes that change places.
+/// Permutations of lanes.
 #pragma once
 
 #include <array>
@@ -38,7 +38,7 @@ template <std::size_t Half, class V>
     return {zip<0>(a.v.high, b.v.high), zip<1>(a.v.high, b.v.high)};
   }
 }
-/// The lanes of even number (Odd = 0) or odd number (1) of a, then those of b.
+/// The even lanes (Odd = 0) or odd lanes (1) of a, then those of b.
 template <std::size_t Odd, class V>
 [[nodiscard]] ORBIS_ALWAYS_INLINE V unzip(const V& a, const V& b) noexcept {
   if constexpr (V::is_native) {
@@ -48,7 +48,7 @@ template <std::size_t Odd, class V>
     return {unzip<Odd>(a.v.low, a.v.high), unzip<Odd>(b.v.low, b.v.high)};
   }
 }
-/// As zip, within each 16 bytes.
+/// Like zip, within each 16 bytes.
 template <std::size_t Half, class V>
 [[nodiscard]] ORBIS_ALWAYS_INLINE V zip_in_blocks(const V& a, const V& b) noexcept {
   if constexpr (V::is_native) {
@@ -94,7 +94,7 @@ ORBIS_TARGET_AVX512 inline void look_up_bytes_64(V& out, const V& table, const V
 
 }  // namespace detail
 
-/// Lane i is lane I[i] of a followed by b. Vectors of one register; any number of lanes comes out.
+/// Lane i is lane I[i] of a followed by b. Vectors of one register; the result may have any number of lanes.
 template <std::size_t... I, class T, std::size_t N, target Target>
 [[nodiscard]] ORBIS_ALWAYS_INLINE vec<T, sizeof...(I), Target> shuffle(const vec<T, N, Target>& a,
                                                                        const vec<T, N, Target>& b) noexcept {
@@ -120,21 +120,21 @@ template <class T, std::size_t N, target Target>
                                                              const vec<T, N, Target>& b) noexcept {
   return detail::zip<1>(a, b);
 }
-/// The lanes of even number of a, then those of b. Undoes zip.
+/// The even lanes of a, then those of b. Inverse of zip.
 template <class T, std::size_t N, target Target>
 [[nodiscard]] ORBIS_ALWAYS_INLINE vec<T, N, Target> unzip_even(const vec<T, N, Target>& a,
                                                                const vec<T, N, Target>& b) noexcept {
   return detail::unzip<0>(a, b);
 }
-/// The lanes of odd number of a, then those of b.
+/// The odd lanes of a, then those of b.
 template <class T, std::size_t N, target Target>
 [[nodiscard]] ORBIS_ALWAYS_INLINE vec<T, N, Target> unzip_odd(const vec<T, N, Target>& a,
                                                               const vec<T, N, Target>& b) noexcept {
   return detail::unzip<1>(a, b);
 }
 
-// Within each 16 bytes: one instruction on every target. Where the order of blocks of 16 bytes does not matter, or
-// narrow_in_blocks restores it. a and b have at least 16 bytes.
+// Operations within each 16 bytes: one instruction on every target. Use them if the order of 16-byte blocks does not
+// matter, or if narrow_in_blocks restores it. a and b have at least 16 bytes.
 
 /// The first eight bytes of each 16 of a and b, interleaved.
 template <class T, std::size_t N, target Target>
@@ -149,8 +149,8 @@ template <class T, std::size_t N, target Target>
   return detail::zip_in_blocks<1>(a, b);
 }
 
-/// Lane i is table[at[i]], for numbers of four bytes. One instruction on AVX2 and AVX-512 for a table of one register;
-/// else through memory. @pre 0 <= at[i] < N
+/// Lane i is table[at[i]], for four-byte numbers. One instruction on AVX2 and AVX-512 for a table of one register;
+/// otherwise through memory. @pre 0 <= at[i] < N
 template <class T, std::size_t N, target Target>
 [[nodiscard]] ORBIS_ALWAYS_INLINE vec<T, N, Target> look_up(const vec<T, N, Target>& table,
                                                             const vec<std::int32_t, N, Target>& at) noexcept {
@@ -173,7 +173,7 @@ template <class T, std::size_t N, target Target>
     return gather(value.data(), at);
   }
 }
-/// Lane i is entry at[i] of a table that is `low` followed by `high`, for numbers of four bytes. @pre 0 <= at[i] < 2 N
+/// Lane i is entry at[i] of a table that is `low` followed by `high`, for four-byte numbers. @pre 0 <= at[i] < 2 N
 template <class T, std::size_t N, target Target>
 [[nodiscard]] ORBIS_ALWAYS_INLINE vec<T, N, Target> look_up(const vec<T, N, Target>& low, const vec<T, N, Target>& high,
                                                             const vec<std::int32_t, N, Target>& at) noexcept {
@@ -184,7 +184,7 @@ template <class T, std::size_t N, target Target>
     V out;
     detail::look_up_two_64(out.v, low.v, high.v, at.v);
     return out;
-  } else if constexpr (N == 8 && V::is_native) {  // which takes the indices modulo 8
+  } else if constexpr (N == 8 && V::is_native) {  // the instruction takes the indices modulo 8
     V a, b;
     detail::look_up_32(a.v, low.v, at.v);
     detail::look_up_32(b.v, high.v, at.v);
@@ -199,8 +199,8 @@ template <class T, std::size_t N, target Target>
   }
 }
 
-/// In each 16 bytes: byte i is byte at[i] % 16 of the same 16 of `table`, or 0 where at[i] >= 128. One instruction with
-/// SSE4.2 and above; else byte by byte.
+/// In each 16 bytes: byte i is byte at[i] % 16 of the same 16 of `table`, or 0 if at[i] >= 128. One instruction with
+/// SSE4.2 and above; otherwise byte by byte.
 template <std::size_t N, target Target>
 [[nodiscard]] ORBIS_ALWAYS_INLINE vec<std::uint8_t, N, Target> look_up_in_blocks(
     const vec<std::uint8_t, N, Target>& table, const vec<std::uint8_t, N, Target>& at) noexcept {

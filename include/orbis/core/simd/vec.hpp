@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// `vec<T, N, Target>`: N numbers that go through the same arithmetic.
+/// `vec<T, N, Target>`: a vector of N numbers with element-wise arithmetic.
 ///
-/// What does not fit into one register of the target is split into halves, so that N is free (a power of two). Lanes
-/// are rounded as IEEE 754 says and a product is never fused into a sum: all targets give the same bits. Integers are
-/// counted modulo 2^bits.
+/// A vector that does not fit into one register of the target is split into halves, so that N is any power of two.
+/// Lanes are rounded according to IEEE 754 and a product is never fused into a sum: all targets give the same bits.
+/// Integers wrap modulo 2^bits.
 #pragma once
 
 #include <cstddef>
@@ -20,16 +20,15 @@ namespace orbis::simd {
 
 namespace detail {
 
-// Registers go in and out by reference: a function that returns one is called otherwise with AVX than without.
+// Registers are passed by reference: the calling convention of a function that returns one differs with AVX.
 
-/// Keeps a product from being fused with a sum, where the target could; see rounded_product.
+/// Prevents the fusion of a product with a sum on targets that could fuse; see rounded_product.
 template <target Target, class V>
 ORBIS_ALWAYS_INLINE void round_product([[maybe_unused]] V& product) noexcept {
 #if defined(__FMA__)
   [[maybe_unused]] constexpr bool can_fuse = true;
 #else
-  [[maybe_unused]] constexpr bool can_fuse =
-      Target::needs >= level::avx2;  // where it could not, the barrier costs a copy
+  [[maybe_unused]] constexpr bool can_fuse = Target::needs >= level::avx2;  // elsewhere the barrier costs a copy
 #endif
 #if !defined(__clang__) && defined(__x86_64__)
   if constexpr (can_fuse && std::is_floating_point_v<element_of<V>>) asm("" : "+v"(product));
@@ -42,7 +41,7 @@ ORBIS_ALWAYS_INLINE void round_product([[maybe_unused]] V& product) noexcept {
 template <class V, class T>
 ORBIS_ALWAYS_INLINE void broadcast(V& out, T x) noexcept {
 #if ORBIS_X86
-  // g++ 12 fills a wide register lane by lane in a template that has no target, also with a constant.
+  // g++ 12 fills a wide register lane by lane in a template that has no target, even from a constant.
   if constexpr (sizeof(V) == 64)
     broadcast_64(out, x);
   else if constexpr (sizeof(V) == 32)
@@ -50,7 +49,7 @@ ORBIS_ALWAYS_INLINE void broadcast(V& out, T x) noexcept {
   else
 #endif
       if constexpr (std::is_floating_point_v<T>)
-    out = x - V{};  // not +: that has a sign of zero to think of
+    out = x - V{};  // not +: the sign of zero would prevent folding
   else
     out = V{} + x;
 }
@@ -64,7 +63,7 @@ struct modular_of<T, true> {
   using type = std::make_unsigned_t<T>;
 };
 
-/// Lanes chosen from two registers of the same type.
+/// Selects lanes from two registers of the same type.
 template <class To, class V, std::size_t... I>
 ORBIS_ALWAYS_INLINE void choose(To& out, const V& a, const V& b, std::index_sequence<I...>) noexcept {
   out = __builtin_shufflevector(a, b, static_cast<int>(I)...);
@@ -76,8 +75,8 @@ template <std::size_t Offset, std::size_t... I>
 
 }  // namespace detail
 
-/// N numbers of type T: floating-point numbers or integers of a fixed size. A number stands for itself in every lane.
-/// An operation costs one instruction for each register unless its comment says more.
+/// A vector of N numbers of type T: floating-point numbers or fixed-size integers. A scalar converts to a vector with
+/// that value in every lane. An operation costs one instruction per register unless its comment states otherwise.
 template <class T, std::size_t N, target Target>
 struct vec {
   static_assert(std::is_arithmetic_v<T> && N >= 2 && (N & (N - 1)) == 0, "a power of two of numbers");
@@ -87,10 +86,10 @@ struct vec {
   using mask = mask_type;
   using half = vec<T, N / 2, Target>;
   static constexpr std::size_t count = N;
-  static constexpr bool is_native = N * sizeof(T) <= Target::bytes;  ///< it fits into one register
+  static constexpr bool is_native = N * sizeof(T) <= Target::bytes;  ///< fits into one register
   using native = detail::reg<T, is_native ? N : 2>;
   using storage = std::conditional_t<is_native, native, detail::halves<half>>;
-  /// Of signed integers the unsigned ones, whose sums do not overflow.
+  /// The unsigned type for signed integers, whose sums do not overflow.
   using modular = detail::reg<typename detail::modular_of<T>::type, is_native ? N : 2>;
 
   storage v;  ///< the register, or the halves
@@ -114,7 +113,7 @@ struct vec {
     return out;
   }
 
-  /// The numbers at p, which need not be aligned.
+  /// Loads the numbers at p, which need not be aligned.
   [[nodiscard]] static ORBIS_ALWAYS_INLINE vec load(const T* p) noexcept {
     vec out;
     if constexpr (is_native)
@@ -123,8 +122,8 @@ struct vec {
       out.v.low = half::load(p), out.v.high = half::load(p + N / 2);
     return out;
   }
-  /// The first n <= N numbers at p, then zeros. Reads no more than these; through memory unless they are of four or
-  /// eight bytes in one register of AVX2 or AVX-512.
+  /// Loads the first n <= N numbers at p, then zeros. Reads only these; through memory unless they are four- or
+  /// eight-byte numbers in one register of AVX2 or AVX-512.
   [[nodiscard]] static ORBIS_ALWAYS_INLINE vec load(const T* p, std::size_t n) noexcept {
 #if ORBIS_X86
     if constexpr (is_native && sizeof(T) >= 4 && sizeof(native) >= 32) {
@@ -146,7 +145,7 @@ struct vec {
     else
       v.low.store(p), v.high.store(p + N / 2);
   }
-  /// Writes the first n <= N lanes and no more; through memory.
+  /// Writes only the first n <= N lanes; through memory.
   ORBIS_ALWAYS_INLINE void store(T* p, std::size_t n) const noexcept {
     alignas(N * sizeof(T)) T buffer[N];
     store(buffer);
@@ -216,7 +215,7 @@ struct vec {
     }
     return out;
   }
-  /// For floating-point numbers.
+  /// For floating-point numbers only.
   friend ORBIS_ALWAYS_INLINE vec operator/(const vec& a, const vec& b) noexcept {
     static_assert(std::is_floating_point_v<T>);
     if constexpr (is_native)
@@ -261,14 +260,14 @@ struct vec {
       return from_register(m.v ? a.v : b.v);
     }
   }
-  /// As std::min: b where b < a, else a (also where one of them is not a number).
+  /// Like std::min: b where b < a, else a (also if one of them is NaN).
   friend ORBIS_ALWAYS_INLINE vec min(const vec& a, const vec& b) noexcept {
     if constexpr (is_native)
       return extremum<false>(a, b);
     else
       return {min(a.v.low, b.v.low), min(a.v.high, b.v.high)};
   }
-  /// As std::max: b where a < b, else a (also where one of them is not a number).
+  /// Like std::max: b where a < b, else a (also if one of them is NaN).
   friend ORBIS_ALWAYS_INLINE vec max(const vec& a, const vec& b) noexcept {
     if constexpr (is_native)
       return extremum<true>(a, b);
@@ -276,7 +275,7 @@ struct vec {
       return {max(a.v.low, b.v.low), max(a.v.high, b.v.high)};
   }
 
-  // Bits of integers.
+  // Bit operations on integers.
   friend ORBIS_ALWAYS_INLINE vec operator&(const vec& a, const vec& b) noexcept {
     if constexpr (is_native)
       return from_register(a.v & b.v);
@@ -309,14 +308,14 @@ struct vec {
     else
       return {a.v.low << n, a.v.high << n};
   }
-  /// Of signed numbers with copies of the sign. @pre 0 <= n < bits of T
+  /// Arithmetic shift for signed numbers. @pre 0 <= n < bits of T
   friend ORBIS_ALWAYS_INLINE vec operator>>(const vec& a, int n) noexcept {
     if constexpr (is_native)
       return from_register(a.v >> static_cast<T>(n));
     else
       return {a.v.low >> n, a.v.high >> n};
   }
-  /// Lane by lane, of numbers of four or eight bytes: for smaller ones there are no such instructions.
+  /// Shifts lane by lane, for four- and eight-byte numbers only: there are no instructions for smaller ones.
   friend ORBIS_ALWAYS_INLINE vec operator<<(const vec& a, const vec& n) noexcept {
     static_assert(sizeof(T) >= 4);
     if constexpr (is_native)
@@ -374,7 +373,7 @@ struct vec {
   friend struct vec;
 };
 
-/// As many numbers as a register of the target holds.
+/// A vector that fills one register of the target.
 template <class T, target Target>
 using native_vec = vec<T, Target::bytes / sizeof(T), Target>;
 
@@ -382,11 +381,11 @@ template <class V>
 inline constexpr bool is_vec = false;
 template <class T, std::size_t N, target Target>
 inline constexpr bool is_vec<vec<T, N, Target>> = true;
-/// A `vec`, of whatever numbers.
+/// Any specialisation of `vec`.
 template <class V>
 concept vector = is_vec<V>;
 
-/// The bits of the lanes as numbers of type U; as many as fit into the same bytes.
+/// Reinterprets the bits of the lanes as numbers of type U.
 template <class U, class T, std::size_t N, target Target>
 [[nodiscard]] ORBIS_ALWAYS_INLINE auto bits_as(const vec<T, N, Target>& a) noexcept {
   using out = vec<U, N * sizeof(T) / sizeof(U), Target>;

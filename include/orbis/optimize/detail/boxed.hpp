@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A value on the heap that may be of an incomplete type where its owner is copied, moved and destroyed: API headers
-/// name the types of solvers and do not include them.
+/// A heap-allocated value whose type may be incomplete where its owner is copied, moved and destroyed: API headers can
+/// declare the types of solvers without including them.
 #pragma once
 
 #include <utility>
 
 namespace orbis::optimize::detail {
 
-/// A `T`, copied with its owner. Empty, and of no use but to be assigned to, after a move.
+/// A `T`, copied with its owner. Empty after a move; then only assignment is allowed.
 template <class T>
 class boxed {
  public:

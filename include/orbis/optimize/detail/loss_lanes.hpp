@@ -12,8 +12,8 @@
 
 namespace orbis::optimize::detail {
 
-/// `lanes_of_loss<Loss>::weigh(loss, s, cost, weight)` computes rho(s) and its derivative, up to rounding, for finite
-/// s >= 0. Losses without a specialisation are called eight times.
+/// `lanes_of_loss<Loss>::weigh(loss, s, cost, weight)` computes rho(s) and its derivative, up to rounding, for finite s
+/// >= 0. Losses without a specialisation are called eight times.
 template <robust_loss Loss>
 struct lanes_of_loss {
   template <camera::double_lanes L>
@@ -51,7 +51,7 @@ struct lanes_of_loss<huber> {
   static ORBIS_ALWAYS_INLINE void weigh(const huber& loss, const L& squared, L& cost, L& weight) {
     const double bound = loss.width * loss.width;
     const auto inside = squared <= L(bound);
-    if (all(inside)) {  // as most are; no root, no quotient
+    if (all(inside)) {  // the common case: no square root, no division
       cost = squared;
       weight = 1.0;
       return;

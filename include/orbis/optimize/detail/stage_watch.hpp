@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// How solvers measure their stages and report their iterations.
+/// Timing of solver stages, and the default report.
 #pragma once
 
 #include <chrono>

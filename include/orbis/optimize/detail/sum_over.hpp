@@ -7,7 +7,7 @@
 
 namespace orbis::optimize::detail {
 
-/// The sum of `term(i)`, i < n, as four sums side by side, so that an addition need not wait for the one before.
+/// The sum of `term(i)`, i < n, as four partial sums, which shortens the dependency chain.
 template <class Term>
 [[nodiscard]] double sum_over(std::size_t n, const Term& term) {
   double a = 0.0, b = 0.0, c = 0.0, d = 0.0;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Loops of a constant number of turns that are written out, for kernels whose numbers have to stay in registers.
+/// Unrolled loops with a constant number of iterations, for kernels whose values must stay in registers.
 #pragma once
 
 #include <type_traits>

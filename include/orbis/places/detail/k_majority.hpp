@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Clusters of binary descriptors about centres that are the majority of their members, bit by bit.
+/// Clustering of binary descriptors whose centres are the bitwise majority of their members.
 #pragma once
 
 #include <algorithm>
@@ -18,7 +18,7 @@
 
 namespace orbis::places::detail {
 
-/// Bit k of a byte to the lowest bit of byte k.
+/// Maps bit k of a byte to the lowest bit of byte k.
 [[nodiscard]] constexpr std::array<std::uint64_t, 256> make_spread_bits() noexcept {
   std::array<std::uint64_t, 256> table{};
   for (std::size_t byte = 0; byte != 256; ++byte)
@@ -27,8 +27,8 @@ namespace orbis::places::detail {
 }
 inline constexpr std::array<std::uint64_t, 256> spread_bits = make_spread_bits();
 
-/// How many of many descriptors have each bit set: counts bit by bit, eight counters in a word until one of them could
-/// run over.
+/// Counts for each bit the descriptors that have it set: bit by bit, with eight counters per word that are flushed
+/// before one of them can overflow.
 template <std::size_t Bits>
 class bit_votes {
  public:
@@ -46,7 +46,7 @@ class bit_votes {
   }
   [[nodiscard]] std::uint64_t total() const noexcept { return total_ + pending_; }
 
-  /// The bits that more than half have set; of those that exactly half have, what `tie` says.
+  /// The bits that more than half of the descriptors have set; ties take the bit of `tie`.
   [[nodiscard]] bit_words<Bits> majority(const bit_words<Bits>& tie) noexcept {
     flush();
     bit_words<Bits> result{};
@@ -74,20 +74,20 @@ class bit_votes {
 };
 
 struct k_majority_options {
-  std::uint32_t clusters = 10;  ///< at most; fewer where there are fewer different descriptors
+  std::uint32_t clusters = 10;  ///< maximum; fewer if there are fewer distinct descriptors
   int max_iterations = 10;
   std::uint64_t seed = 1;
 };
 
-/// Centres, each with at least one member, and the nearest centre of each descriptor (the first of equals).
+/// Centres, each with at least one member, and the nearest centre of each descriptor (the first on ties).
 template <std::size_t Bits>
 struct clustering {
   std::vector<bit_words<Bits>> centres;
   std::vector<std::uint16_t> cluster_of;
 };
 
-/// Lloyd's algorithm under the Hamming distance, whose median is the majority. All sums are of whole numbers, so
-/// that neither the number of threads nor the order matters.
+/// Lloyd's algorithm under the Hamming distance, whose median is the majority. All sums are integers, so that neither
+/// the number of threads nor the order affects the result.
 template <std::size_t Bits>
 class k_majority_solver {
   static constexpr std::size_t grain = 4096;
@@ -107,7 +107,7 @@ class k_majority_solver {
       before.swap(result_.cluster_of);
       result_.cluster_of.resize(descriptors_.size());
       assign(policy);
-      // The last step is an assignment: every descriptor is with the nearest of the centres as they stay.
+      // The last step is an assignment: every descriptor belongs to the nearest final centre.
       if (iteration >= options_.max_iterations || (iteration != 0 && before == result_.cluster_of)) break;
       move_centres(policy);
     }
@@ -116,8 +116,8 @@ class k_majority_solver {
   }
 
  private:
-  /// The next seed is a descriptor drawn with a probability that is proportional to the square of its distance to
-  /// the seeds so far: D. Arthur, S. Vassilvitskii, "k-means++: the advantages of careful seeding", SODA 2007.
+  /// Selects the next seed: a descriptor drawn with a probability proportional to its squared distance from the
+  /// existing seeds: D. Arthur, S. Vassilvitskii, "k-means++: the advantages of careful seeding", SODA 2007.
   template <execution_policy Policy>
   void choose_seeds(const Policy& policy) {
     const std::size_t n = descriptors_.size();
@@ -139,7 +139,7 @@ class k_majority_solver {
       });
       std::uint64_t total = 0;
       for (const std::uint64_t sum : sums) total += sum;
-      if (total == 0) return;  // each is one of the seeds
+      if (total == 0) return;  // all descriptors equal a seed
       std::uint64_t left = static_cast<std::uint64_t>(random_.uniform() * static_cast<double>(total));
       left = std::min(left, total - 1);
       std::size_t chunk = 0;
@@ -159,7 +159,7 @@ class k_majority_solver {
   template <execution_policy Policy>
   void move_centres(const Policy& policy) {
     const std::size_t k = result_.centres.size();
-    // A few long pieces: each has counters of its own for every cluster.
+    // A few long pieces: each has separate counters for every cluster.
     const std::size_t pieces = std::clamp<std::size_t>(descriptors_.size() / (16 * k * grain / 8 + 1), 1, 16);
     const std::size_t piece = (descriptors_.size() + pieces - 1) / pieces;
     std::vector<bit_votes<Bits>> votes(pieces * k);
@@ -169,7 +169,7 @@ class k_majority_solver {
     });
     for (std::size_t c = 0; c != k; ++c) {
       for (std::size_t p = 1; p != pieces; ++p) votes[c].add(votes[p * k + c]);
-      // One that lost all its members stays where it is: others may come near again.
+      // A centre without members is unchanged: it may gain members later.
       if (votes[c].total() != 0) result_.centres[c] = votes[c].majority(result_.centres[c]);
     }
   }
@@ -193,8 +193,8 @@ class k_majority_solver {
   clustering<Bits> result_;
 };
 
-/// Clusters `descriptors`. The same seed gives the same clusters, under every policy. O(descriptors x clusters x
-/// iterations). Nothing in, nothing out.
+/// Clusters `descriptors`. The same seed gives the same clusters under every policy. O(descriptors x clusters x
+/// iterations). Empty for empty input.
 /// Source: C. Grana, D. Borghesani, M. Manfredi, R. Cucchiara, "A fast approach for integrating ORB descriptors in
 /// the bag of words model", SPIE 2013.
 /// @pre 0 < clusters < 65536, max_iterations >= 0, fewer than 2^32 descriptors

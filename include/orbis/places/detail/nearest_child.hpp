@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The nearest of a few descriptors that lie side by side.
+/// The nearest of a few contiguous descriptors.
 #pragma once
 
 #include <algorithm>
@@ -16,7 +16,7 @@
 
 namespace orbis::places::detail {
 
-/// The Hamming distance: word by word, or in a register where that holds a descriptor.
+/// The Hamming distance: word by word, or in a register that holds a descriptor.
 template <class Target, std::size_t Bits>
 [[nodiscard]] ORBIS_ALWAYS_INLINE std::uint32_t distance_of(const bit_words<Bits>& a,
                                                             const bit_words<Bits>& b) noexcept {
@@ -30,19 +30,19 @@ template <class Target, std::size_t Bits>
   }
 }
 
-/// The nearest of `count` children, the first of equals. @pre 0 < count < 65536
+/// The nearest of `count` children, the first on ties. @pre 0 < count < 65536
 template <class Target, std::size_t Bits>
 [[nodiscard]] ORBIS_ALWAYS_INLINE std::uint32_t nearest_child(const bit_words<Bits>& query,
                                                               const bit_words<Bits>* children,
                                                               std::uint32_t count) noexcept {
-  // Distance and index in one number: the least is found without a branch that cannot be predicted.
+  // Distance and index in one number: the minimum needs no unpredictable branch.
   std::uint32_t best = ~std::uint32_t{0};
   for (std::uint32_t c = 0; c != count; ++c)
     best = std::min(best, distance_of<Target, Bits>(query, children[c]) << 16U | c);
   return best & 0xffffU;
 }
 
-/// `nearest[i]` becomes the nearest centre of descriptor `i`.
+/// Sets `nearest[i]` to the nearest centre of descriptor `i`.
 template <std::size_t Bits>
 struct assignment {
   const bit_words<Bits>* centres;
@@ -61,13 +61,13 @@ struct assignment_kernel {
   }
 };
 
-/// Does an assignment. @pre 0 < centre_count < 65536
+/// Executes an assignment. @pre 0 < centre_count < 65536
 template <std::size_t Bits>
 void assign_nearest(const assignment<Bits>& a) {
   simd::kernel<assignment_kernel, void(const assignment<Bits>&), simd::popcnt, simd::avx2>()(a);
 }
 
-/// Asks for the cache line at `p`.
+/// Prefetches the cache line at `p`.
 [[gnu::always_inline]] inline void prefetch(const void* p) noexcept {
 #if defined(__GNUC__)
   __builtin_prefetch(p);

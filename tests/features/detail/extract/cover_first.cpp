@@ -132,7 +132,7 @@ TEST_CASE("levels share by the sides of their images, and what one cannot give t
     levels[1].scale = 2.0;
     levels[2].scale = 4.0;
     std::vector<int> quotas;
-    share_out(levels, 70, quotas);
+    assign_quotas(levels, 70, quotas);
     return quotas;
   };
   CHECK(fill(1000, 1000, 1000) == std::vector<int>{40, 20, 10});

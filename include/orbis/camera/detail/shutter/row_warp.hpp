@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Where the pixels of a rolling shutter's image are in that of a global one, and the other way round.
+/// Correspondence between the pixels of a rolling-shutter image and those of a global-shutter image.
 #pragma once
 
 #include <algorithm>
@@ -19,7 +19,7 @@
 
 namespace orbis::camera::detail {
 
-/// What a row knows of its time, seconds: linear in the row.
+/// Read-out time of a row, seconds: linear in the row.
 struct row_time {
   double first = 0.0, per_row = 0.0;
 
@@ -30,24 +30,24 @@ struct row_time {
     return between(s.color_time(0.0, height), s.color_time(1.0, height));
   }
   [[nodiscard]] double operator()(double v) const noexcept { return first + per_row * v; }
-  /// The largest time of the image, forwards or backwards.
+  /// The largest absolute time of any row.
   [[nodiscard]] double largest(int height) const noexcept {
     return std::max(std::abs((*this)(-0.5)), std::abs((*this)(height - 0.5)));
   }
-  /// Whether all rows are of the frame's time.
+  /// True if all rows are read at the frame's time.
   [[nodiscard]] bool is_zero() const noexcept { return first == 0.0 && per_row == 0.0; }
 
  private:
   [[nodiscard]] static row_time between(double first, double second) noexcept { return {first, second - first}; }
 };
 
-/// The pixel that sees a point at another time, and its depth there as a multiple of its depth here.
+/// The pixel that observes a point at another time, and its depth there as a multiple of its depth here.
 struct warped_pixel {
   double x = 0.0, y = 0.0, ratio = 0.0;
 };
 
-/// The pixel at the frame's time of what the row of `y` reads at the given inverse depth. `ray`: through the pixel, at
-/// z = 1.
+/// The pixel at the frame's time of the point that row `y` observes at the given inverse depth. `ray`: through the
+/// pixel, at z = 1.
 template <camera_model Camera>
 [[nodiscard]] std::optional<warped_pixel> warp_to_frame(const Camera& camera, const row_time& time, const vec6& twist,
                                                         const vec3& ray, double y, double inverse_depth) {
@@ -57,8 +57,8 @@ template <camera_model Camera>
   return warped_pixel{pixel->x(), pixel->y(), p.z()};
 }
 
-/// The pixel that reads what the pixel of `ray` in row `y` would see at the frame's time. Which row that is, and so its
-/// time, is found by iteration; with a motion so fast that it does not settle there is none.
+/// The rolling-shutter pixel of the point that the pixel of `ray` in row `y` observes at the frame's time. Its row, and
+/// hence its time, is found by iteration; empty if the motion is too fast for convergence.
 template <camera_model Camera>
 [[nodiscard]] std::optional<warped_pixel> warp_to_row(const Camera& camera, const row_time& time, const vec6& twist,
                                                       const vec3& ray, double y, double inverse_depth) {
@@ -78,18 +78,18 @@ template <camera_model Camera>
 
 enum class warp_direction { to_frame, to_row };
 
-/// Pixels from node to node of a `row_warp`, and that are evaluated at once.
+/// Spacing of the nodes of a `row_warp` in pixels, and number of pixels evaluated at once.
 inline constexpr int warp_cell = 16;
-/// Parabolas in inverse depth: of the displacement in x, of that in y, and of the ratio of depths.
+/// Parabolas in inverse depth: of the displacement in x, the displacement in y, and the ratio of depths.
 using warp_parabolas = std::array<float, 9>;
 
-/// What a row of pixels is elsewhere; NaN where there is none. All of whole cells.
+/// Warped positions of a row of pixels; NaN where undefined. All lengths are whole cells.
 struct warped_row {
   std::vector<float> x, y, ratio;
   explicit warped_row(std::size_t size) : x(size), y(size), ratio(size) {}
 };
 
-/// Evaluates the parabolas of a row, interpolated between its nodes. Returns whether an inverse depth is larger than
+/// Evaluates the parabolas of a row, interpolated between its nodes. Returns true if an inverse depth is larger than
 /// `most`.
 struct warp_row_kernel {
   struct arguments {
@@ -124,14 +124,14 @@ struct warp_row_kernel {
   }
 };
 
-/// One of the two functions above for all pixels of an image. Over a few pixels and over inverse depth both are smooth:
-/// they are computed at nodes, for three inverse depths, and interpolated: linearly between the nodes and by a parabola
-/// in inverse depth. The error is some thousandths of a pixel for the motions of a read-out, and no pixel costs a
-/// projection. What is very near, or lies beside a node that has no pixel, is computed by itself.
+/// One of the two functions above for all pixels of an image. Both are smooth over a few pixels and over inverse depth:
+/// they are computed at nodes, for three inverse depths, and interpolated linearly between the nodes and by a parabola
+/// in inverse depth. The error is some thousandths of a pixel for the motions of a read-out, and no pixel needs a
+/// projection. Very near points, and those next to a node without a pixel, are computed individually.
 template <camera_model Camera>
 class row_warp {
  public:
-  /// O(nodes)
+  /// Allocates for the size of the camera. O(nodes)
   row_warp(const Camera& camera, warp_direction direction)
       : direction_{direction}, across_{nodes(camera.width())}, down_{nodes(camera.height())} {
     rays_.reserve(across_ * down_);
@@ -142,19 +142,19 @@ class row_warp {
     row_.resize(across_);
   }
 
-  /// For a motion. O(nodes) projections.
+  /// Sets the motion. O(nodes) projections.
   void assign(const Camera& camera, const row_time& time, const vec6& twist) {
     time_ = time;
     twist_ = twist;
     const double shift = time.largest(camera.height()) * norm(head<3>(twist));
-    constexpr double nearest = 0.25, largest_angle = 0.1;  // metres; of the shift, seen from the point
+    constexpr double nearest = 0.25, largest_angle = 0.1;  // metres; of the shift, as seen from the point
     most_inverse_ = shift > largest_angle * nearest ? largest_angle / shift : 1.0 / nearest;
     for (std::size_t j = 0; j != down_; ++j)
       for (std::size_t i = 0; i != across_; ++i) nodes_[j * across_ + i] = fit(camera, i, j);
   }
 
-  /// The pixels of what the pixels of row `y` have at their inverse depths. Those of no depth may hold anything finite
-  /// and not negative. O(pixels). @pre `inverse_depth` and `out` have whole cells
+  /// Computes the warped positions of the pixels of row `y` at their inverse depths. Entries without depth may have any
+  /// finite non-negative value. O(pixels). @pre `inverse_depth` and `out` have whole cells
   void evaluate(const Camera& camera, int y, std::span<const float> inverse_depth, warped_row& out) {
     const auto* const above = nodes_.data() + static_cast<std::size_t>(y / warp_cell) * across_;
     const auto* const below = above + across_;
@@ -171,13 +171,13 @@ class row_warp {
     }
   }
 
-  /// The number of pixels in the whole cells of a row.
+  /// Length of a row rounded up to whole cells, in pixels.
   [[nodiscard]] std::size_t padded_width() const noexcept { return (across_ - 1) * warp_cell; }
 
  private:
   static constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
 
-  [[nodiscard]] static std::size_t nodes(int size) noexcept {  // a row and a pixel past the last one
+  [[nodiscard]] static std::size_t nodes(int size) noexcept {  // one row and one pixel past the last
     return static_cast<std::size_t>((size + warp_cell - 1) / warp_cell) + 1;
   }
   [[nodiscard]] static double place(std::size_t node) noexcept { return static_cast<double>(node) * warp_cell; }
@@ -212,7 +212,7 @@ class row_warp {
     return p;
   }
 
-  /// The pixels of a cell with a larger inverse depth than `above`, without parabolas.
+  /// Computes the pixels of a cell whose inverse depth is larger than `above`, without parabolas.
   void evaluate_each(const Camera& camera, std::size_t of, int y, std::span<const float> inverse_depth, float above,
                      warped_row& out) const {
     constexpr float none = std::numeric_limits<float>::quiet_NaN();
@@ -228,12 +228,12 @@ class row_warp {
 
   warp_direction direction_;
   std::size_t across_, down_;
-  std::vector<vec3> rays_;             // of the nodes; NaN where there is none
+  std::vector<vec3> rays_;             // of the nodes; NaN where undefined
   std::vector<warp_parabolas> nodes_;  // NaN where there is no pixel
-  std::vector<warp_parabolas> row_;    // of the present row
+  std::vector<warp_parabolas> row_;    // of the current row
   row_time time_;
   vec6 twist_ = zeros<vec6>();
-  double most_inverse_ = 0.0;  // up to which the parabolas hold, 1 / metre
+  double most_inverse_ = 0.0;  // upper limit of the parabolas' validity, 1 / metre
 };
 
 }  // namespace orbis::camera::detail

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// From warped pixels to images.
+/// Resamples images at warped pixels.
 #pragma once
 
 #include <cstddef>
@@ -12,7 +12,7 @@
 
 namespace orbis::camera::detail {
 
-/// Where the nearest pixel to each place is in memory, or -1 outside of the image.
+/// Computes the memory offset of the pixel nearest to each position, or -1 outside the image.
 struct nearest_pixels_kernel {
   struct arguments {
     std::size_t count;  ///< whole cells
@@ -38,19 +38,19 @@ struct nearest_pixels_kernel {
   }
 };
 
-/// Which difference of inverse depth there is between neighbours on one surface, at most, as a part of it.
+/// Maximum difference of inverse depth between neighbours on one surface, as a fraction of it.
 inline constexpr float same_surface = 0.03F;
 
-/// Reads inverse depth between pixels, linearly, of those pixels only that lie on the surface that is looked for.
+/// Interpolates inverse depth linearly between pixels, using only pixels that lie on the target surface.
 struct read_surface_kernel {
   struct arguments {
     std::size_t count;  ///< whole cells
     int width, height;
-    const float* surface;  ///< inverse depth where it is to be known ...
-    const float *x, *y;    ///< ... the place where it was read ...
-    const float* ratio;    ///< ... and the depth there as a multiple of that here
-    const float* inverse;  ///< of the image as read, with a border of one pixel of zeros
-    float* metres;         ///< 0 where there is none
+    const float* surface;  ///< inverse depth of the target surface ...
+    const float *x, *y;    ///< ... the position where it was read ...
+    const float* ratio;    ///< ... and the depth there as a multiple of the depth here
+    const float* inverse;  ///< of the image as read, with a border of one zero pixel
+    float* metres;         ///< 0 where undefined
   };
   using signature = void(const arguments&);
 
@@ -86,7 +86,7 @@ struct read_surface_kernel {
       add(at + numbers(1), u * (one - v));
       add(at + numbers(stride), (one - u) * v);
       add(at + numbers(stride + 1), u * v);
-      constexpr float least = 0.24F;  // of a pixel that is half a pixel off in both directions
+      constexpr float least = 0.24F;  // weight of a pixel that is half a pixel off in both directions, with a margin
       const auto found = inside & (weights >= lanes(least));
       // 1 / (sum / weights * ratio)
       select(found, weights / select(found, sum * ratio, one), zero).store(a.metres + i);

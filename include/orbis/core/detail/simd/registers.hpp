@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// One register: the compiler's vector types, and what they lack on x86.
+/// One register: the compiler's vector types and the operations that they lack on x86.
 ///
-/// The compilers' vectors give arithmetic, shifts, comparisons, conversions and constant shuffles. The rest is here,
-/// function by function. Every function that needs an instruction set carries its attribute and takes registers by
-/// reference: so it can be named in a kernel's template, which has no attribute, and is inlined once the template is
+/// The compilers' vectors provide arithmetic, shifts, comparisons, conversions and constant shuffles. This file
+/// provides the rest, one function each. Every function that needs an instruction set carries its target attribute and
+/// takes registers by reference: a kernel template, which has no attribute, can then name it, and it is inlined once
+/// the template is inlined into a function that has the attribute.
 /// inside the function that has one.
 #pragma once
 
@@ -23,7 +24,7 @@ namespace orbis::simd::detail {
 
 template <class T, std::size_t N>
 struct register_of {
-  typedef T type __attribute__((vector_size(N * sizeof(T))));  // NOLINT(modernize-use-using): using refuses it
+  typedef T type __attribute__((vector_size(N * sizeof(T))));  // NOLINT(modernize-use-using): using rejects it
 };
 /// `N` numbers in one register.
 template <class T, std::size_t N>
@@ -42,15 +43,15 @@ using word_of_bits = std::conditional_t<
 template <class V>
 using element_of = std::remove_cvref_t<decltype(std::declval<V>()[0])>;
 
-/// Comparisons as the 512-bit instructions number them.
+/// Comparisons, in the numbering of the 512-bit instructions.
 enum class order { equal = 0, less = 1, less_equal = 2, unequal = 4 };
 
 #if ORBIS_X86
 
 // -- SSE2: 16 bytes ---------------------------------------------------------------------------------------------------
 
-/// `b` where it is larger (smaller) than `a`, else `a`. g++ 12 makes a comparison and a blend of these where one of
-/// them is a constant.
+/// Returns `b` where it is larger (smaller) than `a`, else `a`. g++ 12 compiles these into a comparison and a blend if
+/// one of them is a constant.
 template <bool Max, class V>
 ORBIS_ALWAYS_INLINE void extremum_16(V& out, const V& a, const V& b) noexcept {
   if constexpr (sizeof(a[0]) == 8)
@@ -63,7 +64,7 @@ ORBIS_ALWAYS_INLINE void extremum_16(V& out, const V& a, const V& b) noexcept {
 
 // -- AVX2: 32 bytes ---------------------------------------------------------------------------------------------------
 
-/// The sign bits of the lanes.
+/// Sign bits of the lanes.
 template <class V>
 ORBIS_TARGET_AVX2 inline void sign_bits_32(std::uint32_t& out, const V& v) noexcept {
   constexpr std::size_t size = sizeof(element_of<V>);
@@ -109,7 +110,7 @@ ORBIS_TARGET_AVX2 inline void extremum_32(V& out, const V& a, const V& b) noexce
     out = reinterpret_cast<V>(Max ? _mm256_max_ps(reinterpret_cast<__m256>(b), reinterpret_cast<__m256>(a))
                                   : _mm256_min_ps(reinterpret_cast<__m256>(b), reinterpret_cast<__m256>(a)));
 }
-/// The first n numbers of four or eight bytes at p, then zeros. @pre n <= lanes
+/// Loads the first n numbers of four or eight bytes at p, then zeros. @pre n <= lanes
 template <class V>
 ORBIS_TARGET_AVX2 inline void load_first_32(V& out, const element_of<V>* p, std::size_t n) noexcept {
   if constexpr (sizeof(out[0]) == 8) {
@@ -147,8 +148,8 @@ ORBIS_TARGET_AVX2 inline void fused_32(V& out, const V& a, const V& b, const V& 
 }
 
 // -- AVX-512: 64 bytes ------------------------------------------------------------------------------------------------
-// g++ 12 makes element-wise code of a 512-bit comparison whose result is kept, so masks are registers of their own. Of
-// the intrinsics the masked forms are used where it warns of the others.
+// g++ 12 generates element-wise code for a 512-bit comparison whose result is kept; masks are therefore a separate
+// register type. Masked intrinsics replace the unmasked ones for which it emits warnings.
 
 template <order O, class V, class Word>
 ORBIS_TARGET_AVX512 inline void compare_64(Word& out, const V& a, const V& b) noexcept {
@@ -175,7 +176,7 @@ ORBIS_TARGET_AVX512 inline void compare_64(Word& out, const V& a, const V& b) no
     }
   }
 }
-/// `a` where `m` is set, else `b`.
+/// Selects `a` where `m` is set, else `b`.
 template <class V, class Word>
 ORBIS_TARGET_AVX512 inline void blend_64(V& out, const Word& m, const V& a, const V& b) noexcept {
   using T = element_of<V>;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Arithmetic on bytes in words of 16 bits: the even bytes of a vector, and the odd ones.
+/// Arithmetic on bytes as 16-bit words: the even and the odd bytes of a vector.
 #pragma once
 
 #include <bit>
@@ -12,7 +12,7 @@
 
 namespace orbis::features::detail {
 
-/// The bytes 0, 2, 4 ... as words.
+/// Bytes 0, 2, 4 ... as words.
 template <std::size_t N, class Target>
 [[nodiscard]] ORBIS_ALWAYS_INLINE auto even_bytes(const simd::vec<std::uint8_t, N, Target>& v) noexcept {
   const auto words = simd::bits_as<std::uint16_t>(v);
@@ -21,7 +21,7 @@ template <std::size_t N, class Target>
   else
     return words >> 8;
 }
-/// The bytes 1, 3, 5 ... as words.
+/// Bytes 1, 3, 5 ... as words.
 template <std::size_t N, class Target>
 [[nodiscard]] ORBIS_ALWAYS_INLINE auto odd_bytes(const simd::vec<std::uint8_t, N, Target>& v) noexcept {
   const auto words = simd::bits_as<std::uint16_t>(v);
@@ -30,7 +30,7 @@ template <std::size_t N, class Target>
   else
     return words & decltype(words)(255);
 }
-/// The bytes that `even_bytes` and `odd_bytes` took apart. @pre all words < 256
+/// Inverse of `even_bytes` and `odd_bytes`: interleaves the bytes. @pre all words < 256
 template <std::size_t N, class Target>
 [[nodiscard]] ORBIS_ALWAYS_INLINE auto interleaved(const simd::vec<std::uint16_t, N, Target>& even,
                                                    const simd::vec<std::uint16_t, N, Target>& odd) noexcept {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Chooses corners: some that cover the image, then the strongest of each level.
+/// Selection of corners: first a subset that covers the image, then the strongest of each level.
 #pragma once
 
 #include <algorithm>
@@ -17,9 +17,9 @@
 
 namespace orbis::features::detail {
 
-/// How many features each level gives: proportional to the side of its image. What a coarse level
-/// cannot give goes to the finer ones; what is left then, to any that has more.
-inline void share_out(std::span<const level_corners> levels, int wanted, std::vector<int>& quotas) {
+/// Computes the number of features per level: proportional to the side of its image. Levels with too few corners pass
+/// the remainder to finer levels, and then to any level with more corners.
+inline void assign_quotas(std::span<const level_corners> levels, int wanted, std::vector<int>& quotas) {
   quotas.resize(levels.size());
   double sides = 0.0;
   for (const level_corners& level : levels) sides += 1.0 / level.scale;
@@ -38,7 +38,7 @@ inline void share_out(std::span<const level_corners> levels, int wanted, std::ve
   }
 }
 
-/// Leaves the `wanted` strongest.
+/// Keeps the `wanted` strongest corners.
 inline void keep_strongest(std::vector<corner>& corners, int wanted) {
   const auto count = std::min(corners.size(), static_cast<std::size_t>(std::max(0, wanted)));
   std::nth_element(corners.begin(), corners.begin() + static_cast<std::ptrdiff_t>(count), corners.end(), stronger);
@@ -47,7 +47,7 @@ inline void keep_strongest(std::vector<corner>& corners, int wanted) {
 }
 
 ORBIS_INLINE void cover_first::operator()(std::span<level_corners> levels, int wanted, workspace& memory) const {
-  share_out(levels, wanted, memory.quotas);
+  assign_quotas(levels, wanted, memory.quotas);
   take_covering(levels, wanted, memory);
   for (std::size_t l = 0; l != levels.size(); ++l) {
     std::vector<corner>&corners = levels[l].corners, &covering = memory.covering[l];
@@ -71,7 +71,7 @@ ORBIS_INLINE void cover_first::take_covering(std::span<level_corners> levels, in
   const int columns = static_cast<int>(area.width / side) + 1, rows = static_cast<int>(area.height / side) + 1;
   memory.best.assign(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows), {});
   for (std::uint32_t l = 0; l != levels.size(); ++l) {
-    // A corner's cell by one product and one sum; what lies outside belongs to the cell at the edge.
+    // Computes a corner's cell by one product and one sum; positions outside belong to the nearest cell.
     const double step = levels[l].scale / side, left = area.x / side, top = area.y / side;
     for (std::uint32_t i = 0; i != levels[l].corners.size(); ++i) {
       const corner& c = levels[l].corners[i];

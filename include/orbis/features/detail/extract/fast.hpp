@@ -35,7 +35,7 @@ struct binomial_kernel {
     using bytes = simd::native_vec<std::uint8_t, Target>;
     constexpr int step = static_cast<int>(bytes::count);
     const auto block = [&](int x) ORBIS_INLINE_LAMBDA {
-      // The mean of a and c, rounded down; then its mean with b, rounded up: together that is the rounding wanted.
+      // The mean of a and c, rounded down, then its mean with b, rounded up: together this is correct rounding.
       const bytes va = bytes::load(a + x), vb = bytes::load(b + x), vc = bytes::load(c + x);
       const bytes ac = average(va, vc) - ((va ^ vc) & bytes(1));
       average(ac, vb).store(to + x);
@@ -45,14 +45,15 @@ struct binomial_kernel {
       return;
     }
     for (int x = 0; x <= count - step; x += step) block(x);
-    if (count % step != 0) block(count - step);  // overlaps the block before it
+    if (count % step != 0) block(count - step);  // overlaps the previous block
   }
 };
 
-inline constexpr std::size_t row_margin = 64;  // what kernels may touch beside a row
+inline constexpr std::size_t row_margin = 64;  // padding of rows that kernels may access
 inline constexpr int band_rows = 64;
 
-/// Where the parabola through three values at -1, 0 and 1 is highest. @pre the middle one is, and not all are equal
+/// Position of the maximum of the parabola through three values at -1, 0 and 1. @pre the middle one is the largest, and
+/// not all are equal
 [[nodiscard]] inline float peak_of(int before, int middle, int after) {
   return static_cast<float>(before - after) / static_cast<float>(2 * (before - 2 * middle + after));
 }
@@ -70,7 +71,7 @@ ORBIS_INLINE void fast9::operator()(image_view<const std::uint8_t> image, const 
 
 ORBIS_INLINE void fast9::find_peaks(image_view<const std::uint8_t> image, const region& area, int threshold,
                                     workspace& memory, std::vector<corner>& corners) const {
-  // Scores are needed one pixel around the area, to see whether its outermost pixels are peaks.
+  // Scores are needed one pixel around the area, to test whether its outermost pixels are peaks.
   const int left = std::max(circle_radius, area.x - 1);
   const int right = std::min(image.width() - circle_radius, area.x + area.width + 1);
   const int top = std::max(circle_radius, area.y - 1);
@@ -99,10 +100,10 @@ ORBIS_INLINE void fast9::find_peaks(image_view<const std::uint8_t> image, const 
       score_row(image.data() + y * image.stride() + left, image.stride(), count, static_cast<std::uint8_t>(threshold),
                 row_of(y));
     }
-    const int inner = y - 1;  // now both of its neighbours are known
+    const int inner = y - 1;  // both of its neighbours are now known
     if (inner < std::max(top, area.y) || inner >= area.y + area.height) continue;
     const std::uint8_t* row = row_of(inner);
-    const std::uint8_t* above = row_of(inner + 2);  // the slot before, cyclically; zero above the first row
+    const std::uint8_t* above = row_of(inner + 2);  // the previous slot, cyclically; zero above the first row
     const std::size_t found = peaks_of(above, row, row_of(y), count, ties, memory.columns.data());
     for (std::size_t i = 0; i != found; ++i) {
       const std::uint32_t column = memory.columns[i];
@@ -110,19 +111,19 @@ ORBIS_INLINE void fast9::find_peaks(image_view<const std::uint8_t> image, const 
       if (x < area.x || x >= area.x + area.width) continue;
       corners.push_back({x, inner, static_cast<float>(row[column] - 1)});
       if (!subpixel) continue;
-      const std::uint8_t* here = row + column;  // at column 0, what lies before is row_margin
+      const std::uint8_t* here = row + column;  // at column 0, the preceding bytes are row_margin
       corners.back().dx = peak_of(here[-1], here[0], here[1]);
       corners.back().dy = peak_of(above[column], here[0], row_of(y)[column]);
     }
   }
 }
 
-/// Smooths what the circles of rows [first, last) see. Bands, so that they are still in the cache when
-/// the circles look.
+/// Smooths the pixels that the circles of rows [first, last) cover. Works in bands, so that they are still in the cache
+/// when the circles are evaluated.
 ORBIS_INLINE void fast9::smooth_band(image_view<const std::uint8_t> image, int left, int count, int first, int last,
                                      workspace& memory) {
   const std::size_t pitch = static_cast<std::size_t>(count) + 2 * row_margin;
-  const int from = left - circle_radius, columns = count + 2 * circle_radius;  // all of them in the image
+  const int from = left - circle_radius, columns = count + 2 * circle_radius;  // all of them are in the image
   const int from_more = std::max(0, from - 1), to_more = std::min(image.width(), from + columns + 1);
   if (memory.band.size() < pitch * (band_rows + 2 * circle_radius))
     memory.band.resize(pitch * (band_rows + 2 * circle_radius));
@@ -134,7 +135,7 @@ ORBIS_INLINE void fast9::smooth_band(image_view<const std::uint8_t> image, int l
     const std::uint8_t* above = image.row(std::max(0, y - 1)).data();
     const std::uint8_t* below = image.row(std::min(image.height() - 1, y + 1)).data();
     mix(above + from_more, row + from_more, below + from_more, to_more - from_more, line + (from_more - from));
-    if (from == 0) line[-1] = line[0];  // beyond the edge the image goes on as at the edge
+    if (from == 0) line[-1] = line[0];  // replicates the pixel at the edge
     if (from + columns == image.width()) line[columns] = line[columns - 1];
     std::uint8_t* to =
         memory.band.data() + static_cast<std::size_t>(y - first + circle_radius) * pitch + row_margin - circle_radius;
@@ -160,7 +161,7 @@ ORBIS_INLINE void fast9::drop_weak(const region& area, int strong, workspace& me
     memory.cell_of[i] = static_cast<std::uint32_t>(at);
     memory.strongest[at] = std::max(memory.strongest[at], c.response);
   }
-  // Without a branch: which corners stay is hard to predict.
+  // Branch-free: the outcome is hard to predict.
   const auto bound = static_cast<float>(strong);
   std::size_t kept = 0;
   for (std::size_t i = 0; i != corners.size(); ++i) {

@@ -2,10 +2,10 @@
 /// @file
 /// FAST-9/16 scores of a row of pixels, and the pixels whose scores are local maxima.
 ///
-/// The score of a pixel is the largest step by which nine contiguous pixels of the circle around it are all brighter,
-/// or all darker, than the pixel: the maximum over arcs of the minimum over the arc. Every arc of nine contains one of
-/// the eight arcs of eight that start at an odd pixel, and the pixel before or after it. So eight arcs, each built by
-/// doubling, give all sixteen, and no lane branches.
+/// The score of a pixel is the largest difference by which nine contiguous pixels of the circle around it are all
+/// brighter, or all darker, than the pixel: the maximum over arcs of the minimum over the arc. Every arc of nine
+/// consists of one of the eight arcs of eight that start at an odd pixel, and the pixel before or after it. Eight arcs,
+/// each built by doubling, therefore give all sixteen, and no lane branches.
 #pragma once
 
 #include <algorithm>
@@ -31,7 +31,7 @@ inline constexpr std::array<int, 16> circle_y{-3, -3, -2, -1, 0, 1, 2, 3, 3, 3, 
   return offsets;
 }
 
-/// The score of one pixel, as the definition says.
+/// The score of one pixel, directly from the definition.
 [[nodiscard]] inline int fast_score(const std::uint8_t* centre, const std::array<std::ptrdiff_t, 16>& circle) noexcept {
   int best = 0;
   for (std::size_t start = 0; start != 16; ++start) {
@@ -46,7 +46,7 @@ inline constexpr std::array<int, 16> circle_y{-3, -3, -2, -1, 0, 1, 2, 3, 3, 3, 
   return best;
 }
 
-/// Writes the scores of `count` pixels of a row, 0 for those that do not exceed `threshold`.
+/// Writes the scores of `count` pixels of a row, 0 for scores up to `threshold`.
 /// @pre the circles around all of them are readable
 struct fast_scores_kernel {
   using signature = void(const std::uint8_t* centre, std::ptrdiff_t stride, int count, std::uint8_t threshold,
@@ -75,7 +75,7 @@ struct fast_scores_kernel {
     const auto block = [&](int x) ORBIS_INLINE_LAMBDA {
       const std::uint8_t* at = centre + x;
       const bytes c = bytes::load(at);
-      // Every arc of nine contains a pixel of each pair of opposites: that bounds the score.
+      // Every arc of nine contains one pixel of each opposite pair, which bounds the score.
       bytes pair_max = max(bytes::load(at + circle[0]), bytes::load(at + circle[8]));
       bytes pair_min = min(bytes::load(at + circle[0]), bytes::load(at + circle[8]));
 #pragma GCC unroll 3
@@ -111,13 +111,13 @@ struct fast_scores_kernel {
     };
     constexpr int step = static_cast<int>(N);
     for (int x = 0; x <= count - step; x += step) block(x);
-    if (count % step != 0) block(count - step);  // overlaps the block before it
+    if (count % step != 0) block(count - step);  // overlaps the previous block
   }
 };
 
-/// Writes the columns of the scores that are larger than their eight neighbours, ascending; returns how many there are.
-/// With `ties`, the neighbours before it by row, then column, may be equal.
-/// @pre 64 bytes before the rows and behind their `count` scores are readable and zero
+/// Writes the columns of the scores that are larger than their eight neighbours, ascending; returns their number. With
+/// `ties`, neighbours that precede it by row, then column, may be equal. @pre 64 bytes before the rows and after their
+/// `count` scores are readable and zero
 struct fast_peaks_kernel {
   using signature = std::size_t(const std::uint8_t* above, const std::uint8_t* row, const std::uint8_t* below,
                                 int count, bool ties, std::uint32_t* columns);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The parts of the ORB extractor. Their code is in fast.hpp, cover_first.hpp, orientation.hpp and steered_brief.hpp.
+/// The parts of the ORB extractor. Implemented in fast.hpp, cover_first.hpp, orientation.hpp and steered_brief.hpp.
 #pragma once
 
 #include <cstddef>
@@ -14,23 +14,23 @@
 
 namespace orbis::features::detail {
 
-/// Finds FAST-9/16 corners: nine contiguous pixels of the circle of radius 3 are all brighter or all
-/// darker than the centre by more than a threshold. The response is the largest threshold at which
-/// the pixel still is a corner; only pixels with a larger one than their eight neighbours count. The
-/// threshold adapts to the texture: a cell of the area that has a corner of at least `strong` keeps only
-/// such ones; the others keep all down to `weak`. As a response does not depend on the threshold, one
+/// Detects FAST-9/16 corners: nine contiguous pixels of the circle of radius 3 are all brighter or all darker than the
+/// centre by more than a threshold. The response is the largest threshold at which the pixel still is a corner; only
+/// pixels with a larger response than their eight neighbours count. The threshold adapts to the texture: a cell of the
+/// area with a corner of at least `strong` keeps only such corners; the others keep all down to `weak`. A response does
+/// not depend on the threshold, so one pass finds both.
 /// pass finds both.
 ///
-/// Three things differ from other implementations by default. A slight smoothing, and that a corner whose
-/// neighbour happens to be equal is not lost, make corners come again (by several per cent, under noise and shifts
-/// most). A parabola through the scores of the pixel and its neighbours tells where the peak is (a third less
-/// error). Without them the corners are OpenCV's.
+/// The defaults differ from other implementations in three points. Slight smoothing, and keeping a corner whose
+/// neighbour has an equal response, improve repeatability (by several per cent, most under noise and shifts). A
+/// parabola through the scores of the pixel and its neighbours gives the subpixel peak (a third less error). With these
+/// options off, the corners are those of OpenCV.
 struct fast9 {
-  int cell = 35;       ///< side, pixels; about the reach of a descriptor
-  bool smooth = true;  ///< look at the image convolved with the binomial (1, 2, 1) / 4 in x and y
+  int cell = 35;       ///< side, pixels; about the extent of a descriptor
+  bool smooth = true;  ///< convolve the image with the binomial (1, 2, 1) / 4 in x and y first
   bool ties = true;    ///< of equal neighbours the last by row, then column, is a corner; false: none of them
 
-  bool subpixel = true;  ///< fill in `dx` and `dy`
+  bool subpixel = true;  ///< compute `dx` and `dy`
 
   struct workspace {
     std::vector<std::uint8_t> band;  ///< rows of the smoothed image
@@ -41,9 +41,8 @@ struct fast9 {
     std::vector<float> strongest;        ///< of each cell
   };
 
-  /// Replaces `corners` by those of the area. Pixels whose circle leaves the image are no corners. O(pixels of the
-  /// area).
-  /// @pre the area lies in the image; 0 <= weak <= strong <= 254; cell >= 1
+  /// Replaces `corners` by those of the area. Pixels whose circle leaves the image are not corners. O(pixels of the
+  /// area). @pre the area is inside the image; 0 <= weak <= strong <= 254; cell >= 1
   void operator()(image_view<const std::uint8_t> image, const region& area, const corner_thresholds& thresholds,
                   workspace& memory, std::vector<corner>& corners) const;
 
@@ -56,12 +55,12 @@ struct fast9 {
 };
 static_assert(corner_detector<fast9>);
 
-/// Covers the image first: it is cut into square cells, as many as a share of the wanted corners, and every cell gives
-/// its strongest corner of all levels. The rest are the strongest corners of their levels, wherever they are, because
-/// strong corners are found again in other images. A cell gives one corner, not one on each level, so that there is
-/// room for these. O(n), and sorting of the chosen corners.
+/// Selects corners that cover the image first. The image is divided into square cells, whose number is a share of the
+/// wanted corners, and every cell contributes its strongest corner of all levels. The rest are the strongest corners of
+/// their levels, at any position, because strong corners are more repeatable. A cell contributes one corner in total,
+/// not one per level, which leaves room for these. O(n), and sorting of the chosen corners.
 struct cover_first {
-  double share = 0.25;  ///< of the wanted corners, for covering; 0 (none) ... 1: from best found again to best spread
+  double share = 0.25;  ///< of the wanted corners, for covering; 0: most repeatable, 1: best distributed
 
   struct workspace {
     struct candidate {
@@ -84,8 +83,8 @@ static_assert(corner_selection<cover_first>);
 
 inline constexpr int disc_radius = 15;
 
-/// The direction from a pixel to the centre of brightness of the disc of radius 15 around it
-/// (Rosin, "Measuring corner properties", 1999, as in the ORB paper); 0 where there is none.
+/// The direction from a pixel to the intensity centroid of the disc of radius 15 around it (Rosin, "Measuring corner
+/// properties", 1999, as in the ORB paper); 0 if undefined.
 struct intensity_centroid {
   static constexpr int radius = disc_radius;
 
@@ -94,18 +93,17 @@ struct intensity_centroid {
 };
 static_assert(orientation_estimator<intensity_centroid>);
 
-/// Memory of `smooth`, which the next call uses again.
+/// Reusable memory of `smooth`.
 struct smooth_workspace {
   std::vector<std::uint8_t> line;  ///< a row with its reflections
   std::vector<std::int16_t> sums;  ///< the last eight rows, smoothed horizontally
 };
 
-/// ORB's descriptor: the standard pattern, turned to the keypoint's direction and rounded to pixels,
-/// on the image smoothed by a Gaussian (7x7, sigma 2). The same bits as OpenCV's ORB wherever the direction is the
-/// same.
+/// ORB's descriptor: the standard pattern, rotated to the keypoint's direction and rounded to pixels, on the image
+/// smoothed by a Gaussian (7x7, sigma 2). Gives the same bits as OpenCV's ORB for the same direction.
 struct steered_brief {
   using descriptor = binary_descriptor<256>;
-  static constexpr int reach = 18;     ///< of the turned pattern, pixels
+  static constexpr int reach = 18;     ///< of the rotated pattern, pixels
   static constexpr int diameter = 31;  ///< of the described neighbourhood, by convention
 
   struct workspace {
@@ -114,7 +112,7 @@ struct steered_brief {
     smooth_workspace smoothing;
   };
 
-  /// Smooths what descriptors of keypoints in rows `[first, last)` need. @pre image of at least 4x4 pixels
+  /// Smooths the pixels that descriptors of keypoints in rows `[first, last)` need. @pre image of at least 4x4 pixels
   void prepare(image_view<const std::uint8_t> image, int first, int last, workspace& memory) const;
 
   /// @pre at least `reach` pixels from the edge of the prepared image, in its prepared rows

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The direction of a keypoint.
+/// Orientation of a keypoint.
 #pragma once
 
 #include <array>
@@ -22,7 +22,7 @@
 
 namespace orbis::features::detail {
 
-/// How far the disc reaches to both sides, by distance of the row from its centre.
+/// Half-width of the disc by distance of the row from its centre.
 inline constexpr std::array<int, disc_radius + 1> disc_half_width = [] {
   std::array<int, disc_radius + 1> widths{};
   for (int dy = 0; dy <= disc_radius; ++dy) {
@@ -39,7 +39,7 @@ struct image_moments {
   friend bool operator==(const image_moments&, const image_moments&) = default;
 };
 
-/// Which of the 32 pixels of a row from -15 to 16 lie in the disc, by distance of the row from its centre.
+/// Masks of the 32 pixels of a row from -15 to 16 that are in the disc, by distance of the row from its centre.
 inline constexpr auto disc_masks = [] {
   std::array<std::array<std::uint8_t, 32>, disc_radius + 1> masks{};
   for (std::size_t dy = 0; dy != masks.size(); ++dy)
@@ -59,8 +59,8 @@ struct disc_moments_kernel {
       return bytes::load(left + dy * stride) &
              bytes::load(disc_masks[static_cast<std::size_t>(dy < 0 ? -dy : dy)].data());
     };
-    // The sum of each column, and the sum of dy times brightness: at most 31 * 255 and 120 * 255, so that 16 bits do.
-    // The latter adds up the differences of all rows at least k from the centre, for k from 15 to 1.
+    // The sum of each column, and the sum of dy times brightness: at most 31 * 255 and 120 * 255, which fits into 16
+    // bits. The latter accumulates the differences of all rows at least k from the centre, for k from 15 to 1.
     const bytes middle = pixels(0);
     words sum_even = even_bytes(middle), sum_odd = odd_bytes(middle);
     words step_even(0), step_odd(0), y_even(0), y_odd(0);
@@ -89,12 +89,12 @@ struct disc_moments_kernel {
   }
 };
 
-/// The angle of (x, y) in [0, 2 pi), to 1e-7; the same bits wherever doubles are IEEE's.
+/// The angle of (x, y) in [0, 2 pi), to 1e-7; the same bits with any IEEE double.
 [[nodiscard]] inline float angle_of(double x, double y) noexcept {
   using std::numbers::pi;
   const double ax = std::abs(x), ay = std::abs(y);
   if (!(ax + ay > 0.0)) return 0.0F;
-  // atan of the ratio below 1, from there to below tan(pi / 8), from there a series.
+  // Reduces to the atan of a ratio below 1, then to one below tan(pi / 8), then uses a series.
   double t = ax < ay ? ax / ay : ay / ax;
   const bool upper = t > std::numbers::sqrt2 - 1.0;
   if (upper) t = (t - 1.0) / (t + 1.0);
@@ -117,7 +117,7 @@ ORBIS_INLINE orientation intensity_centroid::operator()(image_view<const std::ui
   const image_moments m = moments(image.data() + y * image.stride() + x, image.stride());
   if (m.x == 0 && m.y == 0) return {};
   const double mx = m.x, my = m.y;
-  const double inverse = 1.0 / std::sqrt(mx * mx + my * my);  // exact below the root: 2^53 is not reached
+  const double inverse = 1.0 / std::sqrt(mx * mx + my * my);  // exact before the root: below 2^53
   return {angle_of(mx, my), static_cast<float>(mx * inverse), static_cast<float>(my * inverse)};
 }
 

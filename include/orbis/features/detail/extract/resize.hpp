@@ -21,14 +21,14 @@
 
 namespace orbis::features::detail {
 
-/// Between which two pixels a pixel of the result lies; `weight` of the second in 1/256.
+/// The two source pixels of a pixel of the result; `weight` of the second in 1/256.
 struct resize_tap {
   int first = 0;
   int second = 0;
   std::uint16_t weight = 0;
 };
 
-/// Pixels are areas with centres at integers: result pixel i lies at (i + 1/2) from / to - 1/2.
+/// Pixels are areas with centres at integers: result pixel i is at (i + 1/2) from / to - 1/2.
 [[nodiscard]] inline resize_tap tap_at(int i, int from, int to) {
   const double at = (i + 0.5) * (static_cast<double>(from) / to) - 0.5;
   const double whole = std::floor(at);
@@ -38,7 +38,7 @@ struct resize_tap {
   return {first, first + 1, static_cast<std::uint16_t>(std::lrint((at - whole) * 256.0))};
 }
 
-inline constexpr int resize_block = 32;  ///< pixels that are written at a time
+inline constexpr int resize_block = 32;  ///< number of pixels written at a time
 
 inline void make_plan(resize_plan& plan, int from, int to) {
   if (plan.from == from && plan.to == to) return;
@@ -52,7 +52,7 @@ inline void make_plan(resize_plan& plan, int from, int to) {
   const int padded = (to + resize_block - 1) / resize_block * resize_block;
   for (int i = 0; i != padded; ++i) {
     const resize_tap t = tap_at(std::min(i, to - 1), from, to);
-    const bool last = t.first == from - 1;  // as one before it, with all the weight on the second
+    const bool last = t.first == from - 1;  // stored as the pixel before it, with all the weight on the second
     plan.first.push_back(last ? from - 2 : t.first);
     plan.weight.push_back(last ? std::uint16_t{256} : t.weight);
   }
@@ -68,7 +68,7 @@ inline void make_plan(resize_plan& plan, int from, int to) {
   }
 }
 
-/// A row of the source, interpolated horizontally, in 1/256.
+/// Interpolates a row of the source horizontally, in 1/256.
 struct resize_along_kernel {
   using signature = void(const resize_plan& plan, const std::uint8_t* from, std::uint16_t* to);
   template <class Target>
@@ -76,7 +76,7 @@ struct resize_along_kernel {
     if (plan.from == 1) return static_cast<void>(std::fill_n(to, plan.to, static_cast<std::uint16_t>(from[0] * 256)));
     using words = simd::native_vec<std::uint16_t, Target>;
     const auto put = [&](const words& first, const words& second, std::size_t x) ORBIS_INLINE_LAMBDA {
-      // Modulo 2^16, in which the result fits: the difference may be negative.
+      // Modulo 2^16, in which the result fits although the difference may be negative.
       ((first << 8) + (second - first) * words::load(plan.weight.data() + x)).store(to + x);
     };
     if constexpr (has_byte_look_up<Target>) {
@@ -104,10 +104,10 @@ struct resize_along_kernel {
   }
 
  private:
-  /// Whether bytes are looked up by an instruction.
+  /// True if the target has a byte look-up instruction.
   template <class Target>
   static constexpr bool has_byte_look_up = Target::needs >= simd::level::popcnt;
-  /// Blocks of sixteen bytes from `from + base[0]`, `from + base[1]` ...
+  /// Loads blocks of sixteen bytes from `from + base[0]`, `from + base[1]` ...
   template <class V>
   [[nodiscard]] static ORBIS_ALWAYS_INLINE V blocks(const std::uint8_t* from, const std::int32_t* base) noexcept {
     if constexpr (V::count == 16)
@@ -117,7 +117,7 @@ struct resize_along_kernel {
   }
 };
 
-/// The mean of two such rows, `weight` / 256 of the second, rounded.
+/// Interpolates vertically between two such rows, `weight` / 256 of the second, rounded.
 struct resize_across_kernel {
   using signature = void(const std::uint16_t* first, const std::uint16_t* second, int weight, int count,
                          std::uint8_t* to);
@@ -134,9 +134,9 @@ struct resize_across_kernel {
   }
 };
 
-/// Shrinks (or enlarges) an image to the size of `to` by bilinear interpolation: weights in 1/256, one
-/// rounding at the end. The same bits as OpenCV's INTER_LINEAR_EXACT. Fast for factors up to 1.8. Shrinking by more
-/// than 2 leaves pixels out. O(pixels of both).
+/// Shrinks (or enlarges) an image to the size of `to` by bilinear interpolation: weights in 1/256, one rounding at the
+/// end. The same bits as OpenCV's INTER_LINEAR_EXACT. Fast for factors up to 1.8. Shrinking by more than 2 skips
+/// pixels. O(pixels of both).
 /// @pre neither image is empty; the rows of `to` may be written up to a multiple of 32 pixels (at
 ///      the end of the last one, too)
 inline void resize(image_view<const std::uint8_t> from, image_view<std::uint8_t> to, resize_workspace& memory) {
@@ -146,7 +146,7 @@ inline void resize(image_view<const std::uint8_t> from, image_view<std::uint8_t>
   make_plan(memory.plan, from.width(), to.width());
   const auto padded = (static_cast<std::size_t>(to.width()) + resize_block - 1) / resize_block * resize_block;
   memory.rows.resize(std::max(memory.rows.size(), 2 * padded));
-  std::array<int, 2> holds{-1, -1};  // which source rows stand in memory.rows; even ones in the first
+  std::array<int, 2> holds{-1, -1};  // source rows held in memory.rows; even ones in the first
   const auto row_of = [&](int y) {
     const auto slot = static_cast<std::size_t>(y & 1);
     std::uint16_t* row = memory.rows.data() + slot * padded;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The memory of bilinear shrinking.
+/// Memory of the bilinear resize.
 #pragma once
 
 #include <cstdint>
@@ -8,21 +8,21 @@
 
 namespace orbis::features::detail {
 
-/// How to get from one width to another; made once, used for any number of images.
+/// Interpolation table from one width to another; computed once, used for any number of images.
 struct resize_plan {
   int from = 0, to = 0;  ///< widths
-  // Of each pixel of the result, up to a whole number of blocks: it lies between `first` and the pixel after it.
+  // For each pixel of the result, up to a whole number of blocks: its position is between `first` and the next pixel.
   std::vector<std::int32_t> first;
-  std::vector<std::uint16_t> weight;  ///< of the pixel after it, in 1/256
-  // Of each eight pixels of the result; empty where they do not lie within sixteen pixels of the source.
-  std::vector<std::int32_t> base;    ///< where the sixteen begin
-  std::vector<std::uint8_t> places;  ///< of each `first` in them, as the low byte of a word whose high byte gives zero
+  std::vector<std::uint16_t> weight;  ///< of the next pixel, in 1/256
+  // For each eight pixels of the result; empty if they do not fit into sixteen pixels of the source.
+  std::vector<std::int32_t> base;    ///< start of the sixteen pixels
+  std::vector<std::uint8_t> places;  ///< of each `first` in the sixteen: low byte of a word; the high byte gives zero
 };
 
-/// Memory of `resize`, which the next call uses again.
+/// Reusable memory of `resize`.
 struct resize_workspace {
   resize_plan plan;
-  std::vector<std::uint16_t> rows;  ///< two of the source, shrunk horizontally
+  std::vector<std::uint16_t> rows;  ///< two source rows, shrunk horizontally
 };
 
 }  // namespace orbis::features::detail

@@ -22,15 +22,15 @@
 
 namespace orbis::features::detail {
 
-/// A Gaussian of sigma 2 at -3 ... 3, in 1/256; their sum is exactly one.
+/// A Gaussian of sigma 2 at -3 ... 3, in 1/256; the weights sum to exactly one.
 inline constexpr std::array<std::uint16_t, 7> gaussian_weights{18, 34, 48, 56, 48, 34, 18};
-inline constexpr int smooth_block = 64;  ///< pixels that are written at a time
+inline constexpr int smooth_block = 64;  ///< number of pixels written at a time
 
-/// Weighted sums along a row, less 2^15 so that they are signed words. Of every block of as many pixels as a register
-/// has bytes, the sums of the even pixels come first, then those of the odd ones.
+/// Weighted sums along a row, minus 2^15 so that they are signed words. In every block of one register of bytes, the
+/// sums of the even pixels precede those of the odd ones.
 /// @pre `line` is readable from -3 to 4 + `count` rounded up to whole blocks
 struct smooth_along_kernel {
-  // The weights are a parameter, because the compiler makes slow shifts and sums of products with constants.
+  // The weights are a parameter, because the compiler generates slow shifts and sums of products from constants.
   using signature = void(const std::uint8_t* line, int count, const std::array<std::uint16_t, 7>& weights,
                          std::int16_t* sums);
   template <class Target>
@@ -57,7 +57,7 @@ struct smooth_along_kernel {
   }
 };
 
-/// Weighted sums of seven such rows, rounded, in the order of the pixels.
+/// Weighted sums of seven such rows, rounded, in pixel order.
 struct smooth_across_kernel {
   using signature = void(const std::array<const std::int16_t*, 7>& rows, int count, std::uint8_t* to);
   template <class Target>
@@ -69,7 +69,7 @@ struct smooth_across_kernel {
                                  ORBIS_INLINE_LAMBDA { return row + i % 2 < 7 ? gaussian_weights[row + i % 2] : 0; });
     };
     const words w01 = weights_of(0), w23 = weights_of(2), w45 = weights_of(4), w6 = weights_of(6);
-    const sums bias(0x8000U * 256 + 0x8000U);  // back to unsigned, and half for rounding
+    const sums bias(0x8000U * 256 + 0x8000U);  // converts back to unsigned and adds half for rounding
     const auto half_block = [&](int x) ORBIS_INLINE_LAMBDA {
       const auto row = [&](std::size_t i) ORBIS_INLINE_LAMBDA { return words::load(rows[i] + x); };
       const words a = row(0), b = row(1), c = row(2), d = row(3), e = row(4), f = row(5), g = row(6);
@@ -100,16 +100,16 @@ struct smooth_across_kernel {
     else
       return simd::bits_as<std::uint16_t>((even << 16) | (odd >> 16));
   }
-  /// Words that stand as 0 4 1 5 2 6 3 7 in each block of eight.
+  /// Words in the order 0 4 1 5 2 6 3 7 in each block of eight.
   template <class V, std::size_t... I>
   [[nodiscard]] static ORBIS_ALWAYS_INLINE V in_order(const V& v, std::index_sequence<I...>) noexcept {
     return simd::shuffle<(I / 8 * 8 + 2 * (I % 4) + I % 8 / 4)...>(v);
   }
 };
 
-/// Convolves rows `[first, last)` of an image with the 7x7 Gaussian of sigma 2, weights in 1/256, with one
-/// rounding at the end. Beyond the edge the image continues as its reflection, without the edge itself. The same bits
-/// as OpenCV's GaussianBlur with these parameters. O(pixels).
+/// Convolves rows `[first, last)` of an image with the 7x7 Gaussian of sigma 2, weights in 1/256, with one rounding at
+/// the end. The image is extended by reflection without repeating the edge. The same bits as OpenCV's GaussianBlur with
+/// these parameters. O(pixels).
 /// @pre width >= 4, height >= 4; `to` has the size of `from`, and its rows may be written up to a
 ///      multiple of 64 pixels (at the end of the last one, too)
 inline void smooth(image_view<const std::uint8_t> from, image_view<std::uint8_t> to, int first, int last,
@@ -126,7 +126,7 @@ inline void smooth(image_view<const std::uint8_t> from, image_view<std::uint8_t>
   const auto reflected = [](int at, int size) { return at < 0 ? -at : at >= size ? 2 * size - 2 - at : at; };
 
   std::uint8_t* line = memory.line.data() + 16;
-  int ready = std::max(0, first - 3);  // sums of rows before this one are there
+  int ready = std::max(0, first - 3);  // sums of rows before this one are ready
   for (int y = first; y < last; ++y) {
     for (; ready <= std::min(y + 3, height - 1); ++ready) {
       std::memcpy(line, from.row(ready).data(), static_cast<std::size_t>(width));

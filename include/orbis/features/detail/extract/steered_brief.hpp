@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Binary descriptors by comparing brightness in a rotated pattern.
+/// Binary descriptors by brightness comparisons in a rotated pattern.
 #pragma once
 
 #include <algorithm>
@@ -21,14 +21,14 @@
 
 namespace orbis::features::detail {
 
-/// Two pixels relative to a keypoint: a test asks whether the second is brighter than the first.
+/// Two pixels relative to a keypoint: the test is true if the second is brighter than the first.
 struct brightness_test {
   std::int8_t x0, y0, x1, y1;
 };
 
-/// The 256 tests of the ORB paper (chosen for high variance and low correlation), in the order in
-/// which every implementation has them, so that vocabularies and descriptors can be exchanged. A
-/// fact of the format: recovered from the responses of an implementation to single bright and dark pixels.
+/// The 256 tests of the ORB paper (chosen for high variance and low correlation), in the order that all implementations
+/// use, so that vocabularies and descriptors are compatible. Recovered from the responses of an implementation to
+/// single bright and dark pixels.
 // clang-format off
 inline constexpr std::array<brightness_test, 256> orb_pattern{{
     {8, -3, 9, 5}, {4, 2, 7, -12}, {-11, 9, -8, 2}, {7, -12, 12, -13}, {2, -13, 2, 12}, {1, -7, 1, 6},
@@ -76,7 +76,7 @@ inline constexpr std::array<brightness_test, 256> orb_pattern{{
 }};
 // clang-format on
 
-/// The coordinates of the tests' first pixels, then those of their second ones.
+/// The coordinates of the first pixels of the tests, then those of the second ones.
 struct alignas(64) split_pattern {
   std::array<float, 512> x;
   std::array<float, 512> y;
@@ -92,11 +92,10 @@ inline constexpr split_pattern orb_points = [] {
   return p;
 }();
 
-/// Adding it leaves the nearest integer (ties to even) in the low bits of a small float.
+/// Adding it puts the nearest integer (ties to even) into the low bits of a small float.
 inline constexpr float rounder = 12582912.0F;
 
-/// Turns all points and rounds them to pixels; bit i says whether the second pixel of test i is brighter than the
-/// first.
+/// Rotates all points and rounds them to pixels; bit i is set if the second pixel of test i is brighter than the first.
 struct steered_brief_kernel {
   using signature = binary_descriptor<256>(const split_pattern& points, const orientation& o,
                                            const std::uint8_t* centre, std::ptrdiff_t stride);
@@ -108,7 +107,7 @@ struct steered_brief_kernel {
     using bytes = simd::vec<std::uint8_t, 64, Target>;
     const floats cosine(o.cosine), sine(o.sine), magic(rounder);
     const integers step(static_cast<std::int32_t>(stride));
-    // y * stride + x with the rounder's bits in both; they are taken out together.
+    // y * stride + x with the rounder's bits in both terms; they are subtracted together.
     const integers offset(static_cast<std::int32_t>(static_cast<std::uint32_t>(std::bit_cast<std::int32_t>(rounder)) *
                                                     (static_cast<std::uint32_t>(stride) + 1)));
     alignas(64) std::array<std::int32_t, 512> at;

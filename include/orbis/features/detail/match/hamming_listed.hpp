@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Hamming distances of one descriptor to listed others.
+/// Hamming distances between one descriptor and a list of others.
 #pragma once
 
 #include <cassert>
@@ -16,7 +16,7 @@
 
 namespace orbis::features::detail {
 
-/// The number of bits in which two strings differ.
+/// Hamming distance of two strings.
 template <class Target, bit_string D>
 [[nodiscard]] ORBIS_ALWAYS_INLINE std::uint32_t hamming_of(const D& a, const D& b) noexcept {
   std::uint32_t sum = 0;

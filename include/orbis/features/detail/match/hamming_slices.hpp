@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Hamming distances of one query to 256 or 512 trains at once, bit-sliced.
+/// Bit-sliced Hamming distances of one query to 256 or 512 trains at once.
 ///
-/// Trains are stored by bit: a slice holds one bit of 256 trains, or of 512 where registers are that wide. Three bits
-/// of a query are a group, a pattern from 0 to 7. For each group the query selects two slices from a table: the parity
-/// and the majority of the three differing bits, which together are their count. Full adders add the counts of all
-/// groups in bit planes, so that one logic instruction works on as many trains as a register has bits. The table is
-/// made once per block of trains, for all queries. The adders follow Harley and Seal (Mula, Kurz, Lemire, "Faster
-/// population counts using AVX2 instructions", 2018), the selection by groups is the method of the four Russians.
+/// Trains are stored by bit: a slice holds one bit of 256 trains, or of 512 with 512-bit registers. Three bits of a
+/// query form a group, a pattern from 0 to 7. For each group the query selects two slices from a table: the parity and
+/// the majority of the three differing bits, which together are their count. Full adders sum the counts of all groups
+/// in bit planes, so that one logic instruction processes one train per bit of a register. The table is built once per
+/// block of trains, for all queries. The adders follow Harley and Seal (Mula, Kurz, Lemire, "Faster population counts
+/// using AVX2 instructions", 2018); the selection by groups is the method of four Russians.
 #pragma once
 
 #include <array>
@@ -27,13 +27,13 @@ namespace orbis::features::detail {
 
 inline constexpr std::size_t slice_planes = 9;  // a distance has 9 bits: 0 to 256
 
-/// The bit planes of the distances, the lowest first.
+/// The bit planes of the distances, lowest first.
 template <std::size_t Words>
 using slice_distances = std::array<slice<Words>, slice_planes>;
 
 /// Transposes a matrix of 64x64 bits: bit `j` of word `i` becomes bit `i` of word `j`.
 inline void transpose_bits(std::array<std::uint64_t, 64>& m) noexcept {
-  // Swaps the off-diagonal blocks of half the size, then those within each block, and so on.
+  // Swaps the off-diagonal blocks of half the size, then those within each block, recursively.
   const auto swap_blocks = [&]<std::size_t Size>(std::integral_constant<std::size_t, Size>, std::uint64_t mask) {
     for (std::size_t k = 0; k != 64; k += 2 * Size)
       for (std::size_t i = k; i != k + Size; ++i) {
@@ -50,7 +50,8 @@ inline void transpose_bits(std::array<std::uint64_t, 64>& m) noexcept {
   swap_blocks(std::integral_constant<std::size_t, 1>{}, 0x5555555555555555ULL);
 }
 
-/// Group `g` is made of bits `g`, `88 + g` and `176 + g`; the last eight lack the third, which counts as zero.
+/// Group `g` consists of bits `g`, `88 + g` and `176 + g`; the last eight groups lack the third bit, which counts as
+/// zero.
 /// @pre at most 64 * Words trains
 template <std::size_t Words, bit_string D>
 void make_slice_table(std::span<const D> trains, slice_table<Words>& table) noexcept {
@@ -74,18 +75,18 @@ void make_slice_table(std::span<const D> trains, slice_table<Words>& table) noex
         const std::uint64_t y = (p & 2U) != 0 ? ~b : b;
         const std::uint64_t majority = (x & y) | ((x ^ y) & c);
         table[g].majority[p].words[w] = majority;
-        table[g].majority[7 - p].words[w] = ~majority;  // the complements of all three bits
+        table[g].majority[7 - p].words[w] = ~majority;  // complement of all three bits
       }
     }
 }
 
-/// Bit `i` of a byte as byte `i` of a word, 0x20 where it is set.
+/// Expands bit `i` of a byte to byte `i` of a word, 0x20 if it is set.
 [[nodiscard]] constexpr std::uint64_t spread_bits(std::uint64_t byte) noexcept {
   const std::uint64_t each = (byte * 0x0101010101010101ULL) & 0x8040201008040201ULL;
   return ((each + 0x7f7f7f7f7f7f7f7fULL) & 0x8080808080808080ULL) >> 2U;
 }
 
-/// Stores the bytes of a word, the lowest first.
+/// Stores the bytes of a word, lowest first.
 inline void store_bytes(std::uint8_t* to, std::uint64_t word) noexcept {
   if constexpr (std::endian::native == std::endian::little) {
     std::memcpy(to, &word, 8);
@@ -106,7 +107,7 @@ inline void make_slice_query(const bit_words<256>& query, slice_query& to) noexc
   }
 }
 
-/// The number of words of a slice, and a register of a slice's bits.
+/// The number of words of a slice, and the register type for its bits.
 template <class Target>
 inline constexpr std::size_t slice_words = Target::bytes == 64 ? 8 : 4;
 template <class Target>
@@ -126,8 +127,8 @@ template <class Target>
 }
 
 #if ORBIS_X86
-/// Lane by lane the function of three bits whose values are the bits of `Table`. The compiler finds it for few of the
-/// functions below: without it brute-force matching takes 1.35 times as long at AVX-512.
+/// Lane-wise function of three bits whose truth table is the bits of `Table`. The compiler recognises few of the
+/// functions below: without it brute-force matching takes 1.35 times as long with AVX-512.
 template <int Table, class R>
 ORBIS_TARGET_AVX512 inline void ternary_logic(R& out, const R& a, const R& b, const R& c) noexcept {
   out = reinterpret_cast<R>(_mm512_ternarylogic_epi64(reinterpret_cast<__m512i>(a), reinterpret_cast<__m512i>(b),
@@ -158,7 +159,7 @@ ORBIS_ALWAYS_INLINE void half_add(V& sum, V& a) noexcept {
   sum = sum ^ a;
   a = carry;
 }
-/// One bit of a comparison from the lowest bit up: below becomes whether x < y, given the same for the lower bits.
+/// One bit of a comparison, from the lowest bit up: below becomes x < y, given the result for the lower bits.
 template <class V>
 ORBIS_ALWAYS_INLINE void compare_bit(V& below, const V& x, const V& y) noexcept {
   if constexpr (has_ternary_logic<V>) {
@@ -170,8 +171,8 @@ ORBIS_ALWAYS_INLINE void compare_bit(V& below, const V& x, const V& y) noexcept 
   }
 }
 
-/// The distances of a query to the trains of a table, and which of them lie below `limit`. Each round adds sixteen
-/// slices: parities count one, majorities two.
+/// Computes the distances of a query to the trains of a table, and the trains whose distance is below `limit`. Each
+/// round adds sixteen slices: parities count one, majorities two.
 template <class Target>
 ORBIS_ALWAYS_INLINE void slice_count(const slice_table<slice_words<Target>>& table, const slice_query& query,
                                      std::uint32_t limit, slice_distances<slice_words<Target>>& distances,
@@ -182,7 +183,7 @@ ORBIS_ALWAYS_INLINE void slice_count(const slice_table<slice_words<Target>>& tab
   for (std::size_t part = 0; part != slice_bytes; part += sizeof(plane)) {
     const plane zero(0);
     plane one = zero, two = zero, four = zero, eight = zero, s16 = zero;
-    plane c32[slice_rounds];  // added up after the rounds
+    plane c32[slice_rounds];  // summed after the rounds
     for (std::size_t g = 0; g != slice_groups; g += 8) {
       const char* const group = reinterpret_cast<const char*>(table.data() + g) + part;
       const auto parity = [&](std::size_t i) ORBIS_INLINE_LAMBDA {
@@ -194,7 +195,7 @@ ORBIS_ALWAYS_INLINE void slice_count(const slice_table<slice_words<Target>>& tab
         return plane::load(reinterpret_cast<const std::uint64_t*>(group + at));
       };
       plane c2, c4, d4, e4, c8, d8, e8, c16;
-      // Two parities and a majority of each of the first four pairs, then the majorities left over.
+      // Two parities and a majority of each of the first four pairs, then the remaining majorities.
       full_add(one, c2, parity(0), parity(1));
       full_add(two, c4, c2, majority(0));
       full_add(one, c2, parity(2), parity(3));
@@ -232,7 +233,7 @@ ORBIS_ALWAYS_INLINE void slice_count(const slice_table<slice_words<Target>>& tab
   }
 }
 
-/// Which distances lie below `limit`.
+/// The trains whose distance is below `limit`.
 template <class Target>
 ORBIS_ALWAYS_INLINE void slice_below(const slice_distances<slice_words<Target>>& distances, std::uint32_t limit,
                                      slice<slice_words<Target>>& below) noexcept {
@@ -245,7 +246,7 @@ ORBIS_ALWAYS_INLINE void slice_below(const slice_distances<slice_words<Target>>&
   }
 }
 
-/// Which distances lie below those in `least`; these are then lowered to them.
+/// The trains whose distance is below `least`; lowers `least` to these distances.
 template <class Target>
 ORBIS_ALWAYS_INLINE void slice_lower(const slice_distances<slice_words<Target>>& distances,
                                      slice_distances<slice_words<Target>>& least,
@@ -263,7 +264,7 @@ ORBIS_ALWAYS_INLINE void slice_lower(const slice_distances<slice_words<Target>>&
   }
 }
 
-/// The `rank`-th smallest distance among the trains in `candidates`, bit by bit from the highest.
+/// The `rank`-th smallest distance among the trains in `candidates`, determined bit by bit from the highest.
 /// @pre 0 < rank <= the number of bits in `candidates`
 template <class Target>
 [[nodiscard]] ORBIS_ALWAYS_INLINE std::uint32_t slice_ranked(const slice_distances<slice_words<Target>>& distances,

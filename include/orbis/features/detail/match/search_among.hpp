@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The search of a source that compares each query with some of the trains.
+/// Search for sources that compare each query with a subset of the trains.
 #pragma once
 
 #include <concepts>
@@ -16,7 +16,7 @@
 
 namespace orbis::features::detail {
 
-/// Memory of `search_among`, which the next call uses again.
+/// Reusable memory of `search_among`.
 struct search_among_workspace {
   struct nearest_query {
     std::uint32_t distance = none;
@@ -26,10 +26,10 @@ struct search_among_workspace {
   std::vector<nearest_query> reverse;             ///< by train
 };
 
-/// One candidate for each query that has a train: `list(q, add)` calls `add(t)` for every train to compare query `q`
-/// with, once for each, in any order; the result does not depend on the order. The reverse
-/// neighbour of a train is the nearest of the queries that it was compared with. For sources; any
-/// distance may be used, the Hamming distance of many pairs is fast.
+/// Returns one candidate for each query with at least one listed train. `list(q, add)` calls `add(t)` once for every
+/// train to compare query `q` with, in any order; the result does not depend on the order. The reverse neighbour of a
+/// train is the nearest of the queries that it was compared with. For use by sources; accepts any distance, and is fast
+/// for many Hamming distances.
 template <class Distance, class Descriptor, class List>
 requires descriptor_distance<Distance, Descriptor>
 void search_among(const Distance& distance, std::vector<candidate>& candidates, search_among_workspace& memory,
@@ -39,7 +39,7 @@ void search_among(const Distance& distance, std::vector<candidate>& candidates, 
   reverse.assign(needs.reverse ? trains.descriptors.size() : 0, {});
   candidates.clear();
   candidates.reserve(queries.descriptors.size());
-  // The lists are short but of changing lengths: what all of them could need is reserved once.
+  // The lists are short with varying lengths: reserve the maximum once.
   indices.reserve(trains.descriptors.size());
   distances.resize(trains.descriptors.size());
   for (std::size_t q = 0; q != queries.descriptors.size(); ++q) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The normal equations of bundle adjustment: computed, reduced to the cameras, solved.
+/// The normal equations of bundle adjustment: linearisation, reduction to the cameras, solution.
 ///
 /// Source: B. Triggs, P. McLauchlan, R. Hartley, A. Fitzgibbon, "Bundle adjustment - a modern
 /// synthesis", Vision Algorithms 2000.
@@ -31,8 +31,8 @@
 
 namespace orbis::optimize::detail {
 
-/// The unknowns are the steps of the cameras that may move, C numbers each, then those of the points in the order of
-/// `structure()`, three each. Keeps its memory.
+/// The unknowns are the steps of the movable cameras, C numbers each, then those of the points in the order of
+/// `structure()`, three each. Reuses its memory.
 template <bundle_residual R, robust_loss Loss>
 class bundle_equations {
  public:
@@ -50,7 +50,7 @@ class bundle_equations {
   [[nodiscard]] const bundle_structure& structure() const { return structure_; }
   [[nodiscard]] const reduced_type& reduced() const { return reduced_; }
 
-  /// Orders the observations and finds the blocks of the reduced system.
+  /// Orders the observations and determines the blocks of the reduced system.
   void set_structure(std::size_t cameras, std::size_t points, std::span<const observation> observations,
                      std::span<const std::uint8_t> fixed) {
     structure_.build(cameras, points, observations, fixed,
@@ -75,7 +75,7 @@ class bundle_equations {
     analyze_reduced();
   }
 
-  /// Begins at these estimates, with the observations that are not ignored and have a projection there; counts them in
+  /// Initialises with these estimates and the observations that are not ignored and have a projection; counts them in
   /// `summary`.
   template <class Policy>
   void begin(const Policy& policy, std::span<const camera_state> cameras, std::span<const vec3> points,
@@ -99,7 +99,7 @@ class bundle_equations {
     choose_observations(policy, options.ignored, summary);
   }
 
-  /// Residuals, weights and normal equations at the estimate.
+  /// Computes residuals, weights and normal equations at the estimate.
   template <class Policy>
   void linearize(const Policy& policy) {
     for_each_index(policy, structure_.chunks(), 1, [&](std::size_t chunk) {
@@ -146,8 +146,8 @@ class bundle_equations {
     return sum;
   }
 
-  /// Eliminates the points from H + diag(damping); an empty `damping` is 0. False if the block of a point is not
-  /// positive definite; `failed_camera()` then sees that point.
+  /// Eliminates the points from H + diag(damping); an empty `damping` is 0. Returns false if the block of a point is
+  /// not positive definite; `failed_camera()` is then a camera that observes it.
   template <class Policy>
   [[nodiscard]] bool eliminate(const Policy& policy, const Eigen::VectorXd& damping) {
     const std::size_t n = structure_.unknowns();
@@ -158,7 +158,7 @@ class bundle_equations {
       buffers_.resize(buffers);
     for (std::size_t s = 0; s != structure_.slots.size(); ++s) begin_reduced(s);
     for (std::size_t i = 0; i != reduced_right_.size(); ++i) reduced_right_[i] = -gradient_.data()[i];
-    if constexpr (one_by_one) {  // with one buffer, which stays in the cache
+    if constexpr (one_by_one) {  // a single buffer, which stays in the cache
       for (std::size_t k = 0; k != runs_.size(); ++k) {
         if (!is_regular(eliminate_run(runs_[k], point_damping, buffers_[0]))) return false;
         for (std::size_t s = runs_[k].first_slot; s != runs_[k].end_slot; ++s) subtract(s, buffers_[0]);
@@ -179,12 +179,12 @@ class bundle_equations {
       camera_block& to = reduced_diagonal_[u];
       for (int i = 0; i != camera_size; ++i) {
         if (damping.size() != 0) to(i, i) += damping[static_cast<Eigen::Index>(camera_size * u) + i];
-        if (camera_hessian_[u](i, i) == 0.0) to(i, i) = 1.0;  // not determined at all: it stays
+        if (camera_hessian_[u](i, i) == 0.0) to(i, i) = 1.0;  // undetermined: does not move
       }
     }
     return true;
   }
-  /// Factors the reduced system; false if it is not positive definite.
+  /// Factorises the reduced system; returns false if it is not positive definite.
   [[nodiscard]] bool factor() {
     if (structure_.unknowns() == 0) return true;
     if (reduced_.factor(reduced_diagonal_, reduced_off_diagonal_)) return true;
@@ -193,13 +193,13 @@ class bundle_equations {
   }
   [[nodiscard]] std::size_t failed_camera() const { return failed_camera_; }
 
-  /// The step of the cameras, their part of `-(H + D)^-1 g`.
+  /// Solves for the step of the cameras, their part of `-(H + D)^-1 g`.
   void solve_cameras(Eigen::VectorXd& step) {
     step.resize(gradient_.size());
     std::copy(reduced_right_.begin(), reduced_right_.end(), step.data());
     if (structure_.unknowns() != 0) reduced_.solve({step.data(), reduced_right_.size()});
   }
-  /// The step of the points, for that of the cameras in `step`.
+  /// Solves for the step of the points, given that of the cameras in `step`.
   template <class Policy>
   void solve_points(const Policy& policy, Eigen::VectorXd& step) {
     for_each_index(policy, structure_.chunks(), 1, [&](std::size_t chunk) {
@@ -213,7 +213,7 @@ class bundle_equations {
     });
   }
 
-  /// The cost one step away; `accept` then makes that the estimate.
+  /// Computes the cost after a step; `accept` then makes the result the estimate.
   template <class Policy>
   [[nodiscard]] double try_step(const Policy& policy, const Eigen::VectorXd& step) {
     for (std::size_t u = 0; u != structure_.unknowns(); ++u) {
@@ -257,24 +257,24 @@ class bundle_equations {
   static constexpr bool through_camera = camera_frame_residual<R>;
   using mixed_block_tile = mixed_tile<camera_size, through_camera>;
 
-  /// Chunks whose points are eliminated one after the other, and the slots that they touch. The bounds depend only on
-  /// the problem.
+  /// Chunks whose points are eliminated sequentially, and the slots that they modify. The bounds depend only on the
+  /// problem.
   struct elimination_run {
     std::size_t first_chunk = 0, end_chunk = 0, first_slot = 0, end_slot = 0;
   };
-  /// What they subtract from the reduced system.
+  /// Contributions to subtract from the reduced system.
   struct elimination_buffer {
     std::vector<double> blocks, right, scratch;
   };
 
-  // The blocks of the normal equations at the estimate last linearised.
+  // The blocks of the normal equations at the last linearisation.
   [[nodiscard]] mat3 point_hessian(std::size_t point) const {
     const double* const v = normal_.data() + point_size * point;
     mat3 h;
     h << v[0], v[1], v[2], v[1], v[3], v[4], v[2], v[4], v[5];
     return h;
   }
-  /// The block of camera and point of an observation by a camera that may move, by its number in `structure()`.
+  /// The camera-point block of an observation by a movable camera, by its number in `structure()`.
   [[nodiscard]] matrix<camera_size, 3> mixed_block(std::size_t number) const {
     const std::size_t place = structure_.mixed_place[number];
     const double* const tile = mixed_.data() + mixed_block_tile::size * (place / 8) + place % 8;
@@ -311,7 +311,7 @@ class bundle_equations {
     pulled_.resize(4 * points);
     reduced_right_.resize(camera_size * n);
 
-    // Fewer runs where the reduced system is large compared to the work that goes into it.
+    // Use fewer runs if the reduced system is large compared to the work for it.
     const std::size_t chunks = structure_.chunks();
     const std::size_t most =
         std::clamp<std::size_t>(structure_.pairs() / (20 * std::max<std::size_t>(1, structure_.slots.size())), 1, 8);
@@ -326,7 +326,7 @@ class bundle_equations {
       const std::size_t end_group = structure_.chunk_begin[run.end_chunk].first_group;
       for (std::size_t g = structure_.chunk_begin[begin].first_group; g != end_group; ++g) {
         const bundle_structure::group& group = structure_.groups[g];
-        if (group.cameras == 0) continue;  // slots of the others lie between those on the diagonal
+        if (group.cameras == 0) continue;  // other slots are between those on the diagonal
         touch(structure_.diagonal_slot[structure_.mixed_unknown[group.first_mixed]]);
         touch(structure_.diagonal_slot[structure_.mixed_unknown[group.first_mixed +
                                                                 std::size_t{group.points} * (group.cameras - 1)]]);
@@ -366,7 +366,7 @@ class bundle_equations {
     else
       reduced_block(s) = zeros<camera_block>();
   }
-  /// Eliminates the points of a run. Returns the first one whose block is not positive definite, or `none`.
+  /// Eliminates the points of a run. Returns the first point whose block is not positive definite, or `none`.
   [[nodiscard]] std::size_t eliminate_run(const elimination_run& run, const double* point_damping,
                                           elimination_buffer& to) {
     to.blocks.resize(rows::block * structure_.slots.size());
@@ -455,7 +455,7 @@ class bundle_equations {
     return sum;
   }
 
-  /// Once all observations of a point have added their parts.
+  /// Completes a point after all its observations have been added.
   void finish_point(std::size_t p) {
     double* const sum = normal_.data() + point_size * p;
     if (holds_point_[p] != 0) std::fill_n(sum, point_size, 0.0);
@@ -485,7 +485,7 @@ class bundle_equations {
       for (int i = 0; i != camera_size; ++i) diagonal_[static_cast<Eigen::Index>(camera_size * u) + i] = h(i, i);
     }
   }
-  /// Whether there is no such point; else remembers the first camera that sees it.
+  /// Returns true if no point failed; otherwise stores the first camera that observes it.
   [[nodiscard]] bool is_regular(std::size_t failed_point) {
     if (failed_point == bundle_structure::none) return true;
     for (const bundle_structure::segment& s : structure_.segments) {
@@ -505,19 +505,19 @@ class bundle_equations {
   schur_kernels<camera_size, camera_frame_residual<R>> schur_;
   bundle_structure structure_;
 
-  // Of each place in the order by camera.
+  // For each place in the order by camera.
   std::vector<double> measurements_, base_information_, information_, flags_;
   std::vector<observation> observations_;
-  // Estimates, and those one step away.
+  // Estimates, and those after an attempted step.
   std::vector<camera_state> states_, tried_states_;
   std::vector<typename R::view> views_, tried_views_;
-  std::vector<double> positions_, tried_positions_;  // four numbers for each point
+  std::vector<double> positions_, tried_positions_;  // four numbers per point
   std::vector<std::uint8_t> holds_point_;
   // The normal equations.
   double cost_ = 0.0, tried_cost_ = 0.0;
   std::vector<double> segment_cost_, segment_sums_;
   std::vector<camera_block> camera_hessian_;
-  std::vector<double> mixed_;             // of each observation by a camera that moves
+  std::vector<double> mixed_;             // of each observation by a movable camera
   std::vector<double> normal_, inverse_;  // of each point
   Eigen::VectorXd gradient_, diagonal_;
   // The reduced system.
@@ -526,7 +526,7 @@ class bundle_equations {
   std::vector<std::size_t> failed_point_;  // of each run, or `none`
   std::vector<elimination_buffer> buffers_;
   std::vector<block_place> off_diagonal_places_;
-  std::vector<std::uint32_t> place_of_slot_;  // among the blocks on, or off, the diagonal
+  std::vector<std::uint32_t> place_of_slot_;  // index among the blocks on, or off, the diagonal
   std::vector<camera_block> reduced_diagonal_, reduced_off_diagonal_;
   std::vector<double> reduced_right_, pulled_;
 };

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Linearisation and cost of observations by one camera, eight at a time.
+/// Linearisation and cost of eight observations by one camera at a time.
 ///
-/// With q = R X + t and M = J_q^T W J_q all blocks of the normal equations of an observation are products of M with R
-/// and hat(q), which saves half of the arithmetic; see `camera_frame_residual`.
+/// With q = R X + t and M = J_q^T W J_q, all blocks of the normal equations of an observation are products of M with R
+/// and hat(q), which halves the arithmetic; see `camera_frame_residual`.
 #pragma once
 
 #include <algorithm>
@@ -25,20 +25,20 @@
 
 namespace orbis::optimize::detail {
 
-/// The cost of an observation that loses its projection by a step: that of an error of a thousand sigmas, so that no
-/// step gains by losing observations.
+/// The cost of an observation that loses its projection by a step: that of an error of a thousand sigmas, so that a
+/// step never gains by losing observations.
 inline constexpr double out_of_sight = 0.5e6;
 
-/// Camera-point blocks of eight observations in memory, row by row in vectors of eight. Through the camera frame rows 3
-/// to 5 are hat(q) times rows 0 to 2, and q takes their place.
+/// Camera-point blocks of eight observations in memory, row by row in vectors of eight. With camera-frame residuals,
+/// rows 3 to 5 are hat(q) times rows 0 to 2, and q is stored in their place.
 template <int C, bool ThroughCamera>
 struct mixed_tile {
   static constexpr int vectors = 3 * C - (ThroughCamera ? 6 : 0);
   static constexpr std::size_t size = 8 * vectors;
 
-  /// Where row `i` begins; through the camera frame, not for rows 3 to 5.
+  /// Offset of row `i`; not for rows 3 to 5 of camera-frame residuals.
   [[nodiscard]] static constexpr int row(int i) { return 24 * (ThroughCamera && i >= 6 ? i - 2 : i); }
-  static constexpr int q = 72;  ///< where q is
+  static constexpr int q = 72;  ///< offset of q
 
   template <class L>
   static ORBIS_ALWAYS_INLINE void load(const double* from, L (*rows)[3]) {
@@ -70,16 +70,16 @@ struct camera_work {
   std::size_t count = 0;
   const double* measurements = nullptr;                   ///< for residuals that are evaluated in lanes
   const typename R::observation* observations = nullptr;  ///< for other residuals
-  const double* information = nullptr;                    ///< 0 for those that take no part
+  const double* information = nullptr;                    ///< 0 for excluded observations
   const std::uint32_t* point = nullptr;
   const double* positions = nullptr;  ///< of the points, four numbers each
-  // Where results go.
-  double* normal = nullptr;  ///< `point_size` of each point, to which observations add
-  double* mixed = nullptr;   ///< a `mixed_tile` for each eight observations, if the camera moves
-  double* sums = nullptr;    ///< `camera_numbers` of the camera; null if it does not move
+  // Outputs.
+  double* normal = nullptr;  ///< `point_size` per point; observations are added to it
+  double* mixed = nullptr;   ///< one `mixed_tile` per eight observations, if the camera is movable
+  double* sums = nullptr;    ///< `camera_numbers` of the camera; null if it is fixed
 };
 
-/// Residuals of eight observations, for residuals that are evaluated one at a time. Not inlined into the kernels, which
+/// Residuals of eight observations, for residuals that are evaluated individually. Not inlined into the kernels, which
 /// are compiled for instruction sets that might round differently.
 template <class R, int Columns>
 struct tile_of_residuals {
@@ -124,8 +124,9 @@ template <bool Derive, class R, int Columns>
   }
 }
 
-/// The residuals `r` of eight observations, and with `Derive` their derivatives by `q` (the point in the camera frame,
-/// or for general residuals in the world) and by the other parameters. Returns which have a projection.
+/// Computes the residuals `r` of eight observations, and with `Derive` their derivatives by `q` (the point in the
+/// camera frame, or for general residuals in the world) and by the other parameters. Returns the mask of those with a
+/// projection.
 template <bool Derive, class R, int Columns, class L>
 ORBIS_ALWAYS_INLINE typename L::mask_type residuals_of_tile(const camera_work<R>& work, std::size_t first, const L* q,
                                                             L* r, L (*by_q)[3],
@@ -151,7 +152,7 @@ ORBIS_ALWAYS_INLINE typename L::mask_type residuals_of_tile(const camera_work<R>
   }
 }
 
-/// Loads eight points in the camera frame; for general residuals in the world.
+/// Loads eight points in the camera frame; for general residuals in the world frame.
 template <class R, class L>
 ORBIS_ALWAYS_INLINE void points_of_tile(const camera_work<R>& work, std::size_t first, L* q) {
   const double* from[8];
@@ -189,7 +190,7 @@ ORBIS_ALWAYS_INLINE double camera_cost(const camera_work<R>& work, const Loss& l
   return simd::sum(cost);
 }
 
-/// Sets `flags[i]` where observation i has a finite residual.
+/// Sets `flags[i]` if observation i has a finite residual.
 template <simd::target Target, class R>
 ORBIS_ALWAYS_INLINE void camera_visibility(const camera_work<R>& work, double* flags) {
   using L = simd::vec<double, 8, Target>;
@@ -216,18 +217,18 @@ ORBIS_ALWAYS_INLINE void add_to_points(const camera_work<R>& work, std::size_t f
   add_transposed(share[8], none, none, none, to, 8);
 }
 
-/// Unknowns of a camera beside its position and rotation; all of them for general residuals.
+/// Number of unknowns of a camera in addition to its pose; all of them for general residuals.
 template <class R>
 inline constexpr int other_unknowns = R::camera_manifold::dimension - (camera_frame_residual<R> ? 6 : 0);
 
-/// Eight observations linearised: all zero where one takes no part.
+/// Eight linearised observations; zero for excluded ones.
 template <class R, class L>
 struct linear_tile {
-  L q[3];                   ///< the points, as `points_of_tile` has them
+  L q[3];                   ///< the points, from `points_of_tile`
   L r[R::dimension];        ///< residuals
   L by_q[R::dimension][3];  ///< their derivatives
   L by_rest[R::dimension][std::max(1, other_unknowns<R>)];
-  L weight;  ///< with the information and that of the loss
+  L weight;  ///< includes the information and the weight of the loss
 };
 
 /// Linearises eight observations; returns their costs.
@@ -240,7 +241,7 @@ ORBIS_ALWAYS_INLINE L linearize_tile(const camera_work<R>& work, const Loss& los
   const auto valid = residuals_of_tile<true, R, columns>(work, first, q, r, by_q, by_rest);
   const L information = L::load(work.information + first);
   L squared = r[0] * r[0];
-  L size = squared;  // anything that is not finite makes this so
+  L size = squared;  // becomes non-finite if any value is
   for (int d = 0; d != rows; ++d) {
     if (d != 0) squared = squared + r[d] * r[d];
     for (int k = 0; k != 3; ++k) size = size + by_q[d][k] * by_q[d][k];
@@ -278,10 +279,10 @@ ORBIS_ALWAYS_INLINE double linearize_camera(const camera_work<R>& work, const Lo
   L minus_rotation[9];
   if constexpr (through_camera)
     for (int i = 0; i != 9; ++i) minus_rotation[i] = -work.view.rotation.data()[i];
-  const auto at = [](int i, int j) ORBIS_INLINE_LAMBDA { return i * (i + 1) / 2 + j; };  // of the lower triangle
+  const auto at = [](int i, int j) ORBIS_INLINE_LAMBDA { return i * (i + 1) / 2 + j; };  // index in the lower triangle
 
-  // Linearisation is one long chain of operations, normal equations are many short ones: apart from each other the
-  // processor works at several tiles at once.
+  // Linearisation is one long dependency chain, normal equations are many short ones: separated, the processor can
+  // overlap several tiles.
   constexpr std::size_t group = 8;
   linear_tile<R, L> tiles[group];
   for (std::size_t first = 0; first < work.count; first += 8) {
@@ -440,7 +441,7 @@ struct cost_kernel {
     return camera_cost<Target>(work, loss);
   }
 };
-/// Runs once for a problem, so that one instruction set is enough.
+/// Runs once per problem, so one instruction set is enough.
 template <class R>
 struct visibility_kernel {
   template <simd::target Target>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The loop of bundle adjustment: `bundle_adjuster`, without what its users need not see.
+/// The main loop of bundle adjustment: the implementation of `bundle_adjuster`.
 #pragma once
 
 #include <algorithm>
@@ -74,7 +74,7 @@ class bundle_solver {
  private:
   using equations_type = bundle_equations<Residual, Loss>;
 
-  /// The equations as the damping policies see them.
+  /// The interface of the equations for damping policies.
   template <class Policy>
   struct problem {
     equations_type& equations;
@@ -139,7 +139,7 @@ class bundle_solver {
     equations_.set_structure(cameras, points, observations, options.fixed_poses);
   }
 
-  /// Counts the observations that cannot be used at all.
+  /// Counts the unusable observations.
   void count_unusable(std::span<const std::uint8_t> ignored, bundle_summary& summary) const {
     for (std::size_t k = 0; k != observations_.size(); ++k)
       if ((ignored.empty() || ignored[k] == 0) && !equations_.residual().is_usable(observations_[k]))

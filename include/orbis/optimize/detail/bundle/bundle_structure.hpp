@@ -15,13 +15,13 @@
 
 namespace orbis::optimize::detail {
 
-/// Observations in two orders. For arithmetic that is the same for each observation: by camera, within chunks of points
-/// that fit into the cache; such segments are made of tiles of eight places, of which the last may stay empty. And by
-/// point, cameras ascending, for products of pairs of observations of a point: points that the same cameras see are
-/// neighbours and form groups, and points with the same first camera are neighbours, too, so that their pairs touch one
-/// part of the reduced system. Keeps its memory.
+/// Observations in two orders. By camera, for arithmetic that is the same for each observation: within chunks of points
+/// that fit into the cache; such segments consist of tiles of eight places, and the last tile may have empty places. By
+/// point, cameras ascending, for products of pairs of observations of a point: points observed by the same cameras are
+/// adjacent and form groups; points with the same first camera are also adjacent, so that their pairs update one part
+/// of the reduced system. Reuses its memory.
 ///
-/// O(observations + pairs of observations of one point + pairs of cameras that may move); one bit for each of the last.
+/// O(observations + pairs of observations of one point + pairs of movable cameras); one bit for each of the last.
 class bundle_structure {
  public:
   static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
@@ -32,37 +32,37 @@ class bundle_structure {
     std::uint32_t camera = 0;
     std::uint32_t count = 0;
     std::size_t first_tile = 0;
-    std::size_t first_mixed_tile = 0;  ///< the same, if tiles of cameras that may move are counted alone
+    std::size_t first_mixed_tile = 0;  ///< the same, counting only tiles of movable cameras
   };
-  /// Points that the same `cameras` cameras that may move see. Observation a of the i-th of them by such cameras has
-  /// the number `first_mixed + a * points + i`.
+  /// Points observed by the same `cameras` movable cameras. Observation a of the i-th of them by these
+  /// cameras has the number `first_mixed + a * points + i`.
   struct group {
     std::uint32_t first_point = 0, points = 0;
     std::uint32_t first_mixed = 0, cameras = 0;
-    std::size_t first_pair = 0;  ///< of its pairs a > b, a ascending; shared by groups alike
+    std::size_t first_pair = 0;  ///< of its pairs a > b, a ascending; shared by equal groups
   };
-  /// Points that are neighbours, with all their observations; its end is where the next begins.
+  /// Consecutive points with all their observations; ends at the beginning of the next chunk.
   struct chunk {
     std::size_t first_point = 0, first_segment = 0, first_group = 0, first_mixed = 0;
   };
 
-  std::vector<chunk> chunk_begin;           ///< of each chunk, and the end
+  std::vector<chunk> chunk_begin;           ///< of each chunk, followed by the end
   std::vector<segment> segments;            ///< by chunk, then by camera
-  std::vector<std::uint32_t> source;        ///< index of the caller's observation at a place
-  std::vector<std::uint32_t> point;         ///< of each place; that of the segment's first place where it is empty
-  std::vector<std::uint32_t> mixed_number;  ///< of each place: its number among observations by cameras that may move
+  std::vector<std::uint32_t> source;        ///< index of the caller's observation at each place
+  std::vector<std::uint32_t> point;         ///< of each place; empty places have the point of the segment's first place
+  std::vector<std::uint32_t> mixed_number;  ///< of each place: its number among observations by movable cameras
 
-  std::vector<std::uint32_t> point_source;  ///< number p is this one of the caller's points
+  std::vector<std::uint32_t> point_source;  ///< index of point p in the caller's array
   std::vector<group> groups;
-  std::vector<std::uint32_t> mixed_unknown;  ///< of each observation by a camera that may move, which one
-  std::vector<std::uint32_t> mixed_place;    ///< where it is if places of cameras that may move are counted alone
-  std::vector<std::uint32_t> pair_slot;      ///< of pairs of observations, the slot
+  std::vector<std::uint32_t> mixed_unknown;  ///< of each observation by a movable camera: its unknown
+  std::vector<std::uint32_t> mixed_place;    ///< its place, counting only places of movable cameras
+  std::vector<std::uint32_t> pair_slot;      ///< slot of each pair of observations
 
-  // Cameras that may move, and blocks of the reduced system: lower triangle with diagonal, row by row.
+  // Movable cameras, and blocks of the reduced system: lower triangle with diagonal, row by row.
   std::vector<std::uint32_t> count;            ///< observations by each camera
-  std::vector<std::uint32_t> unknown, camera;  ///< of each camera, its number or `none`; and back
+  std::vector<std::uint32_t> unknown, camera;  ///< of each camera, its number or `none`; and the inverse
   std::vector<block_place> slots;
-  std::vector<std::uint32_t> diagonal_slot;  ///< of each camera that may move
+  std::vector<std::uint32_t> diagonal_slot;  ///< of each movable camera
 
   [[nodiscard]] std::size_t unknowns() const { return camera.size(); }
   [[nodiscard]] std::size_t points() const { return point_source.size(); }
@@ -70,11 +70,11 @@ class bundle_structure {
   [[nodiscard]] std::size_t places() const { return source.size(); }
   [[nodiscard]] std::size_t mixed_tiles() const { return mixed_tiles_; }
   [[nodiscard]] std::size_t pairs() const { return pairs_; }  ///< of observations of one point
-  /// Most observations of a chunk by cameras that may move.
+  /// Largest number of observations of a chunk by movable cameras.
   [[nodiscard]] std::size_t largest_chunk() const { return largest_chunk_; }
 
-  /// Orders the observations for which `is_usable(index)`. Cameras without any do not move.
-  /// @pre their indices are in range, `fixed` is empty or has one entry for each camera
+  /// Orders the observations for which `is_usable(index)` is true. Cameras without any are not moved.
+  /// @pre their indices are in range; `fixed` is empty or has one entry per camera
   template <class Observation, class Usable>
   void build(std::size_t cameras, std::size_t points, std::span<const Observation> observations,
              std::span<const std::uint8_t> fixed, const Usable& is_usable) {
@@ -88,17 +88,17 @@ class bundle_structure {
 
  private:
   struct entry {
-    std::uint32_t observation, other;  ///< `other`: its point or its camera, whichever the order does not say
+    std::uint32_t observation, other;  ///< `other`: its point or its camera, depending on the order
   };
   struct span_of_cameras {
-    std::uint32_t first = none, last = none, seen = 0;  ///< of a point, among those that may move
+    std::uint32_t first = none, last = none, seen = 0;  ///< of a point, among movable cameras
   };
 
   [[nodiscard]] std::span<const entry> observations_of(std::size_t source_point) const {
     return std::span{by_point_}.subspan(of_point_[source_point], of_point_[source_point + 1] - of_point_[source_point]);
   }
 
-  /// By camera, then by point: `by_point_` has the observations of each point by ascending camera.
+  /// Sorts by camera, then by point: `by_point_` has the observations of each point by ascending camera.
   template <class Observation, class Usable>
   void sort(std::size_t cameras, std::size_t points, std::span<const Observation> observations,
             const Usable& is_usable) {
@@ -133,7 +133,7 @@ class bundle_structure {
       }
   }
 
-  /// By the first camera that may move, the last one, and how many.
+  /// Sorts by the first movable camera, the last one, and their number.
   void order_points(std::size_t points) {
     const auto n = static_cast<std::uint32_t>(unknowns());
     spans_.assign(points, {});
@@ -153,7 +153,7 @@ class bundle_structure {
     sort_points(n, [&](std::uint32_t p) { return std::min(spans_[p].last, n); });
     sort_points(n, [&](std::uint32_t p) { return std::min(spans_[p].first, n); });
   }
-  /// Sorts `point_source` by a key that is at most `largest`; those of the same key keep their order.
+  /// Stable sort of `point_source` by a key of at most `largest`.
   template <class Key>
   void sort_points(std::uint32_t largest, const Key& key) {
     cursor_.assign(std::size_t{largest} + 2, 0);
@@ -178,7 +178,7 @@ class bundle_structure {
     }
   }
 
-  /// Chunks end where they have observations enough to be worth while, for all of them and for each camera.
+  /// Ends a chunk when it has enough observations, in total and per camera.
   void lay_out(std::size_t cameras) {
     constexpr std::size_t enough = 2048, enough_of_camera = 48;
     segments.clear();
@@ -227,7 +227,7 @@ class bundle_structure {
       chunk_begin.push_back({end, segments.size(), groups.size(), mixed_unknown.size()});
     }
   }
-  /// Groups are small enough for the nearest cache.
+  /// End of the group at `p`; groups fit into the first-level cache.
   [[nodiscard]] std::size_t end_of_group(std::size_t p, std::size_t end) const {
     constexpr std::size_t room = 96;
     const std::size_t most = std::max<std::size_t>(1, room / std::max(1U, spans_[point_source[p]].seen));
@@ -259,7 +259,7 @@ class bundle_structure {
     }
   }
 
-  /// Whether the group has the pairs of the one before.
+  /// Returns true if the group has the same pairs as the previous one.
   [[nodiscard]] bool shares_pairs(std::size_t g) const { return g != 0 && is_like_last_[groups[g].first_point] != 0; }
   /// Calls `f(row * (row + 1) / 2 + column)` for the pairs of each group that does not share them.
   template <class F>
@@ -315,7 +315,7 @@ class bundle_structure {
   std::size_t mixed_tiles_ = 0, largest_chunk_ = 0, pairs_ = 0;
   std::vector<entry> by_camera_, by_point_;
   std::vector<std::uint32_t> of_point_, cursor_, moved_, in_chunk_, mixed_in_chunk_, touched_;
-  std::vector<std::uint8_t> is_like_last_;  // of each point: whether the same cameras that may move see the one before
+  std::vector<std::uint8_t> is_like_last_;  // of each point: true if the same movable cameras observe the previous one
   std::vector<span_of_cameras> spans_;
   std::vector<std::uint64_t> present_;
   std::vector<std::uint32_t> rank_;

@@ -14,10 +14,10 @@ namespace orbis::optimize::detail {
 
 using portable_lanes = simd::vec<double, 8, simd::portable>;
 
-/// A `camera_frame_residual` that evaluates eight observations by one camera at once. `measure(o, to)` writes what it
-/// needs of an observation to `to[8 * i]`, i < `R::measured`. `lanes_in_camera<Derive>(view, measurements, q, r, by_q,
-/// by_intrinsics)` is `linearize_in_camera` on all eight (without `Derive`: `residual_in_camera`) and returns which of
-/// them have a projection.
+/// A `camera_frame_residual` that evaluates eight observations by one camera at once. `measure(o, to)` writes the
+/// required values of an observation to `to[8 * i]`, i < `R::measured`. `lanes_in_camera<Derive>(view, measurements, q,
+/// r, by_q, by_intrinsics)` is `linearize_in_camera` on all eight (without `Derive`: `residual_in_camera`) and returns
+/// the mask of those with a projection.
 template <class R>
 concept lane_residual = camera_frame_residual<R> &&
     requires(const R& r, const typename R::observation& o, const typename R::view& view, double* to,

@@ -2,9 +2,9 @@
 /// @file
 /// The Schur complement: elimination of the points from the normal equations, and their steps by back-substitution.
 ///
-/// With V = L L^T of a point and Y = W L^-T of each camera that sees it, Y_a Y_b^T is subtracted from the reduced
-/// system for every pair of cameras; this is symmetric in spite of rounding. Source: D. C. Brown, "The bundle
-/// adjustment - progress and prospects", 1976.
+/// With V = L L^T of a point and Y = W L^-T of each camera that observes it, Y_a Y_b^T is subtracted from the reduced
+/// system for every pair of cameras; this is symmetric despite rounding. Source: D. C. Brown, "The bundle adjustment -
+/// progress and prospects", 1976.
 #pragma once
 
 #include <algorithm>
@@ -22,41 +22,41 @@
 
 namespace orbis::optimize::detail {
 
-/// How the kernels hold C rows: in whole registers, but one that would be alone in a register stands apart.
+/// Memory layout of C rows: whole registers, except that a row alone in a register is stored separately.
 template <int C>
 struct row_layout {
   static constexpr bool has_last = C > 8 && C % 8 == 1;
   static constexpr int body = has_last ? C - 1 : (C + 3) / 4 * 4;  ///< rows in registers
   static constexpr int size = has_last ? body + 4 : body;          ///< numbers of a vector of C rows
-  /// Numbers of a C x C block: C columns of `body` rows, then the last row if it stands apart.
+  /// Size of a C x C block: C columns of `body` rows, then the last row if it is separate.
   static constexpr int block = C * body + (has_last ? size : 0);
-  /// Where the number of a row and a column of a block is.
+  /// Offset of an entry of a block by row and column.
   [[nodiscard]] static constexpr int at(int row, int column) {
     return row < body ? body * column + row : C * body + column;
   }
 };
-/// Rows in a register.
+/// Number of rows in a register.
 template <int C, simd::target Target>
 inline constexpr int row_width = row_layout<C>::body % static_cast<int>(Target::bytes / 8) == 0 ? Target::bytes / 8 : 4;
-/// Whether two rows of blocks fit into the registers: the sums, and two rows and a factor.
+/// True if two rows of blocks fit into the registers: the sums, and two rows and a factor.
 template <int C, simd::target Target>
 inline constexpr bool has_room_for_two = 2 * C + 3 <= (Target::bytes == 64 ? 32 : 16);
 
-/// The elimination of a chunk of points, for cameras with C unknowns.
+/// Elimination of a chunk of points, for cameras with C unknowns.
 struct elimination {
   const bundle_structure& structure;
   std::size_t chunk = 0;
-  const double* normal = nullptr;   ///< `point_size` of each point; all zero: the point stays
-  const double* damping = nullptr;  ///< three of each point, or null
-  const double* mixed = nullptr;    ///< tiles of blocks of cameras and points
-  double* inverse = nullptr;        ///< `point_size` of each point: L^-1, row by row, and L^-1 g
-  // What is subtracted from the reduced system.
-  double* blocks = nullptr;   ///< `row_layout<C>::block` for each slot
-  double* right = nullptr;    ///< C of each unknown
-  double* scratch = nullptr;  ///< three vectors for each observation of the chunk by a camera that may move
+  const double* normal = nullptr;   ///< `point_size` per point; all zero: the point is fixed
+  const double* damping = nullptr;  ///< three per point, or null
+  const double* mixed = nullptr;    ///< tiles of camera-point blocks
+  double* inverse = nullptr;        ///< `point_size` per point: L^-1, row by row, and L^-1 g
+  // Contributions to subtract from the reduced system.
+  double* blocks = nullptr;   ///< `row_layout<C>::block` per slot
+  double* right = nullptr;    ///< C per unknown
+  double* scratch = nullptr;  ///< three vectors per observation of the chunk by a movable camera
 };
 
-/// Computes L^-1 and L^-1 g of the eight points from `p` on, or up to `end`. Returns the first of them whose block is
+/// Computes L^-1 and L^-1 g of up to eight points from `p` on, before `end`. Returns the first of them whose block is
 /// not positive definite, or `end`.
 template <simd::target Target>
 ORBIS_ALWAYS_INLINE std::size_t invert_factors(const elimination& work, std::size_t p, std::size_t end) {
@@ -113,8 +113,8 @@ ORBIS_ALWAYS_INLINE std::size_t invert_factors(const elimination& work, std::siz
   return p + i;
 }
 
-/// Computes Y of the observations of a chunk by one camera, its sum of Y Y^T, and what is subtracted from the
-/// right-hand side.
+/// Computes Y of the observations of a chunk by one camera, its sum of Y Y^T, and the contribution to the right-hand
+/// side.
 template <int C, bool ThroughCamera, simd::target Target>
 ORBIS_ALWAYS_INLINE void make_factors(const elimination& work, const bundle_structure::segment& segment,
                                       std::size_t unknown) {
@@ -129,7 +129,7 @@ ORBIS_ALWAYS_INLINE void make_factors(const elimination& work, const bundle_stru
   for (std::size_t first = 0; first < segment.count; first += 8, mixed += mixed_block::size) {
     const std::uint32_t* const point = work.structure.point.data() + 8 * segment.first_tile + first;
     const std::uint32_t* const number = work.structure.mixed_number.data() + 8 * segment.first_tile + first;
-    double nowhere[3 * rows::size];  // for the empty places of the last tile
+    double nowhere[3 * rows::size];  // dummy output for the empty places of the last tile
     const double* from[8];
     double* to[8];
     for (std::size_t i = 0; i != 8; ++i) {
@@ -178,7 +178,7 @@ ORBIS_ALWAYS_INLINE void make_factors(const elimination& work, const bundle_stru
 }
 
 /// Adds Y_a Y_c^T, summed over a group of points, to a block, for `Count` cameras a to one block each. The Y of a
-/// camera are `columns` vectors, those of the next camera a follow after them.
+/// camera are `columns` vectors, followed by those of the next camera a.
 template <int C, int Count, simd::target Target>
 ORBIS_ALWAYS_INLINE void add_products(const double* ya, const double* yc, std::size_t columns,
                                       double* const (&blocks)[Count]) {
@@ -191,7 +191,7 @@ ORBIS_ALWAYS_INLINE void add_products(const double* ya, const double* yc, std::s
       unroll<C>([&](auto c) ORBIS_INLINE_LAMBDA { sum[r][c] = row::load(blocks[r] + rows::body * c + width * i); });
     });
     const double *a = ya + width * i, *b = yc;
-    for (std::size_t k = 0; k != columns; ++k, a += rows::size, b += rows::size) {  // unrolled it would not fit
+    for (std::size_t k = 0; k != columns; ++k, a += rows::size, b += rows::size) {  // unrolling would spill
       row own[Count];
       unroll<Count>([&](auto r) ORBIS_INLINE_LAMBDA { own[r] = row::load(a + r * columns * rows::size); });
       unroll<C>([&](auto c) ORBIS_INLINE_LAMBDA {
@@ -220,7 +220,7 @@ ORBIS_ALWAYS_INLINE void add_products(const double* ya, const double* yc, std::s
     });
 }
 
-/// Returns the first point whose block is not positive definite, or `bundle_structure::none`.
+/// Eliminates a chunk. Returns the first point whose block is not positive definite, or `bundle_structure::none`.
 template <int C, bool ThroughCamera, simd::target Target>
 ORBIS_ALWAYS_INLINE std::size_t eliminate(const elimination& work) {
   using rows = row_layout<C>;
@@ -247,7 +247,7 @@ ORBIS_ALWAYS_INLINE std::size_t eliminate(const elimination& work) {
       return work.scratch + rows::size * (3 * (group.first_mixed - begin.first_mixed) + columns * a);
     };
     const auto unknown = [&](std::size_t a) { return structure.mixed_unknown[group.first_mixed + a * group.points]; };
-    bool is_seen_twice = false;  // by one camera
+    bool is_seen_twice = false;  // by the same camera
     for (std::size_t a = 1; a != count; ++a) is_seen_twice |= unknown(a) == unknown(a - 1);
     std::size_t a = 1;
     if constexpr (has_room_for_two<C, Target>)  // two rows of blocks share the loads of their factors
@@ -259,22 +259,22 @@ ORBIS_ALWAYS_INLINE std::size_t eliminate(const elimination& work) {
     for (; a != count; ++a)
       for (std::size_t c = 0; c != a; ++c) {
         add_products<C, 1, Target>(y(a), y(c), columns, {block_at(a, c)});
-        if (is_seen_twice && unknown(c) == unknown(a))  // on the diagonal, where the other order counts, too
+        if (is_seen_twice && unknown(c) == unknown(a))  // on the diagonal, where the transposed product also counts
           add_products<C, 1, Target>(y(c), y(a), columns, {block_at(a, c)});
       }
   }
   return bundle_structure::none;
 }
 
-/// The steps of a chunk of points, `-V^-1 (g + W^T x)`, for the steps x of the cameras.
+/// Computes the steps of a chunk of points, `-V^-1 (g + W^T x)`, for the steps x of the cameras.
 struct substitution {
   const bundle_structure& structure;
   std::size_t chunk = 0;
   const double* mixed = nullptr;
   const double* inverse = nullptr;
   const double* cameras = nullptr;
-  double* pulled = nullptr;  ///< four numbers for each point
-  double* steps = nullptr;   ///< three of each point
+  double* pulled = nullptr;  ///< four numbers per point
+  double* steps = nullptr;   ///< three per point
 };
 
 template <int C, bool ThroughCamera, simd::target Target>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The normal equations of poses, points and one camera that they share.
+/// The normal equations of poses, points and one shared camera.
 #pragma once
 
 #include <algorithm>
@@ -25,8 +25,8 @@
 
 namespace orbis::optimize::detail {
 
-/// Levenberg-Marquardt with the points eliminated and a dense reduced system: six unknowns an image, but for the first
-/// one, then the parameters that are estimated.
+/// Levenberg-Marquardt with eliminated points and a dense reduced system: six unknowns for each image except the first,
+/// then the estimated parameters.
 template <camera::parametric_camera Camera>
 class shared_intrinsics {
   using parameters = camera::parameters_of<Camera>;
@@ -46,15 +46,15 @@ class shared_intrinsics {
     std::vector<vec3> points;
   };
   static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
-  /// Why an observation takes no part.
+  /// Reason for the exclusion of an observation.
   enum class out : std::uint8_t {
     no,
-    outlier,  ///< it disagrees with the estimate
-    alone     ///< its image or its point is not determined, or not together with the others
+    outlier,  ///< inconsistent with the estimate
+    alone     ///< its image or its point is not determined, or not connected to the others
   };
 
  public:
-  /// Points that fewer than two usable observations see are left out, and those seen from behind at the start.
+  /// Excludes points with fewer than two usable observations, and points behind a camera at the start.
   shared_intrinsics(const Camera& start, double bf, std::uint32_t free, bool keeps_aspect, std::span<const se3> poses,
                     std::span<const vec3> points, std::span<const bundle_observation> observations)
       : residual_{bf}, now_{start, {poses.begin(), poses.end()}, {points.begin(), points.end()}} {
@@ -66,17 +66,17 @@ class shared_intrinsics {
     }
     if (ties) basis_(1, 0) = parameters::get(start)[1] / parameters::get(start)[0];
     choose(observations);
-    keep_what_holds_together();
+    keep_connected();
   }
 
-  /// Those that take part, and outliers.
+  /// Number of observations used, and outliers.
   [[nodiscard]] std::size_t observations() const noexcept {
     return static_cast<std::size_t>(std::count_if(out_.begin(), out_.end(), [](out o) { return o != out::alone; }));
   }
   [[nodiscard]] std::size_t outliers() const noexcept {
     return static_cast<std::size_t>(std::count(out_.begin(), out_.end(), out::outlier));
   }
-  /// Whether anything holds the size of the world.
+  /// Returns true if depth observations determine the scale.
   [[nodiscard]] bool has_depth() const {
     for (std::size_t k = 0; k != observations_.size(); ++k)
       if (out_[k] == out::no && !std::isnan(observations_[k].right)) return true;
@@ -88,7 +88,7 @@ class shared_intrinsics {
     std::copy(now_.points.begin(), now_.points.end(), points.begin());
   }
 
-  /// Steps until the cost falls no more; counts them. Returns false if `go_on()` did.
+  /// Iterates until the cost stops decreasing; counts the steps. Returns false if `go_on()` did.
   template <class GoOn>
   [[nodiscard]] bool descend(int limit, double relative_tolerance, int& steps, const GoOn& go_on) {
     set_noise();
@@ -113,19 +113,19 @@ class shared_intrinsics {
     return true;
   }
 
-  /// Observations that disagree with the estimate take no part any more, those that agree again do.
-  void leave_out_outliers() {
-    constexpr double gates[] = {13.816, 16.266};  // the chi-squared quantiles of 99.9 %, of two and three coordinates
+  /// Excludes observations that are inconsistent with the estimate, and restores those that are consistent again.
+  void update_outliers() {
+    constexpr double gates[] = {13.816, 16.266};  // the chi-squared quantiles of 99.9 %, for two and three coordinates
     set_noise();
     const std::vector<view_type> views = views_of(now_);
     for (std::size_t k = 0; k != observations_.size(); ++k) {
       const double gate = gates[std::isnan(observations_[k].right) ? 0 : 1] * noise_ * noise_;
       out_[k] = squared(views, now_.points, k) > gate ? out::outlier : out::no;
     }
-    keep_what_holds_together();
+    keep_connected();
   }
 
-  /// Root mean square of the whitened residuals, an entry of them.
+  /// Root mean square of the entries of the whitened residuals.
   [[nodiscard]] double rms() const { return rms_of(now_.camera, now_.poses, now_.points); }
   [[nodiscard]] double rms_of(const Camera& camera, std::span<const se3> poses, std::span<const vec3> points) const {
     const estimate e{camera, {poses.begin(), poses.end()}, {points.begin(), points.end()}};
@@ -140,7 +140,7 @@ class shared_intrinsics {
     return entries > 0.0 ? std::sqrt(sum / entries) : 0.0;
   }
 
-  /// The covariance of the parameters at the present estimate; false if they are not determined.
+  /// The covariance of the parameters at the current estimate; returns false if they are not determined.
   template <class Matrix>
   [[nodiscard]] bool covariance(Matrix& out) {
     out = zeros<Matrix>();
@@ -189,10 +189,10 @@ class shared_intrinsics {
     }
     out_.assign(observations_.size(), out::no);
   }
-  /// The standard deviation of the residuals, as their median tells it.
+  /// Sets the standard deviation of the residuals, estimated from their median.
   void set_noise() {
-    constexpr double medians[] = {1.386, 2.366};  // of chi-squared, of two and three coordinates
-    constexpr double least = 0.01;                // where there is no noise, rounding is none either
+    constexpr double medians[] = {1.386, 2.366};  // of chi-squared, for two and three coordinates
+    constexpr double least = 0.01;  // lower limit for noise-free data, so that rounding does not count as noise
     const std::vector<view_type> views = views_of(now_);
     std::vector<double> shares;
     for (std::size_t k = 0; k != observations_.size(); ++k)
@@ -207,9 +207,9 @@ class shared_intrinsics {
     loss_.width = 2.447 * noise_;
   }
 
-  /// Sets aside images that too few observations hold, points that fewer than two do or that these do not determine,
-  /// and what does not hang together with the most.
-  void keep_what_holds_together() {
+  /// Excludes images with too few observations, points with fewer than two observations or not determined by them, and
+  /// everything outside the largest connected component.
+  void keep_connected() {
     for (out& o : out_)
       if (o == out::alone) o = out::no;
     views_ = views_of(now_);
@@ -229,7 +229,7 @@ class shared_intrinsics {
       if (out_[k] == out::no && part[observations_[k].pose] != largest) out_[k] = out::alone;
     number_images();
   }
-  /// All of a point's observations.
+  /// Excludes all observations of a point.
   void set_aside(std::size_t p) {
     for (std::size_t k = begins_[p]; k != begins_[p + 1]; ++k)
       if (out_[k] == out::no) out_[k] = out::alone;
@@ -250,7 +250,7 @@ class shared_intrinsics {
       }
     }
   }
-  /// By image: the first of those that it hangs together with by points.
+  /// Connected components by shared points: for each image the first one of its component.
   [[nodiscard]] std::vector<std::uint32_t> parts() const {
     std::vector<std::uint32_t> first(now_.poses.size());
     for (std::uint32_t i = 0; i != first.size(); ++i) first[i] = i;
@@ -296,7 +296,7 @@ class shared_intrinsics {
                                std::size_t k) const {
     const bundle_observation& o = observations_[k];
     auto r = residual_.residual(views[o.pose], points[o.point], o);
-    if (r && !std::isnan(o.right)) (*r)[2] -= (*r)[0];  // the depth alone: bf times the inverse depths' difference
+    if (r && !std::isnan(o.right)) (*r)[2] -= (*r)[0];  // the depth alone: bf times the difference of inverse depths
     return r ? o.information * squared_norm(*r) : std::numeric_limits<double>::infinity();
   }
   [[nodiscard]] double cost_of(const estimate& e) const {
@@ -307,22 +307,22 @@ class shared_intrinsics {
     return 0.5 * sum;
   }
 
-  /// What an observation adds to the normal equations.
+  /// The contribution of an observation to the normal equations.
   struct seen {
     bool takes_part = false;
     std::uint32_t row = none;  ///< of its image's unknowns
     block_63 pose_point;
     vec6 gradient;  ///< by the image
   };
-  /// What a point's observations add together.
+  /// The sum of the contributions of a point's observations.
   struct point_part {
-    bool is_determined = false;  ///< by them
+    bool is_determined = false;  ///< by these observations
     mat3 own = zeros<mat3>();
     vec3 gradient = zeros<vec3>();
     block_t3 theta_point = zeros<block_t3>();
     theta_vector theta_gradient = zeros<theta_vector>();
   };
-  /// The part of a point, its own unknowns eliminated from the gradients.
+  /// The contribution of a point, with its own unknowns eliminated from the gradients.
   struct eliminated {
     std::vector<seen> by;
     block_t3 theta_point;
@@ -331,7 +331,7 @@ class shared_intrinsics {
     vec3 gradient;
   };
 
-  /// Makes the part of point `p`, and the derivatives of its residuals.
+  /// Computes the contribution of point `p`, and the derivatives of its residuals.
   void linearize_point(std::size_t p) {
     const vec3& at = now_.points[observations_[begins_[p]].point];
     point_part& part = parts_[p];
@@ -371,7 +371,7 @@ class shared_intrinsics {
     part.is_determined = rows_.size() >= 2;
   }
 
-  /// Adds `part` to a matrix, its first entry at (row, column); of theta only what is used.
+  /// Adds `part` to a matrix, its first entry at (row, column); only the used entries of theta.
   template <int R, int C>
   void add(Eigen::MatrixXd& to, Eigen::Index row, Eigen::Index column, const matrix<R, C>& part) const {
     const int rows = row == pose_rows_ ? count_ : R, columns = column == pose_rows_ ? count_ : C;
@@ -383,8 +383,8 @@ class shared_intrinsics {
     std::fill_n(m.data(), m.size(), 0.0);
   }
 
-  /// Adds what of the linearised point does not go by its own unknowns.
-  void add_directly() {
+  /// Adds the terms of the linearised point that do not involve its own unknowns.
+  void add_direct_terms() {
     const Eigen::Index theta = pose_rows_;
     for (const jacobians& j : rows_) {
       const matrix<6, 3> weighted = j.weight * transposed(j.by_pose);
@@ -395,7 +395,7 @@ class shared_intrinsics {
     }
   }
 
-  /// Makes `point_` of the part of point `p`. False if the observations do not determine it.
+  /// Computes `point_` from the contribution of point `p`. Returns false if the observations do not determine it.
   [[nodiscard]] bool eliminate(std::size_t p, double damping) {
     const point_part& part = parts_[p];
     if (!part.is_determined) return false;
@@ -418,15 +418,15 @@ class shared_intrinsics {
     return true;
   }
 
-  /// The largest sum of magnitudes of a column; for a matrix times that for its inverse, the condition.
+  /// The 1-norm: the largest column sum of magnitudes; multiplied by that of the inverse, the condition number.
   [[nodiscard]] static double size_of(const mat3& m) {
     double most = 0.0;
     for (int c = 0; c != 3; ++c) most = std::max(most, std::abs(m(0, c)) + std::abs(m(1, c)) + std::abs(m(2, c)));
     return most;
   }
 
-  /// Takes away what goes by the unknowns of `point_`; the lower half of the system.
-  void take_away() {
+  /// Subtracts the terms that involve the unknowns of `point_`; the lower half of the system.
+  void subtract_eliminated() {
     const Eigen::Index theta = pose_rows_;
     const block_t3 theta_inverse = point_.theta_point * point_.inverse;
     add(removed_, theta, theta, basis_type(theta_inverse * transposed(point_.theta_point)));
@@ -439,25 +439,26 @@ class shared_intrinsics {
     }
   }
 
-  /// Linearises all residuals at the present estimate.
+  /// Linearises all residuals at the current estimate.
   void linearize() {
     views_ = views_of(now_);
     clear(direct_, pose_rows_ + count_);
     for (std::size_t p = 0; p + 1 < begins_.size(); ++p) {
       linearize_point(p);
       parts_[p].is_determined = eliminate(p, 0.0);
-      if (parts_[p].is_determined) add_directly();
+      if (parts_[p].is_determined) add_direct_terms();
     }
   }
 
-  /// The reduced system with `damping` times its diagonal added (before the points are eliminated), and its gradient.
+  /// Computes the reduced system with `damping` times its diagonal added (before the elimination of the points), and
+  /// its gradient.
   void reduce(double damping) {
     const Eigen::Index size = direct_.rows();
     clear(removed_, size);
     gradient_.assign(static_cast<std::size_t>(size), 0.0);
     for (std::size_t p = 0; p + 1 < begins_.size(); ++p) {
       if (!eliminate(p, damping)) continue;
-      take_away();
+      subtract_eliminated();
       double* const by_theta = gradient_.data() + pose_rows_;
       for (int i = 0; i != count_; ++i) by_theta[i] += point_.theta_gradient[i];
       for (const seen& s : point_.by)
@@ -470,7 +471,7 @@ class shared_intrinsics {
         reduced_(r, c) = direct_(r, c) * (r == c ? 1.0 + damping : 1.0) - removed_(r, c);
   }
 
-  /// Where a damped step leads from what was linearised; empty if there is none, or no such camera.
+  /// The estimate after a damped step from the linearisation; empty if there is none, or if the camera is invalid.
   [[nodiscard]] std::optional<estimate> step(double damping) {
     reduce(damping);
     const Eigen::LLT<Eigen::MatrixXd, Eigen::Lower> factor(reduced_);
@@ -508,18 +509,18 @@ class shared_intrinsics {
   double noise_ = 1.0;  ///< standard deviation of the whitened residuals
   huber loss_{2.447};   ///< the chi-squared gate of two coordinates, times the noise
   estimate now_;
-  basis_type basis_ = zeros<basis_type>();        ///< how the parameters follow the unknowns, a column each
+  basis_type basis_ = zeros<basis_type>();        ///< derivatives of the parameters by the unknowns, a column each
   int count_ = 0;                                 ///< of the unknowns of the camera
   std::vector<bundle_observation> observations_;  ///< by point
-  std::vector<std::size_t> begins_;               ///< of each point's, and the end
+  std::vector<std::size_t> begins_;               ///< start of each point's observations, followed by the end
   std::vector<out> out_;                          ///< by observation
-  std::vector<std::uint32_t> row_of_;             ///< by image: its first unknown; `none` if its pose is held
+  std::vector<std::uint32_t> row_of_;             ///< by image: its first unknown; `none` if its pose is fixed
   Eigen::Index pose_rows_ = 0;
 
   std::vector<view_type> views_;
-  std::vector<seen> seen_;                      ///< by observation: as it was linearised last
-  std::vector<point_part> parts_;               ///< by point: the same
-  std::vector<jacobians> rows_;                 ///< of the residuals of the point that was linearised last
+  std::vector<seen> seen_;                      ///< by observation, at the last linearisation
+  std::vector<point_part> parts_;               ///< by point, likewise
+  std::vector<jacobians> rows_;                 ///< of the residuals of the most recently linearised point
   Eigen::MatrixXd direct_, reduced_, removed_;  ///< lower halves; `direct_`: without elimination and damping
   std::vector<double> gradient_;
   eliminated point_;

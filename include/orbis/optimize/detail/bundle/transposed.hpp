@@ -48,7 +48,7 @@ ORBIS_ALWAYS_INLINE void load_transposed(const double* const* from, simd::vec<do
   }
 }
 
-/// Four columns of eight numbers as eight rows of four: calls `f(i, row)` with i from 0 to 7.
+/// Transposes four columns of eight numbers to eight rows of four: calls `f(i, row)` with i from 0 to 7.
 template <simd::target Target, class F>
 ORBIS_ALWAYS_INLINE void for_each_row(const simd::vec<double, 8, Target>& a, const simd::vec<double, 8, Target>& b,
                                       const simd::vec<double, 8, Target>& c, const simd::vec<double, 8, Target>& d,
@@ -90,7 +90,7 @@ ORBIS_ALWAYS_INLINE void store_transposed(const simd::vec<double, 8, Target>& a,
                                           double* const* to, int offset) {
   for_each_row(a, b, c, d, [&](int i, const auto& row) ORBIS_INLINE_LAMBDA { row.store(to[i] + offset); });
 }
-/// Adds them to what is there; rows may be the same.
+/// Adds the rows to memory; rows may coincide.
 template <simd::target Target>
 ORBIS_ALWAYS_INLINE void add_transposed(const simd::vec<double, 8, Target>& a, const simd::vec<double, 8, Target>& b,
                                         const simd::vec<double, 8, Target>& c, const simd::vec<double, 8, Target>& d,

@@ -9,9 +9,9 @@
 
 namespace orbis::optimize::detail {
 
-/// Takes at most `steps` steps, beginning at `state`. `sum_up(state)` returns the equations there, with the sum of
+/// Takes at most `steps` steps from `state`. `sum_up(state)` returns the normal equations at a state, with the sum of
 /// squares as their `cost`; `step(state, equations)` returns the next state, or empty if there is none. Stops when a
-/// step does not lower the cost by more than rounding. Empty if the cost is not finite at the start.
+/// step does not lower the cost by more than rounding. Empty if the initial cost is not finite.
 template <class State, class SumUp, class Step>
 [[nodiscard]] std::optional<State> descend(State state, int steps, const SumUp& sum_up, const Step& step) {
   auto here = sum_up(state);

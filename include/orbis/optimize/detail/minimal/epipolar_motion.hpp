@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The motion between two views as epipolar geometry sees it, and normal equations of Sampson distances for it.
+/// The relative motion of two views up to scale, and normal equations of Sampson distances for it.
 #pragma once
 
 #include <cmath>
@@ -27,8 +27,8 @@ namespace orbis::optimize::detail {
   return columns;
 }
 
-/// The unit vector that lies a step of `d` radians away from the unit vector `p`, along a great circle. `d` is in
-/// `tangent_basis(p)`, which is its derivative by `d` at 0.
+/// The unit vector at a distance of `d` radians from the unit vector `p` along a great circle. `d` is in
+/// `tangent_basis(p)`, which is the derivative by `d` at 0.
 [[nodiscard]] inline vec3 step_on_sphere(const vec3& p, const vec2& d) {
   const double angle = std::sqrt(d.x() * d.x() + d.y() * d.y());
   const double factor = angle < 1e-8 ? 1.0 : std::sin(angle) / angle, along = std::cos(angle);
@@ -42,23 +42,22 @@ namespace orbis::optimize::detail {
   return {q[0] / length, q[1] / length, q[2] / length};
 }
 
-/// Turns gradients by the point at z = 1 into gradients by the pixel.
+/// Converts gradients by the point at z = 1 to gradients by the pixel.
 struct pixel_gradient {
   double xx, yx, yy;
   explicit pixel_gradient(const metric_ray& r) : xx{1.0 / r.xx}, yx{-r.xy / (r.xx * r.yy)}, yy{1.0 / r.yy} {}
   [[nodiscard]] vec2 operator()(double gx, double gy) const { return {xx * gx, yx * gx + yy * gy}; }
-  /// The transpose.
+  /// Multiplies by the transpose.
   [[nodiscard]] vec2 back(const vec2& g) const { return {xx * g.x() + yx * g.y(), yy * g.y()}; }
 };
 
-/// An essential matrix and the motion that it stands for: rotation and direction of the translation of
-/// `T_second_first`.
+/// An essential matrix and its motion: rotation and direction of the translation of `T_second_first`.
 struct epipolar_motion {
   so3 rotation;
   vec3 direction;
   mat3 e;
   epipolar_motion(const so3& r, const vec3& t) : rotation{r}, direction{t}, e{hat<double>(t) * r.rotation_matrix()} {}
-  /// After a step: `exp(d.head<3>())` on the left of the rotation, the rest on the sphere of directions.
+  /// The motion after a step: `exp(d.head<3>())` on the left of the rotation, the rest on the sphere of directions.
   [[nodiscard]] epipolar_motion moved(const matrix<5>& d) const {
     return {so3::exp(head<3>(d)) * rotation, step_on_sphere(direction, tail<2>(d))};
   }
@@ -80,7 +79,7 @@ struct epipolar_equations {
   matrix<9> g = zeros<matrix<9>>();
   double cost = 0.0;
 
-  /// Adds a match, to the lower triangle of `h`. `weight(squared distance)` is its weight.
+  /// Adds a match to the lower triangle of `h`. `weight(squared distance)` is its weight.
   template <class Weight>
   void add(const mat3& e, const image_match& m, const Weight& weight) {
     const pixel_gradient by_first(m.first), by_second(m.second);
@@ -110,7 +109,7 @@ struct epipolar_equations {
   void add(const mat3& e, const image_match& m) {
     add(e, m, [](double) { return 1.0; });
   }
-  /// Fills the upper triangle of `h`.
+  /// Copies the lower triangle of `h` to the upper one.
   void mirror() {
     for (int a = 0; a != 9; ++a)
       for (int b = a + 1; b != 9; ++b) h(a, b) = h(b, a);
@@ -122,7 +121,7 @@ struct epipolar_equations {
   };
   /// The equations for a step of the motion (`epipolar_motion::moved`). @pre mirrored
   [[nodiscard]] motion_equations by_motion(const epipolar_motion& m) const {
-    // How the entries of E = [t]x R move with exp(phi) R and with t on the sphere.
+    // Derivatives of the entries of E = [t]x R by exp(phi) R and by a step of t on the sphere.
     matrix<9, 5> by_step;
     const matrix<3, 2> basis = tangent_basis(m.direction);
     for (int j = 0; j != 5; ++j) {

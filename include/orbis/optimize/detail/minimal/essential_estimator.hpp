@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The estimator of RANSAC for essential matrices.
+/// The RANSAC estimator of essential matrices.
 #pragma once
 
 #include <algorithm>
@@ -31,7 +31,7 @@
 
 namespace orbis::optimize::detail {
 
-/// The four poses `T_second_first` (translations of length 1) that an essential matrix may stand for.
+/// The four poses `T_second_first` (translations of length 1) that an essential matrix may represent.
 [[nodiscard]] inline std::array<se3, 4> decompose_essential(const mat3& essential) {
   auto [u, values, v] = singular_values_of<3>(essential);
   if (determinant(u) < 0.0) set_column(u, 2, -column_of(u, 2));
@@ -133,11 +133,11 @@ class essential_estimator {
   std::size_t stride_ = 0;
 };
 
-/// The number of inliers that a rotation of the camera alone explains. The rotation is found with weights that fall
-/// with the error, because wrong matches that lie near their epipolar lines by chance are among the inliers.
-[[nodiscard]] inline std::size_t explained_by_rotation(const std::vector<image_match>& matches,
-                                                       std::span<const std::uint32_t> inliers,
-                                                       double squared_threshold) {
+/// The number of inliers that a pure rotation of the camera explains. The rotation is estimated with weights that
+/// decrease with the error, because the inliers contain wrong matches that are close to their epipolar lines by chance.
+[[nodiscard]] inline std::size_t count_rotation_inliers(const std::vector<image_match>& matches,
+                                                        std::span<const std::uint32_t> inliers,
+                                                        double squared_threshold) {
   mat3 rotation = identity<mat3>();
   std::size_t explained = 0;
   for (int round = 0; round != 10; ++round) {

@@ -4,7 +4,7 @@
 ///
 /// The five epipolar constraints leave the matrices `x X + y Y + z Z + W`. An essential matrix is singular and has two
 /// equal singular values, which gives ten cubic equations in x, y and z. Elimination leaves a polynomial of degree ten
-/// in z. Newton's method on the cubics restores the digits that were lost on the way.
+/// in z. Newton's method on the cubics recovers the accuracy lost in the elimination.
 ///
 /// Source: D. Nister, "An efficient solution to the five-point relative pose problem", PAMI 26(6), 2004.
 #pragma once
@@ -39,7 +39,8 @@ class five_point_solutions {
   std::size_t size_ = 0;
 };
 
-/// Polynomials in x, y, z: of degree 1 as coefficients of x y z 1, of degrees 2 and 3 in the order of these tables.
+/// Polynomials in x, y, z: those of degree 1 as coefficients of x y z 1, those of degrees 2 and 3 in the order of these
+/// tables.
 namespace epipolar_cubics {
 
 using linear = std::array<double, 4>;
@@ -50,7 +51,7 @@ using exponents = std::array<std::uint8_t, 3>;
 inline constexpr std::array<exponents, 4> linear_terms{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {0, 0, 0}}};
 inline constexpr std::array<exponents, 10> quadric_terms{
     {{2, 0, 0}, {1, 1, 0}, {1, 0, 1}, {1, 0, 0}, {0, 2, 0}, {0, 1, 1}, {0, 1, 0}, {0, 0, 2}, {0, 0, 1}, {0, 0, 0}}};
-/// First the terms to be eliminated, then the rest: x, y and 1 times powers of z.
+/// First the terms to eliminate, then the rest: x, y and 1 times powers of z.
 inline constexpr std::array<exponents, 20> cubic_terms{
     {{3, 0, 0}, {0, 3, 0}, {2, 1, 0}, {1, 2, 0}, {2, 0, 1}, {2, 0, 0}, {0, 2, 1}, {0, 2, 0}, {1, 1, 1}, {1, 1, 0},
      {1, 0, 2}, {1, 0, 1}, {1, 0, 0}, {0, 1, 2}, {0, 1, 1}, {0, 1, 0}, {0, 0, 3}, {0, 0, 2}, {0, 0, 1}, {0, 0, 0}}};
@@ -108,7 +109,7 @@ inline void add_product(cubic& sum, const quadric& a, const linear& b) noexcept 
   return all;
 }
 
-/// Gauss-Newton on the cubics; false if it does not lead to a common root.
+/// Gauss-Newton on the cubics; returns false if it does not converge to a common root.
 [[nodiscard]] inline bool polish(const std::array<cubic, 10>& cubics, vec3& p) {
   double last = 0.0;
   vec3 previous = p;
@@ -121,7 +122,7 @@ inline void add_product(cubic& sum, const quadric& a, const linear& b) noexcept 
     double error = 0.0;
     mat3 normal = zeros<mat3>();
     vec3 gradient = zeros<vec3>();
-    std::array<std::array<double, 4>, 20> terms;  // with their derivatives by x, y and z
+    std::array<std::array<double, 4>, 20> terms;  // including their derivatives by x, y and z
     for (std::size_t t = 0; t != 20; ++t) {
       const auto [i, j, k] = cubic_terms[t];
       const double x = power[0][i], y = power[1][j], z = power[2][k];
@@ -148,7 +149,8 @@ inline void add_product(cubic& sum, const quadric& a, const linear& b) noexcept 
   return last <= 1e-16 * size * size * size;
 }
 
-/// Four orthonormal vectors that are orthogonal to the five rows; false if the rows are linearly dependent.
+/// Computes four orthonormal vectors that are orthogonal to the five rows; returns false if the rows are linearly
+/// dependent.
 [[nodiscard]] inline bool null_space(std::array<std::array<double, 9>, 5>& rows,
                                      std::array<std::array<double, 9>, 4>& basis) {
   std::array<std::size_t, 9> column{0, 1, 2, 3, 4, 5, 6, 7, 8};
@@ -189,7 +191,7 @@ inline void add_product(cubic& sum, const quadric& a, const linear& b) noexcept 
   return true;
 }
 
-/// Solves for the first ten terms: afterwards row i is `term i + rest = 0`. False if the system is singular.
+/// Solves for the first ten terms: afterwards row i is `term i + rest = 0`. Returns false if the system is singular.
 [[nodiscard]] inline bool eliminate(std::array<cubic, 10>& rows) {
   for (std::size_t k = 0; k != 10; ++k) {
     std::size_t best = k;
@@ -211,9 +213,9 @@ inline void add_product(cubic& sum, const quadric& a, const linear& b) noexcept 
 }  // namespace epipolar_cubics
 
 /// All essential matrices with `second[i]^T E first[i] = 0`, for rays of any length. Empty if the rays do not determine
-/// at most ten of them (all rays in one plane through the centre, or the same ray twice, for example), or are not
-/// finite. Rays that differ only by a rotation are no failure: there is a matrix for every translation. Constant time,
-/// no allocation.
+/// at most ten of them (for example all rays in one plane through the centre, or a repeated ray), or are not finite.
+/// Rays that differ only by a rotation are not a failure: every translation then gives a matrix. Constant time, no
+/// allocation.
 [[nodiscard]] inline five_point_solutions five_point(const std::array<vec3, 5>& first,
                                                      const std::array<vec3, 5>& second) {
   namespace poly = epipolar_cubics;
@@ -235,14 +237,14 @@ inline void add_product(cubic& sum, const quadric& a, const linear& b) noexcept 
   const std::array<poly::cubic, 10> cubics = poly::constraints(e);
   std::array<poly::cubic, 10> c = cubics;
   if (!poly::eliminate(c)) return solutions;
-  // Rows 4 to 9 say x^2 z, x^2, y^2 z, y^2, x y z, x y by the rest; each pair, one minus z times the other, leaves
+  // Rows 4 to 9 express x^2 z, x^2, y^2 z, y^2, x y z, x y in the rest; each pair, one minus z times the other, leaves
   // x p(z) + y q(z) + r(z) = 0 with p and q of degree 3, r of degree 4.
   std::array<std::array<std::array<double, 5>, 3>, 3> b{};  // coefficients of z^k
   for (std::size_t i = 0; i != 3; ++i) {
     const std::size_t above = 4 + 2 * i;
     for (std::size_t part = 0; part != 3; ++part) {
       const std::size_t from = 10 + 3 * part, degree = part == 2 ? 3 : 2;
-      for (std::size_t k = 0; k <= degree; ++k) {  // columns go down in powers
+      for (std::size_t k = 0; k <= degree; ++k) {  // columns have descending powers
         b[i][part][k] += c[above][from + degree - k];
         b[i][part][k + 1] -= c[above + 1][from + degree - k];
       }

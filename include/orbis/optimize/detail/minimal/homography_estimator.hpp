@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The estimator of RANSAC for homographies.
+/// The RANSAC estimator of homographies.
 #pragma once
 
 #include <algorithm>
@@ -21,8 +21,8 @@
 
 namespace orbis::optimize::detail {
 
-/// The homography of four pairs of points, by projective bases, of norm 1. Empty if three points are on a line, or if
-/// some points would lie behind a camera.
+/// The homography of four pairs of points, by projective bases, normalised to norm 1. Empty if three points are
+/// collinear, or if some points would be behind a camera.
 [[nodiscard]] inline std::optional<mat3> homography_of_four(const std::array<vec2, 4>& first,
                                                             const std::array<vec2, 4>& second) {
   mat3 bases[2];
@@ -32,7 +32,7 @@ namespace orbis::optimize::detail {
     const auto cross = [&](std::size_t a, std::size_t b, std::size_t c) {
       return (p[b].x() - p[a].x()) * (p[c].y() - p[a].y()) - (p[b].y() - p[a].y()) * (p[c].x() - p[a].x());
     };
-    // The fourth point in terms of the other three, by the areas of triangles.
+    // The fourth point as a combination of the other three, by triangle areas.
     weights[k] = vec3(cross(3, 1, 2), cross(0, 3, 2), cross(0, 1, 3));
     const double area = cross(0, 1, 2);
     const double extent = squared_norm(p[1] - p[0]) + squared_norm(p[2] - p[0]) + squared_norm(p[3] - p[0]);
@@ -41,7 +41,7 @@ namespace orbis::optimize::detail {
     for (int i = 0; i != 3; ++i) set_column(bases[k], i, weights[k][i] * homogeneous(p[static_cast<std::size_t>(i)]));
   }
   for (int i = 0; i != 3; ++i)
-    if (!(weights[1][i] / weights[0][i] > 0.0)) return std::nullopt;  // some points would see the plane from behind
+    if (!(weights[1][i] / weights[0][i] > 0.0)) return std::nullopt;  // on both sides of the plane
   mat3 out = bases[1] * inverse(bases[0]);
   out /= norm(out);
   if (!all_finite(out)) return std::nullopt;
@@ -55,8 +55,8 @@ struct homography_equations {
   matrix<8> g = zeros<matrix<8>>();
   double cost = 0.0;
 
-  /// Adds the error `r` of a point whose derivative by the point before its projection is `by_point`; that moves by
-  /// `by_d * D * moved`.
+  /// Adds the error `r` of a point whose derivative by the point before its projection is `by_point`; that point
+  /// changes by `by_d * D * moved`.
   void add(const vec2& r, const matrix<2, 3>& by_point, const mat3& by_d, const vec3& moved) {
     const matrix<2, 3> a = by_point * by_d;
     matrix<2, 8> j;
@@ -67,7 +67,7 @@ struct homography_equations {
     }
     cost += squared_norm(r);
   }
-  /// I + D of a Gauss-Newton step; empty if there is none.
+  /// I + D of a Gauss-Newton step; empty if the step does not exist.
   [[nodiscard]] std::optional<mat3> step() const {
     small_cholesky<8> factors;
     if (!factors.set(h) || !(factors.factor(1e-9) > 0.0)) return std::nullopt;

@@ -3,9 +3,9 @@
 /// Absolute orientation in closed form.
 ///
 /// Sources: B. K. P. Horn, "Closed-form solution of absolute orientation using unit quaternions", JOSA A 4 (1987); the
-/// scale is the least-squares one of S. Umeyama, PAMI 13 (1991); the largest eigenvalue is found on the characteristic
-/// polynomial as by D. Theobald, "Rapid calculation of RMSDs using a quaternion-based characteristic polynomial", Acta
-/// Crystallographica A 61 (2005).
+/// scale is the least-squares one of S. Umeyama, PAMI 13 (1991); the largest eigenvalue is computed from the
+/// characteristic polynomial as by D. Theobald, "Rapid calculation of RMSDs using a quaternion-based characteristic
+/// polynomial", Acta Crystallographica A 61 (2005).
 #pragma once
 
 #include <array>
@@ -27,9 +27,9 @@ struct best_rotation {
   double trace = 0.0;
 };
 
-/// The rotation that best takes the points a to the points b, where `m` is the sum of `a b^T` over pairs of centred
+/// The rotation that best maps the points a to the points b, given `m`, the sum of `a b^T` over pairs of centred
 /// points: the eigenvector of the largest eigenvalue of Horn's symmetric 4x4 matrix. That eigenvalue is the trace.
-/// Empty if two rotations are equally good: the points lie on a line or in one place.
+/// Empty if two rotations are equally good: the points are collinear or coincide.
 [[nodiscard]] inline std::optional<best_rotation> find_best_rotation(const mat3& m, double relative_gap) {
   const double size = norm(m);
   if (!(size > 0.0) || !std::isfinite(size)) return std::nullopt;
@@ -51,7 +51,7 @@ struct best_rotation {
   const double c0 =
       laplace(minors(a00, a10, a20, a30, a10, a11, a21, a31), minors(a20, a21, a22, a32, a30, a31, a32, a33));
   const double c1 = -8.0 * determinant(s);
-  // |s| = 1: the largest root lies between 1 and sqrt(3), and Newton's method from above decreases monotonically.
+  // |s| = 1: the largest root is between 1 and sqrt(3), and Newton's method from above decreases monotonically.
   double x = 1.7320508075688774, slope = 0.0;
   for (int i = 0; i != 50; ++i) {
     const double xx = x * x;
@@ -61,7 +61,7 @@ struct best_rotation {
     x -= step;
     if (std::fabs(step) < 1e-15) break;
   }
-  // The slope there is the product of the distances to the other three roots, two of which are large.
+  // The slope at the root is the product of the distances to the other three roots, two of which are large.
   if (slope > 1e-3) {
     // The largest column of the adjugate of a - x.
     const double b00 = a00 - x, b11 = a11 - x, b22 = a22 - x, b33 = a33 - x;
@@ -91,12 +91,12 @@ struct best_rotation {
                        eigen.values[3] * size};
 }
 
-/// The transform that best takes the first points of n pairs with these moments to the second ones; empty if they do
-/// not determine a rotation.
+/// The transform that best maps the first points of n pairs with these moments to the second ones; empty if they do not
+/// determine a rotation.
 [[nodiscard]] inline std::optional<sim3> transform_between(const pair_moments& moments, std::size_t n,
                                                            bool with_scale) {
   const double spread = std::sqrt(moments.from_spread) * std::sqrt(moments.to_spread);
-  // Points in one place, up to the rounding of their coordinates.
+  // Coincident points, up to the rounding of their coordinates.
   const double rounding = 1e-30 * static_cast<double>(n);
   if (!(moments.from_spread > rounding * squared_norm(moments.from_mean)) ||
       !(moments.to_spread > rounding * squared_norm(moments.to_mean)) || !(norm(moments.products) > 1e-10 * spread))

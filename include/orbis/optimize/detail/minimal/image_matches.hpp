@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Matches between the pixels of two images, prepared for two-view geometry: at z = 1 and in random order.
+/// Matches between the pixels of two images, converted for two-view geometry: at z = 1 and in random order.
 #pragma once
 
 #include <array>
@@ -18,7 +18,7 @@
 namespace orbis::optimize::detail {
 
 /// The point (x, y) of a pixel at z = 1, and the derivative of the pixel by that point, made upper triangular by a
-/// rotation: it turns distances at z = 1 into pixels.
+/// rotation: it converts distances at z = 1 to pixels.
 struct metric_ray {
   double x = 0.0, y = 0.0;
   double xx = 1.0, xy = 0.0, yy = 1.0;
@@ -31,7 +31,7 @@ struct metric_ray {
   }
 };
 
-/// False if the camera cannot unproject the pixel.
+/// Computes the ray of a pixel; returns false if the camera cannot unproject it.
 template <camera::camera_model Camera>
 [[nodiscard]] bool read_ray(const Camera& camera, const vec2& pixel, metric_ray& out) {
   if (!all_finite(pixel)) return false;

@@ -3,9 +3,9 @@
 /// The equations of the perspective three-point problem.
 ///
 /// With unit rays `y_i` and depths `l_i` along them, the three distances between the points give `l^T M_ij l = a_ij`.
-/// Two homogeneous combinations of these are conics with up to four common points. The pencil that they span contains a
-/// degenerate conic, a pair of lines, which is found from one real root of a cubic. On each line a quadratic equation
-/// is left. Newton's method on the depths restores the digits that were lost on the way.
+/// Two homogeneous combinations of these are conics with up to four common points. Their pencil contains a degenerate
+/// conic, a pair of lines, given by one real root of a cubic. On each line a quadratic equation remains. Newton's
+/// method on the depths recovers the accuracy lost in these steps.
 ///
 /// Sources: the problem is Grunert's of 1841; the conics are those of M. Persson, K. Nordberg, "Lambda Twist: an
 /// accurate fast robust perspective three point (P3P) solver", ECCV 2018; a degenerate conic is split into its lines by
@@ -29,7 +29,7 @@ namespace orbis::optimize::detail {
   const double q = (a * a - 3.0 * b) / 9.0;
   const double r = (2.0 * a * a * a - 9.0 * a * b + 27.0 * c) / 54.0;
   double x;
-  if (r * r < q * q * q) {  // three real roots: the outer one away from the other two
+  if (r * r < q * q * q) {  // three real roots: take the outer one away from the other two
     const double root_q = std::sqrt(q);
     const double cosine = std::fmin(1.0, std::fabs(r) / (q * root_q));
     x = -2.0 * std::copysign(root_q, r) * std::cos(std::acos(cosine) / 3.0) - a / 3.0;
@@ -60,12 +60,12 @@ struct conic {
   }
 };
 
-/// The trace of the product.
+/// The trace of the product of two conics.
 [[nodiscard]] inline double contraction(const conic& a, const conic& b) noexcept {
   return a.xx * b.xx + a.yy * b.yy + a.zz * b.zz + 2.0 * (a.xy * b.xy + a.xz * b.xz + a.yz * b.yz);
 }
 
-/// The two lines of a degenerate conic; false if they are complex.
+/// Computes the two lines of a degenerate conic; returns false if they are complex.
 [[nodiscard]] inline bool split_conic(const conic& c, vec3& line, vec3& other) {
   const conic adjugate = c.adjugate();  // -v v^T, v half the cross product of the lines
   vec3 v;
@@ -86,7 +86,7 @@ struct conic {
     return false;
   else
     v = zeros<vec3>();  // the same line twice
-  // C + [v]x is the outer product of the lines: any row is one of them, any column the other.
+  // C + [v]x is the outer product of the lines: each row is a multiple of one, each column of the other.
   const double m[3][3] = {
       {c.xx, c.xy - v.z(), c.xz + v.y()}, {c.xy + v.z(), c.yy, c.yz - v.x()}, {c.xz - v.y(), c.yz + v.x(), c.zz}};
   std::size_t row = 0, column = 0;
@@ -103,7 +103,7 @@ struct conic {
   return largest > 0.0;
 }
 
-/// Newton's method on the three distances, from a start that is already good.
+/// Newton's method on the three distances, from an accurate initial value.
 inline void polish_depths(vec3& l, const std::array<double, 3>& cosines, const std::array<double, 3>& squared) {
   const auto [b12, b13, b23] = cosines;
   const auto [a12, a13, a23] = squared;
@@ -119,7 +119,7 @@ inline void polish_depths(vec3& l, const std::array<double, 3>& cosines, const s
     const double determinant = -a * d * e - b * c * f;
     const double length = squared_norm(l);
     if (determinant * determinant < 1e-28 * length * length * length)
-      return;  // a double root: no more digits to be had
+      return;  // a double root: no further improvement possible
     const double scale = 0.5 / determinant;
     l(0) -= scale * (b * d * r23 - d * e * r12 - b * f * r13);
     l(1) -= scale * (a * f * r13 - c * f * r12 - a * d * r23);
@@ -157,7 +157,7 @@ void for_each_p3p(const std::array<vec3, 3>& points_world, const std::array<vec3
                    first.yy + g * second.yy, first.yz + g * second.yz, first.zz + g * second.zz};
   std::array<vec3, 2> lines;
   if (!split_conic(pair, lines[0], lines[1])) return;
-  // On the lines first = -g second; take the one that is not small there.
+  // On the lines first = -g second; use the one that is not small.
   const conic& q = std::fabs(g) <= 1.0 ? second : first;
 
   // The inverse of [d12 d13 normal], by rows.
@@ -185,7 +185,7 @@ void for_each_p3p(const std::array<vec3, 3>& points_world, const std::array<vec3
     const vec3 qu = q.times(u), qv = q.times(v);
     const double qa = dot(u, qu), qb = dot(u, qv), qc = dot(v, qv);
     const double discriminant = qb * qb - qa * qc;
-    // Slightly negative is a double root, up to rounding.
+    // A slightly negative value is a double root, up to rounding.
     if (!(discriminant > -1e-10 * (qa * qa + qb * qb + qc * qc))) continue;
     const double root = -(qb + std::copysign(std::sqrt(std::fmax(0.0, discriminant)), qb));
     for (int k = 0; k != 2; ++k) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The moments of pairs of points.
+/// Moments of pairs of points.
 #pragma once
 
 #include <cstddef>
@@ -9,18 +9,18 @@
 
 namespace orbis::optimize::detail {
 
-/// The moments of pairs of points that absolute orientation needs.
+/// The moments of pairs of points for absolute orientation.
 struct pair_moments {
   vec3 from_mean, to_mean;
   mat3 products;  ///< sum of (from - mean) (to - mean)^T
   double from_spread = 0.0, to_spread = 0.0;
 };
 
-/// The moments of n pairs: `pair(i, a, b)` writes the i-th pair as two arrays of three doubles and returns its weight.
-/// O(n), two passes.
+/// Computes the moments of n pairs: `pair(i, a, b)` writes the i-th pair as two arrays of three doubles and returns its
+/// weight. O(n), two passes.
 template <class Pair>
 [[nodiscard]] pair_moments moments_of(std::size_t n, const Pair& pair) {
-  // Separate sums for even and odd pairs, so that one addition need not wait for the other.
+  // Separate sums for even and odd pairs shorten the dependency chain.
   double sums[2][7] = {};
   for (std::size_t i = 0; i != n; ++i) {
     double a[3], b[3];

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The estimator of RANSAC for poses: samples of three matches, reprojection errors, refinement.
+/// The RANSAC estimator of poses: samples of three matches, reprojection errors, refinement.
 #pragma once
 
 #include <array>
@@ -27,8 +27,8 @@
 
 namespace orbis::optimize::detail {
 
-// The two loops of PnP over its matches: reprojection errors and normal equations. Every instruction set gives the
-// same bits.
+// The two loops of PnP over its matches: reprojection errors and normal equations. Every instruction set gives the same
+// bits.
 
 /// Squared errors of 32 matches. `columns` are the lists of coordinates, `stride` apart; `pose` is the rotation by
 /// rows, with the translation as a fourth column.
@@ -77,7 +77,7 @@ struct match_equations_kernel {
       const V x = p0 * inverse, y = p1 * inverse;
       const V dx = x - at(3), dy = y - at(4);
       const V u = xx * dx + xy * dy, v = yy * dy;
-      // The derivatives of u and v by the point, then by a motion of it: rho + phi x p.
+      // The derivatives of u and v by the point, then by a motion of the point: rho + phi x p.
       V a[6], b[6];
       a[0] = xx * inverse;
       a[1] = xy * inverse;
@@ -119,27 +119,27 @@ struct pose_equations {
   double cost;
 };
 
-/// Gauss-Newton on a pose; `sum_up(pose, equations)` fills in the equations.
+/// Gauss-Newton on a pose; `sum_up(pose, equations)` computes the equations.
 template <class SumUp>
 [[nodiscard]] std::optional<centred_pose> descend_pose(const centred_pose& start, int steps, const SumUp& sum_up) {
   struct state {
     so3 rotation;
     centred_pose pose;
   };
-  const so3 rotation(start.rotation);  // those of samples are orthonormal only up to rounding and a little more
+  const so3 rotation(start.rotation);  // those of samples are orthonormal only to slightly more than rounding
   const auto equations = [&](const state& s) {
     pose_equations e;
     sum_up(s.pose, e);
     return e;
   };
   const auto step = [](const state& s, const pose_equations& e) -> std::optional<state> {
-    // A very small damping, so that directions stay that the matches do not determine.
+    // A very small damping keeps directions that the matches do not determine unchanged.
     mat6 damped = e.h;
     change_diagonal(damped, 1.0 + 1e-9, 1e-12 * largest_of(diagonal_of(e.h)));
     small_cholesky<6> factors;
     if (!factors.set(damped) || !(factors.factor(0.0) > 0.0)) return std::nullopt;
     const vec6 d = -factors.solve(e.g);
-    if (!(norm(tail<3>(d)) < 1.0)) return std::nullopt;  // also where it is not a number
+    if (!(norm(tail<3>(d)) < 1.0)) return std::nullopt;  // also rejects NaN
     const se3 motion = se3::exp(d);
     const so3 turned = motion.rotation() * s.rotation;
     return state{turned, {turned.rotation_matrix(), motion * s.pose.translation}};
@@ -155,7 +155,7 @@ class pnp_estimator {
  public:
   struct model {
     centred_pose pose;
-    std::array<float, 12> rows{};  ///< the pose for the loops over the matches
+    std::array<float, 12> rows{};  ///< the pose, for the loops over the matches
   };
   static constexpr std::size_t sample_size = 3;
 
@@ -219,8 +219,7 @@ class pnp_estimator {
   }
 
  private:
-  /// Copies the named matches side by side and fills up with matches of no weight; returns the number of groups of
-  /// four.
+  /// Copies the given matches contiguously and pads with matches of zero weight; returns the number of groups of four.
   [[nodiscard]] std::size_t gather(std::span<const std::uint32_t> inliers) const {
     const std::size_t groups = (inliers.size() + 3) / 4;
     auto& g = matches_.gathered;
@@ -257,15 +256,15 @@ class pnp_estimator {
   match_kernels kernels_{};
 };
 
-/// Why the points themselves determine no pose; empty if they do.
+/// The reason if the points determine no pose; otherwise empty.
 [[nodiscard]] inline std::string pnp_degeneracy(const pnp_matches& matches) {
   mat3 covariance = zeros<mat3>();
   for (const vec3& p : matches.points) covariance += p * transposed(p);
   const vec3 spread = eigen_of_symmetric<3>(covariance).values;
-  // Up to the rounding of the points about the origin of the world.
+  // Relative to the rounding of the points about the world origin.
   const double rounding = 1e-30 * squared_norm(matches.centre) * static_cast<double>(matches.size());
-  if (!(spread[2] > rounding)) return "the points all lie in one place";
-  if (!(spread[1] > 1e-12 * spread[2])) return "the points all lie on one line";
+  if (!(spread[2] > rounding)) return "all points coincide";
+  if (!(spread[1] > 1e-12 * spread[2])) return "all points are collinear";
   return {};
 }
 

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Matches between known points and pixels, prepared for PnP.
+/// Matches between known points and pixels, converted for PnP.
 ///
-/// A pixel is stored as the point (x, y) of its ray at z = 1, and as the derivative of the pixel by that point, made
-/// upper triangular by a rotation. The error in pixels is this matrix times the difference at z = 1: exact without
-/// distortion, and correct to first order with it, which is enough to rank poses. So the loops over the matches do not
+/// A pixel is stored as the point (x, y) of its ray at z = 1, and the derivative of the pixel by that point, made upper
+/// triangular by a rotation. The error in pixels is this matrix times the difference at z = 1: exact without
+/// distortion, and correct to first order with it, which suffices to rank poses. The loops over the matches thus do not
 /// depend on the camera's type.
 #pragma once
 
@@ -21,29 +21,29 @@
 
 namespace orbis::optimize::detail {
 
-/// From the world, with the centre of the points as origin, to the camera.
+/// Transform from the world, relative to the centre of the points, to the camera.
 struct centred_pose {
   mat3 rotation = identity<mat3>();
   vec3 translation = zeros<vec3>();
 };
 
-/// The coordinates of a match, each in a list of its own: X Y Z, x y, and the three entries of the derivative.
+/// Number of coordinates of a match, each in a separate list: X Y Z, x y, and the three entries of the derivative.
 inline constexpr std::size_t match_coordinates = 8;
 
 /// The usable matches of two lists, in an order that depends only on the seed.
 struct pnp_matches {
-  std::vector<std::uint32_t> original;  ///< which match of the caller's lists this is
-  std::vector<vec3> points;             ///< about the centre
+  std::vector<std::uint32_t> original;  ///< index of the match in the caller's lists
+  std::vector<vec3> points;             ///< relative to the centre
   std::vector<vec3> rays;               ///< unit vectors
   std::vector<double> columns;          ///< eight lists, `stride` apart
   std::vector<float> float_columns;     ///< likewise
-  std::vector<double> gathered;         ///< those of one refinement
+  std::vector<double> gathered;         ///< the matches of one refinement
   std::size_t stride = 0;               ///< size, rounded up to whole blocks
   vec3 centre = zeros<vec3>();
 
   [[nodiscard]] std::size_t size() const noexcept { return original.size(); }
 
-  /// Reads the matches, without those that are not finite or cannot be unprojected. @pre the spans have one length
+  /// Reads the matches, except those that are not finite or cannot be unprojected. @pre the spans have the same length
   template <camera::camera_model Camera>
   void assign(std::span<const vec3> points_world, std::span<const vec2> pixels, const Camera& camera,
               std::uint64_t seed) {

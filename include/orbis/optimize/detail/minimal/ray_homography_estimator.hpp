@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The estimator of RANSAC for homographies between the rays of two cameras of any model, with errors in pixels.
+/// The RANSAC estimator of homographies between the rays of two cameras of any model, with errors in pixels.
 #pragma once
 
 #include <array>
@@ -22,8 +22,7 @@
 
 namespace orbis::optimize::detail {
 
-/// The squared distance of a transferred ray from the one that was seen, in units of the metric; infinite behind the
-/// camera.
+/// The squared distance of a transferred ray from the observed one, in units of the metric; infinite behind the camera.
 [[nodiscard]] inline double squared_transfer(const vec3& p, const metric_ray& seen) {
   if (!(p.z() > 0.0)) return std::numeric_limits<double>::infinity();
   const double dx = p.x() / p.z() - seen.x, dy = p.y() / p.z() - seen.y;
@@ -54,7 +53,7 @@ class ray_homography_estimator {
     return {made_of(*h, matches_[s[0]].first.direction())};
   }
 
-  /// The mean of both transfers.
+  /// The mean of the errors of both transfers.
   [[nodiscard]] double squared_error(const model& m, std::size_t i) const {
     const image_match& x = matches_[i];
     return 0.5 * (squared_transfer(m.forward * x.first.direction(), x.second) +
@@ -79,7 +78,7 @@ class ray_homography_estimator {
   }
 
  private:
-  /// Empty if singular.
+  /// A model from a homography; empty if it is singular.
   [[nodiscard]] static std::optional<model> made_of(const mat3& h, const vec3& in_front) {
     model m{h / norm(h), inverse(h)};
     if ((m.forward * in_front).z() < 0.0) m.forward = -m.forward;

@@ -10,8 +10,8 @@
 
 namespace orbis::optimize::detail {
 
-/// The root of a polynomial between `low` and `high`, where it has different signs: Newton's method, and bisection
-/// where that would leave the interval. `c[i]` is the coefficient of x^i.
+/// The root of a polynomial between `low` and `high`, where it has different signs: Newton's method, with bisection if
+/// a step would leave the interval. `c[i]` is the coefficient of x^i.
 [[nodiscard]] inline double bracketed_root(const double* c, std::size_t degree, double low, double high,
                                            double at_low) {
   double x = 0.5 * (low + high);
@@ -31,12 +31,12 @@ namespace orbis::optimize::detail {
   return x;
 }
 
-/// The roots of a polynomial within [-1, 1], ascending; returns their number. Between two roots of its derivative a
-/// polynomial has at most one root. A root of even multiplicity is reported once, and possibly where there is nearly
-/// one.
+/// Computes the roots of a polynomial within [-1, 1], ascending; returns their number. Between two roots of its
+/// derivative a polynomial has at most one root. A root of even multiplicity is reported once, and possibly also a near
+/// root.
 template <std::size_t Degree>
 std::size_t roots_in_unit_interval(const std::array<double, Degree + 1>& c, std::array<double, Degree>& roots) {
-  // The coefficients of all derivatives, from the line up, each divided by a factorial.
+  // The coefficients of all derivatives, starting with the linear one, each divided by a factorial.
   std::array<std::array<double, Degree + 1>, Degree + 1> derivatives{};
   derivatives[Degree] = c;
   for (std::size_t d = Degree; d > 1; --d)
@@ -62,7 +62,7 @@ std::size_t roots_in_unit_interval(const std::array<double, Degree + 1>& c, std:
       else if ((at_low < 0.0) != (at_high < 0.0) && at_low != 0.0 && at_high != 0.0)
         found[number++] = bracketed_root(p.data(), d, low, high, at_low);
       else if (d == Degree && i != 0 && number < d && (number == 0 || found[number - 1] != low)) {
-        // An extremum that nearly touches zero: a double root up to rounding.
+        // An extremum close to zero: a double root up to rounding.
         double size = 0.0;
         for (std::size_t k = d + 1; k-- != 0;) size = size * std::fabs(low) + std::fabs(p[k]);
         if (std::fabs(at_low) < 1e-11 * size) found[number++] = low;
@@ -80,8 +80,8 @@ std::size_t roots_in_unit_interval(const std::array<double, Degree + 1>& c, std:
   return count;
 }
 
-/// All real roots of a polynomial; returns their number. `c[i]` is the coefficient of x^i. A root of even multiplicity
-/// is reported once, and possibly where there is nearly one. None if a coefficient is not finite.
+/// Computes all real roots of a polynomial; returns their number. `c[i]` is the coefficient of x^i. A root of even
+/// multiplicity is reported once, and possibly also a near root. None if a coefficient is not finite.
 template <std::size_t Degree>
 std::size_t real_roots(const std::array<double, Degree + 1>& c, std::array<double, Degree>& roots) {
   double largest = 0.0;
@@ -91,7 +91,7 @@ std::size_t real_roots(const std::array<double, Degree + 1>& c, std::array<doubl
   }
   if (!(largest > 0.0)) return 0;
   std::size_t count = roots_in_unit_interval<Degree>(c, roots);
-  // The roots outside are the inverses of those of the polynomial with its coefficients in reverse order.
+  // The roots outside [-1, 1] are the inverses of those of the polynomial with reversed coefficients.
   std::array<double, Degree + 1> reversed = c;
   std::reverse(reversed.begin(), reversed.end());
   std::array<double, Degree> inverses{};

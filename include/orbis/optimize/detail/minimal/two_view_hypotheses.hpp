@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Motions between two views as hypotheses: how well each explains the matches, and which others do as well.
+/// Hypotheses for the motion between two views: their support among the matches, and the choice between them.
 ///
-/// Distances are in units of the matches' metric, which is their standard deviation.
+/// Distances are in units of the matches' metric, their standard deviation.
 #pragma once
 
 #include <algorithm>
@@ -19,6 +19,7 @@
 #include <Eigen/LU>
 
 #include <orbis/core/se3.hpp>
+#include <orbis/core/small_cholesky.hpp>
 #include <orbis/core/so3.hpp>
 #include <orbis/core/types.hpp>
 #include <orbis/optimize/detail/minimal/epipolar_motion.hpp>
@@ -26,7 +27,6 @@
 #include <orbis/optimize/detail/minimal/horn.hpp>
 #include <orbis/optimize/detail/minimal/image_matches.hpp>
 #include <orbis/optimize/detail/minimal/ray_homography_estimator.hpp>
-#include <orbis/core/small_cholesky.hpp>
 
 namespace orbis::optimize::detail {
 
@@ -36,21 +36,21 @@ inline constexpr double line_gate = 3.841, point_gate = 5.991;
 [[nodiscard]] inline double square(double x) { return x * x; }
 
 /// The weight of Geman and McClure's loss, in units of its scale.
-[[nodiscard]] inline double falling_weight(double squared) {
+[[nodiscard]] inline double geman_mcclure_weight(double squared) {
   const double w = 1.0 / (1.0 + squared);
   return w * w;
 }
 
-/// The rotation of the camera that explains the most matches, by weights that fall with the distance, first slowly and
-/// then fast. The identity where there is none.
-[[nodiscard]] inline so3 prevailing_rotation(const std::vector<image_match>& matches) {
+/// The camera rotation with the largest support among the matches, by weights that decrease with the distance at
+/// successively smaller scales. The identity if there is none.
+[[nodiscard]] inline so3 dominant_rotation(const std::vector<image_match>& matches) {
   so3 rotation;
   for (const double scale : {100.0, 50.0, 25.0, 12.0, 6.0, 4.0, 3.0, 3.0, 3.0}) {
     mat3 products = zeros<mat3>();
     const mat3 r = rotation.rotation_matrix();
     for (const image_match& m : matches) {
       const vec3 from = m.first.direction();
-      const double weight = falling_weight(squared_transfer(r * from, m.second) / (scale * scale));
+      const double weight = geman_mcclure_weight(squared_transfer(r * from, m.second) / (scale * scale));
       if (weight > 0.0) products += weight * normalized(from) * transposed(normalized(m.second.direction()));
     }
     const auto turn = find_best_rotation(products, 1e-12);
@@ -60,7 +60,7 @@ inline constexpr double line_gate = 3.841, point_gate = 5.991;
   return rotation;
 }
 
-/// Sampson distances made small by Gauss-Newton with weights that fall with the distance, at one scale after the other.
+/// Minimises Sampson distances by Gauss-Newton with weights that decrease with the distance, at successive scales.
 [[nodiscard]] inline std::optional<epipolar_motion> refined_motion(const std::vector<image_match>& matches,
                                                                    epipolar_motion motion,
                                                                    std::span<const double> scales,
@@ -70,7 +70,7 @@ inline constexpr double line_gate = 3.841, point_gate = 5.991;
     const double inverse = 1.0 / (scale * scale);
     const std::size_t n = std::min(most, matches.size());
     for (std::size_t i = 0; i != n; ++i)
-      sum.add(motion.e, matches[i], [&](double squared) { return falling_weight(squared * inverse); });
+      sum.add(motion.e, matches[i], [&](double squared) { return geman_mcclure_weight(squared * inverse); });
     sum.mirror();
     const auto [h, g] = sum.by_motion(motion);
     small_cholesky<5> factors;
@@ -85,25 +85,25 @@ inline constexpr double line_gate = 3.841, point_gate = 5.991;
   return motion;
 }
 
-/// How a match agrees with a motion.
+/// Agreement of a match with a motion.
 enum class agreement : std::uint8_t {
-  none,    ///< it does not
-  far,     ///< it does, at a distance that cannot be told from infinity
-  near,    ///< it does, in front of both cameras
-  behind,  ///< its rays are in one plane with the translation, but do not meet in front of both cameras
+  none,    ///< does not agree
+  far,     ///< agrees, at a distance indistinguishable from infinity
+  near,    ///< agrees, in front of both cameras
+  behind,  ///< rays coplanar with the translation, but not intersecting in front of both cameras
 };
 
-/// What supports a motion. `score`: sum over the matches that agree of the gate less the squared distance.
+/// Support of a motion. `score`: sum of the gate minus the squared distance over the matches that agree.
 struct motion_support {
   double score = 0.0;
   std::size_t far = 0, near = 0, behind = 0;
   [[nodiscard]] std::size_t inliers() const noexcept { return far + near; }
 };
 
-/// Parallax, in deviations of its own, below which nothing tells a point from one at infinity.
+/// Minimum parallax, in standard deviations, that distinguishes a point from one at infinity.
 inline constexpr double least_disparity = 4.0;
 
-/// The squared distance between where a ray would be seen at infinity and where it is seen.
+/// The squared distance between the observed position of a ray and its position at infinite depth.
 [[nodiscard]] inline double squared_disparity(const mat3& rotation, const image_match& m) {
   return squared_transfer(rotation * m.first.direction(), m.second);
 }
@@ -119,7 +119,7 @@ inline constexpr double least_disparity = 4.0;
   return dot(cross(v, t), normal) > 0.0 && dot(cross(u, t), normal) > 0.0 ? agreement::near : agreement::behind;
 }
 
-/// What a match adds to the score of a motion.
+/// Contribution of a match to the score of a motion.
 [[nodiscard]] inline double score_of(const mat3& rotation, const epipolar_motion& motion, const image_match& m) {
   double squared = 0.0;
   const agreement a = agreement_of(rotation, motion.direction, motion.e, m, squared);
@@ -142,8 +142,8 @@ inline constexpr double least_disparity = 4.0;
   return sum;
 }
 
-/// The scores of a homography and of an essential matrix: over both images, the gate of a point less the squared
-/// distance, where that passes the model's own gate.
+/// The scores of a homography and of an essential matrix: over both images, the gate of a point minus the squared
+/// distance, for distances within the model's own gate.
 /// Source: R. Mur-Artal, J. M. M. Montiel, J. D. Tardos, "ORB-SLAM", T-RO 31 (2015), equations 1 and 2.
 struct model_scores {
   double homography = 0.0, essential = 0.0;
@@ -165,7 +165,7 @@ struct model_scores {
   return sum;
 }
 
-/// Directions that cover a hemisphere evenly (the Fibonacci lattice); the other one has the same essential matrices.
+/// Evenly distributed directions on a hemisphere (Fibonacci lattice); the other half has the same essential matrices.
 template <std::size_t N>
 [[nodiscard]] std::array<vec3, N> hemisphere() {
   std::array<vec3, N> out;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The reconstruction of two_view.hpp.
+/// Implementation of the reconstruction in two_view.hpp.
 #pragma once
 
 #include <algorithm>
@@ -29,7 +29,7 @@
 
 namespace orbis::optimize::detail {
 
-/// The search for the motion between two views among all that may be meant.
+/// Search among all candidate motions between two views.
 template <class Match>
 class two_view_search {
  public:
@@ -40,7 +40,7 @@ class two_view_search {
 
   explicit two_view_search(const std::vector<Match>& matches) : matches_{matches} {}
 
-  /// Refines a motion and takes in all four that its essential matrix stands for.
+  /// Refines a motion and adds all four motions of its essential matrix.
   void add(const epipolar_motion& start) {
     constexpr std::array scales{3.0, 3.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0};
     const auto refined = refined_motion(matches_, start, scales);
@@ -50,8 +50,8 @@ class two_view_search {
       all_.push_back({m, support_of(matches_, m)});
     }
   }
-  /// Whether one motion of a plane explains the plane's own matches clearly better than `best` does, which then comes
-  /// from what the plane and something else that moves have in common.
+  /// Returns true if one motion of a plane explains the plane's matches clearly better than `best`; `best` then mixes
+  /// the plane with another moving object.
   [[nodiscard]] static bool contradicts(const std::vector<Match>& plane, const std::vector<epipolar_motion>& motions,
                                         const epipolar_motion& best) {
     constexpr std::array scales{3.0, 2.0, 2.0, 2.0, 2.0, 2.0};
@@ -66,25 +66,26 @@ class two_view_search {
       return refined && score(refined->e) > enough;
     });
   }
-  /// Looks for further motions: from directions of translation all around, with any rotation that goes with them.
-  void look_around(const so3& turn) {
+  /// Searches for further motions: from directions of translation over the whole sphere, each with the best rotation.
+  void add_sampled_motions(const so3& turn) {
     constexpr std::array scales{20.0, 20.0, 10.0, 10.0, 5.0, 5.0};
     constexpr std::size_t few = 150;
     for (const vec3& t : hemisphere<16>())
-      if (const auto rough = refined_motion(matches_, epipolar_motion(turn, t), scales, few); rough && !knows(*rough))
+      if (const auto rough = refined_motion(matches_, epipolar_motion(turn, t), scales, few);
+          rough && !is_known(*rough))
         add(*rough);
   }
 
-  /// Null if there is none.
+  /// The motion with the highest score; null if there is none.
   [[nodiscard]] const hypothesis* best() const {
     const auto found = std::max_element(all_.begin(), all_.end(), [](const hypothesis& a, const hypothesis& b) {
       return a.support.score < b.support.score;
     });
     return found == all_.end() ? nullptr : &*found;
   }
-  /// Whether a motion that is another one than `best` explains the matches about as well: the test of two models that
-  /// may both be wrong. It adds up over the matches by how much each speaks for `best`, in logarithms of a likelihood,
-  /// and asks how far this is from nothing, in deviations by how much they differ.
+  /// Returns true if a motion different from `best` explains the matches about equally well: the test of two models
+  /// that may both be wrong. It sums the log-likelihood ratios of the matches in favour of `best`, and divides by the
+  /// standard deviation of the sum.
   /// Source: Q. Vuong, "Likelihood ratio tests for model selection and non-nested hypotheses", Econometrica 57 (1989).
   [[nodiscard]] bool has_rival(const hypothesis& best) const {
     const mat3 rotation = best.motion.rotation.rotation_matrix();
@@ -103,14 +104,14 @@ class two_view_search {
   }
 
  private:
-  /// Whether two motions, refined, are one.
+  /// Returns true if two refined motions are equal within tolerance.
   [[nodiscard]] static bool same(const epipolar_motion& a, const epipolar_motion& b) {
-    constexpr double turned = 0.02, apart = 0.1;  // radians
+    constexpr double turned = 0.02, apart = 0.1;  // radians; tolerances of rotation and direction
     return (a.rotation.inverse() * b.rotation).angle() < turned &&
            angle_between_directions(a.direction, b.direction) < apart;
   }
-  /// Whether a motion, or its opposite, was refined before.
-  [[nodiscard]] bool knows(const epipolar_motion& m) const {
+  /// Returns true if a motion, or its opposite, has already been refined.
+  [[nodiscard]] bool is_known(const epipolar_motion& m) const {
     return std::any_of(all_.begin(), all_.end(), [&](const hypothesis& h) {
       return same(h.motion, m) || same(h.motion, {m.rotation, vec3(-m.direction)});
     });
@@ -120,7 +121,7 @@ class two_view_search {
   std::vector<hypothesis> all_;
 };
 
-/// The matches that agree with a motion, and what they leave open.
+/// The matches that agree with a motion, and the uncertainty of that motion.
 template <class Match>
 struct two_view_inliers {
   std::vector<const Match*> all, near;
@@ -143,15 +144,15 @@ struct two_view_inliers {
     rotation_deviation = direction_deviation = std::numeric_limits<double>::infinity();
     if (all.empty()) return;
     rms = std::sqrt(rms / static_cast<double>(all.size()));
-    // Matches better than they were said to be are not believed to be so by far.
-    sigma = std::max(0.5, 1.4826 * std::sqrt(middle_of(squares)));
+    // Does not trust residuals far below the given standard deviation.
+    sigma = std::max(0.5, 1.4826 * std::sqrt(median_of(squares)));
     estimate_deviations(motion);
   }
 
  private:
-  /// Two estimates, of which the larger counts: by the noise of matches that err independently of each other, and by
-  /// how the motion changes where the matches of a part of the image are left out (the delete-a-group jackknife), which
-  /// tells what errs together: neighbours, what moves, the rows of a rolling shutter.
+  /// Two estimates, of which the larger counts: from the noise of matches with independent errors, and from the change
+  /// of the motion when the matches of a part of the image are left out (delete-a-group jackknife), which covers
+  /// correlated errors: of neighbours, moving objects, the rows of a rolling shutter.
   void estimate_deviations(const epipolar_motion& motion) {
     constexpr std::size_t side = 3, parts = side * side;
     std::vector<const Match*> order = all;
@@ -168,7 +169,7 @@ struct two_view_inliers {
       std::sort(first, first + static_cast<std::ptrdiff_t>(n), by(&metric_ray::y));
       for (std::size_t i = 0; i != n; ++i) {
         epipolar_equations& sum = of_part[side * column + i * side / n];
-        sum.add(motion.e, *order[begin + i], [](double squared) { return falling_weight(0.25 * squared); });
+        sum.add(motion.e, *order[begin + i], [](double squared) { return geman_mcclure_weight(0.25 * squared); });
       }
     }
     for (epipolar_equations& part : of_part) {
@@ -199,8 +200,8 @@ struct two_view_inliers {
   }
 
  public:
-  /// The middle one of some values. @pre there are some
-  [[nodiscard]] static double middle_of(std::vector<double>& values) {
+  /// The median of some values. @pre not empty
+  [[nodiscard]] static double median_of(std::vector<double>& values) {
     const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
     std::nth_element(values.begin(), middle, values.end());
     return *middle;
@@ -218,11 +219,10 @@ result<two_view_reconstruction> reconstruction_of_matches(const std::vector<Matc
   };
   if (usable < least)
     return fail(errc::no_data, where,
-                "of " + std::to_string(n) + " matches " + std::to_string(usable) + " can be used, " +
-                    std::to_string(least) + " are needed");
+                "only " + of(usable, n) + " matches are usable, " + std::to_string(least) + " are needed");
 
-  // The cheapest answer first: the camera has only turned.
-  const so3 turn = prevailing_rotation(matches);
+  // The cheapest case first: pure rotation.
+  const so3 turn = dominant_rotation(matches);
   const mat3 turned = turn.rotation_matrix();
   const auto is_still = [&](const Match& m, double sigma) {
     return squared_disparity(turned, m) < square(least_disparity * sigma);
@@ -241,13 +241,13 @@ result<two_view_reconstruction> reconstruction_of_matches(const std::vector<Matc
   const auto essential = ransac(lines, asked);
   if (!essential) return refuse(essential.error().message);
   if (5 * essential->inliers.size() < 2 * usable || essential->inliers.size() < least)
-    return refuse("no motion explains more than " + of(essential->inliers.size(), usable) + " matches");
+    return refuse("the best motion explains only " + of(essential->inliers.size(), usable) + " matches");
   ransac_options of_planes = asked;
   of_planes.threshold = std::sqrt(point_gate);
   of_planes.model_cost = 200.0;
   const auto plane = ransac(ray_homography_estimator(matches), of_planes);
 
-  // The motions of both models. That of the model that describes the images worse is a rival all the same.
+  // The motions of both models: those of the model with the lower score are also rivals.
   two_view_search<Match> search(matches);
   const se3 first_of_four = decompose_essential(essential->model)[0];
   search.add({first_of_four.rotation(), first_of_four.translation()});
@@ -267,7 +267,7 @@ result<two_view_reconstruction> reconstruction_of_matches(const std::vector<Matc
   }
   const auto* best = search.best();
   if (best == nullptr) return refuse("no motion can be refined");
-  constexpr const char* two = "two motions explain the matches about as well";
+  constexpr const char* two = "two motions explain the matches about equally well";
   if (search.has_rival(*best)) return refuse(two);
 
   const epipolar_motion motion = best->motion;
@@ -275,9 +275,9 @@ result<two_view_reconstruction> reconstruction_of_matches(const std::vector<Matc
   const auto unmoved = static_cast<std::size_t>(std::count_if(
       inliers.all.begin(), inliers.all.end(), [&](const Match* m) { return is_still(*m, inliers.sigma); }));
   if (2 * unmoved > inliers.all.size())
-    return refuse("no parallax: a rotation alone explains " + of(unmoved, inliers.all.size()) + " matches that agree");
+    return refuse("no parallax: a rotation alone explains " + of(unmoved, inliers.all.size()) + " inliers");
   if (10 * best->support.behind > inliers.all.size())
-    return refuse("behind a camera are " + of(best->support.behind, usable) + " matches");
+    return refuse(of(best->support.behind, usable) + " matches are behind a camera");
   if (!(inliers.rotation_deviation <= options.max_rotation) || !(inliers.direction_deviation <= options.max_direction))
     return refuse("the motion is uncertain");
 
@@ -295,8 +295,8 @@ result<two_view_reconstruction> reconstruction_of_matches(const std::vector<Matc
     if (t.ok()) found.push_back({m->original, t.point, t.parallax});
   }
   if (found.size() < least || 2 * found.size() < inliers.all.size())
-    return refuse("too little parallax: it shows the depth of " + of(found.size(), inliers.all.size()) +
-                  " matches that agree");
+    return refuse("too little parallax: it determines the depth of only " + of(found.size(), inliers.all.size()) +
+                  " inliers");
   std::sort(found.begin(), found.end(), [](const auto& a, const auto& b) { return a.match < b.match; });
   std::vector<double> depths, angles;
   for (const seen_point& p : found) {
@@ -304,12 +304,12 @@ result<two_view_reconstruction> reconstruction_of_matches(const std::vector<Matc
     angles.push_back(p.parallax);
   }
   two_view_reconstruction out;
-  out.parallax = two_view_inliers<Match>::middle_of(angles);
+  out.parallax = two_view_inliers<Match>::median_of(angles);
   if (!(out.parallax >= options.min_parallax)) return refuse("too little parallax between the rays of a point");
 
-  // Only one that would be the answer is compared with all others.
+  // Only a motion that would be accepted is compared with all others.
   const double score = best->support.score;
-  search.look_around(turn);
+  search.add_sampled_motions(turn);
   best = search.best();
   if (best->support.score > 1.02 * score || search.has_rival(*best)) return refuse(two);
   constexpr const char* shared = "two motions share the matches";
@@ -324,7 +324,7 @@ result<two_view_reconstruction> reconstruction_of_matches(const std::vector<Matc
     if (second && 2 * second->inliers.size() > inliers.all.size()) return refuse(shared);
   }
 
-  const double unit = 1.0 / two_view_inliers<Match>::middle_of(depths);
+  const double unit = 1.0 / two_view_inliers<Match>::median_of(depths);
   for (const seen_point& p : found) {
     out.matches.push_back(p.match);
     out.points.push_back(unit * p.position);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The normal equations of a pose graph: made, factored, solved.
+/// The normal equations of a pose graph: linearisation, factorisation, solution.
 #pragma once
 
 #include <cstddef>
@@ -18,7 +18,7 @@
 
 namespace orbis::optimize::detail {
 
-/// The unknowns are the steps of the vertices that may move, in the order of `structure()`. Keeps its memory. Every
+/// The unknowns are the steps of the movable vertices, in the order of `structure()`. Reuses its memory. Every
 /// execution policy gives the same bits.
 template <class T, class Loss, class Between>
 class pose_graph_equations {
@@ -31,7 +31,7 @@ class pose_graph_equations {
   [[nodiscard]] const Eigen::VectorXd& gradient() const { return gradient_; }
   [[nodiscard]] const Eigen::VectorXd& diagonal() const { return diagonal_; }
 
-  /// Begins at these vertices. Analyses the graph if it is not that of the last call.
+  /// Initialises with these vertices. Analyses the graph if it differs from that of the last call.
   template <class Edges>
   [[nodiscard]] pose_graph_finding begin(std::span<const T> vertices, const Edges& edges,
                                          const pose_graph_options& options) {
@@ -51,7 +51,7 @@ class pose_graph_equations {
     return finding;
   }
 
-  /// Residuals, weights and normal equations at the estimate.
+  /// Computes residuals, weights and normal equations at the estimate.
   template <class Policy, class Edges>
   void linearize(const Policy& policy, const Edges& edges) {
     for_each_chunk(policy, structure_.bundles.size(), grain, [&](std::size_t begin, std::size_t end) {
@@ -75,16 +75,16 @@ class pose_graph_equations {
     return sum;
   }
 
-  /// Factors `H + diag(damping)`; an empty `damping` is 0. False where that is not positive definite.
+  /// Factorises `H + diag(damping)`; an empty `damping` is 0. Returns false if it is not positive definite.
   [[nodiscard]] bool factor(const Eigen::VectorXd& damping) {
     return cholesky_.factor(on_diagonal_, off_diagonal_, {damping.data(), static_cast<std::size_t>(damping.size())});
   }
-  /// The vertex that is not determined, after `factor` has returned false.
+  /// The undetermined vertex after `factor` has returned false.
   [[nodiscard]] std::uint32_t failed_vertex() const { return structure_.vertices[cholesky_.failed_block()]; }
   /// Replaces a right-hand side by the solution.
   void solve(Eigen::VectorXd& x) { cholesky_.solve({x.data(), static_cast<std::size_t>(x.size())}); }
 
-  /// The cost one step away from the estimate; `accept` then makes that the estimate.
+  /// Computes the cost after a step; `accept` then makes the result the estimate.
   template <class Policy, class Edges>
   [[nodiscard]] double try_step(const Policy& policy, const Edges& edges, const Eigen::VectorXd& step) {
     for_each_chunk(policy, structure_.vertices.size(), grain, [&](std::size_t begin, std::size_t end) {
@@ -116,7 +116,7 @@ class pose_graph_equations {
   using block = matrix<size, size>;
   using vector = matrix<size>;
 
-  /// What the edges of a bundle add to the normal equations.
+  /// The contribution of the edges of a bundle to the normal equations.
   struct contribution {
     block from, to;
     vector gradient_from, gradient_to;
@@ -153,7 +153,7 @@ class pose_graph_equations {
     return cost;
   }
 
-  /// Adds up the contributions of the bundles at an unknown.
+  /// Sums the contributions of the bundles at an unknown.
   void gather(std::size_t u) {
     block hessian = zeros<block>();
     vector gradient = zeros<vector>();
@@ -184,7 +184,7 @@ class pose_graph_equations {
   std::vector<T> estimate_, tried_;
   double cost_ = 0.0, tried_cost_ = 0.0;
   std::vector<contribution> contributions_;  // of each bundle
-  std::vector<double> chunk_costs_;          // added in order, so that every policy gives the same sum
+  std::vector<double> chunk_costs_;          // summed in order, so that every policy gives the same result
   std::vector<block> on_diagonal_;           // the normal equations
   std::vector<block> off_diagonal_;          // of the bundles between two unknowns
   Eigen::VectorXd gradient_, diagonal_;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Checks of pose graphs, and the structure of their normal equations: which vertices and edges share blocks.
+/// Validation of pose graphs, and the structure of their normal equations: the vertices and edges that share blocks.
 #pragma once
 
 #include <algorithm>
@@ -25,8 +25,8 @@ struct pose_graph_finding {
   std::size_t where = 0;
 };
 
-/// Whether a matrix is symmetric and positive definite, whatever the units of its rows; semidefinite ones can be
-/// accepted.
+/// Returns true if a matrix is symmetric and positive definite, independent of the units of its rows; optionally
+/// accepts semidefinite ones.
 template <int N>
 [[nodiscard]] bool is_information(const matrix<N, N>& given, bool semidefinite) {
   if (!all_finite(given)) return false;
@@ -50,7 +50,7 @@ template <int N>
   return true;
 }
 
-/// The first vertex or edge that is not valid.
+/// Returns the first invalid vertex or edge.
 template <int Dimension, class T, class Edges>
 [[nodiscard]] pose_graph_finding check_pose_graph(std::span<const T> vertices, const Edges& edges,
                                                   bool semidefinite_information) {
@@ -73,26 +73,26 @@ template <int Dimension, class T, class Edges>
   return {};
 }
 
-/// All edges between the same two vertices, at least one of which may move.
+/// All edges between the same two vertices, at least one of which is movable.
 struct edge_bundle {
-  std::uint32_t from = 0, to = 0;      ///< vertices, as the bundle's first edge has them
+  std::uint32_t from = 0, to = 0;      ///< vertices, in the direction of the bundle's first edge
   std::uint32_t begin = 0, count = 0;  ///< into `pose_graph_structure::bundled`
 };
 
-/// The unknowns and blocks of a graph. Kept while the edges join the same vertices.
+/// The unknowns and blocks of a graph. Reused while the edges connect the same vertices.
 class pose_graph_structure {
  public:
   static constexpr std::uint32_t held = std::numeric_limits<std::uint32_t>::max();
 
-  std::vector<std::uint32_t> unknown;               ///< of each vertex: its number among those that move, or `held`
+  std::vector<std::uint32_t> unknown;               ///< of each vertex: its number among the movable ones, or `held`
   std::vector<std::uint32_t> vertices;              ///< of each unknown
   std::vector<edge_bundle> bundles;                 ///< those between two unknowns first
   std::vector<std::uint32_t> bundled;               ///< edges by bundle, in their order
   std::vector<block_place> places;                  ///< of the bundles between two unknowns, in their order
   std::vector<std::uint32_t> first_touch, touches;  ///< by unknown: 2 * bundle + (1 at the bundle's `to`)
 
-  /// Finds the unknowns, and the blocks if the graph is not that of the last call (then `changed` is true).
-  /// @pre the edges name vertices that exist
+  /// Determines the unknowns, and the blocks if the graph differs from that of the last call (then `changed` is true).
+  /// @pre the edges refer to existing vertices
   template <class Edges>
   [[nodiscard]] pose_graph_finding update(std::size_t vertex_count, const Edges& edges,
                                           std::span<const std::uint8_t> fixed, pose_graph_gauge policy, bool& changed) {
@@ -121,9 +121,9 @@ class pose_graph_structure {
     for (const auto& e : edges) {
       touched_[e.from] = touched_[e.to] = 1;
       const std::uint32_t a = root_of(e.from), b = root_of(e.to);
-      root_[std::max(a, b)] = std::min(a, b);  // so that the root is the first vertex of its component
+      root_[std::max(a, b)] = std::min(a, b);  // makes the root the first vertex of its component
     }
-    // Whether each component has a fixed vertex.
+    // Marks the components with a fixed vertex.
     anchored_.assign(vertex_count, 0);
     for (std::uint32_t v = 0; v != vertex_count; ++v)
       if (is_fixed(v)) anchored_[root_of(v)] = 1;

@@ -25,14 +25,14 @@ struct alignas(64) pose_lanes {
   using row = std::array<double, capacity>;
   row x, y, z;      ///< the point
   row u, v, right;  ///< its pixel; `right` is NaN where the depth is unknown
-  row information;  ///< 0 for observations that cannot be used
+  row information;  ///< 0 for unusable observations
   row active;       ///< the information of the inliers, 0 for outliers
 };
 
 /// The normal equations of a pose `T_camera_world` with steps on the left, `exp(xi) * T`.
 struct pose_sums {
-  /// Of H the lower triangle for the translation, by rows; the block of translation and rotation; the lower triangle
-  /// for the rotation.
+  /// H: the lower triangle for the translation, by rows; the block of translation and rotation; the lower triangle for
+  /// the rotation.
   std::array<double, 6> translation{};
   std::array<double, 9> corner{};
   std::array<double, 6> rotation{};
@@ -78,8 +78,8 @@ ORBIS_ALWAYS_INLINE void see(const pose_lanes& in, std::size_t i, const L& infor
   b.projection.valid = b.projection.valid & (b.chi2 <= L(std::numeric_limits<double>::max()));
 }
 
-/// The equations of the first `count` observations, a multiple of eight. A point without a projection costs as much as
-/// one at the gate, so that a step cannot gain by losing points.
+/// Computes the equations of the first `count` observations, a multiple of eight. A point without a projection costs as
+/// much as one at the gate, so that a step cannot gain by losing points.
 template <simd::target Target, class Camera>
 ORBIS_ALWAYS_INLINE void sum_pose(const pose_lanes& in, std::size_t count, const Camera& camera, const pose_at& at,
                                   const huber& loss, pose_sums& out) {
@@ -102,7 +102,7 @@ ORBIS_ALWAYS_INLINE void sum_pose(const pose_lanes& in, std::size_t count, const
     total = total + select(valid, cost, select(active, lost, L(0.0)));
     weight = weight * information;
 
-    // M = w J^T J and v = w J^T r for steps of the point, which then is moved by a step of the pose.
+    // M = w J^T J and v = w J^T r for steps of the point; then applies the chain rule for a step of the pose.
     const auto& j = b.projection.j;
     const L j20 = select(b.has_depth, j[0][0], L(0.0));
     const L j22 = select(b.has_depth, j[0][2] + at.bf * b.inverse_z * b.inverse_z, L(0.0));
@@ -191,8 +191,8 @@ ORBIS_ALWAYS_INLINE void sum_pose(const pose_lanes& in, std::size_t count, const
   out.cost = 0.5 * sum(total);
 }
 
-/// The chi-squared errors of the first `count` observations, outliers included; infinite without a projection or
-/// without information.
+/// Computes the chi-squared errors of the first `count` observations, including outliers; infinite without a projection
+/// or without information.
 template <simd::target Target, class Camera>
 ORBIS_ALWAYS_INLINE void judge_pose(const pose_lanes& in, std::size_t count, const Camera& camera, const pose_at& at,
                                     double* chi2) {

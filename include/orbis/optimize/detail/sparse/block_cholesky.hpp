@@ -2,8 +2,8 @@
 /// @file
 /// Cholesky factorisation of a sparse symmetric positive definite matrix of `B x B` blocks.
 ///
-/// Left-looking and supernodal: columns of the factor with the same structure form one dense panel, and all the work is
-/// products of panels. Source: E. Ng, B. W. Peyton, "Block sparse Cholesky algorithms on advanced uniprocessor
+/// Left-looking and supernodal: columns of the factor with the same structure form one dense panel, and all operations
+/// are products of panels. Source: E. Ng, B. W. Peyton, "Block sparse Cholesky algorithms on advanced uniprocessor
 /// computers", SIAM J. Sci. Comput. 14(5), 1993.
 #pragma once
 
@@ -23,30 +23,30 @@
 
 namespace orbis::optimize::detail {
 
-/// Analyse the structure once, then factor and solve for any values; that allocates nothing. Every processor gives the
-/// same bits. Not thread-safe.
+/// Analyses the structure once; factorising and solving for any values then allocates nothing. Every processor gives
+/// the same bits. Not thread-safe.
 template <int B>
 requires(B >= 1) class block_cholesky {
  public:
   using block = matrix<B, B>;
 
-  /// Prepares for matrices of `size` blocks a side with blocks on the diagonal and at `places`.
-  /// @pre every place is below `size` and off the diagonal, and none is given twice
+  /// Analyses matrices of `size` blocks per side with blocks on the diagonal and at `places`.
+  /// @pre every place is below `size` and off the diagonal, and no place is repeated
   void analyze(std::size_t size, std::span<const block_place> places);
 
   [[nodiscard]] const block_symbolic& symbolic() const { return symbolic_; }
 
-  /// Factors the matrix with `diagonal[i]` at (i, i), `damping` added to its diagonal, and `off_diagonal[k]` at
-  /// `places[k]`. False if the matrix is not positive definite: a pivot is not above `tolerance` times the entry of the
-  /// matrix, or not finite; see `failed_block`.
-  /// @pre sizes as analysed; `damping` empty or one for each row
+  /// Factorises the matrix with `diagonal[i]` at (i, i), `damping` added to its diagonal, and `off_diagonal[k]` at
+  /// `places[k]`. Returns false if the matrix is not positive definite: a pivot is not above `tolerance` times the
+  /// entry of the matrix, or not finite; see `failed_block`.
+  /// @pre sizes as analysed; `damping` empty or one per row
   [[nodiscard]] bool factor(std::span<const block> diagonal, std::span<const block> off_diagonal,
                             std::span<const double> damping = {}, double tolerance = 1e-14);
 
-  /// The block whose pivot was not positive, after `factor` has returned false.
+  /// The block whose pivot was not positive after `factor` has returned false.
   [[nodiscard]] std::uint32_t failed_block() const { return failed_block_; }
 
-  /// Replaces the right-hand side in `x` by the solution. @pre the last `factor` returned true
+  /// Solves in place: replaces the right-hand side in `x` by the solution. @pre the last `factor` returned true
   void solve(std::span<double> x);
 
  private:
@@ -56,7 +56,7 @@ requires(B >= 1) class block_cholesky {
     std::size_t begin = 0;
     std::size_t stride = 0;  ///< between columns
   };
-  /// Where a block off the diagonal is stored.
+  /// Storage position of a block off the diagonal.
   struct target {
     std::size_t begin = 0, stride = 0;
     bool transposed = false;
@@ -156,7 +156,7 @@ requires(B >= 1) class block_cholesky {
     return true;
   }
 
-  /// Column j of a diagonal block; false where its pivot is not above `least`.
+  /// Factorises column j of a diagonal block; returns false if its pivot is not above `least`.
   [[nodiscard]] static bool factor_column(double* top, std::size_t stride, std::size_t j, double least,
                                           double& inverse) {
     for (std::size_t i = j; i != width; ++i)
@@ -175,7 +175,7 @@ requires(B >= 1) class block_cholesky {
     const std::size_t stride = panels_[s].stride;
     const std::size_t height = width * (node.columns + node.rows);
     double* const x = ordered_.data() + offset(node.first);
-    double* const change = product_.data();  // of everything below the column at work
+    double* const change = product_.data();  // of everything below the current column
     std::fill_n(change, height, 0.0);
     for (std::size_t c = 0; c != node.columns; ++c) {
       const double* const top = panel_of(s) + width * c * stride;

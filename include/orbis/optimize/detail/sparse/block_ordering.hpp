@@ -16,7 +16,7 @@
 
 namespace orbis::optimize::detail {
 
-/// The place of one block off the diagonal of a symmetric matrix; (column, row) is implied.
+/// The position of one block off the diagonal of a symmetric matrix; (column, row) is implied.
 struct block_place {
   std::uint32_t row = 0;
   std::uint32_t column = 0;
@@ -52,9 +52,8 @@ class block_adjacency {
   std::vector<std::uint32_t> neighbors_;
 };
 
-/// The quotient graph during an elimination. A node is a variable (not yet eliminated; it may stand for several with
-/// the same neighbours), an element (eliminated; its list is the clique that it leaves behind), or gone: absorbed by
-/// another.
+/// The quotient graph during an elimination. A node is a variable (not yet eliminated; it may represent several with
+/// the same neighbours), an element (eliminated; its list is the resulting clique), or gone: absorbed by another node.
 class quotient_graph {
  public:
   explicit quotient_graph(const block_adjacency& graph)
@@ -73,11 +72,11 @@ class quotient_graph {
     for (std::uint32_t i = 0; i != size_; ++i) {
       list_[i].begin = list_[i].variables = pool_.size();
       for (const std::uint32_t j : graph.neighbors(i)) {
-        if (seen[j] == i) continue;  // given twice
+        if (seen[j] == i) continue;  // duplicate
         seen[j] = i;
         pool_.push_back(j);
       }
-      // Every list has room for one element, the only one that can be added before another entry is removed.
+      // Every list has room for one element: at most one is added before another entry is removed.
       list_[i].end = pool_.size();
       degree_[i] = static_cast<std::uint32_t>(list_[i].end - list_[i].begin);
       last_merged_[i] = i;
@@ -122,7 +121,7 @@ class quotient_graph {
       bucket_[degree_[i]] = next_[i];
     if (next_[i] != none) previous_[next_[i]] = previous_[i];
   }
-  /// `i` is eliminated together with `into`.
+  /// Marks `i` as eliminated together with `into`.
   void merge(std::uint32_t i, std::uint32_t into) {
     merged_[last_merged_[into]] = i;
     last_merged_[into] = last_merged_[i];
@@ -156,7 +155,7 @@ class quotient_graph {
   void in_clique_mark(std::uint32_t i, bool in) { remains_[i] = in ? in_clique : 0; }
   [[nodiscard]] bool is_in_clique(std::uint32_t i) const { return remains_[i] == in_clique; }
 
-  /// All variables that share a neighbour or an element with the pivot.
+  /// Collects all variables that share a neighbour or an element with the pivot.
   void collect_clique(std::uint32_t pivot) {
     clique_.clear();
     in_clique_mark(pivot, true);
@@ -177,7 +176,7 @@ class quotient_graph {
     for (const std::uint32_t i : clique_) clique_weight_ += weight_[i];
   }
 
-  /// How much of each element that touches the clique lies outside it.
+  /// Computes the weight of each element that touches the clique outside of the clique.
   void measure_elements() {
     touched_.clear();
     for (const std::uint32_t i : clique_)
@@ -204,7 +203,7 @@ class quotient_graph {
       for (std::size_t at = own.begin; at != own.variables; ++at) {
         const std::uint32_t e = pool_[at];
         if (state_[e] != element) continue;
-        if (remains_[e] == 1) continue;  // wholly inside the clique: contained in the new element
+        if (remains_[e] == 1) continue;  // entirely inside the clique: contained in the new element
         outside += remains_[e] - 1;
         hash += e;
         pool_[to++] = e;
@@ -225,7 +224,7 @@ class quotient_graph {
       own.variables = elements_end + 1;
       own.end = own.variables + kept;
       if (outside == 0) {
-        merge(i, pivot);  // has no neighbours outside the clique: eliminated with the pivot
+        merge(i, pivot);  // no neighbours outside the clique: eliminated with the pivot
         continue;
       }
       const std::uint64_t bound = std::min<std::uint64_t>(std::uint64_t{degree_[i]} + others, others + outside);
@@ -238,7 +237,7 @@ class quotient_graph {
     }
   }
 
-  /// Merges variables with the same elements and neighbours: these stay the same to the end.
+  /// Merges variables with the same elements and neighbours: they remain indistinguishable.
   void merge_indistinguishable() {
     std::sort(hashes_.begin(), hashes_.end(),
               [](const hashed& a, const hashed& b) { return a.hash != b.hash ? a.hash < b.hash : a.node < b.node; });
@@ -272,13 +271,13 @@ class quotient_graph {
   static constexpr std::uint64_t in_clique = std::numeric_limits<std::uint64_t>::max();
 
   std::uint32_t size_;
-  std::vector<std::uint32_t> weight_;  ///< how many blocks a node stands for
+  std::vector<std::uint32_t> weight_;  ///< number of blocks that a node represents
   std::vector<range> list_;
-  std::vector<std::uint32_t> degree_;  ///< of variables: an upper bound of what eliminating them would connect
+  std::vector<std::uint32_t> degree_;  ///< of variables: an upper bound of the blocks that elimination would connect
   std::vector<kind> state_;
-  std::vector<std::uint64_t> remains_;  ///< of elements: 1 + weight outside the clique; of variables: in it or not
+  std::vector<std::uint64_t> remains_;  ///< of elements: 1 + weight outside the clique; of variables: membership
   std::vector<std::uint32_t> bucket_, next_, previous_;  ///< variables by degree
-  std::vector<std::uint32_t> merged_, last_merged_;      ///< chains of those eliminated together
+  std::vector<std::uint32_t> merged_, last_merged_;      ///< chains of variables eliminated together
   std::vector<std::uint32_t> pool_, clique_, touched_;
   std::vector<hashed> hashes_;
   std::vector<std::uint64_t> marks_;
@@ -287,8 +286,8 @@ class quotient_graph {
   std::uint32_t lowest_ = 0;
 };
 
-/// An order of elimination by approximate minimum degree: `order[k]` is the block to eliminate as the
-/// k-th. Deterministic; about O(places) for meshes and graphs of poses.
+/// An approximate minimum degree elimination order: `order[k]` is the k-th block to eliminate. Deterministic; about
+/// O(places) for meshes and pose graphs.
 [[nodiscard]] inline std::vector<std::uint32_t> minimum_degree_order(const block_adjacency& graph) {
   return quotient_graph{graph}.eliminate_all();
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Symbolic Cholesky factorisation of a block-sparse matrix: the structure of the factor, which does not depend on the
+/// Symbolic Cholesky factorisation of a block-sparse matrix: the structure of the factor, which is independent of the
 /// values.
 ///
 /// Sources: J. W. H. Liu, "The role of elimination trees in sparse factorization", SIAM J. Matrix
@@ -20,15 +20,15 @@
 
 namespace orbis::optimize::detail {
 
-/// Consecutive block columns of the factor with the same rows below them, kept as one dense panel.
+/// Consecutive block columns of the factor with the same rows below them, stored as one dense panel.
 struct supernode {
   std::uint32_t first = 0;     ///< first block column, in the order of elimination
-  std::uint32_t columns = 0;   ///< how many
+  std::uint32_t columns = 0;   ///< number of block columns
   std::size_t rows_begin = 0;  ///< into `block_symbolic::rows`: the block rows below the panel's own, ascending
-  std::uint32_t rows = 0;      ///< how many
+  std::uint32_t rows = 0;      ///< number of block rows
 };
 
-/// The rows `[begin, end)` of the panel of supernode `source` lie in the columns of another supernode and update it.
+/// The rows `[begin, end)` of the panel of supernode `source` are in the columns of another supernode and update it.
 struct supernode_update {
   std::uint32_t source = 0;
   std::uint32_t begin = 0, end = 0;  ///< positions in the source's rows
@@ -36,14 +36,14 @@ struct supernode_update {
 
 /// The structure of a factor `L` with `P A P^T = L L^T`.
 struct block_symbolic {
-  std::vector<std::uint32_t> order;     ///< `order[k]`: which block of A is the k-th of the factor
-  std::vector<std::uint32_t> position;  ///< its inverse
+  std::vector<std::uint32_t> order;     ///< `order[k]`: the block of A that is the k-th of the factor
+  std::vector<std::uint32_t> position;  ///< inverse of `order`
   std::vector<supernode> supernodes;    ///< in the order of elimination
   std::vector<std::uint32_t> rows;
   std::vector<std::uint32_t> supernode_of;  ///< of each block column of the factor
   std::vector<supernode_update> updates;    ///< by target, then by source
-  std::vector<std::size_t> first_update;    ///< of each supernode, as target; one more at the end
-  std::size_t factor_blocks = 0;            ///< blocks in the lower triangle of the panels, explicit zeros included
+  std::vector<std::size_t> first_update;    ///< of each supernode, as target; one extra entry at the end
+  std::size_t factor_blocks = 0;  ///< number of blocks in the lower triangle of the panels, including explicit zeros
 
   [[nodiscard]] std::size_t size() const { return order.size(); }
   [[nodiscard]] std::span<const std::uint32_t> rows_of(const supernode& s) const {
@@ -56,7 +56,7 @@ struct block_symbolic {
 
 inline constexpr std::uint32_t no_block = std::numeric_limits<std::uint32_t>::max();
 
-/// The parent of each column: the first row below it that is filled.
+/// The parent of each column: the first nonzero row below it.
 [[nodiscard]] inline std::vector<std::uint32_t> elimination_tree(const block_adjacency& graph,
                                                                  const std::vector<std::uint32_t>& order,
                                                                  const std::vector<std::uint32_t>& position) {
@@ -66,7 +66,7 @@ inline constexpr std::uint32_t no_block = std::numeric_limits<std::uint32_t>::ma
       std::uint32_t i = position[neighbor];
       while (i < k) {
         const std::uint32_t up = ancestor[i];
-        ancestor[i] = k;  // the path is short the next time
+        ancestor[i] = k;  // path compression
         if (up == no_block) parent[i] = k;
         if (up == no_block || up == k) break;
         i = up;
@@ -75,7 +75,7 @@ inline constexpr std::uint32_t no_block = std::numeric_limits<std::uint32_t>::ma
   return parent;
 }
 
-/// The columns so that every subtree is consecutive and children come before their parent.
+/// A postorder of the columns: every subtree is consecutive and children precede their parent.
 [[nodiscard]] inline std::vector<std::uint32_t> postorder(const std::vector<std::uint32_t>& parent) {
   const std::size_t n = parent.size();
   std::vector<std::uint32_t> child(n, no_block), sibling(n, no_block), stack, result;
@@ -102,7 +102,7 @@ inline constexpr std::uint32_t no_block = std::numeric_limits<std::uint32_t>::ma
   return result;
 }
 
-/// Blocks in each column of the factor, the diagonal included.
+/// Number of blocks in each column of the factor, including the diagonal.
 [[nodiscard]] inline std::vector<std::uint32_t> column_counts(const block_adjacency& graph,
                                                               const block_symbolic& symbolic,
                                                               const std::vector<std::uint32_t>& parent) {
@@ -118,13 +118,13 @@ inline constexpr std::uint32_t no_block = std::numeric_limits<std::uint32_t>::ma
   return count;
 }
 
-/// Whether one panel, in which `zeros` of `blocks` blocks are zero, is faster than two.
+/// Returns true if one panel, in which `zeros` of `blocks` blocks are zero, is faster than two.
 [[nodiscard]] inline bool worth_merging(std::size_t columns, std::size_t zeros, std::size_t blocks) {
   const double share = static_cast<double>(zeros) / static_cast<double>(blocks);
   return zeros == 0 || (columns <= 4 && share < 0.4) || (columns <= 12 && share < 0.15) || share < 0.05;
 }
 
-/// Groups columns; sets everything of the supernodes but their rows.
+/// Groups columns; sets all members of the supernodes except their rows.
 inline void group_columns(block_symbolic& symbolic, const std::vector<std::uint32_t>& parent,
                           const std::vector<std::uint32_t>& count) {
   struct group {
@@ -138,7 +138,7 @@ inline void group_columns(block_symbolic& symbolic, const std::vector<std::uint3
   std::vector<group> groups;
   for (std::uint32_t k = 0; k != parent.size(); ++k) {
     groups.push_back({k, k, count[k] - std::size_t{1}, 0});
-    while (groups.size() > 1) {  // with the last child, which ends where this begins
+    while (groups.size() > 1) {  // merge with the last child, which ends where this begins
       const group& top = groups.back();
       const group& child = groups[groups.size() - 2];
       if (parent[child.last] == no_block || parent[child.last] > top.last) break;
@@ -160,7 +160,7 @@ inline void group_columns(block_symbolic& symbolic, const std::vector<std::uint3
   }
 }
 
-/// The rows of every supernode: those of its columns and of its children.
+/// Computes the rows of every supernode: those of its columns and of its children.
 inline void find_rows(block_symbolic& symbolic, const block_adjacency& graph) {
   std::vector<std::uint32_t> seen(symbolic.size(), no_block), child(symbolic.supernodes.size(), no_block),
       sibling(symbolic.supernodes.size(), no_block);
@@ -191,7 +191,7 @@ inline void find_rows(block_symbolic& symbolic, const block_adjacency& graph) {
   }
 }
 
-/// The updates between supernodes.
+/// Computes the updates between supernodes.
 inline void find_updates(block_symbolic& symbolic) {
   const auto for_each = [&](auto&& visit) {
     for (std::uint32_t s = 0; s != symbolic.supernodes.size(); ++s) {
@@ -212,7 +212,7 @@ inline void find_updates(block_symbolic& symbolic) {
   for_each([&](std::uint32_t target, const supernode_update& u) { symbolic.updates[next[target]++] = u; });
 }
 
-/// The structure of the factor of a matrix with blocks at `places` and on the diagonal.
+/// Computes the structure of the factor of a matrix with blocks at `places` and on the diagonal.
 /// @pre every place is below `size` and off the diagonal
 [[nodiscard]] inline block_symbolic analyze_blocks(std::size_t size, std::span<const block_place> places) {
   const block_adjacency graph{size, places};

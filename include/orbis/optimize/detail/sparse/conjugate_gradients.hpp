@@ -20,8 +20,8 @@
 
 namespace orbis::optimize::detail {
 
-/// Conjugate gradients, preconditioned with the inverses of the diagonal blocks. One iteration costs O(blocks). Keeps
-/// its memory, and refers to the blocks it was given until the last `solve`. Not thread-safe.
+/// Conjugate gradients, preconditioned with the inverses of the diagonal blocks. One iteration costs O(blocks). Reuses
+/// its memory; refers to the blocks passed to `factor` until the last `solve`. Not thread-safe.
 template <int B>
 class block_conjugate_gradients {
  public:
@@ -39,7 +39,7 @@ class block_conjugate_gradients {
     for (auto* v : {&residual_, &direction_, &image_, &preconditioned_, &solution_}) v->assign(B * size, 0.0);
   }
 
-  /// False where a diagonal block is not positive definite.
+  /// Sets the matrix; returns false if a diagonal block is not positive definite.
   /// @pre the spans outlive the calls of `solve`
   [[nodiscard]] bool factor(std::span<const block> diagonal, std::span<const block> off_diagonal) {
     assert(diagonal.size() == size_ && off_diagonal.size() == places_.size());
@@ -58,8 +58,8 @@ class block_conjugate_gradients {
   }
   [[nodiscard]] std::uint32_t failed_block() const { return failed_block_; }
 
-  /// Replaces the right-hand side by an approximate solution: the last iterate before the matrix proved not to be
-  /// positive definite, if it does.
+  /// Replaces the right-hand side by an approximate solution. If the matrix turns out not to be positive definite, that
+  /// is the last iterate before.
   void solve(std::span<double> x) {
     assert(x.size() == B * size_);
     residual_.assign(x.begin(), x.end());

@@ -14,11 +14,11 @@
 
 namespace orbis::optimize::detail {
 
-/// Left-looking, in panels of eight columns. n^3 / 3 multiplications; a matrix of the same size as before allocates
-/// nothing. Every processor gives the same bits. Not thread-safe.
+/// Left-looking factorisation in panels of eight columns. n^3 / 3 multiplications; allocates nothing for a matrix of
+/// the same size as before. Every processor gives the same bits. Not thread-safe.
 class dense_cholesky {
  public:
-  /// Room for an n x n matrix, all of it 0.
+  /// Resizes to an n x n matrix of zeros.
   void resize(std::size_t n) {
     size_ = n;
     stride_ = (n + width - 1) / width * width;
@@ -30,12 +30,12 @@ class dense_cholesky {
   }
   [[nodiscard]] std::size_t size() const { return size_; }
 
-  /// Entry (row, column) of the matrix, of which only the lower triangle is read; after `factor` that of the factor.
+  /// Entry (row, column) of the matrix, of which only the lower triangle is read; after `factor`, of the factor.
   [[nodiscard]] double& operator()(std::size_t row, std::size_t column) { return values_[column * stride_ + row]; }
   [[nodiscard]] double* column(std::size_t c) { return values_.data() + c * stride_; }
 
-  /// Replaces the matrix by its factor. False if it is not positive definite: a pivot is not above `tolerance` times
-  /// the entry of the matrix, or not finite; see `failed_row`.
+  /// Replaces the matrix by its factor. Returns false if it is not positive definite: a pivot is not above `tolerance`
+  /// times the entry of the matrix, or not finite; see `failed_row`.
   [[nodiscard]] bool factor(double tolerance = 1e-14) {
     for (std::size_t i = size_; i != stride_; ++i) (*this)(i, i) = 1.0;
     for (std::size_t i = 0; i != stride_; ++i) given_[i] = (*this)(i, i);
@@ -61,10 +61,10 @@ class dense_cholesky {
     return true;
   }
 
-  /// The row whose pivot was not positive, after `factor` has returned false.
+  /// The row whose pivot was not positive after `factor` has returned false.
   [[nodiscard]] std::size_t failed_row() const { return failed_row_; }
 
-  /// Replaces the right-hand side in `x` by the solution. @pre the last `factor` returned true
+  /// Solves in place: replaces the right-hand side in `x` by the solution. @pre the last `factor` returned true
   void solve(std::span<double> x) const;
 
  private:

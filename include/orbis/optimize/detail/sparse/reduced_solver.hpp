@@ -17,7 +17,7 @@
 
 namespace orbis::optimize::detail {
 
-/// Solves symmetric systems of C x C blocks in one of three ways, chosen by size and fill. Keeps its memory.
+/// Solves symmetric systems of C x C blocks by one of three methods, chosen by size and fill. Reuses its memory.
 template <int C>
 class reduced_solver {
  public:
@@ -29,14 +29,14 @@ class reduced_solver {
 
   [[nodiscard]] kind chosen() const { return kind_; }
 
-  /// `places`: where the blocks off the diagonal are.
+  /// Analyses a matrix; `places`: positions of the blocks off the diagonal.
   void analyze(std::size_t size, std::span<const block_place> places) {
     size_ = size;
     places_.assign(places.begin(), places.end());
     kind_ = kind::dense;
     if (size > options_.dense_limit) {
       sparse_.analyze(size, places);
-      std::size_t fill = 0;  // blocks of the factor
+      std::size_t fill = 0;  // number of blocks of the factor
       for (const supernode& s : sparse_.symbolic().supernodes)
         fill += std::size_t{s.columns} * (std::size_t{s.columns} + s.rows);
       kind_ = fill > options_.fill_limit ? kind::iterative : kind::sparse;
@@ -44,7 +44,7 @@ class reduced_solver {
     if (kind_ == kind::iterative) iterative_.analyze(size, places);
   }
 
-  /// Takes the blocks; false if the matrix is not positive definite.
+  /// Sets the blocks; returns false if the matrix is not positive definite.
   /// @pre the spans outlive the calls of `solve`
   [[nodiscard]] bool factor(std::span<const block> diagonal, std::span<const block> off_diagonal) {
     if (kind_ == kind::sparse) return sparse_.factor(diagonal, off_diagonal);
@@ -76,7 +76,7 @@ class reduced_solver {
     if (kind_ == kind::sparse) sparse_.solve(x);
     if (kind_ == kind::iterative) iterative_.solve(x);
   }
-  /// Of the iterative solver, so far.
+  /// Iterations of the iterative solver so far.
   [[nodiscard]] int iterations() const { return iterative_.iterations(); }
 
  private:
