@@ -15,7 +15,7 @@
 
 namespace orbis::cloud::detail {
 
-using policy = parallel_policy;  // that all others become
+using policy = parallel_policy;  // the policy that all others convert to
 
 template result<neighbor_table> find_all_knn(const policy&, const point_view&, std::size_t, const progress&);
 template result<std::vector<float>> find_mean_distances(const policy&, const point_view&, std::size_t, const progress&);

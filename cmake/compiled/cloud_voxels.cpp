@@ -7,7 +7,7 @@
 
 namespace orbis::cloud::detail {
 
-using policy = parallel_policy;  // that all others become
+using policy = parallel_policy;  // the policy that all others convert to
 template <class S>
 using view = basic_point_view<S>;
 

@@ -21,7 +21,7 @@ namespace detail {
 /// Measures the time between calls of `lap`.
 class stopwatch {
  public:
-  /// Sets `milliseconds` to the time since the last call, or since the construction.
+  /// Sets `milliseconds` to the time since the last call, or since construction.
   void lap(double& milliseconds) {
     const auto now = std::chrono::steady_clock::now();
     milliseconds = std::chrono::duration<double, std::milli>(now - last_).count();
@@ -144,7 +144,7 @@ std::optional<map_keyframe> ORBIS_SLAM_SYSTEM::localize(frame_type f, const row_
   const auto similar = [this](const auto& features, std::size_t count) {
     return shared_.similar(shared_.places.describe(features), count, [](map_keyframe) { return false; });
   };
-  const auto drop = [this](map_id m) {  // unless mapping works on it; then it stays
+  const auto drop = [this](map_id m) {  // unless mapping uses it; then the map is kept
     if (const auto edit = shared_.try_edit()) shared_.remove_map(m);
   };
   front_end_->sync_with_map(maps);
@@ -294,7 +294,8 @@ result<void> ORBIS_SLAM_SYSTEM::load_map(const std::filesystem::path& path) requ
                 shared_.rig.scale_is_known ? "the map was made without depth, its unit of length is not the metre"
                                            : "the map was made with depth, and this sensor measures none");
   if (loaded->keyframes().empty()) return fail(errc::no_data, path.string(), "the map has no keyframes");
-  std::vector<std::pair<keyframe_id, typename Places::signature>> bow_vectors;  // before tracking has to wait
+  std::vector<std::pair<keyframe_id, typename Places::signature>>
+      bow_vectors;  // before locking, so that tracking does not wait
   for (const auto& k : loaded->keyframes()) bow_vectors.emplace_back(k.id, shared_.places.describe(k.features));
   const auto lock = shared_.lock();
   const map_id before = shared_.atlas.active_id();
