@@ -48,8 +48,8 @@ struct calibrated_parameter {
 
 /// Result of a calibration, independent of the camera model.
 struct calibration_summary {
-  std::vector<calibrated_parameter>
-      parameters;  ///< the model's parameters; of `radial_tangential` k3 if it is not 0, k4 to k6 never
+  /// The parameters of the model; of `radial_tangential` k3 if it is not 0, k4 to k6 never.
+  std::vector<calibrated_parameter> parameters;
   std::size_t keyframes = 0, landmarks = 0;  ///< number of those used
   std::size_t observations = 0, outliers = 0;
   double initial_rms = 0.0;  ///< of the inlier observations, in standard deviations

@@ -21,8 +21,8 @@ namespace orbis::slam {
 /// Conditions for making a keyframe of a frame.
 struct keyframe_options {
   double interval = 0.3;  ///< seconds since the last keyframe, after which motion is a sufficient reason
-  double moved =
-      0.06;  ///< metres (without depth, median depths of the view) since the last keyframe that count as motion ...
+  /// Metres (without depth, median depths of the view) since the last keyframe that count as motion ...
+  double moved = 0.06;
   double turned = 0.06;              ///< ... or radians
   double inlier_ratio = 0.75;        ///< a keyframe is made below this share of the reference keyframe's landmarks
   double inlier_ratio_start = 0.4;   ///< `inlier_ratio` while the map has one keyframe
@@ -55,15 +55,14 @@ struct culling_options {
 /// Depth images in pose estimation: points of a frame are aligned with the surfaces of keyframes. For sensors with a
 /// depth image.
 struct depth_term_options {
-  bool enabled = true;       ///< adds the depth term to the keypoints in every pose refinement
-  bool recovers = true;      ///< localises the camera by depth alone where keypoints fail
-  std::size_t points = 400;  ///< maximum number of points of a frame
-  double effective_points =
-      40;  ///< number of independent points they count as at most: errors of neighbouring depths are correlated
-  std::size_t surfaces = 16;  ///< maximum number of keyframe surfaces kept; about 130 kB each
-  double weakest = 0.002;     ///< mean square of the surfaces' directions below which a direction is unconstrained
-  double min_share = 0.7;  ///< minimum share of the points on known surfaces for depth to localise the camera alone ...
-  std::size_t min_points = 100;  ///< ... and their minimum number
+  bool enabled = true;           ///< adds the depth term to the keypoints in every pose refinement
+  bool recovers = true;          ///< localises the camera by depth where keypoints fail
+  std::size_t points = 400;      ///< maximum number of points of a frame
+  double effective_points = 40;  ///< maximum number they count as: errors of neighbouring depths are correlated
+  std::size_t surfaces = 16;     ///< maximum number of keyframe surfaces kept; about 130 kB each
+  double weakest = 0.002;  ///< mean square of the surfaces' normals in a direction below which it is unconstrained
+  double min_share = 0.7;  ///< minimum share of consistent points among those on known surfaces ...
+  std::size_t min_points = 100;  ///< ... and minimum number of the latter, for depth to localise the camera
   std::size_t min_inliers = 5;   ///< minimum number of landmarks that constrain the directions free of surfaces
 };
 
@@ -97,8 +96,7 @@ struct triangulation_options {
   float ratio = 0.6F;            ///< maximum ratio of the distance to that of the second best match
   float line_distance = 1.96F;   ///< maximum distance from the epipolar line, pixels of a keypoint's level
   float epipole_radius = 10.0F;  ///< pixels of a keypoint's level around the epipole in which nothing is matched
-  double scale_tolerance =
-      1.5;  ///< maximum factor, in addition to one level, between the ratios of levels and of distances
+  double scale_tolerance = 1.5;  ///< maximum factor, in addition to one level, between ratios of levels and distances
 };
 
 /// Fusion of duplicate landmarks around a new keyframe.
@@ -186,8 +184,8 @@ struct thread_options {
   /// Off: `track` does everything, and the same frames give the same bytes. On: mapping, loop closing and global
   /// adjustment have one thread each, and `track` returns as soon as the pose is known.
   bool enabled = false;
-  std::size_t max_waiting =
-      3;  ///< maximum number of keyframes waiting for mapping; at the limit, no further keyframe is made ...
+  /// Maximum number of keyframes waiting for mapping; at the limit, no further keyframe is made ...
+  std::size_t max_waiting = 3;
   /// ... or `track` waits: for recordings, which must not outrun mapping. If off, an adjustment also ends early when a
   /// keyframe waits.
   bool wait = false;
@@ -220,8 +218,8 @@ struct options {
   std::size_t local_keyframes = 40;  ///< maximum number of keyframes whose landmarks are searched for in a frame
   camera::shutter shutter{};         ///< exposure times of the rows of the images; the default is a global shutter
   /// Estimates the shutter from the frames, starting from `shutter`, and applies significant changes during tracking:
-  /// after two seconds, and each time the number of frames has doubled. The existing map is not changed. It costs a few
-  /// milliseconds per frame. For recordings: estimate from the first seconds (`system::estimated_shutter`), then
+  /// after two seconds, and each time the observation time has grown by half. The existing map is not changed. It costs
+  /// a few milliseconds per frame. For recordings: estimate from the first seconds (`system::estimated_shutter`), then
   /// restart with the result.
   bool estimates_shutter = false;
   keyframe_options keyframes{};

@@ -59,7 +59,7 @@ struct track_result {
 struct tracked_feature {
   float x = 0.0F, y = 0.0F;  ///< pixels
   bool tracked = false;      ///< observes a previously known landmark, in agreement with the pose
-  bool moving = false;       ///< lies on a moving object; excluded from tracking and mapping (`moving_options`)
+  bool moving = false;       ///< is on a moving object; excluded from tracking and mapping (`moving_options`)
 };
 
 /// Tracking details of a frame, for display or logging.
@@ -75,8 +75,7 @@ struct tracked_frame {
 /// Counts over all frames so far. Frames before the first map begins are neither tracked nor lost.
 struct track_counters {
   std::size_t frames = 0;
-  std::size_t tracked =
-      0;  ///< including relocalised frames and the first of the two frames that begin a map without depth
+  std::size_t tracked = 0;  ///< including relocalised frames and the first of two that begin a map without depth
   std::size_t lost = 0;
   std::size_t relocalized = 0;
   std::size_t loops_closed = 0;
