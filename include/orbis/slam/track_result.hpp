@@ -67,7 +67,7 @@ struct tracked_frame {
   /// The keyframe that the frame's pose follows. `atlas::current` gives its present id; with
   /// `options::trajectory_frames` it may be forgotten later (`basic_map::remembers`).
   map_keyframe reference;
-  se3 T_reference_camera;  ///< in units of the reference's scale (`basic_map::scale_of`), which is 1 with depth
+  se3 T_reference_camera;  ///< translation divided by `basic_map::scale_of` the reference, which is 1 with depth
   std::vector<tracked_feature> features;
   vec6 twist = zeros<vec6>();  ///< see `track_result::twist`
 };

@@ -22,7 +22,7 @@ namespace orbis::slam::detail {
 /// The pose of an erased keyframe relative to its replacement.
 struct erased_keyframe {
   keyframe_id replacement;   ///< may be erased itself; `no_id` if no keyframe was left
-  se3 T_replacement_camera;  ///< in units of the replacement's `scale`; without a replacement: `T_world_camera`
+  se3 T_replacement_camera;  ///< translation divided by the replacement's `scale`; without one: `T_world_camera`
   double scale = 1.0;        ///< relative to that of the replacement
   std::uint64_t number = 0;  ///< ordinal of the erasure
 };

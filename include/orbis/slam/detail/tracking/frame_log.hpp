@@ -22,7 +22,7 @@ namespace orbis::slam::detail {
 struct logged_frame {
   double timestamp = 0.0;  ///< seconds
   map_keyframe reference;
-  se3 T_reference_camera;  ///< in units of the reference's scale (`basic_map::scale_of`)
+  se3 T_reference_camera;  ///< translation divided by the reference's scale (`basic_map::scale_of`)
 };
 
 class frame_log {

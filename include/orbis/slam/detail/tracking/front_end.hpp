@@ -507,8 +507,8 @@ class front_end {
   frame_type last_;                        ///< the last frame that was tracked
   map_keyframe last_reference_;            ///< its reference ...
   double last_scale_ = 1.0;                ///< scale of that keyframe at the last update
-  se3 T_reference_last_;                   ///< ... and its pose relative to the reference, in units of its scale
-  landmark_id first_new_;                  ///< landmarks from this id on were made from the last frame; `no_id`: none
+  se3 T_reference_last_;   ///< ... and its pose relative to the reference, translation divided by its scale
+  landmark_id first_new_;  ///< landmarks from this id on were made from the last frame; `no_id`: none
   motion_model motion_;
   track_counters counters_;
   frame_log log_;
