@@ -63,7 +63,7 @@ struct depth_term_options {
   double weakest = 0.002;  ///< mean square of the surfaces' normals in a direction below which it is unconstrained
   double min_share = 0.7;  ///< minimum share of consistent points among those on known surfaces ...
   std::size_t min_points = 100;  ///< ... and minimum number of the latter, for depth to localise the camera
-  std::size_t min_inliers = 5;   ///< minimum number of landmarks that constrain the directions free of surfaces
+  std::size_t min_inliers = 5;   ///< minimum number of landmarks per direction of the pose that surfaces leave free
 };
 
 /// Recovery from lost tracking.

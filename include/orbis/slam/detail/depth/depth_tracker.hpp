@@ -153,8 +153,8 @@ class depth_tracker {
   /// Returns the last result of `find_surfaces`.
   [[nodiscard]] bool has_surfaces() const noexcept { return !placed_.empty(); }
 
-  /// Returns the cost of a pose close to the true one by the surfaces; empty if they do not constrain it. @pre
-  /// find_surfaces
+  /// Returns the cost of a pose close to the true one by the surfaces; empty if they do not constrain it.
+  /// @pre find_surfaces
   [[nodiscard]] std::optional<pose_quadratic> term_at(const moving_pose& at, const camera::shutter& shutter) {
     const association seen = associate<Camera>(samples_, 1, placed_, at, shutter, rig_, close, planes_);
     if (seen.consistent < options_.min_points / 2) return std::nullopt;

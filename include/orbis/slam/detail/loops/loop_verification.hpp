@@ -181,8 +181,8 @@ template <feature_descriptor D>
   return length;
 }
 
-/// Copies the data for the verification. O(features of some keyframes, and keyframes between the two). @pre the
-/// keyframes exist and differ
+/// Copies the data for the verification. O(features of some keyframes, and keyframes between the two).
+/// @pre the keyframes exist and differ
 template <feature_descriptor D, camera::camera_model Camera>
 [[nodiscard]] snapshot<D> take(const basic_map<D>& current, keyframe_id k, const basic_map<D>& candidate_map,
                                keyframe_id candidate, const camera_rig<Camera>& rig, const loop_options& o = {}) {

@@ -103,8 +103,8 @@ class slot_map {
   }
 
   /// Appends all objects and erased ids of `other`, which count as erased now. Returns the amount by which its ids
-  /// grow. Ids inside the objects are not changed. O(ids of `other`), in steps of 256 for long forgotten ones. @pre at
-  /// most `most_ids` ids in all
+  /// grow. Ids inside the objects are not changed. O(ids of `other`), in steps of 256 for long forgotten ones.
+  /// @pre at most `most_ids` ids in all
   std::uint32_t append(slot_map&& other) {
     assert(other.slots_.size() <= most_ids - slots_.size());
     const std::uint32_t offset = slots_.size();
