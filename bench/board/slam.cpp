@@ -32,12 +32,12 @@ using descriptor = orbis::features::orb_extractor::descriptor;
 /// The body of the template with places around it.
 template <>
 void orbis::slam::detail::local_mapper<camera_type, descriptor, orbis::slam::bag_of_words_places>::adjust(
-    basic_map<descriptor>& m, keyframe_id k, const std::function<bool()>& hurry) {
+    basic_map<descriptor>& m, keyframe_id k, const std::function<bool()>& stop_requested) {
   counted("adjust", [&] {
     const adjustment_options& o = shared_.settings.adjustment;
     snapshot_ = shared_.locked([&] { return local_adjustment::take(m, k, shared_.rig, o, std::move(snapshot_)); });
     if (snapshot_.empty()) return;
-    const auto go_on = [&](std::size_t, std::size_t) { return !hurry(); };
+    const auto go_on = [&](std::size_t, std::size_t) { return !stop_requested(); };
     solution_ = solver_.solve(snapshot_, local_adjustment::schedule_of(o), go_on, std::move(solution_));
     shared_.locked([&] { local_adjustment::apply(m, snapshot_, solution_); });
   });

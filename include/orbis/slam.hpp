@@ -1,29 +1,29 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// RGB-D SLAM, assembled from the other components.
+/// RGB-D SLAM, built on the other components.
 ///
-/// | header | what it is for |
+/// | header | contents |
 /// | --- | --- |
-/// | `system.hpp` | the SLAM system, from depth images, stereo pairs or one camera: give it frames, ask it for poses and the map |
+/// | `system.hpp` | the SLAM system for RGB-D, stereo and monocular cameras: tracks frames, returns poses and the map |
 /// | `options.hpp` | all settings of the system |
-/// | `shutter_estimate.hpp` | what the frames tell of the shutter |
-/// | `track_result.hpp` | what tracking a frame returns: state, pose, timings, counters |
+/// | `shutter_estimate.hpp` | the estimate of a rolling shutter |
+/// | `track_result.hpp` | the result of tracking a frame: state, pose, timings, counters |
 /// | `events.hpp` | callbacks for new keyframes, corrections of the map and changes of state |
 /// | `ids.hpp` | the ids of landmarks, keyframes and maps |
-/// | `extractor.hpp` | requirements on extractors and descriptors, replaceable |
-/// | `frame.hpp` | a frame and a keyframe: features, depth and the landmarks they show |
+/// | `extractor.hpp` | requirements on extractors and descriptors |
+/// | `frame.hpp` | frames and keyframes: features, depth and the observed landmarks |
 /// | `landmark.hpp` | a point of the map and its observations |
-/// | `map.hpp` | keyframes, landmarks, who observes what, and the graphs that follow |
-/// | `covisibility_graph.hpp` | which keyframes observe the same landmarks |
+/// | `map.hpp` | keyframes, landmarks, observations, covisibility graph and spanning tree |
+/// | `covisibility_graph.hpp` | the graph of keyframes that observe the same landmarks |
 /// | `spanning_tree.hpp` | the tree of keyframes, and the loops closed between them |
 /// | `atlas.hpp` | several maps, one of them active |
 /// | `map_file.hpp` | saving and loading a map |
-/// | `measure.hpp` | what a frame measures: from a depth image, a stereo pair, or one image |
-/// | `calibration.hpp` | the camera refined by the map that was made with it |
-/// | `camera_rig.hpp` | the camera with its image pyramid and the weight of depth |
+/// | `measure.hpp` | features with depth from a depth image, a stereo pair, or one image |
+/// | `calibration.hpp` | calibration of the camera from a map made with it |
+/// | `camera_rig.hpp` | the camera with its image pyramid and depth weight |
 /// | `pyramid_scales.hpp` | the scales of an image pyramid |
-/// | `matchers.hpp` | how tracking matches features, replaceable |
-/// | `place_recognition.hpp` | how similar keyframes are found, replaceable |
+/// | `matchers.hpp` | feature matchers of tracking, replaceable |
+/// | `place_recognition.hpp` | search for similar keyframes, replaceable |
 #pragma once
 
 #include <orbis/slam/atlas.hpp>

@@ -76,7 +76,7 @@ must_not_be_half_written(${WORK}/maps)
 app_fails(2 "none.map: no such file" ${room} --load-map none.map --out out)
 app_fails(2 "maps: is a directory" ${room} --load-map maps --out out)
 file(WRITE ${WORK}/text.map "room\n")
-app_fails(2 "text.map: not a map of orbis" ${room} --load-map text.map --out out)
+app_fails(2 "text.map: not an orbis map" ${room} --load-map text.map --out out)
 execute_process(COMMAND head -c 5000 maps/first.map WORKING_DIRECTORY ${WORK} OUTPUT_FILE ${WORK}/short.map)
 app_fails(2 "short.map: .*cut off" ${room} --load-map short.map --out out)
 # Maps that cannot be written: 2, before any work is done.

@@ -93,13 +93,13 @@ TEST_CASE("Rays in a file are rays, and where there is none there is no depth") 
   for (const vec3& ray : {none, vec3{limits::infinity(), 0.0, 1.0}, vec3{0.0, -limits::infinity(), 1.0},
                           vec3{limits::quiet_NaN(), 0.0, limits::quiet_NaN()}, vec3{0.0, 1e300, 1.0}}) {
     INFO(ray.transpose());
-    CHECK(problem_of(ray, 2.0F).find("keypoint 1 has a ray that is none") != std::string::npos);
+    CHECK(problem_of(ray, 2.0F).find("keypoint 1 has an invalid ray") != std::string::npos);
   }
 }
 
 TEST_CASE("A file that is cut off says in which section") {
   const std::string bytes = slam::map_bytes(test::random_map(2, 60, 3));
-  CHECK(fault_of("") == "some.map: not a map of orbis: it does not begin with \"orbismap\"");
+  CHECK(fault_of("") == "some.map: not an orbis map: it does not begin with \"orbismap\"");
   CHECK(fault_of(bytes.substr(0, 10)) == "some.map: ends before its version");
   CHECK(fault_of(bytes.substr(0, 20)) == "some.map: section \"size\" is missing: the file ends at byte 20");
   CHECK(fault_of(bytes.substr(0, 100)) ==
@@ -109,7 +109,7 @@ TEST_CASE("A file that is cut off says in which section") {
     REQUIRE_FALSE(cut.has_value());
     REQUIRE(cut.error().code == errc::malformed);
   }
-  CHECK(fault_of(bytes + "x") == "some.map: goes on after its end at byte " + std::to_string(bytes.size()));
+  CHECK(fault_of(bytes + "x") == "some.map: unexpected data after its end at byte " + std::to_string(bytes.size()));
 }
 
 TEST_CASE("A file with one wrong bit says in which section") {
@@ -123,7 +123,7 @@ TEST_CASE("A file with one wrong bit says in which section") {
   }
   std::string damaged = bytes;
   damaged[100] = static_cast<char>(damaged[100] ^ 1);
-  CHECK(fault_of(damaged) == "some.map: section \"kfrm\" from byte 60 is damaged: its checksum does not fit");
+  CHECK(fault_of(damaged) == "some.map: section \"kfrm\" from byte 60 is damaged: checksum mismatch");
   std::string newer = bytes;
   newer[8] = 5;
   const auto m = parsed(newer);
@@ -166,7 +166,7 @@ TEST_CASE("A file says what sensor the map was made with, and one of version 1 i
     to += bytes.substr(begin, size);
     slam::detail::put(to, std::uint32_t{9});
   });
-  CHECK(fault_of(none) == "some.map: a sensor of kind 9");
+  CHECK(fault_of(none) == "some.map: invalid sensor kind 9");
 }
 
 TEST_CASE("Erased landmarks take few bytes of a file, in version 2 eight each") {
@@ -258,7 +258,7 @@ TEST_CASE("Keyframes that were forgotten are runs of ids, which versions before 
 
   std::string older = bytes;
   older[8] = 3;
-  CHECK(fault_of(older).find("neither there nor erased") != std::string::npos);
+  CHECK(fault_of(older).find("invalid state") != std::string::npos);
 
   // Damage that fits its checksum: a run that is longer than what there is, or empty; a replacement that is forgotten.
   const auto with_keyframes = [&](std::uint32_t ids, const auto& put_all) {
@@ -278,14 +278,14 @@ TEST_CASE("Keyframes that were forgotten are runs of ids, which versions before 
   CHECK(fault_of(with_keyframes(7, run_of(7))) == "");
   constexpr std::uint32_t most = slam::detail::most_keyframes_of_file;
   CHECK(fault_of(with_keyframes(most, run_of(most))) == "");
-  CHECK(fault_of(with_keyframes(most + 1, run_of(most + 1))) == "some.map: more ids than a file may have");
-  CHECK(fault_of(with_keyframes(7, run_of(8))) == "some.map: keyframe 0: begins 8 that are forgotten");
-  CHECK(fault_of(with_keyframes(7, run_of(0))) == "some.map: keyframe 0: begins 0 that are forgotten");
+  CHECK(fault_of(with_keyframes(most + 1, run_of(most + 1))) == "some.map: more ids than a file can hold");
+  CHECK(fault_of(with_keyframes(7, run_of(8))) == "some.map: keyframe 0: invalid run of 8 forgotten keyframes");
+  CHECK(fault_of(with_keyframes(7, run_of(0))) == "some.map: keyframe 0: invalid run of 0 forgotten keyframes");
   CHECK(fault_of(with_keyframes(2, [](std::string& to) {
           slam::detail::put(to, slam::detail::gone_keyframe, std::uint32_t{1});
           slam::detail::put_pose(to, se3{});
           slam::detail::put(to, slam::detail::forgotten_keyframes, std::uint32_t{1});
-        })) == "some.map: keyframe 0: became one that is forgotten");
+        })) == "some.map: keyframe 0: its replacement is forgotten");
 }
 
 TEST_CASE("Corrections of the scale are in the lengths that a file holds") {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Several maps: a new one begins where tracking was lost for long; maps are merged where a place is recognised.
+/// Several maps: a new one begins after tracking is lost for long; maps are merged when a place is recognised.
 ///
 /// Source of the idea: R. Elvira, J. D. Tardos, J. M. M. Montiel, "ORBSLAM-Atlas: a robust and accurate multi-map
 /// system", IROS 2019.
@@ -18,14 +18,15 @@
 
 namespace orbis::slam {
 
-/// Maps with one world frame each. One of them is the active one, in which frames are tracked. References to maps stay
-/// valid until the map is merged into another one or removed.
+/// Maps with one world frame each. Frames are tracked in one of them, the active map. References to maps stay valid
+/// until the map is merged into another one or removed.
 template <feature_descriptor D>
 class basic_atlas {
  public:
   using map_type = basic_map<D>;
 
-  /// An atlas with one empty map. `levels`, `scale_factor`, `min_shared`: as for `basic_map`, the same for all maps.
+  /// Makes an atlas with one empty map. `levels`, `scale_factor`, `min_shared`: as for `basic_map`, the same for all
+  /// maps.
   explicit basic_atlas(int levels = 8, double scale_factor = 1.2, std::uint32_t min_shared = 15)
       : levels_{levels}, scale_factor_{scale_factor}, min_shared_{min_shared} {
     create();
@@ -43,7 +44,7 @@ class basic_atlas {
   [[nodiscard]] const std::map<map_id, map_type>& maps() const noexcept { return maps_; }
   [[nodiscard]] std::size_t size() const noexcept { return maps_.size(); }
 
-  /// Whether a keyframe is there, by its present id.
+  /// Returns true if the keyframe exists, by its present id.
   [[nodiscard]] bool has(map_keyframe k) const { return contains(k.map) && at(k.map).has_keyframe(k.keyframe); }
   /// @pre has(k)
   [[nodiscard]] const basic_keyframe<D>& at(map_keyframe k) const { return at(k.map).at(k.keyframe); }
@@ -72,9 +73,9 @@ class basic_atlas {
     maps_.erase(id);
   }
 
-  /// Makes map `from` a part of map `into`: it is moved by `T_into_from` and its spanning tree attached at `link`. If
-  /// it was the active map, `into` becomes it. No landmarks are fused, and no loop edge is added. O(both maps).
-  /// @pre from != into; `link` refers to keyframes that are there, unless either map is empty
+  /// Merges map `from` into map `into`: it is moved by `T_into_from` and its spanning tree attached at `link`. If it
+  /// was active, `into` becomes active. No landmarks are fused, and no loop edge is added. O(both maps).
+  /// @pre from != into; `link` refers to existing keyframes, unless either map is empty
   id_offsets merge(map_id from, map_id into, const sim3& T_into_from, const map_link& link) {
     assert(from != into && contains(from) && contains(into));
     const id_offsets offsets = at(into).append(std::move(at(from)), T_into_from, link);
@@ -83,14 +84,14 @@ class basic_atlas {
     if (active_ == from) active_ = into;
     return offsets;
   }
-  /// The present id of a keyframe, after mergers of its map. The keyframe may have been erased since (see
+  /// Returns the present id of a keyframe, after mergers of its map. The keyframe may have been erased since (see
   /// `basic_map::replacement_of`). The id of a removed map does not change. O(mergers).
   [[nodiscard]] map_keyframe current(map_keyframe k) const {
     for (auto to = merged_.find(k.map); to != merged_.end(); to = merged_.find(k.map))
       k = {to->second.into, k.keyframe + to->second.offsets.keyframes};
     return k;
   }
-  /// The present id of a landmark of a map, after mergers of the map. @pre l != no_id
+  /// Returns the present id of a landmark of a map, after mergers of the map. @pre l != no_id
   [[nodiscard]] landmark_id current(map_id map, landmark_id l) const {
     for (auto to = merged_.find(map); to != merged_.end(); to = merged_.find(map)) {
       map = to->second.into;

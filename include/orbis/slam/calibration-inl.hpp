@@ -24,10 +24,10 @@ namespace orbis::slam {
 
 namespace detail {
 
-/// Where the stretch of `count` keyframes begins that observes most landmarks. O(keypoints).
+/// Returns the start of the `count` consecutive keyframes with the most observations. O(keypoints).
 template <feature_descriptor D>
 [[nodiscard]] std::size_t first_to_take(const basic_map<D>& m, std::size_t count) {
-  std::vector<std::size_t> up_to{0};  // so many observations by the keyframes before
+  std::vector<std::size_t> up_to{0};  // cumulative number of observations before each keyframe
   for (const auto& k : m.keyframes())
     up_to.push_back(up_to.back() +
                     static_cast<std::size_t>(k.landmarks.size() - static_cast<std::size_t>(std::count(
@@ -38,7 +38,7 @@ template <feature_descriptor D>
   return first;
 }
 
-/// The keyframes that take part, and the landmarks that two of them observe.
+/// Returns the participating keyframes, and the landmarks that two of them observe.
 template <feature_descriptor D, class Camera>
 [[nodiscard]] bundle_snapshot calibration_problem_of(const basic_map<D>& m, const camera_rig<Camera>& rig,
                                                      std::size_t max_keyframes) {
@@ -60,7 +60,7 @@ template <feature_descriptor D, class Camera>
   return s;
 }
 
-/// Which of the parameters belong together, in the order in which they are given up.
+/// Groups of parameters that are estimated or fixed together, in the order in which they are fixed.
 template <camera::parametric_camera Camera>
 [[nodiscard]] constexpr std::array<std::uint32_t, 3> parameter_groups() {
   constexpr std::uint32_t focal_lengths = 0x3, principal_point = 0xc;
@@ -70,8 +70,8 @@ template <camera::parametric_camera Camera>
   return {all & ~(focal_lengths | central), central, focal_lengths};
 }
 
-/// The parameters that are estimated if all are determined. Of a lens whose distortion is a fraction, numerator and
-/// denominator are determined only together, and so are, nearly, more than two powers of the radius.
+/// The parameters that are estimated if all are determined. If the distortion is a fraction, numerator and denominator
+/// are determined only together; so are, nearly, more than two powers of the radius.
 template <camera::parametric_camera Camera>
 [[nodiscard]] std::uint32_t usual_parameters(const Camera&) {
   return (1U << camera::parameters_of<Camera>::count) - 1U;
@@ -80,7 +80,7 @@ template <camera::parametric_camera Camera>
   return c.distortion().k3 != 0.0 ? 0x1ffU : 0xffU;
 }
 
-/// How far one standard deviation of the parameters named moves a pixel, at most, pixels.
+/// Returns the largest displacement of a pixel by one standard deviation of the given parameters, pixels.
 template <camera::parametric_camera Camera, class Covariance>
 [[nodiscard]] double effect_of(const Camera& camera, const Covariance& covariance, std::uint32_t parameters) {
   constexpr int count = camera::parameters_of<Camera>::count, steps = 8;
@@ -123,7 +123,7 @@ template <camera::parametric_camera Camera>
       found = *std::move(tried);
       break;
     }
-    // Distortion must not make up for a focal length that is held: the groups are given up in their order.
+    // Distortion must not compensate for a fixed focal length: the groups are fixed in order.
     free &= ~*std::find_if(groups.begin(), groups.end(), [&](std::uint32_t group) { return (free & group) != 0; });
     if (free == 0)
       return fail(errc::degenerate, "calibration",
@@ -150,7 +150,7 @@ template <camera::parametric_camera Camera>
 template <feature_descriptor D, calibrated_camera Camera>
 result<calibration<Camera>> calibrate(const basic_map<D>& m, const camera_rig<Camera>& rig,
                                       const calibration_options& options, const progress& callback) {
-  camera_rig<Camera> loose = rig;  // a depth error counts as many pixels as bf says
+  camera_rig<Camera> loose = rig;  // bf determines how many pixels a depth error counts as
   loose.model.bf *= std::sqrt(options.depth_weight);
   const detail::bundle_snapshot problem = detail::calibration_problem_of(m, loose, options.max_keyframes);
   if constexpr (std::same_as<Camera, camera::any_camera>) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Calibration of the camera by a map that was made with it: the intrinsic parameters that agree best with all
-/// keyframes, as far as the motion of the camera determines them.
+/// Calibration of the camera from a map made with it: the intrinsic parameters that agree best with all keyframes, as
+/// far as the motion of the camera determines them.
 #pragma once
 
 #include <algorithm>
@@ -24,35 +24,36 @@ concept calibrated_camera = std::same_as<C, camera::any_camera> || std::same_as<
     std::same_as<C, camera::radial_tangential> || std::same_as<C, camera::kannala_brandt>;
 
 struct calibration_options {
-  /// A group of parameters (focal lengths; principal point and tangential distortion; radial distortion) is held where
-  /// its standard deviation moves a pixel anywhere in the image by more than this, pixels.
+  /// Maximum displacement of a pixel anywhere in the image, in pixels, by one standard deviation of a group of
+  /// parameters (focal lengths; principal point and tangential distortion; radial distortion). Groups above it are held
+  /// fixed.
   double max_effect = 2.0;
-  /// The weight of a depth relative to tracking. Its errors are alike from image to image (depth that is not where its
-  /// colour is, a depth camera's own distortion) and would be taken for the lens's; a small weight does to fix the size
-  /// of the world.
+  /// Weight of depth relative to tracking. Depth errors are correlated between images (misregistration with colour, the
+  /// depth camera's own distortion) and would be attributed to the lens; a small weight suffices to fix the scale of
+  /// the world.
   double depth_weight = 0.0025;
-  bool keeps_aspect = true;  ///< the ratio of the focal lengths is known: pixels are square, or as they are given
-  /// Made one after the other, where most was seen; the work grows with the third power of their number.
+  bool keeps_aspect = true;  ///< keeps the given ratio of the focal lengths, as of square pixels
+  /// Maximum number of consecutive keyframes, taken where most was observed; the cost is cubic in their number.
   std::size_t max_keyframes = 300;
 };
 
-/// What the map tells of a parameter.
+/// Result for one parameter.
 struct calibrated_parameter {
-  std::string_view name;  ///< as camera files and OpenCV call it
+  std::string_view name;  ///< name in camera files and OpenCV
   double before = 0.0;
   double after = 0.0;
-  double deviation = 0.0;  ///< one standard deviation; 0 where the parameter was held
-  bool is_held = false;    ///< the motion does not tell; `after` is `before`
+  double deviation = 0.0;  ///< one standard deviation; 0 if the parameter was held
+  bool is_held = false;    ///< not determined by the motion; `after` is `before`
 };
 
-/// What is known of a calibration, whatever the model of its camera.
+/// Result of a calibration, independent of the camera model.
 struct calibration_summary {
-  std::vector<calibrated_parameter>
-      parameters;  ///< those that the model has; of `radial_tangential` k3 if it is not 0, k4 to k6 never
-  std::size_t keyframes = 0, landmarks = 0;  ///< that took part
+  /// The parameters of the model; of `radial_tangential` k3 if it is not 0, k4 to k6 never.
+  std::vector<calibrated_parameter> parameters;
+  std::size_t keyframes = 0, landmarks = 0;  ///< number of those used
   std::size_t observations = 0, outliers = 0;
-  double initial_rms = 0.0;  ///< of the observations that are no outliers, in standard deviations
-  double final_rms = 0.0;    ///< for the camera that was found
+  double initial_rms = 0.0;  ///< of the inlier observations, in standard deviations
+  double final_rms = 0.0;    ///< for the refined camera
   [[nodiscard]] bool is_complete() const {
     return std::none_of(parameters.begin(), parameters.end(), [](const auto& p) { return p.is_held; });
   }
@@ -63,13 +64,13 @@ struct calibration : calibration_summary {
   Camera camera;
 };
 
-/// Refines the camera of a map by its keyframes and landmarks, whose poses and positions are refined with it but not
-/// changed in the map. The map should be made again with the camera that was found, and that be refined in turn, until
-/// nothing changes: what did not fit the first camera had been left out of the map.
+/// Refines the camera of a map by its keyframes and landmarks. Their poses and positions are refined with it, without
+/// changing the map. Rebuild the map with the refined camera and calibrate again, until nothing changes: observations
+/// that did not fit the first camera were left out of the map.
 ///
-/// `rig`: as the map was made with (`make_rig`). @pre options.depth_weight > 0. Errors: `no_data` for a map without
-/// landmarks that two keyframes observe; `degenerate` if its motion determines no parameter, or nothing has depth;
-/// `cancelled` by `callback`. Complexity: see `optimize::self_calibrate`, which is called up to four times.
+/// `rig`: the rig that the map was made with (`make_rig`). @pre options.depth_weight > 0. Errors: `no_data` for a map
+/// without landmarks that two keyframes observe; `degenerate` if its motion determines no parameter, or nothing has
+/// depth; `cancelled` by `callback`. Complexity: see `optimize::self_calibrate`, which is called up to four times.
 template <feature_descriptor D, calibrated_camera Camera>
 [[nodiscard]] result<calibration<Camera>> calibrate(const basic_map<D>& m, const camera_rig<Camera>& rig,
                                                     const calibration_options& options = {},

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The camera as the SLAM system uses it: its model, its image pyramid, and how much its depth is worth.
+/// The camera as the SLAM system uses it: its model, its image pyramid, and the weight of its depth.
 #pragma once
 
 #include <cmath>
@@ -21,10 +21,10 @@ struct camera_rig {
   pyramid_scales scales{};               ///< of the extractor's image pyramid
   double min_depth = 0.1;                ///< metres; depth outside of min_depth ... max_depth is not used
   double max_depth = 10.0;               ///< metres
-  bool scale_is_known = true;            ///< false if no depth is measured: lengths are in a unit of the map's own
+  bool scale_is_known = true;            ///< false if no depth is measured: lengths are in an arbitrary unit per map
 
   [[nodiscard]] const Camera& camera() const noexcept { return model.camera; }
-  /// The standard deviation of a depth (metres) that was measured at a keypoint of a pyramid level, metres.
+  /// Returns the standard deviation, in metres, of a depth (metres) measured at a keypoint of a pyramid level.
   [[nodiscard]] double depth_deviation(double depth, int octave) const {
     return depth * depth / model.bf * scales.scale(octave);
   }
@@ -33,7 +33,7 @@ struct camera_rig {
 template <class Camera>
 camera_rig(optimize::reprojection<Camera>, pyramid_scales) -> camera_rig<Camera>;
 
-/// The rig of a camera with the settings of a system.
+/// Makes the rig of a camera from the settings of a system.
 template <camera::camera_model Camera>
 [[nodiscard]] camera_rig<Camera> make_rig(Camera camera, const options& settings) {
   return {{std::move(camera), settings.bf},
@@ -43,7 +43,7 @@ template <camera::camera_model Camera>
           settings.scale_is_measured};
 }
 
-/// The focal length in the middle of the image, pixels per radian; 0 if the camera cannot project there.
+/// Returns the focal length in the middle of the image, pixels per radian; 0 if the camera cannot project there.
 template <camera::camera_model Camera>
 [[nodiscard]] double focal_length(const Camera& camera) {
   matrix<2, 3> j = zeros<matrix<2, 3>>();

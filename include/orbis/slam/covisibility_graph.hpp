@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The covisibility graph: which keyframes observe the same landmarks, and how many.
+/// The covisibility graph: the keyframes that observe the same landmarks, and the number of shared landmarks.
 ///
 /// Source: R. Mur-Artal, J. M. M. Montiel, J. D. Tardos, "ORB-SLAM: a versatile and accurate monocular SLAM system",
 /// T-RO 31 (2015), section III.D; the idea is H. Strasdat's, "Double window optimisation for constant time visual
@@ -21,20 +21,20 @@
 
 namespace orbis::slam {
 
-/// A keyframe, and how many landmarks it shares with the one asked about.
+/// A keyframe and the number of landmarks it shares with the queried one.
 struct covisible {
   keyframe_id keyframe;
   std::uint32_t shared = 0;
   friend bool operator==(const covisible&, const covisible&) = default;
 };
 
-/// The order of covisible keyframes: more shared landmarks first, the older keyframe where equal.
+/// Order of covisible keyframes: more shared landmarks first; if equal, the older keyframe.
 [[nodiscard]] constexpr bool stronger(const covisible& a, const covisible& b) noexcept {
   return a.shared != b.shared ? a.shared > b.shared : a.keyframe < b.keyframe;
 }
 
 namespace detail {
-/// The position of the pair with `k`, or where it would be inserted, in pairs sorted by keyframe.
+/// Returns the position of the pair with `k`, or its insertion position, in pairs sorted by keyframe.
 template <class Pairs>
 [[nodiscard]] auto find_pair(Pairs&& pairs, keyframe_id k) {
   return std::lower_bound(pairs.begin(), pairs.end(), k,
@@ -43,12 +43,12 @@ template <class Pairs>
 }  // namespace detail
 
 /// A symmetric graph. It counts every pair of keyframes that shares a landmark. A pair has an edge if it shares at
-/// least `min_shared` landmarks; a keyframe without such a pair has one edge, to the keyframe that it shares most with.
-/// The graph depends on the counts alone, not on the order of the changes.
+/// least `min_shared` landmarks; a keyframe without such a pair has one edge, to the keyframe with which it shares
+/// most. The graph depends only on the counts, not on the order of the changes.
 ///
-/// Let d be the number of keyframes that one shares landmarks with. Lookups and changes cost O(log d); adding a pair,
-/// removing a pair and lowering the strongest one cost O(d). Memory: O(1) for each
-/// keyframe that shares something, and for each pair.
+/// Let d be the number of keyframes that share landmarks with a given one. Lookups and changes cost O(log d); adding a
+/// pair, removing a pair and lowering the strongest one cost O(d). Memory: O(1) per keyframe that shares landmarks, and
+/// per pair.
 class covisibility_graph {
  public:
   explicit covisibility_graph(std::uint32_t min_shared = 15) : min_shared_{min_shared} {}
@@ -57,14 +57,14 @@ class covisibility_graph {
   /// The number of keyframes that share a landmark with another one.
   [[nodiscard]] std::size_t size() const noexcept { return nodes_.size(); }
 
-  /// Two keyframes share `count` more landmarks. @pre a != b
+  /// Adds `count` to the number of landmarks that two keyframes share. @pre a != b
   void share(keyframe_id a, keyframe_id b, std::uint32_t count = 1) {
     assert(a != b);
     if (count == 0) return;
     increase(nodes_[a.value()], b, count);
     increase(nodes_[b.value()], a, count);
   }
-  /// Two keyframes share `count` fewer landmarks. @pre they share as many
+  /// Subtracts `count` from the number of landmarks that two keyframes share. @pre shared(a, b) >= count
   void unshare(keyframe_id a, keyframe_id b, std::uint32_t count = 1) {
     assert(shared(a, b) >= count);
     if (count == 0) return;
@@ -88,13 +88,13 @@ class covisibility_graph {
     other.nodes_ = {};
   }
 
-  /// The number of landmarks that both observe.
+  /// Returns the number of landmarks that both observe.
   [[nodiscard]] std::uint32_t shared(keyframe_id a, keyframe_id b) const {
     const std::span<const covisible> pairs = sharing(a);
     const auto at = detail::find_pair(pairs, b);
     return at != pairs.end() && at->keyframe == b ? at->shared : 0;
   }
-  /// Whether two keyframes have an edge.
+  /// Returns true if two keyframes have an edge.
   [[nodiscard]] bool connected(keyframe_id a, keyframe_id b) const {
     const std::uint32_t both = shared(a, b);
     return both != 0 && (both >= min_shared_ || is_only_edge(a, b) || is_only_edge(b, a));
@@ -104,13 +104,13 @@ class covisibility_graph {
     const auto n = nodes_.find(k.value());
     return n != nodes_.end() ? std::span<const covisible>{n->second.pairs} : std::span<const covisible>{};
   }
-  /// The keyframe that `k` shares most with; `no_id` if it shares nothing.
+  /// Returns the keyframe with which `k` shares most landmarks; `no_id` if it shares nothing.
   [[nodiscard]] covisible strongest(keyframe_id k) const {
     const auto n = nodes_.find(k.value());
     return n != nodes_.end() ? n->second.strongest : covisible{};
   }
 
-  /// The neighbours of `k` in the graph, the strongest first; at most `limit`. O(d log d).
+  /// Returns the neighbours of `k` in the graph, the strongest first; at most `limit`. O(d log d).
   [[nodiscard]] std::vector<covisible> neighbors(keyframe_id k,
                                                  std::size_t limit = std::numeric_limits<std::size_t>::max()) const {
     std::vector<covisible> found;
@@ -122,7 +122,7 @@ class covisibility_graph {
     found.erase(end, found.end());
     return found;
   }
-  /// The keyframes that share at least `shared` landmarks with `k`, the strongest first. O(d log d).
+  /// Returns the keyframes that share at least `shared` landmarks with `k`, the strongest first. O(d log d).
   [[nodiscard]] std::vector<covisible> at_least(keyframe_id k, std::uint32_t shared) const {
     std::vector<covisible> found;
     for (const covisible& pair : sharing(k))
@@ -132,12 +132,12 @@ class covisibility_graph {
   }
 
  private:
-  struct node {                    // of a keyframe that shares something
+  struct node {                    // of a keyframe that shares landmarks
     std::vector<covisible> pairs;  ///< by ascending keyframe
     covisible strongest;
   };
 
-  /// Whether the edge to `b` is the only one of `a`, because no pair reaches `min_shared`.
+  /// Returns true if the edge to `b` is the only one of `a`, because no pair reaches `min_shared`.
   [[nodiscard]] bool is_only_edge(keyframe_id a, keyframe_id b) const {
     const covisible most = strongest(a);
     return most.keyframe == b && most.shared < min_shared_;

@@ -15,8 +15,8 @@
 
 namespace orbis::slam {
 
-/// A keyframe was made, or culled. With `options::trajectory_frames` maps forget where culled ones were in the end
-/// (`basic_map::remembers`).
+/// A keyframe was made or culled. With `options::trajectory_frames` maps eventually forget the poses of culled
+/// keyframes (`basic_map::remembers`).
 struct keyframe_event {
   map_keyframe id;
   double timestamp = 0.0;  ///< seconds
@@ -39,20 +39,21 @@ enum class correction_kind : std::uint8_t {
   return "unknown";
 }
 
-/// The poses of a map changed by more than local adjustment changes them. What was built on them has to be moved.
+/// A correction that changed the poses of a map by more than local adjustment does. Data built on the poses must be
+/// moved.
 struct correction_event {
   correction_kind kind{};
   map_id map = 0;  ///< the corrected map
-  /// Of a loop or merger: the keyframes of the same place (`from` by its new id). With threads either may have been
+  /// Of a loop or merger: the two keyframes of the same place (`from` by its new id). With threads either may have been
   /// erased since (`basic_atlas::current` gives its replacement).
   map_keyframe from{}, to{};
   map_id merged = 0;          ///< of a merger: the map that became a part of `map`
-  id_offsets offsets{};       ///< of a merger: by how much the ids of `merged` grew
-  sim3 T_corrected_before{};  ///< the correction at keyframe `from`, in the world of the map; with depth of scale 1
-  /// Of a merger: how the world of `map` changed, where `merged` is the older one, whose world stays.
+  id_offsets offsets{};       ///< of a merger: the amounts by which the ids of `merged` grew
+  sim3 T_corrected_before{};  ///< the correction at keyframe `from`, in the world of the map; with depth, of scale 1
+  /// Of a merger: the change of the world of `map`, if `merged` is the older map, whose world is kept.
   sim3 T_map_before{};
   double milliseconds = 0.0;         ///< wall time
-  double locked_milliseconds = 0.0;  ///< the longest time at once, of this, for which tracking and queries had to wait
+  double locked_milliseconds = 0.0;  ///< the longest single time that tracking and queries had to wait
 };
 
 /// Tracking changed its state.
@@ -63,8 +64,8 @@ struct state_event {
 };
 
 /// Callbacks; any of them may be empty. They are called without a lock held, so they may query the system. With
-/// threads, those for culled keyframes and corrections are called from the system's own threads. They must not wait
-/// for the system; what they throw on a thread of the system ends that, see `system`.
+/// threads, those for culled keyframes and corrections are called from the system's own threads. They must not wait for
+/// the system; an exception thrown on a thread of the system ends that thread (see `system`).
 struct listeners {
   std::function<void(const keyframe_event&)> keyframe_made{};
   std::function<void(const keyframe_event&)> keyframe_culled{};

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// What finds and describes features: the requirements on an extractor, its descriptors and their distance.
+/// Requirements on feature extractors, their descriptors and descriptor distances.
 #pragma once
 
 #include <concepts>
@@ -10,8 +10,8 @@
 
 namespace orbis::slam {
 
-/// How unlike two descriptors are: `type` is the distance by which a map compares descriptors of type `D`. The default
-/// is the Hamming distance. Specialise it for descriptors of your own:
+/// The distance of descriptors: `type` is the distance by which a map compares descriptors of type `D`. The default is
+/// the Hamming distance. Specialise it for custom descriptors:
 ///
 /// @code
 ///   template <>
@@ -26,7 +26,7 @@ struct distance_of {
 template <class D>
 using distance_of_t = typename distance_of<D>::type;
 
-/// A descriptor of features: a value whose distance to another one is a whole number.
+/// A descriptor of features: a value whose distance to another one is an integer.
 template <class D>
 concept feature_descriptor = std::semiregular<D> && features::descriptor_distance<distance_of_t<D>, D>;
 
@@ -34,7 +34,7 @@ concept feature_descriptor = std::semiregular<D> && features::descriptor_distanc
 template <class E>
 concept feature_extractor = features::feature_extractor<E> && feature_descriptor<features::extracted_descriptor<E>>;
 
-/// The descriptor that an extractor gives.
+/// The descriptor type of an extractor.
 template <feature_extractor E>
 using descriptor_of_t = features::extracted_descriptor<E>;
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// What the system keeps of an image: features, their depth, and the landmarks they observe.
+/// Frames and keyframes: the features of an image, their depth, and the landmarks they observe.
 #pragma once
 
 #include <cstddef>
@@ -17,7 +17,7 @@
 
 namespace orbis::slam {
 
-/// What took a frame.
+/// The sensor that took a frame.
 enum class sensor_kind : std::uint8_t { unknown, rgbd, stereo, monocular };
 
 [[nodiscard]] constexpr std::string_view to_string(sensor_kind kind) noexcept {
@@ -30,36 +30,36 @@ enum class sensor_kind : std::uint8_t { unknown, rgbd, stereo, monocular };
   return "unknown";
 }
 
-/// A keypoint where a rolling shutter read it, at the time of its row.
+/// A keypoint as read by a rolling shutter, at the time of its row.
 struct keypoint_as_read {
-  double ray_x = 0.0, ray_y = 0.0;  ///< of the ray through it, scaled to z = 1; NaN where the pixel has none
+  double ray_x = 0.0, ray_y = 0.0;  ///< ray through it, scaled to z = 1; NaN if the pixel has none
   float x = 0.0F, y = 0.0F;         ///< pixels
-  float depth = 0.0F;               ///< at the time of the row, metres, 0 where it is not known
-  float stored_depth = 0.0F;        ///< that of the depth image at the keypoint, metres, 0 where it was not measured
+  float depth = 0.0F;               ///< at the time of the row, metres; 0 if unknown
+  float stored_depth = 0.0F;        ///< depth image at the keypoint, metres; 0 if not measured
 };
 
-/// An image as features of descriptor type `D`. All vectors have one entry for each keypoint.
+/// An image as features of descriptor type `D`. All vectors have one entry per keypoint.
 template <feature_descriptor D>
 struct basic_frame {
   using descriptor_type = D;
 
   double timestamp = 0.0;  ///< seconds
-  std::size_t index = 0;   ///< of the frame in the recording, from 0
+  std::size_t index = 0;   ///< index in the recording, from 0
   se3 T_world_camera;      ///< in the world of the frame's map
   orbis::features::basic_features<D> features;
-  std::vector<float> depth;             ///< metres along z, 0 where it was not measured
-  std::vector<vec3> rays;               ///< through each keypoint, scaled to z = 1; NaN where the pixel has no ray
-  std::vector<landmark_id> landmarks;   ///< observed by each keypoint, or `no_id`
-  orbis::features::keypoint_grid grid;  ///< of the keypoints
-  sensor_kind sensor = sensor_kind::unknown;  ///< a sensor of one's own may leave it
-  bool scale_is_known = true;                 ///< false if no lengths are measured; the system sets it
-  /// Few landmarks hold the pose, or none, and depth does: adjustments, which know of landmarks only, keep it. Map
-  /// files do not tell.
+  std::vector<float> depth;                   ///< metres along z; 0 if not measured
+  std::vector<vec3> rays;                     ///< through each keypoint, scaled to z = 1; NaN if the pixel has no ray
+  std::vector<landmark_id> landmarks;         ///< observed by each keypoint, or `no_id`
+  orbis::features::keypoint_grid grid;        ///< of the keypoints
+  sensor_kind sensor = sensor_kind::unknown;  ///< custom sensors may leave it `unknown`
+  bool scale_is_known = true;                 ///< false if no lengths are measured; set by the system
+  /// Few or no landmarks constrain the pose; depth does. Adjustments, which only use landmarks, keep the pose fixed.
+  /// Not stored in map files.
   bool held_by_depth = false;
-  /// With a rolling shutter the keypoints as they were read; the other members hold where they are at the frame's time.
-  /// Empty with a global shutter.
+  /// The keypoints as read with a rolling shutter; the other members are for the frame's time. Empty with a global
+  /// shutter.
   std::vector<keypoint_as_read> as_read;
-  vec6 twist = zeros<vec6>();  ///< of the camera in its own frame while it was read, per second, translation first
+  vec6 twist = zeros<vec6>();  ///< motion of the camera in its own frame during read-out, per second, translation first
 
   /// The number of features.
   [[nodiscard]] std::size_t size() const noexcept { return features.size(); }
@@ -71,16 +71,16 @@ struct basic_frame {
   [[nodiscard]] vec2 pixel(std::size_t i) const { return {features.keypoints[i].x, features.keypoints[i].y}; }
 };
 
-/// A frame that the map keeps. Its `landmarks` are one side of the map's observations.
+/// A frame stored in the map. Its `landmarks` are one side of the map's observations.
 template <feature_descriptor D>
 struct basic_keyframe : basic_frame<D> {
   keyframe_id id;
-  /// By how much corrections have multiplied the lengths around the keyframe since it was made, in maps whose scale is
-  /// not measured. What was noted relative to the keyframe is to be multiplied by how much this has changed.
+  /// Factor by which corrections have scaled the lengths around the keyframe since it was made, in maps whose scale is
+  /// not measured. Multiply data stored relative to the keyframe by the change of this factor.
   double scale = 1.0;
 };
 
-/// Frames and keyframes with the descriptors of ORB.
+/// Frames and keyframes with ORB descriptors.
 using frame = basic_frame<features::binary_descriptor<256>>;
 using keyframe = basic_keyframe<features::binary_descriptor<256>>;
 

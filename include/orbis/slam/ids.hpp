@@ -15,8 +15,8 @@ namespace orbis::slam {
 /// The value of an id that refers to nothing.
 inline constexpr std::uint32_t no_id = std::numeric_limits<std::uint32_t>::max();
 
-/// An id: a 32-bit number with a type of its own. A number converts to an id; an id converts neither to a number nor to
-/// an id of another kind (`value()` gives the number). Ids are given in ascending order, and never twice.
+/// A strongly typed 32-bit id. A number converts to an id; an id converts neither to a number nor to an id of another
+/// kind (`value()` returns the number). Ids are assigned in ascending order and never reused.
 template <class Kind>
 class basic_id {
  public:
@@ -36,7 +36,7 @@ class basic_id {
     return *this;
   }
   friend constexpr basic_id operator+(basic_id id, std::uint32_t n) noexcept { return id.value_ + n; }
-  /// The distance of two ids.
+  /// The difference of two ids.
   friend constexpr std::uint32_t operator-(basic_id a, basic_id b) noexcept { return a.value_ - b.value_; }
   friend constexpr bool operator==(basic_id, basic_id) noexcept = default;
   friend constexpr auto operator<=>(basic_id, basic_id) noexcept = default;
@@ -62,16 +62,16 @@ struct map_keyframe {
   friend constexpr bool operator==(const map_keyframe&, const map_keyframe&) = default;
 };
 
-/// By how much the ids of a map grew when it became a part of another one.
+/// The amounts by which the ids of a map grew when it was merged into another one.
 struct id_offsets {
   std::uint32_t keyframes = 0;
   std::uint32_t landmarks = 0;
 };
 
-/// Where a map is attached to another one: a keyframe of each; both observe the same place.
+/// A pair of keyframes, one of each map, that observe the same place; it attaches one map to the other.
 struct map_link {
-  keyframe_id into;  ///< of the map that stays
-  keyframe_id from;  ///< of the map that becomes a part of it, by its id there
+  keyframe_id into;  ///< of the map that is kept
+  keyframe_id from;  ///< of the map that is merged into it, by its id there
 };
 
 }  // namespace orbis::slam

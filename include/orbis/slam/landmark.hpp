@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A point of the world in a map, with its observations.
+/// A landmark: a 3D point of a map with its observations.
 #pragma once
 
 #include <algorithm>
@@ -25,18 +25,18 @@ struct observation {
 template <feature_descriptor D>
 struct basic_landmark {
   landmark_id id;
-  vec3 position = zeros<vec3>();           ///< in the world, metres
-  vec3 normal = zeros<vec3>();             ///< mean direction towards the keyframes that observe it, unit length
-  D descriptor{};                         ///< the most typical one of its observations
-  double min_distance = 0.0;              ///< from which it appears at the coarsest pyramid level, metres
-  double max_distance = 0.0;              ///< from which it appears at the finest pyramid level, metres
-  std::vector<observation> observations;  ///< by ascending keyframe, one for each keyframe at most
+  vec3 position = zeros<vec3>();          ///< in the world, metres
+  vec3 normal = zeros<vec3>();            ///< mean direction towards the keyframes that observe it, unit length
+  D descriptor{};                         ///< the most typical descriptor of its observations
+  double min_distance = 0.0;              ///< distance at which it appears at the coarsest pyramid level, metres
+  double max_distance = 0.0;              ///< distance at which it appears at the finest pyramid level, metres
+  std::vector<observation> observations;  ///< by ascending keyframe; at most one per keyframe
   keyframe_id created;                    ///< the keyframe that created it
   std::uint32_t visible = 0;              ///< number of frames in which it was expected
   std::uint32_t found = 0;                ///< number of frames in which it was found
-  bool has_current_descriptor = false;    ///< whether `descriptor` was chosen from the present observations
+  bool has_current_descriptor = false;    ///< true if `descriptor` was chosen from the present observations
 
-  /// The observation by a keyframe, or null. O(log observations).
+  /// Returns the observation by a keyframe, or null. O(log observations).
   [[nodiscard]] const observation* seen_by(keyframe_id k) const noexcept {
     const auto at = std::lower_bound(observations.begin(), observations.end(), k,
                                      [](const observation& o, keyframe_id id) { return o.keyframe < id; });
@@ -44,7 +44,7 @@ struct basic_landmark {
   }
 };
 
-/// A landmark with a descriptor of ORB.
+/// A landmark with an ORB descriptor.
 using landmark = basic_landmark<features::binary_descriptor<256>>;
 
 }  // namespace orbis::slam

@@ -13,9 +13,9 @@
 namespace orbis::slam {
 namespace detail {
 
-/// The index of the most typical of `count` descriptors (`of(i)`): the one whose median distance to the others is
-/// least, the first of those where equal. With more than 16 descriptors, 16 evenly spread ones take part, so that the
-/// cost is bounded. With one or two, the last one.
+/// Returns the index of the most typical of `count` descriptors (`of(i)`): the one with the smallest median distance to
+/// the others, the first if several are equal. With more than 16 descriptors, 16 evenly spread ones are compared, which
+/// bounds the cost. With one or two, the last one.
 /// @pre count > 0
 /// Source: R. Mur-Artal, J. M. M. Montiel, J. D. Tardos, "ORB-SLAM", T-RO 31 (2015), section III.C.
 template <class Of>
@@ -90,7 +90,7 @@ keyframe_id basic_map<D>::next_remembered(keyframe_id id) const {
 template <feature_descriptor D>
 void basic_map<D>::forget_erased(std::span<const keyframe_id> keep, std::size_t latest) {
   std::map<keyframe_id, detail::erased_keyframe> kept;
-  const auto take = [&](keyframe_id id) {  // with all that it leads to
+  const auto take = [&](keyframe_id id) {  // with its chain of replacements
     for (auto e = content_.erased.find(id); e != content_.erased.end();) {
       const keyframe_id next = e->second.replacement;
       kept.insert(content_.erased.extract(e));

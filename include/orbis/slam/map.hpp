@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The map: keyframes, landmarks, which keyframe observes which landmark, and the graphs that follow.
+/// The map: keyframes, landmarks, the observations between them, the covisibility graph and the spanning tree.
 #pragma once
 
 #include <algorithm>
@@ -45,40 +45,40 @@ class basic_map {
   using landmark_type = basic_landmark<D>;
 
   basic_map() = default;
-  /// An empty map. `levels`, `scale_factor`: of the extractor's image pyramid; `min_shared`: the number of shared
-  /// landmarks from which on two keyframes have an edge in the covisibility graph.
+  /// Makes an empty map. `levels`, `scale_factor`: of the extractor's image pyramid; `min_shared`: minimum number of
+  /// shared landmarks of an edge in the covisibility graph.
   basic_map(int levels, double scale_factor, std::uint32_t min_shared = 15) : covisibility_{min_shared} {
     content_.levels = levels;
     content_.scale_factor = scale_factor;
     content_.min_shared = min_shared;
   }
-  /// A map from its content. `keyframe.landmarks` are set from the observations of the landmarks. O(map).
-  /// @pre the content is consistent: ids refer to what is there, and no keypoint observes two landmarks
+  /// Makes a map from its content. `keyframe.landmarks` are set from the observations of the landmarks. O(map).
+  /// @pre the content is consistent: ids refer to existing entries, and no keypoint observes two landmarks
   explicit basic_map(detail::map_content<D> content);
 
-  /// What took the map's first keyframe.
+  /// The sensor of the map's first keyframe.
   [[nodiscard]] sensor_kind sensor() const noexcept { return content_.sensor; }
-  /// Whether lengths are metres; otherwise they are in a unit of the map's own.
+  /// Returns true if lengths are metres; otherwise they are in an arbitrary unit of this map.
   [[nodiscard]] bool scale_is_known() const noexcept { return content_.scale_is_known; }
   /// The keyframes by ascending id: a range with `size()`, `empty()`, `front()` and `back()`.
   [[nodiscard]] const auto& keyframes() const noexcept { return content_.keyframes; }
-  /// The landmarks by ascending id: a range as `keyframes()`.
+  /// The landmarks by ascending id: a range like `keyframes()`.
   [[nodiscard]] const auto& landmarks() const noexcept { return content_.landmarks; }
   [[nodiscard]] std::size_t landmark_count() const noexcept { return content_.landmarks.size(); }
-  /// The id that the next keyframe will get: all present and erased ones are less.
+  /// The id of the next keyframe: greater than all present and erased ids.
   [[nodiscard]] keyframe_id keyframe_end() const noexcept { return content_.keyframes.end_id(); }
-  /// The id that the next landmark will get.
+  /// The id of the next landmark.
   [[nodiscard]] landmark_id landmark_end() const noexcept { return content_.landmarks.end_id(); }
-  /// How many landmarks may still be added, of 2^31 - 1 in the life of a map: of 70 a frame at 30 Hz, for 12 days.
-  /// A map that was written to a file and read has at least 7/8 of them.
+  /// Number of landmarks that can still be added, of 2^31 - 1 in the lifetime of a map: at 70 per frame and 30 Hz, 12
+  /// days. A map read from a file has at least 7/8 of them.
   [[nodiscard]] std::uint32_t landmark_ids_left() const noexcept {
     return decltype(content_.landmarks)::most_ids - landmark_end().value();
   }
-  /// How many keyframes may still be added, of 2^31 - 1 in the life of a map.
+  /// Number of keyframes that can still be added, of 2^31 - 1 in the lifetime of a map.
   [[nodiscard]] std::uint32_t keyframe_ids_left() const noexcept {
     return decltype(content_.keyframes)::most_ids - keyframe_end().value();
   }
-  /// The first landmark from `id` on; `landmark_end()` if there is none. O(erased ids in between).
+  /// Returns the first landmark from `id` on; `landmark_end()` if there is none. O(erased ids in between).
   [[nodiscard]] landmark_id next_landmark(landmark_id id) const noexcept { return content_.landmarks.next_id(id); }
   [[nodiscard]] bool has_keyframe(keyframe_id id) const noexcept { return content_.keyframes.contains(id); }
   [[nodiscard]] bool has_landmark(landmark_id id) const noexcept { return content_.landmarks.contains(id); }
@@ -87,25 +87,26 @@ class basic_map {
   /// @pre has_landmark(id)
   [[nodiscard]] const landmark_type& landmark_at(landmark_id id) const { return content_.landmarks[id]; }
 
-  /// The landmark that stands for `id` now: itself while it is there, otherwise the one it was fused into; `no_id` if
-  /// it was removed, or erased so long ago that 2^18 landmarks or more were added since.
+  /// Returns the present landmark for `id`: itself if it exists, otherwise the one it was fused into; `no_id` if it was
+  /// removed, or erased so long ago that 2^18 landmarks or more have been added since.
   [[nodiscard]] landmark_id replacement_of(landmark_id id) const noexcept {
     return content_.landmarks.replacement_of(id);
   }
-  /// The keyframe that stands for `id` now: itself while it is there, otherwise its nearest ancestor in the spanning
-  /// tree that is; `no_id` if no keyframe is left, or it was forgotten and the map comes from a file.
+  /// Returns the present keyframe for `id`: itself if it exists, otherwise its nearest existing ancestor in the
+  /// spanning tree; `no_id` if no keyframe is left, or it was forgotten and the map comes from a file.
   [[nodiscard]] keyframe_id replacement_of(keyframe_id id) const noexcept {
     return content_.keyframes.replacement_of(id);
   }
-  /// How often a pose was set or a keyframe added or erased: while it stays, the keyframes and their poses do.
+  /// Number of changes of poses and of additions and erasures of keyframes: if it is unchanged, so are the keyframes
+  /// and their poses.
   [[nodiscard]] std::uint64_t pose_changes() const noexcept { return pose_changes_; }
-  /// Whether it is known where a keyframe is or, if it was erased, was (`forget_erased`).
+  /// Returns true if the pose of a keyframe, present or erased, is known (`forget_erased`).
   [[nodiscard]] bool remembers(keyframe_id id) const { return has_keyframe(id) || content_.erased.contains(id); }
-  /// The first id from `id` on that the map remembers; `keyframe_end()` if there is none.
+  /// Returns the first id from `id` on that the map remembers; `keyframe_end()` if there is none.
   [[nodiscard]] keyframe_id next_remembered(keyframe_id id) const;
-  /// `T_world_camera` of a keyframe. An erased keyframe moves with the one that replaced it. @pre remembers(id)
+  /// Returns `T_world_camera` of a keyframe. An erased keyframe moves with its replacement. @pre remembers(id)
   [[nodiscard]] se3 pose_of(keyframe_id id) const;
-  /// `basic_keyframe::scale`, that of an erased keyframe as well. @pre remembers(id)
+  /// Returns `basic_keyframe::scale`, also of an erased keyframe. @pre remembers(id)
   [[nodiscard]] double scale_of(keyframe_id id) const;
 
   [[nodiscard]] const covisibility_graph& covisibility() const noexcept { return covisibility_; }
@@ -123,7 +124,7 @@ class basic_map {
   }
   /// @pre has_landmark(id)
   void set_position(landmark_id id, const vec3& position) { content_.landmarks[id].position = position; }
-  /// Moves a keyframe by `T_new_old`, a motion in the world, whose scale counts in `scale_of`. @pre has_keyframe(id)
+  /// Moves a keyframe by `T_new_old`, a motion in the world, whose scale enters `scale_of`. @pre has_keyframe(id)
   void move_keyframe(keyframe_id id, const sim3& T_new_old) {
     set_pose(id, moved(T_new_old, at(id).T_world_camera));
     content_.keyframes[id].scale *= T_new_old.scale();
@@ -139,18 +140,18 @@ class basic_map {
   /// Changes the world frame of the whole map: poses and positions are multiplied by `T_new_old`. O(map).
   void transform(const sim3& T_new_old);
 
-  /// Adds a frame as a keyframe. It observes `f.landmarks` (fused ones by their replacement). Its parent in the
-  /// spanning tree is the keyframe that it shares most landmarks with, or the newest one if it shares none.
+  /// Adds a frame as a keyframe. It observes `f.landmarks` (for fused ones, their replacement). Its parent in the
+  /// spanning tree is the keyframe with which it shares most landmarks, or the newest one if it shares none.
   /// O(observations of its landmarks).
   keyframe_id add_keyframe(frame_type f);
-  /// Erases a keyframe with its observations, and landmarks that no other keyframe observes. Its children in the
+  /// Erases a keyframe with its observations, and the landmarks that no other keyframe observes. Its children in the
   /// spanning tree get other parents. `pose_of` still gives its pose. @pre has_keyframe(id)
   void erase_keyframe(keyframe_id id);
-  /// Forgets where erased keyframes were, but for those of `keep` and the `latest` ones, and those that they were
-  /// replaced by. What is not forgotten takes some 130 bytes a keyframe. Let n be the number of those that were not
-  /// forgotten before: O((n + keep) log n).
+  /// Forgets the poses of erased keyframes, except those of `keep`, the `latest` ones, and their replacements. Each
+  /// remembered keyframe takes about 130 bytes. Let n be the number of erased keyframes remembered before: O((n + keep)
+  /// log n).
   void forget_erased(std::span<const keyframe_id> keep, std::size_t latest);
-  /// Records that a loop was closed between two keyframes. @pre a != b, and both are there
+  /// Records a loop closure between two keyframes. @pre a != b, and both exist
   void add_loop_edge(keyframe_id a, keyframe_id b) { content_.tree.add_loop_edge(a, b); }
 
   /// Adds a landmark at the depth of a keypoint.
@@ -164,43 +165,43 @@ class basic_map {
   /// Removes a landmark and its observations. O(n^2). @pre has_landmark(id)
   void remove_landmark(landmark_id id) { remove(id, no_id); }
 
-  /// Adds an observation. False, and no change, if the keypoint observes a landmark already, or the keyframe observes
-  /// this landmark already. @pre both are there
+  /// Adds an observation. Returns false, without a change, if the keypoint already observes a landmark, or the keyframe
+  /// already observes this landmark. @pre both exist
   bool add_observation(landmark_id l, keyframe_id k, std::uint32_t feature);
-  /// Erases the observation of a landmark by a keyframe, if there is one. A landmark without observations is removed.
+  /// Erases the observation of a landmark by a keyframe, if any. A landmark without observations is removed.
   void erase_observation(landmark_id l, keyframe_id k);
-  /// Erases the observation `noted`, if it is still there, and returns whether it was.
+  /// Erases the observation `noted` if it still exists; returns true if it did.
   bool erase_observation(landmark_id l, const observation& noted);
 
   /// Replaces landmark `from` by `into`, which takes over its observations by keyframes that do not observe `into`.
-  /// O(n^2). @pre from != into, and both are there
+  /// O(n^2). @pre from != into, and both exist
   void fuse(landmark_id from, landmark_id into);
 
-  /// Recomputes what depends on a landmark's observations: normal, range of distances and, if the observations changed,
-  /// the descriptor. O(n). @pre has_landmark(id)
+  /// Recomputes the data derived from a landmark's observations: normal, range of distances and, if the observations
+  /// changed, the descriptor. O(n). @pre has_landmark(id)
   void update_landmark(landmark_id id);
 
-  /// Makes another map a part of this one: its world is moved by `T_this_other`, its spanning tree attached at `link`.
-  /// No landmarks are fused. Returns by how much its ids have grown. O(both maps).
-  /// @pre both have the same pyramid; `link` refers to keyframes that are there, unless either map is empty;
+  /// Merges another map into this one: its world is moved by `T_this_other`, its spanning tree attached at `link`. No
+  /// landmarks are fused. Returns the amounts by which its ids have grown. O(both maps).
+  /// @pre both have the same pyramid; `link` refers to existing keyframes, unless either map is empty;
   /// landmark_ids_left() >= other.landmark_end(), keyframe_ids_left() >= other.keyframe_end()
   id_offsets append(basic_map&& other, const sim3& T_this_other, const map_link& link);
 
-  /// The keyframes that observe any of the given landmarks, with how many they observe: most first, older first where
-  /// equal. O(observations of these landmarks).
+  /// Returns the keyframes that observe any of the given landmarks, with the number of landmarks observed: most first;
+  /// if equal, the older first. O(observations of these landmarks).
   [[nodiscard]] std::vector<covisible> observers_of(const std::vector<landmark_id>& landmarks) const;
 
  private:
-  /// A pose after a motion in the world.
+  /// Returns a pose after a motion in the world.
   [[nodiscard]] static se3 moved(const sim3& T_new_old, const se3& T_old_camera) {
     return {T_new_old.rotation() * T_old_camera.rotation(), vec3(T_new_old * T_old_camera.translation())};
   }
-  /// Adds both sides of an observation, without the covisibility graph.
+  /// Adds both sides of an observation, without updating the covisibility graph.
   bool attach(landmark_id id, keyframe_id k, std::uint32_t feature);
-  /// Removes both sides of an observation, without the covisibility graph. @pre there is one
+  /// Removes both sides of an observation, without updating the covisibility graph. @pre the observation exists
   void detach(landmark_id id, keyframe_id k);
   landmark_type remove(landmark_id id, landmark_id replacement);
-  /// Enters what a keyframe shares with those of lower id than `below` into the covisibility graph.
+  /// Adds the landmarks shared by a keyframe and those of lower id than `below` to the covisibility graph.
   void count_covisible(const keyframe_type& k, keyframe_id below);
 
   detail::map_content<D> content_;
@@ -208,7 +209,7 @@ class basic_map {
   std::uint64_t pose_changes_ = 0;
 };
 
-/// A map with the descriptors of ORB.
+/// A map with ORB descriptors.
 using map = basic_map<features::binary_descriptor<256>>;
 
 }  // namespace orbis::slam

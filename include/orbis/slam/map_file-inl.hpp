@@ -49,7 +49,7 @@ inline void put_landmark(std::string& to, const landmark& l) {
   for (const observation& o : l.observations) put(to, o.keyframe.value(), o.feature);
 }
 
-/// The whole file.
+/// Returns the bytes of the whole file.
 [[nodiscard]] inline std::string write_sections(const map& m) {
   std::string bytes(map_magic);
   put(bytes, map_version);
@@ -93,7 +93,7 @@ inline void put_landmark(std::string& to, const landmark& l) {
     }
     const auto is_gone = [&m](landmark_id id) { return m.replacement_of(id) == no_id; };
     for (landmark_id id = 0; id != m.landmark_end();) {
-      // Ids that are gone: by pages where the map has forgotten them, one by one where it still knows of them.
+      // Erased ids: by pages where the map has forgotten them, one by one where it still has an entry.
       landmark_id next = m.landmarks().next_known_id(id);
       while (next != m.landmark_end() && is_gone(next)) next = m.landmarks().next_known_id(next + 1);
       if (next != id) put(to, run_of_gone, next - id);
@@ -116,7 +116,7 @@ ORBIS_INLINE result<map> parse_map(std::span<const std::byte> bytes, const std::
   const std::string_view text{reinterpret_cast<const char*>(bytes.data()), bytes.size()};
   constexpr std::size_t head = detail::map_magic.size() + sizeof(detail::map_version);
   if (text.substr(0, detail::map_magic.size()) != detail::map_magic)
-    return fail(errc::malformed, where, "not a map of orbis: it does not begin with \"orbismap\"");
+    return fail(errc::malformed, where, "not an orbis map: it does not begin with \"orbismap\"");
   if (text.size() < head) return fail(errc::malformed, where, "ends before its version");
   const auto version = load_number<std::uint32_t>(text.data() + detail::map_magic.size());
   if (version == 0 || version > detail::map_version)

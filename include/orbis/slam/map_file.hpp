@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Maps in files.
+/// Reading and writing maps in files.
 ///
 /// A file is little-endian; equal maps give equal bytes on every machine:
 ///
@@ -11,25 +11,24 @@
 ///
 /// Poses are tx ty tz qx qy qz qw (f64); ids are u32, ffffffff for none.
 ///
-///     size  levels of the pyramid (u32), shared landmarks that make an edge (u32), scale factor (f64), number of ids
-///           given to keyframes (u32) and to landmarks (u32) so far, sensor (u32: 1 RGB-D, 2 stereo, 3 monocular, 0 not
-///           known) and whether lengths are metres (u32: 1, otherwise 0); version 1 has neither of the last two
-///     kfrm  for each keyframe id a byte. 0: it was erased; its replacement (id) and its pose relative to that. 1: time
-///           stamp (f64), frame index (u64), pose, number of keypoints (u32), and for each keypoint x, y, size, angle,
-///           response (f32), octave (i32), depth (f32), x and y of the ray (f64; NaN without one), descriptor (32
-///           bytes). 2 (version 4): a run of ids that the map has forgotten; its length (u32, at least
-///           1, this id included)
+///     size  levels of the pyramid (u32), minimum shared landmarks of an edge (u32), scale factor (f64), number
+///           of ids assigned to keyframes (u32) and to landmarks (u32), sensor (u32: 1 RGB-D, 2 stereo, 3 monocular, 0
+///           unknown), unit of length (u32: 1 metres, 0 arbitrary); version 1 has neither of the last two
+///     kfrm  for each keyframe id a byte. 0: it was erased; its replacement (id) and its pose relative to that. 1:
+///           timestamp (f64), frame index (u64), pose, number of keypoints (u32), and for each keypoint x, y, size,
+///           angle, response (f32), octave (i32), depth (f32), x and y of the ray (f64; NaN without one), descriptor
+///           (32 bytes). 2 (version 4): a run of forgotten ids; its length (u32, at least 1, this id included)
 ///     tree  for each keyframe: parent (id), number of loop edges (u32), their other ends (ids)
 ///     land  for each landmark id the number of observations (u32). 0: it was erased; the id that replaced it, or none.
-///           ffffffff (version 3): a run of erased ids that nothing replaced; its length (u32, at least 1, this id
+///           ffffffff (version 3): a run of erased ids without replacement; its length (u32, at least 1, this id
 ///           included). Otherwise position, normal (3 f64 each), least and greatest distance (f64), descriptor (32
-///           bytes), keyframe that created it (id), times visible, times found (u32 each), whether the descriptor is
-///           current (a byte), and the observations: keyframe (id), keypoint (u32)
+///           bytes), keyframe that created it (id), times visible, times found (u32 each), a byte that is 1 if the
+///           descriptor is current, and the observations: keyframe (id), keypoint (u32)
 ///
-/// A file has at most 2^28 ids of keyframes, and as many of landmarks. A map that gave more is written without those
-/// that are erased: its landmarks have new ids when it is read.
+/// A file has at most 2^28 ids each of keyframes and landmarks. A map that has assigned more landmark ids is written
+/// without the erased ones: its landmarks get new ids when it is read.
 ///
-/// The covisibility graph and the grids of keypoints are not stored: they follow from the rest.
+/// The covisibility graph and the grids of keypoints are not stored: they are rebuilt from the rest.
 #pragma once
 
 #include <cstddef>
@@ -42,18 +41,18 @@
 
 namespace orbis::slam {
 
-/// The bytes of a map's file. O(map).
+/// Returns the bytes of a map's file. O(map).
 [[nodiscard]] std::string map_bytes(const map& m);
 
-/// The map in `bytes`; `where` names their origin in errors. The map is consistent, whatever the bytes.
-/// Errors: `malformed` (with the section and what is wrong in it), `unsupported` (another version).
+/// Parses the map in `bytes`; `where` names their origin in errors. The map is consistent for any input. Errors:
+/// `malformed` (with the section and the problem), `unsupported` (another version).
 [[nodiscard]] result<map> parse_map(std::span<const std::byte> bytes, const std::string& where = "bytes");
 
 /// Reads a map from a file. Errors: `not_found`, `unreadable`, and those of `parse_map`.
 [[nodiscard]] result<map> read_map(const std::filesystem::path& path);
 
-/// Writes the result of `map_bytes` to a file; an existing file is replaced only once all is written.
-/// Errors: `write_failed`.
+/// Writes the result of `map_bytes` to a file; an existing file is replaced only after everything is written. Errors:
+/// `write_failed`.
 [[nodiscard]] result<void> write_map_bytes(const std::filesystem::path& path, const std::string& bytes);
 
 /// Writes a map to a file, as `write_map_bytes`. Errors: `write_failed`.

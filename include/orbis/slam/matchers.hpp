@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// How tracking matches features.
+/// Feature matchers of tracking.
 #pragma once
 
 #include <concepts>
@@ -22,7 +22,7 @@ namespace orbis::slam {
 
 namespace detail {
 
-/// Whether matchers that name their distance, `M::distance`, compare descriptors as a map does.
+/// True if the distance `M::distance` of the matchers, if declared, is the one by which a map compares descriptors.
 template <class M, class D>
 concept compares_as_map = !requires {
   typename M::distance;
@@ -31,11 +31,11 @@ concept compares_as_map = !requires {
 
 }  // namespace detail
 
-/// The matchers of tracking for descriptors of type `D`: `motion` matches what the last frame observed, near where it
-/// is expected by now; `landmarks` matches landmarks near their projections; `appearance` matches two images without
-/// any expectation. Each is a chain as in `features/matcher.hpp`. A type `distance`, if there is one, must be the
-/// distance by which a map compares these descriptors: many types of descriptors can be compared bit by bit, which
-/// means nothing for most of them.
+/// The matchers of tracking for descriptors of type `D`: `motion` matches the features of the last frame near their
+/// predicted positions; `landmarks` matches landmarks near their projections; `appearance` matches two images without a
+/// prediction. Each is a chain as in `features/matcher.hpp`. If a type `distance` exists, it must be the distance by
+/// which a map compares these descriptors: many descriptor types can be compared bit by bit, which is meaningless for
+/// most of them.
 template <class M, class D>
 concept tracking_matchers = feature_descriptor<D> && detail::compares_as_map<M, D> &&
     requires(const features::basic_features<D>& image, const features::feature_view<D>& seen,
@@ -46,8 +46,8 @@ concept tracking_matchers = feature_descriptor<D> && detail::compares_as_map<M, 
   { M::appearance(image, image) } -> std::convertible_to<std::span<const features::match>>;
 };
 
-/// Matchers whose greatest distances of descriptors are `Motion`, `Landmarks` and `Appearance`.
-/// Source of the default figures: R. Mur-Artal, J. D. Tardos, "ORB-SLAM2", T-RO 33 (2017), and its descriptors of 256
+/// Matchers with maximum descriptor distances `Motion`, `Landmarks` and `Appearance`.
+/// Source of the default figures: R. Mur-Artal, J. D. Tardos, "ORB-SLAM2", T-RO 33 (2017), with descriptors of 256
 /// bits.
 template <class Distance, std::uint32_t Motion = 100, std::uint32_t Landmarks = 80, std::uint32_t Appearance = 80>
 struct distance_matchers {
@@ -60,7 +60,7 @@ struct distance_matchers {
                                      features::cross_check{} | features::max_distance{Appearance};
 };
 
-/// The default, for the descriptors of ORB.
+/// The default matchers, for ORB descriptors.
 using orb_matchers = distance_matchers<features::hamming>;
 
 }  // namespace orbis::slam

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// What a frame measures for each of its features: its ray, and the depth that belongs to a right coordinate, or none.
+/// Measurement of a frame's features: the ray of each and, if available, the depth corresponding to a right coordinate.
 ///
 /// Tracking and adjustments compare right coordinates (`optimize::reprojection`): those of a second camera, or of a
-/// virtual one that stands for the depth sensor. A sensor of another kind is a function that makes such a frame, for
+/// virtual one that models the depth sensor. A sensor of another kind is a function that makes such a frame, for
 /// `system::track_measured`.
 #pragma once
 
@@ -37,19 +37,19 @@
 
 namespace orbis::slam {
 
-/// How the camera moves while a frame is taken.
+/// Motion of the camera while a frame is taken.
 struct frame_motion {
-  camera::shutter shutter{};  ///< the delay of the depth image is that of this frame
-  vec6 twist = zeros<vec6>();  ///< of the camera in its own frame, per second, translation first
+  camera::shutter shutter{};   ///< its depth image delay is that of this frame
+  vec6 twist = zeros<vec6>();  ///< motion of the camera in its own frame, per second, translation first
 };
 
-/// An extractor that takes grey images as well.
+/// An extractor that also accepts grey images.
 template <class E>
 concept grey_extractor = feature_extractor<E> && std::invocable<const E&, image_view<const std::uint8_t>>;
 
 namespace detail {
 
-/// A frame of features, with rays, before their depth is measured. Features whose pixel has no ray get NaN.
+/// Makes a frame of features with rays, before their depth is measured. Features whose pixel has no ray get NaN.
 template <camera::camera_model Camera, feature_descriptor D>
 [[nodiscard]] basic_frame<D> frame_of(const camera_rig<Camera>& rig, features::basic_features<D> features,
                                       sensor_kind sensor) {
@@ -62,8 +62,7 @@ template <camera::camera_model Camera, feature_descriptor D>
   f.landmarks.assign(n, no_id);
   for (std::size_t i = 0; i < n; ++i) {
     const auto& k = f.features.keypoints[i];
-    f.rays[i] =
-        rig.camera().unproject(vec2(k.x, k.y)).value_or(filled<vec3>(std::numeric_limits<double>::quiet_NaN()));
+    f.rays[i] = rig.camera().unproject(vec2(k.x, k.y)).value_or(filled<vec3>(std::numeric_limits<double>::quiet_NaN()));
   }
   f.grid = features::keypoint_grid(f.features.keypoints);
   return f;
@@ -71,8 +70,9 @@ template <camera::camera_model Camera, feature_descriptor D>
 
 }  // namespace detail
 
-/// The number of points with which a frame can begin a map: of its features with depth, where lengths are measured
-/// (`options::scale_is_measured`), else of its features; 0 if there are fewer than `settings.min_start_points`.
+/// Returns the number of points with which a frame can begin a map: of its features with depth, if lengths are measured
+/// (`options::scale_is_measured`), otherwise of all its features; 0 if there are fewer than
+/// `settings.min_start_points`.
 template <feature_descriptor D>
 [[nodiscard]] std::size_t start_points(const basic_frame<D>& f, const options& settings) {
   std::size_t points = 0;
@@ -80,7 +80,7 @@ template <feature_descriptor D>
   return points < settings.min_start_points ? 0 : points;
 }
 
-/// Extracts the features of a colour image and reads their depth from the registered depth image. Depth outside of the
+/// Extracts the features of a colour image and reads their depth from the registered depth image. Depth outside the
 /// rig's range is not used. @pre all images have the size of the camera
 template <camera::camera_model Camera, feature_extractor Extractor, camera::depth_source Depth>
 [[nodiscard]] basic_frame<descriptor_of_t<Extractor>> measure_rgbd(const camera_rig<Camera>& rig,
@@ -96,9 +96,8 @@ template <camera::camera_model Camera, feature_extractor Extractor, camera::dept
   return f;
 }
 
-/// Sets `depth` of `f.as_read` to what each keypoint's row of the colour image would have measured at its own time: it
-/// is read where the camera, which moves on, sees the same point in the depth image. @pre all images have the size of
-/// the camera
+/// Sets `depth` of `f.as_read` to the depth at the time of each keypoint's row of the colour image: reads the depth
+/// image where the moving camera sees the same point. @pre all images have the size of the camera
 template <camera::camera_model Camera, feature_descriptor D, camera::depth_source Depth>
 void follow_rows(const camera_rig<Camera>& rig, const frame_motion& m, basic_frame<D>& f, const Depth& depth) {
   for (keypoint_as_read& k : f.as_read) {
@@ -110,7 +109,7 @@ void follow_rows(const camera_rig<Camera>& rig, const frame_motion& m, basic_fra
     const auto pixel = there.z() > 0.0 ? rig.camera().project(there) : std::nullopt;
     const auto read = pixel ? features::depth_at(depth, static_cast<float>(pixel->x()), static_cast<float>(pixel->y()))
                             : std::nullopt;
-    // Where the two readings lie on different surfaces, neither can be trusted.
+    // If the two readings are of different surfaces, neither is reliable.
     constexpr double same_surface = 0.1;
     const double change = read ? read->z - there.z() : 0.0, z = stored + change;
     const bool usable = read && std::abs(change) < same_surface * stored && z >= rig.min_depth && z <= rig.max_depth;
@@ -118,7 +117,7 @@ void follow_rows(const camera_rig<Camera>& rig, const frame_motion& m, basic_fra
   }
 }
 
-/// The working memory of `measure_stereo`, for one call at a time.
+/// Working memory of `measure_stereo`, for one call at a time.
 struct stereo_memory {
   features::stereo_matcher<> match{};
   image<std::uint8_t> grey_left{}, grey_right{};
@@ -128,7 +127,7 @@ struct stereo_memory {
 
 namespace detail {
 
-/// A frame of the left features. `Pixels`: the images, or the pyramids that the extractor has made of them.
+/// Makes a frame of the left features. `Pixels`: the images, or the pyramids that the extractor made of them.
 template <camera::camera_model Camera, feature_descriptor D, class Pixels>
 [[nodiscard]] basic_frame<D> match_stereo(const camera_rig<Camera>& rig, stereo_memory& memory,
                                           features::basic_features<D> left, const Pixels& left_pixels,
@@ -137,10 +136,10 @@ template <camera::camera_model Camera, feature_descriptor D, class Pixels>
   const double bf = rig.model.bf;
   const std::vector<float>& columns = memory.columns;
   memory.match.into(memory.columns, f.features, left_pixels, right, right_pixels,
-              {.levels = rig.scales.levels(),
-               .scale_factor = static_cast<float>(rig.scales.factor()),
-               .min_disparity = static_cast<float>(bf / rig.max_depth),
-               .max_disparity = static_cast<float>(bf / rig.min_depth)});
+                    {.levels = rig.scales.levels(),
+                     .scale_factor = static_cast<float>(rig.scales.factor()),
+                     .min_disparity = static_cast<float>(bf / rig.max_depth),
+                     .max_disparity = static_cast<float>(bf / rig.min_depth)});
   for (std::size_t i = 0; i != f.size(); ++i)
     if (!std::isnan(columns[i]) && !std::isnan(f.rays[i].x()))
       f.depth[i] =
@@ -150,10 +149,10 @@ template <camera::camera_model Camera, feature_descriptor D, class Pixels>
 
 }  // namespace detail
 
-/// A frame of the left image of a rectified pair (`camera::rectify`). A feature has the right coordinate that
-/// `features::stereo_matcher` finds for it, or none; its depth is `options::bf` over the disparity, where that lies
-/// within the rig's range. Features without a right coordinate become landmarks once other keyframes see them under
-/// enough parallax. @pre both images have the size of the camera
+/// Makes a frame of the left image of a rectified pair (`camera::rectify`). A feature has the right coordinate that
+/// `features::stereo_matcher` finds for it, or none; its depth is `options::bf` over the disparity, if that is within
+/// the rig's range. Features without a right coordinate become landmarks once other keyframes observe them with enough
+/// parallax. @pre both images have the size of the camera
 template <camera::camera_model Camera, grey_extractor Extractor>
 [[nodiscard]] basic_frame<descriptor_of_t<Extractor>> measure_stereo(const camera_rig<Camera>& rig,
                                                                      const Extractor& extract,
@@ -170,7 +169,7 @@ template <camera::camera_model Camera, grey_extractor Extractor>
     return detail::match_stereo(rig, memory, extract(left), left, extract(right), right);
   }
 }
-/// As above, of images in colour.
+/// As above, for colour images.
 template <camera::camera_model Camera, feature_extractor Extractor>
 [[nodiscard]] basic_frame<descriptor_of_t<Extractor>> measure_stereo(const camera_rig<Camera>& rig,
                                                                      const Extractor& extract,
@@ -190,9 +189,9 @@ template <camera::camera_model Camera, feature_extractor Extractor>
     return detail::match_stereo(rig, memory, extract(left), grey_left, extract(right), grey_right);
 }
 
-/// A frame of one image, in colour or in grey, without depth. @pre the image has the size of the camera
+/// Makes a frame of one image, in colour or grey, without depth. @pre the image has the size of the camera
 template <camera::camera_model Camera, feature_extractor Extractor, class Pixel>
-  requires std::invocable<const Extractor&, image_view<const Pixel>>
+requires std::invocable<const Extractor&, image_view<const Pixel>>
 [[nodiscard]] basic_frame<descriptor_of_t<Extractor>> measure_monocular(const camera_rig<Camera>& rig,
                                                                         const Extractor& extract,
                                                                         image_view<const Pixel> picture) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Place recognition: which keyframes have an appearance similar to an image's.
+/// Place recognition: finds keyframes whose appearance is similar to that of an image.
 #pragma once
 
 #include <algorithm>
@@ -20,11 +20,11 @@
 namespace orbis::slam {
 
 /// A database of the appearance of keyframes, for descriptors of type `D`.
-///  - `describe(features)`: the signature of an image. It may be called at any time, from any thread.
-///  - `add`, `erase`, `rename`: change the keyframes in the database; false if that is not possible.
-///  - `similar(signature, count, exclude, neighbors)`: at most `count` keyframes, the most similar first, without those
-///    for which `exclude(id)` is true. `neighbors(id)` gives keyframes that observe the same place, of which one is
-///    enough.
+/// - `describe(features)`: returns the signature of an image. Callable at any time, from any thread.
+/// - `add`, `erase`, `rename`: change the keyframes in the database; return false if that is not possible.
+/// - `similar(signature, count, exclude, neighbors)`: returns at most `count` keyframes, the most similar first,
+/// without those for which `exclude(id)` is true. `neighbors(id)` gives keyframes that observe the same place; one of
+/// them is enough.
 /// The same changes give the same answers.
 template <class P, class D>
 concept place_recognizer = std::movable<P> &&
@@ -38,12 +38,12 @@ concept place_recognizer = std::movable<P> &&
   { places.similar(bow_vector, count, exclude, neighbors) } -> std::convertible_to<std::vector<map_keyframe>>;
 };
 
-/// Place recognition by bags of the words of a vocabulary tree (see `orbis/places.hpp`), for the descriptors of ORB.
+/// Place recognition by bags of words of a vocabulary tree (see `orbis/places.hpp`), for ORB descriptors.
 class bag_of_words_places {
  public:
   using signature = places::bag_of_words;
 
-  /// With the built-in vocabulary.
+  /// Uses the built-in vocabulary.
   bag_of_words_places() : bag_of_words_places(places::default_vocabulary()) {}
   explicit bag_of_words_places(places::vocabulary words) : words_{std::move(words)} {}
   bag_of_words_places(places::vocabulary words, const places::query_options& options)
@@ -53,17 +53,17 @@ class bag_of_words_places {
   /// The number of keyframes.
   [[nodiscard]] std::size_t size() const noexcept { return database_.size(); }
 
-  /// The words of an image.
+  /// Returns the words of an image.
   [[nodiscard]] signature describe(const features::features& f) const { return words_.transform(f.descriptors); }
 
-  /// False if the keyframe is in the database already.
+  /// Adds a keyframe. Returns false if the keyframe is already in the database.
   bool add(map_keyframe k, const signature& bow_vector) { return database_.add(packed(k), bow_vector); }
-  /// False if the keyframe is not in the database.
+  /// Erases a keyframe. Returns false if the keyframe is not in the database.
   bool erase(map_keyframe k) { return database_.erase(packed(k)); }
-  /// Gives a keyframe another id. False if `from` is not in the database, or `to` is.
+  /// Changes the id of a keyframe. Returns false if `from` is not in the database, or `to` is.
   bool rename(map_keyframe from, map_keyframe to) { return database_.rename(packed(from), packed(to)); }
 
-  /// At most `count` keyframes with similar words, the most similar first (see `place_recognizer`).
+  /// Returns at most `count` keyframes with similar words, the most similar first (see `place_recognizer`).
   template <std::predicate<map_keyframe> Exclude, std::invocable<map_keyframe> Neighbors>
   [[nodiscard]] std::vector<map_keyframe> similar(const signature& bow_vector, std::size_t count, Exclude&& exclude,
                                                   Neighbors&& neighbors) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// What a recording tells of its camera's shutter.
+/// The estimate of a camera's shutter.
 #pragma once
 
 #include <limits>
@@ -9,13 +9,13 @@
 
 namespace orbis::slam {
 
-/// A shutter as the frames tell it; see `options::estimates_shutter`. What the motion cannot tell is 0 in `shutter`,
-/// and has a deviation that is not small, or not finite.
+/// A shutter estimated from frames; see `options::estimates_shutter`. Components that the motion does not determine are
+/// 0 in `shutter`, and have a deviation that is large or not finite.
 struct shutter_estimate {
   camera::shutter shutter{};  ///< with the same read-out for both images
-  double read_out = 0.0;      ///< the estimate of the read-out before its significance was judged, seconds
+  double read_out = 0.0;      ///< estimate of the read-out before the significance test, seconds
   double read_out_deviation = std::numeric_limits<double>::infinity();  ///< standard deviation, seconds
-  double delay = 0.0;  ///< that of the depth image's delay before its significance was judged, seconds
+  double delay = 0.0;  ///< estimate of the depth image's delay before the significance test, seconds
   double delay_deviation = std::numeric_limits<double>::infinity();  ///< standard deviation, seconds
 };
 

@@ -19,13 +19,13 @@
 
 namespace orbis::slam {
 
-/// A tree: each keyframe except the root has a parent. In addition, undirected loop edges between any two keyframes.
-/// Children and loop edges are sorted by id. Who chooses the parents is not decided here.
+/// A tree: each keyframe except the root has a parent. In addition, undirected loop edges connect any two keyframes.
+/// Children and loop edges are sorted by id. The caller chooses the parents.
 class spanning_tree {
  public:
   [[nodiscard]] std::size_t size() const noexcept { return nodes_.size(); }
   [[nodiscard]] bool contains(keyframe_id k) const noexcept { return nodes_.contains(k.value()); }
-  /// The root; `no_id` while there is no keyframe.
+  /// The root; `no_id` if there is no keyframe.
   [[nodiscard]] keyframe_id root() const noexcept { return root_; }
   /// The parent of a keyframe; `no_id` for the root. @pre contains(k)
   [[nodiscard]] keyframe_id parent(keyframe_id k) const { return at(k).parent; }
@@ -57,7 +57,7 @@ class spanning_tree {
     }
   }
 
-  /// Records that a loop was closed between two keyframes. @pre a != b, and both are there
+  /// Records a loop closure between two keyframes. @pre a != b, and both exist
   void add_loop_edge(keyframe_id a, keyframe_id b) {
     assert(a != b && contains(a) && contains(b));
     insert(nodes_[a.value()].loops, b);
@@ -65,9 +65,9 @@ class spanning_tree {
   }
 
   /// Erases a keyframe. Each of its children gets a new parent: the old parent or another child, whichever it shares
-  /// most landmarks with (`shared(a, b)`); the old parent where it shares none. If the root is erased, its oldest child
-  /// becomes the root. Loop edges pass to the keyframe that is returned: the parent, or the new root, or `no_id` if
-  /// none is left. O(children^2). @pre contains(k)
+  /// most landmarks with (`shared(a, b)`); the old parent if it shares none. If the root is erased, its oldest child
+  /// becomes the root. Loop edges pass to the returned keyframe: the parent, or the new root, or `no_id` if none is
+  /// left. O(children^2). @pre contains(k)
   template <std::invocable<keyframe_id, keyframe_id> Shared>
   keyframe_id erase(keyframe_id k, Shared&& shared) {
     const node gone = std::move(nodes_.extract(k.value()).mapped());
@@ -91,7 +91,7 @@ class spanning_tree {
   }
 
   /// Adds another tree, whose ids grow by `offset`. Its keyframe `by` becomes its root and a child of `at`.
-  /// @pre this tree has no ids from `offset` on; `at` and `by` are there, unless either tree is empty
+  /// @pre this tree has no ids from `offset` on; `at` and `by` exist, unless either tree is empty
   void append(spanning_tree&& other, std::uint32_t offset, keyframe_id at, keyframe_id by) {
     const bool was_empty = size() == 0;
     if (other.size() != 0 && !was_empty) other.set_root(by);
@@ -134,7 +134,7 @@ class spanning_tree {
     insert(nodes_[parent.value()].children, k);
   }
 
-  /// Prim's algorithm: the next one is the orphan that shares most with a keyframe that is in the tree.
+  /// Prim's algorithm: next is the orphan that shares most landmarks with a keyframe in the tree.
   template <class Shared>
   void adopt(std::vector<keyframe_id> orphans, keyframe_id replacement, Shared&& shared) {
     struct edge {

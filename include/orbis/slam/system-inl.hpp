@@ -21,7 +21,7 @@ namespace detail {
 /// Measures the time between calls of `lap`.
 class stopwatch {
  public:
-  /// Sets `milliseconds` to the time since the last call, or since the construction.
+  /// Sets `milliseconds` to the time since the last call, or since construction.
   void lap(double& milliseconds) {
     const auto now = std::chrono::steady_clock::now();
     milliseconds = std::chrono::duration<double, std::milli>(now - last_).count();
@@ -64,10 +64,10 @@ ORBIS_SLAM_SYSTEM_TEMPLATE
 template <camera::depth_source Depth>
 track_result ORBIS_SLAM_SYSTEM::track(double timestamp, image_view<const rgb8> color, const Depth& depth) {
   detail::stopwatch clock;
-  front_end_->depth().see_nothing();
+  front_end_->depth().clear_depth();
   if (!are_usable(timestamp, color, depth)) return track_frame(timestamp, {}, {}, clock);
   frame_type f = measure_rgbd(shared_.rig, extract_, color, depth);
-  front_end_->depth().see(depth);
+  front_end_->depth().set_depth(depth);
   return track_frame(
       timestamp, std::move(f),
       [&](frame_type& seen, const frame_motion& m) { follow_rows(shared_.rig, m, seen, depth); }, clock);
@@ -79,7 +79,7 @@ requires std::is_invocable_r_v < basic_frame<descriptor_of_t<Extractor>>,
 const Measure&, const camera_rig<Camera>&,
     const Extractor& > track_result ORBIS_SLAM_SYSTEM::track_measured(double timestamp, const Measure& measure) {
   detail::stopwatch clock;
-  front_end_->depth().see_nothing();
+  front_end_->depth().clear_depth();
   return track_frame(timestamp, std::isfinite(timestamp) ? measure(shared_.rig, extract_) : frame_type{}, {}, clock);
 }
 
@@ -119,7 +119,7 @@ track_result ORBIS_SLAM_SYSTEM::track_frame(double timestamp, frame_type f, cons
   track_result result;
   f.scale_is_known = shared_.rig.scale_is_known;
   if (!f.scale_is_known) std::fill(f.depth.begin(), f.depth.end(), 0.0F);
-  if (front_end_->looks_at_rows()) detail::keep_as_read(f);
+  if (front_end_->needs_as_read()) detail::keep_as_read(f);
   f.timestamp = std::isfinite(timestamp) ? timestamp : front_end_->last_timestamp();
   f.index = front_end_->counters().frames;
   clock.lap(result.timings.features_ms);
@@ -144,7 +144,7 @@ std::optional<map_keyframe> ORBIS_SLAM_SYSTEM::localize(frame_type f, const row_
   const auto similar = [this](const auto& features, std::size_t count) {
     return shared_.similar(shared_.places.describe(features), count, [](map_keyframe) { return false; });
   };
-  const auto drop = [this](map_id m) {  // unless mapping works on it; then it stays
+  const auto drop = [this](map_id m) {  // unless mapping uses it; then the map is kept
     if (const auto edit = shared_.try_edit()) shared_.remove_map(m);
   };
   front_end_->sync_with_map(maps);
@@ -292,9 +292,9 @@ result<void> ORBIS_SLAM_SYSTEM::load_map(const std::filesystem::path& path) requ
   if (loaded->scale_is_known() != shared_.rig.scale_is_known)
     return fail(errc::unsupported, path.string(),
                 shared_.rig.scale_is_known ? "the map was made without depth, its unit of length is not the metre"
-                                           : "the map was made with depth, and this sensor measures none");
+                                           : "the map was made with depth, but this sensor measures none");
   if (loaded->keyframes().empty()) return fail(errc::no_data, path.string(), "the map has no keyframes");
-  std::vector<std::pair<keyframe_id, typename Places::signature>> bow_vectors;  // before tracking has to wait
+  std::vector<std::pair<keyframe_id, typename Places::signature>> bow_vectors;  // before the lock, which stops tracking
   for (const auto& k : loaded->keyframes()) bow_vectors.emplace_back(k.id, shared_.places.describe(k.features));
   const auto lock = shared_.lock();
   const map_id before = shared_.atlas.active_id();

@@ -10,9 +10,9 @@
 ///
 /// The scheme is that of R. Mur-Artal, J. D. Tardos, "ORB-SLAM2: an open-source SLAM system for monocular, stereo and
 /// RGB-D cameras", T-RO 33 (2017): predict the pose by constant motion, search for the landmarks of the local map,
-/// refine the pose, make a keyframe where the view has changed, adjust the map around it, and close loops where a place
-/// is recognised. That a new map begins after the camera was lost, and that maps are merged, is after R. Elvira, J. D.
-/// Tardos, J. M. M. Montiel, "ORBSLAM-Atlas", IROS 2019.
+/// refine the pose, make a keyframe when the view has changed, adjust the map around it, and close loops when a place
+/// is recognised. Starting a new map after tracking is lost, and merging maps, follow R. Elvira, J. D. Tardos, J. M. M.
+/// Montiel, "ORBSLAM-Atlas", IROS 2019.
 #pragma once
 
 #include <algorithm>
@@ -61,18 +61,18 @@ class stopwatch;
 
 }  // namespace detail
 
-/// Tracks the frames of one camera and builds a map of landmarks. Images are not kept; a caller who needs those of
-/// keyframes keeps them when `track` returns a keyframe.
+/// Tracks the frames of one camera and builds a map of landmarks. Images are not kept; callers that need the images of
+/// keyframes store them when `track` returns a keyframe.
 ///
 /// Without threads (the default) `track` does everything, and the same frames and options give the same bytes. With
-/// threads (`options::threads`) mapping, loop closing and global adjustment go on while frames are tracked. `track` is
-/// for one thread; everything else may be called from any thread. An exception on a thread of the system (want of
-/// memory, or one of a callback) ends that thread; `track` of a keyframe and `wait` throw it then, and a map may be
-/// left half changed: the system is to be destroyed.
+/// threads (`options::threads`) mapping, loop closing and global adjustment run while frames are tracked. Call `track`
+/// from one thread; all other functions may be called from any thread. An exception on a thread of the system
+/// (`std::bad_alloc`, or one thrown by a callback) ends that thread; `track` of a keyframe and `wait` then rethrow it.
+/// A map may be left partly changed: destroy the system.
 ///
 /// Template parameters: the camera model; the extractor, which determines the type of descriptors; the matchers of
-/// tracking; place recognition. orbis::compiled holds the system of `camera::any_camera` and the library's own parts;
-/// a program that links it and replaces a part includes `<orbis/slam/system-inl.hpp>`.
+/// tracking; place recognition. orbis::compiled holds the system of `camera::any_camera` and the library's own parts; a
+/// program that links it and replaces a part includes `<orbis/slam/system-inl.hpp>`.
 template <camera::camera_model Camera, feature_extractor Extractor = features::orb_extractor,
           tracking_matchers<descriptor_of_t<Extractor>> Matchers = orb_matchers,
           place_recognizer<descriptor_of_t<Extractor>> Places = bag_of_words_places>
@@ -83,37 +83,37 @@ class system {
   using map_type = basic_map<descriptor_type>;
   using revision_type = pose_revision;
 
-  /// A system with an extractor made from `settings.features` and default places.
+  /// Makes a system with an extractor made from `settings.features` and default places.
   explicit system(Camera camera, const options& settings = {}) requires
       std::constructible_from<Extractor, const features::orb_options&> && std::default_initializable<Places>;
-  /// A system with an extractor, and optionally places, of the caller's. `settings.features.levels` and `scale_factor`
-  /// must describe the image pyramid of the extractor.
+  /// Makes a system with a custom extractor and, optionally, custom places. `settings.features.levels` and
+  /// `scale_factor` must describe the image pyramid of the extractor.
   system(Camera camera, const options& settings, Extractor extractor, Places places = Places{});
   system(const system&) = delete;
   system& operator=(const system&) = delete;
-  /// Waits for the threads to finish their running job; what waits is dropped.
+  /// Waits for the threads to finish their running jobs; discards waiting jobs.
   ~system();
 
   /// Registers callbacks. @pre no frame was tracked yet
   void listen(listeners callbacks);
 
-  /// Tracks the next frame. Frames of another size than the camera's, or without a finite time stamp, count as lost.
-  /// @pre time stamps ascend
+  /// Tracks the next frame. Frames whose size differs from the camera's, or without a finite timestamp, count as lost.
+  /// @pre timestamps ascend
   track_result track(const camera::rgbd_frame& f) { return track(f.timestamp, f.color.view(), f.depth_metres()); }
   /// As above; the images are used in place. `timestamp`: seconds; `depth`: metres, registered to the colour image.
   /// orbis::compiled holds `camera::depth_view` of 16-bit numbers and of float; others include system-inl.hpp.
   template <camera::depth_source Depth>
   track_result track(double timestamp, image_view<const rgb8> color, const Depth& depth);
-  /// As above, of a rectified stereo pair (`stereo_options`). `timestamp`: seconds.
+  /// As above, for a rectified stereo pair (`stereo_options`). `timestamp`: seconds.
   track_result track(double timestamp, image_view<const rgb8> left, image_view<const rgb8> right);
   track_result track(double timestamp, image_view<const std::uint8_t> left,
                      image_view<const std::uint8_t> right) requires grey_extractor<Extractor>;
-  /// As above, of one image without depth, for a system with `monocular_options`.
+  /// As above, for one image without depth, for a system with `monocular_options`.
   track_result track(double timestamp, image_view<const rgb8> color);
   track_result track(double timestamp, image_view<const std::uint8_t> grey) requires grey_extractor<Extractor>;
-  /// As above, of a sensor of another kind: `measure(rig, extract)` makes the frame, as the functions of `measure.hpp`
-  /// do, with the depth of each feature, or 0. There is no depth image then (`options::depth_term`), and depth is taken
-  /// as measured at the frame's time. With orbis::compiled, include `<orbis/slam/system-inl.hpp>`.
+  /// As above, for a sensor of another kind: `measure(rig, extract)` makes the frame, like the functions of
+  /// `measure.hpp`, with the depth of each feature, or 0. There is no depth image then (`options::depth_term`), and
+  /// depth is assumed to be measured at the frame's time. With orbis::compiled, include `<orbis/slam/system-inl.hpp>`.
   template <class Measure>
   requires std::is_invocable_r_v < basic_frame<descriptor_of_t<Extractor>>,
   const Measure&, const camera_rig<Camera>&,
@@ -121,68 +121,69 @@ class system {
 
   /// The state after the last frame.
   [[nodiscard]] track_state state() const;
-  /// Sets whether the map is kept unchanged, from the next frame on.
+  /// Enables or disables changes to the map, from the next frame on; if `on`, the map is kept unchanged.
   void set_localization_only(bool on) noexcept { localization_only_ = on; }
 
-  /// The features of the last frame and where it hangs in the map; empty if it was not tracked. For the thread that
-  /// tracks, and without a lock: asking for it does not wait for the back end. O(features).
+  /// Returns the features of the last frame and its pose relative to a keyframe; empty if it was not tracked. For the
+  /// tracking thread only; takes no lock, so it does not wait for the back end. O(features).
   [[nodiscard]] std::optional<tracked_frame> last_frame() const;
 
   /// Sets `T_world_camera` of the first frame of every map that begins from the next frame on
-  /// (`options::initial_pose`). For the thread that tracks: where frames say which way is up, a new map begins upright.
+  /// (`options::initial_pose`). For the tracking thread only: if frames carry the gravity direction, a new map begins
+  /// upright.
   void set_initial_pose(const se3& T_world_camera) {
     options_.initial_pose = T_world_camera;
     options_.find_initial_pose = nullptr;
   }
-  /// As above, asked for only when a map does begin with the frame that is tracked: what it costs is paid once a map
+  /// As above, but `find` is called only when a map begins with the tracked frame, so its cost arises once per map
   /// (`options::find_initial_pose`). `find` must not call the system.
   void set_initial_pose(std::function<se3()> find) { options_.find_initial_pose = std::move(find); }
 
   /// Waits until the threads have nothing to do.
   void wait() const;
 
-  /// Poses of the frames that were tracked in the active map: all, or those that `options::trajectory_frames` leaves.
-  /// Frames follow later corrections of their keyframe. O(frames).
+  /// Returns the poses of the frames that were tracked in the active map: all, or those within
+  /// `options::trajectory_frames`. Frames follow later corrections of their keyframe. O(frames).
   [[nodiscard]] orbis::trajectory trajectory() const;
-  /// As above, of another map; empty if there is no such map, or none of its frames is left.
+  /// As above, for another map; empty if there is no such map, or none of its frames is left.
   [[nodiscard]] orbis::trajectory trajectory(map_id map) const;
-  /// Time stamp, pose and frame index of each keyframe of the active map.
+  /// Returns timestamp, pose and frame index of each keyframe of the active map.
   [[nodiscard]] std::vector<keyframe_pose> keyframes() const;
-  /// As above, unless the poses are those of revision `seen`: then empty. Sets `seen` to the present revision. Cheap
-  /// enough to be asked again and again by whoever builds on the keyframes' poses: local adjustment moves keyframes
-  /// without an event. O(1) if nothing has changed.
+  /// As above, but empty if the poses are those of revision `seen`. Sets `seen` to the present revision. Suitable for
+  /// polling by code that builds on the keyframes' poses: local adjustment moves keyframes without an event. O(1) if
+  /// nothing has changed.
   [[nodiscard]] std::optional<std::vector<keyframe_pose>> keyframes_since(pose_revision& seen) const;
-  /// Time stamp and pose of each keyframe of the active map.
+  /// Returns timestamp and pose of each keyframe of the active map.
   [[nodiscard]] orbis::trajectory keyframe_trajectory() const;
-  /// What the frames tell of the shutter; empty without `options::estimates_shutter`. For the thread that tracks.
+  /// Returns the estimated shutter; empty without `options::estimates_shutter`. For the tracking thread only.
   [[nodiscard]] std::optional<shutter_estimate> estimated_shutter() const;
   /// The number of landmarks of the active map.
   [[nodiscard]] std::size_t landmark_count() const;
   [[nodiscard]] track_counters counters() const;
   [[nodiscard]] map_id active_map() const;
-  /// The map in which most frames were tracked. O(frames).
+  /// Returns the map in which most frames were tracked. O(frames).
   [[nodiscard]] map_id largest_map() const;
-  /// Makes a map the active one; the camera is searched for in it. False if there is no such map.
+  /// Makes a map the active one; the camera is relocalised in it. Returns false if there is no such map.
   bool activate(map_id map);
 
-  /// Calls `read(const atlas_type&)` with the lock held: no map changes meanwhile, and tracking waits. `read` must not
-  /// call the system.
+  /// Calls `read(const atlas_type&)` with the lock held: no map changes during the call, and tracking waits. `read`
+  /// must not call the system.
   template <std::invocable<const atlas_type&> Read>
   decltype(auto) inspect(Read&& read) const {
     const auto lock = shared_.lock();
     return std::forward<Read>(read)(std::as_const(shared_.atlas));
   }
-  /// The active map. @pre while it is used, no frame is tracked and the threads have nothing to do (`wait`)
+  /// Returns the active map. @pre while it is used, no frame is tracked and the threads are idle (`wait`)
   [[nodiscard]] const map_type& map() const { return shared_.atlas.active(); }
   [[nodiscard]] const Camera& camera() const noexcept { return shared_.rig.camera(); }
 
-  /// Writes the active map to a file. For the descriptors of ORB. Errors: `write_failed`.
+  /// Writes the active map to a file. For ORB descriptors. Errors: `write_failed`.
   [[nodiscard]] result<void> save_map(const std::filesystem::path& path)
       const requires std::same_as<descriptor_of_t<Extractor>, features::binary_descriptor<256>>;
-  /// Reads a map from a file and makes it the active one; the camera is searched for in it. The map so far is kept, and
-  /// merged into the loaded one where that is recognised; without keyframes it is removed. For the descriptors of ORB.
-  /// Errors: those of `read_map`, `unsupported` for a map of another image pyramid, or one with a scale of its own
-  /// where the sensor measures lengths, and the other way round, `no_data` for one without keyframes.
+  /// Reads a map from a file and makes it the active one; the camera is relocalised in it. The previous map is kept,
+  /// and merged into the loaded one when that is recognised; without keyframes it is removed. For ORB descriptors.
+  /// Errors: those of `read_map`; `unsupported` for a map with another image pyramid, or a map without metric scale if
+  /// the sensor measures lengths, and vice versa; `no_data` for one without keyframes.
   [[nodiscard]] result<void> load_map(const std::filesystem::path& path) requires
       std::same_as<descriptor_of_t<Extractor>, features::binary_descriptor<256>>;
 
@@ -190,18 +191,18 @@ class system {
   using frame_type = basic_frame<descriptor_type>;
   using front_end = detail::front_end<Camera, descriptor_type, Matchers>;
   using back_end = detail::back_end<Camera, descriptor_type, Places>;
-  /// Brings what was measured to the times of a rolling shutter's rows, once the motion is known.
+  /// Moves the measurements to the times of a rolling shutter's rows, once the motion is known.
   using row_follower = std::function<void(frame_type&, const frame_motion&)>;
 
-  /// Whether the images have the size of the camera, and a time.
+  /// Returns true if the images have the size of the camera and the timestamp is finite.
   template <class... Images>
   [[nodiscard]] bool are_usable(double timestamp, const Images&... images) const {
     return std::isfinite(timestamp) &&
            ((images.width() == camera().width() && images.height() == camera().height()) && ...);
   }
-  /// Tracks a frame that has just been measured; one without features if its images could not be used.
+  /// Tracks a measured frame; the frame has no features if its images could not be used.
   track_result track_frame(double timestamp, frame_type f, const row_follower& follow, detail::stopwatch& clock);
-  /// Localises a frame and makes a keyframe of it if that is due. `lap`: notes the time of localisation.
+  /// Localises a frame and makes a keyframe of it if required. Records the time of localisation with `clock`.
   std::optional<map_keyframe> localize(frame_type f, const row_follower& follow, track_result& result,
                                        detail::stopwatch& clock);
   /// Passes a new keyframe to the callbacks and the back end.
@@ -243,7 +244,7 @@ rgbd_system(Camera, options, Extractor) -> rgbd_system<typename camera::checked_
 
 /// A system for rectified stereo pairs, with `stereo_options`.
 using stereo_system = system<camera::any_camera>;
-/// A system for one camera without depth: lengths are in a unit of the map's own, whatever the options say.
+/// A system for one camera without depth: lengths are in an arbitrary unit per map, regardless of the options.
 template <camera::camera_model Camera>
 class monocular_system : public system<Camera> {
  public:

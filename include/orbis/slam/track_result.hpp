@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// What tracking a frame returns.
+/// The result of tracking a frame.
 #pragma once
 
 #include <cstddef>
@@ -16,11 +16,12 @@
 namespace orbis::slam {
 
 enum class track_state {
-  not_started,  ///< no map has begun: no frame so far had enough keypoints with depth or, where none is measured, no
-                ///< two frames showed a scene beyond doubt
-  tracking,     ///< the pose of the last frame is known
-  lost,         ///< the pose of the last frame is not known
-  relocalized   ///< the last frame was found again in a map
+  /// No map has begun: no frame so far had enough keypoints with depth or, without depth, no two frames gave an
+  /// unambiguous reconstruction.
+  not_started,
+  tracking,    ///< the pose of the last frame is known
+  lost,        ///< the pose of the last frame is not known
+  relocalized  ///< the last frame was relocalised in a map
 };
 
 [[nodiscard]] constexpr std::string_view to_string(track_state state) noexcept {
@@ -37,18 +38,18 @@ enum class track_state {
 struct track_timings {
   double features_ms = 0.0;  ///< feature extraction and depth
   double tracking_ms = 0.0;  ///< estimation of the pose
-  double mapping_ms = 0.0;   ///< keyframe and, without threads, all of mapping
+  double mapping_ms = 0.0;   ///< creation of a keyframe and, without threads, all of mapping
 };
 
 /// The result of tracking one frame.
 struct track_result {
   track_state state = track_state::not_started;
-  std::optional<se3> T_world_camera;    ///< the pose, in the world of `map`; empty where not tracked
+  std::optional<se3> T_world_camera;    ///< the pose, in the world of `map`; empty if not tracked
   map_id map = 0;                       ///< the active map
-  std::size_t inliers = 0;              ///< landmarks that agree with the pose; few or none where depth holds it
-  std::optional<keyframe_id> keyframe;  ///< the keyframe that the frame became, if it did
-  /// With a rolling shutter the motion of the camera, in its own frame, while the frame was taken: per second,
-  /// translation first. Zero where it is not known. `camera::shutter_correction` takes it.
+  std::size_t inliers = 0;              ///< landmarks that agree with the pose; few or none if depth determines it
+  std::optional<keyframe_id> keyframe;  ///< the keyframe made from the frame, if any
+  /// Motion of the camera in its own frame while the frame was taken with a rolling shutter: per second, translation
+  /// first. Zero if unknown. Argument of `camera::shutter_correction`.
   vec6 twist = zeros<vec6>();
   track_timings timings;
   [[nodiscard]] bool tracked() const noexcept { return T_world_camera.has_value(); }
@@ -57,16 +58,16 @@ struct track_result {
 /// A feature of a tracked frame.
 struct tracked_feature {
   float x = 0.0F, y = 0.0F;  ///< pixels
-  bool tracked = false;      ///< observes a landmark that was known before, in agreement with the pose
-  bool moving = false;       ///< lies on something that moves, and is left out of all else (`moving_options`)
+  bool tracked = false;      ///< observes a previously known landmark, in agreement with the pose
+  bool moving = false;       ///< is on a moving object; excluded from tracking and mapping (`moving_options`)
 };
 
-/// What tracking knows of a frame, to be shown or logged.
+/// Tracking details of a frame, for display or logging.
 struct tracked_frame {
   /// The keyframe that the frame's pose follows. `atlas::current` gives its present id; with
-  /// `options::trajectory_frames` it may be forgotten one day (`basic_map::remembers`).
+  /// `options::trajectory_frames` it may be forgotten later (`basic_map::remembers`).
   map_keyframe reference;
-  se3 T_reference_camera;  ///< in lengths over the reference's scale (`basic_map::scale_of`), which is 1 with depth
+  se3 T_reference_camera;  ///< translation divided by `basic_map::scale_of` the reference, which is 1 with depth
   std::vector<tracked_feature> features;
   vec6 twist = zeros<vec6>();  ///< see `track_result::twist`
 };
@@ -74,7 +75,7 @@ struct tracked_frame {
 /// Counts over all frames so far. Frames before the first map begins are neither tracked nor lost.
 struct track_counters {
   std::size_t frames = 0;
-  std::size_t tracked = 0;  ///< relocalised frames included, and the first of two that a map without depth begins with
+  std::size_t tracked = 0;  ///< including relocalised frames and the first of two that begin a map without depth
   std::size_t lost = 0;
   std::size_t relocalized = 0;
   std::size_t loops_closed = 0;
@@ -89,8 +90,8 @@ struct keyframe_pose {
   std::size_t frame = 0;  ///< index of the frame, from 0
 };
 
-/// Identifies the keyframes of the active map with their poses: it changes when a keyframe moves, is made or is culled,
-/// and when another map becomes the active one. The default is the revision of no map.
+/// Revision of the keyframes of the active map and their poses: it changes when a keyframe moves, is made or is culled,
+/// and when another map becomes active. The default is the revision of no map.
 struct pose_revision {
   map_id map = no_id;
   std::uint64_t changes = 0;

@@ -38,9 +38,9 @@ struct scene {
     CHECK(tracker.needs_surface(maps, se3{}));
     tracker.keep({maps.active_id(), id}, se3{}, vec6::Zero(), {});
   }
-  void see(const se3& pose) { tracker.see(test::metres(test::depth_of(room, pose, rig.camera()))); }
+  void see(const se3& pose) { tracker.set_depth(test::metres(test::depth_of(room, pose, rig.camera()))); }
   [[nodiscard]] std::optional<depth_alignment> align(const se3& last) {
-    if (!tracker.surround(maps, last)) return std::nullopt;
+    if (!tracker.find_surfaces(maps, last)) return std::nullopt;
     return tracker.align(search_starts(last, last, 0.5), {});
   }
 };
@@ -87,14 +87,14 @@ TEST_CASE("The term of depth pulls towards the true pose, and is nothing where n
   scene s{test::corner()};
   const se3 pose = se3::exp(vector6(0.05, 0.02, -0.03, 0.02, 0.03, -0.02));
   s.see(pose);
-  REQUIRE(s.tracker.surround(s.maps, pose));
+  REQUIRE(s.tracker.find_surfaces(s.maps, pose));
   const se3 off = pose * se3::exp(vector6(0.006, -0.005, 0.004, 0.002, -0.003, 0.002));
   const auto term = s.tracker.term_at({off, vec6::Zero()}, {});
   REQUIRE(term);
   const vec6 step = term->h.topLeftCorner<6, 6>().ldlt().solve(-term->g.head<6>());
   CHECK(pose_error(off * se3::exp(-step), pose) < 0.25 * pose_error(off, pose));
   s.maps.create();
-  CHECK(!s.tracker.surround(s.maps, pose));
+  CHECK(!s.tracker.find_surfaces(s.maps, pose));
 }
 
 TEST_CASE("A surface that was read later than the colour is kept as it is at the time of the frame") {
@@ -105,7 +105,7 @@ TEST_CASE("A surface that was read later than the colour is kept as it is at the
   s.see(pose * se3::exp(0.02 * twist));
   s.tracker.keep({s.maps.active_id(), slam::keyframe_id{0}}, pose, twist, late);
   s.see(pose);
-  REQUIRE(s.tracker.surround(s.maps, pose));
+  REQUIRE(s.tracker.find_surfaces(s.maps, pose));
   const moving_pose at{pose, vec6::Zero()};
   const auto kept = s.tracker.term_at(at, {});
   REQUIRE(kept);
@@ -133,8 +133,8 @@ TEST_CASE("Depth in the pose allocates nothing once its buffers have grown") {
   const se3 pose = se3::exp(vector6(0.02, 0.02, -0.03, 0.02, 0.03, -0.02));
   const image<float> depth = test::depth_of(s.room, pose, s.rig.camera());
   const auto frame = [&] {
-    s.tracker.see(test::metres(depth));
-    if (!s.tracker.surround(s.maps, pose)) return false;
+    s.tracker.set_depth(test::metres(depth));
+    if (!s.tracker.find_surfaces(s.maps, pose)) return false;
     const bool there = s.tracker.term_at({pose, vec6::Zero()}, {}).has_value();
     return s.tracker.align(search_starts(pose, pose, 0.1), {}).has_value() && there;
   };

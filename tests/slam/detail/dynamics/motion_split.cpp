@@ -119,7 +119,7 @@ TEST_CASE("A closer look is taken where many disagree, or where what is new draw
     std::vector<std::uint8_t> out(s.observations.size());
     const auto all = optimize::refine_pose(std::span<const optimize::pose_observation>(s.observations), s.model,
                                            s.truth, std::span<std::uint8_t>(out));
-    return splitter::is_drawn_along(s.observations, s.trust, s.model, all.T_world_camera, s.options);
+    return splitter::is_biased_by_motion(s.observations, s.trust, s.model, all.T_world_camera, s.options);
   };
   CHECK(drawn(scene(vec3(0.009, 0.0, 0.0))));
   CHECK(!drawn(scene(vec3::Zero())));

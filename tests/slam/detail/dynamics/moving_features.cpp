@@ -74,7 +74,7 @@ struct scene {
       for (std::uint32_t j = 0; j != f.size(); ++j)
         if (last.features.descriptors[i] == f.features.descriptors[j]) matches.push_back({i, j, 0});
     }
-    moving.drop_left_out(matches);
+    moving.remove_excluded(matches);
     std::size_t agree = 0;
     for (const auto& found : matches)
       agree += slam::detail::agrees(rig, f, se3{}, found.train, list.points[found.query].position);

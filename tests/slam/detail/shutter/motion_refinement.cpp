@@ -139,10 +139,10 @@ TEST_CASE("Early depth follows the refined twist as far as pixels determine it, 
     const vec6 former = motion + off;
     const twist_prior prior = twist_prior::after({before, former}, 0.033, true);
     early_depth_twist twist;
-    twist.see(std::span<const row_observation>(seen), model, {before, former}, {});
+    twist.update(std::span<const row_observation>(seen), model, {before, former}, {});
     CHECK(twist.between({}, motion) == motion);  // no former frame
     twist.advance();
-    twist.see(std::span<const row_observation>(seen), model, {pose, motion}, prior);
+    twist.update(std::span<const row_observation>(seen), model, {pose, motion}, prior);
     return (former - twist.between(prior, motion)).dot(off) / off.squaredNorm();
   };
   const vec6 sideways_or_turning = vector6(0.2, 0.0, 0.0, 0.0, -0.1, 0.0), rolling = vector6(0, 0, 0, 0, 0, 0.2);

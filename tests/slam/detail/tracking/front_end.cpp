@@ -243,7 +243,7 @@ TEST_CASE("Where depth is not asked for, the image of it changes nothing") {
     for (int v = 0; v != 480; ++v)
       for (int u = 0; u != 640; ++u) wall(u, v) = 2.0F + 0.001F * static_cast<float>(u);
     for (std::uint32_t i = 0; i < 8; ++i) {
-      if (sees_depth) s.front_end.depth().see(camera::depth_view<float>{std::as_const(wall).view()});
+      if (sees_depth) s.front_end.depth().set_depth(camera::depth_view<float>{std::as_const(wall).view()});
       CHECK(s.see(i) > 30);
     }
     return s.front_end.last_pose(s.maps);
@@ -273,7 +273,7 @@ TEST_CASE("A frame without keypoints is held by the depth of a known corner, and
   };
   const auto show = [&](const se3& T_first_camera) {
     const image<float> depth = corner_from(T_first_camera);
-    s.front_end.depth().see(camera::depth_view<float>{depth.view()});
+    s.front_end.depth().set_depth(camera::depth_view<float>{depth.view()});
   };
   show(se3{});
   REQUIRE(s.see(0) > 30);
@@ -284,7 +284,7 @@ TEST_CASE("A frame without keypoints is held by the depth of a known corner, and
   CHECK((s.front_end.last_pose(s.maps).inverse() * s.world.truth(0) * step).log().norm() < 0.01);
   CHECK(s.maps.active().keyframes().size() == 1);  // nothing that a keyframe needs
   CHECK(s.front_end.counters().lost == 0);
-  s.front_end.depth().see_nothing();
+  s.front_end.depth().clear_depth();
   CHECK(s.see_nothing(1.0) == 0);
   CHECK(s.front_end.state() == track_state::lost);
 }

@@ -91,7 +91,7 @@ outcome begin(const Frames& frames) {
   for (std::size_t i = 0; i != frames.size(); ++i) {
     auto f = slam::detail::frame_of(rig, extract(frames.frame(i).value().color.view()), slam::sensor_kind::monocular);
     f.index = i;
-    const auto begun = start.see(f);
+    const auto begun = start.process(f);
     if (!begun) continue;
     CHECK(start.candidates().empty());
     CHECK(begun->first.size() >= settings.start.min_features);  // it is the whole frame that is handed over
@@ -227,17 +227,17 @@ TEST_CASE("The first frame gives way when little of it is still seen") {
     f.index = i;
     return f;
   };
-  CHECK_FALSE(start.see(frame_at(0)).has_value());
+  CHECK_FALSE(start.process(frame_at(0)).has_value());
   REQUIRE(start.candidates().size() == 1);
   CHECK(start.candidates().front().frame.index == 0);
-  CHECK_FALSE(start.see(frame_at(5)).has_value());
+  CHECK_FALSE(start.process(frame_at(5)).has_value());
   REQUIRE(start.candidates().size() == 1);
   CHECK(start.candidates().front().frame.index == 5);
   CHECK(start.why().code == errc::no_data);
   start.reset();
   CHECK(start.candidates().empty());
   slam::frame empty;
-  CHECK_FALSE(start.see(empty).has_value());
+  CHECK_FALSE(start.process(empty).has_value());
   CHECK(start.candidates().empty());
   CHECK(start.why().code == errc::no_data);
 }
@@ -253,7 +253,7 @@ TEST_CASE("Younger frames wait for the time when the first one is out of sight, 
   for (std::size_t i = 0; i != frames.size(); ++i) {
     auto f = slam::detail::frame_of(rig, extract(frames.frame(i).value().color.view()), slam::sensor_kind::monocular);
     f.index = i;
-    REQUIRE_FALSE(start.see(f).has_value());
+    REQUIRE_FALSE(start.process(f).has_value());
     const auto& waiting = start.candidates();
     REQUIRE(!waiting.empty());
     most = std::max(most, waiting.size());

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The pose of a frame from its depth: its points against the surfaces of keyframes.
+/// Estimation of the pose of a frame from its depth: its points are aligned with the surfaces of keyframes.
 ///
-/// Points meet surfaces by projection, and their distances from the planes there are minimised. Sources: G. Blais, M.
-/// D. Levine, "Registering multiview range data to create 3D computer objects", PAMI 17(8), 1995; Y. Chen, G. Medioni,
-/// "Object modelling by registration of multiple range images", Image and Vision Computing 10(3), 1992. What the
-/// surfaces leave free is left alone: J. Zhang, M. Kaess, S. Singh, "On degeneracy of optimization-based state
-/// estimation problems", ICRA 2016.
+/// Points are associated with surfaces by projection, and their distances from the planes are minimised. Sources: G.
+/// Blais, M. D. Levine, "Registering multiview range data to create 3D computer objects", PAMI 17(8), 1995; Y. Chen, G.
+/// Medioni, "Object modelling by registration of multiple range images", Image and Vision Computing 10(3), 1992.
+/// Directions that the surfaces leave free are not changed: J. Zhang, M. Kaess, S. Singh, "On degeneracy of
+/// optimization-based state estimation problems", ICRA 2016.
 #pragma once
 
 #include <algorithm>
@@ -31,36 +31,36 @@
 
 namespace orbis::slam::detail {
 
-/// A surface where it stands in the world.
+/// A surface with its pose in the world.
 struct placed_surface {
   const surface* seen = nullptr;
   se3 T_world_camera;
 };
 
-/// How far a point may be from the plane that it is compared with.
+/// Maximum deviation of a point from its associated plane.
 struct alignment_gate {
   double distance = 0.05;   ///< metres ...
-  double deviations = 4.0;  ///< ... or so many standard deviations, if that is more
-  double cosine = 0.8;      ///< of the angle between the directions of both surfaces, at least
+  double deviations = 4.0;  ///< ... or this number of standard deviations, if that is more
+  double cosine = 0.8;      ///< minimum cosine of the angle between the normals of both surfaces
 };
 
-/// A point of the frame and the plane that it lies on.
+/// A point of the frame and its associated plane.
 struct plane_observation_of_row {
   optimize::point_to_plane seen;  ///< `measured` in the camera frame of the row's time
   double time = 0.0;              ///< of the row, relative to the frame, seconds
 };
 
-/// What became of the samples.
+/// Counts of the associated samples.
 struct association {
-  std::size_t visible = 0;     ///< samples that project to where a surface is known
-  std::size_t consistent = 0;  ///< of these, those within the gate
+  std::size_t visible = 0;     ///< samples that project onto a known surface
+  std::size_t consistent = 0;  ///< those of the visible samples that are within the gate
   [[nodiscard]] double share() const noexcept {
     return visible == 0 ? 0.0 : static_cast<double>(consistent) / static_cast<double>(visible);
   }
 };
 
-/// Finds the planes that samples lie on, given a pose: for each those of the first surface that agrees with it.
-/// `stride`: of the samples every how many-th is looked at. O(samples * surfaces).
+/// Finds the planes of samples, given a pose: for each sample the plane of the first surface that agrees with it.
+/// `stride`: every `stride`-th sample is used. O(samples * surfaces).
 template <camera::camera_model Camera>
 association associate(std::span<const surface_sample> samples, std::size_t stride,
                       std::span<const placed_surface> surfaces, const moving_pose& at, const camera::shutter& shutter,
@@ -111,15 +111,15 @@ association associate(std::span<const surface_sample> samples, std::size_t strid
 /// The residuals of the planes to second order in a motion of the camera frame (`exp(step) * T_camera_world`), without
 /// the directions that they leave free.
 struct depth_equations {
-  pose_quadratic term;     ///< the information is that of so many independent points as is allowed, at most
-  int determined = 0;      ///< directions of the pose, of six
-  double least = 0.0;      ///< what the normals have in the direction that they determine least, mean square
+  pose_quadratic term;     ///< with the information of at most the given number of independent points
+  int determined = 0;      ///< number of determined directions of the pose, of six
+  double least = 0.0;      ///< mean square of the normals in the least determined direction
   double deviation = 0.0;  ///< root mean square of the residuals, standard deviations
 };
 
-/// `points`: how many points the term may count as; more are weighed down to this. `weakest`: the mean square of what
-/// the normals have in a direction, below which it counts as free; rotations as if the points were at their mean
-/// depth, which is what turns an angle into metres. O(planes).
+/// Returns the equations of planes. `points`: maximum number of points the term counts as; more are down-weighted.
+/// `weakest`: mean square of the normals in a direction below which it counts as free; rotations are scaled to metres
+/// by the mean depth of the points. O(planes).
 [[nodiscard]] inline depth_equations equations_of(std::span<const plane_observation_of_row> planes,
                                                   const moving_pose& at, double points, double weakest) {
   depth_equations e;
@@ -135,7 +135,7 @@ struct depth_equations {
     matrix<1, 6> right;
     const auto r = seen.linearize(at.T_world_camera, right);
     if (!r) continue;
-    const vec6 j = -transposed(right);  // a step of the camera from the left is one of its pose from the right, back
+    const vec6 j = -transposed(right);  // a left step of the camera is a right step of its pose, reversed
     const double error = std::abs((*r)[0]);
     const double weight = error <= width ? 1.0 : width / error;
     cost += 0.5 * weight * error * error;
@@ -150,7 +150,7 @@ struct depth_equations {
   const auto n = static_cast<double>(planes.size());
   e.deviation = std::sqrt(squares / n);
 
-  // Eigenvalues where a radian counts as the metres at the mean range.
+  // Eigenvalues, with radians scaled to metres at the mean range.
   vec6 scale = filled<vec6>(1);
   for (int i = 3; i != 6; ++i) scale[i] = n / range;
   mat6 scaled;
@@ -165,7 +165,7 @@ struct depth_equations {
     const vec6 v = column_of(directions.vectors, i);
     keep += outer_product(v, v);
   }
-  for (int i = 0; i != 6; ++i)  // of scaled gradients: of gradients
+  for (int i = 0; i != 6; ++i)  // from scaled gradients to gradients
     for (int k = 0; k != 6; ++k) keep(i, k) *= scale[k] / scale[i];
   const double share = std::min(1.0, points / n);
   for (mat6& m : h) m = share * (keep * m * transposed(keep));
@@ -175,7 +175,7 @@ struct depth_equations {
   return e;
 }
 
-/// The motion of the camera frame to the least cost, where the planes determine one; zero in all other directions.
+/// Returns the motion of the camera frame to the least cost in the determined directions; zero in all others.
 [[nodiscard]] inline vec6 step_of(const depth_equations& e) {
   const symmetric_eigen<6> h = eigen_of_symmetric<6>(block<6, 6>(e.term.h, 0, 0));
   vec6 step = zeros<vec6>();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// What the depth image of a frame says of its pose, and the surfaces of the last keyframes that it is aligned with.
+/// Pose constraints from the depth image of a frame, and the keyframe surfaces with which it is aligned.
 #pragma once
 
 #include <algorithm>
@@ -28,12 +28,12 @@
 
 namespace orbis::slam::detail {
 
-/// Surfaces by the keyframe that they move with. When there is no room, the one that was asked for longest ago goes.
+/// Surfaces by the keyframe with which they move. When full, it replaces the least recently used one.
 class surface_memory {
  public:
   explicit surface_memory(std::size_t capacity) : capacity_{std::max<std::size_t>(capacity, 1)} {}
 
-  /// Keeps a surface, which is exchanged for one whose memory may be used again.
+  /// Stores a surface, and returns one in `s` whose memory can be reused.
   void keep(map_keyframe anchor, const se3& T_anchor_camera, surface& s) {
     if (kept_.size() < capacity_) kept_.emplace_back();
     kept& k =
@@ -44,8 +44,8 @@ class surface_memory {
     std::swap(k.seen, s);
   }
 
-  /// The surfaces that a camera at a pose in the active map is nearest to, at most `count`, the nearest first. They
-  /// stay valid until the next one is kept. O(surfaces).
+  /// Finds at most `count` surfaces nearest to a camera pose in the active map, the nearest first. They remain valid
+  /// until the next `keep`. O(surfaces).
   template <feature_descriptor D>
   void around(const basic_atlas<D>& maps, const se3& T_world_camera, std::size_t count,
               std::vector<placed_surface>& to) {
@@ -67,7 +67,7 @@ class surface_memory {
     }
   }
 
-  /// How far the view has changed between two poses: metres, where a radian counts as two of them.
+  /// Returns the change of the view between two poses, metres, where a radian counts as two metres.
   [[nodiscard]] static double distance(const se3& a, const se3& b) {
     const se3 between = a.inverse() * b;
     return norm(between.translation()) + 2.0 * between.rotation().angle();
@@ -89,20 +89,20 @@ class surface_memory {
   std::size_t capacity_;
   std::uint64_t clock_ = 0;
   std::vector<kept> kept_;
-  std::vector<near> near_;  ///< its memory is used again
+  std::vector<near> near_;  ///< reused working memory
 };
 
-/// A pose that the depth of a frame was aligned at.
+/// The result of aligning the depth of a frame.
 struct depth_alignment {
   moving_pose at;
-  int determined = 0;   ///< directions of the pose that the surfaces determine, of six
-  double least = 0.0;   ///< how well they do in the worst of these: `depth_equations::least`
-  association seen;     ///< there
+  int determined = 0;   ///< number of directions of the pose that the surfaces determine, of six
+  double least = 0.0;   ///< their strength in the worst of these: `depth_equations::least`
+  association seen;     ///< at the aligned pose
   bool is_only = true;  ///< no other pose fits nearly as well
 };
 
-/// Poses to align depth from: where the motion leads to, where the camera was, and turned from there both ways, and up
-/// and down, by what a hand turns it in the time. `interval`: seconds since `last`.
+/// Returns start poses for depth alignment: the predicted pose, the last pose, and the last pose turned left and right,
+/// up and down, by the angle of a hand-held camera in the time. `interval`: seconds since `last`.
 [[nodiscard]] inline std::array<moving_pose, 8> search_starts(const se3& last, const se3& predicted, double interval) {
   const double angle = std::clamp(interval, 0.05, 0.25);  // about a radian per second
   std::array<moving_pose, 8> starts;
@@ -117,7 +117,7 @@ struct depth_alignment {
   return starts;
 }
 
-/// Keeps surfaces of keyframes and compares frames with them. `see` begins a frame; `keep` may end it. Allocates
+/// Keeps surfaces of keyframes and compares frames with them. `set_depth` begins a frame; `keep` may end it. Allocates
 /// nothing once its buffers have grown.
 template <camera::camera_model Camera>
 class depth_tracker {
@@ -127,33 +127,34 @@ class depth_tracker {
 
   [[nodiscard]] bool is_on() const noexcept { return options_.enabled || options_.recovers; }
 
-  /// The depth image of the next frame. About half a millisecond.
+  /// Sets the depth image of the next frame. About half a millisecond.
   template <camera::depth_source Depth>
-  void see(const Depth& depth) {
+  void set_depth(const Depth& depth) {
     samples_.clear();
     now_.cells.clear();
     if (!is_on() || depth.width() != rig_.camera().width() || depth.height() != rig_.camera().height()) return;
     builder_.build(rig_.camera(), depth, 1.0 / rig_.model.bf, rig_.min_depth, rig_.max_depth, now_);
     sampler_.choose(now_, options_.points, samples_);
   }
-  /// The next frame has no depth image.
-  void see_nothing() {
+  /// Records that the next frame has no depth image.
+  void clear_depth() {
     samples_.clear();
     now_.cells.clear();
   }
 
-  /// Finds the surfaces around a pose in the active map, for what follows. Whether there are any.
+  /// Finds the surfaces around a pose in the active map, for the functions below. Returns true if there are any.
   template <feature_descriptor D>
-  bool surround(const basic_atlas<D>& maps, const se3& T_world_camera) {
+  bool find_surfaces(const basic_atlas<D>& maps, const se3& T_world_camera) {
     placed_.clear();
     if (samples_.size() < options_.min_points) return false;
     memory_.around(maps, T_world_camera, 2, placed_);
     return !placed_.empty();
   }
-  /// What it returned last.
-  [[nodiscard]] bool is_surrounded() const noexcept { return !placed_.empty(); }
+  /// Returns the last result of `find_surfaces`.
+  [[nodiscard]] bool has_surfaces() const noexcept { return !placed_.empty(); }
 
-  /// What the surfaces say of a pose close to the true one; empty if that is nothing. @pre surround
+  /// Returns the cost of a pose close to the true one by the surfaces; empty if they do not constrain it.
+  /// @pre find_surfaces
   [[nodiscard]] std::optional<pose_quadratic> term_at(const moving_pose& at, const camera::shutter& shutter) {
     const association seen = associate<Camera>(samples_, 1, placed_, at, shutter, rig_, close, planes_);
     if (seen.consistent < options_.min_points / 2) return std::nullopt;
@@ -163,17 +164,17 @@ class depth_tracker {
     return e.term;
   }
 
-  /// How much of the frame lies on the surfaces around it at a pose. @pre surround
+  /// Counts the points of the frame that are on the surfaces around it at a pose. @pre find_surfaces
   [[nodiscard]] association agreement(const moving_pose& at, const camera::shutter& shutter) {
     return associate<Camera>(samples_, 1, placed_, at, shutter, rig_, close, planes_);
   }
-  /// Whether that is enough for depth to hold the camera there.
-  [[nodiscard]] bool holds(const association& seen) const noexcept {
+  /// Returns true if depth agrees well enough to support the pose.
+  [[nodiscard]] bool supports_pose(const association& seen) const noexcept {
     return seen.consistent >= options_.min_points && seen.share() >= options_.min_share;
   }
 
-  /// Aligns the frame, from the best of several poses around a start; empty if it is not sure that it lies there. What
-  /// the surfaces leave free stays as it is at the start. About a millisecond. @pre surround
+  /// Aligns the frame from the best of several start poses; empty if the result is uncertain. Directions that the
+  /// surfaces leave free keep their value at the start. About a millisecond. @pre find_surfaces
   template <class Starts>
   [[nodiscard]] std::optional<depth_alignment> align(const Starts& starts, const camera::shutter& shutter) {
     found_.clear();
@@ -189,7 +190,7 @@ class depth_tracker {
     if (best == found_.end()) return std::nullopt;
     depth_alignment result = descend(best->at, shutter, 1, 0.1, 6);
     result.seen = agreement(result.at, shutter);
-    if (!holds(result.seen)) return std::nullopt;
+    if (!supports_pose(result.seen)) return std::nullopt;
     constexpr double apart = 0.1;
     for (const depth_alignment& other : found_)
       if (surface_memory::distance(other.at.T_world_camera, best->at.T_world_camera) > apart &&
@@ -197,21 +198,21 @@ class depth_tracker {
         result.is_only = false;
     return result;
   }
-  /// Whether an alignment is sure enough to go without landmarks.
-  [[nodiscard]] bool holds_alone(const depth_alignment& found) const noexcept {
+  /// Returns true if an alignment is certain enough without landmarks.
+  [[nodiscard]] bool determines_pose(const depth_alignment& found) const noexcept {
     constexpr double share = 0.85, visible = 0.35, least = 0.003;
     return found.is_only && found.least >= least && found.seen.share() >= share &&
            static_cast<double>(found.seen.visible) >= visible * static_cast<double>(samples_.size());
   }
 
-  /// Keeps the surface of the frame, which was tracked at `at`, as that of a keyframe, or near one.
+  /// Keeps the surface of the present frame at `T_anchor_camera` relative to keyframe `anchor`.
   void keep(map_keyframe anchor, const se3& T_anchor_camera, const vec6& twist, const camera::shutter& shutter) {
     if (now_.empty()) return;
     if (!shutter.is_global()) move_to_frame_time(twist, shutter);
     memory_.keep(anchor, T_anchor_camera, now_);
     now_.cells.clear();
   }
-  /// Whether the nearest surface is so far from a pose that another one is needed there.
+  /// Returns true if the nearest surface is so far from a pose that another one is needed there.
   template <feature_descriptor D>
   [[nodiscard]] bool needs_surface(const basic_atlas<D>& maps, const se3& T_world_camera) {
     constexpr double far = 0.5;
@@ -223,7 +224,7 @@ class depth_tracker {
  private:
   static constexpr alignment_gate close{.distance = 0.03, .deviations = 2.0, .cosine = 0.85};
 
-  /// Steps with a gate that closes from `distance`, metres.
+  /// Iterates with a gate that shrinks from `distance`, metres.
   depth_alignment descend(const moving_pose& start, const camera::shutter& shutter, std::size_t stride, double distance,
                           int iterations) {
     depth_alignment a;
@@ -262,7 +263,7 @@ class depth_tracker {
   surface_builder<Camera> builder_;
   surface_sampler sampler_;
   surface_memory memory_;
-  surface now_;  ///< of the frame
+  surface now_;  ///< of the present frame
   std::vector<surface_sample> samples_;
   std::vector<placed_surface> placed_;
   std::vector<plane_observation_of_row> planes_;

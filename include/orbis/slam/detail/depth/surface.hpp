@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The surface that a depth image shows, as a coarse grid of small planes.
+/// The surface measured by a depth image, as a coarse grid of small planes.
 ///
 /// The inverse depth of a plane is a linear function of the ray `(x, y, 1)` through a pixel, and the noise of a
 /// disparity sensor is the same for each inverse depth: planes are fitted to inverse depths by least squares.
@@ -20,15 +20,15 @@ namespace orbis::slam::detail {
 
 /// A small plane, in the camera frame.
 struct surface_cell {
-  float x = 0.0F, y = 0.0F, z = 0.0F;     ///< a point on it, metres; `z` is 0 where there is none
-  float nx = 0.0F, ny = 0.0F, nz = 0.0F;  ///< its normal, of unit length, towards the camera
-  float measured = 0.0F;                  ///< the depth there as it was measured, without its neighbours, metres
+  float x = 0.0F, y = 0.0F, z = 0.0F;     ///< a point on it, metres; `z` is 0 if there is no plane
+  float nx = 0.0F, ny = 0.0F, nz = 0.0F;  ///< unit normal, towards the camera
+  float measured = 0.0F;                  ///< its measured depth, without its neighbours, metres
   [[nodiscard]] bool is_there() const noexcept { return z > 0.0F; }
   [[nodiscard]] vec3 point() const { return {static_cast<double>(x), static_cast<double>(y), static_cast<double>(z)}; }
   [[nodiscard]] vec3 normal() const {
     return {static_cast<double>(nx), static_cast<double>(ny), static_cast<double>(nz)};
   }
-  /// The point as it was measured, on the same ray.
+  /// The measured point on the same ray.
   [[nodiscard]] vec3 measured_point() const { return static_cast<double>(measured / z) * point(); }
 };
 
@@ -39,24 +39,25 @@ struct surface {
   std::vector<surface_cell> cells;
 
   [[nodiscard]] bool empty() const noexcept { return cells.empty(); }
-  /// The cell that a pixel lies in; null outside of the grid.
+  /// Returns the cell that contains a pixel; null outside of the grid.
   [[nodiscard]] const surface_cell* at(const vec2& pixel) const noexcept {
     const double u = (pixel.x() + 0.5) / step, v = (pixel.y() + 0.5) / step;
     if (!(u >= 0.0 && v >= 0.0 && u < columns && v < rows)) return nullptr;
     return &cells[static_cast<std::size_t>(v) * static_cast<std::size_t>(columns) + static_cast<std::size_t>(u)];
   }
-  /// The row of pixels in the middle of a cell.
+  /// Returns the pixel row in the middle of a cell.
   [[nodiscard]] double pixel_row(std::size_t cell) const noexcept {
     return (static_cast<double>(cell / static_cast<std::size_t>(columns)) + 0.5) * step - 0.5;
   }
 };
 
-/// Makes surfaces of the depth images of one camera. Its memory and that of the surface are used again.
+/// Makes surfaces from the depth images of one camera. Reuses its memory and that of the surface.
 template <camera::camera_model Camera>
 class surface_builder {
  public:
-  /// `noise`: the standard deviation of an inverse depth, 1/m. Depths outside of `min_depth ... max_depth` (metres) are
-  /// not used. O(pixels). @pre the image has the size of the camera, and the camera is the same in all calls
+  /// Builds the surface of a depth image. `noise`: the standard deviation of an inverse depth, 1/m. Depths outside of
+  /// `min_depth ... max_depth` (metres) are not used. O(pixels). @pre the image has the size of the camera, and the
+  /// camera is the same in all calls
   template <camera::depth_source Depth>
   void build(const Camera& camera, const Depth& depth, double noise, double min_depth, double max_depth, surface& to) {
     to.step = std::max(4, (depth.width() + 40) / 80);
@@ -77,17 +78,17 @@ class surface_builder {
  private:
   /// The mean of the depths in a cell.
   struct sampled {
-    float x, y;     ///< the ray to their middle, at z = 1
+    float x, y;     ///< the ray to their mean pixel, at z = 1
     float inverse;  ///< 1/m; 0: none
   };
   struct ray {
     float x, y;        ///< through the middle of the cell; NaN: none
-    float by_u, by_v;  ///< change for each pixel
+    float by_u, by_v;  ///< change per pixel
   };
   struct sampling {
     int step;
     float min_depth, max_depth;
-    float jump;  ///< of inverse depths in a cell that noise alone makes, 1/m
+    float jump;  ///< range of inverse depths in a cell that noise alone causes, 1/m
   };
 
   void find_rays(const Camera& camera, const surface& to) {
@@ -134,7 +135,7 @@ class surface_builder {
     s = {r.x + du * r.by_u, r.y + dv * r.by_v, std::isnan(r.x) ? 0.0F : sum / n};
   }
 
-  /// The plane through a cell and those around it that lie on the same surface.
+  /// Fits a plane to a cell and the cells around it on the same surface.
   void fit(int column, int row, float noise, surface& to) const {
     constexpr int radius = 2, enough = 12;
     constexpr float steepest = 0.05F;  // relative change of depth from cell to cell

@@ -16,18 +16,18 @@
 
 namespace orbis::slam::detail {
 
-/// A measured point and the direction of the surface there, in the camera frame of the moment when it was read.
+/// A measured point and its surface normal, in the camera frame at the time when it was read.
 struct surface_sample {
   vec3 point;
   vec3 normal;
   double row = 0.0;  ///< of the depth image, pixels
 };
 
-/// Chooses points of surfaces. Its memory is used again.
+/// Selects points of surfaces. Reuses its memory.
 class surface_sampler {
  public:
-  /// At most `count` cells of a surface: every direction gets the same number, or all it has, and what it has is taken
-  /// evenly over the image. O(cells).
+  /// Selects at most `count` cells of a surface: every direction gets the same number, or all its cells, evenly spread
+  /// over the image. O(cells).
   void choose(const surface& from, std::size_t count, std::vector<surface_sample>& to) {
     for (auto& bin : bins_) bin.clear();
     for (std::size_t i = 0; i != from.cells.size(); ++i)
@@ -40,7 +40,7 @@ class surface_sampler {
     });
     to.clear();
     std::size_t left = count;
-    for (std::size_t k = 0; k != bin_count; ++k) {  // the smallest first: what they lack goes to the others
+    for (std::size_t k = 0; k != bin_count; ++k) {  // the smallest first: unused places go to the others
       const auto& bin = bins_[order[k]];
       const std::size_t take = std::min(bin.size(), left / (bin_count - k));
       left -= take;
@@ -55,7 +55,7 @@ class surface_sampler {
  private:
   static constexpr std::size_t across = 5, bin_count = across * across;
 
-  /// Normals look towards the camera: their x and y tell them apart.
+  /// Normals point towards the camera: their x and y distinguish them.
   [[nodiscard]] static std::size_t bin_of(const surface_cell& c) noexcept {
     const auto part = [](float x) {
       const auto i = static_cast<int>((x + 1.0F) * 0.5F * static_cast<float>(across));

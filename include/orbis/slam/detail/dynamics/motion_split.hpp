@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Tells the motion of the camera from that of something that moves before it.
+/// Separates the motion of the camera from that of an object moving in front of it.
 #pragma once
 
 #include <algorithm>
@@ -26,39 +26,39 @@
 
 namespace orbis::slam::detail {
 
-/// What is known of a frame whose matches do not all agree with one pose.
+/// The result for a frame whose matches do not all agree with one pose.
 struct motion_split {
-  se3 T_world_camera;                  ///< by what stands still
-  std::size_t inliers = 0;             ///< matches that agree with it
+  se3 T_world_camera;                  ///< from static matches
+  std::size_t inliers = 0;             ///< number of matches that agree with it
   std::vector<std::uint8_t> outliers;  ///< 1 for each match that does not
-  std::vector<std::uint8_t> moving;    ///< 1 for each match on something that moves; these are outliers
+  std::vector<std::uint8_t> moving;    ///< 1 for each match on a moving object; these are outliers
   bool by_trust = false;               ///< the pose is that of the trusted matches alone
 };
 
-/// The trust from which on a match counts as one of something that stands still.
+/// Minimum trust of a match that counts as static.
 inline constexpr double enough_trust = 0.7;
-/// The weight of a match that is not trusted at all.
+/// The weight of a match without trust.
 inline constexpr double least_trust = 0.02;
 
-/// Whether so many outliers are worth a closer look.
+/// Returns true if the number of outliers justifies a search for a second motion.
 [[nodiscard]] inline bool may_hold_two_motions(std::size_t matches, std::size_t inliers,
                                                const moving_options& o) noexcept {
   const std::size_t outliers = matches - std::min(inliers, matches);
   return outliers >= o.min_features && static_cast<double>(outliers) > o.share * static_cast<double>(matches);
 }
 
-/// Looks for a second rigid motion among matches of which one pose leaves many out, and for which of the two is that of
-/// the camera: the one with the greater sum of trust times spread. What has been part of the map for long is trusted;
-/// what carries the camera along has come lately, or is small beside the room behind it. Among the poses that are tried
-/// is the one that the trusted matches alone give, from the prediction. The second motion is found by RANSAC among what
-/// the first leaves out, as in P. H. S. Torr, "Geometric motion segmentation and model selection", Phil. Trans. R. Soc.
-/// A 356 (1998).
+/// Searches for a second rigid motion among matches of which one pose leaves many out, and decides which of the two is
+/// that of the camera: the one with the greater sum of trust times spread. Matches that have long been part of the map
+/// are trusted; an object that drags the pose along has appeared recently, or is small compared with the room behind
+/// it. The candidate poses include the one from the trusted matches alone, starting from the prediction. The second
+/// motion is found by RANSAC among the outliers of the first, as in P. H. S. Torr, "Geometric motion segmentation and
+/// model selection", Phil. Trans. R. Soc. A 356 (1998).
 template <camera::camera_model Camera>
 class motion_splitter {
  public:
-  /// `trust`: of each match, 0 ... 1. `predicted`: where the camera is expected; `fitted`: by all matches, of which
-  /// these `outliers` do not agree. Empty if there is no second motion, and no better pose. O(matches), some tenths of
-  /// a millisecond. @pre one entry of `trust` and `outliers` for each observation
+  /// `trust`: of each match, 0 ... 1. `predicted`: the expected pose of the camera; `fitted`: the pose from all
+  /// matches, with which these `outliers` disagree. Empty if there is no second motion, and no better pose. O(matches),
+  /// some tenths of a millisecond. @pre one entry of `trust` and `outliers` for each observation
   [[nodiscard]] static std::optional<motion_split> split(std::span<const optimize::pose_observation> observations,
                                                          std::span<const double> trust,
                                                          const optimize::reprojection<Camera>& model,
@@ -74,7 +74,7 @@ class motion_splitter {
       constexpr double clearly = 1.02;
       const double value = other ? s.score(*other) : 0.0;
       if (!(value > (changed ? 1.0 : clearly) * score)) return;
-      if (trusted && !s.leaves_out_a_body(*other)) return;
+      if (trusted && !s.outliers_form_body(*other)) return;
       score = value, pose = *other, changed = true, by_trust = trusted;
     };
     const std::vector<std::uint8_t> trusted = s.trusted();
@@ -94,11 +94,12 @@ class motion_splitter {
     return out;
   }
 
-  /// Whether the others of the matches agree with the pose of all, but not with that of the trusted ones: something
-  /// moves so slowly that it draws the pose along. O(matches), some ten microseconds.
-  [[nodiscard]] static bool is_drawn_along(std::span<const optimize::pose_observation> observations,
-                                           std::span<const double> trust, const optimize::reprojection<Camera>& model,
-                                           const se3& fitted, const moving_options& options) {
+  /// Returns true if the untrusted matches agree with the pose of all, but not with that of the trusted ones: an object
+  /// moves so slowly that it biases the pose. O(matches), some ten microseconds.
+  [[nodiscard]] static bool is_biased_by_motion(std::span<const optimize::pose_observation> observations,
+                                                std::span<const double> trust,
+                                                const optimize::reprojection<Camera>& model, const se3& fitted,
+                                                const moving_options& options) {
     motion_splitter s{observations, trust, model, options, 0};
     const std::vector<std::uint8_t> trusted = s.trusted();
     const auto count = static_cast<std::size_t>(std::count(trusted.begin(), trusted.end(), std::uint8_t{1}));
@@ -119,7 +120,7 @@ class motion_splitter {
                   const optimize::reprojection<Camera>& model, const moving_options& options, std::uint64_t seed)
       : observations_{observations}, trust_{trust}, model_{model}, options_{options}, seed_{seed} {}
 
-  /// Trust, less where a match agrees less, times the spread of those that agree.
+  /// Returns the sum of trust, weighted by agreement, times the spread of the agreeing matches.
   [[nodiscard]] double score(const se3& T_world_camera) const {
     const se3 T_camera_world = T_world_camera.inverse();
     double sum = 0.0, weight = 0.0;
@@ -139,14 +140,14 @@ class motion_splitter {
     return sum * std::sqrt(std::max(variance, 0.0));
   }
 
-  /// 1 for each match that is trusted.
+  /// Returns 1 for each trusted match.
   [[nodiscard]] std::vector<std::uint8_t> trusted() const {
     std::vector<std::uint8_t> all(observations_.size());
     for (std::size_t i = 0; i != all.size(); ++i) all[i] = trust_[i] >= enough_trust ? 1 : 0;
     return all;
   }
 
-  /// The pose by the matches that are `chosen`, beginning with `start`.
+  /// Estimates the pose from the `chosen` matches, starting from `start`.
   [[nodiscard]] std::optional<se3> refine_some(std::span<const std::uint8_t> chosen, const se3& start) {
     part_.clear();
     for (std::size_t i = 0; i != chosen.size(); ++i)
@@ -159,7 +160,7 @@ class motion_splitter {
     return refined.T_world_camera;
   }
 
-  /// Refines a pose on all that agree with it.
+  /// Refines a pose on all matches that agree with it.
   [[nodiscard]] std::optional<se3> refine_on_agreeing(se3 pose) {
     std::vector<std::uint8_t> agree(observations_.size());
     for (int round = 0; round != 2; ++round) {
@@ -172,20 +173,20 @@ class motion_splitter {
     return pose;
   }
 
-  /// Says which matches do not agree with a pose.
+  /// Marks the matches that disagree with a pose.
   void judge(const se3& T_world_camera, std::span<std::uint8_t> outliers) const {
     const se3 T_camera_world = T_world_camera.inverse();
     for (std::size_t i = 0; i != observations_.size(); ++i)
       outliers[i] = error(T_camera_world, i) <= error_limit(observations_[i].has_depth()) ? 0 : 1;
   }
-  /// Chi-squared.
+  /// The chi-squared error of a match.
   [[nodiscard]] double error(const se3& T_camera_world, std::size_t i) const {
     const optimize::pose_observation& o = observations_[i];
     const auto r = model_.residual(T_camera_world * o.point, o);
     return r ? squared_norm(*r) * o.information : std::numeric_limits<double>::infinity();
   }
 
-  /// A rigid motion among the outliers, by RANSAC.
+  /// Finds a rigid motion among the outliers by RANSAC.
   [[nodiscard]] std::optional<se3> second_motion(std::span<const std::uint8_t> outliers) {
     points_.clear();
     pixels_.clear();
@@ -204,8 +205,8 @@ class motion_splitter {
     return found->T_world_camera;
   }
 
-  /// Marks the outliers that agree with one other motion, clearly not with that of the camera, and lie among outliers:
-  /// what moves is one body, but the outliers of a blurred image are everywhere.
+  /// Marks the outliers that agree with one other motion, clearly disagree with that of the camera, and are surrounded
+  /// by outliers: a moving object is one body, whereas the outliers of a blurred image are everywhere.
   [[nodiscard]] bool mark_moving(motion_split& s) {
     const std::optional<se3> other = second_motion(s.outliers);
     if (!other) return false;
@@ -214,7 +215,7 @@ class motion_splitter {
     for (std::size_t i = 0; i != observations_.size(); ++i) {
       const double limit = error_limit(observations_[i].has_depth());
       const bool moves = s.outliers[i] != 0 && error(T_camera_other, i) <= 2.0 * limit &&
-                         error(T_camera_world, i) > 2.0 * limit && lies_among(s.outliers, i);
+                         error(T_camera_world, i) > 2.0 * limit && is_among_outliers(s.outliers, i);
       s.moving[i] = moves ? 1 : 0;
       count += s.moving[i];
     }
@@ -223,18 +224,18 @@ class motion_splitter {
     return false;
   }
 
-  /// Whether enough of the new matches that do not agree with a pose lie among such.
-  [[nodiscard]] bool leaves_out_a_body(const se3& T_world_camera) const {
+  /// Returns true if enough of the new matches that disagree with a pose are surrounded by outliers.
+  [[nodiscard]] bool outliers_form_body(const se3& T_world_camera) const {
     std::vector<std::uint8_t> out(observations_.size());
     judge(T_world_camera, out);
     std::size_t count = 0;
     for (std::size_t i = 0; i != out.size(); ++i)
-      count += out[i] != 0 && trust_[i] < enough_trust && lies_among(out, i);
+      count += out[i] != 0 && trust_[i] < enough_trust && is_among_outliers(out, i);
     return count >= options_.min_features;
   }
 
-  /// Whether most of the points nearest to one are outliers. O(matches).
-  [[nodiscard]] bool lies_among(std::span<const std::uint8_t> outliers, std::size_t which) const {
+  /// Returns true if most of the nearest points of a match are outliers. O(matches).
+  [[nodiscard]] bool is_among_outliers(std::span<const std::uint8_t> outliers, std::size_t which) const {
     struct neighbour {
       double distance = std::numeric_limits<double>::infinity();
       bool out = false;

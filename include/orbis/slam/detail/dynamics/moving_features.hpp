@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The features on what moves, followed from frame to frame and left out of all else.
+/// The features on moving objects, tracked from frame to frame and excluded from all other steps.
 #pragma once
 
 #include <algorithm>
@@ -29,7 +29,7 @@
 
 namespace orbis::slam::detail {
 
-/// Removes features of a frame, and keeps the order of the others. `leave_out`: one entry for each feature.
+/// Removes features of a frame, keeping the order of the others. `leave_out`: one entry per feature.
 template <feature_descriptor D>
 void remove_features(basic_frame<D>& f, std::span<const std::uint8_t> leave_out) {
   std::size_t kept = 0;
@@ -52,20 +52,20 @@ void remove_features(basic_frame<D>& f, std::span<const std::uint8_t> leave_out)
   f.grid = features::keypoint_grid(f.features.keypoints);
 }
 
-/// The features of the last frame that lie on something that moves. In each frame: `find`, then `judge` on matches of
-/// what stands still, `spread` when the pose is known, and `take_out` at the end. While nothing moves each of these
-/// returns at once and changes nothing.
+/// The features of the last frame on moving objects. Call for each frame: `find`, then `judge` on matches of static
+/// features, `spread` when the pose is known, and `take_out` at the end. While nothing moves, each of these returns at
+/// once and changes nothing.
 ///
-/// Where a second motion is found, its features are left out from then on. A feature is followed by its appearance near
-/// where its own motion in the image leads, and its place in the world is compared with that of a little earlier. Those
-/// around them that nothing is known of are left out as well. Who stands still stays left out for a while
-/// (`moving_options::hold`), so that going on is no surprise.
+/// When a second motion is found, its features are excluded from then on. A feature is matched by its appearance near
+/// the position predicted by its image motion, and its world position is compared with an earlier one. Features of
+/// unknown motion around them are excluded as well. An object that stops remains excluded for a while
+/// (`moving_options::hold`), in case it moves again.
 template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers>
 class moving_features {
  public:
   moving_features(const camera_rig<Camera>& rig, const options& settings) : rig_{rig}, options_{settings} {}
 
-  /// Forgets all.
+  /// Forgets all moving features.
   void clear() {
     tracks_.clear();
     next_.clear();
@@ -73,16 +73,16 @@ class moving_features {
     trusts_old_only_ = false;
   }
   [[nodiscard]] bool is_enabled() const noexcept { return options_.moving.enabled; }
-  /// How many features of the last frame were left out.
+  /// The number of features of the last frame that were excluded.
   [[nodiscard]] std::size_t size() const noexcept { return tracks_.size(); }
-  /// Where these were, pixels.
+  /// Their positions, pixels.
   [[nodiscard]] std::vector<vec2> pixels() const {
     std::vector<vec2> all;
     for (const track& t : tracks_) all.emplace_back(static_cast<double>(t.at.x), static_cast<double>(t.at.y));
     return all;
   }
 
-  /// Finds what moved in the last frame in the next one.
+  /// Finds the moving features of the last frame in the next one.
   void find(const basic_frame<D>& f) {
     is_left_out_.clear();
     next_.clear();
@@ -114,14 +114,14 @@ class moving_features {
     }
   }
 
-  /// Removes matches of features that are left out.
-  void drop_left_out(std::vector<features::match>& matches) const {
+  /// Removes matches of excluded features.
+  void remove_excluded(std::vector<features::match>& matches) const {
     if (is_left_out_.empty()) return;
     std::erase_if(matches, [&](const features::match& m) { return is_left_out_[m.train] != 0; });
   }
 
-  /// After the pose of a frame was refined on matches of `list`: looks for a second motion, if many of them do not
-  /// agree. Sets pose and landmarks of the frame anew where there is one. Returns the number of matches that agree.
+  /// Searches for a second motion after the pose of a frame was refined on matches of `list`, if many of them disagree.
+  /// If one is found, sets pose and landmarks of the frame again. Returns the number of matches that agree.
   std::size_t judge(basic_frame<D>& f, const basic_map<D>& m, const search_list<D>& list,
                     std::span<const features::match> matches, std::size_t inliers, const se3& predicted) {
     if (!is_enabled() || inliers == 0) return inliers;
@@ -134,15 +134,15 @@ class moving_features {
     return agreeing;
   }
 
-  /// The pose of the last frame.
+  /// Sets the pose of the last frame.
   void set_last(const se3& T_world_camera) { T_world_last_ = T_world_camera; }
 
-  /// Whether a landmark is to be left out of the search in the present frame: what is new may move.
-  [[nodiscard]] bool avoids(const basic_map<D>& m, landmark_id id, double now) const {
+  /// Returns true if a landmark must be excluded from the search in the present frame: new landmarks may move.
+  [[nodiscard]] bool is_excluded(const basic_map<D>& m, landmark_id id, double now) const {
     return trusts_old_only_ && trust_of(m, id, now) < enough_trust;
   }
 
-  /// Leaves out what lies around features that move, nearer to them than to what agrees with the pose.
+  /// Excludes features around moving ones that are nearer to them than to features that agree with the pose.
   void spread(const basic_frame<D>& f) {
     if (next_.empty()) return;
     struct labelled {
@@ -189,7 +189,7 @@ class moving_features {
     }
   }
 
-  /// Takes what moves out of a frame whose pose is known, and follows it on.
+  /// Removes the moving features from a frame whose pose is known, and keeps them for the next frame.
   void take_out(basic_frame<D>& f) {
     std::swap(tracks_, next_);
     next_.clear();
@@ -230,12 +230,12 @@ class moving_features {
     std::size_t feature = 0;  ///< of the present frame
     features::keypoint at;
     D descriptor{};
-    float flow_x = 0.0F, flow_y = 0.0F;  ///< pixels since the frame before
-    vec3 anchor = zeros<vec3>();         ///< where it was a little earlier, world
-    double anchored = 0.0;               ///< when that was, seconds
-    double moved = 0.0;                  ///< when it was last seen to move, or first seen
+    float flow_x = 0.0F, flow_y = 0.0F;  ///< pixels since the previous frame
+    vec3 anchor = zeros<vec3>();         ///< an earlier position, world
+    double anchored = 0.0;               ///< time of the anchor, seconds
+    double moved = 0.0;                  ///< time of the last motion, or of the first observation, seconds
     bool has_anchor = false;
-    bool has_moved = false;  ///< by itself; otherwise it is left out for what is beside it
+    bool has_moved = false;  ///< moved by itself; otherwise excluded because of its neighbours
   };
 
   std::size_t split_motions(basic_frame<D>& f, const basic_map<D>& m, const search_list<D>& list,
@@ -249,7 +249,8 @@ class moving_features {
       trust.push_back(trust_of(m, p.landmark, f.timestamp));
     }
     if (!may_hold_two_motions(matches.size(), inliers, options_.moving) &&
-        !motion_splitter<Camera>::is_drawn_along(observations, trust, rig_.model, f.T_world_camera, options_.moving))
+        !motion_splitter<Camera>::is_biased_by_motion(observations, trust, rig_.model, f.T_world_camera,
+                                                      options_.moving))
       return inliers;
     const se3 T_camera_world = f.T_world_camera.inverse();
     for (std::size_t i = 0; i != matches.size(); ++i)
@@ -282,8 +283,8 @@ class moving_features {
     return split->inliers;
   }
 
-  /// Whether a feature is clearly not where it was a little earlier. Only its pixel is asked: the depth at the edge of
-  /// something leaps.
+  /// Returns true if a feature is clearly not at its earlier position. Only its pixel is compared: depth is
+  /// discontinuous at the edge of an object.
   [[nodiscard]] bool away(const basic_frame<D>& f, const se3& T_camera_world, const track& t) const {
     const auto expected = rig_.camera().project(T_camera_world * t.anchor);
     if (!expected) return false;
@@ -291,7 +292,7 @@ class moving_features {
     return squared_norm(*expected - f.pixel(t.feature)) * information > 2.0 * error_limit(false);
   }
 
-  /// How much a landmark is to be trusted to stand still, by its age.
+  /// Returns the trust in a landmark to be static, by its age.
   [[nodiscard]] double trust_of(const basic_map<D>& m, landmark_id id, double now) const {
     if (id == no_id) return 0.0;
     const keyframe_id by = m.landmark_at(id).created;
@@ -302,10 +303,10 @@ class moving_features {
   const camera_rig<Camera>& rig_;
   const options& options_;
   std::vector<track> tracks_, next_;       ///< of the last frame, of the present one
-  std::vector<std::uint8_t> is_left_out_;  ///< of the present frame's features; empty: none is
-  std::vector<std::uint8_t> agrees_;       ///< which of these agree with the pose of what stands still
+  std::vector<std::uint8_t> is_left_out_;  ///< by feature of the present frame; empty: none is excluded
+  std::vector<std::uint8_t> agrees_;       ///< by feature: 1 if it agrees with the pose of the static scene
   bool trusts_old_only_ = false;           ///< in the present frame
-  double moved_ = 0.0;                     ///< when something moved, seconds
+  double moved_ = 0.0;                     ///< time of the last motion, seconds
   se3 T_world_last_;
 };
 

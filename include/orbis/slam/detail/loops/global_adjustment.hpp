@@ -2,10 +2,11 @@
 /// @file
 /// Bundle adjustment of a whole map.
 ///
-/// `take` and `apply` touch the map, solving works on the snapshot. Between them keyframes, landmarks and observations
-/// may be added: keyframes follow their parent in the spanning tree, landmarks the keyframe that created them. So does
-/// a landmark with a single observation, which takes no part. The root of the map is held. Where lengths are not
-/// measured, what hangs on a keyframe grows or shrinks as the lengths in its view do.
+/// `take_...`, `apply_poses` and `erase_outliers` access the map, solving works on the snapshot. Between them
+/// keyframes, landmarks and observations may be added: keyframes follow their parent in the spanning tree, landmarks
+/// the keyframe that created them. The same holds for a landmark with a single observation, which is not adjusted. The
+/// root of the map is held fixed. If lengths are not measured, everything relative to a keyframe is scaled with the
+/// lengths in its view.
 ///
 /// Source: R. Mur-Artal, J. D. Tardos, "ORB-SLAM2", T-RO 33 (2017), section III.E.
 #pragma once
@@ -30,9 +31,9 @@ namespace orbis::slam::detail::global_adjustment {
 
 /// The result of adjusting a map.
 struct report {
-  std::size_t keyframes = 0;     ///< that were adjusted
-  std::size_t landmarks = 0;     ///< that were adjusted
-  std::size_t observations = 0;  ///< that took part
+  std::size_t keyframes = 0;     ///< number of adjusted keyframes
+  std::size_t landmarks = 0;     ///< number of adjusted landmarks
+  std::size_t observations = 0;  ///< number of observations used
   std::size_t outliers = 0;      ///< observations that disagreed and were erased
   int iterations = 0;
   double initial_cost = 0.0;  ///< half the robust sum of squared errors
@@ -41,13 +42,13 @@ struct report {
 
 struct snapshot : bundle_snapshot {
   std::unordered_map<std::uint32_t, std::uint32_t> index;  ///< by keyframe id: its index in the arrays
-  landmark_id next_landmark = 0;                           ///< the first one that was not looked at yet
+  landmark_id next_landmark = 0;                           ///< the next landmark to copy
 
   [[nodiscard]] std::uint32_t index_of(keyframe_id k) const {
     const auto i = index.find(k.value());
     return i != index.end() ? i->second : no_id;
   }
-  /// Whether `take_landmarks` has more to do.
+  /// Returns true if `take_landmarks` has more to do.
   [[nodiscard]] bool has_more() const noexcept { return next_landmark != end_landmark; }
 };
 
@@ -76,7 +77,7 @@ template <feature_descriptor D>
     s.index.emplace(k.id.value(), static_cast<std::uint32_t>(s.keyframes.size()));
     s.add_keyframe(k.id, k.T_world_camera, is_root);
   }
-  // Arrays that grow are copied, and whoever waits for a part of the landmarks would wait for that as well.
+  // Growing arrays would be copied, which would add to the time that the lock is held for a part of the landmarks.
   s.landmarks.reserve(m.landmark_count());
   s.points.reserve(m.landmark_count());
   s.observations.reserve(keypoints);
@@ -84,8 +85,8 @@ template <feature_descriptor D>
   return s;
 }
 
-/// Copies the next `count` landmarks, with their observations, so that a caller who shares the map can do it part by
-/// part. Keyframes, landmarks and observations may be added in between; they take no part. O(observations).
+/// Copies the next `count` landmarks with their observations, so that a caller that shares the map can do it in parts.
+/// Keyframes, landmarks and observations added in between are not adjusted. O(observations).
 template <feature_descriptor D, camera::camera_model Camera>
 void take_landmarks(snapshot& s, const basic_map<D>& m, const camera_rig<Camera>& rig, std::size_t count) {
   const auto next = [&](landmark_id from) { return std::min(m.next_landmark(from), s.end_landmark); };
@@ -95,8 +96,8 @@ void take_landmarks(snapshot& s, const basic_map<D>& m, const camera_rig<Camera>
   }
 }
 
-/// By how much a solution multiplies the lengths in the view of each keyframe: the median over its landmarks. 1 where
-/// lengths are measured. O(observations).
+/// Returns the factor by which a solution scales the lengths in the view of each keyframe: the median over its
+/// landmarks. 1 if lengths are measured. O(observations).
 [[nodiscard]] inline std::vector<double> growth_of(const snapshot& s, const bundle_solution& solved, bool is_measured) {
   std::vector<double> growth(s.keyframes.size(), 1.0);
   if (is_measured) return growth;
@@ -112,8 +113,8 @@ void take_landmarks(snapshot& s, const basic_map<D>& m, const camera_rig<Camera>
   return growth;
 }
 
-/// Writes the poses and positions of a solution into the map that the snapshot was taken of. `erase_outliers`, then
-/// `update_landmarks`, are left to the caller. @pre solved.usable
+/// Writes the poses and positions of a solution into the map of the snapshot. The caller then calls `erase_outliers`
+/// and `update_landmarks`. @pre solved.usable
 template <feature_descriptor D>
 report apply_poses(basic_map<D>& m, const snapshot& s, const bundle_solution& solved) {
   std::vector<sim3> poses;
@@ -122,7 +123,7 @@ report apply_poses(basic_map<D>& m, const snapshot& s, const bundle_solution& so
   for (std::size_t k = 0; k != solved.poses.size(); ++k)
     poses.emplace_back(solved.poses[k].rotation(), solved.poses[k].translation(), growth[k]);
   const keyframe_motions motion = propagate_motion<D>(m, s.keyframes, poses);
-  // Landmarks that take no part move with a keyframe; the others then get their own position.
+  // Landmarks that are not adjusted move with a keyframe; the others then get their adjusted position.
   std::size_t next = 0;
   for (const auto& l : m.landmarks()) {
     while (next != s.landmarks.size() && s.landmarks[next] < l.id) ++next;
@@ -136,8 +137,9 @@ report apply_poses(basic_map<D>& m, const snapshot& s, const bundle_solution& so
           solved.iterations,  solved.initial_cost, solved.final_cost};
 }
 
-/// Erases the outliers among the `count` observations from `first` on, with landmarks whose position nothing determines
-/// any more, so that a caller who shares the map can do it part by part. Returns how many were there. O(count).
+/// Erases the outliers among the `count` observations from `first` on, and the landmarks whose position is no longer
+/// determined, so that a caller that shares the map can do it in parts. Returns the number of erased outliers.
+/// O(count).
 /// @pre solved.usable
 template <feature_descriptor D>
 std::size_t erase_outliers(basic_map<D>& m, const snapshot& s, const bundle_solution& solved, std::size_t first,

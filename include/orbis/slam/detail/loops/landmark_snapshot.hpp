@@ -23,7 +23,7 @@
 
 namespace orbis::slam::detail {
 
-/// What the search for a landmark needs, but for the descriptor.
+/// The data for the search for a landmark, except the descriptor.
 struct snapshot_landmark {
   landmark_id id;
   vec3 position = zeros<vec3>();  ///< in the world of its map, metres
@@ -32,7 +32,7 @@ struct snapshot_landmark {
   double max_distance = 0.0;
 };
 
-/// A keyframe with the landmarks that it and its neighbours observe. It does not refer to the map.
+/// A keyframe with the landmarks that it and its neighbours observe. Independent of the map.
 template <feature_descriptor D>
 struct landmark_snapshot {
   keyframe_id keyframe;
@@ -57,7 +57,7 @@ template <feature_descriptor D>
 }
 
 /// Searches for landmarks in a frame at `T_world_camera`: within `radius` pixels (of the predicted level) of their
-/// projections, with descriptors that differ by `distance` at most. Queries of the matches index the landmarks, trains
+/// projections, with descriptors that differ by at most `distance`. Queries of the matches index the landmarks, trains
 /// the keypoints; no keypoint is matched twice. O(landmarks).
 template <camera::camera_model Camera, feature_descriptor D>
 [[nodiscard]] std::vector<features::match> find_landmarks(const landmark_snapshot<D>& known, const basic_frame<D>& f,

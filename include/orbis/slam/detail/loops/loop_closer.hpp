@@ -26,7 +26,7 @@
 
 namespace orbis::slam::detail {
 
-/// Within a map a recognised place closes a loop; between two maps it merges them.
+/// A place recognised within a map closes a loop; one in another map merges the two maps.
 /// Source: R. Mur-Artal, J. D. Tardos, "ORB-SLAM2", T-RO 33 (2017), sections III.D and E; R. Elvira et al.,
 /// "ORBSLAM-Atlas", IROS 2019, for the merging of maps.
 template <camera::camera_model Camera, feature_descriptor D, place_recognizer<D> Places>
@@ -34,38 +34,38 @@ class loop_closer {
  public:
   explicit loop_closer(shared_state<Camera, D, Places>& shared) : shared_{shared} {}
 
-  /// Searches for places that the keyframe observes again. Returns whether a map was corrected: then it should be
+  /// Searches for places that the keyframe observes again. Returns true if a map was corrected: then it should be
   /// adjusted globally.
   bool close(map_keyframe k) {
     if (!shared_.settings.places.enabled) return false;
     for (map_keyframe& candidate : candidates_of(k)) {
-      effort by;
-      const auto taken = locked(by, [&] { return take(k, candidate); });
+      correction_timing timing;
+      const auto taken = locked(timing, [&] { return take(k, candidate); });
       if (!taken || taken->connected) continue;
       const loop_check check = loop_verification::verify(*taken, shared_.rig, shared_.settings.places.loop);
       if (!check) continue;
-      const bool closed =
-          k.map == candidate.map ? correct(k, candidate, check.match, by) : merge(k, candidate, check.match, by);
+      const bool closed = k.map == candidate.map ? correct(k, candidate, check.match, timing)
+                                                 : merge(k, candidate, check.match, timing);
       if (closed) return true;
     }
     return false;
   }
 
-  /// Adjusts a whole map. Stops without a result if a loop is closed meanwhile, or `stop` is called.
+  /// Adjusts a whole map. Stops without a result if a loop is closed in the meantime, or `stop` is called.
   void adjust_globally(map_id id) {
     if (!shared_.settings.places.adjusts_globally) return;
     const global_adjustment_options& o = shared_.settings.places.adjustment;
-    effort by;
+    correction_timing timing;
     std::uint64_t before = 0;
     global_adjustment::snapshot s;
     {
       const auto edit = shared_.edit();
       before = corrections_;
-      locked(by, [&] {
+      locked(timing, [&] {
         if (shared_.atlas.contains(id)) s = global_adjustment::take_keyframes(shared_.atlas.at(id), o);
       });
       while (s.has_more())
-        locked(by, [&] { global_adjustment::take_landmarks(s, shared_.atlas.at(id), shared_.rig, at_once); });
+        locked(timing, [&] { global_adjustment::take_landmarks(s, shared_.atlas.at(id), shared_.rig, at_once); });
     }
     if (s.empty()) return;
     const auto go_on = [&](std::size_t, std::size_t) { return !stopped_ && corrections_ == before; };
@@ -74,52 +74,52 @@ class loop_closer {
     if (!solved.usable) return;
     {
       const auto edit = shared_.edit();
-      if (!locked(by, [&] {
+      if (!locked(timing, [&] {
             if (corrections_ != before || !shared_.atlas.contains(id)) return false;
             global_adjustment::apply_poses(shared_.atlas.at(id), s, solved);
             return true;
           }))
         return;
-      erase_outliers(id, s, solved, by);
-      update(id, by);
+      erase_outliers(id, s, solved, timing);
+      update(id, timing);
     }
-    report({.kind = correction_kind::global_adjustment, .map = id}, by);
+    report({.kind = correction_kind::global_adjustment, .map = id}, timing);
   }
 
-  /// Ends what can be interrupted soon. May be called from any thread.
+  /// Stops interruptible work soon. May be called from any thread.
   void stop() noexcept { stopped_ = true; }
 
  private:
   using clock = std::chrono::steady_clock;
-  // What is done per lock, so that tracking waits for about a millisecond:
+  // Work per lock, chosen such that tracking waits for about a millisecond:
   static constexpr std::uint32_t at_once = 4096;              ///< landmarks
-  static constexpr std::size_t pairs_at_once = 512;           ///< of landmarks that are fused
-  static constexpr std::size_t observations_at_once = 65536;  ///< among which are outliers
+  static constexpr std::size_t pairs_at_once = 512;           ///< pairs of landmarks to fuse
+  static constexpr std::size_t observations_at_once = 65536;  ///< observations to check for outliers
 
-  /// How long a correction takes.
-  struct effort {
+  /// Duration of a correction, and the longest time with the lock held.
+  struct correction_timing {
     clock::time_point start = clock::now();
-    double locked = 0.0;  ///< milliseconds, the longest time at once
+    double locked = 0.0;  ///< milliseconds, the longest single time
   };
-  /// Holds the lock, and notes for how long.
-  struct noted_lock {
+  /// Holds the lock and records its duration.
+  struct timing_lock {
     std::unique_lock<std::mutex> held;
-    effort& by;
+    correction_timing& timing;
     clock::time_point since = clock::now();
-    ~noted_lock() { by.locked = std::max(by.locked, milliseconds_since(since)); }
+    ~timing_lock() { timing.locked = std::max(timing.locked, milliseconds_since(since)); }
   };
   [[nodiscard]] static double milliseconds_since(clock::time_point start) {
     return std::chrono::duration<double, std::milli>(clock::now() - start).count();
   }
-  /// Calls `f` with the lock held.
+  /// Calls `f` with the lock held, and records the duration.
   template <std::invocable F>
-  decltype(auto) locked(effort& by, F&& f) const {
-    const noted_lock lock{shared_.lock(), by};
+  decltype(auto) locked(correction_timing& timing, F&& f) const {
+    const timing_lock lock{shared_.lock(), timing};
     return std::forward<F>(f)();
   }
 
-  /// The keyframes with similar appearance; `k` gets its present id. In its own map only keyframes that it shares no
-  /// landmark with and that are some keyframes older.
+  /// Returns the keyframes with similar appearance; updates `k` to its present id. In its own map only keyframes that
+  /// share no landmark with it and are some keyframes older.
   std::vector<map_keyframe> candidates_of(map_keyframe& k) {
     typename Places::signature bow_vector;
     {
@@ -152,13 +152,13 @@ class loop_closer {
     return loop_verification::take(shared_.atlas.at(k.map), k.keyframe, shared_.atlas.at(candidate.map),
                                    candidate.keyframe, shared_.rig, shared_.settings.places.loop);
   }
-  bool correct(map_keyframe k, map_keyframe candidate, const loop_match& match, effort by) {
+  bool correct(map_keyframe k, map_keyframe candidate, const loop_match& match, correction_timing timing) {
     const loop_correction_options& o = shared_.settings.places.correction;
     correction_event event{.kind = correction_kind::loop, .map = k.map, .from = k, .to = candidate};
     {
       const auto edit = shared_.edit();
       se3 before;
-      const auto taken = locked(by, [&]() -> std::optional<loop_correction::snapshot<D>> {
+      const auto taken = locked(timing, [&]() -> std::optional<loop_correction::snapshot<D>> {
         if (!shared_.atlas.has(k)) return std::nullopt;
         before = shared_.atlas.at(k).T_world_camera;
         return loop_correction::take(shared_.atlas.at(k.map), match, o);
@@ -167,7 +167,7 @@ class loop_closer {
       const auto go_on = [&](std::size_t, std::size_t) { return !stopped_.load(); };
       const auto solved = loop_correction::solve(*taken, shared_.rig, o, go_on);
       if (!solved) return false;
-      if (!locked(by, [&] {
+      if (!locked(timing, [&] {
             basic_map<D>& m = shared_.atlas.at(k.map);
             const loop_correction::report done = loop_correction::apply_poses(m, *taken, *solved);
             if (!done.corrected) return false;
@@ -179,22 +179,23 @@ class loop_closer {
           }))
         return false;
       last_closed_ = k;
-      fuse(k.map, solved->pairs, {}, by);
-      update(k.map, by);
+      fuse(k.map, solved->pairs, {}, timing);
+      update(k.map, timing);
     }
-    report(std::move(event), by);
+    report(std::move(event), timing);
     return true;
   }
-  /// The map of `k` becomes a part of the candidate's.
-  bool merge(map_keyframe k, map_keyframe candidate, const loop_match& match, effort by) {
+  /// Merges the map of `k` into the candidate's.
+  bool merge(map_keyframe k, map_keyframe candidate, const loop_match& match, correction_timing timing) {
     const loop_fusion_options& o = shared_.settings.places.correction.fusion;
     correction_event event{.kind = correction_kind::merge, .map = candidate.map, .to = candidate, .merged = k.map};
     {
       const auto edit = shared_.edit();
-      const auto taken = locked(by, [&] { return map_merging::take(shared_.atlas, k.map, candidate.map, match, o); });
+      const auto taken =
+          locked(timing, [&] { return map_merging::take(shared_.atlas, k.map, candidate.map, match, o); });
       if (!taken) return false;
       const std::vector<loop_fusion::pair> pairs = loop_fusion::find_pairs(taken->fusion, shared_.rig, o);
-      const bool merged = locked(by, [&] {
+      const bool merged = locked(timing, [&] {
         std::vector<keyframe_id> ids;
         for (const auto& each : shared_.atlas.at(k.map).keyframes()) ids.push_back(each.id);
         const map_merging::report done = map_merging::join(shared_.atlas, *taken);
@@ -204,7 +205,7 @@ class loop_closer {
         event.offsets = done.offsets;
         event.from = {candidate.map, done.keyframe};
         event.T_corrected_before = done.T_into_from;
-        if (k.map < candidate.map) {  // the world stays that of the older map
+        if (k.map < candidate.map) {  // the world of the older map is kept
           event.T_map_before = done.T_into_from.inverse();
           shared_.atlas.at(candidate.map).transform(event.T_map_before);
           event.T_corrected_before = sim3{};
@@ -215,39 +216,41 @@ class loop_closer {
       });
       if (!merged) return false;
       last_closed_ = event.from;
-      fuse(candidate.map, pairs, event.offsets, by);
+      fuse(candidate.map, pairs, event.offsets, timing);
     }
-    report(std::move(event), by);
+    report(std::move(event), timing);
     return true;
   }
 
-  // Part by part, so that tracking does not wait for all of it. @pre edit() is held, and the map is there
+  // In parts, so that tracking does not wait for the whole. @pre edit() is held, and the map exists
 
   /// Updates all landmarks of a map.
-  void update(map_id id, effort& by) {
+  void update(map_id id, correction_timing& timing) {
     landmark_id at = 0;
     const auto has_more_after_some = [&] {
       auto& m = shared_.atlas.at(id);
       at = update_landmarks(m, at, at_once);
       return at != m.landmark_end();
     };
-    while (locked(by, has_more_after_some)) {
+    while (locked(timing, has_more_after_some)) {
     }
   }
-  void fuse(map_id id, std::span<const loop_fusion::pair> pairs, const id_offsets& offsets, effort& by) {
+  void fuse(map_id id, std::span<const loop_fusion::pair> pairs, const id_offsets& offsets, correction_timing& timing) {
     for (; !pairs.empty(); pairs = pairs.subspan(std::min(pairs_at_once, pairs.size())))
-      locked(by, [&] {
+      locked(timing, [&] {
         loop_fusion::fuse<D>(shared_.atlas.at(id), pairs.first(std::min(pairs_at_once, pairs.size())), offsets);
       });
   }
-  void erase_outliers(map_id id, const global_adjustment::snapshot& s, const bundle_solution& solved, effort& by) {
+  void erase_outliers(map_id id, const global_adjustment::snapshot& s, const bundle_solution& solved,
+                      correction_timing& timing) {
     for (std::size_t at = 0; at < s.observations.size(); at += observations_at_once)
-      locked(by, [&] { global_adjustment::erase_outliers(shared_.atlas.at(id), s, solved, at, observations_at_once); });
+      locked(timing,
+             [&] { global_adjustment::erase_outliers(shared_.atlas.at(id), s, solved, at, observations_at_once); });
   }
 
-  void report(correction_event event, const effort& by) const {
-    event.milliseconds = milliseconds_since(by.start);
-    event.locked_milliseconds = by.locked;
+  void report(correction_event event, const correction_timing& timing) const {
+    event.milliseconds = milliseconds_since(timing.start);
+    event.locked_milliseconds = timing.locked;
     if (shared_.callbacks.map_corrected) shared_.callbacks.map_corrected(event);
   }
 

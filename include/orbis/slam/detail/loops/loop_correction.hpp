@@ -2,9 +2,10 @@
 /// @file
 /// Closes a loop: distributes the drift over the keyframes between its ends, and fuses the landmarks of both ends.
 ///
-/// `take` and `apply_poses` touch the map, `solve` works on the snapshot. The essential graph with the new edge is
-/// optimised as a pose graph; the root of the map is held, and the other edges keep their measurement. Landmarks follow
-/// the keyframes. Between the two keyframes, landmarks and observations may be added: keyframes follow their parent.
+/// `take` and `apply_poses` access the map, `solve` works on the snapshot. The essential graph with the new edge is
+/// optimised as a pose graph; the root of the map is held fixed, and the other edges keep their measurement. Landmarks
+/// follow the keyframes. Between `take` and `apply_poses`, keyframes, landmarks and observations may be added:
+/// keyframes follow their parent.
 ///
 /// Source: R. Mur-Artal, J. M. M. Montiel, J. D. Tardos, "ORB-SLAM: a versatile and accurate monocular SLAM system",
 /// T-RO 31 (2015), sections VII.C and VII.D; with depth, poses have no scale. H. Strasdat, J. M. M. Montiel, A. J.
@@ -49,14 +50,14 @@ struct essential_edge {
   std::uint32_t from = no_id;  ///< a keyframe's id; for `optimize_poses` an index
   std::uint32_t to = no_id;    ///< as `from`
   edge_kind kind = edge_kind::tree;
-  std::uint32_t shared = 0;  ///< landmarks that both observe
+  std::uint32_t shared = 0;  ///< number of landmarks that both observe
   sim3 measurement;          ///< `T_from_to`; lengths at `from` are its scale times those at `to`
-  double weight = 1.0;       ///< of its squared error
+  double weight = 1.0;       ///< weight of its squared error
 };
 
-/// The edges of the spanning tree, the loop edges, and the pairs that share at least `threshold` landmarks; each pair
-/// of keyframes once, by ascending `from`. Edges of the tree lead from child to parent, the others from the newer
-/// keyframe to the older one. The measurements are the present relative poses. O(keyframes and pairs that share
+/// Returns the edges of the spanning tree, the loop edges, and the pairs that share at least `threshold` landmarks;
+/// each pair of keyframes once, by ascending `from`. Edges of the tree lead from child to parent, the others from the
+/// newer keyframe to the older one. The measurements are the present relative poses. O(keyframes and pairs that share
 /// landmarks).
 template <feature_descriptor D>
 [[nodiscard]] std::vector<essential_edge> essential_graph(const basic_map<D>& m, std::uint32_t threshold = 100) {
@@ -82,7 +83,7 @@ template <feature_descriptor D>
   return edges;
 }
 
-/// Optimises poses of type `T`. Their number is that of the vertices.
+/// Optimises poses of type `T`, one per vertex.
 template <class T>
 [[nodiscard]] std::optional<int> optimize_graph(std::span<T> poses, const std::vector<essential_edge>& edges,
                                                 std::span<const std::uint8_t> is_fixed, int max_iterations,
@@ -105,9 +106,9 @@ template <class T>
   return summary.iterations;
 }
 
-/// Moves poses such that they agree with the edges, whose ends are indices of them; those with a nonzero entry in
-/// `is_fixed` stay. `scale_is_known`: all scales are and remain 1; otherwise scales are adjusted as well. Returns the
-/// number of iterations; empty, and the poses are of no use, if it fails or `callback` cancels it.
+/// Moves poses to agree with the edges, whose ends are indices of the poses; those with a nonzero entry in `is_fixed`
+/// are held. `scale_is_known`: all scales are and remain 1; otherwise scales are adjusted as well. Returns the number
+/// of iterations; empty, with unusable poses, if it fails or `callback` cancels it.
 template <class S = double>
 [[nodiscard]] std::optional<int> optimize_poses(std::type_identity_t<std::span<basic_sim3<S>>> poses,
                                                 const std::vector<essential_edge>& edges,
@@ -129,10 +130,10 @@ namespace orbis::slam::detail::loop_correction {
 /// The result of closing a loop.
 struct report {
   bool corrected = false;
-  double moved = 0.0;         ///< of the keyframe, metres
-  double turned = 0.0;        ///< of the keyframe, radians
-  double scale = 1.0;         ///< by how much lengths at the keyframe grew
-  std::size_t keyframes = 0;  ///< that were corrected
+  double moved = 0.0;         ///< translation of the keyframe, metres
+  double turned = 0.0;        ///< rotation of the keyframe, radians
+  double scale = 1.0;         ///< factor by which lengths at the keyframe grew
+  std::size_t keyframes = 0;  ///< number of corrected keyframes
   int iterations = 0;         ///< of the pose graph
 };
 
@@ -152,8 +153,9 @@ struct solution {
   int iterations = 0;
 };
 
-/// Empty if a keyframe of the match is gone. O(keyframes, pairs that share landmarks, features of the neighbourhood).
-/// @pre the match is one within the map
+/// Copies the data for the correction. Empty if a keyframe of the match no longer exists. O(keyframes, pairs that share
+/// landmarks, features of the neighbourhood).
+/// @pre the match is within the map
 template <feature_descriptor D>
 [[nodiscard]] std::optional<snapshot<D>> take(const basic_map<D>& m, const loop_match& match,
                                               const loop_correction_options& o = {}) {
@@ -171,14 +173,14 @@ template <feature_descriptor D>
            std::max(e.from, e.to) == std::max(a, b);
   });
   for (essential_edge& e : s.edges) {
-    // The more landmarks two keyframes share, the better their relative pose is known. But an edge of an earlier loop
-    // may have passed on to keyframes that share few, although many of their neighbours do: it stays a tie.
+    // The more landmarks two keyframes share, the better their relative pose is known. An edge of an earlier loop may
+    // have passed to keyframes that share few, although many of their neighbours do: it keeps a minimum weight.
     const std::uint32_t least = e.kind == edge_kind::loop ? std::max(1U, o.strong / 4) : 1U;
     e.weight *= static_cast<double>(std::clamp(e.shared, least, o.strong)) / o.strong;
   }
   s.edges.push_back(
       {b, a, edge_kind::loop, static_cast<std::uint32_t>(match.inliers), match.scaled_motion(), o.loop_weight});
-  for (essential_edge& e : s.edges) {  // from ids to indices: in the end most ids are those of erased keyframes
+  for (essential_edge& e : s.edges) {  // from ids to indices: eventually most ids are those of erased keyframes
     const auto index_of = [&s](std::uint32_t id) {
       return static_cast<std::uint32_t>(std::lower_bound(s.keyframes.begin(), s.keyframes.end(), keyframe_id{id}) -
                                         s.keyframes.begin());
@@ -189,7 +191,8 @@ template <feature_descriptor D>
   return s;
 }
 
-/// Empty if it was stopped (`callback(iteration, iterations)` returned false), or the graph cannot be solved.
+/// Solves the correction. Empty if it was stopped (`callback(iteration, iterations)` returned false), or the graph
+/// cannot be solved.
 template <feature_descriptor D, camera::camera_model Camera>
 [[nodiscard]] std::optional<solution> solve(const snapshot<D>& s, const camera_rig<Camera>& rig,
                                             const loop_correction_options& o = {}, const progress& callback = {}) {
@@ -200,9 +203,9 @@ template <feature_descriptor D, camera::camera_model Camera>
   return found;
 }
 
-/// Writes the poses of a solution into the map that the snapshot was taken of. `loop_fusion::fuse`, then
-/// `update_landmarks`, are left to the caller, if the report says that the map was corrected: it is not if no keyframe
-/// stands for an end of the loop any more.
+/// Writes the poses of a solution into the map of the snapshot. The map is not corrected if no keyframe replaces an end
+/// of the loop. If the report says that the map was corrected, the caller then calls `loop_fusion::fuse` and
+/// `update_landmarks`.
 template <feature_descriptor D>
 report apply_poses(basic_map<D>& m, const snapshot<D>& s, const solution& solved) {
   report done;

@@ -2,8 +2,8 @@
 /// @file
 /// Fuses the landmarks of two parts of a map, or of two maps, that observe the same place.
 ///
-/// `take` copies what is needed, `find_pairs` finds which keypoints of the one side observe which landmarks of the
-/// other one, `fuse` enters these into the map.
+/// `take` copies the necessary data, `find_pairs` finds the keypoints of one side that observe landmarks of the other,
+/// `fuse` writes these into the map.
 ///
 /// Source: R. Mur-Artal, J. M. M. Montiel, J. D. Tardos, "ORB-SLAM: a versatile and accurate monocular SLAM system",
 /// T-RO 31 (2015), section VII.C.
@@ -28,7 +28,7 @@
 
 namespace orbis::slam::detail::loop_fusion {
 
-/// A keyframe around the one of the match.
+/// A keyframe around that of the match.
 template <feature_descriptor D>
 struct image {
   keyframe_id keyframe;
@@ -50,7 +50,7 @@ struct pair {
 };
 
 /// Copies the neighbourhood of the keyframe and the landmarks around the candidate. O(features of the neighbourhood).
-/// @pre the keyframes of the match are there
+/// @pre the keyframes of the match exist
 template <feature_descriptor D>
 [[nodiscard]] snapshot<D> take(const basic_map<D>& current, const basic_map<D>& candidate_map, const loop_match& match,
                                const loop_fusion_options& o) {
@@ -63,7 +63,7 @@ template <feature_descriptor D>
   return s;
 }
 
-/// The matches, and what a search for the landmarks finds in each image at the pose that follows from the match.
+/// Returns the matches, and the landmarks found in each image at the pose that follows from the match.
 template <camera::camera_model Camera, feature_descriptor D>
 [[nodiscard]] std::vector<pair> find_pairs(const snapshot<D>& s, const camera_rig<Camera>& rig,
                                            const loop_fusion_options& o) {
@@ -81,9 +81,10 @@ template <camera::camera_model Camera, feature_descriptor D>
   return pairs;
 }
 
-/// Fuses landmarks that the pairs say are the same; those of the candidate's side stay. `offsets`: by how much the ids
-/// of the keyframe's side have grown, if it was a map of its own. Pairs whose keyframe or landmark is gone are left
-/// out. Changed landmarks are updated. A caller who shares the map can do it part by part: the result is the same.
+/// Fuses the landmarks that the pairs identify; those of the candidate's side are kept. `offsets`: amounts by which the
+/// ids of the keyframe's side have grown, if it was a separate map. Pairs whose keyframe or landmark no longer exists
+/// are skipped. Changed landmarks are updated. A caller that shares the map can call it in parts: the result is the
+/// same.
 template <feature_descriptor D>
 fusion_counts fuse(basic_map<D>& m, std::span<const pair> pairs, const id_offsets& offsets = {}) {
   fusion_counts counts;

@@ -1,16 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Whether two keyframes with similar appearance observe the same place, and their relative pose.
+/// Verification that two keyframes with similar appearance observe the same place, and their relative pose.
 ///
-/// `take` copies what is needed out of the maps, `verify` works on the copy: matches between the keypoints of both
-/// keyframes by appearance; the rigid motion between these; the landmarks around the candidate searched for in the
-/// keyframe from there, and its pose refined on them; the same landmarks searched for in neighbours of the keyframe;
-/// and, within one map, that the motion contradicts the poses by no more than the drift between the two can explain.
+/// `take` copies the necessary data from the maps, `verify` works on the copy. Steps: match the keypoints of both
+/// keyframes by appearance; estimate the rigid motion between these; search for the landmarks around the candidate in
+/// the keyframe at that pose, and refine its pose on them; search for the same landmarks in neighbours of the keyframe;
+/// and, within one map, check that the motion differs from the poses by no more than plausible drift.
 ///
-/// Source of the procedure: C. Campos, R. Elvira, J. J. Gomez Rodriguez, J. M. M. Montiel, J. D. Tardos, "ORB-SLAM3: an
-/// accurate open-source library for visual, visual-inertial and multi-map SLAM", T-RO 37 (2021), section VI. Where the
-/// scale is not measured, it is found as well: by the points of the matches, then by the landmarks that both sides
-/// have.
+/// Source: C. Campos, R. Elvira, J. J. Gomez Rodriguez, J. M. M. Montiel, J. D. Tardos, "ORB-SLAM3: an accurate
+/// open-source library for visual, visual-inertial and multi-map SLAM", T-RO 37 (2021), section VI. If the scale is not
+/// measured, it is estimated as well: from the points of the matches, then from the landmarks that both sides have.
 #pragma once
 
 #include <algorithm>
@@ -46,7 +45,7 @@
 
 namespace orbis::slam::detail {
 
-/// Keypoint `feature` of the keyframe observes `landmark`, one of the candidate's map.
+/// A pair of keypoint `feature` of the keyframe and the `landmark` it observes, one of the candidate's map.
 struct loop_pair {
   std::uint32_t feature = 0;
   landmark_id landmark;
@@ -56,14 +55,14 @@ struct loop_pair {
 /// Two keyframes that observe the same place.
 struct loop_match {
   keyframe_id keyframe;
-  keyframe_id candidate;           ///< of the same map or another one
-  se3 T_candidate_keyframe;        ///< camera to camera, by the matches; in lengths at the candidate
-  double scale = 1.0;              ///< lengths at the candidate over those at the keyframe; 1 where depth is measured
+  keyframe_id candidate;     ///< of the same map or another one
+  se3 T_candidate_keyframe;  ///< camera to camera, from the matches; in lengths at the candidate
+  double scale = 1.0;        ///< ratio of lengths at the candidate to those at the keyframe; 1 if depth is measured
   std::vector<loop_pair> matches;  ///< the inliers, by ascending landmark
   std::size_t inliers = 0;         ///< their number
   std::size_t supporters = 0;      ///< neighbours of the keyframe that agree
 
-  /// What takes points from the keyframe's camera to the candidate's.
+  /// The similarity that transforms points from the keyframe's camera to the candidate's.
   [[nodiscard]] sim3 scaled_motion() const {
     return {T_candidate_keyframe.rotation(), T_candidate_keyframe.translation(), scale};
   }
@@ -102,7 +101,7 @@ struct loop_check {
 
 namespace loop_verification {
 
-/// A keyframe, and those of its features whose point is known.
+/// A keyframe, and its features with known points.
 template <feature_descriptor D>
 struct view {
   basic_frame<D> image;
@@ -130,8 +129,8 @@ struct snapshot {
   double path_length = 0.0;  ///< along the keyframes between the two, metres
 };
 
-/// The standard deviation of a landmark's depth in keyframe `k` where none is measured, in the map's unit: of its rays
-/// by a pixel's error, over the largest angle between them. Infinite with one observation.
+/// Returns the standard deviation of a landmark's depth in keyframe `k` if no depth is measured, in the map's unit: by
+/// a pixel's error of its rays and the largest angle between them. Infinite with one observation.
 template <feature_descriptor D, camera::camera_model Camera>
 [[nodiscard]] double deviation_by_parallax(const basic_map<D>& m, const basic_keyframe<D>& k, std::uint32_t feature,
                                            const camera_rig<Camera>& rig) {
@@ -155,7 +154,7 @@ template <feature_descriptor D, camera::camera_model Camera>
   for (std::uint32_t i = 0; i < k.size(); ++i) {
     const landmark_id l = k.landmarks[i];
     if (l == no_id && !k.has_depth(i)) continue;
-    // The measured depth rather than the landmark, which may rest on the observations of others.
+    // The measured depth is preferred to the landmark, which may depend on other observations.
     const vec3 point = k.has_depth(i) ? k.point_camera(i) : T_camera_world * m.landmark_at(l).position;
     if (!all_finite(point) || !(point.z() > 0.0)) continue;
     v.features.keypoints.push_back(k.features.keypoints[i]);
@@ -169,7 +168,7 @@ template <feature_descriptor D, camera::camera_model Camera>
   return v;
 }
 
-/// The length of the path along the keyframes between two, metres. O(ids between them).
+/// Returns the length of the path along the keyframes between two, metres. O(ids between them).
 template <feature_descriptor D>
 [[nodiscard]] double path_between(const basic_map<D>& m, keyframe_id a, keyframe_id b) {
   double length = 0.0;
@@ -182,7 +181,8 @@ template <feature_descriptor D>
   return length;
 }
 
-/// O(features of some keyframes, and keyframes between the two). @pre the keyframes are there, and not the same
+/// Copies the data for the verification. O(features of some keyframes, and keyframes between the two).
+/// @pre the keyframes exist and differ
 template <feature_descriptor D, camera::camera_model Camera>
 [[nodiscard]] snapshot<D> take(const basic_map<D>& current, keyframe_id k, const basic_map<D>& candidate_map,
                                keyframe_id candidate, const camera_rig<Camera>& rig, const loop_options& o = {}) {
@@ -204,7 +204,7 @@ template <feature_descriptor D, camera::camera_model Camera>
   return s;
 }
 
-/// The steps of the check.
+/// The steps of the verification.
 template <camera::camera_model Camera, feature_descriptor D>
 class checker {
  public:
@@ -243,7 +243,8 @@ class checker {
                          features::rotation_consistency{};
     return matcher(s_.seen.features, s_.known.features);
   }
-  /// The rigid motion between the points of the matches, by RANSAC; where lengths are not measured, with the scale.
+  /// Estimates the rigid motion between the points of the matches by RANSAC; if lengths are not measured, with the
+  /// scale.
   [[nodiscard]] bool align(const std::vector<features::match>& matches, loop_match& found) const {
     if (!rig_.scale_is_known) return align_scaled(matches, found);
     std::vector<vec3> from, to;
@@ -270,7 +271,7 @@ class checker {
     std::vector<double> ratios;
     for (const features::match& m : matches)
       ratios.push_back(s_.known.points[m.train].z() / s_.seen.points[m.query].z());
-    const double ratio = median_of(ratios);  // both sides in about the same unit, for what the deviations add up to
+    const double ratio = median_of(ratios);  // converts both sides to about the same unit before adding the deviations
     const auto known = [&](const view<D>& v, std::uint32_t i) {
       return known_point{v.points[i], v.image.pixel(v.index[i]),
                          rig_.scales.information(v.features.keypoints[i].octave)};
@@ -296,7 +297,8 @@ class checker {
     found.scale = T.scale();
     return true;
   }
-  /// The landmarks around the candidate that a frame observes, and its pose by them, starting from `T_world_camera`.
+  /// Finds the landmarks around the candidate that a frame observes, and its pose by them, starting from
+  /// `T_world_camera`.
   [[nodiscard]] optimize::pose_refinement localize(const basic_frame<D>& f, const se3& T_world_camera, double radius,
                                                    std::vector<loop_pair>* observed) const {
     const auto matches = find_landmarks(s_.landmarks, f, T_world_camera, rig_, radius, options_.landmark_distance);
@@ -325,7 +327,8 @@ class checker {
     return second.inliers >= options_.min_inliers;
   }
 
-  /// The scale by the depths of landmarks that both sides have: their median ratio. False if that is not sure.
+  /// Estimates the scale as the median ratio of the depths of landmarks that both sides have. Returns false if it is
+  /// uncertain.
   [[nodiscard]] bool measure_scale(loop_match& found) const {
     std::vector<vec3> at(s_.seen.image.size(), zeros<vec3>());
     for (std::size_t i = 0; i != s_.seen.points.size(); ++i) at[s_.seen.index[i]] = s_.seen.points[i];
@@ -352,7 +355,7 @@ class checker {
     const auto localized = localize(n.image, T_world_camera, options_.radius, nullptr);
     if (!localized.ok() || localized.inliers < options_.supporter_inliers) return false;
     if (rig_.scale_is_known) return true;
-    // Where the neighbour is clearly apart, it is found there as far away as the scale says.
+    // If the neighbour is clearly apart, its distance must agree with the scale.
     const se3 T_keyframe_neighbor =
         (s_.landmarks.T_world_camera * found.T_candidate_keyframe).inverse() * localized.T_world_camera;
     const double expected = found.scale * norm(n.T_keyframe_camera.translation());
@@ -360,7 +363,7 @@ class checker {
     return off <= 0.3 * expected || expected <= 0.02 * found.scale * s_.seen.median_depth;
   }
 
-  /// Drift of the scale has no bound that is known beforehand; only the rotation is limited then.
+  /// Drift of the scale has no bound known in advance; without a known scale only the rotation is limited.
   [[nodiscard]] bool is_plausible(const se3& T_candidate_keyframe) const {
     const se3& was = s_.seen.image.T_world_camera;
     const se3 is = s_.landmarks.T_world_camera * T_candidate_keyframe;
@@ -376,7 +379,7 @@ class checker {
   const loop_options& options_;
 };
 
-/// Deterministic. The cost is that of tracking a few frames.
+/// Verifies a loop. Deterministic. The cost is that of tracking a few frames.
 template <camera::camera_model Camera, feature_descriptor D>
 [[nodiscard]] loop_check verify(const snapshot<D>& s, const camera_rig<Camera>& rig, const loop_options& o = {}) {
   return checker<Camera, D>{s, rig, o}.run();

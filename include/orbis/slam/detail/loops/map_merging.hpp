@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Merges two maps that observe the same place.
+/// Merging of two maps that observe the same place.
 ///
-/// `take` and `join` touch the maps, `loop_fusion::find_pairs` works on the snapshot. Between them both maps may grow.
-/// Who shares the maps locks them for `take`, `join` and each part of `loop_fusion::fuse`.
+/// `take` and `join` access the maps, `loop_fusion::find_pairs` works on the snapshot. Between them both maps may grow.
+/// Callers that share the maps lock them for `take`, `join` and each part of `loop_fusion::fuse`.
 ///
 /// Source: C. Campos, R. Elvira, J. J. Gomez Rodriguez, J. M. M. Montiel, J. D. Tardos, "ORB-SLAM3", T-RO 37 (2021),
 /// section VI.
@@ -23,10 +23,10 @@ namespace orbis::slam::detail::map_merging {
 /// The result of merging two maps.
 struct report {
   bool merged = false;
-  id_offsets offsets;     ///< by how much the ids of the one map have grown
-  keyframe_id keyframe;   ///< that of the match, by its new id
-  keyframe_id candidate;  ///< that of the match
-  sim3 T_into_from;       ///< how the one map was moved
+  id_offsets offsets;     ///< amounts by which the ids of the merged map have grown
+  keyframe_id keyframe;   ///< keyframe of the match, by its new id
+  keyframe_id candidate;  ///< candidate of the match
+  sim3 T_into_from;       ///< motion of the merged map
 };
 
 template <feature_descriptor D>
@@ -36,7 +36,7 @@ struct snapshot {
   loop_fusion::snapshot<D> fusion;
 };
 
-/// Whether the maps and keyframes of a match are there, and ids are left for what both hold.
+/// Returns true if the maps and keyframes of a match exist and enough ids are left for both maps.
 template <feature_descriptor D>
 [[nodiscard]] bool is_possible(const basic_atlas<D>& maps, map_id from, map_id into, const loop_match& match) {
   return from != into && maps.has({from, match.keyframe}) && maps.has({into, match.candidate}) &&
@@ -44,8 +44,9 @@ template <feature_descriptor D>
          maps.at(into).keyframe_ids_left() > maps.at(from).keyframe_end().value();
 }
 
-/// Copies what merging map `from`, which contains the keyframe of the match, into map `into`, which contains the
-/// candidate, needs. Empty if a map or keyframe is gone, or ids run out. O(features of the neighbourhood).
+/// Copies the data needed to merge map `from`, which contains the keyframe of the match, into map `into`, which
+/// contains the candidate. Empty if a map or keyframe no longer exists, or ids run out. O(features of the
+/// neighbourhood).
 template <feature_descriptor D>
 [[nodiscard]] std::optional<snapshot<D>> take(const basic_atlas<D>& maps, map_id from, map_id into,
                                               const loop_match& match, const loop_fusion_options& o = {}) {
@@ -53,9 +54,9 @@ template <feature_descriptor D>
   return snapshot<D>{from, into, match, loop_fusion::take(maps.at(from), maps.at(into), match, o)};
 }
 
-/// Moves `from` as the match says, makes it a part of `into`, and adds a loop edge at the match. If `from` was the
-/// active map, `into` becomes it. Nothing is changed if a map or keyframe is gone. O(`from`). `loop_fusion::fuse` is
-/// left to the caller, if the report says that the maps were merged.
+/// Moves `from` by the match, merges it into `into`, and adds a loop edge at the match. If `from` was active, `into`
+/// becomes active. Changes nothing if a map or keyframe no longer exists. O(`from`). If the report says that the maps
+/// were merged, the caller then calls `loop_fusion::fuse`.
 template <feature_descriptor D>
 report join(basic_atlas<D>& maps, const snapshot<D>& s) {
   report done;

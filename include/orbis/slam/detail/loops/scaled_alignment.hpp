@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The similarity between two cameras that both know some points, each in a unit of its own.
+/// The similarity between two cameras that both know some points, each in a separate unit of length.
 ///
-/// A point's depth without a sensor is known as well as its parallax was: a pair is judged by where the points appear
-/// in the images, not by their distance.
+/// Without a sensor, a point's depth is only as certain as its parallax: pairs are compared by the positions of the
+/// points in the images, not by their distance.
 ///
 /// Source: R. Mur-Artal, J. M. M. Montiel, J. D. Tardos, "ORB-SLAM: a versatile and accurate monocular SLAM system",
 /// T-RO 31 (2015), section VII.B.
@@ -27,15 +27,15 @@
 
 namespace orbis::slam::detail {
 
-/// A point as a camera knows it.
+/// A point known to a camera.
 struct known_point {
-  vec3 position = zeros<vec3>();  ///< in the camera, in its unit
-  vec2 pixel = zeros<vec2>();     ///< where the camera saw it
+  vec3 position = zeros<vec3>();  ///< in the camera frame, in its unit
+  vec2 pixel = zeros<vec2>();     ///< observed position
   double information = 1.0;       ///< 1 / sigma^2 of the pixel, 1 / pixel^2
 };
 
-/// The estimator of RANSAC for the similarity that takes points from one camera to another one. The error of a pair is
-/// the larger one of those of its two points, reprojected into the other image, in standard deviations of a pixel.
+/// The RANSAC estimator of the similarity that transforms points from one camera to another. The error of a pair is the
+/// larger of those of its two points, reprojected into the other image, in standard deviations of a pixel.
 template <camera::camera_model Camera>
 class scaled_alignment {
  public:
@@ -48,7 +48,7 @@ class scaled_alignment {
   };
   static constexpr std::size_t sample_size = 3;
 
-  /// The pairs are to be in random order.
+  /// @pre the pairs are in random order
   scaled_alignment(const Camera& camera, std::vector<pair> pairs) : camera_{camera}, pairs_{std::move(pairs)} {}
 
   [[nodiscard]] std::size_t size() const noexcept { return pairs_.size(); }

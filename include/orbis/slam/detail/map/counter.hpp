@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// How often each id occurs.
+/// Counts the occurrences of ids.
 #pragma once
 
 #include <cstddef>
@@ -20,7 +20,7 @@ class counter {
     friend bool operator==(const entry&, const entry&) = default;
   };
 
-  /// Counts an id; true the first time. O(1) amortised.
+  /// Counts an id; returns true the first time. O(1) amortised.
   bool add(Id id) {
     if (2 * (entries_.size() + 1) > table_.size()) grow();
     std::size_t at = index_of(id);
@@ -35,7 +35,7 @@ class counter {
     return true;
   }
 
-  /// In the order in which the ids first occurred.
+  /// The entries in the order in which the ids first occurred.
   [[nodiscard]] const std::vector<entry>& entries() const noexcept { return entries_; }
   [[nodiscard]] std::vector<entry> take() && { return std::move(entries_); }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Files in sections, each with a name, a length and a checksum: what is damaged can be named.
+/// Files in sections, each with a name, a length and a checksum, so that damage can be attributed to a section.
 #pragma once
 
 #include <cstddef>
@@ -35,7 +35,7 @@ void put_section(std::string& to, std::string_view name, Write&& write) {
   put(to, crc32c(std::as_bytes(std::span{to}).subspan(begin)));
 }
 
-/// Numbers out of a section's content. At its end come zeros, and `ended`.
+/// Reads numbers from a section's content. At its end it returns zeros and sets `ended`.
 class section_reader {
  public:
   explicit section_reader(std::string_view content) : content_{content} {}
@@ -51,9 +51,9 @@ class section_reader {
     return value;
   }
   [[nodiscard]] std::size_t left() const noexcept { return content_.size(); }
-  /// Whether more was taken than there is.
+  /// Returns true if more was read than is available.
   [[nodiscard]] bool ended() const noexcept { return ended_; }
-  /// As if that had happened.
+  /// Discards the rest and sets `ended`. Returns false.
   bool end() {
     content_ = {};
     ended_ = true;
@@ -65,12 +65,12 @@ class section_reader {
   bool ended_ = false;
 };
 
-/// Goes from section to section.
+/// Iterates over the sections of a file.
 class section_finder {
  public:
   section_finder(std::string_view file, std::size_t begin) : file_{file}, at_{begin} {}
 
-  /// The content of the next section, if that is `name` and whole.
+  /// Returns the content of the next section if it is `name` and complete.
   [[nodiscard]] std::optional<section_reader> find(std::string_view name) {
     const auto wrong = [&](const std::string& what) {
       problem_ = "section \"" + std::string(name) + "\" " + what;
@@ -86,15 +86,15 @@ class section_finder {
     const std::size_t size = section_head + static_cast<std::size_t>(length);
     const std::string_view whole = file_.substr(at_, size);
     if (crc32c(std::as_bytes(std::span{whole})) != load_number<std::uint32_t>(file_.data() + at_ + size))
-      return wrong("from byte " + std::to_string(at_) + " is damaged: its checksum does not fit");
+      return wrong("from byte " + std::to_string(at_) + " is damaged: checksum mismatch");
     at_ += size + section_tail;
     return section_reader{whole.substr(section_head)};
   }
 
-  /// Whether nothing follows.
+  /// Returns true if no section follows.
   [[nodiscard]] bool at_end() {
     if (at_ == file_.size()) return true;
-    problem_ = "goes on after its end at byte " + std::to_string(at_);
+    problem_ = "unexpected data after its end at byte " + std::to_string(at_);
     return false;
   }
   [[nodiscard]] const std::string& problem() const noexcept { return problem_; }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Moves keyframes, and landmarks along with them.
+/// Moves keyframes together with their landmarks.
 #pragma once
 
 #include <algorithm>
@@ -21,7 +21,7 @@ namespace orbis::slam::detail {
 using keyframe_motions = std::unordered_map<std::uint32_t, sim3>;
 
 /// Moves every keyframe `k` by `T_new_old[k]`, a motion in the world, and every landmark with the oldest keyframe that
-/// observes it. `map.update_landmark` is not called: see `update_landmarks`. O(map).
+/// observes it. Does not call `map.update_landmark`: see `update_landmarks`. O(map).
 /// @pre there is a motion for every keyframe of the map
 template <feature_descriptor D>
 void move_all(basic_map<D>& m, const keyframe_motions& T_new_old) {
@@ -30,7 +30,7 @@ void move_all(basic_map<D>& m, const keyframe_motions& T_new_old) {
 }
 
 /// Calls `map.update_landmark` for `count` landmarks from the id `first` on, or for all that are left. Returns the id
-/// behind them, at most `landmark_end()`, so that a caller who shares the map can go on there later. Until then,
+/// after them, at most `landmark_end()`, from which a caller that shares the map can continue later. Until then,
 /// landmarks are searched for by their old normals and distances.
 template <feature_descriptor D>
 landmark_id update_landmarks(basic_map<D>& m, landmark_id first, std::size_t count) {
@@ -39,7 +39,7 @@ landmark_id update_landmarks(basic_map<D>& m, landmark_id first, std::size_t cou
   return l;
 }
 
-/// A keyframe and its neighbours in the covisibility graph.
+/// Returns a keyframe and its neighbours in the covisibility graph.
 template <feature_descriptor D>
 [[nodiscard]] std::vector<keyframe_id> neighborhood(const basic_map<D>& m, keyframe_id k) {
   std::vector<keyframe_id> around{k};
@@ -47,9 +47,9 @@ template <feature_descriptor D>
   return around;
 }
 
-/// The motion of every keyframe of a map, given new poses for some of them, with the scale of the lengths in their
-/// views. The others move with their parent in the spanning tree; the identity where no keyframe up to the root has a
-/// new pose. New poses of erased keyframes are ignored. O(keyframes).
+/// Returns the motion of every keyframe of a map, given new poses for some of them, with the scale of the lengths in
+/// their views. The others move with their parent in the spanning tree; by the identity if no keyframe up to the root
+/// has a new pose. New poses of erased keyframes are ignored. O(keyframes).
 template <feature_descriptor D>
 [[nodiscard]] keyframe_motions propagate_motion(const basic_map<D>& m, std::span<const keyframe_id> solved,
                                                 std::span<const sim3> T_world_camera) {

@@ -19,7 +19,7 @@ namespace orbis::slam::detail {
 /// A point to search for.
 struct candidate_point {
   vec3 position = zeros<vec3>();  ///< in the world, metres
-  landmark_id landmark;           ///< `no_id` for a point that is known from the depth of the last frame alone
+  landmark_id landmark;           ///< `no_id` for a point known only from the depth of the last frame
 };
 
 /// Points with their descriptors and search windows, index by index.
@@ -39,15 +39,15 @@ struct search_list {
   [[nodiscard]] std::size_t size() const noexcept { return points.size(); }
 };
 
-/// The rule for windows of `radius` pixels of a keypoint's level around projections.
+/// Returns the rule for windows of `radius` pixels of a keypoint's level around projections.
 [[nodiscard]] inline features::projection_rule rule_of(const pyramid_scales& scales, double radius) {
   return {.radius = static_cast<float>(radius),
           .levels = scales.levels(),
           .scale_factor = static_cast<float>(scales.factor())};
 }
 
-/// Adds a point that the last frame observed, if it projects into the image. The window has `radius` pixels of the
-/// level of that observation.
+/// Adds a point observed by the last frame, if it projects into the image. The window has `radius` pixels of the level
+/// of that observation.
 template <camera::camera_model Camera, feature_descriptor D>
 void add_seen_point(search_list<D>& list, const features::camera_projection<Camera>& project,
                     const pyramid_scales& scales, const candidate_point& point, const D& descriptor,
@@ -57,8 +57,8 @@ void add_seen_point(search_list<D>& list, const features::camera_projection<Came
              {at->x, at->y, static_cast<float>(radius * scales.scale(seen.octave)), seen.octave - 1, seen.octave + 1});
 }
 
-/// Adds a landmark, if the frame is expected to observe it: it projects into the image, and `rule` accepts its distance
-/// and direction. Returns whether it was added.
+/// Adds a landmark if the frame is expected to observe it: it projects into the image, and `rule` accepts its distance
+/// and direction. Returns true if it was added.
 template <camera::camera_model Camera, feature_descriptor D>
 bool add_landmark(search_list<D>& list, const features::camera_projection<Camera>& project,
                   const features::projection_rule& rule, const basic_landmark<D>& l, landmark_id id) {

@@ -12,21 +12,21 @@
 
 namespace orbis::slam::detail {
 
-/// The keyframe that shares the most landmarks with a frame; `otherwise` if none shares any.
+/// Returns the keyframe that shares the most landmarks with a frame; `otherwise` if none shares any.
 template <feature_descriptor D>
 [[nodiscard]] keyframe_id most_shared(const basic_map<D>& m, const basic_frame<D>& f, keyframe_id otherwise) {
   const auto order = m.observers_of(f.landmarks);
   return order.empty() ? otherwise : order.front().keyframe;
 }
 
-/// The median; changes the order of the values. @pre there are any
+/// Returns the median; changes the order of the values. @pre !values.empty()
 [[nodiscard]] inline double median_of(std::vector<double>& values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
   return *middle;
 }
 
-/// The median depth of the landmarks that a frame observes, in the unit of the map; 0 if it observes none.
+/// Returns the median depth of the landmarks that a frame observes, in the unit of the map; 0 if it observes none.
 /// O(keypoints).
 template <feature_descriptor D>
 [[nodiscard]] double median_depth(const basic_map<D>& m, const basic_frame<D>& f) {
@@ -37,9 +37,9 @@ template <feature_descriptor D>
   return depths.empty() ? 0.0 : median_of(depths);
 }
 
-/// The keyframes around a frame, at most `limit`: the reference, those that share landmarks with the frame (most
-/// first), then the neighbours of the nearest of these in the covisibility graph and in the spanning tree. The cost
-/// depends on the observations of the frame's landmarks and on these neighbours, not on the size of the map.
+/// Returns the keyframes around a frame, at most `limit`: the reference, those that share landmarks with the frame
+/// (most first), then the neighbours of the nearest of these in the covisibility graph and in the spanning tree. The
+/// cost depends on the observations of the frame's landmarks and on these neighbours, not on the size of the map.
 template <feature_descriptor D>
 [[nodiscard]] std::vector<keyframe_id> local_keyframes(const basic_map<D>& m, const basic_frame<D>& f,
                                                        keyframe_id reference, std::size_t limit) {
@@ -61,7 +61,7 @@ template <feature_descriptor D>
   return around;
 }
 
-/// The landmarks that these keyframes observe, each once, in ascending order.
+/// Returns the landmarks that these keyframes observe, each once, in ascending order.
 template <feature_descriptor D>
 [[nodiscard]] std::vector<landmark_id> landmarks_of(const basic_map<D>& m, const std::vector<keyframe_id>& keyframes) {
   counter<landmark_id> seen;
@@ -73,7 +73,7 @@ template <feature_descriptor D>
   return all;
 }
 
-/// The landmarks of `local_keyframes`.
+/// Returns the landmarks of `local_keyframes`.
 template <feature_descriptor D>
 [[nodiscard]] std::vector<landmark_id> local_landmarks(const basic_map<D>& m, const basic_frame<D>& f,
                                                        keyframe_id reference, std::size_t limit) {

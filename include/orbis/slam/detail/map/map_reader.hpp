@@ -22,13 +22,13 @@
 
 namespace orbis::slam::detail {
 
-/// The bound of all coordinates, metres: sums and products stay finite.
+/// Upper bound of all coordinates, metres: sums and products remain finite.
 inline constexpr double farthest = 1e12;
-/// That of rays at z = 1: where they are times a depth is finite, and so is its square.
+/// Upper bound of rays at z = 1: their product with a depth, and its square, are finite.
 inline constexpr double farthest_aside = 1e30;
 inline constexpr std::size_t bytes_of_keypoint = 76, bytes_of_observation = 8;
 
-/// A pose with the bits that were written; empty if the numbers are no pose.
+/// Reads a pose bit by bit as written; empty if the numbers are not a valid pose.
 [[nodiscard]] inline std::optional<se3> take_pose(section_reader& from) {
   std::array<double, 7> v{};
   for (double& x : v) x = from.take<double>();
@@ -47,8 +47,8 @@ inline constexpr std::size_t bytes_of_keypoint = 76, bytes_of_observation = 8;
   return {x, y, from.take<double>()};
 }
 
-/// Reads section by section. Each function returns whether the section is valid and consistent with those before it; if
-/// not, `problem` says what is wrong.
+/// Reads section by section. Each function returns true if the section is valid and consistent with those before it;
+/// otherwise `problem` describes the error.
 class map_reader {
  public:
   using content = map_content<features::binary_descriptor<256>>;
@@ -63,17 +63,17 @@ class map_reader {
     keyframe_ids_ = in.take<std::uint32_t>();
     landmark_ids_ = in.take<std::uint32_t>();
     if (keyframe_ids_ > most_keyframes_of_file || landmark_ids_ > most_landmarks_of_file)
-      return wrong("more ids than a file may have");
+      return wrong("more ids than a file can hold");
     const auto sensor = version_ < 2 ? 0 : in.take<std::uint32_t>();
     if (sensor > static_cast<std::uint32_t>(sensor_kind::monocular))
-      return wrong("a sensor of kind " + std::to_string(sensor));
+      return wrong("invalid sensor kind " + std::to_string(sensor));
     const auto scale_is_known = version_ < 2 ? 1 : in.take<std::uint32_t>();
-    if (scale_is_known > 1) return wrong("a scale that is neither known nor unknown");
+    if (scale_is_known > 1) return wrong("invalid scale flag");
     to_.sensor = static_cast<sensor_kind>(sensor);
     to_.scale_is_known = scale_is_known == 1;
     to_.levels = static_cast<int>(levels);
-    if (levels == 0 || levels > 64) return wrong("a pyramid of " + std::to_string(levels) + " levels");
-    if (!(to_.scale_factor > 1.0 && to_.scale_factor < 100.0)) return wrong("a scale factor that is none");
+    if (levels == 0 || levels > 64) return wrong("invalid number of pyramid levels: " + std::to_string(levels));
+    if (!(to_.scale_factor > 1.0 && to_.scale_factor < 100.0)) return wrong("invalid scale factor");
     return ends(in, "size");
   }
 
@@ -82,12 +82,11 @@ class map_reader {
       const std::string name = "keyframe " + to_string(id);
       const auto state = in.take<std::uint8_t>();
       if (in.ended()) return wrong(name + ": the section ends before it");
-      if (state > (version_ >= 4 ? forgotten_keyframes : kept_keyframe))
-        return wrong(name + ": neither there nor erased");
+      if (state > (version_ >= 4 ? forgotten_keyframes : kept_keyframe)) return wrong(name + ": invalid state");
       if (!(state == kept_keyframe ? keyframe_at(in, id) : state == gone_keyframe ? erased(in, id) : forgotten(in, id)))
         return wrong(name + ": " + problem);
     }
-    return replacements_end() && ends(in, "kfrm");
+    return check_replacements() && ends(in, "kfrm");
   }
 
   bool tree(section_reader in) {
@@ -99,14 +98,14 @@ class map_reader {
       const keyframe_id parent = in.take<std::uint32_t>();
       const auto count = in.take<std::uint32_t>();
       if (in.ended() || in.left() / sizeof(keyframe_id) < count) return wrong(name + ": the section ends within it");
-      if (parent != no_id && !to_.keyframes.contains(parent)) return wrong(name + ": its parent is not there");
+      if (parent != no_id && !to_.keyframes.contains(parent)) return wrong(name + ": its parent does not exist");
       if (parent == no_id && std::exchange(root, k.id) != no_id) return wrong(name + ": a second root");
       if (parent != no_id) children[parent].push_back(k.id);
       keyframe_id last;
       for (std::uint32_t i = 0; i != count; ++i) {
         const keyframe_id other = in.take<std::uint32_t>();
         if (other == k.id || !to_.keyframes.contains(other) || (last != no_id && other <= last))
-          return wrong(name + ": a loop edge to keyframe " + to_string(other));
+          return wrong(name + ": invalid loop edge to keyframe " + to_string(other));
         loops.emplace_back(k.id, last = other);
       }
     }
@@ -122,15 +121,15 @@ class map_reader {
         open.push_back(child);
       }
     }
-    if (to_.tree.size() != to_.keyframes.size()) return wrong("the tree does not hold all keyframes together");
+    if (to_.tree.size() != to_.keyframes.size()) return wrong("the tree does not connect all keyframes");
     for (const auto& [a, b] : loops)
       if (a < b) to_.tree.add_loop_edge(a, b);
     for (const auto& [a, b] : loops)
       if (const auto& ends = to_.tree.loop_edges(a); !std::binary_search(ends.begin(), ends.end(), b))
-        return wrong("keyframe " + to_string(a) + ": a loop edge that does not lead back");
+        return wrong("keyframe " + to_string(a) + ": a loop edge without its reverse edge");
     std::size_t both_ways = 0;
     for (const keyframe& k : to_.keyframes) both_ways += to_.tree.loop_edges(k.id).size();
-    if (both_ways != loops.size()) return wrong("a loop edge that does not lead back");
+    if (both_ways != loops.size()) return wrong("a loop edge without its reverse edge");
     return ends(in, "tree");
   }
 
@@ -146,7 +145,7 @@ class map_reader {
     to_.landmarks.adopt(false);
     for (const auto& [id, replacement] : replacements_)
       if (!to_.landmarks.contains(replacement))
-        return wrong("landmark " + to_string(id) + ": became one that is not there");
+        return wrong("landmark " + to_string(id) + ": its replacement does not exist");
     return ends(in, "land");
   }
 
@@ -158,7 +157,7 @@ class map_reader {
   bool ends(const section_reader& in, std::string_view name) {
     if (in.ended() || in.left() != 0)
       return wrong("section \"" + std::string(name) + "\" is " + (in.ended() ? "shorter" : "longer") +
-                   " than what it holds");
+                   " than its entries require");
     return true;
   }
 
@@ -166,8 +165,8 @@ class map_reader {
     const keyframe_id replacement = in.take<std::uint32_t>();
     const auto pose = take_pose(in);
     if (in.ended()) return wrong("the section ends within it");
-    if (!pose) return wrong("its pose is none");
-    if (replacement != no_id && replacement >= keyframe_ids_) return wrong("its replacement never was");
+    if (!pose) return wrong("invalid pose");
+    if (replacement != no_id && replacement >= keyframe_ids_) return wrong("its replacement has an invalid id");
     to_.erased[id] = {replacement, *pose, 1.0, to_.erasures++};
     to_.keyframes.add_erased(replacement);
     return true;
@@ -181,7 +180,7 @@ class map_reader {
     const auto pose = take_pose(in);
     const auto n = in.take<std::uint32_t>();
     if (in.ended() || in.left() / bytes_of_keypoint < n) return wrong("the section ends within it");
-    if (!pose || !std::isfinite(k.timestamp)) return wrong("its pose or time is none");
+    if (!pose || !std::isfinite(k.timestamp)) return wrong("invalid pose or timestamp");
     k.T_world_camera = *pose;
     k.features.keypoints.reserve(n);
     k.features.descriptors.reserve(n);
@@ -199,9 +198,9 @@ class map_reader {
       k.features.keypoints.push_back(p);
       if (!std::isfinite(p.x) || !std::isfinite(p.y) || p.octave < 0 || p.octave >= to_.levels ||
           !(k.depth.back() >= 0.0F && std::isfinite(k.depth.back())))
-        return wrong("keypoint " + std::to_string(i) + " has a place, level or depth that is none");
+        return wrong("keypoint " + std::to_string(i) + " has an invalid position, level or depth");
       if (!has_ray && !(std::isnan(x) && std::isnan(y) && k.depth.back() == 0.0F))
-        return wrong("keypoint " + std::to_string(i) + " has a ray that is none, or depth without a ray");
+        return wrong("keypoint " + std::to_string(i) + " has an invalid ray, or depth without a ray");
     }
     k.landmarks.assign(n, no_id);
     k.grid = features::keypoint_grid(k.features.keypoints);
@@ -213,22 +212,22 @@ class map_reader {
     const auto count = in.take<std::uint32_t>();
     if (in.ended()) return wrong("the section ends within it");
     if (count == 0 || count > keyframe_ids_ - id)
-      return wrong("begins " + std::to_string(count) + " that are forgotten");
+      return wrong("invalid run of " + std::to_string(count) + " forgotten keyframes");
     to_.keyframes.add_gone(count);
     to_.forgotten += count;
     return true;
   }
 
-  /// The chains of replacements lead to keyframes that are there, or to none.
-  bool replacements_end() {
-    std::map<keyframe_id, keyframe_id> met;  // from which one it was reached first
+  /// Checks that the chains of replacements lead to existing keyframes, or to none.
+  bool check_replacements() {
+    std::map<keyframe_id, keyframe_id> met;  // the keyframe from which each was reached first
     for (const auto& [id, e] : to_.erased)
       for (keyframe_id k = id; k != no_id && !to_.keyframes.contains(k);) {
         const auto at = to_.erased.find(k);
-        if (at == to_.erased.end()) return wrong("keyframe " + to_string(id) + ": became one that is forgotten");
+        if (at == to_.erased.end()) return wrong("keyframe " + to_string(id) + ": its replacement is forgotten");
         const auto [first, is_new] = met.emplace(k, id);
         if (!is_new && first->second == id) return wrong("keyframe " + to_string(id) + ": is its own replacement");
-        if (!is_new) break;  // from here on it has been followed before
+        if (!is_new) break;  // the rest of the chain has been checked before
         k = at->second.replacement;
       }
     return true;
@@ -236,7 +235,7 @@ class map_reader {
 
   bool removed(section_reader& in, landmark_id id) {
     const landmark_id replacement = in.take<std::uint32_t>();
-    if (replacement != no_id && replacement >= landmark_ids_) return wrong("became one that never was");
+    if (replacement != no_id && replacement >= landmark_ids_) return wrong("its replacement has an invalid id");
     if (replacement != no_id) replacements_.emplace_back(id, replacement);
     to_.landmarks.add_erased(replacement);
     return true;
@@ -245,7 +244,8 @@ class map_reader {
   bool gone(section_reader& in, landmark_id id) {
     const auto count = in.take<std::uint32_t>();
     if (in.ended()) return false;
-    if (count == 0 || count > landmark_ids_ - id) return wrong("begins " + std::to_string(count) + " that are gone");
+    if (count == 0 || count > landmark_ids_ - id)
+      return wrong("invalid run of " + std::to_string(count) + " erased landmarks");
     to_.landmarks.add_gone(count);
     return true;
   }
@@ -265,8 +265,8 @@ class map_reader {
     if (in.ended() || in.left() / bytes_of_observation < count) return in.end();
     if (!(largest_magnitude(l.position) < farthest) || !all_finite(l.normal) || !(l.min_distance >= 0.0) ||
         !(l.max_distance >= 0.0) || !std::isfinite(l.max_distance))
-      return wrong("is at no finite place");
-    if (l.created >= keyframe_ids_) return wrong("comes from a keyframe that never was");
+      return wrong("invalid position, normal or distance range");
+    if (l.created >= keyframe_ids_) return wrong("its first keyframe has an invalid id");
     l.observations.reserve(count);
     for (std::uint32_t i = 0; i != count; ++i) {
       observation o;
@@ -274,10 +274,11 @@ class map_reader {
       o.feature = in.take<std::uint32_t>();
       const std::string by = "keypoint " + std::to_string(o.feature) + " of keyframe " + to_string(o.keyframe);
       if (!to_.keyframes.contains(o.keyframe) || o.feature >= to_.keyframes[o.keyframe].size())
-        return wrong("is seen by " + by + ", which is not there");
-      if (i != 0 && o.keyframe <= l.observations.back().keyframe) return wrong("lists its observations in no order");
+        return wrong("observed by " + by + ", which does not exist");
+      if (i != 0 && o.keyframe <= l.observations.back().keyframe)
+        return wrong("its observations are not in ascending order");
       if (std::exchange(to_.keyframes[o.keyframe].landmarks[o.feature], id) != no_id)
-        return wrong("is seen by " + by + ", which shows another");
+        return wrong("observed by " + by + ", which observes another landmark");
       l.observations.push_back(o);
     }
     to_.landmarks.add(std::move(l));

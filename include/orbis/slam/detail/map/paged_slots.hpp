@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Where the object of each id is, for ids of which most are erased in the end.
+/// Slots of objects by id, for ids of which most are eventually erased.
 #pragma once
 
 #include <cassert>
@@ -14,12 +14,12 @@
 
 namespace orbis::slam::detail {
 
-/// A number for each of the ids 0, 1, 2 ...: the slot of its object, below `erased`; or, once it is erased, `erased`
-/// with the id that replaced it; or `gone`: erased, and nothing replaced it.
+/// Stores a number for each of the ids 0, 1, 2 ...: the slot of its object, below `erased`; or, once it is erased,
+/// `erased` with the id that replaced it; or `gone`: erased without a replacement.
 ///
-/// Numbers are in pages of 256. A page whose ids are all erased is given back when `remembered` more ids were given
-/// since, and its ids are `gone` then: they take 16 bytes for a thousand. A page with one id that is not erased takes 1
-/// kB. So a robot that never stops needs memory for the objects that are there, and next to none for those that were.
+/// Numbers are in pages of 256. A page whose ids are all erased is freed when `remembered` more ids have been assigned
+/// since; its ids are then `gone` and take 16 bytes per thousand. A page with one id that is not erased takes 1 kB. A
+/// robot that runs indefinitely therefore needs memory for the present objects, and almost none for erased ones.
 class paged_slots {
  public:
   static constexpr std::uint32_t erased = 0x80000000U;
@@ -28,7 +28,7 @@ class paged_slots {
 
   explicit paged_slots(std::uint32_t remembered) : remembered_{remembered} {}
   paged_slots(const paged_slots&) = default;
-  /// `other` has no ids afterwards.
+  /// Moves the ids of `other`, which has none afterwards.
   paged_slots(paged_slots&& other) : paged_slots{other.remembered_} { swap(other); }
   paged_slots& operator=(paged_slots other) noexcept {
     swap(other);
@@ -46,7 +46,7 @@ class paged_slots {
   }
   [[nodiscard]] bool contains(std::uint32_t i) const noexcept { return i < size_ && ((*this)[i] & erased) == 0; }
 
-  /// Gives the next id. O(1) amortised.
+  /// Adds the next id. O(1) amortised.
   void push_back(std::uint32_t slot) {
     if (size_ % page_size == 0) begin_page();
     const std::uint32_t page = page_of(size_);
@@ -55,7 +55,7 @@ class paged_slots {
     ++size_;
     if (size_ % page_size == 0) end_page(size_ - 1);
   }
-  /// Gives `count` ids that are `gone`. O(1) amortised, however many.
+  /// Adds `count` ids that are `gone`. O(1) amortised, regardless of `count`.
   void push_gone(std::uint32_t count) {
     for (; count != 0 && size_ % page_size != 0; --count) push_back(gone);
     size_ += count / page_size * page_size;
@@ -70,20 +70,20 @@ class paged_slots {
     if (i / page_size != size_ / page_size) end_page(i);
   }
 
-  /// The first id from `i` on that is not erased; `size()` if there is none. O(erased ids in between), but a page whose
-  /// ids are all erased takes one step, as do 65536 ids that were `gone` from the start.
+  /// Returns the first id from `i` on that is not erased; `size()` if there is none. O(erased ids in between); a page
+  /// whose ids are all erased takes one step, as do 65536 ids that were `gone` from the start.
   [[nodiscard]] std::uint32_t next_contained(std::uint32_t i) const noexcept {
     return next(
         i, [this](std::uint32_t page) { return contained_[page] != 0; },
         [](std::uint32_t slot) { return (slot & erased) == 0; });
   }
-  /// The first id from `i` on that is not `gone`; `size()` if there is none. O(ids in between), but a page that was
-  /// given back takes one step, as do 65536 ids that were `gone` from the start.
+  /// Returns the first id from `i` on that is not `gone`; `size()` if there is none. O(ids in between); a freed page
+  /// takes one step, as do 65536 ids that were `gone` from the start.
   [[nodiscard]] std::uint32_t next_known(std::uint32_t i) const noexcept {
     return next(
         i, [](std::uint32_t) { return true; }, [](std::uint32_t slot) { return slot != gone; });
   }
-  /// The last id that is not erased; `size()` if there is none. Cost as `next_contained`.
+  /// Returns the last id that is not erased; `size()` if there is none. Cost as for `next_contained`.
   [[nodiscard]] std::uint32_t last_contained() const noexcept {
     for (std::uint32_t i = size_; i != 0;) {
       const std::uint32_t at = i - 1;
@@ -97,15 +97,15 @@ class paged_slots {
     return size_;
   }
 
-  /// From now on, or no more, ids of another source are added that were erased at times of their own: until the end of
-  /// that nothing is given back, and they count as erased then.
+  /// Begins or ends the import of ids of another source, which were erased at other times. During the import no page is
+  /// freed; at its end, the imported erased ids count as erased then.
   void adopt(bool on) noexcept {
     if (!on)
       for (; adopted_from_ < retired_.size(); ++adopted_from_) retired_[adopted_from_].since = size_;
     adopts_ = on;
     adopted_from_ = retired_.size();
   }
-  /// Bytes on the heap.
+  /// Heap memory in bytes.
   [[nodiscard]] std::size_t memory_bytes() const noexcept {
     return (chunks_.capacity() + pages_.capacity() + slots_.capacity() + free_.capacity()) * sizeof(std::uint32_t) +
            contained_.capacity() * sizeof(std::uint16_t) + retired_.size() * sizeof(retired_page);
@@ -177,7 +177,7 @@ class paged_slots {
     pages_[place_of_page(size_)] = free_.back();
     free_.pop_back();
   }
-  /// The page that holds the id is whole: it is no longer needed if all its ids are erased.
+  /// Completes the page of an id: it may be freed if all its ids are erased.
   void end_page(std::uint32_t i) {
     if (remembered_ != no_id && contained_[page_of(i)] == 0) retired_.push_back({i, size_});
   }
@@ -185,13 +185,13 @@ class paged_slots {
   std::uint32_t remembered_;
   std::uint32_t size_ = 0;
   bool adopts_ = false;
-  std::size_t adopted_from_ = 0;          ///< of `retired_`: where those begin that were erased elsewhere
-  std::vector<std::uint32_t> chunks_;     ///< by id / 2^16: which 256 of `pages_`; or `none`
-  std::vector<std::uint32_t> pages_;      ///< which page of `slots_`, or `none`, for 256 ids
+  std::size_t adopted_from_ = 0;          ///< index in `retired_` of the first page of the import
+  std::vector<std::uint32_t> chunks_;     ///< by id / 2^16: index of a group of 256 `pages_`; or `none`
+  std::vector<std::uint32_t> pages_;      ///< by group of 256 ids: index of the page of `slots_`, or `none`
   std::vector<std::uint32_t> slots_;      ///< page after page
-  std::vector<std::uint16_t> contained_;  ///< by page of `slots_`: how many of its ids are not erased
-  std::vector<std::uint32_t> free_;       ///< pages of `slots_` that are not in use
-  std::deque<retired_page> retired_;      ///< whose ids are all erased, the oldest first
+  std::vector<std::uint16_t> contained_;  ///< by page of `slots_`: number of its ids that are not erased
+  std::vector<std::uint32_t> free_;       ///< unused pages of `slots_`
+  std::deque<retired_page> retired_;      ///< pages whose ids are all erased, the oldest first
 };
 
 }  // namespace orbis::slam::detail

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The observation of a point by a keypoint, and whether both agree.
+/// The observation of a point by a keypoint, and the test for their agreement.
 #pragma once
 
 #include <cstddef>
@@ -15,7 +15,7 @@
 
 namespace orbis::slam::detail {
 
-/// The observation of `point` (world, metres) by keypoint `i` of a frame.
+/// Returns the observation of `point` (world, metres) by keypoint `i` of a frame.
 template <camera::camera_model Camera, feature_descriptor D>
 [[nodiscard]] optimize::pose_observation observation_of(const camera_rig<Camera>& rig, const basic_frame<D>& f,
                                                         std::size_t i, const vec3& point) {
@@ -32,7 +32,8 @@ template <camera::camera_model Camera, feature_descriptor D>
   return optimize::chi_squared_gate(has_depth ? 3 : 2);
 }
 
-/// Whether keypoint `i` of a frame may observe `point` (world, metres): the reprojection error is below `error_limit`.
+/// Returns true if keypoint `i` of a frame agrees with `point` (world, metres): the reprojection error is below
+/// `error_limit`.
 template <camera::camera_model Camera, feature_descriptor D>
 [[nodiscard]] bool agrees(const camera_rig<Camera>& rig, const basic_frame<D>& f, const se3& T_camera_world,
                           std::size_t i, const vec3& point) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Objects by id. Ids stay valid while objects come and go.
+/// Objects by id. Ids remain valid while other objects are added and erased.
 #pragma once
 
 #include <cassert>
@@ -17,16 +17,16 @@
 
 namespace orbis::slam::detail {
 
-/// Objects with the ids 0, 1, 2 ... in the order in which they were added. No id is used twice, but the memory of
-/// erased objects is. An erased id remembers which object replaced it, if one did, at least until `remembered` more ids
-/// were given (`no_id`: for ever). References stay valid until their object is erased. All operations take O(1) where
-/// nothing else is said.
+/// Objects with the ids 0, 1, 2 ... in the order in which they were added. No id is reused, but the memory of erased
+/// objects is. An erased id remembers its replacement, if any, at least until `remembered` more ids have been assigned
+/// (`no_id`: for ever). References stay valid until their object is erased. All operations take O(1) unless stated
+/// otherwise.
 template <std::default_initializable T, class Id, std::uint32_t remembered = no_id>
 class slot_map {
  public:
   static constexpr std::uint32_t most_ids = 0x7fffffffU;
 
-  /// Adds an object and returns its id. @pre fewer than `most_ids` ids were given so far
+  /// Adds an object and returns its id. @pre fewer than `most_ids` ids assigned so far
   Id add(T value) {
     assert(slots_.size() < most_ids);
     std::uint32_t slot = static_cast<std::uint32_t>(items_.size());
@@ -41,24 +41,24 @@ class slot_map {
     return last_id();
   }
 
-  /// Between `adopt(true)` and `adopt(false)`: objects and ids of another store are added, as from a file. What was
-  /// erased there counts as erased at the end of that.
+  /// Begins or ends the import of objects and ids of another store, for example a file. Ids erased there count as
+  /// erased at the end of the import.
   void adopt(bool on) noexcept { slots_.adopt(on); }
-  /// Adds an id whose object was erased before.
+  /// Adds an id whose object is already erased.
   /// @pre `replacement` is `no_id`, or the id of an object that will be added
   Id add_erased(Id replacement) {
     assert(slots_.size() < most_ids);
     slots_.push_back(paged_slots::erased | replacement.value());
     return last_id();
   }
-  /// Adds `count` ids whose objects were erased before, and that nothing replaced. O(1) amortised.
+  /// Adds `count` ids whose objects are already erased, without replacement. O(1) amortised.
   /// @pre at most `most_ids` ids in all
   void add_gone(std::uint32_t count) {
     assert(count <= most_ids - slots_.size());
     slots_.push_gone(count);
   }
 
-  /// Erases an object; `replacement` takes its place. @pre contains(i); replacement is no_id or another contained id
+  /// Erases an object; `replacement` replaces it. @pre contains(i); replacement is no_id or another contained id
   void erase(Id i, Id replacement = no_id) {
     assert(contains(i) && (replacement == no_id || (replacement != i && contains(replacement))));
     const std::uint32_t slot = slots_[i.value()];
@@ -80,16 +80,17 @@ class slot_map {
   /// The number of objects.
   [[nodiscard]] std::size_t size() const noexcept { return items_.size() - free_.size(); }
   [[nodiscard]] bool empty() const noexcept { return size() == 0; }
-  /// The id that the next object will get.
+  /// The id of the next object.
   [[nodiscard]] Id end_id() const noexcept { return slots_.size(); }
-  /// The first id from `i` on that has an object; `end_id()` if there is none. O(erased ids in between), 256
-  /// at once where all are erased.
+  /// Returns the first id from `i` on that has an object; `end_id()` if there is none. O(erased ids in between), in
+  /// steps of 256 where all are erased.
   [[nodiscard]] Id next_id(Id i) const noexcept { return slots_.next_contained(i.value()); }
-  /// The first id from `i` on that has an object or a replacement; `end_id()` if there is none. Cost as `next_id`.
+  /// Returns the first id from `i` on that has an object or a replacement; `end_id()` if there is none. Cost as for
+  /// `next_id`.
   [[nodiscard]] Id next_known_id(Id i) const noexcept { return slots_.next_known(i.value()); }
 
-  /// `i` itself while its object is there; otherwise the object that replaced it, over all replacements since; `no_id`
-  /// if there is none, or if that was forgotten. O(replacements).
+  /// Returns `i` itself if its object exists; otherwise its replacement, following the chain of replacements; `no_id`
+  /// if there is none, or if it was forgotten. O(replacements).
   [[nodiscard]] Id replacement_of(Id i) const noexcept {
     std::uint32_t at = i.value();
     while (at < slots_.size()) {
@@ -101,9 +102,9 @@ class slot_map {
     return no_id;
   }
 
-  /// Moves all objects and erased ids of `other` behind those of this one, where they count as erased now. Returns by
-  /// how much its ids have grown. Ids inside the objects are not changed. O(ids of `other`), the long forgotten ones
-  /// 256 at once. @pre at most `most_ids` ids in all
+  /// Appends all objects and erased ids of `other`, which count as erased now. Returns the amount by which its ids
+  /// grow. Ids inside the objects are not changed. O(ids of `other`), in steps of 256 for long forgotten ones.
+  /// @pre at most `most_ids` ids in all
   std::uint32_t append(slot_map&& other) {
     assert(other.slots_.size() <= most_ids - slots_.size());
     const std::uint32_t offset = slots_.size();
@@ -156,9 +157,9 @@ class slot_map {
 
   [[nodiscard]] const_iterator begin() const { return {*this, 0}; }
   [[nodiscard]] const_iterator end() const { return {*this, end_id()}; }
-  /// The object with the least id. Cost as `next_id`. @pre !empty()
+  /// The object with the smallest id. Cost as for `next_id`. @pre !empty()
   [[nodiscard]] const T& front() const { return *begin(); }
-  /// The object with the greatest id. Cost as `next_id`. @pre !empty()
+  /// The object with the greatest id. Cost as for `next_id`. @pre !empty()
   [[nodiscard]] const T& back() const { return (*this)[slots_.last_contained()]; }
 
  private:

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Finds duplicates of landmarks around a keyframe and fuses them.
+/// Finds and fuses duplicate landmarks around a keyframe.
 ///
 /// Source: R. Mur-Artal, J. M. M. Montiel, J. D. Tardos, "ORB-SLAM: a versatile and accurate monocular SLAM system",
 /// T-RO 31 (2015), sections VI.C and VII.C.
@@ -27,13 +27,13 @@
 namespace orbis::slam::detail {
 
 struct fusion_counts {
-  std::size_t fused = 0;     ///< landmarks that were fused into another one
-  std::size_t observed = 0;  ///< observations that were added
+  std::size_t fused = 0;     ///< landmarks fused into another one
+  std::size_t observed = 0;  ///< added observations
 };
 
 /// Searches for landmarks in a keyframe that does not observe them. A found keypoint that observes another landmark
-/// fuses both: the one with fewer observations into the other, the younger one where equal. A keypoint that observes
-/// none gets an observation. The descriptors must match, and the position must agree with the keypoint (95 %). Changed
+/// fuses both: the one with fewer observations into the other, the younger one if equal. A keypoint that observes none
+/// gets an observation. The descriptors must match, and the position must agree with the keypoint (95 %). Changed
 /// landmarks are updated.
 template <feature_descriptor D, camera::camera_model Camera>
 fusion_counts fuse_into(basic_map<D>& m, keyframe_id id, std::span<const landmark_id> landmarks,
@@ -68,8 +68,8 @@ fusion_counts fuse_into(basic_map<D>& m, keyframe_id id, std::span<const landmar
   return counts;
 }
 
-/// Searches for the landmarks of a keyframe in its neighbours and their neighbours, and for theirs in it (`fuse_into`).
-/// O(neighbours).
+/// Searches for the landmarks of a keyframe in its neighbours and their neighbours, and for their landmarks in it
+/// (`fuse_into`). O(neighbours).
 template <feature_descriptor D, camera::camera_model Camera>
 fusion_counts fuse_with_neighbors(basic_map<D>& m, keyframe_id id, const camera_rig<Camera>& rig,
                                   const fusion_options& o = {}) {

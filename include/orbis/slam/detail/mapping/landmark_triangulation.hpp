@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// New landmarks from matching keypoints of two keyframes, by triangulation: for points without depth.
+/// Triangulation of new landmarks from matching keypoints of two keyframes: for points without depth.
 ///
 /// Sources: R. Mur-Artal, J. M. M. Montiel, J. D. Tardos, "ORB-SLAM: a versatile and accurate monocular SLAM system",
 /// T-RO 31 (2015), section VI.C; R. Mur-Artal, J. D. Tardos, "ORB-SLAM2", T-RO 33 (2017), section III.A, for the
@@ -67,8 +67,8 @@ struct view_pair {
   double focal;
   se3 T_a_world = a.T_world_camera.inverse(), T_b_world = b.T_world_camera.inverse();
 
-  /// The point (world, metres) that keypoint `i` of `a` and keypoint `j` of `b` observe; empty unless it passes all
-  /// checks.
+  /// Returns the point (world, metres) that keypoint `i` of `a` and keypoint `j` of `b` observe; empty unless it passes
+  /// all checks.
   [[nodiscard]] std::optional<vec3> point(std::uint32_t i, std::uint32_t j) const {
     const auto p = place(i, j);
     if (!p) return std::nullopt;
@@ -76,7 +76,7 @@ struct view_pair {
     if (!(in_a.z() > 0.0 && in_b.z() > 0.0)) return std::nullopt;
     if (!agrees<Camera, D>(rig, a, T_a_world, i, *p) || !agrees<Camera, D>(rig, b, T_b_world, j, *p))
       return std::nullopt;
-    // A point that is twice as far appears half as large.
+    // A point at twice the distance appears half as large.
     const double factor = norm(in_b) * rig.scales.scale(b.features.keypoints[j].octave) /
                           (norm(in_a) * rig.scales.scale(a.features.keypoints[i].octave));
     const double limit = options.scale_tolerance * rig.scales.factor();
@@ -84,7 +84,8 @@ struct view_pair {
   }
 
  private:
-  /// By triangulation or by depth, whichever has the larger parallax: that of depth is the virtual stereo camera's.
+  /// Computes the point by triangulation or depth, whichever has the larger parallax; the parallax of depth is that of
+  /// the virtual stereo camera.
   [[nodiscard]] std::optional<vec3> place(std::uint32_t i, std::uint32_t j) const {
     const double of_a = stereo_parallax(a, i), of_b = stereo_parallax(b, j);
     const auto met = optimize::triangulate(a.T_world_camera, a.rays[i], b.T_world_camera, b.rays[j],
@@ -98,12 +99,12 @@ struct view_pair {
 };
 
 /// Matches keypoints without a landmark of a keyframe with those of its best neighbours, along epipolar lines, and
-/// makes landmarks of the matches. The position is triangulated, or taken from the depth of either keypoint where that
-/// is more precise. A match becomes a landmark with both observations if
-///  - it lies in front of both cameras;
-///  - the angle between the rays is large enough (not required where depth is used);
-///  - it agrees with both keypoints (chi-square, 95 %), and with their depth where they have it;
-///  - the ratio of its distances agrees with the keypoints' pyramid levels.
+/// makes landmarks of the matches. The position is triangulated, or taken from the depth of either keypoint if that is
+/// more precise. A match becomes a landmark with both observations if
+/// - it is in front of both cameras;
+/// - the angle between the rays is large enough (not required if depth is used);
+/// - it agrees with both keypoints (chi-square, 95 %), and with their depth if available;
+/// - the ratio of its distances agrees with the keypoints' pyramid levels.
 /// Returns the number of new landmarks. O(neighbours x keypoints^2) distances to lines. @pre m.has_keyframe(newest)
 template <feature_descriptor D, camera::camera_model Camera>
 std::size_t triangulate_landmarks(basic_map<D>& m, keyframe_id newest, const camera_rig<Camera>& rig,

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Local bundle adjustment: a keyframe, its neighbours, and all that they observe.
+/// Local bundle adjustment: a keyframe, its neighbours, and the landmarks they observe.
 ///
-/// Who shares the map locks it for `take` and `apply` only:
+/// Callers that share the map lock it for `take` and `apply` only:
 ///
 /// @code
 ///   snapshot s = take(map, newest, rig, options);                       // reads the map
@@ -10,8 +10,8 @@
 ///   apply(map, s, solved);                                              // changes the map
 /// @endcode
 ///
-/// Between `take` and `apply`, keyframes, landmarks and observations may be added to the map or erased. Nobody else may
-/// move what was taken.
+/// Between `take` and `apply`, keyframes, landmarks and observations may be added to the map or erased. No other thread
+/// may move the copied keyframes and landmarks.
 ///
 /// Source: R. Mur-Artal, J. M. M. Montiel, J. D. Tardos, "ORB-SLAM: a versatile and accurate monocular SLAM system",
 /// T-RO 31 (2015), section VI.D.
@@ -37,11 +37,11 @@
 
 namespace orbis::slam::detail::local_adjustment {
 
-/// What takes part in an adjustment.
+/// The keyframes and landmarks of an adjustment.
 struct snapshot : bundle_snapshot {
-  std::vector<keyframe_id> moving;  ///< the keyframes whose landmarks take part, the newest first
+  std::vector<keyframe_id> moving;  ///< the keyframes whose landmarks are adjusted, the newest first
 
-  /// The index of a keyframe in the arrays; the number of keyframes if it does not take part.
+  /// Returns the index of a keyframe in the arrays; the number of keyframes if it is not among them.
   [[nodiscard]] std::uint32_t index_of(keyframe_id k) const {
     const auto at = std::lower_bound(keyframes.begin(), keyframes.end(), k);
     return static_cast<std::uint32_t>((at != keyframes.end() && *at == k ? at : keyframes.end()) - keyframes.begin());
@@ -53,9 +53,9 @@ struct snapshot : bundle_snapshot {
 }
 
 /// Copies keyframe `newest`, the keyframes that share most with it, and their landmarks. Other keyframes that observe
-/// these landmarks take part and are held, as are the root of the map and keyframes that depth holds. Empty if there is
-/// nothing to adjust. `memory`: a former snapshot, whose memory is used again. O(observations of the landmarks). @pre
-/// m.has_keyframe(newest)
+/// these landmarks are included but held fixed, as are the root of the map and keyframes localised by depth. Empty if
+/// there is nothing to adjust. `memory`: a former snapshot, whose memory is reused. O(observations of the landmarks).
+/// @pre m.has_keyframe(newest)
 template <feature_descriptor D, camera::camera_model Camera>
 [[nodiscard]] snapshot take(const basic_map<D>& m, keyframe_id newest, const camera_rig<Camera>& rig,
                             const adjustment_options& o, snapshot memory = {}) {
@@ -90,8 +90,8 @@ template <feature_descriptor D, camera::camera_model Camera>
   return s;
 }
 
-/// How a keyframe moved in the world; one that was added later as its nearest ancestor that takes part. Empty if it did
-/// not move.
+/// Returns the motion of a keyframe in the world; for one that was added later, that of its nearest ancestor in the
+/// snapshot. Empty if it did not move.
 template <feature_descriptor D>
 [[nodiscard]] std::optional<se3> motion_of(const basic_map<D>& m, keyframe_id k, const snapshot& s,
                                            const bundle_solution& solved) {
@@ -103,9 +103,9 @@ template <feature_descriptor D>
   return solved.poses[i] * s.poses[i].inverse();
 }
 
-/// Writes a solution into the map, if it is usable. Keyframes that were added since `take` move along with their
-/// ancestor in the spanning tree, landmarks with the keyframe that created them. Outliers are erased, and landmarks
-/// whose position nothing determines any more.
+/// Writes a solution into the map, if it is usable. Keyframes that were added since `take` move with their ancestor in
+/// the spanning tree, landmarks with the keyframe that created them. Outliers are erased, as are landmarks whose
+/// position is no longer determined.
 template <feature_descriptor D>
 void apply(basic_map<D>& m, const snapshot& s, const bundle_solution& solved) {
   if (!solved.usable) return;

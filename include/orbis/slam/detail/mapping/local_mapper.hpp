@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Local mapping: what is done with each new keyframe.
+/// Local mapping: the processing of each new keyframe.
 #pragma once
 
 #include <algorithm>
@@ -25,7 +25,7 @@
 
 namespace orbis::slam::detail {
 
-/// The number of observations of a landmark; those with depth count twice. O(observations).
+/// Returns the number of observations of a landmark; those with depth count twice. O(observations).
 template <feature_descriptor D>
 [[nodiscard]] std::uint32_t support(const basic_map<D>& m, const basic_landmark<D>& l) {
   std::uint32_t sum = 0;
@@ -33,8 +33,8 @@ template <feature_descriptor D>
   return sum;
 }
 
-/// Whether a landmark is unreliable at the time of keyframe `newest`: seldom found where it is expected, or hardly
-/// observed by the keyframes after the one that created it. Landmarks of the newest keyframe never are.
+/// Returns true if a landmark is unreliable at the time of keyframe `newest`: seldom found where it is expected, or
+/// hardly observed by the keyframes after the one that created it. Always false for landmarks of the newest keyframe.
 /// Source: R. Mur-Artal, J. M. M. Montiel, J. D. Tardos, "ORB-SLAM", T-RO 31 (2015), section VI.B.
 template <feature_descriptor D>
 [[nodiscard]] bool is_unreliable(const basic_map<D>& m, const basic_landmark<D>& l, keyframe_id newest,
@@ -47,8 +47,8 @@ template <feature_descriptor D>
   return age >= o.age && age <= o.age + 1 && support(m, l) < o.min_support;
 }
 
-/// Removes the unreliable landmarks among those that the last keyframes and the neighbours of the newest one observe.
-/// To be called after each keyframe. Returns how many were removed. O(observations of these keyframes).
+/// Removes the unreliable landmarks among those observed by the last keyframes and the neighbours of the newest one.
+/// Call after each keyframe. Returns the number removed. O(observations of these keyframes).
 template <feature_descriptor D>
 std::size_t cull_landmarks(basic_map<D>& m, keyframe_id newest, const culling_options& o) {
   std::vector<keyframe_id> around;
@@ -65,8 +65,8 @@ std::size_t cull_landmarks(basic_map<D>& m, keyframe_id newest, const culling_op
   return removed;
 }
 
-/// Whether enough of a keyframe's landmarks that are closer than `close_depth` (metres; infinite: all, where no depth
-/// is measured) are observed by enough other keyframes at the same or a finer pyramid level. False for a keyframe
+/// Returns true if enough of a keyframe's landmarks that are closer than `close_depth` (metres; infinite: all, if no
+/// depth is measured) are observed by enough other keyframes at the same or a finer pyramid level. False for a keyframe
 /// without close landmarks. O(observations of its landmarks). Source: R. Mur-Artal, J. D. Tardos, "ORB-SLAM2", T-RO 33
 /// (2017), section III.C, after ORB-SLAM (2015), VI.E.
 template <feature_descriptor D>
@@ -87,10 +87,10 @@ template <feature_descriptor D>
   return close != 0 && static_cast<double>(seen_by_others) >= o.redundant * static_cast<double>(close);
 }
 
-/// Erases the redundant neighbours of keyframe `newest`, the strongest first; each is judged after the ones before it
-/// were erased. Kept are the root and those for which `keep(id)` is true. Keyframes with loop edges are erased like
-/// others, and their edges pass to the replacement (ORB-SLAM keeps such keyframes: a map that closes loops for days
-/// would grow by two keyframes for each). Returns the erased ones.
+/// Erases the redundant neighbours of keyframe `newest`, the strongest first; each is tested after the previous ones
+/// were erased. Keeps the root and the keyframes for which `keep(id)` is true. Keyframes with loop edges are erased
+/// like others, and their edges pass to the replacement (ORB-SLAM keeps such keyframes: a map that closes loops for
+/// days would grow by two keyframes for each). Returns the erased ones.
 template <feature_descriptor D, std::predicate<keyframe_id> Keep>
 std::vector<keyframe_id> cull_keyframes(basic_map<D>& m, keyframe_id newest, double close_depth,
                                         const culling_options& o, Keep&& keep) {
@@ -113,9 +113,9 @@ class local_mapper {
  public:
   explicit local_mapper(shared_state<Camera, D, Places>& shared) : shared_{shared}, solver_{shared.rig.model} {}
 
-  /// Adds the keyframe to the places, and improves the map around it. Does nothing if it is gone. `hurry()` is called
-  /// before each step of the adjustment: true ends it early.
-  void process(map_keyframe k, const std::function<bool()>& hurry) {
+  /// Adds the keyframe to the places, and improves the map around it. Does nothing if it no longer exists. Calls
+  /// `stop_requested()` before each step of the adjustment: true ends it early.
+  void process(map_keyframe k, const std::function<bool()>& stop_requested) {
     std::vector<keyframe_event> culled;
     {
       const auto edit = shared_.edit();
@@ -125,7 +125,7 @@ class local_mapper {
       shared_.locked([&] { cull_landmarks(m, k.keyframe, settings.culling); });
       shared_.locked([&] { triangulate_landmarks(m, k.keyframe, shared_.rig, settings.triangulation); });
       shared_.locked([&] { fuse_with_neighbors(m, k.keyframe, shared_.rig, settings.fusion); });
-      adjust(m, k.keyframe, hurry);
+      adjust(m, k.keyframe, stop_requested);
       culled = cull(m, k);
     }
     if (const auto& callback = shared_.callbacks.keyframe_culled)
@@ -133,7 +133,7 @@ class local_mapper {
   }
 
  private:
-  /// Adds the keyframe, which gets its present id, to the places. False if it is gone.
+  /// Updates `k` to its present id and adds it to the places. Returns false if it no longer exists.
   bool prepare(map_keyframe& k) {
     const auto* frame = shared_.locked([&]() -> const basic_keyframe<D>* {
       k = shared_.atlas.current(k);
@@ -144,17 +144,17 @@ class local_mapper {
     shared_.locked([&] { shared_.places.add(k, bow_vector); });
     return true;
   }
-  void adjust(basic_map<D>& m, keyframe_id k, const std::function<bool()>& hurry) {
+  void adjust(basic_map<D>& m, keyframe_id k, const std::function<bool()>& stop_requested) {
     const adjustment_options& o = shared_.settings.adjustment;
     snapshot_ = shared_.locked([&] { return local_adjustment::take(m, k, shared_.rig, o, std::move(snapshot_)); });
     if (snapshot_.empty()) return;
-    const auto go_on = [&](std::size_t, std::size_t) { return !hurry(); };
+    const auto go_on = [&](std::size_t, std::size_t) { return !stop_requested(); };
     solution_ = solver_.solve(snapshot_, local_adjustment::schedule_of(o), go_on, std::move(solution_));
     shared_.locked([&] { local_adjustment::apply(m, snapshot_, solution_); });
   }
   std::vector<keyframe_event> cull(basic_map<D>& m, map_keyframe newest) {
     return shared_.locked([&] {
-      // The events are made while the keyframes are there. Newer keyframes have not been mapped yet and stay.
+      // The events are made while the keyframes exist. Newer keyframes have not been mapped yet and are kept.
       std::vector<keyframe_event> judged;
       const auto keep = [&](keyframe_id k) {
         if (k > newest.keyframe) return true;
@@ -175,8 +175,8 @@ class local_mapper {
 
   shared_state<Camera, D, Places>& shared_;
   bundle_solver<Camera> solver_;
-  local_adjustment::snapshot snapshot_;  ///< its memory is used again
-  bundle_solution solution_;             ///< its memory is used again
+  local_adjustment::snapshot snapshot_;  ///< reused memory
+  bundle_solution solution_;             ///< reused memory
 };
 
 }  // namespace orbis::slam::detail

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A part of a map as a bundle adjustment problem: copied out of the map, solved, and without outliers solved again.
+/// A part of a map as a bundle adjustment problem: copied from the map, solved, and solved again without outliers.
 #pragma once
 
 #include <algorithm>
@@ -28,19 +28,19 @@ namespace orbis::slam::detail {
 /// Keyframes, landmarks and observations of a map, as arrays.
 struct bundle_snapshot {
   std::vector<keyframe_id> keyframes;                      ///< ascending
-  std::vector<std::uint8_t> is_fixed;                      ///< by keyframe: 1 if its pose is held
+  std::vector<std::uint8_t> is_fixed;                      ///< by keyframe: 1 if its pose is held fixed
   std::vector<se3> poses;                                  ///< by keyframe: `T_world_camera`
   std::vector<landmark_id> landmarks;                      ///< ascending
   std::vector<vec3> points;                                ///< by landmark: in the world, metres
   std::vector<optimize::bundle_observation> observations;  ///< `pose` and `point` index the arrays above
-  std::vector<observation> sources;                        ///< of each of these, the keyframe and keypoint
+  std::vector<observation> sources;                        ///< by observation: the keyframe and keypoint
   keyframe_id end_keyframe = 0;                            ///< ids from here on were added to the map later
   landmark_id end_landmark = 0;
 
-  /// Whether there is nothing to adjust.
+  /// Returns true if there is nothing to adjust.
   [[nodiscard]] bool empty() const noexcept { return observations.empty(); }
 
-  /// Empties the arrays and keeps their memory.
+  /// Empties the arrays, keeping their memory.
   void clear() {
     keyframes.clear();
     is_fixed.clear();
@@ -55,7 +55,7 @@ struct bundle_snapshot {
     poses.push_back(T_world_camera);
     is_fixed.push_back(fixed ? 1 : 0);
   }
-  /// Adds a landmark with the observations by keyframes for which `index_of(id)` gives an index, not `no_id`.
+  /// Adds a landmark with the observations by keyframes for which `index_of(id)` returns an index, not `no_id`.
   template <feature_descriptor D, camera::camera_model Camera, class IndexOf>
   void add_landmark(const basic_map<D>& m, const basic_landmark<D>& l, const camera_rig<Camera>& rig,
                     IndexOf&& index_of) {
@@ -70,7 +70,7 @@ struct bundle_snapshot {
       sources.push_back(seen);
     }
   }
-  /// The same, if there are at least two.
+  /// As above, but only if there are at least two such observations.
   template <feature_descriptor D, camera::camera_model Camera, class IndexOf>
   void add_shared_landmark(const basic_map<D>& m, const basic_landmark<D>& l, const camera_rig<Camera>& rig,
                            IndexOf&& index_of) {
@@ -79,8 +79,8 @@ struct bundle_snapshot {
   }
 };
 
-/// Erases an observation, if it is still there, and returns whether it was. A landmark whose position is not determined
-/// any more (one observation, without depth) is removed.
+/// Erases an observation if it still exists, and returns true if it did. A landmark whose position is no longer
+/// determined (one observation, without depth) is removed.
 template <feature_descriptor D>
 bool erase_outlier(basic_map<D>& m, landmark_id l, const observation& source) {
   if (!m.erase_observation(l, source)) return false;
@@ -90,12 +90,12 @@ bool erase_outlier(basic_map<D>& m, landmark_id l, const observation& source) {
   return true;
 }
 
-/// The result of an adjustment, index by index as the snapshot.
+/// The result of an adjustment, with the indices of the snapshot.
 struct bundle_solution {
   std::vector<se3> poses;
   std::vector<vec3> points;
   std::vector<std::uint8_t> outliers;  ///< by observation: 1 if it disagrees with the result
-  bool usable = false;                 ///< whether poses and points are valid, and better than before
+  bool usable = false;                 ///< true if poses and points are valid, and better than before
   bool complete = false;               ///< false if it was stopped, or failed
   int iterations = 0;
   double initial_cost = 0.0;  ///< half the robust sum of squared errors
@@ -103,21 +103,21 @@ struct bundle_solution {
 };
 
 struct bundle_schedule {
-  int robust_iterations = 5;  ///< with all observations, at most
-  int iterations = 5;         ///< without the outliers, at most
+  int robust_iterations = 5;  ///< maximum number with all observations
+  int iterations = 5;         ///< maximum number without the outliers
   double relative_tolerance = 1e-6;
-  bool keep_partial = false;  ///< whether the result so far is used if the adjustment is stopped
+  bool keep_partial = false;  ///< uses the partial result if the adjustment is stopped
 };
 
-/// Solves snapshots. It keeps its memory: the next problem allocates next to nothing if it is not larger.
+/// Solves snapshots. It keeps its memory: the next problem allocates almost nothing if it is not larger.
 template <camera::camera_model Camera>
 class bundle_solver {
  public:
   explicit bundle_solver(const optimize::reprojection<Camera>& model, optimize::huber loss = {})
       : adjuster_{model, loss} {}
 
-  /// `go_on(iteration, iterations)` is asked before each step; if it returns false, the adjustment stops. Nothing is
-  /// called an outlier before the first half is complete. `memory`: a former solution, whose memory is used again.
+  /// Calls `go_on(iteration, iterations)` before each step; if it returns false, the adjustment stops. No observation
+  /// is marked as an outlier before the first half is complete. `memory`: a former solution, whose memory is reused.
   [[nodiscard]] bundle_solution solve(const bundle_snapshot& s, const bundle_schedule& schedule,
                                       const progress& go_on = {}, bundle_solution memory = {}) {
     bundle_solution result = std::move(memory);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The pose of a frame together with the motion during its read-out.
+/// Refinement of the pose of a frame together with the motion during its read-out.
 #pragma once
 
 #include <algorithm>
@@ -25,24 +25,24 @@
 
 namespace orbis::slam::detail {
 
-/// A pose and the camera's twist there.
+/// A pose and the twist of the camera at its time.
 struct moving_pose {
   se3 T_world_camera;
-  vec6 twist = zeros<vec6>();  ///< of the camera in its own frame, per second, translation first
+  vec6 twist = zeros<vec6>();  ///< motion of the camera in its own frame, per second, translation first
 };
 
-/// What is known of the twist before the frame is looked at: the mean motion since a former pose, which is followed
-/// further by a part of its change, up to the acceleration of a hand; otherwise that it is that of a hand.
+/// The prior of the twist, before the frame is used: the mean motion since a former pose, extrapolated by a part of its
+/// change, within the acceleration of a hand; without a former pose, the motion of a hand.
 struct twist_prior {
   std::optional<se3> T_world_before;   ///< the former pose ...
   double interval = 0.0;               ///< ... and the seconds since
-  double trend = 0.0;                  ///< which part of the change from `twist_before` to the mean motion is added
+  double trend = 0.0;                  ///< part of the change from `twist_before` to the mean motion that is added
   vec6 twist_before = zeros<vec6>();   ///< at the former pose
   double translation_deviation = 0.5;  ///< metres per second
   double rotation_deviation = 1.0;     ///< radians per second
 
-  /// The prior `interval` seconds after a former frame. With a constant acceleration a trend of 1 is exact, but errors
-  /// of the twist would alternate for ever; half of it damps them. @pre interval > 0
+  /// Returns the prior `interval` seconds after a former frame. With a constant acceleration a trend of 1 is exact, but
+  /// errors of the twist would alternate for ever; half of it damps them. @pre interval > 0
   [[nodiscard]] static twist_prior after(const moving_pose& before, double interval, bool twist_is_known) {
     constexpr double acceleration = 6.0;  // metres, or radians, per second squared
     const twist_prior unknown;
@@ -55,7 +55,7 @@ struct twist_prior {
             std::min(deviation, unknown.rotation_deviation)};
   }
 
-  /// The twist that is expected at a pose.
+  /// Returns the expected twist at a pose.
   [[nodiscard]] vec6 expected(const se3& T_camera_world) const {
     if (!T_world_before) return zeros<vec6>();
     const vec6 mean = (T_camera_world * *T_world_before).inverse().log() / interval;
@@ -63,13 +63,13 @@ struct twist_prior {
   }
 };
 
-/// A keypoint as it was read, and the known point that it observes.
+/// A keypoint as read, and the known point that it observes.
 struct row_observation {
   optimize::pose_observation seen;
   double time = 0.0;  ///< of its row, relative to the frame, seconds
 };
 
-/// The mean twist of the camera from a frame to a later one; zero if it is not later.
+/// Returns the mean twist of the camera from a frame to a later one; zero if it is not later.
 template <feature_descriptor D>
 [[nodiscard]] vec6 motion_between(const basic_frame<D>& before, const basic_frame<D>& after) {
   const double interval = after.timestamp - before.timestamp;
@@ -77,7 +77,8 @@ template <feature_descriptor D>
   return (before.T_world_camera.inverse() * after.T_world_camera).log() / interval;
 }
 
-/// What the keypoints of a frame that observe a landmark read. O(features). @pre the keypoints were kept as read
+/// Finds the observations of landmarks by the keypoints of a frame as read. O(features). @pre the keypoints were kept
+/// as read
 template <feature_descriptor D, camera::camera_model Camera>
 void find_row_observations(const basic_frame<D>& f, const basic_map<D>& m, const camera_rig<Camera>& rig,
                            const camera::shutter& shutter, std::vector<row_observation>& to) {
@@ -94,7 +95,7 @@ void find_row_observations(const basic_frame<D>& f, const basic_map<D>& m, const
   }
 }
 
-/// The same of a global shutter.
+/// As above, for a global shutter.
 template <feature_descriptor D, camera::camera_model Camera>
 void find_observations(const basic_frame<D>& f, const basic_map<D>& m, const camera_rig<Camera>& rig,
                        std::vector<row_observation>& to) {
@@ -103,11 +104,12 @@ void find_observations(const basic_frame<D>& f, const basic_map<D>& m, const cam
     if (f.landmarks[i] != no_id) to.push_back({observation_of(rig, f, i, m.landmark_at(f.landmarks[i]).position)});
 }
 
-/// Of Huber's loss of these residuals, standard deviations: as in the refinement of the pose alone.
+/// Width of Huber's loss of these residuals, standard deviations: as in the refinement of the pose alone.
 inline constexpr double row_loss_width = 2.447;
 
-/// The residual of an observation, and its derivative by a motion of the camera frame (`exp(step) * T_camera_world`) at
-/// the time of its row; that by the twist is `-o.time` times as much. Empty where the point has no projection.
+/// Returns the residual of an observation, and its derivative by a motion of the camera frame (`exp(step) *
+/// T_camera_world`) at the time of its row; the derivative by the twist is `-o.time` times this. Empty if the point has
+/// no projection.
 template <camera::camera_model Camera>
 [[nodiscard]] std::optional<vec3> row_residual(const optimize::reprojection<Camera>& model, const se3& T_camera_world,
                                                const vec6& twist, const row_observation& o, matrix<3, 6>& j) {
@@ -119,7 +121,7 @@ template <camera::camera_model Camera>
   return r;
 }
 
-/// A cost of pose and twist, to second order around `at`: what other measurements than keypoints say. The steps are a
+/// A cost of pose and twist, to second order around `at`, from measurements other than keypoints. The steps are a
 /// motion of the camera frame (`exp(step) * T_camera_world`), then that of the twist.
 struct pose_quadratic {
   moving_pose at;
@@ -127,7 +129,7 @@ struct pose_quadratic {
   matrix<12, 1> g = zeros<matrix<12, 1>>();
   double cost = 0.0;
 
-  /// Takes the twist for known: the cost no longer depends on it.
+  /// Treats the twist as known: the cost no longer depends on it.
   void hold_twist() {
     for (int i = 0; i != 12; ++i)
       for (int k = 6; k != 12; ++k) h(i, k) = h(k, i) = 0.0;
@@ -135,10 +137,10 @@ struct pose_quadratic {
   }
 };
 
-/// What the refinement of a pose depends on besides the keypoints.
+/// Inputs of the refinement of a pose other than the keypoints.
 struct refinement_terms {
-  const pose_quadratic* other = nullptr;  ///< a further cost, if there is one
-  bool moves = true;                      ///< whether the camera moves while it is read: else the twist stays as it is
+  const pose_quadratic* other = nullptr;  ///< a further cost, or null
+  bool moves = true;                      ///< true if the camera moves during read-out; otherwise the twist is fixed
 };
 
 /// The normal equations of pose and twist.
@@ -148,7 +150,7 @@ struct moving_pose_equations {
   double cost = 0.0;  ///< half the robust sum
 };
 
-/// The equations for a pose and its twist (h, g of `to`) of those given by powers of the rows' times.
+/// Sets the equations for a pose and its twist (h, g of `to`) from those given by powers of the rows' times.
 template <class Equations>
 void set_parts(Equations& to, const std::array<mat6, 3>& h, const std::array<vec6, 2>& g) {
   set_block(to.h, 0, 0, h[0]);
@@ -158,8 +160,8 @@ void set_parts(Equations& to, const std::array<mat6, 3>& h, const std::array<vec
   to.g = stacked(g[0], g[1]);
 }
 
-/// Adds to equations of the keypoints, which are given by powers of the rows' times, what else determines pose and
-/// twist.
+/// Adds the other constraints on pose and twist to the equations of the keypoints, which are given by powers of the
+/// rows' times.
 inline void add_terms(moving_pose_equations& e, const std::array<mat6, 3>& h, const std::array<vec6, 2>& g,
                       const se3& T_camera_world, const vec6& twist, const twist_prior& prior,
                       const refinement_terms& terms) {
@@ -189,8 +191,7 @@ inline void add_terms(moving_pose_equations& e, const std::array<mat6, 3>& h, co
   }
 }
 
-/// The step of Gauss and Newton: the motion of the camera frame, then that of the twist, which is zero unless it
-/// `moves`.
+/// Returns the Gauss-Newton step: the motion of the camera frame, then that of the twist, which is zero unless `moves`.
 [[nodiscard]] inline matrix<12, 1> newton_step(const moving_pose_equations& e, bool moves) {
   if (moves) return solve_semidefinite(e.h, matrix<12>(-e.g)).value_or(zeros<matrix<12>>());
   const auto pose = solve_semidefinite(block<6, 6>(e.h, 0, 0), vec6(-head<6>(e.g)));
@@ -223,29 +224,30 @@ template <camera::camera_model Camera>
   return e;
 }
 
-/// The squares of the deviations, times the square of `factor`, on the diagonal.
+/// Returns the squares of the deviations, times the square of `factor`, on the diagonal.
 [[nodiscard]] inline mat6 variances_of(const twist_prior& prior, double factor) {
   const double t = factor * prior.translation_deviation, r = factor * prior.rotation_deviation;
   return diagonal_matrix(stacked(filled<vec3>(t * t), filled<vec3>(r * r)));
 }
 
-/// The twist by which a depth image that was taken before its frame is brought to the frame's time.
+/// The twist that moves a depth image taken before its frame to the frame's time.
 ///
-/// A twist follows from the poses around it, and the pose of the frame from depth that was moved by the twist. Where
-/// depth comes after the frame, an error of the pose meets itself with the opposite sign and fades; where it comes
-/// before, a direction that pixels hardly determine would swing from frame to frame, wider each time. So such a depth
-/// image follows the refined twist only as far as pixels alone determine that, and the former twist otherwise, by the
-/// gain of R. E. Kalman, "A new approach to linear filtering and prediction problems", J. Basic Engineering 82 (1960).
+/// A twist follows from the poses around it, and the pose of the frame from depth that was moved by the twist. If depth
+/// comes after the frame, an error of the pose feeds back with the opposite sign and decays; if it comes before, a
+/// direction that pixels hardly determine would oscillate from frame to frame with growing amplitude. Such a depth
+/// image therefore follows the refined twist only as far as pixels alone determine it, and the former twist otherwise,
+/// by the gain of R. E. Kalman, "A new approach to linear filtering and prediction problems", J. Basic Engineering 82
+/// (1960).
 class early_depth_twist {
  public:
-  /// What the pixels of a frame's observations determine. Call before `between`. O(observations).
+  /// Computes the gain from the pixels of a frame's observations. Call before `between`. O(observations).
   template <camera::camera_model Camera>
-  void see(std::span<const row_observation> observations, const optimize::reprojection<Camera>& model,
-           const moving_pose& at, const twist_prior& prior) {
+  void update(std::span<const row_observation> observations, const optimize::reprojection<Camera>& model,
+              const moving_pose& at, const twist_prior& prior) {
     constexpr double width = row_loss_width;
-    constexpr double share = 0.25;  // of the information of independent errors: landmarks that are near err together
+    constexpr double share = 0.25;  // of the information: errors of near landmarks are correlated
     const se3 T_camera_world = at.T_world_camera.inverse();
-    std::array<mat6, 3> h{identity<mat6>(), zeros<mat6>(), zeros<mat6>()};  // a metre or a radian, if nothing is seen
+    std::array<mat6, 3> h{identity<mat6>(), zeros<mat6>(), zeros<mat6>()};  // a metre or a radian, without observations
     for (const row_observation& o : observations) {
       matrix<3, 6> j;
       const auto r = row_residual(model, T_camera_world, at.twist, o, j);
@@ -259,21 +261,21 @@ class early_depth_twist {
     determine(h, prior);
   }
 
-  /// Between the twist of the former frame and that of this one.
+  /// Returns a twist between that of the former frame and that of this one.
   [[nodiscard]] vec6 between(const twist_prior& prior, const vec6& refined) const {
     if (!prior.T_world_before || !all_finite(gain_)) return refined;
     return prior.twist_before + gain_ * (refined - prior.twist_before);
   }
 
-  /// The frame that was seen becomes the former one.
+  /// Makes the present frame the former one.
   void advance() { former_covariance_ = pose_covariance_; }
 
  private:
-  /// From what the pixels determine, by powers of the rows' times.
+  /// Computes the gain from the information of the pixels, by powers of the rows' times.
   void determine(const std::array<mat6, 3>& h, const twist_prior& prior) {
     pose_covariance_ = inverse(h[0]);
     if (!prior.T_world_before) return;
-    // The prior ties the twist to both poses, of which the former one is not exact either.
+    // The prior relates the twist to both poses, of which the former one is not exact either.
     const double by_pose = (1.0 + prior.trend) / prior.interval;
     const mat6 tie = inverse(variances_of(prior, 1.0) + by_pose * by_pose * former_covariance_);
     const mat6 mixed = h[1] + by_pose * tie;
@@ -287,8 +289,8 @@ class early_depth_twist {
   mat6 gain_ = identity<mat6>();
 };
 
-/// Refines pose and twist, or the pose alone, by Gauss-Newton steps as long as they lower the cost. The observations
-/// should hold few outliers. O(observations) for each step.
+/// Refines pose and twist, or the pose alone, by Gauss-Newton steps while they lower the cost. The observations should
+/// contain few outliers. O(observations) per step.
 template <camera::camera_model Camera>
 [[nodiscard]] moving_pose refine_moving_pose(std::span<const row_observation> observations,
                                              const optimize::reprojection<Camera>& model, const moving_pose& start,

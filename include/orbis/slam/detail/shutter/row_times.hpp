@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Keypoints of a rolling shutter, moved to where they are at the time of the frame.
+/// Motion of rolling-shutter keypoints to their positions at the time of the frame.
 ///
 /// The camera moves by a constant body twist while an image is read out. A keypoint of a row that is read `t` seconds
 /// after the frame's time observes, in the camera frame of that moment, the point `p`; in the camera frame of the
 /// frame's time it is at `exp(t * twist) p`. Projected there, with its depth, it is a measurement of a global shutter,
-/// and all that uses it needs to know nothing of rows.
+/// and later steps need no knowledge of rows.
 ///
-/// The model of constant velocity during the read-out: J. Hedborg, P.-E. Forssen, M. Felsberg, E. Ringaby, "Rolling
-/// shutter bundle adjustment", CVPR 2012.
+/// Source of the model of constant velocity during read-out: J. Hedborg, P.-E. Forssen, M. Felsberg, E. Ringaby,
+/// "Rolling shutter bundle adjustment", CVPR 2012.
 #pragma once
 
 #include <cmath>
@@ -25,7 +25,7 @@ namespace orbis::slam::detail {
 
 using camera::moved_by;
 
-/// Remembers the keypoints as they were read. Their rays and depths must be set.
+/// Stores the keypoints as read in `as_read`. @pre their rays and depths are set
 template <feature_descriptor D>
 void keep_as_read(basic_frame<D>& f) {
   f.as_read.resize(f.size());
@@ -34,10 +34,10 @@ void keep_as_read(basic_frame<D>& f) {
                     f.depth[i],    f.depth[i]};
 }
 
-/// Moves the keypoints from where they were read to where they are at the frame's time; sets their rays and depths, the
-/// grid and `f.twist`. `depth_of(i)`: the depth of what a keypoint without measured depth observes, where it is known;
-/// 0: it is far, and only the rotation counts. A keypoint that is not in the image then stays where it was read. Does
-/// nothing where the keypoints were not kept. O(features).
+/// Moves the keypoints from their read positions to those at the frame's time; sets their rays and depths, the grid and
+/// `f.twist`. `depth_of(i)`: the depth of the point observed by a keypoint without measured depth, if known; 0: it is
+/// far, and only the rotation is applied. A keypoint that leaves the image keeps its read position. Does nothing
+/// without stored keypoints (`keep_as_read`). O(features).
 template <feature_descriptor D, camera::camera_model Camera, class DepthOf>
 void move_to_frame_time(basic_frame<D>& f, const camera_rig<Camera>& rig, const camera::shutter& shutter,
                         const vec6& twist, DepthOf&& depth_of) {
@@ -52,7 +52,7 @@ void move_to_frame_time(basic_frame<D>& f, const camera_rig<Camera>& rig, const 
     constexpr double far = 1e6;  // metres
     const vec3 moved = moved_by(twist, t, (known > 0.0 ? known : far) * vec3(read.ray_x, read.ray_y, 1.0));
     const auto pixel = moved.z() > 0.0 ? rig.camera().project(moved) : std::nullopt;
-    if (!pixel) {  // or it has no ray
+    if (!pixel) {  // also if it has no ray
       at.x = read.x, at.y = read.y;
       f.rays[i] = {read.ray_x, read.ray_y, std::isnan(read.ray_x) ? read.ray_x : 1.0};
       f.depth[i] = read.depth;

@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The read-out time of a camera, and the delay of its depth image, from the frames themselves.
+/// Estimation of the read-out time of a camera, and the delay of its depth image, from the frames.
 ///
-/// A point that a keyframe and a frame observe is projected from the one into the other; by how much it misses depends
-/// on read-out and delay in a known way, as the motion of the camera is known from the poses around each. For each pair
-/// the relative pose is eliminated (it would explain a part); what is left are two linear equations, summed over all
-/// pairs. Their deviation is found from how much the keyframes' sums disagree, as the errors of the pairs of one
+/// A point observed by a keyframe and a frame is projected from one into the other; its error depends on read-out and
+/// delay in a known way, because the motion of the camera is known from the poses around each. For each pair the
+/// relative pose is eliminated (it would explain a part); two linear equations remain, which are summed over all pairs.
+/// Their deviation is estimated from the variation of the keyframes' sums, because the errors of the pairs of one
 /// keyframe are not independent.
 ///
-/// Read-out from motion: P.-E. Forssen, E. Ringaby, "Rectifying rolling shutter video from hand-held devices", CVPR
-/// 2010. Deviations from sums over clusters: K.-Y. Liang, S. L. Zeger, "Longitudinal data analysis using generalized
-/// linear models", Biometrika 73 (1986).
+/// Sources: read-out from motion: P.-E. Forssen, E. Ringaby, "Rectifying rolling shutter video from hand-held devices",
+/// CVPR 2010; deviations from sums over clusters: K.-Y. Liang, S. L. Zeger, "Longitudinal data analysis using
+/// generalized linear models", Biometrika 73 (1986).
 #pragma once
 
 #include <algorithm>
@@ -34,13 +34,13 @@
 
 namespace orbis::slam::detail {
 
-/// How the depth of a keypoint would change if the depth image were `step` seconds later, and earlier, than assumed,
-/// metres; 0 where it is not known.
+/// Change of the depth of a keypoint if the depth image were `step` seconds later, and earlier, than assumed, metres; 0
+/// if unknown.
 struct depth_change {
-  static constexpr double step = 0.008;  ///< seconds: so little that few edges lie between
+  static constexpr double step = 0.008;  ///< seconds: short enough that few edges are in between
   float later = 0.0F, earlier = 0.0F;
-  /// This, if depth changes evenly there, as on a surface; otherwise an edge lies between the readings, which would be
-  /// taken for a motion: nothing is known then.
+  /// Returns this if depth changes evenly there, as on a surface; otherwise zero: an edge between the readings would be
+  /// mistaken for a motion.
   [[nodiscard]] depth_change if_even(float depth) const noexcept {
     constexpr float limit = 0.02F;  // 1 / metres: some deviations of a depth camera's noise
     return std::abs(later + earlier) <= limit * depth * depth ? *this : depth_change{};
@@ -51,7 +51,7 @@ struct depth_change {
   }
 };
 
-/// A frame as it was read, with its motion as its neighbours tell it.
+/// A frame as read, with its motion estimated from its neighbours.
 struct row_view {
   se3 T_world_camera;
   vec6 twist = zeros<vec6>();
@@ -67,7 +67,7 @@ struct shutter_equations {
   vec2 c = zeros<vec2>();
 };
 
-/// Eliminates the relative pose from equations and gradient; false if the points do not determine it.
+/// Eliminates the relative pose from equations and gradient; returns false if the points do not determine it.
 [[nodiscard]] inline bool eliminate_pose(shutter_equations& e, vec2& gradient, const mat6& pose,
                                          const matrix<6, 2>& mixed, const vec6& pose_gradient) {
   const matrix<6, 2> solved = inverse(pose) * mixed;
@@ -77,8 +77,8 @@ struct shutter_equations {
   return true;
 }
 
-/// The equations of the points that two views share; empty where these are too few. `shutter`: by which `depth` of the
-/// keypoints was read, around which the equations are linear. O(keypoints).
+/// Returns the equations of the points that two views share; empty if there are too few. `shutter`: the one with which
+/// `depth` of the keypoints was read, around which the equations are linear. O(keypoints).
 template <camera::camera_model Camera>
 [[nodiscard]] std::optional<shutter_equations> shutter_equations_of(const row_view& from, const row_view& to,
                                                                     const camera_rig<Camera>& rig,
@@ -130,7 +130,7 @@ template <camera::camera_model Camera>
         by_point * (T_to_from.rotation() * (share(a.y) * speed(from.twist, there)) - share(b.y) * speed(to.twist, q)));
     set_column(by_shutter, 1, by_point * (T_to_from.rotation() * (change_a.rate() * ray)));
     const double z = static_cast<double>(b.depth);
-    const double by_depth = o.has_depth() ? rig.model.bf / (z * z) : 0.0;  // of what was measured
+    const double by_depth = o.has_depth() ? rig.model.bf / (z * z) : 0.0;  // derivative of the measured depth
     by_shutter(2, 1) -= by_depth * change_b.rate();
     pose += weight * (transposed(by_pose) * by_pose);
     mixed += weight * (transposed(by_pose) * by_shutter);
@@ -138,8 +138,8 @@ template <camera::camera_model Camera>
     e.h += weight * (transposed(by_shutter) * by_shutter);
     gradient += weight * (transposed(by_shutter) * *r);
     ++count;
-    // Depth is noisy, and so is its rate, whose square would be too large: the delay would come out too small. The
-    // squared errors of three readings with the same noise are a parabola without this bias.
+    // Depth is noisy, and so is its rate, whose square would be biased upwards: the delay would be underestimated. The
+    // squared errors of three readings with the same noise form a parabola without this bias.
     const auto moved = [&](float in_a, float in_b) {
       const vec3 row = row_of(by_point, 2);
       return (*r)[2] + dot(row, T_to_from.rotation() * vec3(static_cast<double>(in_a) * ray)) -
@@ -158,7 +158,7 @@ template <camera::camera_model Camera>
   return e;
 }
 
-/// Sums equations over a run and decides what is significant.
+/// Sums equations over a run and decides which components are significant.
 class shutter_estimator {
  public:
   /// Adds the equations of a pair. `block`: the same for all pairs of one keyframe.
@@ -175,10 +175,11 @@ class shutter_estimator {
     blocks_.back().second.h += e.h;
     blocks_.back().second.c += e.c;
   }
-  /// Forgets all equations: after the shutter changed by which they were made.
+  /// Forgets all equations, after a change of the shutter with which they were made.
   void clear() { blocks_.clear(); }
 
-  /// The present estimate. What is assumed already is given up less easily than it was taken to. O(keyframes).
+  /// Returns the present estimate. The threshold for keeping an assumed value is lower than for adopting a new one.
+  /// O(keyframes).
   [[nodiscard]] shutter_estimate estimate(const camera::shutter& assumed = {}) const {
     constexpr std::size_t enough = 8;
     shutter_estimate result;
@@ -214,7 +215,7 @@ class shutter_estimator {
       const double sigmas = before == 0.0 ? 5.0 : 2.5;
       return std::abs(value) > sigmas * deviation && std::abs(value) >= least && std::abs(value) <= most;
     };
-    // A shorter read-out does no harm worth the trouble, and no camera needs longer for an image.
+    // A shorter read-out has no relevant effect, and no camera needs longer for an image.
     if (result.read_out > 0.0 && holds(result.read_out, result.read_out_deviation, assumed.color_read_out, 0.003, 0.07))
       result.shutter.color_read_out = result.shutter.depth_read_out = result.read_out;
     if (holds(result.delay, result.delay_deviation, assumed.depth_delay, 0.003, 0.05))

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Watches tracking and estimates the shutter.
+/// Estimates the shutter from tracked frames.
 #pragma once
 
 #include <algorithm>
@@ -24,8 +24,8 @@
 
 namespace orbis::slam::detail {
 
-/// Compares each tracked frame with the last keyframes once the next frame tells its motion from both sides, and from
-/// time to time proposes the shutter that follows.
+/// Compares each tracked frame with the last keyframes once the next frame determines its motion from both sides, and
+/// periodically proposes the resulting shutter.
 class shutter_observer {
  public:
   [[nodiscard]] shutter_estimate estimate() const { return estimate_; }
@@ -51,8 +51,8 @@ class shutter_observer {
     }
   }
 
-  /// Takes in a tracked frame that follows `last` (as it was tracked, with its present pose). `keyframe`: the one that
-  /// the frame became. Returns the shutter that is to be assumed from the next frame on, if it changes.
+  /// Adds a tracked frame that follows `last` (as it was tracked, with its present pose). `keyframe`: the one made from
+  /// the frame. Returns the shutter to assume from the next frame on, if it changes.
   template <feature_descriptor D, camera::camera_model Camera>
   [[nodiscard]] std::optional<camera::shutter> add(const basic_frame<D>& last, const basic_frame<D>& f,
                                                    const std::optional<map_keyframe>& keyframe, const basic_map<D>& m,
@@ -72,7 +72,7 @@ class shutter_observer {
     return decide(assumed);
   }
 
-  /// The frame that comes next does not follow the last one.
+  /// Records that the next frame does not follow the last one.
   void interrupt() {
     before_.reset();
     before_that_.reset();
@@ -80,7 +80,7 @@ class shutter_observer {
   }
 
  private:
-  static constexpr std::size_t kept = 4;  ///< keyframes that a frame is compared with
+  static constexpr std::size_t kept = 4;  ///< number of keyframes with which a frame is compared
 
   template <feature_descriptor D, camera::camera_model Camera>
   void set_pending(const basic_frame<D>& f, const std::optional<map_keyframe>& keyframe,
@@ -110,10 +110,10 @@ class shutter_observer {
     views_.emplace_back(id, pending_);
   }
 
-  /// The estimate is revised each time the time of observation has grown by half, and what was measured by the former
-  /// shutter is forgotten then: the equations are linear only around what was assumed, and gates of tracking have
-  /// favoured it. Slopes of depth are noisy, and their squares too large, so that a step towards the delay is about
-  /// half as long as it should be: it takes several.
+  /// Revises the estimate each time the observation time has grown by half, and discards the measurements made with the
+  /// former shutter: the equations are linear only around the assumed values, and the gates of tracking have favoured
+  /// them. Slopes of depth are noisy, and their squares too large, so a step towards the delay is about half as long as
+  /// it should be: several steps are needed.
   [[nodiscard]] std::optional<camera::shutter> decide(const camera::shutter& assumed) {
     constexpr double first = 2.0, often = 0.5, same = 0.001;  // seconds
     if (watched_ - looked_ < often) return std::nullopt;
@@ -127,14 +127,14 @@ class shutter_observer {
                                    std::abs(next.depth_delay - assumed.depth_delay));
     if (change < same) return std::nullopt;
     estimator_.clear();
-    views_.clear();  // their depths were read by the former delay
+    views_.clear();  // their depths were read with the former delay
     interrupt();
     last_ = estimate_;
     return next;
   }
 
-  /// A new estimate, unless it is of too few equations yet: it is better than the one before, which was linear around a
-  /// shutter that was far off.
+  /// Returns a new estimate, unless it is from too few equations yet: it is better than the previous one, which was
+  /// linearised around a shutter that was far off.
   [[nodiscard]] shutter_estimate best(const shutter_estimate& now) const {
     return last_ && !(now.read_out_deviation <= 2.0 * last_->read_out_deviation) ? *last_ : now;
   }
@@ -145,7 +145,7 @@ class shutter_observer {
   std::vector<std::pair<map_keyframe, row_view>> views_;
   row_view pending_;
   std::optional<map_keyframe> pending_keyframe_;
-  std::optional<vec6> before_, before_that_;             ///< the motion to the pending frame, and to the one before
+  std::optional<vec6> before_, before_that_;             ///< the motion to the pending frame, and to the previous one
   std::vector<depth_change> changes_;                    ///< of the present frame
   double watched_ = 0.0, decided_ = 0.0, looked_ = 0.0;  ///< seconds
 };

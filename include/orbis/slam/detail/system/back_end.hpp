@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The back end: mapping, loop closing and global adjustment, at once or in threads of their own.
+/// The back end: mapping, loop closing and global adjustment, synchronous or in separate threads.
 #pragma once
 
 #include <algorithm>
@@ -22,10 +22,9 @@
 
 namespace orbis::slam::detail {
 
-/// Calls `work` for each job, in the order in which they are pushed. `stop` and the destructor wait for the running job
-/// and drop the others. While jobs use a pointer to their worker, call `stop` before the pointer is reset. If `work`
-/// throws, that is the end: the other jobs are dropped, and `push`, `wait` and `wait_for_room` throw the same from then
-/// on.
+/// Calls `work` for each job in the order of `push`. `stop` and the destructor wait for the running job and discard the
+/// others. If jobs use a pointer to their worker, call `stop` before the pointer is reset. If `work` throws, the worker
+/// ends: the other jobs are discarded, and `push`, `wait` and `wait_for_room` rethrow the exception from then on.
 template <std::movable Job>
 class worker {
  public:
@@ -34,7 +33,7 @@ class worker {
   worker& operator=(const worker&) = delete;
   ~worker() { stop(); }
 
-  /// Waits for the running job; no other one is begun any more. Not to be called by a job.
+  /// Waits for the running job; no other job is started. Must not be called by a job.
   void stop() {
     {
       const std::lock_guard lock(mutex_);
@@ -44,11 +43,11 @@ class worker {
     if (thread_.joinable()) thread_.join();
   }
 
-  /// Appends a job; drops it after `stop`.
+  /// Appends a job; after `stop`, discards it.
   void push(Job job) {
     push_unless(std::move(job), [](const auto&, const Job&) { return false; });
   }
-  /// As `push`, unless an equal job is in the queue already.
+  /// As `push`, but does nothing if an equal job is already in the queue.
   void push_once(Job job) requires std::equality_comparable<Job> {
     push_unless(std::move(job), [](const auto& jobs, const Job& other) {
       return std::find(jobs.begin(), jobs.end(), other) != jobs.end();
@@ -60,7 +59,7 @@ class worker {
     const std::lock_guard lock(mutex_);
     return jobs_.size();
   }
-  /// Whether no job runs or waits.
+  /// Returns true if no job runs or waits.
   [[nodiscard]] bool idle() const {
     const std::lock_guard lock(mutex_);
     return jobs_.empty() && !busy_;
@@ -97,7 +96,7 @@ class worker {
     for (;;) {
       changed_.wait(lock, [&] { return ends_ || !jobs_.empty(); });
       if (ends_) {
-        jobs_.clear();  // nobody shall wait for them
+        jobs_.clear();  // no caller must wait for them
         changed_.notify_all();
         return;
       }
@@ -132,9 +131,9 @@ class worker {
   std::thread thread_;
 };
 
-/// Works on each new keyframe: local mapping, then loop closing, then, if a loop was closed, global adjustment. With
-/// threads each of the three has one, and passes the keyframe on to the next. No queue grows without a bound: mapping
-/// waits while too many keyframes wait for loop closing, and a map waits once for its adjustment.
+/// Processes each new keyframe: local mapping, then loop closing, then, if a loop was closed, global adjustment. With
+/// threads each of the three has its own, and passes the keyframe to the next. All queues are bounded: mapping waits
+/// while too many keyframes wait for loop closing, and a map is queued for adjustment at most once.
 template <camera::camera_model Camera, feature_descriptor D, place_recognizer<D> Places>
 class back_end {
  public:
@@ -145,7 +144,7 @@ class back_end {
       if (closer_.close(k)) global_->push_once(shared_.locked([&] { return shared_.atlas.current(k).map; }));
     });
     mapping_ = std::make_unique<worker<map_keyframe>>([this](map_keyframe k) {
-      // Where frames wait for the mapping, the load of the machine decides about time, not about the map.
+      // If frames wait for mapping, the load of the machine affects only the time, not the map.
       mapper_.process(k, [this] { return !shared_.settings.threads.wait && mapping_->waiting() != 0; });
       loops_->wait_for_room(most_waiting());
       loops_->push(k);
@@ -153,28 +152,28 @@ class back_end {
   }
   back_end(const back_end&) = delete;
   back_end& operator=(const back_end&) = delete;
-  /// Waits for the running jobs and drops the others.
+  /// Waits for the running jobs and discards the others.
   ~back_end() {
     closer_.stop();
-    // Each passes jobs to the next one, and queries its own queue: none is destroyed until all have stopped.
+    // Each worker pushes jobs to the next one and queries its own queue: none is destroyed until all have stopped.
     if (mapping_) mapping_->stop();
     if (loops_) loops_->stop();
     if (global_) global_->stop();
   }
 
-  /// Works on a keyframe, or, with threads, adds it to the queue. No lock is held.
+  /// Processes a keyframe or, with threads, adds it to the queue. Must be called without a lock held.
   void process(map_keyframe k) {
     if (mapping_) return mapping_->push(k);
     mapper_.process(k, [] { return false; });
     if (closer_.close(k)) closer_.adjust_globally(shared_.atlas.current(k).map);
   }
-  /// Whether so many keyframes wait that no further one should be made.
+  /// Returns true if the limit of waiting keyframes is reached and no further one should be made.
   [[nodiscard]] bool is_full() const { return mapping_ && mapping_->waiting() >= most_waiting(); }
   /// Waits until `is_full` is false.
   void wait_for_room() const {
     if (mapping_) mapping_->wait_for_room(most_waiting());
   }
-  /// Waits until the threads have nothing to do.
+  /// Waits until the threads are idle.
   void wait() const {
     if (mapping_) mapping_->wait();
     if (loops_) loops_->wait();
@@ -189,7 +188,7 @@ class back_end {
   shared_state<Camera, D, Places>& shared_;
   local_mapper<Camera, D, Places> mapper_;
   loop_closer<Camera, D, Places> closer_;
-  std::unique_ptr<worker<map_id>> global_;  ///< null without threads, as the others
+  std::unique_ptr<worker<map_id>> global_;  ///< null without threads, like the others
   std::unique_ptr<worker<map_keyframe>> loops_, mapping_;
 };
 

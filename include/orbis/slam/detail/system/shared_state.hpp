@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// What tracking, mapping and loop closing share, and the locks for it.
+/// The state shared by tracking, mapping and loop closing, and its locks.
 #pragma once
 
 #include <concepts>
@@ -18,14 +18,13 @@
 
 namespace orbis::slam::detail {
 
-/// Two locks, always taken in this order:
-///  - `edit()`: held while maps are changed in several steps (mapping of a keyframe, correction of a loop, global
-///    adjustment), so that between the steps only tracking adds to a map, and lets it
-///    forget keyframes that were erased long ago;
-///  - `lock()`: held while anything here is read or changed, for a short time; never while solving, nor while callbacks
-///    are called.
+/// Two locks, always locked in this order:
+/// - `edit()`: held while maps are changed in several steps (mapping of a keyframe, correction of a loop, global
+/// adjustment). Between the steps only tracking changes the map: it adds to it, and makes it forget long-erased
+/// keyframes;
+/// - `lock()`: held for a short time while anything here is read or changed; never while solving or calling callbacks.
 ///
-/// Both are fair: a thread that releases a lock and takes it again, step by step, lets those that wait go first.
+/// Both are fair: a thread that releases and relocks a lock repeatedly lets waiting threads go first.
 template <camera::camera_model Camera, feature_descriptor D, place_recognizer<D> Places>
 struct shared_state {
   shared_state(camera_rig<Camera> rig_, const options& settings_, Places places_)
@@ -46,7 +45,7 @@ struct shared_state {
 
   [[nodiscard]] std::unique_lock<std::mutex> lock() const { return lock_fairly(next_map_mutex_, map_mutex_); }
   [[nodiscard]] std::unique_lock<std::mutex> edit() const { return lock_fairly(next_edit_mutex_, edit_mutex_); }
-  /// As `edit`, without waiting: check whether the lock is owned.
+  /// As `edit`, without waiting: check if the lock is owned.
   [[nodiscard]] std::unique_lock<std::mutex> try_edit() const {
     return std::unique_lock{edit_mutex_, std::try_to_lock};
   }
@@ -63,7 +62,7 @@ struct shared_state {
     return {k, frame.timestamp, frame.index, frame.T_world_camera};
   }
 
-  /// The keyframes with the most similar appearance, one of each place.
+  /// Returns the keyframes with the most similar appearance, one of each place.
   template <std::predicate<map_keyframe> Exclude>
   [[nodiscard]] std::vector<map_keyframe> similar(const typename Places::signature& bow_vector, std::size_t count,
                                                   Exclude&& exclude) {
@@ -75,15 +74,14 @@ struct shared_state {
     });
   }
 
-  /// Removes a map and its keyframes. @pre it is there, and not the active one
+  /// Removes a map and its keyframes. @pre the map exists and is not active
   void remove_map(map_id id) {
     for (const auto& k : atlas.at(id).keyframes()) places.erase({id, k.id});
     atlas.remove(id);
   }
 
  private:
-  /// The thread that is next holds `next` while it waits: a plain mutex may be taken again before waiting threads wake
-  /// up.
+  /// The next thread holds `next` while it waits: a plain mutex may be relocked before waiting threads wake up.
   [[nodiscard]] static std::unique_lock<std::mutex> lock_fairly(std::mutex& next, std::mutex& mutex) {
     const std::lock_guard first{next};
     return std::unique_lock{mutex};

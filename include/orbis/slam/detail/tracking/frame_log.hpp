@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The tracked frames, each relative to a keyframe, so that they follow later corrections. If there is a limit, the
+/// The tracked frames, each relative to a keyframe, so that they follow later corrections. With a limit, only the
 /// latest frames are kept, and the others are counted.
 #pragma once
 
@@ -22,12 +22,12 @@ namespace orbis::slam::detail {
 struct logged_frame {
   double timestamp = 0.0;  ///< seconds
   map_keyframe reference;
-  se3 T_reference_camera;  ///< in lengths over the reference's scale (`basic_map::scale_of`)
+  se3 T_reference_camera;  ///< translation divided by the reference's scale (`basic_map::scale_of`)
 };
 
 class frame_log {
  public:
-  /// Keeps the latest frames, at most so many.
+  /// Makes a log that keeps at most the `most` latest frames.
   explicit frame_log(std::size_t most = std::numeric_limits<std::size_t>::max()) : most_{most} {}
 
   void add(const logged_frame& f) {
@@ -39,7 +39,7 @@ class frame_log {
     frames_.pop_front();
   }
 
-  /// The present poses of the frames that are kept and were tracked in a map, or in one that was merged into it. Empty
+  /// Returns the present poses of the kept frames that were tracked in a map, or in one that was merged into it. Empty
   /// if there is no such map. O(frames).
   template <feature_descriptor D>
   [[nodiscard]] orbis::trajectory trajectory(const basic_atlas<D>& maps, map_id map) const {
@@ -53,19 +53,20 @@ class frame_log {
     return all;
   }
 
-  /// The keyframes of a map that frames which are kept hang on, by their present ids. O(frames).
+  /// Returns the reference keyframes of the kept frames that are in a map, by their present ids. O(frames).
   template <feature_descriptor D>
   [[nodiscard]] std::vector<keyframe_id> references(const basic_atlas<D>& maps, map_id map) const {
     std::vector<keyframe_id> all;
     map_keyframe before;
     for (const logged_frame& f : frames_) {
-      if (std::exchange(before, f.reference) == f.reference) continue;  // as most are
+      if (std::exchange(before, f.reference) == f.reference) continue;  // as for most frames
       if (const map_keyframe k = maps.current(f.reference); k.map == map) all.push_back(k.keyframe);
     }
     return all;
   }
 
-  /// The map with most frames, kept or not, the oldest where equal; the active map if there are no frames. O(frames).
+  /// Returns the map with most frames, kept or not, the oldest if equal; the active map if there are no frames.
+  /// O(frames).
   template <feature_descriptor D>
   [[nodiscard]] map_id largest_map(const basic_atlas<D>& maps) const {
     std::map<map_id, std::size_t> frames;
@@ -80,14 +81,14 @@ class frame_log {
   }
 
  private:
-  /// Of the frames of a map.
+  /// The forgotten frames of a map.
   struct forgotten {
     std::size_t frames = 0;
-    map_keyframe reference;  ///< of the last one: it leads to the map that this one became a part of
+    map_keyframe reference;  ///< of the last frame: it leads to the map into which this one was merged
   };
 
   std::size_t most_;
-  std::deque<logged_frame> frames_;        // grows without moving what is there: no frame waits for it
+  std::deque<logged_frame> frames_;        // grows without moving its elements, so tracking does not wait
   std::map<map_id, forgotten> forgotten_;  ///< by the map in which they were tracked
 };
 

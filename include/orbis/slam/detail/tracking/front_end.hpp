@@ -35,24 +35,24 @@
 
 namespace orbis::slam::detail {
 
-/// Tracks the frames of one camera. It takes no lock: the caller makes sure that the maps are not changed during a
-/// call. For each frame, in this order: `sync_with_map`, `localize`, `update_reference` and, if `needs_keyframe`,
+/// Tracks the frames of one camera. It takes no lock: the caller ensures that the maps are not changed during a call.
+/// Call for each frame, in this order: `sync_with_map`, `localize`, `update_reference` and, if `needs_keyframe`,
 /// `make_keyframe`, then `finish`.
 ///
-/// The scheme is that of R. Mur-Artal, J. D. Tardos, "ORB-SLAM2", T-RO 33 (2017), section III.
+/// Follows R. Mur-Artal, J. D. Tardos, "ORB-SLAM2", T-RO 33 (2017), section III.
 template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers>
 class front_end {
  public:
   using frame_type = basic_frame<D>;
   using atlas_type = basic_atlas<D>;
-  /// Sets what the sensor measures for the rows of a rolling shutter (`as_read`), given the motion.
+  /// Sets the measurements of a rolling shutter's rows (`as_read`), given the motion.
   using row_follower = std::function<void(frame_type&, const frame_motion&)>;
-  /// The keyframes with the most similar appearance, as ids.
+  /// Returns the ids of the keyframes with the most similar appearance.
   using appearance_search =
       std::function<std::vector<map_keyframe>(const decltype(frame_type::features)&, std::size_t count)>;
-  /// So many erased keyframes are remembered in any case: who got their ids from an event may still ask where they are.
+  /// Minimum number of erased keyframes whose poses remain queryable: users may have received their ids from an event.
   static constexpr std::size_t latest_erased = 1024;
-  /// Called for a map that is left behind with few keyframes.
+  /// Called for a map with few keyframes when another one becomes active.
   using map_drop = std::function<void(map_id)>;
 
   front_end(const camera_rig<Camera>& rig, const options& settings)
@@ -67,45 +67,45 @@ class front_end {
     if (settings.estimates_shutter) observer_.emplace();
   }
 
-  /// When the rows of the images are taken, as far as it is known.
+  /// The present shutter, as given or estimated.
   [[nodiscard]] const camera::shutter& shutter() const noexcept { return shutter_; }
-  /// What the frames tell of it; empty if they are not asked.
+  /// The estimate of the shutter; empty unless it is estimated.
   [[nodiscard]] std::optional<shutter_estimate> estimated_shutter() const {
     return observer_ ? std::optional{observer_->estimate()} : std::nullopt;
   }
-  /// Whether frames need `as_read`.
-  [[nodiscard]] bool looks_at_rows() const noexcept { return observer_ || !shutter_.is_global(); }
+  /// Returns true if frames need `as_read`.
+  [[nodiscard]] bool needs_as_read() const noexcept { return observer_ || !shutter_.is_global(); }
 
-  /// What the depth image of the next frame is to be told to, before the frame is localised.
+  /// The depth tracker. Pass it the depth image of the next frame before the frame is localised.
   [[nodiscard]] depth_tracker<Camera>& depth() noexcept { return depth_; }
 
   [[nodiscard]] track_state state() const noexcept { return state_; }
   [[nodiscard]] bool is_tracking() const noexcept {
     return state_ == track_state::tracking || state_ == track_state::relocalized;
   }
-  /// Counts over all frames; those of mapping are not filled in.
+  /// Counts over all frames; those of mapping are not set.
   [[nodiscard]] const track_counters& counters() const noexcept { return counters_; }
-  /// The tracked frames, the latest `options::trajectory_frames`.
+  /// The tracked frames, at most the latest `options::trajectory_frames`.
   [[nodiscard]] const frame_log& log() const noexcept { return log_; }
   [[nodiscard]] double last_timestamp() const noexcept { return last_.timestamp; }
-  /// The present pose of the last tracked frame: later corrections of its keyframe move it.
+  /// The present pose of the last tracked frame; it follows later corrections of its keyframe.
   [[nodiscard]] se3 last_pose(const atlas_type& maps) const {
     const map_keyframe k = maps.current(last_reference_);
     return maps.contains(k.map) && maps.at(k.map).remembers(k.keyframe)
                ? maps.at(k.map).pose_of(k.keyframe) * scaled(T_reference_last_, maps.at(k.map).scale_of(k.keyframe))
                : last_.T_world_camera;
   }
-  /// The motion during the read-out of the last tracked frame; zero with a global shutter.
+  /// The motion during read-out of the last tracked frame; zero with a global shutter.
   [[nodiscard]] vec6 last_twist() const { return shutter_.is_global() ? vec6(zeros<vec6>()) : last_.twist; }
 
-  /// The last tracked frame with its features. For the thread that tracks; takes no look at the maps. O(features).
+  /// Returns the last tracked frame with its features. For the tracking thread; does not read the maps. O(features).
   [[nodiscard]] tracked_frame last_frame() const {
     tracked_frame shown{last_reference_, T_reference_last_, {}, last_twist()};
     shown.features.reserve(last_.size());
     for (std::size_t i = 0; i != last_.size(); ++i) {
       const landmark_id l = last_.landmarks[i];
       const auto& at = last_.features.keypoints[i];
-      const bool moved = !last_.as_read.empty();  // shown where they are in the image
+      const bool moved = !last_.as_read.empty();  // at their positions in the image
       shown.features.push_back(
           {moved ? last_.as_read[i].x : at.x, moved ? last_.as_read[i].y : at.y, l != no_id && l < first_new_, false});
     }
@@ -114,14 +114,14 @@ class front_end {
     return shown;
   }
 
-  /// The active map was changed from outside: the camera is searched for in it.
+  /// Records that another map became active: the camera is relocalised in it.
   void set_lost() {
     state_ = track_state::lost;
     lost_since_.reset();
   }
 
-  /// Brings ids and poses that are kept from the last frame to the state of the maps, which may have been merged,
-  /// corrected and culled since.
+  /// Updates ids and poses kept from the last frame to the state of the maps, which may have been merged, corrected and
+  /// culled since.
   void sync_with_map(const atlas_type& maps) {
     const map_keyframe now = maps.current(reference_);
     if (now.map != reference_.map)
@@ -141,8 +141,8 @@ class front_end {
   }
 
   /// Estimates the pose of a frame and sets `state()`. Returns the number of landmarks that agree with the pose (of
-  /// points with depth, if the frame begins a map), 0 if it has none; `is_tracking()` with 0 where depth alone holds
-  /// it. `is_frozen`: nothing is changed in the maps, and no map is begun.
+  /// points with depth, if the frame begins a map); 0 if it has no pose, or, with `is_tracking()`, if only depth
+  /// determines it. `is_frozen`: the maps are not changed, and no map is begun.
   std::size_t localize(frame_type& f, atlas_type& maps, bool is_frozen, const row_follower& follow_rows,
                        const appearance_search& similar, const map_drop& drop) {
     first_new_ = no_id;
@@ -151,18 +151,18 @@ class front_end {
     if (state_ == track_state::not_started) return is_frozen ? 0 : begin_map(f, maps, drop);
     if (is_tracking())
       if (const std::size_t inliers = track_from_last(f, maps, is_frozen, follow_rows); inliers > 0)
-        return settle(f, maps, inliers, is_frozen, follow_rows);
+        return recheck_with_depth(f, maps, inliers, is_frozen, follow_rows);
     const auto aligned = align_depth(f, maps);
     if (aligned)
       if (const std::size_t inliers = track_from_depth(f, maps, *aligned, is_frozen, follow_rows); inliers > 0)
         return inliers;
     if (const std::size_t inliers = relocalize(f, maps, is_frozen, follow_rows, similar); inliers > 0) return inliers;
-    if (aligned && is_tracking() && hold_by_depth(f, *aligned)) return 0;
+    if (aligned && is_tracking() && localize_by_depth(f, *aligned)) return 0;
     if (const std::size_t inliers = search_in_place(f, maps, is_frozen, follow_rows); inliers > 0) return inliers;
     if (is_tracking()) lost_since_ = last_.timestamp;
     if (!lost_since_) lost_since_ = f.timestamp;
     state_ = track_state::lost;
-    // Two frames take a while to find: where little is lost, that begins at once.
+    // Finding two frames takes time: if little is lost, the search begins at once.
     const bool is_here = last_.size() != 0 && maps.current(last_reference_).map == maps.active_id();
     const bool at_once =
         is_here && !rig_.scale_is_known && maps.active().keyframes().size() < options_.recovery.min_map_keyframes;
@@ -175,8 +175,8 @@ class front_end {
     if (!maps.active().keyframes().empty())
       reference_ = {maps.active_id(), most_shared(maps.active(), f, reference_.keyframe)};
   }
-  /// Whether a localised frame should become a keyframe. One that depth holds becomes one if landmarks have not held
-  /// the camera for some time, and if a map could begin with it.
+  /// Returns true if a localised frame should become a keyframe. A frame localised by depth becomes one if landmarks
+  /// have not localised the camera for some time and a map could begin with the frame.
   [[nodiscard]] bool needs_keyframe(const frame_type& f, std::size_t inliers, const atlas_type& maps) const {
     if (begins_map()) return true;
     if (f.held_by_depth)
@@ -185,9 +185,9 @@ class front_end {
         gather_evidence(maps.active(), f, reference_.keyframe, inliers, options_, rig_.scale_is_known),
         options_.keyframes);
   }
-  /// Whether the last frame begins a map.
+  /// Returns true if the last frame begins a map.
   [[nodiscard]] bool begins_map() const noexcept { return begins_map_; }
-  /// A keyframe before that of the last frame, with which a map begins that needs two.
+  /// The first of the two keyframes with which a map without depth begins; the last frame is the second.
   [[nodiscard]] const std::optional<map_keyframe>& first_keyframe() const noexcept { return first_keyframe_; }
   /// Adds a frame to the active map as a keyframe, which becomes the reference.
   map_keyframe make_keyframe(frame_type& f, atlas_type& maps) {
@@ -203,8 +203,8 @@ class front_end {
     return reference_ = {maps.active_id(), id};
   }
 
-  /// Counts a frame and, if it was localised, keeps it for the next prediction and in the log.
-  /// `made`: the keyframe that it became.
+  /// Counts a frame and, if it was localised, keeps it for the next prediction and in the log. `made`: the keyframe
+  /// made from it.
   void finish(frame_type f, const atlas_type& maps, const std::optional<map_keyframe>& made) {
     ++counters_.frames;
     counters_.tracked += is_tracking();
@@ -228,9 +228,9 @@ class front_end {
       depth_.keep(last_reference_, T_reference_last_, f.twist, shutter_);
     last_ = std::move(f);
   }
-  /// Where the trajectory is limited, so is what the active map remembers of erased keyframes: those that frames of the
-  /// trajectory hang on, and the latest. O(1), but O(frames + n log n) for every thousandth erased keyframe, where n
-  /// are remembered.
+  /// If the trajectory is limited, limits the erased keyframes that the active map remembers: to the reference
+  /// keyframes of the frames in the trajectory, and the latest ones. O(1), except O(frames + n log n) for every
+  /// thousandth erased keyframe, where n is the number remembered.
   void forget_erased(atlas_type& maps) {
     if (options_.trajectory_frames == std::numeric_limits<std::size_t>::max()) return;
     if (maps.active().content().erased.size() < most_erased_) return;
@@ -242,19 +242,19 @@ class front_end {
   }
 
  private:
-  /// Begins a map with a frame, if the sensor says that it can; without depth, with a frame before it as well. The map
-  /// becomes the active one. Returns the number of its points.
+  /// Begins a map with a frame, if its measurements allow it; without depth, together with an earlier frame. The map
+  /// becomes active. Returns the number of its points.
   std::size_t begin_map(frame_type& f, atlas_type& maps, const map_drop& drop) {
     std::size_t points = start_points(f, options_);
     if (points == 0) return 0;
     std::optional<monocular_start_result<D>> start;
     if (!rig_.scale_is_known) {
-      start = start_.see(f);
+      start = start_.process(f);
       if (!start) return 0;
       points = start->points.size();
     }
     enter_new_map(maps, drop);
-    f.landmarks.assign(f.size(), no_id);  // of searches in other maps
+    f.landmarks.assign(f.size(), no_id);  // they are from searches in other maps
     f.T_world_camera =
         options_.find_initial_pose ? options_.find_initial_pose() : options_.initial_pose.value_or(se3{});
     if (start) add_start(*std::move(start), f, maps);
@@ -262,7 +262,7 @@ class front_end {
     state_ = track_state::tracking;
     return points;
   }
-  /// Makes a new map the active one, unless that is new. One with few keyframes is left behind.
+  /// Activates a new map, unless the active one is new. If the previous map has few keyframes, it is passed to `drop`.
   void enter_new_map(atlas_type& maps, const map_drop& drop) {
     if (state_ == track_state::not_started) return;
     const map_id before = maps.active_id();
@@ -271,10 +271,10 @@ class front_end {
     last_ = {};
     motion_.reset();
   }
-  /// Adds the first of two frames that a map begins with; with `f`, the second one, their points follow
+  /// Adds the first of two frames with which a map begins; their points are added with `f`, the second one
   /// (`make_keyframe`).
   void add_start(monocular_start_result<D> start, frame_type& f, atlas_type& maps) {
-    // An initial pose that was asked for just now is that of `f`, otherwise that of the first frame.
+    // `find_initial_pose` returns the pose of `f`; `initial_pose` is that of the first frame.
     const se3 T_world_first =
         options_.find_initial_pose ? f.T_world_camera * start.T_first_second.inverse() : se3(f.T_world_camera);
     f.T_world_camera = T_world_first * start.T_first_second;
@@ -289,7 +289,7 @@ class front_end {
     ++counters_.tracked;
     if (state_ == track_state::lost) --counters_.lost;
   }
-  /// From the last frame, otherwise from the reference keyframe; refined on the local map.
+  /// Tracks from the last frame, otherwise from the reference keyframe; refines the pose on the local map.
   std::size_t track_from_last(frame_type& f, atlas_type& maps, bool is_frozen, const row_follower& follow_rows) {
     const se3 predicted = motion_.predict({last_.timestamp, last_.T_world_camera}, f.timestamp);
     if (!shutter_.is_global()) {
@@ -311,7 +311,7 @@ class front_end {
     state_ = track_state::tracking;
     return inliers;
   }
-  /// From the reference and the keyframes with similar appearance, in any map.
+  /// Relocalises a frame from the reference and the keyframes with similar appearance, in any map.
   std::size_t relocalize(frame_type& f, atlas_type& maps, bool is_frozen, const row_follower& follow_rows,
                          const appearance_search& similar) {
     moving_.clear();
@@ -331,7 +331,8 @@ class front_end {
     reference_ = reference_before;
     return 0;
   }
-  /// Around the last tracked frame's place, for a camera that has turned; by a frame that sees enough to begin a map.
+  /// Searches around the last tracked frame's pose, for a camera that has turned; requires a frame with enough points
+  /// to begin a map.
   std::size_t search_in_place(frame_type& f, atlas_type& maps, bool is_frozen, const row_follower& follow_rows) {
     const bool is_here = last_.size() != 0 && reference_.map == maps.active_id() && maps.has(reference_);
     const bool is_recent = f.timestamp - last_.timestamp < options_.recovery.new_map_after;
@@ -344,7 +345,7 @@ class front_end {
         [&](landmark_id l) { is_frozen ? void() : m.count_found(l); });
   }
 
-  /// Takes from a frame the landmarks that do not agree with its pose. Returns how many are left.
+  /// Removes the landmarks of a frame that disagree with its pose. Returns the number left.
   std::size_t drop_disagreeing(frame_type& f, const basic_map<D>& m) const {
     const se3 T_camera_world = f.T_world_camera.inverse();
     std::size_t left = 0;
@@ -361,20 +362,20 @@ class front_end {
   void move_keypoints(frame_type& f) const {
     if (!shutter_.is_global()) move_to_frame_time(f, rig_, shutter_, motion_between(last_, f));
   }
-  /// Lets the observer see a tracked frame.
+  /// Passes a tracked frame to the shutter observer.
   void observe(const frame_type& f, const atlas_type& maps, const std::optional<map_keyframe>& made) {
     if (state_ != track_state::tracking || last_.index + 1 != f.index || last_.size() == 0)
       return observer_->interrupt();
     if (const auto changed = observer_->add(last_, f, made, maps.active(), rig_, shutter_)) shutter_ = *changed;
   }
-  /// Refines a frame by the landmarks that it observes and, if it joins in, by depth: the pose and, with a rolling
-  /// shutter, the twist, to which the keypoints are moved then. `is_next`: the frame follows the last one.
+  /// Refines a frame by its observed landmarks and, if enabled, by depth: the pose and, with a rolling shutter, the
+  /// twist, by which the keypoints are then moved. `is_next`: the frame follows the last one.
   void refine_motion(frame_type& f, const atlas_type& maps, bool is_next, const row_follower& follow_rows) {
     const basic_map<D>& m = maps.active();
     const bool rolls = !shutter_.is_global();
-    const bool with_depth = depth_.surround(maps, f.T_world_camera) && options_.depth_term.enabled;
+    const bool with_depth = depth_.find_surfaces(maps, f.T_world_camera) && options_.depth_term.enabled;
     twist_prior prior;
-    if (looks_at_rows() && is_next && f.timestamp > last_.timestamp)
+    if (needs_as_read() && is_next && f.timestamp > last_.timestamp)
       prior =
           twist_prior::after({last_.T_world_camera, last_.twist}, f.timestamp - last_.timestamp, motion_.is_known());
     const auto expected_twist = [&] {
@@ -385,14 +386,14 @@ class front_end {
     if (!rolls && with_depth) find_observations(f, m, rig_, rows_);
     for (int round = 0; round != rounds; ++round) {
       if (rolls) {
-        follow_rows(f, {shutter_, refined.twist});  // the depth was read by the motion before
+        follow_rows(f, {shutter_, refined.twist});  // depth was read with the previous motion
         find_row_observations(f, m, rig_, shutter_, rows_);
       }
       const auto depth = with_depth ? depth_.term_at(refined, shutter_) : std::nullopt;
       refined = refine_moving_pose(std::span<const row_observation>(rows_), rig_.model, refined, prior,
                                    with_depth ? 3 : 5, {.other = depth ? &*depth : nullptr, .moves = rolls});
       if (shutter_.is_depth_early()) {
-        early_depth_.see(std::span<const row_observation>(rows_), rig_.model, refined, prior);
+        early_depth_.update(std::span<const row_observation>(rows_), rig_.model, refined, prior);
         refined.twist = early_depth_.between(prior, refined.twist);
       }
     }
@@ -408,8 +409,8 @@ class front_end {
                                      : (refined.T_world_camera.inverse() * m.landmark_at(f.landmarks[i]).position).z();
     });
   }
-  /// From a pose that was found by a search, in the active map around the reference: refined on the local map. Sets
-  /// `state()` if the frame is found again.
+  /// Refines a pose found by a search, in the active map around the reference, on the local map. Sets `state()` if the
+  /// frame is relocalised.
   std::size_t track_found(frame_type& f, atlas_type& maps, bool is_frozen, const row_follower& follow_rows) {
     const std::size_t inliers = track_local_map(f, maps.active(), 3.0 * options_.search_radius, is_frozen);
     if (inliers < options_.recovery.min_inliers) return 0;
@@ -417,7 +418,7 @@ class front_end {
     state_ = track_state::relocalized;
     return inliers;
   }
-  /// Aligns the depth of a frame around the last one with the surfaces of keyframes.
+  /// Aligns the depth of a frame near the last one with the surfaces of keyframes.
   [[nodiscard]] std::optional<depth_alignment> align_depth(const frame_type& f, const atlas_type& maps) {
     constexpr double longest = 2.0;  // seconds
     const double interval = f.timestamp - last_.timestamp;
@@ -425,10 +426,10 @@ class front_end {
         maps.current(last_reference_).map != maps.active_id())
       return std::nullopt;
     const se3 predicted = motion_.predict({last_.timestamp, last_.T_world_camera}, f.timestamp);
-    if (!depth_.surround(maps, predicted)) return std::nullopt;
+    if (!depth_.find_surfaces(maps, predicted)) return std::nullopt;
     return depth_.align(search_starts(last_.T_world_camera, predicted, interval), shutter_);
   }
-  /// From a pose that depth was aligned at, refined on the local map.
+  /// Tracks from a pose aligned by depth; refines it on the local map.
   std::size_t track_from_depth(frame_type& f, atlas_type& maps, const depth_alignment& aligned, bool is_frozen,
                                const row_follower& follow_rows) {
     f.T_world_camera = aligned.at.T_world_camera;
@@ -446,34 +447,35 @@ class front_end {
     refine_motion(f, maps, true, follow_rows);
     if (inliers < options_.min_inliers) {
       const std::size_t confirmed = drop_disagreeing(f, maps.active());
-      if (confirmed < few || !depth_.is_surrounded() ||
-          !depth_.holds(depth_.agreement({f.T_world_camera, f.twist}, shutter_)))
+      if (confirmed < few || !depth_.has_surfaces() ||
+          !depth_.supports_pose(depth_.agreement({f.T_world_camera, f.twist}, shutter_)))
         return 0;
       f.held_by_depth = true;
     }
     state_ = is_tracking() ? track_state::tracking : track_state::relocalized;
     return inliers;
   }
-  /// Where the depth of a frame that was tracked by `inliers` landmarks does not fit its pose, but another one: from
-  /// there. Returns as `localize`.
-  std::size_t settle(frame_type& f, atlas_type& maps, std::size_t inliers, bool is_frozen,
-                     const row_follower& follow_rows) {
-    // Where something moves in the view, that is what does not fit.
-    if (!options_.depth_term.recovers || moving_.size() != 0 || !depth_.is_surrounded()) return inliers;
+  /// Checks a frame tracked by `inliers` landmarks against its depth. If the depth disagrees with the pose but agrees
+  /// with another one, tracks from that pose. Returns as `localize`.
+  std::size_t recheck_with_depth(frame_type& f, atlas_type& maps, std::size_t inliers, bool is_frozen,
+                                 const row_follower& follow_rows) {
+    // If something moves in the view, it causes the disagreement.
+    if (!options_.depth_term.recovers || moving_.size() != 0 || !depth_.has_surfaces()) return inliers;
     const association seen = depth_.agreement({f.T_world_camera, f.twist}, shutter_);
     if (seen.visible < options_.depth_term.min_points || seen.share() >= options_.depth_term.min_share) return inliers;
     const auto aligned = align_depth(f, maps);
     constexpr double better = 0.15;
     if (!aligned || aligned->seen.share() < seen.share() + better) return inliers;
-    unsettled_ = f;
+    before_recheck_ = f;
     if (const std::size_t there = track_from_depth(f, maps, *aligned, is_frozen, follow_rows); there > 0) return there;
-    if (hold_by_depth(f, *aligned)) return 0;
-    std::swap(f, unsettled_);
+    if (localize_by_depth(f, *aligned)) return 0;
+    std::swap(f, before_recheck_);
     return inliers;
   }
-  /// Takes a pose from depth alone. False if that is not sure, or leaves a direction of it free.
-  bool hold_by_depth(frame_type& f, const depth_alignment& aligned) {
-    if (!depth_.holds_alone(aligned)) return false;
+  /// Sets the pose from depth alone. Returns false if the alignment is uncertain, or leaves a direction of the pose
+  /// free.
+  bool localize_by_depth(frame_type& f, const depth_alignment& aligned) {
+    if (!depth_.determines_pose(aligned)) return false;
     f.T_world_camera = aligned.at.T_world_camera;
     f.landmarks.assign(f.size(), no_id);
     move_keypoints(f);
@@ -490,27 +492,27 @@ class front_end {
   const options& options_;
   camera::shutter shutter_;
   std::optional<shutter_observer> observer_;
-  std::vector<row_observation> rows_;  ///< its memory is used again
+  std::vector<row_observation> rows_;  ///< reused working memory
   early_depth_twist early_depth_;
-  frame_type unsettled_;  ///< the same
+  frame_type before_recheck_;  ///< reused working memory
 
-  double held_since_ = 0.0;  ///< when the last frame was tracked whose pose depth did not hold, seconds
+  double held_since_ = 0.0;  ///< time of the last tracked frame whose pose was not determined by depth alone, seconds
 
   track_state state_ = track_state::not_started;
   bool begins_map_ = false;
   std::optional<map_keyframe> first_keyframe_;
-  std::vector<start_point> start_points_;  ///< of both, in the world, until the second one is a keyframe
-  std::optional<double> lost_since_;       ///< time stamp; empty: since the next frame
-  map_keyframe reference_;                 ///< the keyframe that the current frame shares most with
+  std::vector<start_point> start_points_;  ///< points of both frames, in the world, until the second is a keyframe
+  std::optional<double> lost_since_;       ///< timestamp; empty: since the next frame
+  map_keyframe reference_;                 ///< the keyframe with which the current frame shares most landmarks
   frame_type last_;                        ///< the last frame that was tracked
   map_keyframe last_reference_;            ///< its reference ...
-  double last_scale_ = 1.0;                ///< of that keyframe, when the frame was last looked at
-  se3 T_reference_last_;                   ///< ... and its pose relative to that, in lengths over its scale
-  landmark_id first_new_;                  ///< landmarks from this on were made of the last frame; `no_id`: none were
+  double last_scale_ = 1.0;                ///< scale of that keyframe at the last update
+  se3 T_reference_last_;   ///< ... and its pose relative to the reference, translation divided by its scale
+  landmark_id first_new_;  ///< landmarks from this id on were made from the last frame; `no_id`: none
   motion_model motion_;
   track_counters counters_;
   frame_log log_;
-  std::size_t most_erased_ = 2 * latest_erased;  ///< of any map, before it is made to forget
+  std::size_t most_erased_ = 2 * latest_erased;  ///< maximum number of erased keyframes before some are forgotten
 };
 
 }  // namespace orbis::slam::detail

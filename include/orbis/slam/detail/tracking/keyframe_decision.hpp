@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Whether a frame should become a keyframe.
+/// The decision to make a keyframe of a frame.
 #pragma once
 
 #include <algorithm>
@@ -12,19 +12,19 @@
 
 namespace orbis::slam::detail {
 
-/// What the decision depends on.
+/// Quantities on which the decision depends.
 struct keyframe_evidence {
-  double since = 0.0;               ///< the last keyframe, seconds
-  double moved = 0.0;               ///< since then, metres; if the scale is not known, over the depth of the scene
-  double turned = 0.0;              ///< since then, radians
+  double since = 0.0;   ///< seconds since the last keyframe
+  double moved = 0.0;   ///< translation since then, metres; if the scale is unknown, relative to the depth of the scene
+  double turned = 0.0;  ///< rotation since then, radians
   std::size_t inliers = 0;          ///< landmarks tracked in the frame
   std::size_t reference = 0;        ///< landmarks of the reference keyframe that other keyframes observe as well
   std::size_t close_tracked = 0;    ///< close keypoints that observe a landmark
   std::size_t close_untracked = 0;  ///< close keypoints that could become landmarks
-  std::size_t keyframes = 0;        ///< of the map
+  std::size_t keyframes = 0;        ///< number of keyframes of the map
 };
 
-/// @pre the map has keyframes, and `reference` is one
+/// Collects the evidence for a frame. @pre the map has keyframes, and `reference` is one
 template <feature_descriptor D>
 [[nodiscard]] keyframe_evidence gather_evidence(const basic_map<D>& m, const basic_frame<D>& f, keyframe_id reference,
                                                 std::size_t inliers, const options& o, bool scale_is_known = true) {
@@ -40,7 +40,7 @@ template <feature_descriptor D>
   e.turned = motion.rotation().angle();
   e.inliers = inliers;
   e.keyframes = m.keyframes().size();
-  // Without depth two observations make a landmark, and only a third one says something for it.
+  // Without depth two observations make a landmark; only a third one confirms it.
   const std::size_t seen_by_others = std::min<std::size_t>(scale_is_known ? 2 : 3, e.keyframes);
   for (const landmark_id l : m.at(reference).landmarks)
     if (l != no_id && m.landmark_at(l).observations.size() >= seen_by_others) ++e.reference;
@@ -51,8 +51,8 @@ template <feature_descriptor D>
   return e;
 }
 
-/// A keyframe is due when the view has changed much, when too few of the close keypoints observe landmarks, or when the
-/// last keyframe is some time ago and the camera has moved. Never with too few inliers, and never for a camera at rest.
+/// Returns true if the view has changed much, if too few of the close keypoints observe landmarks, or if some time has
+/// passed since the last keyframe and the camera has moved. False with too few inliers, and for a camera at rest.
 [[nodiscard]] inline bool is_keyframe_due(const keyframe_evidence& e, const keyframe_options& o) {
   if (e.inliers <= o.min_inliers) return false;
   const double ratio = e.keyframes < 2 ? o.inlier_ratio_start : o.inlier_ratio;

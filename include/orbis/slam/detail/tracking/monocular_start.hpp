@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The beginning of a map without depth: two frames from which the scene and the motion between them are certain.
+/// Initialisation of a map without depth: two frames with an unambiguous reconstruction of the scene and their motion.
 #pragma once
 
 #include <algorithm>
@@ -34,43 +34,43 @@ struct start_point {
   vec3 position = zeros<vec3>();        ///< in the world
 };
 
-/// Two frames with poses, and the points that they share. The first camera is the world; the unit of length is the
-/// median depth of the points in it.
+/// Two frames with poses, and the points that they share. The first camera is the world frame; the unit of length is
+/// the median depth of the points in it.
 template <feature_descriptor D>
 struct monocular_start_result {
   basic_frame<D> first;              ///< its pose is the identity
-  se3 T_first_second;                ///< of the frame that was seen last
+  se3 T_first_second;                ///< pose of the last frame
   std::vector<start_point> points;   ///< by ascending keypoints of the first frame
   double parallax = 0.0;             ///< median angle between the rays of a point, radians
   double rotation_deviation = 0.0;   ///< standard deviation of the rotation, radians ...
   double direction_deviation = 0.0;  ///< ... and of the direction of the translation, radians
 };
 
-/// Waits for two frames that a map can begin with. Keeps some frames of different age that may be the first, follows
-/// the keypoints of each from frame to frame, and reconstructs the scene once this is certain
-/// (`optimize::reconstruct_two_views`). A frame is given up where too few of its keypoints can be followed; there are
-/// younger ones by then, so that the waiting does not begin anew. A frame costs about a millisecond for each of them.
+/// Selects two frames with which a map can begin. Keeps several frames of different age as candidates for the first,
+/// tracks the keypoints of each from frame to frame, and reconstructs the scene once it is certain
+/// (`optimize::reconstruct_two_views`). A candidate is discarded when too few of its keypoints can be tracked; younger
+/// candidates remain, so that the search does not restart. Each candidate costs about a millisecond per frame.
 ///
-/// Source of the scheme: R. Mur-Artal, J. M. M. Montiel, J. D. Tardos, "ORB-SLAM: a versatile and accurate monocular
-/// SLAM system", T-RO 31 (2015), section IV, which keeps one frame.
+/// Source: R. Mur-Artal, J. M. M. Montiel, J. D. Tardos, "ORB-SLAM: a versatile and accurate monocular SLAM system",
+/// T-RO 31 (2015), section IV, which keeps one frame.
 template <camera::camera_model Camera, feature_descriptor D>
 class monocular_start {
  public:
-  /// A frame that may be the first of a map.
+  /// A candidate for the first frame of a map.
   struct candidate {
     basic_frame<D> frame;
     std::vector<features::match> matches;   ///< of its keypoints (query) with those of the last frame (train)
-    std::vector<features::window> windows;  ///< one for each keypoint, where it was seen last
-    std::size_t most = 0;                   ///< matches that there were with any frame
+    std::vector<features::window> windows;  ///< one per keypoint, around its last position
+    std::size_t most = 0;                   ///< maximum number of matches with any frame
   };
 
   monocular_start(const camera_rig<Camera>& rig, const start_options& options, std::uint64_t seed = 1)
       : rig_{rig}, options_{options}, seed_{seed} {}
 
-  /// Takes the next frame; its pose does not matter. The beginning of a map, after which all frames are forgotten, or
-  /// nothing.
-  [[nodiscard]] std::optional<monocular_start_result<D>> see(const basic_frame<D>& f) {
-    why_ = {errc::no_data, "start of a map", "no frame before it has enough matches"};
+  /// Processes the next frame; its pose is not used. Returns the start of a map, after which all frames are forgotten,
+  /// or nothing.
+  [[nodiscard]] std::optional<monocular_start_result<D>> process(const basic_frame<D>& f) {
+    why_ = {errc::no_data, "start of a map", "no earlier frame has enough matches"};
     std::erase_if(candidates_, [&](candidate& c) { return !follow(c, f); });
     for (candidate& c : candidates_) {
       auto start = reconstruct(c, f);
@@ -87,9 +87,9 @@ class monocular_start {
   /// Forgets all frames.
   void reset() { candidates_.clear(); }
 
-  /// Why the last frame began no map, with the oldest frame before it.
+  /// The reason why the last frame did not begin a map with the oldest candidate.
   [[nodiscard]] const error& why() const noexcept { return why_; }
-  /// The frames that may be the first, the oldest one first.
+  /// The candidates for the first frame, the oldest one first.
   [[nodiscard]] const std::vector<candidate>& candidates() const noexcept { return candidates_; }
 
  private:
@@ -98,7 +98,7 @@ class monocular_start {
            features::unique{} | features::rotation_consistency{};
   }
 
-  /// Follows the keypoints of a candidate to the next frame. False if they are too few.
+  /// Tracks the keypoints of a candidate into the next frame. Returns false if too few are left.
   bool follow(candidate& c, const basic_frame<D>& f) {
     chain(options_).match_into(c.matches, memory_, c.frame.features, f.features,
                                std::span<const features::window>(c.windows), f.grid);
@@ -109,9 +109,9 @@ class monocular_start {
     }
     return c.matches.size() >= options_.min_matches;
   }
-  /// Makes `f` a candidate if it has enough features, and differs from the youngest one.
+  /// Makes `f` a candidate if it has enough features and differs from the youngest one.
   void add(const basic_frame<D>& f) {
-    constexpr double faded = 0.6;  // the share of matches that the youngest one has left by then
+    constexpr double faded = 0.6;  // maximum share of its matches that the youngest one still has
     if (f.size() < options_.min_features || candidates_.size() == options_.max_candidates) return;
     if (!candidates_.empty() &&
         static_cast<double>(candidates_.back().matches.size()) > faded * static_cast<double>(candidates_.back().most))
@@ -120,7 +120,7 @@ class monocular_start {
     for (const auto& k : f.features.keypoints)
       candidates_.back().windows.push_back({k.x, k.y, static_cast<float>(options_.radius), k.octave - 1, k.octave + 1});
   }
-  /// The beginning with a candidate, whose frame is handed over then, and the next frame.
+  /// Reconstructs a start from a candidate and the next frame; on success, moves out the candidate's frame.
   [[nodiscard]] result<monocular_start_result<D>> reconstruct(candidate& c, const basic_frame<D>& f) const {
     std::vector<vec2> first, second;
     std::vector<double> deviations;

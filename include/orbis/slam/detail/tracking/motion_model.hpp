@@ -11,30 +11,30 @@
 
 namespace orbis::slam::detail {
 
-/// A pose at a time.
+/// A pose with its timestamp.
 struct timed_pose {
   double timestamp = 0.0;  ///< seconds
   se3 T_world_camera;
 };
 
-/// Predicts poses by the motion between the last two frames. Unknown at first.
+/// Predicts poses by the motion between the last two frames, which is unknown at first.
 class motion_model {
  public:
-  /// The motion is not known.
+  /// Makes the motion unknown.
   void reset() { velocity_.reset(); }
-  /// The motion is the one between two frames.
+  /// Sets the motion to that between two frames.
   void set(const timed_pose& before, const timed_pose& after) {
     velocity_ = (before.T_world_camera.inverse() * after.T_world_camera).log();
     interval_ = after.timestamp - before.timestamp;
   }
-  /// Lengths are so many times what they were.
+  /// Rescales the motion after a scale correction.
   void scale_by(double factor) {
     if (velocity_) velocity_->head<3>() *= factor;
   }
   [[nodiscard]] bool is_known() const noexcept { return velocity_.has_value(); }
 
-  /// `T_world_camera` at `timestamp` if the motion goes on from `last`, for three times the last interval at most;
-  /// `last` itself if the motion is not known.
+  /// Predicts `T_world_camera` at `timestamp` by continuing the motion from `last`, for at most three times the last
+  /// interval; returns `last` itself if the motion is unknown.
   [[nodiscard]] se3 predict(const timed_pose& last, double timestamp) const {
     if (!velocity_) return last.T_world_camera;
     const double ratio = interval_ > 0.0 ? (timestamp - last.timestamp) / interval_ : 1.0;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Estimates the pose of a frame: from the last frame, from a keyframe, or from the landmarks around it.
+/// Estimation of the pose of a frame: from the last frame, from a keyframe, or from the landmarks around it.
 #pragma once
 
 #include <algorithm>
@@ -31,8 +31,8 @@
 namespace orbis::slam::detail {
 
 /// Refines the pose of `f` on matches of `list` (query) with its keypoints (train), starting from `f.T_world_camera`,
-/// and sets `f.landmarks` to those that agree with the result. Returns the number of matches that agree; 0, and an
-/// unchanged pose, where the pose cannot be determined.
+/// and sets `f.landmarks` to those that agree with the result. Returns the number of matches that agree; 0, with an
+/// unchanged pose, if the pose cannot be determined.
 template <feature_descriptor D, camera::camera_model Camera>
 std::size_t refine_on_matches(basic_frame<D>& f, const search_list<D>& list, std::span<const features::match> matches,
                               const camera_rig<Camera>& rig) {
@@ -60,8 +60,8 @@ class tracker {
  public:
   tracker(const camera_rig<Camera>& rig, const options& settings) : rig_{rig}, options_{settings} {}
 
-  /// Searches for what the last frame observed: its landmarks, and its other points with depth. `last` has its present
-  /// pose, and landmarks by ids of the map at that time. `predicted`: the expected `T_world_camera`.
+  /// Searches for the observations of the last frame: its landmarks, and its other points with depth. `last` has its
+  /// present pose, and landmarks by ids of the map at that time. `predicted`: the expected `T_world_camera`.
   std::size_t by_motion(basic_frame<D>& f, const basic_map<D>& m, const basic_frame<D>& last, const se3& predicted,
                         moving_features<Camera, D, Matchers>& moving) const {
     for (const double widening : {1.0, 2.0}) {
@@ -69,7 +69,7 @@ class tracker {
       const search_list<D> list = seen_points(m, last, predicted, widening * options_.motion_radius);
       std::vector<features::match> matches = Matchers::motion(
           features::feature_view<D>{list.keypoints, list.descriptors}, f.features, list.windows, f.grid);
-      moving.drop_left_out(matches);
+      moving.remove_excluded(matches);
       if (matches.size() < options_.min_inliers) continue;
       const std::size_t fitted = refine_on_matches<D>(f, list, matches, rig_);
       if (const std::size_t inliers = moving.judge(f, m, list, matches, fitted, predicted); inliers >= 10)
@@ -79,7 +79,7 @@ class tracker {
   }
 
   /// As `by_motion`, for a camera that may have turned in any direction by up to half of its view since the last frame:
-  /// tries the turned poses at which most matches are found, from the last frame's place. Some 80 searches.
+  /// tries the turned poses with most matches, from the last frame's position. About 80 searches.
   std::size_t by_turning(basic_frame<D>& f, const basic_map<D>& m, const basic_frame<D>& last) const {
     const auto& camera = rig_.camera();
     const auto corner = camera.unproject({0.0, 0.0});
@@ -117,7 +117,7 @@ class tracker {
     return 0;
   }
 
-  /// Matches a frame with a keyframe by appearance and estimates its pose by RANSAC. @pre the keyframe is there
+  /// Matches a frame with a keyframe by appearance and estimates its pose by RANSAC. @pre m.has_keyframe(id)
   std::size_t by_appearance(basic_frame<D>& f, const basic_map<D>& m, keyframe_id id) const {
     const auto& k = m.at(id);
     search_list<D> list;
@@ -148,9 +148,9 @@ class tracker {
     return inliers >= enough ? inliers : 0;
   }
 
-  /// Searches for the landmarks of the local map in a frame whose pose is known roughly, within `radius` pixels of a
-  /// keypoint's level. `expected(id)` is called for the landmarks that the frame is expected to observe, `found(id)`
-  /// for those that it does.
+  /// Searches for the landmarks of the local map in a frame whose pose is roughly known, within `radius` pixels of a
+  /// keypoint's level. Calls `expected(id)` for the landmarks that the frame is expected to observe, `found(id)` for
+  /// those that it observes.
   template <class Expected, class Found>
   std::size_t on_local_map(basic_frame<D>& f, const basic_map<D>& m, keyframe_id reference, double radius,
                            const moving_features<Camera, D, Matchers>& moving, Expected&& expected,
@@ -159,9 +159,10 @@ class tracker {
     const features::projection_rule rule = rule_of(rig_.scales, radius);
     search_list<D> list;
     for (const landmark_id id : local_landmarks(m, f, reference, options_.local_keyframes))
-      if (!moving.avoids(m, id, f.timestamp) && add_landmark(list, project, rule, m.landmark_at(id), id)) expected(id);
+      if (!moving.is_excluded(m, id, f.timestamp) && add_landmark(list, project, rule, m.landmark_at(id), id))
+        expected(id);
     std::vector<features::match> matches = Matchers::landmarks(list.descriptors, f.features, list.windows, f.grid);
-    moving.drop_left_out(matches);
+    moving.remove_excluded(matches);
     const std::size_t inliers = refine_on_matches<D>(f, list, matches, rig_);
     for (const landmark_id l : f.landmarks)
       if (l != no_id) found(l);
@@ -169,7 +170,8 @@ class tracker {
   }
 
  private:
-  /// What the last frame observed, where a camera at a pose sees it, to be searched for within `radius` pixels.
+  /// Returns the points observed by the last frame, projected into a camera at a pose, with search windows of `radius`
+  /// pixels.
   [[nodiscard]] search_list<D> seen_points(const basic_map<D>& m, const basic_frame<D>& last, const se3& T_world_camera,
                                            double radius) const {
     const features::camera_projection project{rig_.camera(), T_world_camera};
