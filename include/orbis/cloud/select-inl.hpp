@@ -25,7 +25,7 @@ namespace detail {
   return out;
 }
 
-/// Points left, and with `non_finite::keep` those that are not finite.
+/// Indices of the remaining points and, with `non_finite::keep`, of the non-finite ones.
 [[nodiscard]] inline std::vector<std::uint32_t> kept_points(const point_view& points, std::span<const char> left,
                                                             const select_options& options) {
   return indices_where(left.size(), [&](std::size_t i) {
@@ -89,7 +89,7 @@ automatic_result choose_and_filter(const Policy& policy, const point_view& point
   return out;
 }
 
-/// The function that a choice calls with views.
+/// Wraps a function object as the `view_judge` of a choice.
 template <class F>
 [[nodiscard]] view_judge judge_of(const F& judge) {
   return {&judge,

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// What views say of a cloud, as a step of a chain.
+/// Evidence of views about a cloud, as a step of a chain.
 #pragma once
 
 #include <algorithm>
@@ -25,13 +25,13 @@
 
 namespace orbis::cloud::detail {
 
-/// How many points a step removed, and why.
+/// Number of points that a step removed, by reason.
 struct ray_removals {
   std::size_t passed_through = 0;
   std::size_t unsupported = 0;
 };
 
-/// Clears `left` where the counts exclude a point.
+/// Clears `left` for the points that the counts exclude.
 [[nodiscard]] inline ray_removals remove_by_rays(const std::vector<ray_evidence>& scores, const ray_step& step,
                                                  std::span<char> left) {
   ray_removals out;
@@ -46,7 +46,7 @@ struct ray_removals {
   return out;
 }
 
-/// Clears `left` where the views exclude a point. If cancelled, nothing is removed.
+/// Clears `left` for the points that the views exclude. If cancelled, removes nothing.
 template <execution_policy Policy, posed_depth_range Views, camera::camera_model Camera>
 ray_removals apply_rays(const Policy& policy, const point_view& points, const ray_step& step, const Views& views,
                         const Camera& camera, std::span<char> left, bool& cancelled, progress on_progress) {
@@ -62,7 +62,7 @@ ray_removals apply_rays(const Policy& policy, const point_view& points, const ra
   return cancelled ? ray_removals{} : remove_by_rays(counter.scores(), step, left);
 }
 
-/// Whether a cloud was made of some views: nearly every point of a sample is in one of them.
+/// Tests if a cloud was made from some views: nearly every point of a sample is in one of them.
 template <camera::camera_model Camera>
 class made_of_views {
  public:
@@ -96,8 +96,8 @@ class made_of_views {
   ray_evidence_counter<Camera> counter_;
 };
 
-/// Judges a cloud by its views, clears `left` where they exclude a point, and adds the step and its
-/// reason. False if cancelled.
+/// Judges a cloud by its views, clears `left` for the points they exclude, and adds the step and its reason. Returns
+/// false if cancelled.
 template <execution_policy Policy, posed_depth_range Views, camera::camera_model Camera>
 [[nodiscard]] bool judge_views(const Policy& policy, const point_view& points, const Views& views, const Camera& camera,
                                const select_options& options, std::span<char> left, filter_choice& choice,
@@ -112,7 +112,7 @@ template <execution_policy Policy, posed_depth_range Views, camera::camera_model
     cancelled = cancelled || !on_progress(done, count);
     return !cancelled;
   };
-  // All views are counted at once, and those that turn out to be wrong are taken back: most views are looked at once.
+  // All views are counted, and the distrusted ones are subtracted afterwards, so that most views are read once.
   made_of_views<Camera> sources{policy, points, camera, step.evidence};
   ray_evidence_counter<Camera> counter{policy, points, camera, step.evidence};
   view_trust trust = find_distrusted_views(
@@ -129,7 +129,7 @@ template <execution_policy Policy, posed_depth_range Views, camera::camera_model
   step.need_support = sources.verdict();
   ray_removals removed;
   constexpr std::size_t most_counted = std::numeric_limits<std::uint16_t>::max();
-  if (count > most_counted && !step.distrusted.empty()) {  // counts may have come to their end
+  if (count > most_counted && !step.distrusted.empty()) {  // counts may be saturated
     removed = apply_rays(policy, points, step, views, camera, left, cancelled, {});
   } else {
     view_cleaner cleaner;
