@@ -99,7 +99,7 @@ class basic_viewed_points {
       if (count == 0) return;
       const auto* const first = std::ranges::data(points);
       const std::array<const S*, 3> axis = stored_coordinates<S>(*first);
-      if (lie_in(*first, axis)) {
+      if (holds_coordinates(*first, axis)) {
         view_ = {axis, sizeof(*first), count};
         return;
       }
@@ -118,7 +118,7 @@ class basic_viewed_points {
   /// Returns true if the coordinates exist and are inside the point itself. Those of a packed struct, for example,
   /// would be copies.
   template <class P>
-  [[nodiscard]] static bool lie_in(const P& point, const std::array<const S*, 3>& axis) noexcept {
+  [[nodiscard]] static bool holds_coordinates(const P& point, const std::array<const S*, 3>& axis) noexcept {
     const auto begin = reinterpret_cast<std::uintptr_t>(std::addressof(point));
     for (const S* const a : axis) {
       const auto at = reinterpret_cast<std::uintptr_t>(a);

@@ -265,7 +265,7 @@ class nearest_search {
   /// Gathers the leaves near a box within leaf `l` into `shared_`. The box of a row contains those of its leaves, so
   /// rows near a leaf are near the leaf's row; consecutive leaves of a row share these near rows.
   [[nodiscard]] bool gather_shared(std::size_t l, const box3& box, float bound) {
-    if (!have_near_rows(l / leaf_width, bound)) return gather_near(*tree_, 0, kernels_, box, bound, open_, shared_);
+    if (!ensure_near_rows(l / leaf_width, bound)) return gather_near(*tree_, 0, kernels_, box, bound, open_, shared_);
     return gather_rows(box, bound, shared_);
   }
   /// Gathers the leaves near a box within leaf `l` into `own_`.
@@ -293,7 +293,7 @@ class nearest_search {
 
   /// Makes `near_rows_` hold all rows of leaves within squared distance `bound` of a row. Returns false if there are
   /// too many.
-  [[nodiscard]] bool have_near_rows(std::size_t row, float bound) {
+  [[nodiscard]] bool ensure_near_rows(std::size_t row, float bound) {
     if (row == near_rows_of_ && bound <= near_rows_reach_) return true;
     if (tree_->levels.size() == 1 || (row == near_rows_of_ && bound >= too_many_rows_)) return false;
     const box3 box = tree_->levels[1][row / leaf_width].child(row % leaf_width);

@@ -17,7 +17,7 @@ namespace orbis::cloud::detail {
 /// Calls `f(i)` for the first `n` numbers, sixteen at a time as far as possible: compilers vectorise loops of known
 /// length at -O2.
 template <class F>
-[[gnu::always_inline]] inline void in_sixteens(std::size_t n, F&& f) {
+[[gnu::always_inline]] inline void for_each_by_16(std::size_t n, F&& f) {
   std::size_t i = 0;
   for (; i + 16 <= n; i += 16) {
     for (std::size_t lane = 0; lane != 16; ++lane) f(i + lane);
@@ -30,7 +30,7 @@ struct widen_range {
   template <simd::target>
   static ORBIS_ALWAYS_INLINE void run(float* __restrict low, float* __restrict high, const float* other_low,
                                       const float* other_high, std::size_t n) {
-    in_sixteens(n, [&](std::size_t i) ORBIS_INLINE_LAMBDA {
+    for_each_by_16(n, [&](std::size_t i) ORBIS_INLINE_LAMBDA {
       low[i] = other_low[i] < low[i] ? other_low[i] : low[i];
       high[i] = other_high[i] > high[i] ? other_high[i] : high[i];
     });
@@ -40,7 +40,7 @@ struct widen_range {
 struct replace_zeros {
   template <simd::target>
   static ORBIS_ALWAYS_INLINE void run(float* __restrict x, float value, std::size_t n) {
-    in_sixteens(n, [&](std::size_t i) ORBIS_INLINE_LAMBDA { x[i] = x[i] > 0.0F ? x[i] : value; });
+    for_each_by_16(n, [&](std::size_t i) ORBIS_INLINE_LAMBDA { x[i] = x[i] > 0.0F ? x[i] : value; });
   }
 };
 /// Converts a row of stored depths to metres, 0 if missing, as `camera::depth_view` does.
@@ -48,7 +48,7 @@ struct stored_to_metres {
   template <simd::target>
   static ORBIS_ALWAYS_INLINE void run(const std::uint16_t* stored, double scale, float least, float most,
                                       float* __restrict out, std::size_t n) {
-    in_sixteens(n, [&](std::size_t i) ORBIS_INLINE_LAMBDA {
+    for_each_by_16(n, [&](std::size_t i) ORBIS_INLINE_LAMBDA {
       const auto metres = static_cast<float>(static_cast<double>(stored[i]) / scale);
       const bool valid = (stored[i] != 0) & (stored[i] != std::numeric_limits<std::uint16_t>::max()) & (metres > 0.0F) &
                          (metres >= least) & (metres <= most);

@@ -128,7 +128,7 @@ class view_cleaner {
 };
 
 /// Default callback for views: does nothing.
-struct ask_nothing {
+struct no_view_action {
   template <class View>
   void operator()(const View&, const cleaned_view&, const depth_windows&) const noexcept {}
 };
@@ -207,7 +207,7 @@ class view_verdicts {
 /// samples of the views, if drawn before; otherwise each view is read once more. O(views (pixels + samples of all
 /// views)), and O(views) memory.
 /// @pre views' images have the camera's size; the samples are of these views
-template <execution_policy Policy, posed_depth_range Views, camera::camera_model Camera, class Also = ask_nothing>
+template <execution_policy Policy, posed_depth_range Views, camera::camera_model Camera, class Also = no_view_action>
 [[nodiscard]] view_trust find_distrusted_views(const Policy& policy, const Views& views, const Camera& camera,
                                                const ray_evidence_options& evidence = {},
                                                const view_trust_options& options = {}, progress on_progress = {},

@@ -15,7 +15,7 @@
 #include <utility>
 #include <vector>
 
-#include <orbis/cloud/detail/select/in_words.hpp>
+#include <orbis/cloud/detail/select/describe.hpp>
 #include <orbis/cloud/detail/select/log_density.hpp>
 #include <orbis/cloud/detail/select/surroundings.hpp>
 #include <orbis/cloud/filter_chain.hpp>
@@ -47,7 +47,7 @@ void center(const Policy& policy, surroundings& around, reference& r) {
 }
 
 /// Options of a test.
-struct test_manner {
+struct threshold_options {
   double lowest = 0.55;         ///< lower limit of the threshold
   double without_valley = 1.6;  ///< threshold for a single population, if its bulk is not wider
   bool shoulders = true;     ///< detect a shoulder on the bulk, as flying pixels form, instead of a separate population
@@ -60,14 +60,14 @@ struct test_manner {
 /// the spacing from which on more than 40 % of the sparser points lie on surfaces.
 template <execution_policy Policy>
 [[nodiscard]] density_evidence find_threshold(const Policy& policy, surroundings& around, const reference& r,
-                                              const test_manner& manner) {
+                                              const threshold_options& manner) {
   constexpr double first = 0.3;
   constexpr double bin_width = 0.08;
   constexpr std::size_t bins = 64;
   constexpr double most_surface = 0.4;
   constexpr double chance = 10;  // points; fewer are not significant
   const std::vector<float> residual = around.residuals(policy, r.step);
-  around.look_at_shapes(policy, residual, r.step.surface_line());
+  around.compute_shapes(policy, residual, r.step.surface_line());
   std::vector<float> loose;  // residuals of sparse points that are not on surfaces
   std::array<double, bins> all{};
   std::array<double, bins> surface{};
@@ -113,17 +113,17 @@ template <execution_policy Policy>
   return out;
 }
 
-[[nodiscard]] inline std::string in_words(const density_evidence& e) {
-  std::string out = joined({percent(e.removed), " of the points lie more than ", in_words(std::exp(e.threshold)),
+[[nodiscard]] inline std::string describe(const density_evidence& e) {
+  std::string out = joined({percent(e.removed), " of the points are more than ", describe(std::exp(e.threshold)),
                             " times sparser than usual"});
-  if (e.mode == filter_mode::range_log_statistical) out += " at their range";
-  if (e.mode == filter_mode::local_log_statistical) out += " around them";
-  out += " and on no surface";
+  if (e.mode == filter_mode::range_log_statistical) out += " for their range";
+  if (e.mode == filter_mode::local_log_statistical) out += " for their surroundings";
+  out += " and not on a surface";
   if (e.threshold == e.valley_position) {
-    out += joined(
-        {" (a population apart: the valley before it is ", in_words(e.valley_ratio), " times lower than its peak)"});
+    out += joined({" (a separate population: its peak is ", describe(e.valley_ratio),
+                   " times higher than the valley before it)"});
   } else if (e.shoulder > 0.01) {
-    out += joined({" (", percent(e.shoulder), " make a shoulder just outside the bulk, as flying pixels do)"});
+    out += joined({" (", percent(e.shoulder), " form a shoulder of the distribution, as flying pixels do)"});
   }
   return out;
 }
@@ -180,14 +180,14 @@ void judge_points(const Policy& policy, surroundings& around, const select_optio
     if (share > 0) choice.chain.emplace_back(step);
     return share;
   };
-  const auto test = [&](reference r, const test_manner& manner) {
+  const auto test = [&](reference r, const threshold_options& manner) {
     r.step.surface_spacing = usual.step.usual;
     density_evidence found = find_threshold(policy, around, r, manner);
     if (std::isfinite(found.threshold)) {
       density_step step = r.step;
       step.threshold = found.threshold;
       found.removed = try_step(step);
-      if (found.removed > 0) reasons.push_back(in_words(found));
+      if (found.removed > 0) reasons.push_back(describe(found));
     }
     evidence.density.push_back(found);
   };
@@ -208,7 +208,7 @@ void judge_points(const Policy& policy, surroundings& around, const select_optio
   if (evidence.isolated > 0)
     reasons.push_back(
         joined({percent(evidence.isolated), " are groups of fewer than ", std::to_string(isolation.min_size),
-                " points further than ", in_words(isolation.reach), " usual spacings from all others"}));
+                " points more than ", describe(isolation.reach), " usual spacings from all others"}));
   cluster_options cluster;
   cluster.min_size = std::clamp<std::size_t>(around.size() / 125, 30, 300);
   cluster.min_gap = 4;
@@ -216,7 +216,7 @@ void judge_points(const Policy& policy, surroundings& around, const select_optio
   if (evidence.clustered > 0)
     reasons.push_back(
         joined({percent(evidence.clustered), " are clusters of fewer than ", std::to_string(cluster.min_size),
-                " points that hang ", in_words(cluster.min_gap), " spacings or more from the surface"}));
+                " points at least ", describe(cluster.min_gap), " spacings from the surface"}));
 }
 
 }  // namespace orbis::cloud::detail

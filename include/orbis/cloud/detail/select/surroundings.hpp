@@ -135,7 +135,7 @@ class surroundings {
 
   /// Computes the shapes around the points that are sparser than the bulk by `residual` or by `usual`.
   template <execution_policy Policy>
-  void look_at_shapes(const Policy& policy, std::span<const float> residual, const log_line& line) {
+  void compute_shapes(const Policy& policy, std::span<const float> residual, const log_line& line) {
     flat_.add(
         policy, size(), [&](std::size_t i) { return residual[i] >= bulk_end || !is_bulk(line, i); },
         [&](std::size_t i) { return static_cast<float>(off_plane_at(i)); });
@@ -156,7 +156,7 @@ class surroundings {
   template <execution_policy Policy>
   void apply(const Policy& policy, const density_step& step) {
     const std::vector<float> residual = residuals(policy, step);
-    look_at_shapes(policy, residual, step.surface_line());
+    compute_shapes(policy, residual, step.surface_line());
     for_each_index(policy, size(), 1024, [&](std::size_t i) {
       if (gone_[i] == 0 && double{residual[i]} > step.threshold && !on_surface(i, step.surface, step.surface_line()))
         gone_[i] = 1;

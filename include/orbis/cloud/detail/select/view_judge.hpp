@@ -16,7 +16,7 @@
 #include <orbis/camera/model.hpp>
 #include <orbis/cloud/detail/rays/depth_windows.hpp>
 #include <orbis/cloud/detail/rays/view_trust.hpp>
-#include <orbis/cloud/detail/select/in_words.hpp>
+#include <orbis/cloud/detail/select/describe.hpp>
 #include <orbis/cloud/filter_chain.hpp>
 #include <orbis/cloud/filter_choice.hpp>
 #include <orbis/cloud/ray_evidence-inl.hpp>
@@ -64,19 +64,19 @@ ray_removals apply_rays(const Policy& policy, const point_view& points, const ra
 
 /// Tests if a cloud was made from some views: nearly every point of a sample is in one of them.
 template <camera::camera_model Camera>
-class made_of_views {
+class source_view_test {
  public:
   template <execution_policy Policy>
-  made_of_views(const Policy& policy, const point_view& points, const Camera& camera,
-                const ray_evidence_options& options)
+  source_view_test(const Policy& policy, const point_view& points, const Camera& camera,
+                   const ray_evidence_options& options)
       : counter_{policy, sample_of(points), camera, options} {}
 
   template <execution_policy Policy, posed_depth View>
   void add(const Policy& policy, const View& view) {
     counter_.add(policy, view);
   }
-  /// @pre all views were added
-  [[nodiscard]] bool verdict() const {
+  /// Returns true if the cloud was made from the views. @pre all views were added
+  [[nodiscard]] bool passed() const {
     const std::vector<ray_evidence> scores = counter_.scores();
     const auto supported = std::ranges::count_if(scores, [](const ray_evidence& e) { return e.supported > 0; });
     return static_cast<double>(supported) >= 0.98 * static_cast<double>(scores.size());
@@ -113,7 +113,7 @@ template <execution_policy Policy, posed_depth_range Views, camera::camera_model
     return !cancelled;
   };
   // All views are counted, and the distrusted ones are subtracted afterwards, so that most views are read once.
-  made_of_views<Camera> sources{policy, points, camera, step.evidence};
+  source_view_test<Camera> sources{policy, points, camera, step.evidence};
   ray_evidence_counter<Camera> counter{policy, points, camera, step.evidence};
   view_trust trust = find_distrusted_views(
       policy, views, camera, step.evidence, {}, watched,
@@ -126,7 +126,7 @@ template <execution_policy Policy, posed_depth_range Views, camera::camera_model
   evidence.worst_conflict = trust.worst_conflict;
   evidence.usual_conflict = trust.usual_conflict;
   step.distrusted = std::move(trust.distrusted);
-  step.need_support = sources.verdict();
+  step.need_support = sources.passed();
   ray_removals removed;
   constexpr std::size_t most_counted = std::numeric_limits<std::uint16_t>::max();
   if (count > most_counted && !step.distrusted.empty()) {  // counts may be saturated
@@ -150,12 +150,12 @@ template <execution_policy Policy, posed_depth_range Views, camera::camera_model
   if (!step.distrusted.empty()) {
     const bool one = step.distrusted.size() == 1;
     why = joined({std::to_string(step.distrusted.size()), " of ", all, one ? " views contradicts" : " views contradict",
-                  " the others (by up to ", percent(trust.worst_conflict), ") and ", one ? "does" : "do",
-                  " not count; "});
+                  " the others (by up to ", percent(trust.worst_conflict), ") and ", one ? "is" : "are", " ignored; "});
   }
   why += joined({"the rays of ", all, " views pass through ", percent(evidence.passed_through), " of the points"});
   if (removed.unsupported > 0)
-    why += joined({", and ", percent(evidence.unsupported), " are in no trusted view but as stray pixels"});
+    why += joined(
+        {", and ", percent(evidence.unsupported), " are measured by no trusted view (stray pixels do not count)"});
   reasons.push_back(std::move(why));
   choice.chain.emplace_back(std::move(step));
   return true;

@@ -10,7 +10,7 @@
 
 namespace orbis::cloud::detail {
 
-[[nodiscard]] inline std::string in_words(double value) {
+[[nodiscard]] inline std::string describe(double value) {
   char text[32];
   std::snprintf(text, sizeof text, "%.3g", value);
   return text;
@@ -21,6 +21,6 @@ namespace orbis::cloud::detail {
   for (const std::string_view part : parts) out += part;
   return out;
 }
-[[nodiscard]] inline std::string percent(double share) { return in_words(100 * share) + " %"; }
+[[nodiscard]] inline std::string percent(double share) { return describe(100 * share) + " %"; }
 
 }  // namespace orbis::cloud::detail
