@@ -44,7 +44,7 @@ struct octomap_file {
   std::string_view data;
 };
 
-/// Parses the header. Comments, CRLF and keywords in any order are accepted.
+/// Parses the header. Accepts comments, CRLF and keywords in any order.
 [[nodiscard]] inline result<octomap_file> parse_header(std::string_view bytes, std::string_view magic,
                                                        const std::string& where) {
   const auto next_line = [&]() -> std::optional<std::string_view> {
@@ -93,7 +93,7 @@ struct octomap_file {
   return file;
 }
 
-/// Reads a file whose nodes `Reader` knows.
+/// Reads a file whose nodes `Reader` can parse.
 template <class Model, class Reader>
 [[nodiscard]] result<occupancy_octree<Model>> read_octomap(std::string_view bytes, std::string_view magic,
                                                            const std::string& where) {
