@@ -202,8 +202,7 @@ template <execution_policy Policy>
   });
   for (const std::uint32_t i : small_ones) out.goes[out.sets.root(i)] = 1;
   for (std::size_t s = 0; s != small_ones.size(); ++s) {
-    if (apart[s] == 0)
-      out.goes[out.sets.root(small_ones[s])] = 0;  // one point close to the surface keeps the whole component
+    if (apart[s] == 0) out.goes[out.sets.root(small_ones[s])] = 0;  // one point near the surface keeps it all
   }
   return out;
 }

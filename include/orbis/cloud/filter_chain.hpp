@@ -66,8 +66,7 @@ struct ray_step {
 struct surface_test {
   double flatness = 0.15;   ///< maximum `off_plane` of a plane
   double same_scale = 0.7;  ///< neighbours denser by more than this (log) do not support a point
-  std::size_t support =
-      3;  ///< required supporting neighbours of the nearest 8, unless the point itself lies in a plane
+  std::size_t support = 3;  ///< supporting neighbours required of the nearest 8, unless the point is in a plane
 };
 
 /// Removes points whose log spacing exceeds the usual one by more than the threshold, unless they lie on a surface.

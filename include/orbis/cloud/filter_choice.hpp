@@ -44,16 +44,15 @@ struct density_evidence {
 
 /// Measurements on which a choice is based. Lengths in metres; shares are of all finite points.
 struct filter_evidence {
-  std::size_t points = 0;  ///< number of points
-  std::size_t finite = 0;  ///< number of finite points
-  std::size_t judged =
-      0;  ///< finite points, with a finite range if any has one, that are not identical to all their neighbours
-  double median_spacing = 0;                ///< median over the points of the mean neighbour distance
-  double left_scale = 0;                    ///< width of the bulk below its median with the chosen reference, log
-  double right_scale = 0;                   ///< width of the bulk above its median, log
-  double global_scale = 0;                  ///< width with one reference for all points, log
-  std::optional<double> range_scale;        ///< width with the reference over range, if ranges are known
-  double local_scale = 0;                   ///< width with the surroundings as the reference
+  std::size_t points = 0;             ///< number of points
+  std::size_t finite = 0;             ///< number of finite points
+  std::size_t judged = 0;             ///< finite, with a finite range if any has one, not identical to all neighbours
+  double median_spacing = 0;          ///< median over the points of the mean neighbour distance
+  double left_scale = 0;              ///< width of the bulk below its median with the chosen reference, log
+  double right_scale = 0;             ///< width of the bulk above its median, log
+  double global_scale = 0;            ///< width with one reference for all points, log
+  std::optional<double> range_scale;  ///< width with the reference over range, if ranges are known
+  double local_scale = 0;             ///< width with the surroundings as the reference
   std::vector<density_evidence> density{};  ///< one entry per test performed
   double isolated = 0;                      ///< share removed as groups of a few points
   double clustered = 0;                     ///< share removed as small clusters

@@ -33,8 +33,7 @@ struct flying_pixel_options {
   /// Distance in pixels at which the surfaces on either side are read: the widest transition that is recognised as a
   /// whole. 1 ... 8
   int reach = 2;
-  double noise =
-      1.425e-3;  ///< standard deviation of inverse depth, sigma_z / z^2, 1 / metre; the default is a Kinect's
+  double noise = 1.425e-3;    ///< deviation of inverse depth, sigma_z / z^2, 1 / metre; the default is a Kinect's
   double resolution = 0.001;  ///< smallest depth difference that counts, metres
   double sigmas = 4.0;        ///< minimum distance from a surface, in multiples of the noise or the resolution
   double jump = 3.0;          ///< minimum size of an edge, in multiples of that distance

@@ -32,9 +32,8 @@ enum class ray_end {
 /// End of a cast ray.
 struct ray_hit {
   ray_end end = ray_end::out_of_grid;
-  voxel_key key;  ///< the voxel in which the ray ended
-  vec3 point =
-      zeros<vec3>();  ///< centre of the voxel, metres; key and point are zero if the ray starts outside the grid
+  voxel_key key;               ///< the voxel in which the ray ended
+  vec3 point = zeros<vec3>();  ///< its centre, metres; key and point are zero if the ray starts outside the grid
 
   /// Returns true if the ray hit an occupied voxel.
   [[nodiscard]] explicit operator bool() const noexcept { return end == ray_end::hit; }
@@ -81,7 +80,7 @@ class ray_caster {
         cells = is_passable_octant() ? node_cells(detail::octant_level) : 0;
       }
       if (cells != 0) {
-        const auto way = ray.find_way_out(cells);
+        const auto way = ray.find_node_exit(cells);
         if (way.face.parameter < safe) {
           ray.take(way);
           if (!ray.is_outside()) continue;

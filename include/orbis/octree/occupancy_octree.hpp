@@ -149,7 +149,7 @@ class occupancy_octree {
     lose_track();
   }
 
-  // -- changing what is known
+  // -- modification of known voxels
 
   /// Calls `edit(block&)` with the 64 voxels of the octant that contains `k`, and stores the result. Ignores values of
   /// voxels that are unknown after the call. O(1). @pre k is in the grid

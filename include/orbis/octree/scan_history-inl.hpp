@@ -184,7 +184,7 @@ void scan_history<Octree>::change_uses(std::uint32_t number, const scan_voxels& 
     const std::uint32_t brick = uses_.number_of(p.name);
     auto& uses = uses_[brick].uses;
     uses.erase(place_of(uses, s.frame));
-    uses_.make_stale(brick, detail::octants_of(p));
+    uses_.mark_stale(brick, detail::octants_of(p));
   };
   fresh_.clear();
   for (std::uint32_t j = 0; j != new_parts.size(); ++j) {
@@ -195,14 +195,14 @@ void scan_history<Octree>::change_uses(std::uint32_t number, const scan_voxels& 
     const auto at = place_of(uses, s.frame);
     if (i != old_parts.size() && old_parts[i].name == p.name) {
       at->part = j;
-      uses_.make_stale(brick, detail::different_octants(s.voxels, old_parts[i], after, p));
+      uses_.mark_stale(brick, detail::different_octants(s.voxels, old_parts[i], after, p));
       ++i;
     } else if (at == uses.end()) {
       uses.push_back({number, j});
       fresh_.push_back(j);
     } else {
       uses.insert(at, {number, j});
-      uses_.make_stale(brick, detail::octants_of(p));
+      uses_.mark_stale(brick, detail::octants_of(p));
     }
   }
   for (; i != old_parts.size(); ++i) drop(old_parts[i]);

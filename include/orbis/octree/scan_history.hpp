@@ -121,7 +121,7 @@ class scan_history {
   /// Number of scans.
   [[nodiscard]] std::size_t size() const noexcept { return order_.size(); }
 
-  // -- following them
+  // -- replay
 
   /// Number of bricks with stale octants.
   [[nodiscard]] std::size_t stale_bricks() const noexcept { return uses_.stale().size(); }

@@ -396,7 +396,7 @@ class nearest_search {
   std::array<bool, leaf_width> has_places_{};
   std::array<float, leaf_width> largest_{};  ///< squared distance to the `wanted`-th nearest
   float hoped_;  ///< factor of `usual_` that should suffice; its scatter falls with the number of neighbours
-  float reach_;  ///< factor of `usual_` that suffices for nearly all points
+  float reach_;  ///< factor of `usual_` that should suffice in any case
   float shared_reach_ = -1;  ///< squared distance from the run's box up to which `shared_` is complete
   float usual_ = -1;         ///< squared distance to the `wanted`-th nearest; negative if not yet known
 };

@@ -30,7 +30,7 @@ template <std::predicate<std::size_t> Keep>
 }
 
 /// Returns the indices, ascending, of the points that are not outliers by their score. Points without a score (NaN):
-/// finite ones are kept (a single point), others are treated as the options specify.
+/// finite ones are kept (a single point), `policy` decides on the others.
 template <std::predicate<float> Outlier>
 [[nodiscard]] std::vector<std::uint32_t> inliers_by_score(const point_view& points, std::span<const float> score,
                                                           non_finite policy, Outlier&& outlier) {

@@ -87,8 +87,8 @@ class surroundings {
   static constexpr float bulk_end = 0.3F;        ///< log spacing above usual up to which the shape is not analysed
 
   /// Builds the neighbour graph. `left`: per point, nonzero if it is present; non-finite points are not. `ranges`:
-  /// metres, per point of the cloud, non-finite or negative if unknown; empty if all are unknown. Both the points and
-  /// the ranges must outlive this object.
+  /// metres, per point of the cloud, non-finite or negative if unknown; empty if all are unknown. The ranges
+  /// must outlive this object.
   template <execution_policy Policy>
   surroundings(const Policy& policy, const point_view& points, std::span<const char> left,
                std::span<const float> ranges, std::size_t neighbors)
@@ -133,7 +133,7 @@ class surroundings {
     return out;
   }
 
-  /// Computes the shapes around the points that are sparser than the bulk by `residual` or by `usual`.
+  /// Computes the shapes around the points that are sparser than the bulk by `residual` or relative to `line`.
   template <execution_policy Policy>
   void compute_shapes(const Policy& policy, std::span<const float> residual, const log_line& line) {
     flat_.add(
@@ -171,8 +171,7 @@ class surroundings {
       const float around = local[i] + static_cast<float>(step.offset);
       const float line = usual(step.usual, i);
       const float widest = line > around ? line : around;
-      spacing[i] = std::isnan(widest) ? std::numeric_limits<float>::infinity()
-                                      : std::exp(widest);  // only the spacings of others limit its links
+      spacing[i] = std::isnan(widest) ? std::numeric_limits<float>::infinity() : std::exp(widest);  // linked by others
     }
     const cluster_options options{.neighbors = width, .reach = step.reach, .min_size = step.min_size, .min_gap = 0};
     remove_components(policy, spacing, options, [&](std::size_t i) {

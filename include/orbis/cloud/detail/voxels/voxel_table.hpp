@@ -95,8 +95,7 @@ class voxel_table {
       rows_ = std::move(rows);
       capacity_ = most;
     }
-    const std::size_t slots =
-        std::min(std::bit_ceil(2 * most), std::size_t{1} << 32U);  // limited by the number of hashes
+    const std::size_t slots = std::min(std::bit_ceil(2 * most), std::size_t{1} << 32U);  // one per hash at most
     slots_.assign(slots, 0);
     most_ = most;
     mask_ = slots - 1;

@@ -151,7 +151,7 @@ class ot_reader : public node_reader {
     return byte(i) | byte(i + 1) << 8U | byte(i + 2) << 16U | byte(i + 3) << 24U;
   }
   /// Reads the next eight nodes at once if they are all leaves.
-  [[nodiscard]] bool take_eight(float* values) noexcept {
+  [[nodiscard]] bool read_eight_leaves(float* values) noexcept {
     if (left.size() < 40) return false;
     unsigned children = 0;
     bool finite = true;
@@ -196,7 +196,7 @@ class ot_reader : public node_reader {
         std::fill(v, v + 8, value);
         continue;
       }
-      if (children == 0xff && take_eight(v)) continue;
+      if (children == 0xff && read_eight_leaves(v)) continue;
       for (unsigned rest = children; rest != 0; rest &= rest - 1) {
         if (!take(v[std::countr_zero(rest)], none)) return false;
         if (none != 0) return give_up(too_deep);

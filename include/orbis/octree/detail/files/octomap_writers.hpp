@@ -102,7 +102,7 @@ class bt_writer {
     return {std::move(out_), nodes_};
   }
 
-  // -- called by upper_walk
+  // -- interface of upper_walk
 
   struct open_node {
     std::size_t place;
@@ -232,7 +232,7 @@ class ot_writer {
     return {std::move(out_), nodes};
   }
 
-  // -- called by upper_walk
+  // -- interface of upper_walk
 
   struct child {
     float value;

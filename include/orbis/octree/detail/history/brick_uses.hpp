@@ -61,7 +61,7 @@ class brick_uses {
   [[nodiscard]] const used_brick& operator[](std::uint32_t number) const noexcept { return bricks_[number]; }
 
   /// Marks octants of a brick as stale.
-  void make_stale(std::uint32_t number, unsigned octants) {
+  void mark_stale(std::uint32_t number, unsigned octants) {
     if (octants == 0) return;
     used_brick& b = bricks_[number];
     if (b.stale == 0) queue_.push_back(number);

@@ -169,8 +169,7 @@ class dense_rays {
   /// crosses. This method has a constant cost per ray; the fewer rays per voxel, the more voxels must be tested
   /// individually.
   [[nodiscard]] bool is_worthwhile(double voxel) const {
-    const double planes = sample_.length / voxel,
-                 apart = windows_.spacing * planes;  // apart: distance between rays at their ends, in voxels
+    const double planes = sample_.length / voxel, apart = windows_.spacing * planes;  // apart: voxels, at the ends
     return 6.0 + 1000.0 * apart * apart < 20.0 + 0.5 * planes;
   }
   template <class Point>

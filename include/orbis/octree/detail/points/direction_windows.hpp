@@ -49,7 +49,7 @@ struct direction_windows {
   /// Chooses windows for `count` rays, based on a sample. The cells have edge `wanted` (at z = 1), adjusted so that
   /// they contain between `fewest` and `most` rays on average. O(sample)
   void fit(const sampled_rays& sample, std::size_t count, double wanted, double fewest, double most) {
-    const mat3 turned = turn(sample.directions);
+    const mat3 turned = cube_rotation(sample.directions);
     std::array<float3, 3> axes;  // of the cube, in the world
     for (int i = 0; i != 3; ++i)
       for (int k = 0; k != 3; ++k)
@@ -109,7 +109,7 @@ struct direction_windows {
 
  private:
   /// Rotation from the world to the cube; arbitrary for rays in all directions.
-  [[nodiscard]] static mat3 turn(const std::vector<vec3>& directions) {
+  [[nodiscard]] static mat3 cube_rotation(const std::vector<vec3>& directions) {
     vec3 mean = zeros<vec3>();
     mat3 moments = zeros<mat3>();
     for (const vec3& d : directions) {

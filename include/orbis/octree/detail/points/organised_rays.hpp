@@ -267,12 +267,11 @@ class organised_rays {
   se3 pose_;
   pixel_placement placement_;
   place_in_pixels* place_ = nullptr;
-  std::vector<std::int32_t> pixel_;           ///< pixel of each ray
-  std::vector<float> z_;                      ///< depth of its end
-  std::vector<pixel_places::bounds> within_;  ///< bounds of each worker's rays
-  std::vector<std::uint32_t> numbers_;        ///< number of each pixel's ray, if it has one
-  std::vector<std::vector<std::uint32_t>>
-      second_;  ///< per band of rows: additional rays of pixels that already have one
+  std::vector<std::int32_t> pixel_;                 ///< pixel of each ray
+  std::vector<float> z_;                            ///< depth of its end
+  std::vector<pixel_places::bounds> within_;        ///< bounds of each worker's rays
+  std::vector<std::uint32_t> numbers_;              ///< number of each pixel's ray, if it has one
+  std::vector<std::vector<std::uint32_t>> second_;  ///< per band of rows: further rays of pixels that have one
   std::vector<descent_worker> workers_;
 };
 

@@ -42,7 +42,7 @@ class pinhole_fit {
     // Pixel numbers far from the centre may initially be wrong by one.
     for (int step = 0; step != 4; ++step)
       if ((step % 2 == 0 && !number_pixels()) || !refine()) return false;
-    return set_image(count) && set_error() && holds(count, direction);
+    return set_image(count) && set_error() && verify(count, direction);
   }
 
   [[nodiscard]] const camera::pinhole& camera() const noexcept { return camera_; }
@@ -69,10 +69,8 @@ class pinhole_fit {
   struct run {
     std::array<vec3, run_length> d;  ///< unit vectors
     vec3 normal;
-    double length;  ///< length of the first ray, metres
-    double x_gap = 0.0,
-           x_way =
-               0.0;  ///< at z = 1: smallest distance between consecutive points; distance from the first to the last
+    double length;                    ///< length of the first ray, metres
+    double x_gap = 0.0, x_way = 0.0;  ///< at z = 1: smallest distance between neighbours; from the first to the last
     double y = 0.0;
   };
   /// A ray and its pixel.
@@ -305,7 +303,7 @@ class pinhole_fit {
   }
   /// Verifies the camera with other points, and computes the share of the image's pixels with points.
   template <class Direction>
-  [[nodiscard]] bool holds(std::size_t count, const Direction& direction) {
+  [[nodiscard]] bool verify(std::size_t count, const Direction& direction) {
     std::size_t tried = 0, good = 0;
     random_bits random{2};
     for (std::size_t k = 0; k != most_runs; ++k) {

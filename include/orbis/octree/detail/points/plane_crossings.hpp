@@ -102,8 +102,7 @@ struct mark_crossings_kernel {
     const integers first_plane(w.first), origin_cell(static_cast<std::int32_t>(w.cell(0, 0)));
 
     for (std::size_t r = begin; r < end; r += n) {
-      integers left =
-          integers::load(rays.planes.data() + r) - first_plane;  // remaining planes; negative: the ray has ended
+      integers left = integers::load(rays.planes.data() + r) - first_plane;  // planes; negative: the ray has ended
       mask alive = mask::first(end - r) & (left >= integers(0));
       if (none(alive)) continue;
 

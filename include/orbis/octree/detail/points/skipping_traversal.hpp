@@ -39,13 +39,13 @@ class skipping_traversal {
     return face;
   }
   /// Exit of the ray from the node of edge `cells` that contains it.
-  struct way_out {
+  struct node_exit {
     crossing face;
     std::array<std::uint32_t, 3> steps;  ///< steps to leave the node along each axis alone
   };
   /// Finds the exit from the current node. @pre cells is a power of two, at most 32
-  [[nodiscard]] way_out find_way_out(std::uint32_t cells) noexcept {
-    way_out way{};
+  [[nodiscard]] node_exit find_node_exit(std::uint32_t cells) noexcept {
+    node_exit way{};
     const auto steps_along = [&](std::size_t i) {
       const std::uint32_t inside = at_[i] & (cells - 1);
       way.steps[i] = step_[i] > 0 ? cells - inside : inside + 1;
@@ -58,7 +58,7 @@ class skipping_traversal {
     return way;
   }
   /// Takes all steps up to an exit.
-  void take(const way_out& way) noexcept {
+  void take(const node_exit& way) noexcept {
     const double end = way.face.parameter;
     const auto take_along = [&](std::size_t i) {
       // Steps are `delta` apart up to rounding, so only the one next to the face must be examined. The first is less
