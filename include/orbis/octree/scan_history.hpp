@@ -47,10 +47,10 @@ concept replayable_octree = octree_map<M> && std::same_as<M, occupancy_octree<ty
 ///
 /// @code
 ///   orbis::octree::scan_history<> history{0.05};
-///   history.set(seq, frame, depth, camera, T_world_camera, {.max_range = 5.0});   // in the map at once
+///   history.set(seq, frame, depth, camera, T_world_camera, {.max_range = 5.0});   // applied immediately
 ///   ...
 ///   history.set(seq, frame, depth, camera, T_corrected, {.max_range = 5.0});      // after a loop
-///   history.replay(par);                                                          // the map is right again
+///   history.replay(par);                                                          // updates the map
 ///   const auto snapshot = history.map();                                          // for readers on other threads
 /// @endcode
 ///
