@@ -2,26 +2,26 @@
 /// @file
 /// Point clouds: neighbours, outlier filters, automatic selection of filters, voxel grids.
 ///
-/// | header                     | what it is for                                                              |
+/// | header                     | contents                                                                    |
 /// | -------------------------- | --------------------------------------------------------------------------- |
 /// | `all_knn.hpp`              | k nearest neighbours of every point, and the mean distance to them          |
 /// | `cluster.hpp`              | filter: small groups of points far from the surface                         |
-/// | `extract.hpp`              | copy points by index; points inside a box; what happens to non-finite points |
-/// | `filter_chain.hpp`         | several filters in order, as data                                           |
+/// | `extract.hpp`              | points by index; points inside a box; treatment of non-finite points        |
+/// | `filter_chain.hpp`         | a sequence of filters, as data                                              |
 /// | `filter_choice.hpp`        | options and result of the automatic selection, with its evidence            |
-/// | `flying_pixels.hpp`        | depth images without the wrong pixels at edges                              |
+/// | `flying_pixels.hpp`        | removal of flying pixels at edges of depth images                           |
 /// | `log_statistical.hpp`      | filter: mean neighbour distance relative to its median                      |
-/// | `nanoflann.hpp`            | neighbours of single points by a k-d tree; included by name, needs nanoflann |
-/// | `neighbors.hpp`            | what searches for nearest neighbours find                                   |
+/// | `nanoflann.hpp`            | neighbours of single points by a k-d tree; not in this header, needs nanoflann |
+/// | `neighbors.hpp`            | result type of nearest-neighbour searches                                   |
 /// | `radius.hpp`               | filter: points with too few neighbours within a radius                      |
 /// | `ray_evidence.hpp`         | filter: points that the rays of depth images pass through                   |
-/// | `ray_evidence_counter.hpp` | the counts behind that filter, image by image                               |
-/// | `select.hpp`               | choose and apply filters automatically                                      |
-/// | `sensor_origins.hpp`       | where points were seen from                                                 |
+/// | `ray_evidence_counter.hpp` | the counts of that filter, image by image                                   |
+/// | `select.hpp`               | automatic selection and application of filters                              |
+/// | `sensor_origins.hpp`       | sensor positions of points                                                  |
 /// | `statistical.hpp`          | filter: mean neighbour distance above mu + alpha sigma; also relative to range |
-/// | `view_samples.hpp`         | a few measurements of each depth image, by which these judge each other      |
-/// | `voxel_grid.hpp`           | one point for each voxel                                                    |
-/// | `voxel_sums.hpp`           | centroids of voxels from which measurements can be removed again            |
+/// | `view_samples.hpp`         | samples of each depth image, used to compare images with each other         |
+/// | `voxel_grid.hpp`           | voxel-grid downsampling: one point per occupied voxel                       |
+/// | `voxel_sums.hpp`           | centroids of voxels, from which measurements can be removed again           |
 #pragma once
 
 #include <orbis/cloud/all_knn.hpp>

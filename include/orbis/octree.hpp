@@ -2,22 +2,22 @@
 /// @file
 /// Everything in orbis::octree: the log-odds occupancy octree.
 ///
-/// | header | what it is for |
+/// | header | contents |
 /// | --- | --- |
 /// | occupancy_octree.hpp | the map: insertion, queries, snapshots, rolling window |
-/// | integration.hpp | options of an insertion, and what became of a scan's points |
-/// | sensor_model.hpp | what a hit and a miss do to a voxel: OctoMap's model, or your own |
+/// | integration.hpp | options and summary of an insertion |
+/// | sensor_model.hpp | effect of a hit and a miss on a voxel: OctoMap's model, or a custom one |
 /// | key.hpp | voxel keys, the grid, boxes, Morton order |
-/// | accessor.hpp | many look-ups near each other; the concept of a map |
-/// | octants.hpp | what is known, as bit masks of 4x4x4 voxels |
-/// | cast_ray.hpp | what a ray meets first, one ray or many |
-/// | overlap.hpp | whether boxes, spheres and capsules are free |
-/// | change_log.hpp | which voxels changed since a revision |
-/// | scan_history.hpp | a map that follows its scans when they change, are removed or come late |
-/// | scan_voxels.hpp | the voxels that one scan observes, packed; the marker that finds them |
-/// | decay.hpp | what time does to voxels that are not observed |
-/// | voxel_layer.hpp | colours, labels or counts beside the map |
-/// | files.hpp | OctoMap's `.bt` and `.ot` |
+/// | accessor.hpp | fast look-up of voxels near each other; the concept of a map |
+/// | octants.hpp | states of voxels, as bit masks of 4x4x4 voxels |
+/// | cast_ray.hpp | ray casting, one ray or many |
+/// | overlap.hpp | collision tests of boxes, spheres and capsules |
+/// | change_log.hpp | log of voxels changed since a revision |
+/// | scan_history.hpp | a map that follows its scans when they change, are removed or arrive late |
+/// | scan_voxels.hpp | voxels observed by one scan, packed; the marker that finds them |
+/// | decay.hpp | decay of voxels that are not observed |
+/// | voxel_layer.hpp | colours, labels or counts per voxel of a map |
+/// | files.hpp | reading and writing of OctoMap's `.bt` and `.ot` files |
 /// | depth_points.hpp | world points of a depth image |
 #pragma once
 

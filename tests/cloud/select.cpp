@@ -181,14 +181,14 @@ TEST_CASE("each kind of cloud gets the steps that suit it") {
     const auto result = filter_automatically(orbis::seq, grid);
     CHECK(result.choice.chain.empty());
     CHECK(result.inliers.size() == grid.size());
-    CHECK(result.choice.reason.find("no point stands out") != std::string::npos);
+    CHECK(result.choice.reason.find("no outliers found") != std::string::npos);
   }
   SECTION("a test of density for uniform outliers") {
     auto cloud = clean;
     add_uniform(cloud, 1500, 9);
     const auto choice = orbis::cloud::select_filter(orbis::seq, cloud);
     CHECK(has_step(choice.chain, filter_mode::log_statistical));
-    CHECK(choice.reason.find("a population apart") != std::string::npos);
+    CHECK(choice.reason.find("a separate population") != std::string::npos);
   }
   SECTION("clusters for what hangs in the air") {
     auto cloud = clean;

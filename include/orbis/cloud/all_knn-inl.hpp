@@ -32,7 +32,7 @@ neighbor_table find_all_knn(const Policy& policy, const point_view& points, std:
         tree, kernels, out.width, begin, end,
         [&](std::size_t l, std::size_t i) { return row_of(tree.members[l * leaf_width + i]); }, [](std::size_t) {});
   });
-  // Those left out have the first of their copies for neighbours.
+  // Each point that was left out takes the first of its copies as neighbours.
   for (const surplus_copy& copy : tree.left_out) {
     const auto row = row_of(copy.index);
     for (std::size_t n = 0; n != row.size(); ++n) row[n] = {tree.members[copy.kept + n], 0.0F};
@@ -40,9 +40,8 @@ neighbor_table find_all_knn(const Policy& policy, const point_view& points, std:
   return out;
 }
 
-/// `float(sum / divisor)`, where `sum` adds the roots in ascending order in double. The order only
-/// matters where a rounding border of float lies within the error of the sum, so they are sorted
-/// only there.
+/// `float(sum / divisor)`, where `sum` adds the square roots in ascending order in double. The order affects the result
+/// only if a rounding boundary of float is within the error of the sum, so the roots are sorted only in that case.
 [[nodiscard]] inline float mean_root(std::span<float> squared, double divisor) {
   double sum = 0;
   for (const float s : squared) sum += std::sqrt(double{s});
@@ -56,8 +55,8 @@ neighbor_table find_all_knn(const Policy& policy, const point_view& points, std:
   return static_cast<float>(sum / divisor);
 }
 
-/// The mean of the roots of all but the smallest (the point itself) of the `wanted` smallest of `found`, whose sum is
-/// known as far as `nearest_sum` says. Infinity where there are not that many: their squares overflow.
+/// Mean of the roots of the `wanted` smallest of `found` without the smallest (the point itself); `sum` holds the known
+/// part of their sum. Infinity if fewer were found, because their squares overflow.
 [[nodiscard]] inline float mean_of_nearest(const nearest_sum& sum, std::span<float> found, std::size_t wanted) {
   if (found.size() < wanted) return std::numeric_limits<float>::infinity();
   const auto divisor = static_cast<double>(wanted - 1);

@@ -22,8 +22,8 @@ struct neighbor_table {
   static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
 
   std::size_t width = 0;              ///< neighbours of each finite point
-  std::size_t points = 0;             ///< of the cloud, finite or not: as many rows
-  std::vector<neighbor<float>> rows;  ///< `width` per point; index `none` in rows of points that are not finite
+  std::size_t points = 0;             ///< number of points of the cloud, finite or not, and of rows
+  std::vector<neighbor<float>> rows;  ///< `width` per point; index `none` in the rows of non-finite points
 
   /// The neighbours of point `i`; none if it is not finite.
   [[nodiscard]] std::span<const neighbor<float>> operator[](std::size_t i) const noexcept {
@@ -34,7 +34,7 @@ struct neighbor_table {
 
 namespace detail {
 
-/// `all_knn` and `all_mean_knn_distance` for any points.
+/// `all_knn` and `all_mean_knn_distance` on a type-erased cloud.
 template <execution_policy Policy>
 [[nodiscard]] neighbor_table find_all_knn(const Policy& policy, const point_view& points, std::size_t k);
 template <execution_policy Policy>
@@ -42,13 +42,13 @@ template <execution_policy Policy>
 
 }  // namespace detail
 
-/// The `min(k, finite points - 1)` nearest other points of every finite point, nearest first; points
-/// at equal squared distances by index, so that the result is one and the same for every policy and
-/// processor. Identical points are neighbours of each other.
+/// Finds the `min(k, finite points - 1)` nearest other points of every finite point, nearest first. Points at equal
+/// squared distances are ordered by index, so the result is the same for every policy and processor. Identical points
+/// are neighbours of each other.
 ///
-/// Coordinates are taken as float, distances are computed in float. O(n (log n + k log k)), also where
-/// many points are identical. Memory: 8 k bytes per point for the result, 40 per point meanwhile, and 12 for points
-/// that do not hold floats one point after the other.
+/// Coordinates are converted to float, and distances are computed in float. O(n (log n + k log k)), also with many
+/// identical points. Memory: 8 k bytes per point for the result, 40 bytes per point during the call, and 12 more if the
+/// points are not contiguous floats.
 /// @pre k > 0, fewer than 2^32 - 1 points
 template <execution_policy Policy, point_range Points>
 [[nodiscard]] neighbor_table all_knn(const Policy& policy, const Points& points, std::size_t k) {
@@ -56,13 +56,13 @@ template <execution_policy Policy, point_range Points>
   return detail::find_all_knn(detail::threads_of(policy), detail::viewed_points{points}, k);
 }
 
-/// For each point the mean distance in metres to its `k` nearest other points; to all others where
-/// there are fewer than `k`. NaN for points that are not finite, and for a point that is alone.
+/// Computes for each point the mean distance in metres to its `k` nearest other points, or to all others if there are
+/// fewer than `k`. NaN for non-finite points and for a single finite point.
 ///
-/// Coordinates are taken as float. Squared distances are float, roots and sums double in ascending
-/// order, the mean float: bit for bit the mean distances of the usual statistical outlier filter.
-/// O(n log n) for fixed k, also where many points are identical; the same result for every policy and
-/// processor. Memory: about 40 bytes per point, and 0.45 k + 42 kilobytes per thread.
+/// Coordinates are converted to float. Squared distances are float; roots and sums are double, in ascending order; the
+/// mean is float. The result equals, bit for bit, the mean distances of the usual statistical outlier filter. O(n log
+/// n) for fixed k, also with many identical points; the same result for every policy and processor. Memory: about 40
+/// bytes per point, and 0.45 k + 42 kilobytes per thread.
 /// @pre k > 0, fewer than 2^32 points
 template <execution_policy Policy, point_range Points>
 [[nodiscard]] std::vector<float> all_mean_knn_distance(const Policy& policy, const Points& points, std::size_t k) {

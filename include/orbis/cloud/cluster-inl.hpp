@@ -21,10 +21,11 @@
 namespace orbis::cloud {
 namespace detail {
 
-inline constexpr std::size_t most_box_levels = 8;  // 2^32 points make seven
+inline constexpr std::size_t most_box_levels = 8;  // 2^32 points need seven
 
-/// Calls `sink.add(place, squared distance)` for the points within `sink.bound_squared()` of `q`, which may shrink,
-/// near leaves first, until it returns false. A place is the number of a point in `members`. @pre q is finite
+/// Calls `sink.add(place, squared distance)` for the points within `sink.bound_squared()` of `q`, near leaves first,
+/// until it returns false. The bound may shrink during the search. A place is the index of a point in `members`. @pre q
+/// is finite
 template <class Sink>
 void visit_near(const leaf_hierarchy& tree, const knn_kernels& kernels, const std::array<float, 3>& q, Sink& sink) {
   struct box_to_visit {
@@ -59,24 +60,24 @@ void visit_near(const leaf_hierarchy& tree, const knn_kernels& kernels, const st
     for (; mask != 0; mask &= mask - 1) {
       const auto n = static_cast<std::size_t>(std::countr_zero(mask));
       const std::size_t child = next.index * leaf_width + n;
-      if (child >= children) break;  // where the bound is infinite
+      if (child >= children) break;  // if the bound is infinite
       open[count++] = {distance[n], level, static_cast<std::uint32_t>(child)};
       if (open[count - 1].distance > open[first].distance) continue;
-      std::swap(open[count - 1], open[first]);  // the nearest at the bottom, for now
+      std::swap(open[count - 1], open[first]);  // keep the nearest at the bottom until the loop ends
     }
-    if (count > first) std::swap(open[count - 1], open[first]);  // and on top
+    if (count > first) std::swap(open[count - 1], open[first]);  // then move it to the top
   }
 }
 
-/// The place of the point nearest to some other, and its squared distance.
+/// Place of the point nearest to a query, and its squared distance.
 struct nearest_place {
   std::uint32_t place = std::numeric_limits<std::uint32_t>::max();
   float distance_squared = std::numeric_limits<float>::infinity();
   [[nodiscard]] bool found() const noexcept { return place != std::numeric_limits<std::uint32_t>::max(); }
 };
 
-/// The nearest to `q` of the points for whose place `counts(place)` is true; of several the one with the lowest index,
-/// except at `q` itself. `found()` is false if there is none. @pre q is finite
+/// Finds the point nearest to `q` among those for whose place `counts(place)` is true. Ties are resolved by the lowest
+/// index, except at `q` itself. `found()` is false if there is no such point. @pre q is finite
 template <class Counts>
 [[nodiscard]] nearest_place find_nearest(const leaf_hierarchy& tree, const knn_kernels& kernels,
                                          const std::array<float, 3>& q, const Counts& counts) {
@@ -100,8 +101,8 @@ template <class Counts>
 
 namespace detail {
 
-/// Disjoint sets that several threads join at once. The root of a set is its least element, whatever the
-/// order of joins.
+/// Disjoint sets that several threads can join concurrently. The root of a set is its smallest element, independent of
+/// the order of joins.
 /// Source: R. J. Anderson, H. Woll, "Wait-free parallel algorithms for the union-find problem", STOC 1991.
 class disjoint_sets {
  public:
@@ -138,18 +139,18 @@ class disjoint_sets {
   return std::min<std::size_t>(200, std::max<std::size_t>(30, points / 250));
 }
 
-/// Components of linked points, by the least vertex in them, their root.
+/// Connected components of the neighbour graph, identified by their roots (the smallest vertex).
 struct linked_components {
   disjoint_sets sets;
   std::vector<std::uint32_t> sizes;  ///< by root
-  std::vector<char> goes;            ///< by root
-  std::size_t min_size = 0;          ///< as it was applied
+  std::vector<char> goes;            ///< by root: 1 if the component is removed
+  std::size_t min_size = 0;          ///< the value that was applied
 
   [[nodiscard]] bool is_small(std::uint32_t i) noexcept { return sizes[sets.root(i)] < min_size; }
 };
 
-/// The components of a graph, and which of them go. `gone`: by place, whether a point takes no part, or empty.
-/// `spacing`: by place, metres. O(links), 9 bytes for each vertex.
+/// Finds the components of a graph and decides which of them to remove. `gone`: by place, nonzero for points to ignore,
+/// or empty. `spacing`: by place, metres. O(links), 9 bytes per vertex.
 template <execution_policy Policy>
 [[nodiscard]] linked_components separate(const Policy& policy, const neighbor_graph& graph, std::span<const char> gone,
                                          std::span<const float> spacing, const cluster_options& options) {
@@ -201,13 +202,13 @@ template <execution_policy Policy>
   });
   for (const std::uint32_t i : small_ones) out.goes[out.sets.root(i)] = 1;
   for (std::size_t s = 0; s != small_ones.size(); ++s) {
-    if (apart[s] == 0) out.goes[out.sets.root(small_ones[s])] = 0;  // one point close to the surface is enough
+    if (apart[s] == 0) out.goes[out.sets.root(small_ones[s])] = 0;  // one point near the surface keeps it all
   }
   return out;
 }
 
-/// Numbers components by their first points. `vertex(i)`: of point `i` of the cloud; negative where it takes no part.
-/// `stays(i)`: whether such a point is an inlier even so.
+/// Numbers components by their first points. `vertex(i)`: vertex of point `i` of the cloud, negative if it has none.
+/// `stays(i)`: true if such a point is an inlier nevertheless.
 template <class Vertex, class Stays>
 [[nodiscard]] cluster_result numbered(linked_components found, std::size_t count, const Vertex& vertex,
                                       const Stays& stays) {

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Parts of a cloud: the points with given indices, the points inside a box, and what filters do with points
-/// that are not finite.
+/// Parts of a cloud: points by index, points inside a box, and the treatment of non-finite points.
 #pragma once
 
 #include <cassert>
@@ -17,13 +16,13 @@
 
 namespace orbis::cloud {
 
-/// What a filter does with points that are not finite. They never count in its statistics.
+/// Treatment of non-finite points by a filter. They never count in its statistics.
 enum class non_finite {
   drop,  ///< they are outliers
   keep   ///< they are inliers, so that an organised cloud keeps its holes
 };
 
-/// A copy of the points, and colours if there are any, with the given indices, in their order.
+/// Copies the points with the given indices, in their order, and their colours if there are any.
 /// @pre every index < cloud.size()
 [[nodiscard]] inline point_cloud extract(const point_cloud& cloud, std::span<const std::uint32_t> indices) {
   point_cloud out;
@@ -37,13 +36,13 @@ enum class non_finite {
   return out;
 }
 
-/// A box along the axes, its faces included; unlimited by default.
+/// An axis-aligned box, its faces included; unlimited by default.
 struct pass_through_options {
   vec3 low = filled<vec3>(-std::numeric_limits<double>::infinity());  ///< metres
   vec3 high = filled<vec3>(std::numeric_limits<double>::infinity());  ///< metres
 };
 
-/// The indices, ascending, of the finite points inside the box. O(n).
+/// Returns the indices, ascending, of the finite points inside the box. O(n).
 template <point_range Points>
 [[nodiscard]] std::vector<std::uint32_t> pass_through_inliers(const Points& points,
                                                               const pass_through_options& options = {}) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Several filters in order, with their parameters: what the automatic selection chooses.
+/// A sequence of filters with their parameters, as the automatic selection chooses it.
 #pragma once
 
 #include <cstddef>
@@ -21,14 +21,14 @@ namespace orbis::cloud {
 
 /// The kinds of filter.
 enum class filter_mode {
-  none,                   ///< everything (finite) stays
-  ray_evidence,           ///< what other views' depth rays pass through goes
-  statistical,            ///< mu + alpha sigma of the mean neighbour distance
-  radius,                 ///< a number of neighbours within a radius
-  log_statistical,        ///< log mean neighbour distance against its median over the cloud
-  range_log_statistical,  ///< log mean neighbour distance against a line over log range
-  local_log_statistical,  ///< log mean neighbour distance against that of the surroundings
-  isolation,              ///< groups of a few points away from everything by what is usual
+  none,                   ///< all (finite) points stay
+  ray_evidence,           ///< removes points that depth rays of other views pass through
+  statistical,            ///< mean neighbour distance above mu + alpha sigma
+  radius,                 ///< fewer than a minimum number of neighbours within a radius
+  log_statistical,        ///< log mean neighbour distance relative to its median over the cloud
+  range_log_statistical,  ///< log mean neighbour distance relative to a line over log range
+  local_log_statistical,  ///< log mean neighbour distance relative to that of the surroundings
+  isolation,              ///< groups of a few points that are far from all others in units of the usual spacing
   cluster                 ///< small components of the neighbour graph far from the large ones
 };
 
@@ -47,56 +47,56 @@ enum class filter_mode {
   return "unknown";
 }
 
-/// `intercept + slope * log(range)`: the log spacing that is usual at a range.
+/// The usual log spacing as a function of range: `intercept + slope * log(range)`.
 struct log_line {
   double intercept = 0;
   double slope = 0;
   [[nodiscard]] double at(double log_range) const noexcept { return intercept + slope * log_range; }
 };
 
-/// Removes what the views exclude: points that rays pass through, and with `need_support` points that
-/// no view measured, stray pixels (`remove_stray_pixels`) not counted. Needs the views.
+/// Removes points that the views contradict: points that rays pass through and, with `need_support`, points that no
+/// view measured. Stray pixels (`remove_stray_pixels`) do not count as measurements. Needs the views.
 struct ray_step {
   ray_evidence_options evidence{.resolve_ghosts = false, .ratio = 0.5};
-  std::vector<std::uint32_t> distrusted{};  ///< views, by number, that count as no evidence
-  bool need_support = false;                ///< the cloud was made of these views: each point is in one at least
+  std::vector<std::uint32_t> distrusted{};  ///< numbers of the views that do not count as evidence
+  bool need_support = false;                ///< the cloud was made from these views, so each point is in at least one
 };
 
-/// When neighbours count as a surface: points on one are spared by the tests of density.
+/// Criteria for neighbours that form a surface; density tests spare points on a surface.
 struct surface_test {
-  double flatness = 0.15;   ///< `off_plane` up to here is a plane
-  double same_scale = 0.7;  ///< neighbours denser by more, log, do not speak for a point,
-  std::size_t support = 3;  ///< and so many of the nearest 8 have to, unless it lies in a plane itself
+  double flatness = 0.15;   ///< maximum `off_plane` of a plane
+  double same_scale = 0.7;  ///< neighbours denser by more than this (log) do not support a point
+  std::size_t support = 3;  ///< supporting neighbours required of the nearest 8, unless the point is in a plane
 };
 
-/// Removes points whose log spacing exceeds what is usual by more than the threshold, unless they lie on a surface.
+/// Removes points whose log spacing exceeds the usual one by more than the threshold, unless they lie on a surface.
 struct density_step {
   filter_mode mode = filter_mode::log_statistical;  ///< or range_log_statistical, local_log_statistical
-  std::size_t neighbors = 8;                        ///< over which the spacing is averaged; > 0
-  log_line usual{};                                 ///< log spacing of the bulk at a log range; slope 0: at any
-  double offset = 0;                                ///< of the local mode's bulk from its surroundings
-  double threshold = 0;                             ///< outliers: log spacing - usual > threshold
+  std::size_t neighbors = 8;                        ///< neighbours over which the spacing is averaged; > 0
+  log_line usual{};      ///< log spacing of the bulk as a function of log range; slope 0: constant
+  double offset = 0;     ///< offset of the bulk from its surroundings in the local mode
+  double threshold = 0;  ///< outliers: log spacing - usual > threshold
   surface_test surface{};
-  /// Log spacing of surfaces at a log range, by which neighbours count as one; empty: what is `usual`.
+  /// Log spacing of surfaces as a function of log range, at which neighbours count as a surface; empty: `usual`.
   std::optional<log_line> surface_spacing{};
 
   [[nodiscard]] const log_line& surface_line() const noexcept { return surface_spacing ? *surface_spacing : usual; }
 };
 
-/// Removes groups of fewer than `min_size` points that are further from others than `reach` times the
-/// usual spacing, that of the surroundings if it is larger.
+/// Removes groups of fewer than `min_size` points whose distance to other points exceeds `reach` times the usual
+/// spacing, or the spacing of the surroundings if that is larger.
 struct isolation_step {
-  std::size_t neighbors = 8;  ///< over which the spacing is averaged; > 0
-  log_line usual{};           ///< log spacing of the bulk at a log range; slope 0: at any
-  double offset = 0;          ///< of the bulk from its surroundings, log
+  std::size_t neighbors = 8;  ///< neighbours over which the spacing is averaged; > 0
+  log_line usual{};           ///< log spacing of the bulk as a function of log range; slope 0: constant
+  double offset = 0;          ///< offset of the bulk from its surroundings, log
   double reach = 2.5;
   std::size_t min_size = 30;
 };
 
 using filter_step =
     std::variant<ray_step, density_step, isolation_step, cluster_options, statistical_options, radius_options>;
-/// Each step judges what the ones before it left. The tests of density, isolation and clusters share one
-/// pass over the neighbours of what there was before the first of them.
+/// Filters in order; each step judges the points that the previous ones left. The density, isolation and cluster tests
+/// share one pass over the neighbours of the points present before the first of them.
 using filter_chain = std::vector<filter_step>;
 
 [[nodiscard]] inline filter_mode mode_of(const filter_step& step) noexcept {
@@ -121,7 +121,8 @@ using filter_chain = std::vector<filter_step>;
       step);
 }
 
-/// The names of the steps with a plus between them, such as "range-log-statistical+cluster"; "none" for no step.
+/// Returns the names of the steps joined by plus signs, such as "range-log-statistical+cluster"; "none" for an empty
+/// chain.
 [[nodiscard]] inline std::string to_string(const filter_chain& chain) {
   if (chain.empty()) return std::string{to_string(filter_mode::none)};
   std::string out;

@@ -17,7 +17,7 @@ namespace orbis::cloud {
 
 namespace detail {
 
-/// Inverse depths of sixteen neighbouring pixels, and of those `reach` and twice `reach` away on either side.
+/// Inverse depths of sixteen neighbouring pixels, and of the pixels `reach` and twice `reach` away on either side.
 struct flying_lines {
   const float* center;
   const float* before;
@@ -33,26 +33,25 @@ struct flying_limits {
   float margin;
 };
 
-/// By how much inverse depths may differ by accident.
+/// Difference of inverse depths that noise can explain.
 ORBIS_ALWAYS_INLINE float flying_tolerance(float w, const flying_limits& limits) noexcept {
   const float quantised = limits.resolution * (w * w);
   return quantised < limits.noise ? limits.noise : quantised;
 }
 
-/// All ones where `x > y`.
+/// Returns all ones if `x > y`, else 0.
 ORBIS_ALWAYS_INLINE std::uint32_t exceeds(float x, float y) noexcept { return x > y ? ~0U : 0U; }
 
-/// All ones unless `x == y`.
+/// Returns 0 if `x == y`, else all ones.
 ORBIS_ALWAYS_INLINE std::uint32_t differ(float x, float y) noexcept { return x == y ? 0U : ~0U; }
 
-/// `x` where `mask` is all ones, 0 where it is 0.
+/// Returns `x` if `mask` is all ones, 0 if it is 0.
 ORBIS_ALWAYS_INLINE float masked(float x, std::uint32_t mask) noexcept {
   return std::bit_cast<float>(std::bit_cast<std::uint32_t>(x) & mask);
 }
 
-/// Sets `flags[i]` where pixel i lies between the two surfaces beside it. In loops that compilers turn into
-/// vector instructions; no product is added to anything, so that there is nothing to fuse, and the result is
-/// the same on every processor.
+/// Sets `flags[i]` if pixel i lies between the two surfaces next to it. The loops are vectorised by compilers. No
+/// product is added to anything, so no operations are fused, and the result is the same on every processor.
 struct flag_between {
   template <simd::target>
   static ORBIS_ALWAYS_INLINE void run(const flying_lines& l, const flying_limits& limits, std::uint32_t* flags) {
@@ -60,8 +59,8 @@ struct flag_between {
       const float w = l.center[i];
       const float a = l.before[i];
       const float b = l.after[i];
-      // Over `reach` pixels; where one is not measured, as the surface on the other side goes on. Outside the
-      // image it is no number, and so are the differences: nothing exceeds anything.
+      // Slopes over `reach` pixels; an unmeasured surface takes the slope of the other side. Values outside the image
+      // are NaN, as are differences with them: no comparison is true.
       const std::uint32_t a_known = exceeds(a, 0.0F) & differ(l.before_that[i], 0.0F);
       const std::uint32_t b_known = exceeds(b, 0.0F) & differ(l.after_that[i], 0.0F);
       const float a_own = masked(a - l.before_that[i], a_known);
@@ -70,7 +69,7 @@ struct flag_between {
       const float b_slope = b_own - masked(a_own, ~b_known);
       const float a_here = a + a_slope;
       const float b_here = b + b_slope;
-      // Each surface is somewhere between flat and extended.
+      // Each surface is somewhere between flat and extrapolated.
       const float a_low = a < a_here ? a : a_here;
       const float a_high = a_here < a ? a : a_here;
       const float b_low = b < b_here ? b : b_here;
@@ -78,7 +77,7 @@ struct flag_between {
       const float tolerance = flying_tolerance(w, limits);
       const float share = limits.margin * std::abs(a - b);
       const float clear = tolerance < share ? share : tolerance;
-      // What steep surfaces do by themselves over that distance is no edge.
+      // A difference that the slopes themselves explain over that distance is no edge.
       const float steep = std::abs(a_slope) + std::abs(b_slope);
       const float far_apart = limits.jump * tolerance;
       const float jump = far_apart < steep ? steep : far_apart;
@@ -91,7 +90,7 @@ struct flag_between {
   }
 };
 
-/// How many of the eight pixels around lie at the depth of the one at `center`.
+/// Number of the eight pixels around that have the depth of the one at `center`.
 [[nodiscard]] inline int flying_support(const float* center, std::ptrdiff_t stride, float tolerance) noexcept {
   int count = -1;  // the pixel itself
   for (std::ptrdiff_t y = -1; y <= 1; ++y) {

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Flying pixels of depth images: at the edge of a near surface before a far one, pixels that see both
-/// measure something in between, where there is nothing.
+/// Detection of flying pixels in depth images: at the edge of a near surface in front of a far one, pixels that see
+/// both measure a depth in between, where there is no surface.
 ///
-/// The test works on the inverse of depth along the rows and columns of the image. Inverse depth is linear
-/// over the image of a plane, however slanted, and its noise and quantisation are the same at every depth
-/// for a camera that triangulates (sigma_z ~ z^2). A pixel flies if the surfaces to its two sides, each
-/// extended to the pixel along its own slope, miss each other by a jump, and it lies between the two, clear
-/// of both; unless enough of the pixels around it lie where it does, as on a narrow thing that really is
-/// there. A missing measurement counts as infinitely far: the shadow beside a near surface is an edge, too.
+/// The test works on inverse depth along the rows and columns of the image. Inverse depth is linear over the image of a
+/// plane of any slant, and for a triangulating camera (sigma_z ~ z^2) its noise and quantisation are the same at every
+/// depth. A pixel is flying if the surfaces on its two sides, each extrapolated to the pixel along its own slope,
+/// differ by a jump, and the pixel lies between the two, clear of both. It is kept if enough of the pixels around it
+/// have the same depth, as on a thin real object. A missing measurement counts as infinitely far, because the shadow
+/// next to a near surface is an edge, too.
 ///
 /// Sources: M. Reynolds, J. Dobos, L. Peel, T. Weyrich, G. J. Brostow, "Capturing time-of-flight data with
 /// confidence", CVPR 2011; A. Sabov, J. Krueger, "Identification and correction of flying pixels in range
@@ -30,28 +30,29 @@
 namespace orbis::cloud {
 
 struct flying_pixel_options {
-  /// Pixels to either side at which the surfaces are looked for: the widest transition that is recognised
-  /// as a whole. 1 ... 8
+  /// Distance in pixels at which the surfaces on either side are read: the widest transition that is recognised as a
+  /// whole. 1 ... 8
   int reach = 2;
-  double noise = 1.425e-3;    ///< deviation of inverse depth: sigma_z / z^2, 1 / metre; the default is a Kinect's
-  double resolution = 0.001;  ///< least difference of depth that counts, metres
-  double sigmas = 4.0;        ///< clear of a surface: by this many times the noise, or the resolution
-  double jump = 3.0;          ///< an edge: by this many times as much
-  double margin = 0.05;       ///< clear of a surface: by this part of the jump as well
-  int support = 4;            ///< of the eight pixels around, this many at the same depth prove a thing
+  double noise = 1.425e-3;    ///< deviation of inverse depth, sigma_z / z^2, 1 / metre; the default is a Kinect's
+  double resolution = 0.001;  ///< smallest depth difference that counts, metres
+  double sigmas = 4.0;        ///< minimum distance from a surface, in multiples of the noise or the resolution
+  double jump = 3.0;          ///< minimum size of an edge, in multiples of that distance
+  double margin = 0.05;       ///< minimum distance from a surface, as a part of the jump
+  int support = 4;            ///< number of the eight pixels around with the same depth that keeps a pixel
 };
 
-/// What was looked at and what was found.
+/// Counts of the examined and the removed pixels.
 struct flying_pixel_count {
   std::size_t valid = 0;    ///< pixels with a depth
-  std::size_t removed = 0;  ///< of these
+  std::size_t removed = 0;  ///< number of flying pixels among them
   friend bool operator==(const flying_pixel_count&, const flying_pixel_count&) = default;
 };
 
-/// Memory that calls can share, one at a time: for images of one size nothing is allocated after the first.
+/// Memory that successive calls can share: nothing is allocated after the first call for images of one size. Not
+/// thread-safe.
 class flying_pixel_workspace {
  public:
-  /// Inverse depth with `border` pixels around it of which nothing is known (NaN).
+  /// Returns inverse depth with a border of `border` unknown pixels (NaN).
   image_view<float> inverse(int width, int height, int border) {
     const int padded_width = width + 2 * border + lanes;
     const int padded_height = height + 2 * border;
@@ -63,12 +64,12 @@ class flying_pixel_workspace {
     }
     return inverse_;
   }
-  /// One for each row.
+  /// Returns one counter per row.
   std::span<flying_pixel_count> counts(int height) {
     counts_.assign(static_cast<std::size_t>(height), {});
     return counts_;
   }
-  static constexpr int lanes = 16;  ///< pixels that are tested at once
+  static constexpr int lanes = 16;  ///< pixels tested at once
 
  private:
   image<float> inverse_;
@@ -79,7 +80,7 @@ class flying_pixel_workspace {
 
 namespace detail {
 
-/// Reads a row of a depth image, metres.
+/// Reads a row of a depth image in metres.
 struct depth_row_reader {
   const void* depth = nullptr;
   void (*read)(const void* depth, int y, int width, float* out) = nullptr;
@@ -92,7 +93,7 @@ template <camera::depth_source Depth>
           }};
 }
 
-/// `remove_flying_pixels` for any depth image.
+/// `remove_flying_pixels` on a type-erased depth image.
 template <execution_policy Policy>
 flying_pixel_count read_without_flying_pixels(const Policy& policy, const depth_row_reader& depth,
                                               image_view<float> out, const flying_pixel_options& options,
@@ -100,9 +101,8 @@ flying_pixel_count read_without_flying_pixels(const Policy& policy, const depth_
 
 }  // namespace detail
 
-/// Writes the depth in metres to `out`, 0 where there is none or the pixel flies. `out` may be the memory
-/// that `depth` reads, if that holds metres. O(width * height); the same result for every policy and
-/// processor.
+/// Writes the depth in metres to `out`, 0 where it is missing or the pixel is flying. `out` may be the memory that
+/// `depth` reads, if that holds metres. O(width * height); the same result for every policy and processor.
 /// @pre out is as large as depth; reach is 1 ... 8
 template <execution_policy Policy, camera::depth_source Depth>
 flying_pixel_count remove_flying_pixels(const Policy& policy, const Depth& depth, image_view<float> out,
@@ -113,7 +113,7 @@ flying_pixel_count remove_flying_pixels(const Policy& policy, const Depth& depth
                                             workspace);
 }
 
-/// Removes flying pixels as above, with memory that is freed at the end.
+/// Removes flying pixels as above, with temporary memory.
 template <execution_policy Policy, camera::depth_source Depth>
 flying_pixel_count remove_flying_pixels(const Policy& policy, const Depth& depth, image_view<float> out,
                                         const flying_pixel_options& options = {}) {

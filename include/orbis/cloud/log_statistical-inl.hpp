@@ -25,7 +25,7 @@ ORBIS_INLINE log_statistical_result log_statistical_decision(std::vector<float> 
   out.judged = values.size();
   out.threshold = options.threshold;
   if (!values.empty()) {
-    // Order is kept by the logarithm: only one value needs its own.
+    // The logarithm preserves order, so only the median itself needs one.
     float* const middle = values.data() + (values.size() - 1) / 2;
     std::nth_element(values.data(), middle, values.data() + values.size());
     out.median = std::log(double{*middle});

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Points whose surroundings are so many times sparser than usual.
+/// Filter of points whose surroundings are sparser than usual by a factor.
 ///
-/// Mean distances to neighbours are spread over orders of magnitude, with a long tail of outliers that
-/// drags mean and standard deviation along. Their logarithms against the median are not dragged, and
-/// the threshold is a factor: what counts as sparse does not depend on the unit or the size of the scene.
+/// Mean neighbour distances are spread over orders of magnitude, with a long tail of outliers that biases mean and
+/// standard deviation. Their logarithms relative to the median are robust, and the threshold is a factor, independent
+/// of the unit and the size of the scene.
 #pragma once
 
 #include <cassert>
@@ -21,36 +21,36 @@
 namespace orbis::cloud {
 
 struct log_statistical_options {
-  std::size_t neighbors = 8;  ///< k, the point itself not counted; > 0
+  std::size_t neighbors = 8;  ///< k, not counting the point itself; > 0
   double threshold = 1.6;     ///< natural logarithm: outliers are exp(threshold) times sparser than the median
   cloud::non_finite non_finite = cloud::non_finite::drop;
 };
 
-/// The filter's decision, and what it is based on.
+/// Decision of the filter, and the statistics it is based on.
 struct log_statistical_result {
   std::vector<std::uint32_t> inliers;  ///< indices, ascending
-  std::vector<float> mean_distance;    ///< per point, metres; NaN where not finite or alone
-  std::size_t judged = 0;              ///< points with a positive, finite mean distance: those that have a logarithm
-  double median = 0;                   ///< of their logarithms
-  double threshold = 0;                ///< log(mean distance) - median beyond this makes an outlier
-  double threshold_distance = std::numeric_limits<double>::infinity();  ///< the same as a mean distance, metres
+  std::vector<float> mean_distance;    ///< per point, metres; NaN for a non-finite or single point
+  std::size_t judged = 0;  ///< number of points with a positive, finite mean distance, which have a logarithm
+  double median = 0;       ///< median of their logarithms
+  double threshold = 0;    ///< log(mean distance) - median above this is an outlier
+  double threshold_distance = std::numeric_limits<double>::infinity();  ///< the threshold as a mean distance, metres
 };
 
-/// Decides on mean distances that are known already: see `log_statistical_inliers`. Points that have none
-/// (NaN) are kept or dropped as `non_finite` says. O(n).
+/// Decides on known mean distances: see `log_statistical_inliers`. `non_finite` decides on points without one (NaN).
+/// O(n).
 [[nodiscard]] log_statistical_result log_statistical_decision(std::vector<float> mean_distance,
                                                               const log_statistical_options& options = {});
 
 namespace detail {
 
-/// `log_statistical_filter` for any points.
+/// `log_statistical_filter` on a type-erased cloud.
 template <execution_policy Policy>
 [[nodiscard]] log_statistical_result filter_by_logarithm(const Policy& policy, const point_view& points,
                                                          const log_statistical_options& options);
 
 }  // namespace detail
 
-/// Finds the points that `log_statistical_inliers` returns, their scores and the threshold.
+/// Finds the points that `log_statistical_inliers` returns, with their scores and the threshold.
 template <execution_policy Policy, point_range Points>
 [[nodiscard]] log_statistical_result log_statistical_filter(const Policy& policy, const Points& points,
                                                             const log_statistical_options& options = {}) {
@@ -58,9 +58,9 @@ template <execution_policy Policy, point_range Points>
   return detail::filter_by_logarithm(detail::threads_of(policy), detail::viewed_points{points}, options);
 }
 
-/// The indices, ascending, of the points whose mean distance to their `neighbors` nearest neighbours is
-/// at most exp(`threshold`) times the median over the cloud. Points identical to all their neighbours stay; so
-/// does a point that is alone. O(n log n) for fixed k; the same result for every policy.
+/// Returns the indices, ascending, of the points whose mean distance to their `neighbors` nearest neighbours is at most
+/// exp(`threshold`) times the median over the cloud. Keeps points identical to all their neighbours, and a single
+/// point. O(n log n) for fixed k; the same result for every policy.
 /// @pre neighbors > 0, fewer than 2^32 points
 template <execution_policy Policy, point_range Points>
 [[nodiscard]] std::vector<std::uint32_t> log_statistical_inliers(const Policy& policy, const Points& points,

@@ -2,9 +2,8 @@
 /// @file
 /// Nearest neighbours by nanoflann's k-d tree, over any range of points, in place.
 ///
-/// Works with nanoflann 1.4 and later: results come through a sink of our own and the search
-/// parameters are written `{}`, so that neither the renaming of `SearchParams` in 1.5 nor what 1.6
-/// asks of result sets is a difference.
+/// Works with nanoflann 1.4 and later. Results go to a custom sink and the search parameters are written `{}`, which
+/// avoids the renaming of `SearchParams` in 1.5 and the changed result set interface of 1.6.
 #pragma once
 
 #include <algorithm>
@@ -26,12 +25,12 @@
 
 namespace orbis::cloud {
 
-/// A k-d tree over `points`, which must outlive it and stay as they are. Points that are not finite
-/// are left out. Building takes O(n log n), a query O(log n + k) on usual clouds; identical points do
-/// no harm. Memory: about 20 bytes per point, and the indices of the finite ones where not all are.
+/// A k-d tree over `points`, which must outlive it and must not change. Skips non-finite points. Construction takes O(n
+/// log n), a query O(log n + k) on usual clouds; identical points are supported. Memory: about 20 bytes per point, plus
+/// the indices of the finite points if some are not finite.
 ///
-/// The tree reads the points where they are, at random: where a large cloud has no order in memory (shuffled, out of
-/// a hash), queries wait for memory most of the time.
+/// The tree reads the points in place, in random order. For a large cloud without spatial order in memory (shuffled, or
+/// from a hash table), queries are limited by memory latency.
 /// @pre fewer than 2^32 points
 template <point_range Points>
 class nanoflann_search {
@@ -45,29 +44,29 @@ class nanoflann_search {
   nanoflann_search(const nanoflann_search&) = delete;
   nanoflann_search& operator=(const nanoflann_search&) = delete;
 
-  /// How many points are searched.
+  /// Number of points in the tree.
   [[nodiscard]] std::size_t size() const noexcept { return data_.kdtree_get_point_count(); }
 
-  /// The `min(k, size())` points nearest to `q`, nearest first, equal distances by index; if `q` is a point of the
-  /// cloud, it is found as well. Which of several points at exactly the k-th distance is reported is deterministic.
-  /// May be called from several threads at once. @pre q is finite
+  /// Finds the `min(k, size())` points nearest to `q`, nearest first, equal distances by index. A point of the cloud
+  /// equal to `q` is found as well. If several points are at exactly the k-th distance, the choice between them is
+  /// deterministic. Can be called from several threads at once. @pre q is finite
   void knn(const query& q, std::size_t k, std::vector<neighbor<scalar>>& out) const {
     out.clear();
     if (k != 0) find(q, nearest_sink{k, out}, out);
   }
-  /// All points within `r` metres of `q`, the border included, nearest first. @pre q is finite, r >= 0
+  /// Finds all points within `r` metres of `q`, the border included, nearest first. @pre q is finite, r >= 0
   void radius(const query& q, scalar r, std::vector<neighbor<scalar>>& out) const {
     out.clear();
     find(q, radius_sink{r * r, out}, out);
   }
 
  private:
-  /// Keeps the `k` nearest of what it is given, with squared distances, in a max-heap. @pre k > 0
+  /// Keeps the `k` nearest points added, with squared distances, in a max-heap. @pre k > 0
   struct nearest_sink {
     std::size_t k;
     std::vector<neighbor<scalar>>& out;
 
-    /// Points further than this need not be reported.
+    /// Squared distance beyond which points need not be added.
     [[nodiscard]] scalar bound_squared() const noexcept {
       return out.size() < k ? std::numeric_limits<scalar>::infinity() : out.front().distance;
     }
@@ -82,11 +81,11 @@ class nanoflann_search {
         out.push_back(found);
       }
       std::push_heap(out.begin(), out.end(), is_nearer<scalar>);
-      // k identical points: nothing can be nearer.
+      // k identical points: no point can be nearer
       return out.size() < k || out.front().distance > 0;
     }
   };
-  /// Keeps everything within a radius.
+  /// Keeps all points within a radius.
   struct radius_sink {
     scalar bound;  ///< squared
     std::vector<neighbor<scalar>>& out;
@@ -97,14 +96,14 @@ class nanoflann_search {
       return true;
     }
   };
-  /// Gathers in `out`, by the sink, and takes the roots of what is there.
+  /// Collects results in `out` through the sink, and takes the square roots of the distances.
   template <class Sink>
   void find(const query& q, Sink sink, std::vector<neighbor<scalar>>& out) const {
     if (size() == 0) return;
     result_set<Sink> results{&sink, &data_};
     tree_.findNeighbors(results, q.data(), {});
     for (neighbor<scalar>& n : out) n.distance = std::sqrt(n.distance);
-    // After the roots: different squares can have the same one.
+    // Sort after taking the roots: different squares can have the same root.
     std::sort(out.begin(), out.end(), is_nearer<scalar>);
   }
 
@@ -138,11 +137,11 @@ class nanoflann_search {
     }
 
     const Points* points;
-    std::vector<std::uint32_t> finite;  ///< original indices of the points that are searched
+    std::vector<std::uint32_t> finite;  ///< original indices of the points in the tree
     bool some_left_out = false;
   };
 
-  /// The metric, summed as `squared_distance` sums.
+  /// The metric, with the summation order of `squared_distance`.
   struct metric {
     using ElementType = scalar;
     using DistanceType = scalar;
@@ -157,11 +156,11 @@ class nanoflann_search {
     const dataset* data;
   };
 
-  /// nanoflann's view of the sink. nanoflann adds up the distance to a cell with rounding errors of
-  /// its own; the slack in the bound makes up for them, so that no neighbour is lost.
+  /// Adapts the sink to nanoflann's interface. nanoflann accumulates the distance to a cell with rounding errors; the
+  /// slack in the bound compensates for them, so that no neighbour is lost.
   template <class Sink>
   struct result_set {
-    using DistanceType = scalar;  // 1.6 and later ask for these names
+    using DistanceType = scalar;  // required by nanoflann 1.6 and later
     using IndexType = std::uint32_t;
     [[nodiscard]] scalar worstDist() const {
       constexpr scalar slack = 64 * std::numeric_limits<scalar>::epsilon();

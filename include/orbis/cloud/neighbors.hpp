@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// What searches for nearest neighbours find.
+/// Result type of nearest-neighbour searches.
 #pragma once
 
 #include <concepts>
@@ -8,7 +8,7 @@
 
 namespace orbis::cloud {
 
-/// A point that was found, by its index in the searched cloud.
+/// A neighbour found by a search: its index in the cloud and its distance.
 template <std::floating_point S>
 struct neighbor {
   std::uint32_t index = 0;
@@ -16,7 +16,7 @@ struct neighbor {
   friend bool operator==(const neighbor&, const neighbor&) = default;
 };
 
-/// The order in which neighbours come: the nearest first, equal distances by index.
+/// Order of neighbours in results: nearest first, equal distances by index.
 template <std::floating_point S>
 [[nodiscard]] constexpr bool is_nearer(const neighbor<S>& a, const neighbor<S>& b) noexcept {
   return a.distance < b.distance || (a.distance == b.distance && a.index < b.index);

@@ -19,13 +19,13 @@ namespace orbis::cloud {
 
 namespace detail {
 
-/// Says of the points of one leaf after another whether enough points lie within a radius.
+/// Decides for the points of one leaf at a time if enough points lie within a radius.
 class crowd_search {
  public:
-  /// `enough`: with the point itself.
+  /// `enough`: minimum number of points, including the point itself.
   crowd_search(const leaf_hierarchy& tree, const knn_kernels& kernels, float radius, std::size_t enough)
       : tree_{&tree}, kernels_{kernels}, bound_{radius * radius}, enough_{enough}, near_{most_leaves} {
-    // Enough are too many for this, which ends as soon as they are found.
+    // If `enough` is too large for the gathered list, counting stops as soon as enough points are found.
     if (std::isfinite(bound_) && enough <= most_found) {
       chosen_.resize(near_.leaves.size() + leaf_width);
       found_.resize(enough + 4 * leaf_width);
@@ -37,7 +37,7 @@ class crowd_search {
   void visit_leaf(std::size_t l, F&& f) {
     const std::size_t size = tree_->size_of(l);
     const box3 box = tree_->levels[0][l / leaf_width].child(l % leaf_width);
-    // No two points of a box are further apart than its corners, rounding included.
+    // No two points of a box are further apart than its corners, also after rounding.
     const bool all_near = squared_distance(box.low, box.high) <= bound_;
     bool gathered = false;
     bool usable = !found_.empty();
@@ -70,7 +70,7 @@ class crowd_search {
   [[nodiscard]] std::size_t within(std::size_t l, const std::array<float, 3>& q) const {
     std::array<float, leaf_width> distance;
     const std::uint32_t mask = kernels_.distances(tree_->leaves[l], q, bound_, distance.data());
-    const std::uint32_t there = (1U << tree_->size_of(l)) - 1;  // counts where the bound is infinite
+    const std::uint32_t there = (1U << tree_->size_of(l)) - 1;  // masks padding if the bound is infinite
     return static_cast<std::size_t>(std::popcount(mask & there));
   }
 
@@ -88,7 +88,7 @@ template <execution_policy Policy>
 std::vector<std::uint32_t> find_radius_inliers(const Policy& policy, const point_view& points,
                                                const radius_options& options) {
   const std::size_t count = points.size();
-  const std::size_t enough = std::min(options.min_neighbors, count) + 1;  // with the point itself
+  const std::size_t enough = std::min(options.min_neighbors, count) + 1;  // including the point itself
   const leaf_hierarchy tree = make_leaves(policy, points, enough);
   std::vector<char> kept(count, options.non_finite == cloud::non_finite::keep ? 1 : 0);
   const knn_kernels kernels;
@@ -99,7 +99,7 @@ std::vector<std::uint32_t> find_radius_inliers(const Policy& policy, const point
           l, [&](std::size_t i, bool has_enough) { kept[tree.members[l * leaf_width + i]] = has_enough ? 1 : 0; });
     }
   });
-  // Enough copies of those left out are in the leaves.
+  // The leaves hold enough copies of each point that was left out.
   for (const surplus_copy& copy : tree.left_out) kept[copy.index] = 1;
   return indices_where(count, [&](std::size_t i) { return kept[i] != 0; });
 }

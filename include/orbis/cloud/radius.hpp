@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Radius outlier removal: points with too few neighbours close by.
+/// Radius outlier removal: filter of points with too few neighbours within a radius.
 #pragma once
 
 #include <cassert>
@@ -17,22 +17,22 @@ namespace orbis::cloud {
 
 struct radius_options {
   double radius = 0.05;           ///< metres, the border included; >= 0
-  std::size_t min_neighbors = 5;  ///< the point itself not counted
+  std::size_t min_neighbors = 5;  ///< not counting the point itself
   cloud::non_finite non_finite = cloud::non_finite::drop;
 };
 
 namespace detail {
 
-/// `radius_inliers` for any points.
+/// `radius_inliers` on a type-erased cloud.
 template <execution_policy Policy>
 [[nodiscard]] std::vector<std::uint32_t> find_radius_inliers(const Policy& policy, const point_view& points,
                                                              const radius_options& options);
 
 }  // namespace detail
 
-/// The indices, ascending, of the points with at least `min_neighbors` other points within `radius`.
-/// O(n (log n + min_neighbors)), also where many points are identical; the same result for every policy and
-/// processor. Coordinates are taken as float, squared distances computed in float.
+/// Returns the indices, ascending, of the points with at least `min_neighbors` other points within `radius`. O(n (log n
+/// + min_neighbors)), also with many identical points; the same result for every policy and processor. Coordinates are
+/// converted to float; squared distances are computed in float.
 /// @pre radius >= 0, fewer than 2^32 points
 template <execution_policy Policy, point_range Points>
 [[nodiscard]] std::vector<std::uint32_t> radius_inliers(const Policy& policy, const Points& points,

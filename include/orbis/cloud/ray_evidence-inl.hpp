@@ -15,7 +15,7 @@ namespace orbis::cloud {
 
 namespace detail {
 
-/// `f` with the camera, of the kind that it is where that is known at run time.
+/// Calls `f` with the camera; a camera type chosen at run time is resolved to its concrete model.
 template <camera::camera_model Camera, class F>
 decltype(auto) with_model(const Camera& camera, F&& f) {
   if constexpr (requires { camera.visit([](const auto&) {}); }) {

@@ -9,7 +9,7 @@
 
 #include <orbis/cloud/detail/select/decision.hpp>
 #include <orbis/cloud/detail/select/density_judge.hpp>
-#include <orbis/cloud/detail/select/in_words.hpp>
+#include <orbis/cloud/detail/select/describe.hpp>
 #include <orbis/cloud/detail/select/surroundings.hpp>
 #include <orbis/cloud/detail/select/view_judge.hpp>
 #include <orbis/cloud/ray_evidence-inl.hpp>
@@ -25,7 +25,7 @@ namespace detail {
   return out;
 }
 
-/// Points left, and with `non_finite::keep` those that are not finite.
+/// Indices of the remaining points and, with `non_finite::keep`, of the non-finite ones.
 [[nodiscard]] inline std::vector<std::uint32_t> kept_points(const point_view& points, std::span<const char> left,
                                                             const select_options& options) {
   return indices_where(left.size(), [&](std::size_t i) {
@@ -33,21 +33,21 @@ namespace detail {
   });
 }
 
-inline void remove_gone(const surroundings& around, std::span<char> left) {
+inline void clear_removed(const surroundings& around, std::span<char> left) {
   for (std::size_t i = 0; i != around.size(); ++i) {
     if (around.gone()[i] != 0) left[around.index(i)] = 0;
   }
 }
 
-[[nodiscard]] inline std::string sentence_of(const filter_choice& choice, std::span<const std::string> reasons,
-                                             bool by_range) {
+[[nodiscard]] inline std::string join_reasons(const filter_choice& choice, std::span<const std::string> reasons,
+                                              bool by_range) {
   std::string out;
   for (const std::string& r : reasons) {
     if (!out.empty()) out += "; ";
     out += r;
   }
-  if (out.empty()) out = "no point stands out";
-  return joined({out, " (median spacing ", in_words(1e3 * choice.evidence.median_spacing), " mm",
+  if (out.empty()) out = "no outliers found";
+  return joined({out, " (median spacing ", describe(1e3 * choice.evidence.median_spacing), " mm",
                  by_range ? ", which grows with range)" : ")"});
 }
 
@@ -80,18 +80,18 @@ automatic_result choose_and_filter(const Policy& policy, const point_view& point
     choice.reason = reasons.front();
   } else {
     judge_points(policy, around, options, choice, reasons);
-    remove_gone(around, left);
+    clear_removed(around, left);
     const bool by_range = std::ranges::any_of(
         choice.evidence.density, [](const auto& d) { return d.mode == filter_mode::range_log_statistical; });
-    choice.reason = sentence_of(choice, reasons, by_range);
+    choice.reason = join_reasons(choice, reasons, by_range);
   }
   out.inliers = kept_points(points, left, options);
   return out;
 }
 
-/// The function that a choice calls with views.
+/// Wraps a function object as the `view_judge` of a choice.
 template <class F>
-[[nodiscard]] view_judge judge_of(const F& judge) {
+[[nodiscard]] view_judge make_view_judge(const F& judge) {
   return {&judge,
           [](const void* context, std::span<char> left, filter_choice& choice, std::vector<std::string>& reasons) {
             return (*static_cast<const F*>(context))(left, choice, reasons);
@@ -111,7 +111,7 @@ automatic_result filter_automatically(const Policy& policy, const Points& points
     const auto judge = [&](std::span<char> left, filter_choice& choice, std::vector<std::string>& reasons) {
       return detail::judge_views(threads, all, views, model, options, left, choice, reasons, on_progress);
     };
-    return detail::choose_and_filter(threads, all, ranges.all, options, detail::judge_of(judge));
+    return detail::choose_and_filter(threads, all, ranges.all, options, detail::make_view_judge(judge));
   });
 }
 

@@ -1,20 +1,19 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A filter that chooses itself: the cloud is judged, and the choice comes with its evidence.
+/// Automatic selection of filters: analyses the cloud and returns the choice with its evidence.
 ///
-/// 1. *Views*, where there are any, know best: what their rays pass through is not there, and what only
-///    a stray pixel or a view that contradicts all others has measured is not either.
-/// 2. *Density*: a point's measure is how much sparser its surroundings are than usual, the logarithm of
-///    its mean distance to a few neighbours less a reference: one for all points, or a line over the
-///    logarithm of the range (a depth camera's points thin out with range); and the surroundings', where the
-///    cloud itself is of uneven density. Outliers show as a second population of points that lie on no
-///    surface; the threshold goes into the valley before it. Where there is none, only points far
-///    outside the bulk go: a clean cloud stays as it is.
-/// 3. *Connection*: groups of a few points with nothing around, and small clusters far from the surface.
+/// 1. *Views*, if available, take precedence: points that their rays pass through are removed, as are points
+///    measured only by a stray pixel or by a view that contradicts all others.
+/// 2. *Density*: the logarithm of a point's mean distance to a few neighbours, less a reference. The reference is one
+///    value for all points, a line over the logarithm of the range (a depth camera's points thin out with range), or,
+///    for clouds of uneven density, the value of the surroundings. Outliers appear as a second population of points
+///    that lie on no surface; the threshold is placed in the valley before it. Without such a population, only points
+///    far outside the bulk are removed: a clean cloud stays as it is.
+/// 3. *Connection*: isolated groups of a few points, and small clusters far from the surface.
 ///
-/// Every step is part of the chosen chain only if it removes something.
+/// A step is part of the chosen chain only if it removes points.
 ///
-/// The library orbis::compiled holds what judges points alone; who gives views includes select-inl.hpp.
+/// The library orbis::compiled holds the part that judges points alone; callers with views include select-inl.hpp.
 #pragma once
 
 #include <cassert>
@@ -35,7 +34,7 @@
 
 namespace orbis::cloud {
 
-/// The inliers' indices, ascending, and the choice that led to them.
+/// Indices of the inliers, ascending, and the choice that led to them.
 struct automatic_result {
   std::vector<std::uint32_t> inliers;
   filter_choice choice;
@@ -43,20 +42,20 @@ struct automatic_result {
 
 namespace detail {
 
-/// What a choice asks about views. False: cancelled.
+/// Type-erased callback that judges points by views. Returns false if cancelled.
 struct view_judge {
   const void* context = nullptr;
-  /// Clears what is left where the views exclude a point, and adds a step and its reason; null without views.
+  /// Clears `left` for the points that the views exclude, and adds a step and its reason; null without views.
   bool (*run)(const void* context, std::span<char> left, filter_choice& choice,
               std::vector<std::string>& reasons) = nullptr;
 };
 
-/// `filter_automatically` for any points and views. `ranges`: of each point, or empty where none is known.
+/// `filter_automatically` on a type-erased cloud and views. `ranges`: one per point, or empty if none is known.
 template <execution_policy Policy>
 [[nodiscard]] automatic_result choose_and_filter(const Policy& policy, const point_view& points,
                                                  std::span<const float> ranges, const select_options& options,
                                                  const view_judge& views);
-/// The ranges that are given, or those from the sensor's origin; empty where neither is known.
+/// The given ranges, or those computed from the sensor's origin; empty if neither is known.
 struct known_ranges {
   std::vector<float> own{};
   std::span<const float> all{};
@@ -74,12 +73,12 @@ struct known_ranges {
 
 }  // namespace detail
 
-/// Judges the cloud by its points and by the depth images that it was made of, or that saw the same
-/// place, and returns the points that the chosen filters keep. The images testify against points in
-/// front of what they measured, which no density can show: moving objects, wrong poses.
+/// Judges the cloud by its points and by the depth images from which it was made, or that saw the same place. Returns
+/// the points that the chosen filters keep. The images detect false points in front of their measurements, such as
+/// moving objects or the effect of wrong poses, which do not show in the density.
 ///
-/// Deterministic, the same for every policy. `on_progress` counts the views; if it cancels, the
-/// chain is empty, the reason "cancelled", and all points stay. O(n log n + views (pixels + n)).
+/// Deterministic and the same for every policy. `on_progress` counts the views; if it cancels, the chain is empty, the
+/// reason is "cancelled", and all points stay. O(n log n + views (pixels + n)).
 /// @pre neighbors > 0; ranges is empty or as long as points; views' images have the camera's size; samples, if there
 /// are any, are of these views
 template <execution_policy Policy, point_range Points, posed_depth_range Views, camera::camera_model Camera>
@@ -87,7 +86,7 @@ template <execution_policy Policy, point_range Points, posed_depth_range Views, 
                                                     const Camera& camera, const select_options& options = {},
                                                     progress on_progress = {});
 
-/// Judges the cloud by its points alone. An empty cloud, or one too small to judge, gets an empty chain. O(n log n).
+/// Judges the cloud by its points alone. A cloud that is empty or too small to judge gets an empty chain. O(n log n).
 /// @pre neighbors > 0; ranges is empty or as long as points
 template <execution_policy Policy, point_range Points>
 [[nodiscard]] automatic_result filter_automatically(const Policy& policy, const Points& points,
@@ -98,7 +97,7 @@ template <execution_policy Policy, point_range Points>
                                    detail::known_ranges{threads, points, options}.all, options, {});
 }
 
-/// Judges the cloud and says which filters suit it: `filter_automatically` without its inliers.
+/// Judges the cloud and selects filters: `filter_automatically` without the inliers.
 template <execution_policy Policy, point_range Points>
 [[nodiscard]] filter_choice select_filter(const Policy& policy, const Points& points,
                                           const select_options& options = {}) {

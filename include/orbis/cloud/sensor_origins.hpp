@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Where the points of a cloud were seen from.
+/// Sensor positions of a cloud's points.
 #pragma once
 
 #include <cassert>
@@ -21,26 +21,26 @@
 
 namespace orbis::cloud {
 
-/// What else a type of cloud knows than its points: a customisation point whose primary template is
-/// empty. A specialisation may have `static std::optional<vec3> sensor_origin(const C&)`: where all its
-/// points were seen from, metres, in the frame of the points.
+/// Additional properties of a cloud type: a customisation point whose primary template is empty. A specialisation may
+/// define `static std::optional<vec3> sensor_origin(const C&)`, the position from which all its points were seen,
+/// metres, in the frame of the points.
 template <class C>
 struct cloud_traits {};
 
-/// A cloud that may know where it was seen from.
+/// A cloud type that can report its sensor origin.
 template <class C>
 concept cloud_with_sensor_origin = requires(const std::remove_cvref_t<C>& cloud) {
   { cloud_traits<std::remove_cvref_t<C>>::sensor_origin(cloud) } -> std::same_as<std::optional<vec3>>;
 };
 
-/// Where a cloud was seen from, in the frame of its points. Of what is given, the most specific counts:
-/// `ranges`, else `common`, else what the cloud itself says (`cloud_traits`).
+/// Sensor origin of a cloud, in the frame of its points. The most specific source is used: `ranges`, else `common`,
+/// else the origin stated by the cloud itself (`cloud_traits`).
 struct sensor_origins {
-  std::optional<vec3> common{};     ///< of all points, metres
-  std::span<const float> ranges{};  ///< of each point, metres from its sensor; empty or as long as the cloud
+  std::optional<vec3> common{};     ///< origin of all points, metres
+  std::span<const float> ranges{};  ///< distance of each point from its sensor, metres; empty or as long as the cloud
 };
 
-/// The origin that a cloud itself states.
+/// Returns the origin stated by a cloud itself.
 template <class C>
 [[nodiscard]] std::optional<vec3> stated_sensor_origin([[maybe_unused]] const C& cloud) {
   if constexpr (cloud_with_sensor_origin<C>) {
@@ -50,9 +50,8 @@ template <class C>
   }
 }
 
-/// For each point its distance in metres from where it was seen; NaN where that is not known, and for
-/// points, origins and given ranges that are not finite or, as a range, negative. O(n); the same result
-/// for every policy.
+/// Computes for each point its distance in metres from its sensor. NaN if that is unknown, and for non-finite points,
+/// origins or given ranges and for negative ranges. O(n); the same result for every policy.
 /// @pre `ranges` of `origins` is empty or as long as `points`
 template <execution_policy Policy, point_range Points>
 [[nodiscard]] std::vector<float> sensor_ranges(const Policy& policy, const Points& points,

@@ -4,10 +4,10 @@
 /// over the whole cloud (`statistical_inliers`) or for their range from the sensor
 /// (`range_statistical_inliers`).
 ///
-/// The points of a depth camera or a scanner lie `angle * r` apart at range r (the angle between two
-/// rays), and scatter along the ray by sigma(r) = `noise * r^2` (triangulation). The second filter
-/// divides a point's mean distance by what its range explains, sqrt((angle r)^2 + (noise r^2)^2). The
-/// quotient has one size over the whole cloud, so that a far wall stays and outliers near the sensor go.
+/// The points of a depth camera or a scanner are `angle * r` apart at range r (`angle`: the angle between two rays),
+/// and scatter along the ray by sigma(r) = `noise * r^2` (triangulation). The second filter divides a point's mean
+/// distance by the spacing that its range explains, sqrt((angle r)^2 + (noise r^2)^2). The quotient has the same scale
+/// over the whole cloud, so that a far wall stays and outliers near the sensor are removed.
 ///
 /// Sources: R. B. Rusu, Z. C. Marton, N. Blodow, M. Dolha, M. Beetz, "Towards 3D point cloud based
 /// object maps for household environments", Robotics and Autonomous Systems 56, 2008. For the noise:
@@ -34,40 +34,39 @@
 namespace orbis::cloud {
 
 struct statistical_options {
-  std::size_t neighbors = 50;     ///< k, the point itself not counted; > 0
+  std::size_t neighbors = 50;     ///< k, not counting the point itself; > 0
   double sigma_multiplier = 1.0;  ///< alpha
   cloud::non_finite non_finite = cloud::non_finite::drop;
 };
 
-/// The filter's decision, and what it is based on.
+/// Decision of the filter, and the statistics it is based on.
 struct statistical_result {
   std::vector<std::uint32_t> inliers;  ///< indices, ascending
-  std::vector<float> mean_distance;    ///< per point, metres; NaN where not finite or alone
+  std::vector<float> mean_distance;    ///< per point, metres; NaN for a non-finite or single point
   double mean = 0;                     ///< mu of the mean distances, metres
   double standard_deviation = 0;       ///< sigma, with n - 1
-  double threshold = 0;                ///< mu + alpha sigma; points beyond it are outliers
+  double threshold = 0;                ///< mu + alpha sigma; points above it are outliers
 };
 
-/// Decides on mean distances that are known already: see `statistical_inliers`. Points that have none
-/// (NaN) are kept or dropped as `non_finite` says. O(n).
+/// Decides on known mean distances: see `statistical_inliers`. `non_finite` decides on points without one (NaN). O(n).
 ///
-/// The variance is a difference of sums, as others compute it, and where all distances are nearly equal
-/// it can come out below zero. Such a cloud has no spread that could be measured: sigma is reported as 0
-/// and the threshold as infinite, everything stays (as in PCL, where both are NaN and no distance is
-/// larger). The same goes, with an infinite sigma, where distances or their squares overflow.
+/// The variance is a difference of sums, as in other implementations, and can be negative if all distances are nearly
+/// equal. The spread of such a cloud cannot be measured: sigma is then reported as 0 and the threshold as infinite, and
+/// all points stay (as in PCL, where both are NaN and no distance is larger). If distances or their squares overflow,
+/// sigma is infinite and all points stay as well.
 [[nodiscard]] statistical_result statistical_decision(std::vector<float> mean_distance,
                                                       const statistical_options& options = {});
 
 namespace detail {
 
-/// `statistical_filter` for any points.
+/// `statistical_filter` on a type-erased cloud.
 template <execution_policy Policy>
 [[nodiscard]] statistical_result filter_statistically(const Policy& policy, const point_view& points,
                                                       const statistical_options& options);
 
 }  // namespace detail
 
-/// Finds the points that `statistical_inliers` returns, their scores and the threshold.
+/// Finds the points that `statistical_inliers` returns, with their scores and the threshold.
 template <execution_policy Policy, point_range Points>
 [[nodiscard]] statistical_result statistical_filter(const Policy& policy, const Points& points,
                                                     const statistical_options& options = {}) {
@@ -75,14 +74,14 @@ template <execution_policy Policy, point_range Points>
   return detail::filter_statistically(detail::threads_of(policy), detail::viewed_points{points}, options);
 }
 
-/// The indices, ascending, of the points whose mean distance to their `neighbors` nearest neighbours
-/// is at most mu + `sigma_multiplier` sigma, where mu and sigma are the mean and the standard
-/// deviation of that distance over the cloud.
+/// Returns the indices, ascending, of the points whose mean distance to their `neighbors` nearest neighbours is at most
+/// mu + `sigma_multiplier` sigma, where mu and sigma are the mean and the standard deviation of that distance over the
+/// cloud.
 ///
-/// With `non_finite::keep` the selection is that of PCL 1.13's StatisticalOutlierRemoval on an
-/// unorganised cloud, point for point. A cloud with k or fewer other points uses those there are; an
-/// empty cloud gives an empty result, a single point is kept. O(n log n) for fixed k; the same result
-/// for every policy. Coordinates are taken as float.
+/// With `non_finite::keep` the selection equals that of PCL 1.13's StatisticalOutlierRemoval on an unorganised cloud,
+/// point for point. In a cloud with k or fewer other points, all of them are used. An empty cloud gives an empty
+/// result; a single point is kept. O(n log n) for fixed k; the same result for every policy. Coordinates are converted
+/// to float.
 /// @pre neighbors > 0, fewer than 2^32 points
 template <execution_policy Policy, point_range Points>
 [[nodiscard]] std::vector<std::uint32_t> statistical_inliers(const Policy& policy, const Points& points,
@@ -91,17 +90,17 @@ template <execution_policy Policy, point_range Points>
 }
 
 struct range_statistical_options {
-  std::size_t neighbors = 50;     ///< k, the point itself not counted; > 0
+  std::size_t neighbors = 50;     ///< k, not counting the point itself; > 0
   double sigma_multiplier = 1.0;  ///< alpha
-  /// Between neighbouring rays, radians; for a camera 1 / fx. >= 0, and not zero together with `noise`.
+  /// Angle between neighbouring rays, radians; 1 / fx for a camera. >= 0, and not zero together with `noise`.
   double angle = 1.0 / 525.0;
-  /// sigma(r) / r^2, 1 / metre; the default is a Kinect's. Only its ratio to `angle` matters. >= 0
+  /// Depth noise sigma(r) / r^2, 1 / metre; the default is a Kinect's. Only its ratio to `angle` matters. >= 0
   double noise = 1.425e-3;
-  double least_range = 0.1;  ///< closer points are judged as if they were here, metres; > 0
+  double least_range = 0.1;  ///< lower limit of the range of a point, metres; > 0
   cloud::non_finite non_finite = cloud::non_finite::drop;
 };
 
-/// The spacing in metres that the sensor explains at a range.
+/// Spacing in metres that the sensor explains at a range.
 [[nodiscard]] inline double explained_spacing(double range, const range_statistical_options& options) noexcept {
   const double r = range > options.least_range ? range : options.least_range;
   const double beside = options.angle * r;
@@ -109,19 +108,18 @@ struct range_statistical_options {
   return std::sqrt(beside * beside + along * along);
 }
 
-/// The filter's decision, and what it is based on.
+/// Decision of the filter, and the statistics it is based on.
 struct range_statistical_result {
   std::vector<std::uint32_t> inliers;  ///< indices, ascending
-  std::vector<float> normalised;       ///< per point, spacing over explained spacing; NaN where either is not known
-  std::size_t judged = 0;              ///< points where it is finite
-  double mean = 0;                     ///< mu of those
+  std::vector<float> normalised;       ///< per point, spacing over explained spacing; NaN if either is unknown
+  std::size_t judged = 0;              ///< number of points with a finite quotient
+  double mean = 0;                     ///< mu of the quotients
   double standard_deviation = 0;       ///< sigma, with n - 1
-  double threshold = std::numeric_limits<double>::infinity();  ///< mu + alpha sigma; points beyond are outliers
+  double threshold = std::numeric_limits<double>::infinity();  ///< mu + alpha sigma; points above it are outliers
 };
 
-/// Decides on mean distances and ranges that are known already: see `range_statistical_inliers`. Points
-/// without a mean distance (NaN) are kept or dropped as `non_finite` says; those without a range alone
-/// stay. O(n).
+/// Decides on known mean distances and ranges: see `range_statistical_inliers`. `non_finite` decides on points without
+/// a mean distance (NaN); points without a range only are kept. O(n).
 /// @pre ranges is as long as mean_distance; angle >= 0, noise >= 0 and not both zero; least_range > 0
 [[nodiscard]] range_statistical_result range_statistical_decision(std::span<const float> mean_distance,
                                                                   std::span<const float> ranges,
@@ -129,7 +127,7 @@ struct range_statistical_result {
 
 namespace detail {
 
-/// `range_statistical_filter` for any points with known ranges.
+/// `range_statistical_filter` on a type-erased cloud with known ranges.
 template <execution_policy Policy>
 [[nodiscard]] range_statistical_result filter_by_range(const Policy& policy, const point_view& points,
                                                        std::span<const float> ranges,
@@ -137,7 +135,7 @@ template <execution_policy Policy>
 
 }  // namespace detail
 
-/// Finds the points that `range_statistical_inliers` returns, their scores and the threshold.
+/// Finds the points that `range_statistical_inliers` returns, with their scores and the threshold.
 template <execution_policy Policy, point_range Points>
 [[nodiscard]] range_statistical_result range_statistical_filter(const Policy& policy, const Points& points,
                                                                 const sensor_origins& origins,
@@ -147,10 +145,10 @@ template <execution_policy Policy, point_range Points>
                                  sensor_ranges(policy, points, origins), options);
 }
 
-/// The indices, ascending, of the points whose mean distance to their `neighbors` nearest neighbours,
-/// divided by the spacing that the sensor explains at their range, is at most mu + `sigma_multiplier`
-/// sigma of that quotient over the cloud. Points whose range is not known stay, all of them where none is
-/// (`judged` is 0 then). O(n log n) for fixed k; the same result for every policy.
+/// Returns the indices, ascending, of the points whose mean distance to their `neighbors` nearest neighbours, divided
+/// by the spacing that the sensor explains at their range, is at most mu + `sigma_multiplier` sigma of that quotient
+/// over the cloud. Keeps points of unknown range, so all points if no range is known (`judged` is 0 then). O(n log n)
+/// for fixed k; the same result for every policy.
 /// @pre neighbors > 0, fewer than 2^32 points; see `range_statistical_decision`
 template <execution_policy Policy, point_range Points>
 [[nodiscard]] std::vector<std::uint32_t> range_statistical_inliers(const Policy& policy, const Points& points,

@@ -23,25 +23,25 @@ struct voxel_grid_options {
 
 namespace detail {
 
-/// The number type in which cells are found: double holds all that a cloud can have.
+/// Number type for computing cells: double represents all coordinates that a cloud can have.
 template <point_range Points>
 using voxel_scalar =
     std::conditional_t<std::is_same_v<point_scalar_t<std::ranges::range_value_t<Points>>, float>, float, double>;
 
-/// `voxel_grid` for any points.
+/// `voxel_grid` on a type-erased cloud.
 template <execution_policy Policy, std::floating_point S>
 [[nodiscard]] point_cloud find_centroids(const Policy& policy, const basic_point_view<S>& points,
                                          std::span<const rgb8> colors, double size);
 
 }  // namespace detail
 
-/// One point for each occupied voxel, in the order in which the voxels are first seen: the centroid of its points, with
-/// the mean of their colours where `colors` is not empty; the same for every policy. Points that are not finite are
-/// left out, as are those more than 2^31 voxels from the origin. O(n). Memory meanwhile: about 20 bytes per point, 25
-/// with colours, and 25 MB, on one thread the latter alone for at most 2^17 points.
+/// Returns one point for each occupied voxel, in the order in which the voxels first occur: the centroid of its points,
+/// with the mean of their colours if `colors` is not empty. The result is the same for every policy. Skips non-finite
+/// points and points more than 2^31 voxels from the origin. O(n). Temporary memory: about 20 bytes per point, 25 with
+/// colours, and 25 MB; on one thread and for at most 2^17 points only the 25 MB.
 ///
-/// Coordinates are summed in double in the order of the points. Where many voxels are occupied, the points are first
-/// brought into parts whose voxels fit into the cache.
+/// Coordinates are summed in double in the order of the points. If many voxels are occupied, the points are first
+/// partitioned so that the voxels of each part fit into the cache.
 /// @pre size > 0, fewer than 2^32 - 1 points; colors is empty or as long as points
 template <execution_policy Policy, point_range Points>
 [[nodiscard]] point_cloud voxel_grid(const Policy& policy, const Points& points, std::span<const rgb8> colors,
@@ -52,7 +52,7 @@ template <execution_policy Policy, point_range Points>
                                 options.size);
 }
 
-/// One point for each occupied voxel of a cloud without colours.
+/// Returns one point for each occupied voxel of a cloud without colours.
 template <execution_policy Policy, point_range Points>
 [[nodiscard]] point_cloud voxel_grid(const Policy& policy, const Points& points,
                                      const voxel_grid_options& options = {}) {
@@ -62,7 +62,7 @@ template <point_range Points>
 [[nodiscard]] point_cloud voxel_grid(const Points& points, const voxel_grid_options& options = {}) {
   return voxel_grid(seq, points, std::span<const rgb8>{}, options);
 }
-/// One point, with its colour, for each occupied voxel of a `point_cloud`.
+/// Returns one point, with its colour, for each occupied voxel of a `point_cloud`.
 template <std::same_as<point_cloud> Cloud>
 [[nodiscard]] point_cloud voxel_grid(const Cloud& cloud, const voxel_grid_options& options = {}) {
   return voxel_grid(seq, cloud.points, cloud.colors, options);

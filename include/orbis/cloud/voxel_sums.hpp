@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Sums of measurements in voxels from which measurements can be taken back without a trace.
+/// Per-voxel sums of measurements, from which measurements can be removed exactly.
 ///
-/// Everything is summed in integers: where in its voxel a measurement lies, to 1/1024 of the edge; its
-/// colour; its range in millimetres. Such sums do not depend on any order, and what was added can be
-/// subtracted exactly. The surfaces that depth cameras see are thin, so that voxels are stored in bricks
-/// of 8^3, each with the sums of its occupied voxels only.
+/// All sums are integers: the position of a measurement in its voxel in units of 1/1024 of the edge, its colour, and
+/// its range in millimetres. Such sums do not depend on the order of addition, and subtraction is exact. The surfaces
+/// that depth cameras see are thin, so voxels are stored in bricks of 8^3, each with the sums of its occupied voxels
+/// only.
 #pragma once
 
 #include <algorithm>
@@ -35,15 +35,15 @@ namespace orbis::cloud {
 
 namespace detail {
 
-/// A place in a grid of bricks.
+/// A position in a grid of bricks.
 struct brick_place {
   voxel_key brick;
   std::uint16_t cell;                   ///< x + 8 y + 64 z
-  std::array<std::uint16_t, 3> offset;  ///< within the voxel, of 1024
+  std::array<std::uint16_t, 3> offset;  ///< within the voxel, in 1/1024 of its edge
 };
 
-/// Where a point lies, in one conversion to fixed point; false where it is not finite or more than 2^31
-/// voxels from the origin. `steps_per_metre`: 1024 for each voxel.
+/// Finds the voxel of a point with one conversion to fixed point. Returns false if the point is not finite or more than
+/// 2^31 voxels from the origin. `steps_per_metre`: 1024 per voxel.
 [[nodiscard]] inline bool locate(const vec3& point, double steps_per_metre, brick_place& out) noexcept {
   std::array<double, 3> scaled;
   for (std::size_t a = 0; a != 3; ++a)
@@ -53,7 +53,7 @@ struct brick_place {
   std::uint32_t cell = 0;
   for (std::size_t a = 0; a != 3; ++a) {
     const auto toward_zero = static_cast<std::int64_t>(scaled[a]);
-    // std::floor is a call without SSE4.
+    // std::floor is a function call without SSE4.
     const std::int64_t step = toward_zero - (scaled[a] < static_cast<double>(toward_zero) ? 1 : 0);
     out.brick[a] = static_cast<std::int32_t>(step >> 13);
     out.offset[a] = static_cast<std::uint16_t>(step & 1023);
@@ -65,8 +65,8 @@ struct brick_place {
 
 }  // namespace detail
 
-/// Measurements sorted into runs that lie in one brick each, for `voxel_sums`; a part of a larger set.
-/// Memory is kept from one use to the next.
+/// Measurements grouped into runs that lie in one brick each, as input of `voxel_sums`; a part of a larger set. Its
+/// memory is reused.
 class voxel_measurements {
  public:
   /// @pre size > 0, metres
@@ -77,16 +77,15 @@ class voxel_measurements {
     runs_.clear();
     without_voxel_ = 0;
   }
-  /// Adds a measurement (metres, in the world), with the distance in metres that it was made from.
-  /// Those that are not finite, and those more than 2^31 voxels from the origin, have no voxel and are
-  /// only counted.
+  /// Adds a measurement (world frame, metres) with the distance in metres from which it was made. Non-finite
+  /// measurements, and those more than 2^31 voxels from the origin, have no voxel and are only counted.
   void push(const vec3& point, const rgb8& color, float range) {
     detail::brick_place at;
     if (!detail::locate(point, steps_per_metre_, at)) {
       ++without_voxel_;
       return;
     }
-    constexpr float longest = 4e6F;  // metres; what fits, and more than any sensor reaches
+    constexpr float longest = 4e6F;  // metres; fits the integer, and exceeds the range of any sensor
     const auto millimetres =
         range > 0 ? static_cast<std::uint32_t>(static_cast<std::int64_t>(1000.0F * std::min(range, longest) + 0.5F))
                   : 0;
@@ -97,7 +96,7 @@ class voxel_measurements {
     }
     items_.push_back({at.cell, at.offset, color, millimetres});
   }
-  /// How many have a voxel.
+  /// Number of measurements that have a voxel.
   [[nodiscard]] std::size_t size() const noexcept { return items_.size(); }
   [[nodiscard]] std::size_t without_voxel() const noexcept { return without_voxel_; }
   [[nodiscard]] std::size_t memory_bytes() const noexcept {
@@ -108,18 +107,17 @@ class voxel_measurements {
   friend class voxel_sums;
   struct run {
     detail::voxel_key brick;
-    std::uint32_t begin;  ///< to where the next one begins
+    std::uint32_t begin;  ///< the run ends where the next one begins
   };
   double steps_per_metre_;
   std::vector<detail::voxel_item> items_;
   std::vector<run> runs_;
-  detail::voxel_key last_{};  ///< of the last run
+  detail::voxel_key last_{};  ///< brick of the last run
   std::size_t without_voxel_ = 0;
 };
 
-/// The mean of the measurements in each voxel, as a function of what was added and not yet removed, and
-/// of nothing else: not of the order, nor of the number of threads, nor of what was there before. About
-/// 50 bytes for each voxel.
+/// The mean of the measurements in each voxel. It depends only on the measurements added and not yet removed, not on
+/// their order, the number of threads or the history. About 50 bytes per voxel.
 class voxel_sums {
   [[nodiscard]] auto key_of() const {
     return [this](std::uint32_t number) -> const detail::voxel_key& { return bricks_[number].key; };
@@ -134,14 +132,14 @@ class voxel_sums {
   void add(const Policy& policy, std::span<voxel_measurements> parts) {
     apply<true>(policy, parts);
   }
-  /// Takes back measurements that were added; voxels without any, and bricks without voxels, are freed.
-  /// O(n). @pre they were added, and not removed since; not after `finish`
+  /// Removes measurements that were added. Frees voxels without measurements and bricks without voxels. O(n). @pre they
+  /// were added, and not removed since; not after `finish`
   template <execution_policy Policy>
   void remove(const Policy& policy, std::span<voxel_measurements> parts) {
     apply<false>(policy, parts);
   }
 
-  /// Frees the sums; which voxels are occupied stays. O(bricks).
+  /// Frees the sums but keeps the set of occupied voxels. O(bricks).
   void finish() {
     finished_ = true;
     for (brick& b : bricks_) b.voxels.drop_sums();
@@ -149,9 +147,9 @@ class voxel_sums {
     std::vector<chained_run>{}.swap(chained_);
   }
 
-  /// The number of occupied voxels.
+  /// Number of occupied voxels.
   [[nodiscard]] std::size_t size() const noexcept { return occupied_; }
-  /// All memory that is held, bytes.
+  /// Memory in use, bytes.
   [[nodiscard]] std::size_t memory_bytes() const noexcept {
     std::size_t bytes = bricks_.capacity() * sizeof(brick) + free_.capacity() * sizeof(std::uint32_t) +
                         touched_.capacity() * sizeof(std::uint32_t) + chained_.capacity() * sizeof(chained_run) +
@@ -160,13 +158,13 @@ class voxel_sums {
     return bytes;
   }
 
-  /// Gives every voxel its place in the order of `cloud`: by brick, then by voxel, along z, y, x. Valid
-  /// until the next change. O(bricks log bricks).
+  /// Place of every voxel in the order of `cloud`: by brick, then by voxel, along z, y, x. Valid until the next change.
+  /// O(bricks log bricks).
   class order {
    private:
     friend class voxel_sums;
     std::vector<std::uint32_t> bricks_;  ///< numbers, in order
-    std::vector<std::size_t> first_;     ///< for each brick's number the place of its first voxel
+    std::vector<std::size_t> first_;     ///< per brick number, the place of its first voxel
   };
   [[nodiscard]] order in_order() const {
     order out;
@@ -187,15 +185,16 @@ class voxel_sums {
     return out;
   }
 
-  /// Some of the voxels, in a form made for many questions. Valid until the next change.
+  /// A subset of the voxels, stored for fast look-ups. Valid until the next change.
   class choice {
    public:
     choice() = default;
-    /// Asks about points one after the other, quickly where most lie in the same brick as the one before.
+    /// Looks up points one after the other; fast if most lie in the same brick as the previous one.
     class reader {
      public:
       explicit reader(const choice& of) noexcept : of_{&of} {}
-      /// Whether the voxel that the point (metres, in the world) lies in was chosen; empty where nothing is.
+      /// Returns true if the voxel that contains the point (world frame, metres) was chosen; empty if the voxel is not
+      /// occupied.
       [[nodiscard]] std::optional<bool> find(const vec3& point) {
         detail::brick_place at;
         if (!detail::locate(point, 1024.0 / of_->sums_->size_, at)) return std::nullopt;
@@ -211,16 +210,17 @@ class voxel_sums {
      private:
       const choice* of_;
       bool asked_ = false;
-      detail::voxel_key brick_{};  ///< of the last point,
-      std::uint32_t number_ = 0;   ///< and its number
+      detail::voxel_key brick_{};  ///< of the last point
+      std::uint32_t number_ = 0;   ///< number of that brick
     };
 
    private:
     friend class voxel_sums;
     const voxel_sums* sums_ = nullptr;
-    std::vector<std::array<std::uint64_t, 8>> chosen_;  ///< by the bricks' numbers, a bit for each cell
+    std::vector<std::array<std::uint64_t, 8>> chosen_;  ///< by brick number, one bit per cell
   };
-  /// `chosen`: for each voxel, in the order of `cloud`, not 0 if it is chosen. O(voxels + bricks log bricks).
+  /// Makes a subset. `chosen`: per voxel, in the order of `cloud`, nonzero if it is chosen. O(voxels + bricks log
+  /// bricks).
   [[nodiscard]] choice choose(std::span<const char> chosen) const {
     assert(chosen.size() == occupied_);
     choice out;
@@ -235,7 +235,7 @@ class voxel_sums {
     return out;
   }
 
-  /// The mean of each voxel's measurements, with their mean colours. O(voxels). @pre not after `finish`
+  /// Returns the mean of each voxel's measurements, with their mean colours. O(voxels). @pre not after `finish`
   template <execution_policy Policy>
   [[nodiscard]] point_cloud cloud(const Policy& policy, const order& places, bool with_colors = true) const {
     point_cloud out;
@@ -244,7 +244,7 @@ class voxel_sums {
     for_each_voxel(
         policy, places, [&](std::size_t place, const detail::voxel_key& voxel, const detail::voxel_sum& sum) {
           for (std::size_t a = 0; a != 3; ++a) {
-            // An offset stands for the middle of its 1/1024.
+            // An offset represents the middle of its 1/1024.
             const double within = (sum.offset[a] / static_cast<double>(sum.count) + 0.5) / 1024.0;
             out.points[place][static_cast<Eigen::Index>(a)] = static_cast<float>((voxel[a] + within) * size_);
           }
@@ -255,7 +255,7 @@ class voxel_sums {
         });
     return out;
   }
-  /// The mean of the distances that each voxel was measured from, metres. O(voxels). @pre not after `finish`
+  /// Returns the mean distance from which each voxel was measured, metres. O(voxels). @pre not after `finish`
   template <execution_policy Policy>
   [[nodiscard]] std::vector<float> ranges(const Policy& policy, const order& places) const {
     std::vector<float> out(occupied_);
@@ -269,7 +269,7 @@ class voxel_sums {
   static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
   struct brick {
     detail::voxel_key key{};
-    std::uint32_t first_run = none;  ///< while measurements are applied
+    std::uint32_t first_run = none;  ///< used while measurements are applied
     detail::voxel_brick voxels{};
   };
 
@@ -289,7 +289,7 @@ class voxel_sums {
     });
   }
 
-  /// The brick with this key, a new one if there is none.
+  /// Returns the number of the brick with this key; adds the brick if it does not exist.
   std::uint32_t brick_at(const detail::voxel_key& key) {
     const auto number = free_.empty() ? static_cast<std::uint32_t>(bricks_.size()) : free_.back();
     if (const std::uint32_t found = index_.find_or_insert(key, number, key_of()); found != number) return found;
@@ -304,7 +304,7 @@ class voxel_sums {
   template <bool Add, execution_policy Policy>
   void apply(const Policy& policy, std::span<voxel_measurements> parts) {
     assert(!finished_);
-    // Runs are chained brick by brick, then every brick is one thread's.
+    // Runs are chained by brick; then one thread handles each brick.
     std::size_t total = 0;
     for (const auto& part : parts) total += part.runs_.size();
     chained_.clear();
@@ -328,7 +328,7 @@ class voxel_sums {
         chained_.push_back({{part.items_.data() + run.begin, part.items_.data() + end}, next});
       }
     }
-    std::atomic<std::size_t> more{0};  // modulo 2^64: also where there are fewer
+    std::atomic<std::size_t> more{0};  // modulo 2^64, so it can also decrease
     for_each_index(policy, touched_.size(), 8, [&](std::size_t i) {
       brick& b = bricks_[touched_[i]];
       const std::size_t before = b.voxels.size();
@@ -356,15 +356,15 @@ class voxel_sums {
 
   struct chained_run {
     std::span<const detail::voxel_item> items;
-    std::uint32_t next;  ///< of the same brick
+    std::uint32_t next;  ///< next run of the same brick
   };
   double size_;
-  bool finished_ = false;  ///< the sums are gone
+  bool finished_ = false;  ///< the sums were freed
   std::size_t occupied_ = 0;
   std::vector<brick> bricks_;
-  std::vector<std::uint32_t> free_;                                ///< numbers of bricks that are not in use
-  number_index<detail::voxel_key, detail::voxel_key_hash> index_;  ///< of bricks
-  std::vector<std::uint32_t> touched_;                             ///< kept for their memory
+  std::vector<std::uint32_t> free_;                                ///< numbers of unused bricks
+  number_index<detail::voxel_key, detail::voxel_key_hash> index_;  ///< numbers of the bricks by key
+  std::vector<std::uint32_t> touched_;                             ///< scratch memory, reused
   std::vector<chained_run> chained_;
 };
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Looking up voxels that lie near each other: an accessor remembers where it looked last.
+/// Fast look-up of voxels near each other: an accessor caches its last position.
 #pragma once
 
 #include <concepts>
@@ -13,8 +13,7 @@
 
 namespace orbis::octree::detail {
 
-/// Reads octants, bricks and chunks of a store, which must outlive it and stay as it is. One for each
-/// thread.
+/// Reads octants, bricks and chunks of a store, which must outlive the reader and must not change. Use one per thread.
 template <class T>
 class store_reader {
  public:
@@ -22,25 +21,25 @@ class store_reader {
 
   explicit store_reader(const brick_store<T>& store) noexcept : store_{&store} {}
 
-  /// The octant that contains `k`; nothing in it is known where nothing is stored. O(1).
+  /// Returns the octant that contains `k`; all its voxels are unknown if nothing is stored there. O(1).
   [[nodiscard]] const octant_view<T>& octant(const voxel_key& k) noexcept {
     if (const std::uint32_t far = distance(k); far >= cells_) move(k, far);
     return octant_;
   }
-  /// The value of voxel `k`, empty where nothing is known. O(1).
+  /// Returns the value of voxel `k`, empty if unknown. O(1).
   [[nodiscard]] std::optional<T> value(const voxel_key& k) noexcept {
     const octant_view<T>& o = octant(k);
     const std::uint32_t place = place_in_octant(k);
     return (o.known >> place & 1U) != 0 ? std::optional{o.at(place)} : std::nullopt;
   }
-  /// The octant asked for last.
+  /// Returns the last octant that was read.
   [[nodiscard]] const octant_view<T>& last() const noexcept { return octant_; }
-  /// Whether all that is known in the octant asked for last is less than `bound`.
+  /// Returns true if all known values in the last octant are less than `bound`.
   [[nodiscard]] bool is_below(T bound) const noexcept { return max_ < bound; }
   [[nodiscard]] const brick_store<T>& store() const noexcept { return *store_; }
 
  private:
-  /// At least as large as the smallest node that contains both `k` and the last octant.
+  /// Upper bound of the size of the smallest node that contains both `k` and the last octant.
   [[nodiscard]] std::uint32_t distance(const voxel_key& k) const noexcept {
     return (k.x ^ at_.x) | (k.y ^ at_.y) | (k.z ^ at_.z);
   }
@@ -61,34 +60,34 @@ class store_reader {
   }
 
   const brick_store<T>* store_;
-  voxel_key at_{~0U, ~0U, ~0U};  ///< the voxel asked for last; at first far from all
-  std::uint32_t cells_ = 0;      ///< the edge of the node around it that `octant_` stands for
+  voxel_key at_{~0U, ~0U, ~0U};  ///< the last voxel read; initially far from all
+  std::uint32_t cells_ = 0;      ///< edge of the node around it that `octant_` represents
   const chunk* chunk_ = nullptr;
   const brick<T>* brick_ = nullptr;
   octant_view<T> octant_;
-  T max_{};  ///< the largest value in the octant, if anything is known there
+  T max_{};  ///< the largest value in the octant, if any is known
 };
 
 }  // namespace orbis::octree::detail
 
 namespace orbis::octree {
 
-/// What queries need of a map: its sensor model, its store and its grid. See occupancy_octree.
+/// Requirements of queries on a map: a sensor model, a store and a grid. See occupancy_octree.
 template <class M>
 concept octree_map = sensor_model<typename M::model> && requires(const M& map) {
   { map.store() } -> std::same_as<const detail::brick_store<typename M::model::value_type>&>;
   { map.grid() } -> std::same_as<const voxel_grid&>;
 };
 
-/// The probability that a stored value stands for; empty if there is none.
+/// Probability of a stored value; empty if there is none.
 template <sensor_model Model>
 [[nodiscard]] std::optional<double> probability_at(std::optional<typename Model::value_type> v) noexcept {
   return v ? std::optional{probability_of(*v)} : std::nullopt;
 }
 
-/// The queries of a map for points or voxels of which each lies near the one before: along a ray, on
-/// a surface, in a scan. Those are found without a search. The map must outlive it and stay as it is;
-/// one for each thread.
+/// Queries of a map at points or voxels near each other: along a ray, on a surface, in a scan. A place near the
+/// previous one is found without a search. The map must outlive the accessor and must not change; use one accessor per
+/// thread.
 ///
 /// @code
 ///   auto near = map.accessor();
@@ -102,22 +101,22 @@ class octree_accessor {
   octree_accessor(const detail::brick_store<value_type>& store, const voxel_grid& grid) noexcept
       : reader_{store}, grid_{grid} {}
 
-  /// What is stored at `p`: empty where unknown or outside the grid. O(1), as are all.
+  /// Returns the value stored at `p`; empty if unknown or outside the grid. All queries are O(1).
   template <point_like P>
   [[nodiscard]] std::optional<value_type> value(const P& p) noexcept {
     const auto key = grid_.key(p);
     return key ? reader_.value(*key) : std::nullopt;
   }
   [[nodiscard]] std::optional<value_type> value(const voxel_key& key) noexcept { return reader_.value(key); }
-  /// The log-odds at `p`, empty where unknown or outside the grid.
+  /// Returns the log-odds at `p`, empty if unknown or outside the grid.
   template <class P>
   requires point_like<P> || std::same_as<P, voxel_key>
   [[nodiscard]] std::optional<value_type> log_odds(const P& p) noexcept { return value(p); }
-  /// The probability that `p` is occupied, empty where unknown or outside the grid.
+  /// Returns the probability that `p` is occupied, empty if unknown or outside the grid.
   template <class P>
   requires point_like<P> || std::same_as<P, voxel_key>
   [[nodiscard]] std::optional<double> probability(const P& p) noexcept { return probability_at<Model>(value(p)); }
-  /// What is known about `p`.
+  /// Returns the state of `p`.
   template <class P>
   requires point_like<P> || std::same_as<P, voxel_key>
   [[nodiscard]] occupancy state(const P& p) noexcept {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The first occupied or unknown voxel along a ray, as OctoMap's `castRay` finds it.
+/// Ray casting: the first occupied or unknown voxel along a ray, identical to that of OctoMap's `castRay`.
 #pragma once
 
 #include <array>
@@ -23,29 +23,29 @@ namespace orbis::octree {
 
 enum class ray_end {
   hit,           ///< an occupied voxel
-  unknown,       ///< a voxel nothing is known about
-  out_of_range,  ///< the centre of the voxel lies beyond the range
+  unknown,       ///< an unknown voxel
+  out_of_range,  ///< the centre of the voxel is beyond the range
   out_of_grid,   ///< the ray leaves the grid, or starts outside
   no_direction   ///< the direction is zero or not finite
 };
 
-/// Where a ray ended.
+/// End of a cast ray.
 struct ray_hit {
   ray_end end = ray_end::out_of_grid;
-  voxel_key key;              ///< the voxel where it ended
-  vec3 point = zeros<vec3>();  ///< its centre, metres; both are zero if the ray starts outside the grid
+  voxel_key key;               ///< the voxel in which the ray ended
+  vec3 point = zeros<vec3>();  ///< its centre, metres; key and point are zero if the ray starts outside the grid
 
-  /// Whether something occupied was hit.
+  /// Returns true if the ray hit an occupied voxel.
   [[nodiscard]] explicit operator bool() const noexcept { return end == ray_end::hit; }
 };
 
 struct ray_options {
-  double max_range = std::numeric_limits<double>::infinity();  ///< metres; infinite or <= 0: no limit but the grid
-  bool ignore_unknown = false;                                 ///< whether rays go on through unknown space
+  double max_range = std::numeric_limits<double>::infinity();  ///< metres; infinite or <= 0: limited by the grid only
+  bool ignore_unknown = false;                                 ///< true if rays pass through unknown space
 };
 
-/// Casts rays, one after the other: faster if each passes near the one before. One for each thread;
-/// store and grid must outlive it and stay as they are.
+/// Casts rays one after the other; faster if each passes near the previous one. Use one per thread; store and grid must
+/// outlive the caster and must not change.
 template <sensor_model Model>
 class ray_caster {
  public:
@@ -54,8 +54,8 @@ class ray_caster {
   ray_caster(const detail::brick_store<value_type>& store, const voxel_grid& grid, const ray_options& options) noexcept
       : reader_{store}, grid_{grid}, options_{options} {}
 
-  /// Walks from `origin` along `direction` (any length) until a voxel is occupied, or unknown unless
-  /// that is ignored, or too far away. O(voxels along the ray), few operations for each.
+  /// Walks from `origin` along `direction` (any length) to the first voxel that is occupied, unknown (unless ignored)
+  /// or out of range. O(voxels along the ray), with few operations per voxel.
   [[nodiscard]] ray_hit operator()(const detail::float3& origin, detail::float3 direction) noexcept {
     const auto start = grid_.key(origin);
     if (!start) return {};
@@ -73,14 +73,14 @@ class ray_caster {
     detail::skipping_traversal ray{cursor};
     const double safe = surely_in_range(origin);
     for (;;) {
-      // Where nothing can stop it, the ray leaps to the node's face.
+      // Leap to the face of a node in which no voxel can stop the ray.
       std::uint32_t cells = passable_cells(ray.key());
       if (cells == 0) {
         if (const auto stop = stop_at(ray.key())) return ended(*stop, ray.key());
         cells = is_passable_octant() ? node_cells(detail::octant_level) : 0;
       }
       if (cells != 0) {
-        const auto way = ray.find_way_out(cells);
+        const auto way = ray.find_node_exit(cells);
         if (way.face.parameter < safe) {
           ray.take(way);
           if (!ray.is_outside()) continue;
@@ -105,11 +105,11 @@ class ray_caster {
 
  private:
   using chunk = typename detail::brick_store<value_type>::chunk;
-  /// What is remembered of a chunk, stored or not. Which bricks let rays through is worked out once
-  /// enough rays have come by.
+  /// Cached data of a chunk, stored or not. The mask of passable bricks is computed once enough rays have visited the
+  /// chunk.
   struct seen_chunk {
     std::uint64_t name = ~std::uint64_t{0};
-    std::uint64_t passable = 0;  ///< bricks in Morton order
+    std::uint64_t passable = 0;  ///< passable bricks, in Morton order
     const chunk* content = nullptr;
     std::uint32_t visits = 0;
   };
@@ -126,14 +126,14 @@ class ray_caster {
     const bool occupied = !reader_.is_below(Model::occupancy_threshold) && is_occupied<Model>(o.at(place));
     return occupied ? std::optional{ray_end::hit} : std::nullopt;
   }
-  /// Whether no voxel of the octant asked for last stops a ray.
+  /// Returns true if no voxel of the last octant stops a ray.
   [[nodiscard]] bool is_passable_octant() const noexcept {
     const std::uint64_t known = reader_.last().known;
     const bool is_free = known == 0 || reader_.is_below(Model::occupancy_threshold);
     return is_free && (options_.ignore_unknown || known == ~std::uint64_t{0});
   }
-  /// The edge, in voxels, of a node from a brick to a chunk around `k` in which no voxel stops a ray; 0
-  /// if there is none.
+  /// Returns the edge, in voxels, of a node around `k`, from a brick to a chunk, in which no voxel stops a ray; 0 if
+  /// there is none.
   [[nodiscard]] std::uint32_t passable_cells(const voxel_key& k) noexcept {
     const seen_chunk& c = chunk_at(k);
     const std::uint32_t place = detail::place_in_chunk(k);
@@ -171,8 +171,8 @@ class ray_caster {
     return passable;
   }
 
-  /// A ray parameter up to which no voxel's centre is beyond the range. A centre is at most 0.87
-  /// voxels away from where the ray enters the voxel; floats round to 6e-8 of their size.
+  /// Ray parameter up to which no voxel's centre is out of range. A centre is at most 0.87 voxels away from the point
+  /// where the ray enters the voxel; floats are rounded to 6e-8 of their magnitude.
   [[nodiscard]] double surely_in_range(const detail::float3& origin) const noexcept {
     if (!(options_.max_range > 0.0)) return std::numeric_limits<double>::infinity();
     double far = options_.max_range;
@@ -193,11 +193,11 @@ class ray_caster {
   voxel_grid grid_;
   ray_options options_;
   std::array<seen_chunk, chunks_kept> seen_{};
-  std::size_t here_ = 0;  ///< of the chunk looked at last
+  std::size_t here_ = 0;  ///< index of the last chunk read
 };
 
-/// Casts many rays: `out[i]` becomes where the ray from `origins[i]` along `directions[i]` ends, the
-/// same under every policy. `origins` may be a single point. Allocates nothing.
+/// Casts many rays: sets `out[i]` to the end of the ray from `origins[i]` along `directions[i]`; the same under every
+/// policy. `origins` may be a single point. Allocates nothing.
 /// @pre origins (unless a point), directions and out have the same size
 template <execution_policy Policy, octree_map Map, class Origins, point_range Directions>
 requires point_range<Origins> || point_like<Origins>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Which voxels changed since a revision: for sending changes of a map to other processes, or for updating what was
-/// derived from it.
+/// Log of voxels changed since a revision, for sending changes of a map to other processes or updating data derived
+/// from it.
 #pragma once
 
 #include <algorithm>
@@ -18,8 +18,8 @@
 
 namespace orbis::octree {
 
-/// A log of changed voxels by revision, as masks of octants of 4x4x4 voxels. A reader that has seen revision r asks for
-/// what changed after it:
+/// A log of changed voxels by revision, as masks of octants of 4x4x4 voxels. A reader that has processed revision r
+/// requests the changes after it:
 ///
 /// @code
 ///   const std::uint64_t seen = log.revision();
@@ -27,23 +27,22 @@ namespace orbis::octree {
 ///   log.for_each_since(seen, [&](const voxel_key& octant, std::uint64_t mask) { send(octant, mask); });
 /// @endcode
 ///
-/// 24 bytes for each recorded octant and revision, up to a capacity; beyond it the oldest are merged,
-/// one for each octant, a few with each new one, so that memory is bounded by the capacity and the
-/// number of octants that have ever changed and no record() waits for long. Const members may be
-/// called from several threads at once.
+/// 24 bytes per recorded octant and revision, up to a capacity. Beyond the capacity the oldest entries are merged into
+/// one entry per octant, a few with each new entry. Memory is thus bounded by the capacity and the number of octants
+/// that have ever changed, and record() has no long pauses. Const members can be called from several threads at once.
 class change_log {
  public:
-  /// The current revision; 0 until the first begin_revision().
+  /// Returns the current revision; 0 before the first begin_revision().
   [[nodiscard]] std::uint64_t revision() const noexcept { return revision_; }
-  /// Begins the next revision, and returns its number.
+  /// Begins the next revision and returns its number.
   std::uint64_t begin_revision() noexcept {
     if (entries_.size() < 2 * capacity_) limit_ = 2 * capacity_;
     return ++revision_;
   }
 
-  /// Voxels of the octant that contains `k` have changed in this revision: those whose bits are set, in
-  /// Morton order. Any number of times for the same octant. Amortised O(1), as long as no revision
-  /// outgrows twice the capacity. @pre revision() != 0; coordinates < 2^21
+  /// Records that voxels of the octant that contains `k` changed in this revision: those whose bits are set, in Morton
+  /// order. Can be called repeatedly for an octant. Amortised O(1), as long as no revision exceeds twice the capacity.
+  /// @pre revision() != 0; coordinates < 2^21
   void record(const voxel_key& k, std::uint64_t mask) {
     assert(revision_ != 0);
     if (mask == 0) return;
@@ -52,16 +51,15 @@ class change_log {
       entries_.back().mask |= mask;
       return;
     }
-    // Two old ones for each new one: a log that has grown too long shrinks again.
+    // Merge two old entries for each new one, so that a log that has grown too long shrinks again.
     for (int i = 0; i != 2 && entries_.size() >= capacity_; ++i) merge_oldest();
     if (entries_.size() >= limit_) unite_newest();
     entries_.push_back({octant, mask, revision_});
   }
 
-  /// Calls `visit(lowest voxel of the octant, mask)` once for every octant of which a voxel changed
-  /// after `revision`, in Morton order; the mask has the voxels that did. If `revision` is older than
-  /// exact_since(), it may have more of those that changed before as well. O(n log n) for the n entries
-  /// looked at. @pre revision >= complete_since()
+  /// Calls `visit(lowest voxel of the octant, mask)` once for every octant with voxels that changed after `revision`,
+  /// in Morton order; the mask selects these voxels. If `revision` is older than exact_since(), the mask may also
+  /// contain voxels that changed earlier. O(n log n) for n entries read. @pre revision >= complete_since()
   template <std::invocable<const voxel_key&, std::uint64_t> Visit>
   void for_each_since(std::uint64_t revision, Visit&& visit) const {
     assert(revision >= complete_since_);
@@ -76,7 +74,7 @@ class change_log {
     for (const entry& e : changed) visit(morton_key(e.octant << 6U), e.mask);
   }
 
-  /// Forgets changes up to `revision`. Afterwards, only revisions from this one on may be asked about. O(entries).
+  /// Discards changes up to `revision`, which becomes the oldest revision for queries. O(entries).
   void forget_before(std::uint64_t revision) {
     if (revision <= complete_since_) return;
     complete_since_ = std::max(complete_since_, std::min(revision, revision_));
@@ -87,15 +85,14 @@ class change_log {
     for (std::size_t i = 0; i != merged_.size(); ++i)
       merged_index_.set(merged_[i].octant, static_cast<std::uint32_t>(i));
   }
-  /// The oldest revision that may be asked about, see forget_before(), clear() and stop(): who has seen only an
-  /// older one needs the whole map.
+  /// Oldest revision for which queries are complete, see forget_before(), clear() and stop(). A reader that has
+  /// processed only an older one needs the whole map.
   [[nodiscard]] std::uint64_t complete_since() const noexcept { return complete_since_; }
-  /// The oldest revision about which answers are exact; for older ones they may have too many voxels,
-  /// never too few.
+  /// Oldest revision for which queries are exact; for older ones the masks may contain additional voxels but miss none.
   [[nodiscard]] std::uint64_t exact_since() const noexcept { return exact_since_; }
 
-  /// How many octants and revisions to tell apart before the oldest are merged. The current revision is
-  /// never merged, however much there is of it.
+  /// Sets the number of entries (octants and revisions) from which on the oldest are merged. The current revision is
+  /// never merged, whatever its size.
   void set_capacity(std::size_t entries) {
     capacity_ = entries;
     limit_ = 2 * entries;
@@ -104,7 +101,7 @@ class change_log {
   }
   [[nodiscard]] std::size_t capacity() const noexcept { return capacity_; }
 
-  /// Forgets all changes and keeps the revision number. O(1).
+  /// Discards all changes and keeps the revision number. O(1).
   void clear() {
     const std::size_t capacity = capacity_;
     const std::uint64_t revision = revision_;
@@ -112,25 +109,25 @@ class change_log {
     set_capacity(capacity);
     revision_ = complete_since_ = exact_since_ = revision;
   }
-  /// Changes are not recorded from now on: forgets all, and until the next clear() no revision may be asked about, not
-  /// the current one either. A log that never had a revision says so by revision() == 0. O(1).
+  /// Stops recording: discards all changes; until the next clear() no revision is complete, including the current one.
+  /// A log that never had a revision has revision() == 0. O(1).
   void stop() {
     clear();
     if (revision_ != 0) exact_since_ = ++complete_since_;
   }
-  /// Bytes on the heap.
+  /// Heap memory in bytes.
   [[nodiscard]] std::size_t memory_bytes() const noexcept {
     return entries_.memory_bytes() + merged_.capacity() * sizeof(entry) + merged_index_.memory_bytes();
   }
 
  private:
   struct entry {
-    std::uint64_t octant;  ///< its Morton code
+    std::uint64_t octant;  ///< Morton code
     std::uint64_t mask;
-    std::uint64_t revision;  ///< in which it changed; the last one if several are merged
+    std::uint64_t revision;  ///< revision of the change; the last one of merged entries
   };
 
-  /// First in, first out, in a ring that grows to the longest it has been.
+  /// A first-in-first-out ring buffer that grows to its maximum size.
   class queue {
    public:
     queue() = default;
@@ -169,12 +166,12 @@ class change_log {
    private:
     [[nodiscard]] std::size_t place(std::size_t i) const noexcept { return (first_ + i) & (ring_.size() - 1); }
 
-    std::vector<entry> ring_;  ///< as many as a power of two, or none
+    std::vector<entry> ring_;  ///< size is a power of two or zero
     std::size_t first_ = 0;
     std::size_t size_ = 0;
   };
 
-  /// The number of entries of revisions up to `revision`.
+  /// Number of entries of revisions up to `revision`.
   [[nodiscard]] std::size_t first_after(std::uint64_t revision) const noexcept {
     std::size_t low = 0, high = entries_.size();
     while (low != high) {
@@ -187,7 +184,7 @@ class change_log {
     return low;
   }
 
-  /// Sorts entries by octant, each octant once.
+  /// Sorts entries by octant and merges those of the same octant.
   static void unite(std::vector<entry>& entries) {
     std::sort(entries.begin(), entries.end(), [](const entry& a, const entry& b) { return a.octant < b.octant; });
     auto out = entries.begin();
@@ -199,7 +196,7 @@ class change_log {
     }
     entries.erase(out, entries.end());
   }
-  /// Unites what the current revision has so far, which loses nothing.
+  /// Merges the entries of the current revision by octant, which loses no information.
   void unite_newest() {
     const std::size_t first = first_after(revision_ - 1);
     std::vector<entry> newest;
@@ -210,7 +207,7 @@ class change_log {
     entries_.truncate(first + newest.size());
     limit_ = std::max(2 * capacity_, 2 * entries_.size());
   }
-  /// Merges the oldest entry into what is kept once for each octant, unless it is of this revision.
+  /// Moves the oldest entry to the merged entries, unless it is of the current revision.
   bool merge_oldest() {
     if (entries_.empty() || entries_[0].revision == revision_) return false;
     const entry oldest = entries_[0];
@@ -226,14 +223,14 @@ class change_log {
     return true;
   }
 
-  queue entries_;              ///< in the order of revisions
-  std::vector<entry> merged_;  ///< each octant once
+  queue entries_;              ///< in order of revision
+  std::vector<entry> merged_;  ///< one entry per octant
   hash_index merged_index_;
   std::uint64_t revision_ = 0;
   std::uint64_t complete_since_ = 0;
   std::uint64_t exact_since_ = 0;
   std::size_t capacity_ = std::size_t{1} << 18U;
-  std::size_t limit_ = 2 * capacity_;  ///< entries at which to unite those of the current revision
+  std::size_t limit_ = 2 * capacity_;  ///< number of entries at which those of the current revision are merged
 };
 
 }  // namespace orbis::octree

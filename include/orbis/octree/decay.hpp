@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Decay: how the value of a voxel changes with the time since it was observed. What was seen long ago may have moved
-/// away; its voxels fade towards unknown and become unknown in the end.
+/// Decay: change of a voxel's value with the time since its last observation. Objects seen long ago may have moved
+/// away; their voxels fade towards unknown and finally become unknown.
 ///
-/// A policy is a pure function of a voxel's value, so that a map may apply it once for each distinct value
-/// (`occupancy_octree::transform`). Write your own to decay in another way, or to forget: empty is unknown.
+/// A policy is a pure function of a voxel's value, so that a map can apply it once per distinct value
+/// (`occupancy_octree::transform`). Write a custom policy for another kind of decay or to erase voxels: an empty result
+/// means unknown.
 #pragma once
 
 #include <algorithm>
@@ -16,7 +17,7 @@
 
 namespace orbis::octree {
 
-/// Where a value comes to rest: log-odds 0, or the value nearest to it that has the same state.
+/// Limit of the decay of a value: log-odds 0, or the value nearest to it with the same state.
 template <sensor_model M>
 [[nodiscard]] inline typename M::value_type resting_value(typename M::value_type v) noexcept {
   using T = typename M::value_type;
@@ -24,13 +25,13 @@ template <sensor_model M>
   return M::occupancy_threshold > 0 ? T{0} : largest_free_value<M>();
 }
 
-/// Log-odds halve in every `half_life`. Applying it twice is applying it once for the sum of the times,
-/// but for rounding. Free never turns into occupied, nor back.
+/// Exponential decay: log-odds halve in every `half_life`. Two applications equal one for the sum of the times, up to
+/// rounding. Free never becomes occupied, nor vice versa.
 /// @pre half_life > 0, elapsed >= 0
 template <sensor_model M = log_odds<>>
 struct exponential_decay {
   double half_life = 60.0;  ///< seconds
-  double elapsed = 1.0;     ///< since the last time, seconds
+  double elapsed = 1.0;     ///< time since the last application, seconds
 
   [[nodiscard]] typename M::value_type operator()(typename M::value_type v) const noexcept {
     assert(half_life > 0.0 && elapsed >= 0.0);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A depth image as points in the world.
+/// World points of a depth image.
 #pragma once
 
 #include <algorithm>
@@ -24,14 +24,13 @@
 
 namespace orbis::octree {
 
-/// The rays of a camera's pixels, as camera::ray_table has them, x and y apart. A pinhole's x depends
-/// on the column alone and its y on the row alone, so that it needs no table. Kept from frame to
-/// frame for as long as the camera stays the same.
+/// Rays of a camera's pixels, as in camera::ray_table, with x and y stored separately. The x of a pinhole's ray depends
+/// only on the column and the y only on the row, so that no table is needed. Reused for all frames of the same camera.
 class pixel_rays {
  public:
   static constexpr int padding = 16;  ///< readable values after the end of a row
 
-  /// Makes these the rays of `camera`; does nothing if they are already, as far as `==` can tell.
+  /// Sets the rays to those of `camera`; does nothing if it compares equal (`==`) to the current one.
   template <camera::camera_model Camera>
   void fit(const Camera& camera) {
     if constexpr (std::same_as<Camera, camera::any_camera>) {
@@ -49,7 +48,7 @@ class pixel_rays {
       tabulate(camera);
       if constexpr (std::regular<Camera>) {
         if (last != nullptr)
-          *last = camera;  // in place: nothing is allocated
+          *last = camera;  // in place, without allocation
         else
           camera_ = camera;
       }
@@ -58,16 +57,17 @@ class pixel_rays {
 
   [[nodiscard]] int width() const noexcept { return width_; }
   [[nodiscard]] int height() const noexcept { return height_; }
-  /// Whether x depends on the column alone and y on the row alone.
+  /// Returns true if x depends only on the column and y only on the row.
   [[nodiscard]] bool separable() const noexcept { return separable_; }
-  /// Changes whenever the rays do.
+  /// Version number; changes with the rays.
   [[nodiscard]] unsigned version() const noexcept { return version_; }
-  /// The pixel of a ray is about `focal * (x, y) + center`; exactly, if separable.
+  /// Focal length of the approximate projection: the pixel of a ray is about `focal * (x, y) + center`; exactly, if
+  /// separable.
   [[nodiscard]] const vec2& focal() const noexcept { return focal_; }
   [[nodiscard]] const vec2& center() const noexcept { return center_; }
-  /// The x of the rays of row `v`, NaN where there is none.
+  /// Returns the x of the rays of row `v`, NaN if a pixel has no ray.
   [[nodiscard]] const float* x(int v) const noexcept { return x_.data() + (separable_ ? 0 : row(v)); }
-  /// The y of the rays of row `v`; a single value if separable.
+  /// Returns the y of the rays of row `v`; a single value if separable.
   [[nodiscard]] const float* y(int v) const noexcept { return y_.data() + (separable_ ? v : row(v)); }
   [[nodiscard]] std::pair<float, float> at(int u, int v) const noexcept { return {x(v)[u], y(v)[separable_ ? 0 : u]}; }
   [[nodiscard]] std::size_t memory_bytes() const noexcept { return (x_.capacity() + y_.capacity()) * sizeof(float); }
@@ -110,8 +110,8 @@ class pixel_rays {
   bool separable_ = false;
 };
 
-/// Appends to `points` the world points (metres) of the pixels of `depth` that hold a measurement
-/// and whose ray the camera can un-project, row by row.
+/// Appends the world points (metres) of the pixels of `depth` that have a measurement and a valid ray to `points`, row
+/// by row.
 /// @pre depth and camera have the same size
 template <camera::depth_source Depth>
 void append_world_points(const Depth& depth, const pixel_rays& rays, const se3& T_world_camera,

@@ -44,7 +44,7 @@ struct octomap_file {
   std::string_view data;
 };
 
-/// Parses the header. Comments, CRLF and keywords in any order are accepted.
+/// Parses the header. Accepts comments, CRLF and keywords in any order.
 [[nodiscard]] inline result<octomap_file> parse_header(std::string_view bytes, std::string_view magic,
                                                        const std::string& where) {
   const auto next_line = [&]() -> std::optional<std::string_view> {
@@ -84,7 +84,7 @@ struct octomap_file {
       if (parsed.ec != std::errc{} || parsed.ptr != end || !std::isfinite(file.resolution) || file.resolution <= 0.0)
         return fail(errc::malformed, where, "the resolution is not a positive number");
     } else {
-      return fail(errc::malformed, where, "unknown word \"" + std::string{word.substr(0, 40)} + "\" in the header");
+      return fail(errc::malformed, where, "unknown keyword \"" + std::string{word.substr(0, 40)} + "\" in the header");
     }
   }
   if (!has_id || !has_size || file.resolution <= 0.0)
@@ -93,7 +93,7 @@ struct octomap_file {
   return file;
 }
 
-/// Reads a file whose nodes `Reader` knows.
+/// Reads a file whose nodes `Reader` can parse.
 template <class Model, class Reader>
 [[nodiscard]] result<occupancy_octree<Model>> read_octomap(std::string_view bytes, std::string_view magic,
                                                            const std::string& where) {
@@ -106,7 +106,7 @@ template <class Model, class Reader>
     return fail(errc::malformed, where,
                 "holds " + std::to_string(reader.nodes) + " nodes, but declares " + std::to_string(file->nodes));
   if (!reader.left.empty())
-    return fail(errc::malformed, where, std::to_string(reader.left.size()) + " bytes behind the last node");
+    return fail(errc::malformed, where, std::to_string(reader.left.size()) + " bytes after the last node");
   return occupancy_octree<Model>{file->resolution, default_tree_depth, std::move(store)};
 }
 
@@ -125,7 +125,7 @@ template <class Writer, class Map>
   return write_file_atomically(path, [&](std::ostream& out) -> result<void> {
     if (map.tree_depth() != default_tree_depth)
       return fail(errc::unsupported, path.string(),
-                  "OctoMap's trees have 16 levels, this one " + std::to_string(map.tree_depth()));
+                  "the tree has " + std::to_string(map.tree_depth()) + " levels, but OctoMap's files need 16");
     const octomap_nodes nodes = Writer{map.store(), map.tree_depth()}.write();
     const std::string header = octomap_header(magic, nodes.nodes, map.resolution());
     out.write(header.data(), static_cast<std::streamsize>(header.size()));

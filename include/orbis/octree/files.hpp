@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// OctoMap's files: `.bt` (free or occupied, 2 bits per child) and `.ot` (log-odds as float32).
+/// Reading and writing of OctoMap's files: `.bt` (free or occupied, 2 bits per child) and `.ot` (log-odds as float32).
 ///
-/// The files are byte for byte those that OctoMap writes for the same map, pruned in the same way. Reading takes at
-/// most 8 KB and 400 bytes for each byte of the file, also of damaged files. The library orbis::compiled holds these
-/// functions for maps with the model log_odds<>; other models include files-inl.hpp.
+/// The files are byte-identical to those of OctoMap for the same map, including the pruning. Reading takes at most 8 KB
+/// plus 400 bytes per byte of the file, also for damaged files. The library orbis::compiled contains these functions
+/// for maps with the model log_odds<>; for other models include files-inl.hpp.
 #pragma once
 
 #include <cstddef>
@@ -18,37 +18,37 @@
 
 namespace orbis::octree {
 
-/// The bytes of a `.bt` file: every voxel free or occupied, whichever is likelier; pruned.
+/// Returns the bytes of a `.bt` file: every voxel free or occupied, whichever is likelier; pruned.
 /// @pre map.tree_depth() == default_tree_depth
 template <octomap_model Model>
 [[nodiscard]] std::string bt_bytes(const occupancy_octree<Model>& map);
 
-/// The bytes of an `.ot` file: the pruned octree with all its log-odds.
+/// Returns the bytes of an `.ot` file: the pruned octree with all its log-odds.
 /// @pre map.tree_depth() == default_tree_depth
 template <octomap_model Model>
 [[nodiscard]] std::string ot_bytes(const occupancy_octree<Model>& map);
 
-/// Writes a `.bt` file, whole or not at all. Errors: write_failed; unsupported for a map of another
-/// depth than OctoMap's.
+/// Writes a `.bt` file atomically. Errors: write_failed; unsupported if the tree depth of the map differs from
+/// OctoMap's.
 template <octomap_model Model>
 [[nodiscard]] result<void> write_bt(const occupancy_octree<Model>& map, const std::filesystem::path& path);
 
-/// Writes an `.ot` file, whole or not at all. Errors: those of write_bt.
+/// Writes an `.ot` file atomically. Errors: those of write_bt.
 template <octomap_model Model>
 [[nodiscard]] result<void> write_ot(const occupancy_octree<Model>& map, const std::filesystem::path& path);
 
-/// Reads the bytes of a `.bt` file; `where` names them in errors. Leaves get the model's bounds.
-/// Errors: malformed (damaged, truncated, not such a file), unsupported (another type of tree).
+/// Reads the bytes of a `.bt` file; `where` is their name in error messages. Leaves get the model's bounds. Errors:
+/// malformed (damaged, truncated, not a `.bt` file), unsupported (another type of tree).
 template <octomap_model Model = log_odds<>>
 [[nodiscard]] result<occupancy_octree<Model>> read_bt(std::span<const std::byte> bytes,
                                                       const std::string& where = "bytes");
 
-/// Reads the bytes of an `.ot` file. Inner values are not read: they follow from the leaves.
+/// Reads the bytes of an `.ot` file. Skips inner values, which follow from the leaves.
 template <octomap_model Model = log_odds<>>
 [[nodiscard]] result<occupancy_octree<Model>> read_ot(std::span<const std::byte> bytes,
                                                       const std::string& where = "bytes");
 
-/// Reads a file. Errors: not_found, unreadable, and those above.
+/// Reads a file. Errors: not_found, unreadable, and those of the functions above.
 template <octomap_model Model = log_odds<>>
 [[nodiscard]] result<occupancy_octree<Model>> read_bt(const std::filesystem::path& path);
 template <octomap_model Model = log_odds<>>

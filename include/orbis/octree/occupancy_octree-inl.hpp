@@ -13,7 +13,7 @@ namespace orbis::octree {
 
 namespace detail {
 
-/// What a scan need not say about a map, for point_integrator and depth_integrator.
+/// Voxels of a map that a miss would not change, for point_integrator and depth_integrator.
 template <sensor_model Model>
 [[nodiscard]] saturated_voxels saturated_in(const brick_store<typename Model::value_type>& store) {
   using map = brick_store<typename Model::value_type>;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The occupancy map: a log-odds octree. From the same scans it gets the same values as OctoMap, bit for bit.
+/// The occupancy map: a log-odds octree. Its values are bit-identical to those of OctoMap for the same scans.
 ///
 /// A. Hornung, K. M. Wurm, M. Bennewitz, C. Stachniss, W. Burgard, "OctoMap: An efficient
 /// probabilistic 3D mapping framework based on octrees", Autonomous Robots 34, 2013.
@@ -44,16 +44,15 @@
 
 namespace orbis::octree {
 
-/// The voxels of an octant (a node of 4x4x4 voxels, aligned) in the open, see occupancy_octree::edit_octant:
-/// `value[i]` is what is stored of voxel i, in Morton order (morton_code(key) & 63), and bit i of `known` says
-/// whether anything is known about it.
+/// Unpacked voxels of an octant (an aligned node of 4x4x4 voxels), see occupancy_octree::edit_octant: `value[i]` is the
+/// stored value of voxel i, in Morton order (morton_code(key) & 63); bit i of `known` is set if the voxel is known.
 using detail::block;
 
-/// A leaf of the pruned octree: a cube in which everything has the same log-odds.
+/// A leaf of the pruned octree: a cube of voxels with equal log-odds.
 template <class T>
 struct octree_leaf {
   voxel_key key;    ///< its lowest voxel
-  int depth = 0;    ///< the tree's depth for a single voxel
+  int depth = 0;    ///< the tree's depth if the leaf is a single voxel
   vec3 center;      ///< metres
   double size = 0;  ///< edge, metres
   T log_odds{};
@@ -69,38 +68,38 @@ struct octree_leaf {
 ///   if (map.state(p) == orbis::octree::occupancy::occupied) ...
 /// @endcode
 ///
-/// Const members may be called from several threads at once. A copy shares all memory with the original until one of
-/// the two changes, and costs O(pages of 4 KB): readers on other threads take a copy between two insertions and use it
-/// while the writer goes on.
+/// Const members can be called from several threads at once. A copy shares all memory with the original (copy on write)
+/// and costs O(pages of 4 KB): readers on other threads take a copy between two insertions and use it while the writer
+/// continues.
 template <sensor_model Model = log_odds<>>
 class occupancy_octree {
  public:
   using model = Model;
-  using value_type = typename Model::value_type;  ///< what is stored: log-odds
+  using value_type = typename Model::value_type;  ///< type of a stored value (log-odds)
   using leaf = octree_leaf<value_type>;
 
-  /// `resolution`: the edge of a voxel, metres. `tree_depth`: the map is 2^tree_depth voxels wide.
+  /// Makes an empty map. `resolution`: edge of a voxel, metres. `tree_depth`: the map is 2^tree_depth voxels wide.
   /// @pre resolution finite and > 0; 5 <= tree_depth <= max_tree_depth
   explicit occupancy_octree(double resolution, int tree_depth = default_tree_depth) : grid_{resolution, tree_depth} {}
-  /// A map of bricks that the library's own readers have made. @pre no brick lies outside the grid
+  /// Makes a map from bricks, for the library's own readers. @pre no brick is outside the grid
   occupancy_octree(double resolution, int tree_depth, detail::brick_store<value_type> store)
       : grid_{resolution, tree_depth}, store_{std::move(store)} {}
 
   [[nodiscard]] double resolution() const noexcept { return grid_.resolution(); }
   [[nodiscard]] int tree_depth() const noexcept { return grid_.depth(); }
   [[nodiscard]] const voxel_grid& grid() const noexcept { return grid_; }
-  /// What is stored, for the library's own algorithms. The type is internal and may change.
+  /// Returns the storage, for the library's own algorithms. The type is internal and may change.
   [[nodiscard]] const detail::brick_store<value_type>& store() const noexcept { return store_; }
 
   // -- insertion
 
-  /// Integrates a scan: `points` in the world frame (metres), seen from `origin`. Every voxel that a ray crosses
-  /// is observed free once and every voxel that holds a point is observed occupied once, however many rays and
-  /// points there are; where both is the case, it is observed occupied. Coordinates are rounded to float first.
-  /// The result does not depend on the policy or on the order of the points. Points that are not finite or lie
-  /// outside the grid are counted as rejected; if the origin is not finite, all are. In mode every_ray, a scan with
-  /// many points for its voxels, as of a depth image, costs little more than the image: O(points + voxels near
-  /// surfaces); and another O(points x voxels per ray).
+  /// Integrates a scan: `points` in the world frame (metres), seen from `origin`. Every voxel crossed by rays is
+  /// observed free once, and every voxel that contains points is observed occupied once, regardless of the numbers of
+  /// rays and points; if both apply, it is observed occupied. Coordinates are rounded to float first. The result does
+  /// not depend on the policy or on the order of the points. Points that are non-finite or outside the grid are counted
+  /// as rejected; if the origin is non-finite, all are. In mode every_ray, a scan with many points per voxel, such as
+  /// one from a depth image, takes little more time than the image: O(points + voxels near surfaces). Other scans take
+  /// O(points x voxels per ray).
   template <execution_policy Policy, point_range Points, point_like Origin>
   integration_summary integrate(const Policy& policy, const Points& points, const Origin& origin,
                                 const integration_options& options = {}) {
@@ -110,9 +109,9 @@ class occupancy_octree {
   integration_summary integrate(const Points& points, const Origin& origin, const integration_options& options = {}) {
     return integrate(seq, points, origin, options);
   }
-  /// Integrates a depth image (depths in metres along the optical axis). The map is the one that the image's world
-  /// points (see append_world_points) make when seen from the camera's centre, but this is many times as fast.
-  /// O(pixels + voxels near surfaces).
+  /// Integrates a depth image (depths in metres along the optical axis). The result equals that of the image's world
+  /// points (see append_world_points) seen from the camera's centre, but is computed many times faster. O(pixels +
+  /// voxels near surfaces).
   /// @pre depth and camera have the same size
   template <execution_policy Policy, camera::depth_source Depth, camera::camera_model Camera>
   integration_summary integrate(const Policy& policy, const Depth& depth, const Camera& camera,
@@ -125,17 +124,17 @@ class occupancy_octree {
     return integrate(seq, depth, camera, T_world_camera, options);
   }
 
-  /// Calls `change(store, log)` with what is stored, as one revision of the change log, for the library's own
-  /// algorithms: the type of the store is internal and may change. `change` must record in `log` every voxel that it
-  /// changes, unless `log` is null because changes are not tracked.
+  /// Calls `change(store, log)` with the storage, as one revision of the change log, for the library's own algorithms:
+  /// the type of the store is internal and may change. `change` must record every voxel that it changes in `log`; `log`
+  /// is null if changes are not tracked.
   template <std::invocable<detail::brick_store<value_type>&, change_log*> Change>
   void change_store(Change&& change) {
     begin_change();
     change(store_, track_.on ? &track_.log : nullptr);
   }
 
-  /// Gives all voxels of a node one value. `key`: the node's lowest voxel; `depth`: of the node
-  /// in the tree (0: the root, tree_depth(): one voxel). O(1).
+  /// Sets all voxels of a node to one value. `key`: the node's lowest voxel; `depth`: depth of the node in the tree (0:
+  /// the root, tree_depth(): one voxel). O(1).
   /// @pre the node is unknown as a whole; key is a multiple of the node's size
   void set_unknown_node(const voxel_key& key, int depth, value_type value) {
     begin_change();
@@ -143,17 +142,17 @@ class occupancy_octree {
     note_node(key, tree_depth() - depth);
   }
 
-  /// Makes everything unknown and gives the memory back. The grid stays.
+  /// Makes all voxels unknown and frees the memory. The grid stays.
   void clear() {
     store_.clear();
     scratch_ = {};
     lose_track();
   }
 
-  // -- changing what is known
+  // -- modification of known voxels
 
-  /// Calls `edit(block&)` with the 64 voxels of the octant that contains `k`, and stores what it leaves there. Values
-  /// of voxels that are unknown afterwards are ignored. O(1). @pre k lies in the grid
+  /// Calls `edit(block&)` with the 64 voxels of the octant that contains `k`, and stores the result. Ignores values of
+  /// voxels that are unknown after the call. O(1). @pre k is in the grid
   template <std::invocable<block<value_type>&> Edit>
   void edit_octant(const voxel_key& k, Edit&& edit) {
     edit_octants(std::array{k}, [&](const voxel_key&, block<value_type>& voxels) { edit(voxels); });
@@ -177,8 +176,8 @@ class occupancy_octree {
       replace_octant(k, before, after);
     }
   }
-  /// Replaces every voxel's value by `change(value)`, a std::optional: empty makes the voxel unknown. `change` must
-  /// depend on its argument alone, as decay policies do (decay.hpp): it is called once for each distinct value of an
+  /// Replaces every voxel's value by `change(value)`, a std::optional; empty makes the voxel unknown. `change` must
+  /// depend only on its argument, as decay policies do (decay.hpp): it is called once for each distinct value of an
   /// octant. O(octants).
   template <class Change>
   requires std::is_invocable_r_v<std::optional<value_type>, Change&, value_type> void transform(Change&& change) {
@@ -194,10 +193,11 @@ class occupancy_octree {
     });
     if (has_large) lose_track();
   }
-  /// A rolling window: removes every brick (8x8x8 voxels) and larger leaf that lies completely outside `box` (metres),
-  /// after calling `evict(const leaf&)` for its leaves. `set_unknown_node(leaf.key, leaf.depth, leaf.log_odds)` brings
-  /// a leaf back. Returns the number of bricks and larger leaves removed. The change log records what was evicted: it
-  /// is unknown now. Payload layers keep their values: erase there what was evicted. O(bricks + voxels evicted).
+  /// Rolling window: removes every brick (8x8x8 voxels) and larger leaf that is completely outside `box` (metres),
+  /// after calling `evict(const leaf&)` for its leaves. `set_unknown_node(leaf.key, leaf.depth, leaf.log_odds)`
+  /// restores a leaf. Returns the number of bricks and larger leaves removed. The change log records the evicted
+  /// voxels, which are now unknown. Payload layers keep their values; erase the evicted voxels there. O(bricks + voxels
+  /// evicted).
   template <std::invocable<const leaf&> Evict>
   std::size_t evict_outside(const bounding_box& box, Evict&& evict) {
     const auto is_outside = [&](std::uint64_t name) {
@@ -219,47 +219,47 @@ class occupancy_octree {
     store_.erase_large(large);
     return bricks.size() + large.size();
   }
-  /// Merges equal uniform bricks to larger leaves. This saves memory and changes no value; inside bricks, pruning is
-  /// done at once and always. A later change splits a leaf again. O(bricks).
+  /// Merges equal uniform bricks into larger leaves. This saves memory and changes no value. Inside bricks, pruning is
+  /// always immediate. A later change splits a leaf again. O(bricks).
   void prune();
 
-  /// Starts recording which voxels change (see change_log), or stops and clears the record. After `clear`, an
-  /// assignment, a change to a leaf bigger than a brick, or a time without tracking, the log cannot tell what changed:
-  /// its `complete_since` moves on, and whoever mirrors the map has to take all of it again; while tracking is stopped,
-  /// each time (`complete_since` is beyond `revision` then). Copies are not tracked.
+  /// Starts recording changed voxels (see change_log), or stops and clears the log. After `clear`, an assignment, a
+  /// change to a leaf larger than a brick, or a period without tracking, the log is incomplete: its `complete_since`
+  /// advances, and readers must read the whole map again. While tracking is stopped, `complete_since` exceeds
+  /// `revision`, so readers must read the whole map every time. Copies are not tracked.
   void track_changes(bool wanted = true) {
     if (track_.on == wanted) return;
     track_.on = wanted;
     if (!store_.empty() || track_.log.revision() != 0) lose_track();
   }
-  /// Whether changes are recorded. A map of which they never were has a log whose `revision` is 0.
+  /// Returns true if changes are recorded. The log of a map that was never tracked has `revision` 0.
   [[nodiscard]] bool tracks_changes() const noexcept { return track_.on; }
   [[nodiscard]] const change_log& changes() const noexcept { return track_.log; }
-  /// The log for writing: to forget revisions that all readers have seen, or to limit its length.
+  /// Mutable access to the log, to discard revisions that all readers have processed, or to limit its length.
   [[nodiscard]] change_log& changes() noexcept { return track_.log; }
 
   // -- queries
 
-  /// What is stored at `p` (metres): empty where unknown or outside the grid. O(1), as are the
-  /// queries for one place below.
+  /// Returns the value stored at `p` (metres); empty if unknown or outside the grid. O(1), as are the queries for one
+  /// place below.
   template <point_like P>
   [[nodiscard]] std::optional<value_type> value(const P& p) const {
     const auto key = grid_.key(p);
     return key ? store_.value(*key) : std::nullopt;
   }
   [[nodiscard]] std::optional<value_type> value(const voxel_key& key) const { return store_.value(key); }
-  /// The log-odds at `p`, empty where unknown or outside the grid.
+  /// Returns the log-odds at `p`, empty if unknown or outside the grid.
   template <class P>
   requires point_like<P> || std::same_as<P, voxel_key>
   [[nodiscard]] std::optional<value_type> log_odds(const P& p) const { return value(p); }
-  /// The probability that `p` is occupied, empty where unknown or outside the grid.
+  /// Returns the probability that `p` is occupied, empty if unknown or outside the grid.
   template <class P>
   requires point_like<P> || std::same_as<P, voxel_key>
   [[nodiscard]] std::optional<double> probability(const P& p) const { return probability_at<Model>(value(p)); }
-  /// An object with these queries that is several times as fast for places near each other. One for each thread; valid
-  /// until the map changes.
+  /// Returns an object with these queries that is several times faster for places near each other. Use one per thread;
+  /// valid until the map changes.
   [[nodiscard]] octree_accessor<Model> accessor() const noexcept { return {store_, grid_}; }
-  /// What is known about `p`.
+  /// Returns the state of `p`.
   template <class P>
   requires point_like<P> || std::same_as<P, voxel_key>
   [[nodiscard]] occupancy state(const P& p) const {
@@ -268,9 +268,9 @@ class occupancy_octree {
     return is_occupied<Model>(*v) ? occupancy::occupied : occupancy::free;
   }
 
-  /// The first voxel along a ray that is occupied, or unknown unless `ignore_unknown`. `origin` in metres, `direction`
-  /// of any length, `max_range` in metres (infinite or <= 0: no limit). The voxel is the one that OctoMap's `castRay`
-  /// finds. See ray_hit, and cast_rays for many rays. O(voxels along the ray).
+  /// Finds the first voxel along a ray that is occupied, or unknown unless `ignore_unknown`. `origin` in metres,
+  /// `direction` of any length, `max_range` in metres (infinite or <= 0: no limit). The voxel equals that of OctoMap's
+  /// `castRay`. See ray_hit, and cast_rays for many rays. O(voxels along the ray).
   template <point_like Origin, point_like Direction>
   [[nodiscard]] ray_hit cast_ray(const Origin& origin, const Direction& direction,
                                  double max_range = std::numeric_limits<double>::infinity(),
@@ -285,33 +285,33 @@ class occupancy_octree {
     detail::visit_leaves(store_, tree_depth(),
                          [&](const voxel_key& key, int level, value_type v) { visit(leaf_of(key, level, v)); });
   }
-  /// Numbers of nodes of the pruned octree. O(bricks + octants that are not uniform), as are the four functions below.
+  /// Counts the nodes of the pruned octree. O(bricks + octants that are not uniform), as are the four functions below.
   [[nodiscard]] octree_counts counts() const;
-  /// Leaves of the pruned octree, of any size.
+  /// Number of leaves of the pruned octree, of any size.
   [[nodiscard]] std::size_t num_leaves() const { return counts().leaves; }
   [[nodiscard]] std::size_t num_occupied_leaves() const { return counts().occupied_leaves; }
   [[nodiscard]] std::size_t num_free_leaves() const { return counts().free_leaves; }
-  /// Nodes of the pruned octree, inner nodes and leaves.
+  /// Number of nodes of the pruned octree, inner nodes and leaves.
   [[nodiscard]] std::size_t size() const { return counts().nodes; }
   [[nodiscard]] bool empty() const noexcept { return store_.empty(); }
 
-  /// The smallest box around everything known; empty if nothing is.
+  /// Smallest box around all known voxels; empty if there are none.
   [[nodiscard]] std::optional<bounding_box> bounds() const;
 
-  /// Bytes on the heap: of the map (with what copies share), and of the buffers that are kept for the next scan.
+  /// Heap memory in bytes: of the map (including memory shared with copies), and of the reused scan buffers.
   [[nodiscard]] std::size_t memory_bytes() const noexcept { return store_.memory_bytes() + track_.log.memory_bytes(); }
   [[nodiscard]] std::size_t buffer_bytes() const noexcept { return scratch_.memory_bytes(); }
 
  private:
-  /// The parts of `integrate` that are not compiled for each policy and each type of points.
+  /// Parts of `integrate` that are not instantiated for each policy and point type.
   integration_summary integrate_points(const parallel_policy& policy, const detail::point_view& points,
                                        const detail::float3& origin, const integration_options& options);
   integration_summary integrate_depth(const parallel_policy& policy, const detail::depth_scan& scan,
                                       const se3& T_world_camera, const integration_options& options);
 
-  /// The change log. Copies of the map begin without one, and a map that is moved to a new place takes it along. A map
-  /// that is assigned to, or moved from, has changed as a whole, and its own log says so: readers know it by its
-  /// revisions, and those of another log say nothing to them.
+  /// The change log. Copies of a map start without one, and a map that is moved takes its log along. A map that is
+  /// assigned to, or moved from, has changed as a whole, and its own log becomes incomplete: readers refer to revisions
+  /// of this log, and those of another log would be meaningless.
   struct tracking {
     change_log log;
     bool on = false;
@@ -330,7 +330,7 @@ class occupancy_octree {
     }
     ~tracking() = default;
 
-    /// Marks the log as incomplete: what has just changed is not recorded.
+    /// Marks the log as incomplete, because the last change is not recorded.
     void lose() {
       if (!on) return log.stop();
       log.begin_revision();
@@ -341,9 +341,9 @@ class occupancy_octree {
   [[nodiscard]] leaf leaf_of(const voxel_key& key, int level, value_type v) const {
     return {key, tree_depth() - level, grid_.center(key, level), grid_.node_size(level), v, is_occupied<Model>(v)};
   }
-  /// Stores an octant that has been changed, and forgets its brick if nothing is known there any more.
+  /// Stores a changed octant, and removes its brick if all its voxels are unknown.
   void replace_octant(const voxel_key& k, const block<value_type>& before, block<value_type>& after);
-  /// -0 is 0: values are told apart bit by bit.
+  /// Replaces -0 by 0, because values are compared bit by bit.
   [[nodiscard]] static constexpr value_type without_sign_of_zero(value_type v) noexcept {
     return v == value_type{} ? value_type{} : v;
   }
@@ -351,7 +351,7 @@ class occupancy_octree {
     if (track_.on) track_.log.begin_revision();
   }
   void lose_track() { track_.lose(); }
-  /// Everything known in a brick, or a larger leaf, is about to change.
+  /// Records that all known voxels of a brick, or of a larger leaf, are about to change.
   void note_brick(const voxel_key& k, int level);
   void note_node(const voxel_key& k, int level);
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// What a map knows, by octants of 4x4x4 voxels as bit masks: for what is derived from a map as a whole, or from what
-/// its change log names.
+/// States of a map's voxels by octants of 4x4x4 voxels, as bit masks: for data derived from a whole map, or from the
+/// octants in its change log.
 #pragma once
 
 #include <concepts>
@@ -13,10 +13,10 @@
 
 namespace orbis::octree {
 
-/// The 64 voxels of an octant; bit i is the voxel at place i of the Morton curve, as in change_log.
+/// The 64 voxels of an octant; bit i is the voxel at position i of the Morton curve, as in change_log.
 struct octant_states {
   std::uint64_t known = 0;
-  std::uint64_t occupied = 0;  ///< of the known ones
+  std::uint64_t occupied = 0;  ///< subset of the known ones
 
   [[nodiscard]] constexpr std::uint64_t free() const noexcept { return known & ~occupied; }
   friend constexpr bool operator==(const octant_states&, const octant_states&) = default;
@@ -37,14 +37,14 @@ template <sensor_model Model>
 
 }  // namespace detail
 
-/// Octants of a map of which each lies near the one before: those of a change log, for example. The map must outlive it
-/// and stay as it is; one for each thread.
+/// Reads octants of a map near each other, for example those of a change log. The map must outlive the reader and must
+/// not change; use one per thread.
 template <octree_map Map>
 class octant_reader {
  public:
   explicit octant_reader(const Map& map) noexcept : store_{&map.store()} {}
 
-  /// The octant that contains `k`. O(1).
+  /// Returns the octant that contains `k`. O(1).
   [[nodiscard]] octant_states operator()(const voxel_key& k) {
     if (const voxel_key chunk = node_key(k, detail::chunk_level); !started_ || !(chunk == at_)) {
       started_ = true;
@@ -67,10 +67,9 @@ class octant_reader {
   bool started_ = false;
 };
 
-/// Calls `visit(lowest voxel, level, states)` for every octant (level 2) that has a voxel in `box` and of which
-/// something is known, and for every such leaf bigger than 8x8x8 voxels (level > 3), all of whose octants have these
-/// states, in no particular order. O(blocks of 32x32x32 voxels with bricks + large leaves + octants in the box that are
-/// not uniform).
+/// Calls `visit(lowest voxel, level, states)` for every octant (level 2) with a voxel in `box` and at least one known
+/// voxel, and for every such leaf larger than 8x8x8 voxels (level > 3), all of whose octants have these states.
+/// Unordered. O(blocks of 32x32x32 voxels with bricks + large leaves + octants in the box that are not uniform).
 template <octree_map Map, std::invocable<const voxel_key&, int, const octant_states&> Visit>
 void for_each_octant(const Map& map, const key_box& box, Visit&& visit) {
   using model = typename Map::model;
@@ -96,7 +95,7 @@ void for_each_octant(const Map& map, const key_box& box, Visit&& visit) {
   });
 }
 
-/// The same for the whole map. O(bricks + octants that are not uniform).
+/// Visits the octants of the whole map. O(bricks + octants that are not uniform).
 template <octree_map Map, std::invocable<const voxel_key&, int, const octant_states&> Visit>
 void for_each_octant(const Map& map, Visit&& visit) {
   constexpr std::uint32_t last = node_cells(max_tree_depth) - 1;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Collision tests for planners: whether a box, a sphere or a capsule overlaps what the map holds.
+/// Collision tests for planners: overlap of a box, a sphere or a capsule with occupied space.
 #pragma once
 
 #include <algorithm>
@@ -18,12 +18,12 @@
 
 namespace orbis::octree {
 
-/// A ball, metres. @pre radius >= 0
+/// A ball; centre and radius in metres. @pre radius >= 0
 struct sphere {
   vec3 center = zeros<vec3>();
   double radius = 0.0;
 };
-/// Everything within `radius` of the segment from `a` to `b`, metres. @pre radius >= 0
+/// All points within `radius` of the segment from `a` to `b`, metres. @pre radius >= 0
 struct capsule {
   vec3 a = zeros<vec3>(), b = zeros<vec3>();
   double radius = 0.0;
@@ -37,12 +37,12 @@ struct capsule {
   return {shifted(entrywise_min(c.a, c.b), -c.radius), shifted(entrywise_max(c.a, c.b), c.radius)};
 }
 
-/// The point of a box that is nearest to `p`.
+/// Point of a box that is nearest to `p`.
 [[nodiscard]] inline vec3 clamped(const vec3& p, const bounding_box& b) {
   return entrywise_min(entrywise_max(p, b.min), b.max);
 }
 
-/// Whether a shape and a box have a point in common; faces and corners belong to them.
+/// Returns true if a shape and a box have a point in common, including faces and corners.
 [[nodiscard]] inline bool touches(const bounding_box& a, const bounding_box& b) noexcept {
   return all_at_most(a.min, b.max) && all_at_most(b.min, a.max);
 }
@@ -51,11 +51,11 @@ struct capsule {
   return squared_norm(s.center - nearest) <= s.radius * s.radius;
 }
 namespace detail {
-/// Exact, see below.
+/// Exact test, used below.
 [[nodiscard]] inline bool touches_exactly(const capsule& c, const bounding_box& b) noexcept {
   const vec3 along = c.b - c.a;
-  // The squared distance of a + t (b - a) from the box is convex in t, its slope is linear between the
-  // parameters at which the segment crosses the planes of the faces: look for the piece where it is 0.
+  // The squared distance of a + t (b - a) from the box is convex in t, and its slope is linear between the parameters
+  // at which the segment crosses the planes of the faces: find the piece in which the slope is 0.
   const auto away = [&](double t) -> vec3 {
     const vec3 p = c.a + t * along;
     return p - clamped(p, b);
@@ -82,18 +82,19 @@ namespace detail {
 }  // namespace detail
 
 [[nodiscard]] inline bool touches(const capsule& c, const bounding_box& b) noexcept {
-  // Most boxes are farther from the segment than the ball around them, or nearer than the ball in them.
+  // Most boxes are farther from the segment than their circumscribed ball, or nearer than their inscribed ball.
   const vec3 middle = 0.5 * (b.min + b.max), half = b.max - middle, along = c.b - c.a, from = middle - c.a;
   const double squares = squared_norm(along), product = dot(from, along);
-  // Where the segment is nearest to the middle of the box: at its beginning, its end, or between.
+  // Point of the segment nearest to the centre of the box: its start, its end, or between.
   const double share = product <= 0.0 ? 0.0 : product >= squares ? 1.0 : product / squares;
   const double apart = squared_norm(from - share * along);
   const double outside = (c.radius + 1.7320508075688773 * largest_of(half)) * (1.0 + 1e-9);
   if (apart > outside * outside) return false;
   const double inside = (c.radius + smallest_of(half)) * (1.0 - 1e-9);
   if (apart < inside * inside) return true;
-  // That point of the segment may be near enough to the box; or else the plane through the nearest point of the box,
-  // across the way between the two, may keep both ends away. A ball is one or the other, but for rounding.
+  // That point of the segment may be near enough to the box; otherwise the plane through the nearest point of the box,
+  // perpendicular to the line between the two, may separate both ends from the box. For a ball one of both holds, up to
+  // rounding.
   const vec3 point = c.a + share * along, nearest = clamped(point, b), way = point - nearest;
   const double squared = squared_norm(way), reach = c.radius * c.radius;
   if (squared < reach * (1.0 - 1e-9)) return true;
@@ -102,8 +103,8 @@ namespace detail {
   return detail::touches_exactly(c, b);
 }
 
-/// A shape that can be looked for: `bounds_of(shape)` is a box around it, `touches(shape, box)` says
-/// whether it has a point in common with a box. Bring your own in your own namespace.
+/// A shape for overlap tests: `bounds_of(shape)` returns a box around it, `touches(shape, box)` returns true if it has
+/// a point in common with a box. Define user shapes in their own namespace.
 template <class S>
 concept overlap_shape = requires(const S& shape, const bounding_box& box) {
   { bounds_of(shape) } -> std::convertible_to<bounding_box>;
@@ -111,12 +112,12 @@ concept overlap_shape = requires(const S& shape, const bounding_box& box) {
 };
 
 struct overlap_options {
-  occupancy unknown = occupancy::free;  ///< what unknown space, and all outside the grid, counts as
+  occupancy unknown = occupancy::free;  ///< state that unknown space and all space outside the grid counts as
 };
 
 namespace detail {
 
-/// Goes down where the shape is, as long as something there may be in its way.
+/// Descends the tree at the shape as long as a blocking voxel is possible.
 template <sensor_model Model, overlap_shape Shape>
 class overlap_search {
  public:
@@ -130,7 +131,7 @@ class overlap_search {
     const double edge = grid_.resolution() * (grid_.cells() / 2);
     const bool is_inside = all_at_most(filled<vec3>(-edge), bounds.min) && all_at_most(bounds.max, filled<vec3>(edge));
     if (unknown_blocks_ && !is_inside) return true;
-    // Faces that only touch are found as well.
+    // The box is extended by one voxel to include faces that only touch.
     const auto keys =
         keys_between(grid_, shifted(bounds.min, -grid_.resolution()), shifted(bounds.max, grid_.resolution()));
     if (!keys) return false;
@@ -154,7 +155,7 @@ class overlap_search {
     const auto along = [](std::uint32_t a, std::uint32_t b) { return (b >> chunk_level) - (a >> chunk_level) + 1.0; };
     return along(keys.low.x, keys.high.x) * along(keys.low.y, keys.high.y) * along(keys.low.z, keys.high.z);
   }
-  /// Below the smallest node that contains all keys.
+  /// Starts below the smallest node that contains all keys.
   [[nodiscard]] bool from_common_node(const key_box& keys) const {
     const std::uint32_t differ = (keys.low.x ^ keys.high.x) | (keys.low.y ^ keys.high.y) | (keys.low.z ^ keys.high.z);
     const int level = std::max(chunk_level, static_cast<int>(std::bit_width(differ)));
@@ -163,7 +164,7 @@ class overlap_search {
   [[nodiscard]] bool upper(const key_box& keys, const voxel_key& k, int level) const {
     if (!keys.overlaps(k, level) || !meets(k, level)) return false;
     if (level == chunk_level) return chunk(keys, k);
-    // Large leaves that are occupied have been looked at.
+    // Occupied large leaves were already tested.
     if (const auto large = store_.find_large(k); large && large->second >= level) return false;
     for (unsigned i = 0; i != 8; ++i)
       if (upper(keys, child_key(k, i, node_cells(level - 1)), level - 1)) return true;
@@ -204,7 +205,7 @@ class overlap_search {
       if (unknown_blocks_) blocking |= ~store_.known(b, i);
       if (blocking == 0 || !meets(octant, octant_level)) continue;
       if (blocking == ~std::uint64_t{0}) return true;
-      for (unsigned eighth = 0; eighth != 8; ++eighth) {  // 2x2x2 voxels follow each other along the Morton curve
+      for (unsigned eighth = 0; eighth != 8; ++eighth) {  // 2x2x2 voxels are contiguous along the Morton curve
         std::uint64_t voxels = blocking & (std::uint64_t{0xff} << (8 * eighth));
         if (voxels == 0) continue;
         const bool are_few = std::popcount(voxels) <= 2;
@@ -225,9 +226,9 @@ class overlap_search {
 
 }  // namespace detail
 
-/// Whether the shape has a point in common with an occupied voxel, or with unknown space if that
-/// counts as occupied. The cubes of voxels include their faces, so that touching is overlapping.
-/// Nodes without anything occupied are passed over as a whole. @pre finite coordinates
+/// Returns true if the shape has a point in common with an occupied voxel, or with unknown space if that counts as
+/// occupied. The cubes of voxels include their faces, so that touching is overlapping. Skips nodes without occupied
+/// voxels. @pre finite coordinates
 template <octree_map Map, overlap_shape Shape>
 [[nodiscard]] bool overlaps(const Map& map, const Shape& shape, const overlap_options& options = {}) {
   assert(all_finite(bounds_of(shape).min) && all_finite(bounds_of(shape).max));

@@ -17,7 +17,7 @@
 namespace orbis::octree {
 namespace detail {
 
-/// The voxels in which two octants differ; unknown voxels hold 0.
+/// Mask of the voxels in which two octants differ; unknown voxels hold 0.
 template <class T>
 [[nodiscard]] std::uint64_t difference(const block<T>& a, const block<T>& b) noexcept {
   std::uint64_t different = a.known ^ b.known;
@@ -25,8 +25,8 @@ template <class T>
   return different;
 }
 
-/// Replays the stale octants of a brick from empty: every scan of `b.uses` in turn, `voxels_of(scan)` being its voxels.
-/// Reads the store only. O(scans that use the brick).
+/// Replays the stale octants of a brick from empty with every scan of `b.uses` in turn; `voxels_of(scan)` returns the
+/// scan's voxels. Reads the store only. O(scans that use the brick).
 /// @pre no leaf of the store is larger than a brick
 template <sensor_model Model, class VoxelsOf>
 void replay_brick(const brick_store<typename Model::value_type>& store, const used_brick& b, const VoxelsOf& voxels_of,
@@ -57,8 +57,8 @@ void replay_brick(const brick_store<typename Model::value_type>& store, const us
   }
 }
 
-/// Stores the octants of a replayed brick that differ from what is stored, and records that. Returns whether anything
-/// is known about the brick afterwards.
+/// Stores the octants of a replayed brick that differ from the stored ones, and records the changes. Returns true if
+/// any voxel of the brick is known afterwards.
 template <class T>
 bool store_replayed(brick_store<T>& store, std::uint64_t name, const replayed_brick<T>& replayed, change_log* log) {
   const voxel_key key = named_key(name);
@@ -82,7 +82,7 @@ bool store_replayed(brick_store<T>& store, std::uint64_t name, const replayed_br
 namespace detail {
 
 [[nodiscard]] inline unsigned octants_of(const scan_voxels::part& p) noexcept { return p.free | p.occupied | p.full; }
-/// The octants of a brick of which two scans say different things.
+/// Mask of the octants of a brick for which the observations of two scans differ.
 [[nodiscard]] inline unsigned different_octants(const scan_voxels& a, const scan_voxels::part& in_a,
                                                 const scan_voxels& b, const scan_voxels::part& in_b) noexcept {
   const auto x = a.masks(in_a), y = b.masks(in_b);
@@ -184,7 +184,7 @@ void scan_history<Octree>::change_uses(std::uint32_t number, const scan_voxels& 
     const std::uint32_t brick = uses_.number_of(p.name);
     auto& uses = uses_[brick].uses;
     uses.erase(place_of(uses, s.frame));
-    uses_.make_stale(brick, detail::octants_of(p));
+    uses_.mark_stale(brick, detail::octants_of(p));
   };
   fresh_.clear();
   for (std::uint32_t j = 0; j != new_parts.size(); ++j) {
@@ -195,14 +195,14 @@ void scan_history<Octree>::change_uses(std::uint32_t number, const scan_voxels& 
     const auto at = place_of(uses, s.frame);
     if (i != old_parts.size() && old_parts[i].name == p.name) {
       at->part = j;
-      uses_.make_stale(brick, detail::different_octants(s.voxels, old_parts[i], after, p));
+      uses_.mark_stale(brick, detail::different_octants(s.voxels, old_parts[i], after, p));
       ++i;
     } else if (at == uses.end()) {
       uses.push_back({number, j});
       fresh_.push_back(j);
     } else {
       uses.insert(at, {number, j});
-      uses_.make_stale(brick, detail::octants_of(p));
+      uses_.mark_stale(brick, detail::octants_of(p));
     }
   }
   for (; i != old_parts.size(); ++i) drop(old_parts[i]);

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A map that follows its scans: when a scan changes, is removed, or comes late, the map becomes, bit for bit, the one
-/// made of all scans in order.
+/// A map that follows its scans: when a scan changes, is removed or arrives late, the map becomes bit-identical to one
+/// made from all scans in order.
 ///
-/// Log-odds are clamped, so that the order of scans matters and a scan cannot be subtracted again: what clamping lost
-/// would stay lost. Instead, the history keeps what each scan says, as the voxels that it observed free and occupied,
-/// and replays the octants of 4x4x4 voxels about which a scan now says something else: from empty, with all scans in
-/// order. Replaying is cheap, because no ray is traversed again.
+/// Log-odds are clamped, so the order of scans matters, and a scan cannot be subtracted, because clamping loses
+/// information. Instead, the history keeps the voxels that each scan observed free and occupied, and replays the
+/// octants of 4x4x4 voxels whose observations changed: from empty, with all scans in order. Replaying is cheap, because
+/// no ray is traversed again.
 #pragma once
 
 #include <chrono>
@@ -33,9 +33,9 @@
 
 namespace orbis::octree {
 
-/// How much to replay in one call. Where a limit is reached, the rest stays stale for the next call.
+/// Limits of one call of replay. When a limit is reached, the remaining octants stay stale for the next call.
 struct replay_limits {
-  std::chrono::nanoseconds time = std::chrono::nanoseconds::max();  ///< looked at after every few dozen bricks
+  std::chrono::nanoseconds time = std::chrono::nanoseconds::max();  ///< checked after every few dozen bricks
   std::size_t bricks = std::numeric_limits<std::size_t>::max();
 };
 
@@ -43,29 +43,29 @@ struct replay_limits {
 template <class M>
 concept replayable_octree = octree_map<M> && std::same_as<M, occupancy_octree<typename M::model>>;
 
-/// A map, and the scans it is made of, ordered by a number that the caller gives: the index of the frame.
+/// A map and the scans it is made from, ordered by a caller-defined number: the index of the frame.
 ///
 /// @code
 ///   orbis::octree::scan_history<> history{0.05};
-///   history.set(seq, frame, depth, camera, T_world_camera, {.max_range = 5.0});   // in the map at once
+///   history.set(seq, frame, depth, camera, T_world_camera, {.max_range = 5.0});   // applied immediately
 ///   ...
 ///   history.set(seq, frame, depth, camera, T_corrected, {.max_range = 5.0});      // after a loop
-///   history.replay(par);                                                          // the map is right again
+///   history.replay(par);                                                          // updates the map
 ///   const auto snapshot = history.map();                                          // for readers on other threads
 /// @endcode
 ///
-/// A scan that is newer than all others is applied at once. What else changes makes octants stale; they keep what they
-/// held until `replay` has seen to them. When nothing is stale, the map is the one that `integrate` makes of all scans
-/// in the order of their frames, bit for bit, whatever the history of calls, limits and policies.
+/// A scan that is newer than all others is applied immediately. Other changes make octants stale; they keep their
+/// values until `replay` updates them. When no octant is stale, the map is bit-identical to the one that `integrate`
+/// makes from all scans in the order of their frames, independent of the history of calls, limits and policies.
 ///
-/// One thread at a time; a copy of the map may be read by others meanwhile.
+/// Not thread-safe, but other threads may read a copy of the map at the same time.
 template <replayable_octree Octree = occupancy_octree<>>
 class scan_history {
  public:
   using octree_type = Octree;
   using model = typename Octree::model;
 
-  /// `resolution`: the edge of a voxel, metres. `tree_depth`: the map is 2^tree_depth voxels wide.
+  /// Makes an empty map. `resolution`: edge of a voxel, metres. `tree_depth`: the map is 2^tree_depth voxels wide.
   /// @pre as for occupancy_octree
   explicit scan_history(double resolution, int tree_depth = default_tree_depth) : map_{resolution, tree_depth} {
     map_.track_changes();
@@ -78,21 +78,21 @@ class scan_history {
 
   // -- the map
 
-  /// The map as it is, readable at any time. A copy shares its memory until the map changes.
+  /// Returns the current map. A copy shares its memory until the map changes.
   [[nodiscard]] const Octree& map() const noexcept { return map_; }
   [[nodiscard]] const voxel_grid& grid() const noexcept { return map_.grid(); }
-  /// Which voxels changed: a `set` or `replay` that changes the map is one revision, and records exactly the voxels
-  /// whose value it changed or made known or unknown.
+  /// Log of changed voxels. A `set` or `replay` that changes the map is one revision, and records exactly the voxels
+  /// whose value changed or that became known or unknown.
   [[nodiscard]] const change_log& changes() const noexcept { return map_.changes(); }
-  /// The log for writing: to forget revisions that all readers have seen, or to limit its length.
+  /// Mutable access to the log, to discard revisions that all readers have processed, or to limit its length.
   [[nodiscard]] change_log& changes() noexcept { return map_.changes(); }
 
   // -- the scans
 
-  /// The scan of `frame` is this depth image, seen from `T_world_camera`, see occupancy_octree::integrate. Where there
-  /// is one already, this one takes its place: corrected poses and later verdicts of filters (pixels set to 0) come in
-  /// this way. The summary is that of `integrate`, with all free voxels counted.
-  /// O(marking, see scan_marker) + O(bricks observed before and now).
+  /// Sets the scan of `frame` to this depth image, seen from `T_world_camera`, see occupancy_octree::integrate.
+  /// Replaces an existing scan, for example after a pose correction or when a later filter invalidates pixels (sets
+  /// them to 0). The summary equals that of `integrate`, with all free voxels counted. O(marking, see scan_marker) +
+  /// O(bricks observed before and now).
   /// @pre depth and camera have the same size
   template <execution_policy Policy, camera::depth_source Depth, camera::camera_model Camera>
   integration_summary set(const Policy& policy, std::uint64_t frame, const Depth& depth, const Camera& camera,
@@ -101,7 +101,7 @@ class scan_history {
     set(frame, marked_);
     return summary;
   }
-  /// The same for points in the world frame (metres), seen from `origin`.
+  /// Sets the scan of `frame` to points in the world frame (metres), seen from `origin`.
   template <execution_policy Policy, point_range Points, point_like Origin>
   integration_summary set(const Policy& policy, std::uint64_t frame, const Points& points, const Origin& origin,
                           const integration_options& options = {}) {
@@ -109,33 +109,33 @@ class scan_history {
     set(frame, marked_);
     return summary;
   }
-  /// The same for voxels that were marked before, on another thread for example.
-  /// O(bricks observed before and now x log(scans that use a brick)).
+  /// Sets the scan of `frame` to voxels that were marked before, on another thread for example. O(bricks observed
+  /// before and now x log(scans that use a brick)).
   /// @pre `voxels` were marked for this grid
   void set(std::uint64_t frame, const scan_voxels& voxels);
-  /// Removes a scan; the octants it observed become stale. Returns whether there was one. O(its bricks + scans).
+  /// Removes a scan; the octants it observed become stale. Returns true if it existed. O(its bricks + scans).
   bool remove(std::uint64_t frame);
-  /// The voxels of a scan, valid until it changes; null if there is none. O(log scans).
+  /// Returns the voxels of a scan, valid until it changes; null if the scan does not exist. O(log scans).
   [[nodiscard]] const scan_voxels* find_scan(std::uint64_t frame) const noexcept;
   [[nodiscard]] bool contains(std::uint64_t frame) const noexcept { return find_scan(frame) != nullptr; }
-  /// How many scans there are.
+  /// Number of scans.
   [[nodiscard]] std::size_t size() const noexcept { return order_.size(); }
 
-  // -- following them
+  // -- replay
 
-  /// How many bricks have stale octants.
+  /// Number of bricks with stale octants.
   [[nodiscard]] std::size_t stale_bricks() const noexcept { return uses_.stale().size(); }
-  /// Replays stale octants, those first that have been stale for longest, as one revision of the change log. Returns
-  /// the number of bricks replayed: at least one, if there is one, whatever the time. The map is the same under every
-  /// policy. Allocates nothing once its buffers have grown. O(bricks x scans that use each).
+  /// Replays stale octants, the longest stale first, as one revision of the change log. Returns the number of bricks
+  /// replayed: at least one, if any is stale, regardless of the time limit. The map is the same under every policy.
+  /// Allocates nothing once its buffers have grown. O(bricks x scans that use each).
   template <execution_policy Policy>
   std::size_t replay(const Policy& policy, const replay_limits& limits = {}) {
     return replay_stale(detail::as_parallel(policy), limits);
   }
 
-  /// Bytes on the heap of the scans and the lists of who observes what; without the map. O(bricks + scans).
+  /// Heap memory in bytes of the scans and the per-brick lists of scans, without the map. O(bricks + scans).
   [[nodiscard]] std::size_t bytes() const noexcept;
-  /// Bytes of the buffers for marking and replaying.
+  /// Memory in bytes of the buffers for marking and replaying.
   [[nodiscard]] std::size_t buffer_bytes() const noexcept {
     return marker_.bytes() + marked_.bytes() + replayed_.capacity() * sizeof(replayed_[0]);
   }
@@ -155,13 +155,13 @@ class scan_history {
 
   [[nodiscard]] static bool is_before(const place& p, std::uint64_t frame) noexcept { return p.frame < frame; }
   [[nodiscard]] typename std::vector<place>::iterator find(std::uint64_t frame) noexcept;
-  /// The number of the scan of `frame`, new or not.
+  /// Returns the number of the scan of `frame`; makes a new one if needed.
   [[nodiscard]] std::uint32_t make_scan(std::uint64_t frame);
-  /// Where the scan of `frame` stands, or would stand, among those that use a brick.
+  /// Position (existing or for insertion) of the scan of `frame` among those that use a brick.
   [[nodiscard]] std::vector<detail::brick_use>::iterator place_of(std::vector<detail::brick_use>& uses,
                                                                   std::uint64_t frame) const noexcept;
-  /// Brings the lists of the bricks' users from what scan `number` says to what `after` says. Where the scan is the
-  /// newest of a brick, the brick is left to apply_fresh; elsewhere octants become stale.
+  /// Updates the bricks' lists of scans from the old voxels of scan `number` to `after`. If the scan is the newest of a
+  /// brick, apply_fresh handles the brick; otherwise octants become stale.
   void change_uses(std::uint32_t number, const scan_voxels& after);
   /// Applies the parts of a scan that are the newest in their bricks.
   void apply_fresh(std::uint32_t number);
@@ -171,15 +171,15 @@ class scan_history {
                     std::size_t count);
   Octree map_;
   std::vector<scan> scans_;          ///< by number
-  std::vector<std::uint32_t> free_;  ///< numbers that are not in use
+  std::vector<std::uint32_t> free_;  ///< unused numbers
   std::vector<place> order_;         ///< by frame
   detail::brick_uses uses_;
 
   scan_marker marker_;
   scan_voxels marked_;
-  std::vector<std::uint32_t> fresh_;  ///< parts of the scan at hand that are the newest in their bricks
+  std::vector<std::uint32_t> fresh_;  ///< parts of the current scan that are the newest in their bricks
   std::vector<detail::replayed_brick<value_type>> replayed_;
-  std::vector<std::uint64_t> unknown_;  ///< bricks of which nothing is known any more
+  std::vector<std::uint64_t> unknown_;  ///< bricks whose voxels have all become unknown
 };
 
 }  // namespace orbis::octree

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The voxels that one scan observes free and occupied, packed to be kept; and the marker that finds them.
+/// Compact storage of the voxels that one scan observes free and occupied, and the marker that finds them.
 #pragma once
 
 #include <array>
@@ -29,30 +29,30 @@ class scan_masks;
 }  // namespace detail
 
 /// The voxels that one scan observes free and occupied: two disjoint sets, as bit masks of octants of 4x4x4 voxels,
-/// grouped by bricks of 8x8x8. A mask is kept only where it is neither empty nor a whole free octant. A depth image of
-/// 640x480 pixels takes about 10 kB at 5 cm and 100 kB at 2 cm.
+/// grouped by bricks of 8x8x8. A mask is stored only if it is neither empty nor a completely free octant. A depth image
+/// of 640x480 pixels takes about 10 kB at 5 cm and 100 kB at 2 cm.
 class scan_voxels {
  public:
-  /// One brick. Masks of bits: bit i is octant i.
+  /// One brick. In the 8-bit masks, bit i is octant i.
   struct part {
     std::uint64_t name = 0;     ///< see detail::node_name
-    std::uint32_t first = 0;    ///< of its masks in words(): first the free ones, then the occupied ones
+    std::uint32_t first = 0;    ///< index of its first mask in words(): the free masks, then the occupied ones
     std::uint8_t free = 0;      ///< octants that have a mask of free voxels
     std::uint8_t occupied = 0;  ///< octants that have a mask of occupied voxels
-    std::uint8_t full = 0;      ///< octants that are free as a whole, which have no masks
+    std::uint8_t full = 0;      ///< octants that are completely free, without masks
     friend bool operator==(const part&, const part&) = default;
   };
-  /// The masks of one brick in the open; word i is octant i.
+  /// Unpacked masks of one brick; word i is octant i.
   struct brick_masks {
     std::array<std::uint64_t, 8> free{};
     std::array<std::uint64_t, 8> occupied{};
   };
 
-  /// The bricks, ordered by name, each once.
+  /// Bricks, ordered by name, each once.
   [[nodiscard]] std::span<const part> parts() const noexcept { return parts_; }
   [[nodiscard]] std::span<const std::uint64_t> words() const noexcept { return words_; }
   [[nodiscard]] bool empty() const noexcept { return parts_.empty(); }
-  /// Calls `visit(octant, free, occupied)` for every octant of a brick of which the scan observed something, in order.
+  /// Calls `visit(octant, free, occupied)` for every octant of a brick with observations of the scan, in order.
   template <class Visit>
   void for_each_octant(const part& p, Visit&& visit) const {
     const std::uint64_t* free = words_.data() + p.first;
@@ -71,7 +71,7 @@ class scan_voxels {
     });
     return m;
   }
-  /// Numbers of voxels observed free and occupied. O(words).
+  /// Returns the numbers of voxels observed free and occupied. O(words).
   [[nodiscard]] std::pair<std::size_t, std::size_t> counts() const noexcept {
     std::size_t free = 0, occupied = 0;
     for (const part& p : parts_)
@@ -81,11 +81,11 @@ class scan_voxels {
       });
     return {free, occupied};
   }
-  /// Bytes on the heap.
+  /// Heap memory in bytes.
   [[nodiscard]] std::size_t bytes() const noexcept {
     return parts_.capacity() * sizeof(part) + words_.capacity() * sizeof(std::uint64_t);
   }
-  /// Forgets all voxels, keeps the memory.
+  /// Removes all voxels, keeps the memory.
   void clear() noexcept {
     parts_.clear();
     words_.clear();
@@ -95,20 +95,20 @@ class scan_voxels {
  private:
   friend class scan_marker;
 
-  /// Adds a brick. @pre names come in order
+  /// Adds a brick. @pre names are in ascending order
   void add(const detail::scan_brick& b);
 
   std::vector<part> parts_;
   std::vector<std::uint64_t> words_;
 };
 
-/// Finds the voxels that `occupancy_octree::integrate` would observe free and occupied, without a map. Keeps its
-/// buffers from scan to scan: marking allocates nothing once they have grown. One marker for each thread.
+/// Finds the voxels that `occupancy_octree::integrate` would observe free and occupied, without a map. Reuses its
+/// buffers: marking allocates nothing once they have grown. Use one marker per thread.
 class scan_marker {
  public:
-  /// Marks a depth image (metres along the optical axis). Unlike `integrate`, this leaves out no voxel for being
-  /// saturated, so that the scan may be applied to any map. The same voxels for every policy. The summary counts what
-  /// `integrate` counts. O(pixels + voxels near surfaces + bricks).
+  /// Marks a depth image (metres along the optical axis). Unlike `integrate`, includes saturated voxels, so that the
+  /// scan can be applied to any map. The same voxels for every policy. The summary has the counts of `integrate`.
+  /// O(pixels + voxels near surfaces + bricks).
   /// @pre depth and camera have the same size
   template <execution_policy Policy, camera::depth_source Depth, camera::camera_model Camera>
   integration_summary mark(const Policy& policy, const voxel_grid& grid, const Depth& depth, const Camera& camera,
@@ -123,7 +123,7 @@ class scan_marker {
     return mark_points(detail::as_parallel(policy), grid, scratch_.view(points), coordinates<float>(origin), options,
                        voxels);
   }
-  /// Bytes on the heap.
+  /// Heap memory in bytes.
   [[nodiscard]] std::size_t bytes() const noexcept {
     return scratch_.memory_bytes() + order_.capacity() * sizeof(order_[0]);
   }

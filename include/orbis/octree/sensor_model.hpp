@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Sensor models: what one observation does to the belief about a voxel.
+/// Sensor models: effect of one observation on the belief about a voxel.
 ///
-/// A. Hornung, K. M. Wurm, M. Bennewitz, C. Stachniss, W. Burgard, "OctoMap: An efficient
-/// probabilistic 3D mapping framework based on octrees", Autonomous Robots 34, 2013: the belief is
-/// kept as log-odds `L(n) = log(P(n) / (1 - P(n)))`; an observation adds to it (equation 2), and the
-/// sum is clamped (equation 4) so that the map stays able to change and compresses well.
+/// A. Hornung, K. M. Wurm, M. Bennewitz, C. Stachniss, W. Burgard, "OctoMap: An efficient probabilistic 3D mapping
+/// framework based on octrees", Autonomous Robots 34, 2013: the belief is stored as log-odds `L(n) = log(P(n) / (1 -
+/// P(n)))`; an observation adds to it (equation 2), and the sum is clamped (equation 4), so that the map can still
+/// change and compresses well.
 #pragma once
 
 #include <bit>
@@ -18,11 +18,11 @@
 
 namespace orbis::octree::detail {
 
-/// The natural logarithm of `x`, within three units in the last place of a double, so that its float is
-/// std::log's (but for one value in some ten million, where the two round apart).
+/// Natural logarithm of `x`, within three units in the last place of a double, so that its float equals that of
+/// std::log (except for about one value in ten million, which rounds differently).
 ///
-/// `x = m * 2^e` with `m` in [0.7, 1.41]; `log(m) = 2 atanh(s)` for `s = (m - 1) / (m + 1)`, by the
-/// series `s + s^3 / 3 + s^5 / 5 + ...`, |s| < 0.172. For constants: at run time std::log is faster.
+/// `x = m * 2^e` with `m` in [0.7, 1.41]; `log(m) = 2 atanh(s)` for `s = (m - 1) / (m + 1)`, by the series `s + s^3 / 3
+/// + s^5 / 5 + ...`, |s| < 0.172. For constants; std::log is faster at run time.
 /// @pre x is positive and normal
 [[nodiscard]] constexpr double constexpr_log(double x) noexcept {
   const auto bits = std::bit_cast<std::uint64_t>(x);
@@ -36,7 +36,7 @@ namespace orbis::octree::detail {
   const double s = (m - 1.0) / (m + 1.0);
   double series = 0.0;
   for (int k = 27; k != 1; k -= 2) series = (series + 1.0 / k) * (s * s);
-  // log 2 in two parts, the first of which is exact when multiplied by an exponent.
+  // log 2 in two parts; the product of the first one with an exponent is exact
   constexpr double log2_high = 0x1.62e42fee00000p-1, log2_low = 0x1.a39ef35793c76p-33;
   return exponent * log2_high + (2.0 * s + (2.0 * s * series + exponent * log2_low));
 }
@@ -45,20 +45,20 @@ namespace orbis::octree::detail {
 
 namespace orbis::octree {
 
-/// What is known about a place.
+/// State of a voxel.
 enum class occupancy { unknown, free, occupied };
 
-/// The log-odds of a probability in (0, 1).
+/// Log-odds of a probability in (0, 1).
 [[nodiscard]] constexpr float log_odds_of(double probability) noexcept {
   const double odds = probability / (1.0 - probability);
   return static_cast<float>(std::is_constant_evaluated() ? detail::constexpr_log(odds) : std::log(odds));
 }
-/// The probability of log-odds.
+/// Probability of log-odds.
 [[nodiscard]] inline double probability_of(double log_odds) noexcept { return 1.0 - 1.0 / (1.0 + std::exp(log_odds)); }
 
-// -- what makes a sensor model; apart, so that a compiler's message names what is wrong
+// -- requirements of a sensor model, as separate concepts for specific compiler messages
 
-/// All five constants are there and have the value type, a floating-point one.
+/// All five constants exist and have the value type, a floating-point type.
 template <class M>
 concept has_constants_of_its_value_type = std::floating_point<typename M::value_type> && requires {
   { M::hit } -> std::same_as<const typename M::value_type&>;
@@ -71,28 +71,28 @@ template <class M>
 concept hit_raises_and_miss_lowers = M::miss < 0 && 0 < M::hit;
 template <class M>
 concept clamps_are_ordered = M::clamp_min < M::clamp_max;
-/// At the lower bound a voxel is free, at the upper one it is occupied.
+/// The lower bound is free, the upper bound occupied.
 template <class M>
 concept threshold_is_between_clamps = M::clamp_min < M::occupancy_threshold&& M::occupancy_threshold <= M::clamp_max;
-/// A sensor model: additive hit and miss, bounds, and the value from which on a voxel counts as
-/// occupied. All are compile-time constants.
+/// A sensor model: additive hit and miss, bounds, and the minimum value of an occupied voxel. All are compile-time
+/// constants.
 template <class M>
 concept sensor_model = has_constants_of_its_value_type<M> && hit_raises_and_miss_lowers<M> && clamps_are_ordered<M> &&
     threshold_is_between_clamps<M>;
 
-/// A sensor model whose maps OctoMap's files can hold.
+/// A sensor model whose maps can be stored in OctoMap's files.
 template <class M>
 concept octomap_model = sensor_model<M> && std::same_as<typename M::value_type, float>;
 
-/// The model OctoMap uses unless told otherwise: P(hit) = 0.7, P(miss) = 0.4, beliefs kept within
-/// [0.1192, 0.971], occupied from 0.5 on. Derive from it, or write your own, to change constants:
+/// OctoMap's default model: P(hit) = 0.7, P(miss) = 0.4, beliefs clamped to [0.1192, 0.971], occupied from 0.5 on.
+/// Derive from it, or write a custom model, to change constants:
 ///
 /// @code
 ///   struct confident : orbis::octree::log_odds<> { static constexpr float hit = 1.5F; };
 ///   orbis::octree::occupancy_octree<confident> map{0.05};
 /// @endcode
 ///
-/// Or say probabilities, see sensor_model_from.
+/// To specify probabilities instead, see sensor_model_from.
 template <std::floating_point T = float>
 struct log_odds {
   using value_type = T;
@@ -103,15 +103,14 @@ struct log_odds {
   static constexpr T occupancy_threshold{0};
 };
 
-/// The value after one more observation that the voxel is occupied. A value at or beyond its bound
-/// stays.
+/// Value after one more observation of the voxel as occupied. A value at or beyond its bound does not change.
 template <sensor_model M>
 [[nodiscard]] constexpr typename M::value_type after_hit(typename M::value_type v) noexcept {
   if (v >= M::clamp_max) return v;
   v = static_cast<typename M::value_type>(v + M::hit);
   return v < M::clamp_min ? M::clamp_min : v > M::clamp_max ? M::clamp_max : v;
 }
-/// The value after one more observation that the voxel is free.
+/// Value after one more observation of the voxel as free.
 template <sensor_model M>
 [[nodiscard]] constexpr typename M::value_type after_miss(typename M::value_type v) noexcept {
   if (v <= M::clamp_min) return v;
@@ -131,7 +130,7 @@ template <sensor_model M>
 
 // -- models from probabilities
 
-/// The probabilities behind OctoMap's constants.
+/// The probabilities of OctoMap's constants.
 struct octomap_probabilities {
   static constexpr double hit = 0.7;   ///< that a voxel is occupied if a ray ends in it
   static constexpr double miss = 0.4;  ///< that a voxel is occupied if a ray crosses it
@@ -159,7 +158,7 @@ template <std::floating_point T>
 
 }  // namespace detail
 
-/// The sensor model of five probabilities, worked out by the compiler.
+/// Sensor model computed at compile time from five probabilities.
 ///
 /// @code
 ///   struct doubtful : orbis::octree::octomap_probabilities { static constexpr double hit = 0.6; };

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A sparse layer of payload beside a map: colours, labels or counts, one value for each voxel that has any,
-/// under the keys of the map.
+/// A sparse layer of payload for a map: colours, labels or counts, with at most one value per voxel, under the keys of
+/// the map.
 #pragma once
 
 #include <algorithm>
@@ -22,13 +22,12 @@
 
 namespace orbis::octree {
 
-/// A payload: plain bytes, which copies of a map can share; its default value is that of a voxel that
-/// has none yet.
+/// A payload type: plain bytes that copies of a map can share. Its default value is that of a voxel without data.
 template <class T>
 concept voxel_payload = std::copyable<T> && std::default_initializable<T> && std::is_trivially_copyable_v<T>;
 
-/// The mean of the colours seen; 8 bytes. Exact over the first 257 of them; after that the past counts
-/// as 128 observations or more, so that the mean follows the last two hundred or so.
+/// Running mean of observed colours; 8 bytes. Exact for the first 257 observations; afterwards the past has a weight of
+/// at least 128 observations, so that the mean follows about the last two hundred.
 class rgb_mean {
  public:
   void update(const rgb8& color) noexcept {
@@ -38,9 +37,9 @@ class rgb_mean {
     sum_[2] = static_cast<std::uint16_t>(sum_[2] + color.b);
     ++count_;
   }
-  /// How many observations the mean is of, 257 at most.
+  /// Number of observations in the mean, 257 at most.
   [[nodiscard]] std::uint32_t count() const noexcept { return count_; }
-  /// The mean, rounded; black if nothing has been seen.
+  /// Returns the mean, rounded; black without observations.
   [[nodiscard]] rgb8 color() const noexcept {
     const std::uint32_t n = count_ == 0 ? 1U : count_;
     const auto mean = [&](std::uint32_t sum) { return static_cast<std::uint8_t>((sum + n / 2) / n); };
@@ -59,23 +58,23 @@ class rgb_mean {
   std::uint16_t count_ = 0;
 };
 
-/// Values in octants of 4x4x4 voxels. Costs 64 values for each octant that has any. A copy shares
-/// everything with the original until one of the two changes; a reference to a value holds until the
-/// value is erased, or the layer copied or gone.
+/// Values in octants of 4x4x4 voxels. Takes the memory of 64 values per octant with any value. A copy shares all data
+/// with the original until one of them changes. A reference to a value is valid until the value is erased or the layer
+/// is copied or destroyed.
 ///
 /// @code
 ///   orbis::octree::voxel_layer<orbis::octree::rgb_mean> colors;
 ///   if (const auto key = map.grid().key(p)) colors.make(*key).update({200, 120, 40});
 /// @endcode
 ///
-/// Const members may be called from several threads at once.
-/// Everywhere: @pre coordinates of keys < 2^21.
+/// Const members can be called from several threads at once.
+/// All functions: @pre coordinates of keys < 2^21.
 template <voxel_payload T>
 class voxel_layer {
  public:
   using value_type = T;
 
-  /// The value of voxel `k`, or null if it has none. O(1), as are those below unless they say more.
+  /// Returns the value of voxel `k`, or null if it has none. O(1), as are the functions below unless stated otherwise.
   [[nodiscard]] const T* find(const voxel_key& k) const noexcept {
     const std::uint64_t code = morton_code(k);
     const std::uint32_t i = index_.find(code >> 6U);
@@ -83,7 +82,7 @@ class voxel_layer {
     const octant& o = octants_[i];
     return (o.known >> (code & 63U) & 1U) != 0 ? &o.value[code & 63U] : nullptr;
   }
-  /// The value of voxel `k`, value-initialised if it had none.
+  /// Returns the value of voxel `k`; inserts a value-initialised one if needed.
   [[nodiscard]] T& make(const voxel_key& k) {
     const std::uint64_t code = morton_code(k);
     const std::uint32_t i = index_.find(code >> 6U);
@@ -92,13 +91,13 @@ class voxel_layer {
     return o.value[code & 63U];
   }
 
-  /// Takes its value from voxel `k`. Returns whether it had one.
+  /// Erases the value of voxel `k`. Returns true if it had one.
   bool erase(const voxel_key& k) {
     const std::uint64_t code = morton_code(k);
     return erase_in(code >> 6U, std::uint64_t{1} << (code & 63U)) != 0;
   }
-  /// Takes their values from the octant, or the brick of 8x8x8 voxels, that contains `k`. Returns how
-  /// many there were.
+  /// Erase the values of the octant, or of the brick of 8x8x8 voxels, that contains `k`. Return the number of erased
+  /// values.
   std::size_t erase_octant(const voxel_key& k) { return erase_in(morton_code(k) >> 6U, ~std::uint64_t{0}); }
   std::size_t erase_brick(const voxel_key& k) {
     const std::uint64_t brick = morton_code(k) >> 9U;
@@ -107,8 +106,8 @@ class voxel_layer {
     return erased;
   }
 
-  /// Calls `visit(key, value)` for every voxel that has a value, along the Morton curve: the order
-  /// does not depend on how the layer came about. O(octants log octants + values).
+  /// Calls `visit(key, value)` for every voxel with a value, along the Morton curve: the order does not depend on the
+  /// history of the layer. O(octants log octants + values).
   template <std::invocable<const voxel_key&, const T&> Visit>
   void for_each(Visit&& visit) const {
     std::vector<std::pair<std::uint64_t, const octant*>> order;
@@ -127,22 +126,22 @@ class voxel_layer {
     }
   }
 
-  /// Forgets everything and gives the memory back.
+  /// Erases all values and frees the memory.
   void clear() noexcept { *this = voxel_layer{}; }
   [[nodiscard]] bool empty() const noexcept { return index_.empty(); }
-  /// The number of voxels that have a value. O(octants).
+  /// Number of voxels with a value. O(octants).
   [[nodiscard]] std::size_t size() const noexcept {
     std::size_t n = 0;
     for (std::size_t i = 0; i != octants_.size(); ++i) n += static_cast<std::size_t>(std::popcount(octants_[i].known));
     return n;
   }
-  /// Bytes on the heap, those shared with copies included.
+  /// Heap memory in bytes, including memory shared with copies.
   [[nodiscard]] std::size_t memory_bytes() const noexcept {
     return index_.memory_bytes() + octants_.memory_bytes() + free_.capacity() * sizeof(std::uint32_t);
   }
 
  private:
-  /// `known` is 0 if and only if the octant is not in use; all values that are not known are T{}.
+  /// `known` is 0 if and only if the octant is unused; all values that are not known are T{}.
   struct octant {
     std::uint64_t code = 0;
     std::uint64_t known = 0;
@@ -180,7 +179,7 @@ class voxel_layer {
 
   hash_index index_;
   cow_pages<octant> octants_;
-  std::vector<std::uint32_t> free_;  ///< octants not in use
+  std::vector<std::uint32_t> free_;  ///< unused octants
 };
 
 }  // namespace orbis::octree

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Any points as one type: what algorithms that are compiled once take.
+/// Type-erased points, the argument type of algorithms that are compiled once.
 #pragma once
 
 #include <algorithm>
@@ -20,7 +20,7 @@
 
 namespace orbis::cloud::detail {
 
-/// Any policy as the one that algorithms are compiled for: the result is the same for all of them.
+/// Converts any policy to the one for which algorithms are compiled; the result is the same for all policies.
 template <execution_policy Policy>
 [[nodiscard]] parallel_policy threads_of(const Policy& policy) noexcept(noexcept(policy.threads())) {
   if constexpr (std::same_as<Policy, parallel_policy>)
@@ -29,13 +29,14 @@ template <execution_policy Policy>
     return {std::max(1U, static_cast<unsigned>(policy.threads()))};
 }
 
-/// Points whose coordinates are numbers of type `S` at the same places in each of them.
+/// Points whose coordinates are numbers of type `S` with a fixed stride.
 template <std::floating_point S>
 class basic_point_view {
  public:
   using scalar = S;
   basic_point_view() = default;
-  /// `axis`: the coordinates of the first point; those of the next one follow after `stride` bytes.
+  /// Views points in memory. `axis`: coordinates of the first point; those of each next point follow after `stride`
+  /// bytes.
   basic_point_view(const std::array<const S*, 3>& axis, std::size_t stride, std::size_t count) noexcept
       : stride_{stride}, count_{count} {
     for (std::size_t a = 0; a != 3; ++a) axis_[a] = reinterpret_cast<const unsigned char*>(axis[a]);
@@ -61,13 +62,13 @@ class basic_point_view {
 
 using point_view = basic_point_view<float>;
 
-/// Points that hold their numbers themselves, and no pointer to them.
+/// A point type that stores its coordinates itself, not a pointer to them.
 template <class P>
 concept indexed_storage = std::is_bounded_array_v<P> || requires {
   std::tuple_size<P>::value;
 } ||(requires { P::SizeAtCompileTime; } && std::same_as<P, typename P::PlainObject>);
 
-/// The coordinates of a point where they are; none where it computes them, or has them as another number type.
+/// Addresses of a point's coordinates; null if it computes them or stores another number type.
 template <std::floating_point S, point_like P>
 [[nodiscard]] std::array<const S*, 3> stored_coordinates(const P& p) noexcept {
   if constexpr (requires { typename point_traits<P>::is_default; }) {
@@ -86,8 +87,8 @@ template <std::floating_point S, point_like P>
   return {};
 }
 
-/// A user's points as a `basic_point_view`: in place where they hold such numbers one point after the other in memory,
-/// copied otherwise (12 bytes for each, of float).
+/// Adapts a user's points to `basic_point_view`: in place if they store numbers of type `S` contiguously, otherwise
+/// copied (12 bytes per point for float).
 template <std::floating_point S>
 class basic_viewed_points {
  public:
@@ -98,7 +99,7 @@ class basic_viewed_points {
       if (count == 0) return;
       const auto* const first = std::ranges::data(points);
       const std::array<const S*, 3> axis = stored_coordinates<S>(*first);
-      if (lie_in(*first, axis)) {
+      if (holds_coordinates(*first, axis)) {
         view_ = {axis, sizeof(*first), count};
         return;
       }
@@ -114,9 +115,10 @@ class basic_viewed_points {
   [[nodiscard]] operator const basic_point_view<S>&() const noexcept { return view_; }
 
  private:
-  /// Whether the coordinates are there and in the point itself: those of a packed struct, for one, would be copies.
+  /// Returns true if the coordinates exist and are inside the point itself. Those of a packed struct, for example,
+  /// would be copies.
   template <class P>
-  [[nodiscard]] static bool lie_in(const P& point, const std::array<const S*, 3>& axis) noexcept {
+  [[nodiscard]] static bool holds_coordinates(const P& point, const std::array<const S*, 3>& axis) noexcept {
     const auto begin = reinterpret_cast<std::uintptr_t>(std::addressof(point));
     for (const S* const a : axis) {
       const auto at = reinterpret_cast<std::uintptr_t>(a);
@@ -130,7 +132,7 @@ class basic_viewed_points {
 };
 using viewed_points = basic_viewed_points<float>;
 
-/// The i-th point of a cloud.
+/// Returns the i-th point of a cloud.
 template <point_range Points>
 [[nodiscard]] decltype(auto) point_at(const Points& points, std::size_t i) {
   return std::ranges::begin(points)[static_cast<std::ranges::range_difference_t<const Points>>(i)];

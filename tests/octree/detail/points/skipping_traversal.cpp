@@ -47,7 +47,7 @@ TEST_CASE("A node that is left at once is left where steps leave it") {
           parameter = by_step.next[axis];
           by_step.advance(axis);
         }
-        const auto way = skipping.find_way_out(cells);
+        const auto way = skipping.find_node_exit(cells);
         CHECK(way.face.axis == axis);
         CHECK(way.face.parameter == parameter);
         skipping.take(way);

@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The inner loops of the search for the neighbours of all points.
+/// Inner loops of the all-points neighbour search.
 ///
-/// Distances to boxes are computed by the same operations in the same order as those to points.
-/// Rounding is monotonic, so the distance to a box is never more than that to a point within it, and
-/// no neighbour is lost to rounding.
+/// Distances to boxes are computed by the same operations in the same order as distances to points. Rounding is
+/// monotonic, so the distance to a box never exceeds that to a point in it, and no neighbour is lost by rounding.
 #pragma once
 
 #include <array>
@@ -23,8 +22,9 @@
 
 namespace orbis::cloud::detail {
 
-/// Allocates at cache lines. On many processors a register that is stored across two of them cannot be read again until
-/// it has reached the cache; so rows whose first registers are read soon after begin at a line.
+/// Allocates at cache-line boundaries. On many processors, a stored register that straddles two cache lines cannot be
+/// read again until it has reached the cache. Rows whose first registers are read soon after writing therefore begin at
+/// a cache line.
 template <class T>
 struct line_allocator {
   using value_type = T;
@@ -44,8 +44,8 @@ struct line_allocator {
 template <class T>
 using line_vector = std::vector<T, line_allocator<T>>;
 
-/// Boxes axis by axis: the first corners' coordinates along axis a begin at `first + a * stride`, the opposite
-/// corners' three strides later.
+/// Boxes in structure-of-arrays layout: the coordinates of the low corners along axis a begin at `first + a * stride`,
+/// those of the high corners three strides later.
 struct box_axes {
   const float* first;
   std::size_t stride;
@@ -56,19 +56,19 @@ struct box_axes {
   }
 };
 
-/// The leaves near a group of queries, or rows of leaves, and their boxes.
+/// Leaves near a group of queries, or rows of leaves, with their boxes.
 struct nearby_leaves {
   explicit nearby_leaves(std::size_t most)
       : stride{(most / leaf_width + 2) * leaf_width}, boxes(6 * stride), leaves(stride) {}
   std::size_t stride;
-  line_vector<float> boxes;  ///< as `box_axes` says
+  line_vector<float> boxes;  ///< layout of `box_axes`
   line_vector<std::uint32_t> leaves;
   std::size_t count = 0;
-  /// Whether a further row of children may be added.
+  /// Returns true if a further row of children fits.
   [[nodiscard]] bool has_room() const noexcept { return count + 2 * leaf_width <= stride; }
-  /// Sixteen boxes. @pre first is a multiple of sixteen
+  /// Returns sixteen boxes. @pre first is a multiple of sixteen
   [[nodiscard]] box_axes row(std::size_t first) const noexcept { return {boxes.data() + first, stride}; }
-  /// Fills up the last row with boxes at infinity.
+  /// Fills the last row up with boxes at infinity.
   void finish() noexcept {
     constexpr float inf = std::numeric_limits<float>::infinity();
     for (std::size_t i = count; i % leaf_width != 0; ++i) {
@@ -80,32 +80,32 @@ struct nearby_leaves {
   }
 };
 
-/// What is known of the `wanted` smallest of some squared distances.
+/// Partial result on the `wanted` smallest of some squared distances.
 struct nearest_sum {
-  double roots = 0;           ///< the sum of their roots, to within the slack; negative where that is not known
+  double roots = 0;           ///< sum of their roots, up to `roots_slack`; negative if unknown
   float largest_squared = 0;  ///< the largest of them
 };
 
-/// The relative error that `nearest_sum::roots` may have: that of roots from Newton's method, and of
-/// corrections added up in float.
+/// Upper bound of the relative error of `nearest_sum::roots`: the error of roots from Newton's method and of
+/// corrections summed in float.
 [[nodiscard]] inline double roots_slack(std::size_t wanted) noexcept {
   return 0x1p-40 + 0x1p-46 * static_cast<double>(wanted);
 }
 
-/// `(x^2 + y^2) + z^2`, each operation rounded: `squared_distance` in lanes.
+/// `(x^2 + y^2) + z^2`, each operation rounded: the vectorised `squared_distance`.
 template <simd::vector V>
 [[nodiscard]] ORBIS_ALWAYS_INLINE V sum_of_squares(const V& x, const V& y, const V& z) noexcept {
   return (x * x + y * y) + z * z;
 }
 
-/// A point or the corner of a box, each coordinate in all lanes.
+/// A point or the corner of a box, each coordinate broadcast to all lanes.
 template <simd::vector V>
 struct spread_point {
   V x, y, z;
   explicit ORBIS_ALWAYS_INLINE spread_point(const std::array<float, 3>& p) noexcept : x(p[0]), y(p[1]), z(p[2]) {}
 };
 
-/// Squared distances between boxes `at`, `at + 1` ... of some and the one between `low` and `high`.
+/// Squared distances between the boxes `at`, `at + 1`, ... and the box from `low` to `high`.
 template <simd::vector V>
 [[nodiscard]] ORBIS_ALWAYS_INLINE V box_distances(const box_axes& boxes, std::size_t at, const spread_point<V>& low,
                                                   const spread_point<V>& high) noexcept {
@@ -115,7 +115,7 @@ template <simd::vector V>
   };
   return sum_of_squares(gap(0, low.x, high.x), gap(1, low.y, high.y), gap(2, low.z, high.z));
 }
-/// Squared distances between points `at`, `at + 1` ... of a leaf and `q`.
+/// Squared distances between the points `at`, `at + 1`, ... of a leaf and `q`.
 template <simd::vector V>
 [[nodiscard]] ORBIS_ALWAYS_INLINE V point_distances(const point_row& leaf, std::size_t at,
                                                     const spread_point<V>& q) noexcept {
@@ -123,7 +123,7 @@ template <simd::vector V>
                         q.z - V::load(leaf.axis[2].data() + at));
 }
 
-/// The squared distances from a box to sixteen others; returns those within `bound` as bits.
+/// Computes the squared distances from a box to sixteen others; returns a bit mask of those within `bound`.
 struct near_boxes {
   template <simd::target Target>
   static ORBIS_ALWAYS_INLINE std::uint32_t run(const box_axes& boxes, const box3& query, float bound, float* distance) {
@@ -139,7 +139,7 @@ struct near_boxes {
   }
 };
 
-/// The squared distances from a point to those of a leaf; returns those within `bound` as bits.
+/// Computes the squared distances from a point to those of a leaf; returns a bit mask of those within `bound`.
 struct leaf_distances {
   template <simd::target Target>
   static ORBIS_ALWAYS_INLINE std::uint32_t run(const point_row& leaf, const std::array<float, 3>& query, float bound,
@@ -156,8 +156,8 @@ struct leaf_distances {
   }
 };
 
-/// Writes the squared distances within `bound` from a point to those of a leaf one after the other, and returns how
-/// many they are. May write sixteen.
+/// Writes the squared distances within `bound` from a point to those of a leaf contiguously; returns their number. May
+/// write up to sixteen values.
 struct near_in_leaf {
   template <simd::vector V>
   static ORBIS_ALWAYS_INLINE std::size_t keep(const point_row& leaf, const spread_point<V>& q, const V& bound,
@@ -167,7 +167,7 @@ struct near_in_leaf {
       const V d = point_distances(leaf, at, q);
       const auto within = d <= bound;
       if constexpr (V::count == 4)
-        if (simd::none(within)) continue;  // where moving lanes together takes long
+        if (simd::none(within)) continue;  // compressing lanes is slow
       count += simd::compress_store(found + count, d, within);
     }
     return count;
@@ -180,8 +180,8 @@ struct near_in_leaf {
   }
 };
 
-/// Writes the numbers of the leaves of `near` whose boxes are within `bound` of a point; returns how many they are. May
-/// write sixteen more.
+/// Writes the numbers of the leaves of `near` whose boxes are within `bound` of a point; returns their number. May
+/// write sixteen more values.
 struct chosen_leaves {
   template <simd::vector V, simd::vector Numbers>
   static ORBIS_ALWAYS_INLINE std::size_t find(const nearby_leaves& near, const spread_point<V>& q, const V& bound,
@@ -197,9 +197,9 @@ struct chosen_leaves {
   }
 };
 
-/// Writes the squared distances within `bound` from a point to those of the leaves that were chosen, then sixteen times
-/// infinity. Returns how many they are. Ends early with more than `capacity` of them; touches no more than
-/// `capacity + 3 * leaf_width`.
+/// Writes the squared distances within `bound` from a point to those of the chosen leaves, followed by sixteen times
+/// infinity. Returns their number. Ends early if there are more than `capacity`; writes at most `capacity + 3 *
+/// leaf_width` values.
 struct near_in_leaves {
   template <simd::vector V>
   static ORBIS_ALWAYS_INLINE std::size_t collect(const point_row* leaves, const std::uint32_t* chosen,
@@ -215,7 +215,7 @@ struct near_in_leaves {
   }
 };
 
-/// As `near_in_leaves`, and writes which points they are, as places in `leaf_hierarchy::members`, beside them.
+/// As `near_in_leaves`; also writes the corresponding places in `leaf_hierarchy::members`.
 struct places_in_leaves {
   template <simd::vector V>
   static ORBIS_ALWAYS_INLINE std::size_t collect(const point_row* leaves, const std::uint32_t* chosen,
@@ -241,11 +241,10 @@ struct places_in_leaves {
   }
 };
 
-/// `near_in_leaves` or, with `places`, `places_in_leaves` for the points [first, last) of a leaf and those leaves of
-/// `near` whose boxes are within `bound` of them. Their rows in `found` and `places` are `stride` long; sets their
-/// `counts`. `scratch`: sixteen rows, each longer by sixteen than
-/// `near.leaves`. In two passes, so that what the first one writes for a point has reached the cache when the second
-/// one reads it.
+/// Applies `near_in_leaves` or, with `places`, `places_in_leaves` to the points [first, last) of a leaf and the leaves
+/// of `near` whose boxes are within `bound` of them. The rows in `found` and `places` are `stride` long; sets their
+/// `counts`. `scratch`: sixteen rows, each longer than `near.leaves` by sixteen. Works in two passes, so that data
+/// written for a point in the first pass has reached the cache when the second pass reads it.
 struct near_in_leaves_each {
   template <simd::target Target>
   static ORBIS_ALWAYS_INLINE void run(const point_row* leaves, const nearby_leaves& near, const point_row& points,
@@ -273,14 +272,14 @@ struct near_in_leaves_each {
   }
 };
 
-/// Counts lanes that are set.
+/// Counts the lanes that are set.
 template <simd::target Target>
 class lane_counter {
  public:
   using lanes = simd::native_vec<float, Target>;
   ORBIS_ALWAYS_INLINE void add(const typename lanes::mask_type& m) noexcept {
     if constexpr (Target::needs == simd::level::portable)
-      count_ -= select(m, numbers(-1), numbers(0));  // without an instruction that counts bits
+      count_ -= select(m, numbers(-1), numbers(0));  // no population count instruction
     else
       count_ += simd::number_of(m);
   }
@@ -296,31 +295,31 @@ class lane_counter {
   std::conditional_t<Target::needs == simd::level::portable, numbers, std::size_t> count_ = 0;
 };
 
-/// The sum of the roots of the `wanted` smallest distances, and the largest of them.
+/// Computes the sum of the roots of the `wanted` smallest distances, and the largest of them.
 /// @pre 0 < wanted <= count, no distance above `bound`, and sixteen times infinity after them
 struct sum_nearest {
-  /// Adds -1 to the lanes of `count` where `v` is greater than `other`.
+  /// Adds -1 to the lanes of `count` in which `v` is greater than `other`.
   template <simd::vector V, simd::vector Numbers>
   static ORBIS_ALWAYS_INLINE void count_smaller(Numbers& count, float other, const V& v) noexcept {
     if constexpr (V::is_native)
-      count = select(V(other) < v, count - Numbers(1), count);  // one instruction with a mask
+      count = select(V(other) < v, count - Numbers(1), count);  // one masked instruction
     else
       count += select(V(other) < v, Numbers(-1), Numbers(0));
   }
-  /// The `rank`-th smallest (from 1) of sixteen values: by counting, for each of them, how many are smaller.
+  /// Returns the `rank`-th smallest (from 1) of sixteen values by counting the smaller ones for each of them.
   template <simd::target Target>
   static ORBIS_ALWAYS_INLINE float ranked(const float* values, std::size_t rank) noexcept {
     using lanes = simd::vec<float, leaf_width, Target>;
     using numbers = simd::vec<std::int32_t, leaf_width, Target>;
     const lanes v = lanes::load(values);
-    numbers even = 0, odd = 0;  // for each value, minus how many are smaller
+    numbers even = 0, odd = 0;  // for each value, minus the number of smaller ones
     for (std::size_t i = 0; i != leaf_width; i += 2) {
       count_smaller(even, values[i], v);
       count_smaller(odd, values[i + 1], v);
     }
     return simd::greatest(select(even + odd > numbers(-static_cast<std::int32_t>(rank)), v, lanes(0.0F)));
   }
-  /// The same of thirty-two values, of which those from `count` on are infinite.
+  /// Returns the `rank`-th smallest of thirty-two values, of which those from `count` on are infinite.
   template <simd::target Target>
   static ORBIS_ALWAYS_INLINE float ranked_of_two(const float* values, std::size_t count, std::size_t rank) noexcept {
     using lanes = simd::vec<float, leaf_width, Target>;
@@ -338,14 +337,14 @@ struct sum_nearest {
     return simd::greatest(max(select(smaller0 > least, v0, zero), select(smaller1 > least, v1, zero)));
   }
 
-  /// Adds the roots of the lanes of `v` that are set in `in`, in double. Where multiplications are fused with sums,
-  /// they are roots to twice the precision of float: s = v / sqrt(v) by Newton's method, and the remainder v - s^2 as
-  /// a correction; `tiny`: remainders that would underflow.
+  /// Adds the roots of the lanes of `v` selected by `in`, in double. With fused multiply-add, the roots have twice the
+  /// precision of float: s = v / sqrt(v) by Newton's method, and the remainder v - s^2 as a correction. `tiny`: lanes
+  /// whose remainders would underflow.
   template <simd::target Target>
   struct root_sum {
     using lanes = simd::native_vec<float, Target>;
     using mask = typename lanes::mask_type;
-    simd::vec<double, lanes::count / 2, Target> low = 0.0, high = 0.0;  // of the lower and the higher lanes
+    simd::vec<double, lanes::count / 2, Target> low = 0.0, high = 0.0;  // sums of the lower and the upper lanes
     lanes corrections = 0.0F;
     mask tiny = mask::first(0);
 
@@ -359,7 +358,7 @@ struct sum_nearest {
         const mask usual = in & (all >= lanes(0x1p-70F));
         tiny = tiny | (simd::and_not(in, usual) & (all > zero));
         const lanes v = select(usual, all, zero);
-        // A guess from halving and negating the exponent; each step squares its error.
+        // Initial value from halving and negating the exponent; each step squares its error.
         using bits = simd::native_vec<std::int32_t, Target>;
         const lanes half_v = half * v;
         lanes y = simd::bits_as<float>(bits(0x5f375a86) - (simd::bits_as<std::int32_t>(v) >> 1));
@@ -372,7 +371,7 @@ struct sum_nearest {
         high += simd::convert<double>(s.high());
       }
     }
-    /// Negative where it is not known.
+    /// Returns the sum; negative if it is unknown.
     [[nodiscard]] ORBIS_ALWAYS_INLINE double total() const noexcept {
       if (simd::any(tiny)) return -1.0;
       return simd::sum((low + simd::convert<double>(corrections.low())) +
@@ -380,7 +379,7 @@ struct sum_nearest {
     }
   };
 
-  /// A sum of roots, if it is known, and `times` that of the largest squared distance.
+  /// Adds `times` the root of the largest squared distance to a sum of roots; negative if the sum is unknown.
   static ORBIS_ALWAYS_INLINE double with_largest(double roots, std::size_t times, float largest_squared) noexcept {
     return roots < 0 ? -1.0 : roots + static_cast<double>(times) * std::sqrt(static_cast<double>(largest_squared));
   }
@@ -406,7 +405,7 @@ struct sum_nearest {
     };
     const auto largest = [&]() ORBIS_INLINE_LAMBDA {
       if (count <= leaf_width) return ranked<Target>(found, wanted);
-      // With fewer lanes, or where often more than these are found, guesses are faster.
+      // With fewer lanes, or if more values than these are common, guessing is faster.
       if constexpr (lanes::count == leaf_width)
         if (wanted <= leaf_width && count <= 2 * leaf_width) return ranked_of_two<Target>(found, count, wanted);
       const rank_bracket bracket = bracket_rank(bound, count, wanted, count_within, count_three);
@@ -425,7 +424,7 @@ struct sum_nearest {
     };
     nearest_sum out;
     out.largest_squared = largest();
-    // Those below the largest, and the largest as often as it takes.
+    // Sums the values below the largest, and the largest value repeated up to `wanted` values.
     root_sum<Target> roots;
     lane_counter<Target> smaller;
     for (std::size_t i = 0; i < count; i += lanes::count) {
@@ -439,8 +438,8 @@ struct sum_nearest {
   }
 };
 
-/// `sum_nearest` for the points [first, last) of a leaf, whose rows in `found` are `stride` long; not for those with
-/// fewer than `wanted`.
+/// Applies `sum_nearest` to the points [first, last) of a leaf, whose rows in `found` are `stride` long; skips points
+/// with fewer than `wanted` distances.
 struct sum_nearest_each {
   template <simd::target Target>
   static ORBIS_ALWAYS_INLINE void run(const float* found, std::size_t stride, std::size_t first, std::size_t last,
@@ -456,8 +455,8 @@ struct sum_nearest_each {
   }
 
  private:
-  /// Where two registers hold what was found, one holds all but the largest. Both steps take long for one point, and
-  /// little more for several, one after the other. Returns the points that are left.
+  /// If the found distances fit into two registers, all except the largest fit into one. Both steps have a high latency
+  /// for one point but a high throughput for several points in sequence. Returns the mask of the remaining points.
   template <simd::target Target>
   static ORBIS_ALWAYS_INLINE std::uint32_t sum_few(const float* found, std::size_t stride, std::uint32_t points,
                                                    const std::uint32_t* counts, std::size_t wanted, nearest_sum* out) {
@@ -492,7 +491,7 @@ struct sum_nearest_each {
   }
 };
 
-/// The `rank`-th smallest, from 1, of sixteen values that are not negative.
+/// Returns the `rank`-th smallest, from 1, of sixteen non-negative values.
 struct ranked_of_leaf {
   template <simd::target Target>
   static ORBIS_ALWAYS_INLINE float run(const float* values, std::size_t rank) {
@@ -500,7 +499,8 @@ struct ranked_of_leaf {
   }
 };
 
-/// Adds to `near` the boxes with bits in `wanted`; the first box of the row is that of leaf, or row, `first`.
+/// Adds the boxes selected by the bits of `wanted` to `near`; the first box of the row belongs to leaf, or row,
+/// `first`.
 struct gather_leaves {
   template <simd::target Target>
   static ORBIS_ALWAYS_INLINE void run(const box_row& boxes, std::uint32_t wanted, std::uint32_t first,
@@ -508,7 +508,7 @@ struct gather_leaves {
     using lanes = simd::native_vec<float, Target>;
     using numbers = simd::native_vec<std::uint32_t, Target>;
     float* const to = near.boxes.data();
-    if constexpr (Target::needs == simd::level::portable) {  // which moves lanes together one by one
+    if constexpr (Target::needs == simd::level::portable) {  // compresses lanes one by one
       for (; wanted != 0; wanted &= wanted - 1) {
         const auto i = static_cast<std::size_t>(std::countr_zero(wanted));
         for (std::size_t a = 0; a != 3; ++a) {
@@ -531,7 +531,7 @@ struct gather_leaves {
   }
 };
 
-/// The loops for the best instruction set.
+/// The loops, compiled for the best available instruction set.
 struct knn_kernels {
   using point = std::array<float, 3>;
   using boxes_code = std::uint32_t(const box_axes&, const box3&, float, float*);
@@ -552,7 +552,7 @@ struct knn_kernels {
   sums_code* sums_of_each = simd::kernel<sum_nearest_each, sums_code>();
   rank_code* ranked = simd::kernel<ranked_of_leaf, rank_code>();
 
-  /// `near_points_of_each` for one point: returns its count. `scratch`: longer by sixteen than `near.leaves`.
+  /// Applies `near_points_of_each` to one point and returns its count. `scratch`: longer than `near.leaves` by sixteen.
   [[nodiscard]] std::size_t near_point(const point_row* leaves, const nearby_leaves& near, const point& query,
                                        float bound, std::uint32_t* scratch, float* found, std::uint32_t* places,
                                        std::size_t capacity) const {
@@ -562,7 +562,7 @@ struct knn_kernels {
     near_points_of_each(leaves, near, row, 0, 1, bound, scratch, found, places, 0, capacity, &count);
     return count;
   }
-  /// `sums_of_each` for one point. @pre as for `detail::sum_nearest`
+  /// Applies `sums_of_each` to one point. @pre as for `detail::sum_nearest`
   [[nodiscard]] nearest_sum sum_nearest(const float* found, std::size_t count, std::size_t wanted, float bound) const {
     const auto counted = static_cast<std::uint32_t>(count);
     nearest_sum out;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A cloud in leaves of sixteen points under a sixteen-wide hierarchy of boxes: what the searches for
-/// the neighbours of all points walk through.
+/// A cloud in leaves of sixteen points under a sixteen-wide hierarchy of boxes: the index structure of the all-points
+/// neighbour search.
 #pragma once
 
 #include <algorithm>
@@ -22,7 +22,7 @@ namespace orbis::cloud::detail {
 
 inline constexpr std::size_t leaf_width = 16;
 
-/// Points of one leaf, axis by axis; places without a point lie at infinity.
+/// Points of one leaf, axis by axis; unused places are at infinity.
 struct alignas(64) point_row {
   std::array<std::array<float, leaf_width>, 3> axis;
 };
@@ -32,7 +32,7 @@ struct box3 {
   std::array<float, 3> high;
 };
 
-/// The boxes of sixteen children, axis by axis; places without a child lie at infinity.
+/// Boxes of sixteen children, axis by axis; unused places are at infinity.
 struct alignas(64) box_row {
   std::array<std::array<float, leaf_width>, 3> low;
   std::array<std::array<float, leaf_width>, 3> high;
@@ -41,7 +41,7 @@ struct alignas(64) box_row {
   }
 };
 
-/// Cells of a grid and their keys along a Hilbert curve through it.
+/// Cells of a grid and their keys along a Hilbert curve.
 struct curve_block {
   static constexpr std::size_t size = 256;
   static constexpr std::uint32_t bits = 10;
@@ -49,7 +49,7 @@ struct curve_block {
   std::array<std::uint32_t, size> key;
 };
 
-/// Ten bits, two zeros after each.
+/// Spreads ten bits, with two zeros after each.
 [[nodiscard]] constexpr std::uint32_t spread_ten_bits(std::uint32_t x) noexcept {
   x = (x | x << 16U) & 0x030000ffU;
   x = (x | x << 8U) & 0x0300f00fU;
@@ -57,8 +57,8 @@ struct curve_block {
   return (x | x << 2U) & 0x09249249U;
 }
 
-/// Source: J. Skilling, "Programming the Hilbert curve", AIP Conference Proceedings 707, 2004; here
-/// for many cells at once, without branches, in loops that compilers turn into vector instructions.
+/// Computes Hilbert keys for many cells at once, without branches, in loops that compilers vectorise.
+/// Source: J. Skilling, "Programming the Hilbert curve", AIP Conference Proceedings 707, 2004.
 struct fill_curve_keys {
   template <simd::target>
   static ORBIS_ALWAYS_INLINE void run(curve_block& cells) {
@@ -91,10 +91,9 @@ struct fill_curve_keys {
   }
 };
 
-/// The order in which points go into leaves: along a Hilbert curve, cell by cell of a grid of 2^10
-/// cells a side; where many points share a cell, along a curve of its own within it, and so on. So
-/// the leaves follow the density however uneven it is. Each level divides the extent by a thousand,
-/// of which float has room for 28: O(n) on usual clouds, never worse than 28 times that.
+/// Order of the points in the leaves: along a Hilbert curve through a grid of 2^10 cells a side; if many points share a
+/// cell, recursively along a finer curve within it. The leaves thus adapt to any uneven density. Each level divides the
+/// extent by a thousand, and float has room for 28 levels: O(n) on usual clouds, at most 28 times that.
 class leaf_order {
  public:
   struct entry {
@@ -106,9 +105,8 @@ class leaf_order {
     std::size_t end;
   };
 
-  /// Orders the finite points. Of identical points that share a cell with many, those beyond
-  /// `most_copies` are left out, so that a search never meets more of them than it has use for.
-  /// `there`: for each point whether it is looked at; empty for all.
+  /// Orders the finite points. Of identical points in a crowded cell, only `most_copies` are kept, because a search
+  /// needs no more. `there`: per point, nonzero if it is included; empty for all.
   template <execution_policy Policy>
   leaf_order(const Policy& policy, const point_view& points, std::size_t most_copies, std::span<const char> there = {})
       : points_{points}, most_copies_{most_copies} {
@@ -125,14 +123,14 @@ class leaf_order {
     std::vector<entry>{}.swap(spare_);
   }
   [[nodiscard]] std::span<const entry> entries() const noexcept { return entries_; }
-  /// Frees the memory of the entries, where they are not needed any more.
+  /// Frees the memory of the entries.
   void drop_entries() noexcept { std::vector<entry>{}.swap(entries_); }
-  /// The entries left out, in ascending order. Each has at least `most_copies` copies elsewhere.
+  /// Entries that were left out, in ascending order. Each has at least `most_copies` copies in the order.
   [[nodiscard]] std::span<const range> left_out() const noexcept { return left_out_; }
   [[nodiscard]] std::array<float, 3> position(std::uint32_t i) const noexcept { return points_[i]; }
 
  private:
-  static constexpr std::size_t few = 2 * leaf_width;  // points that may share a cell
+  static constexpr std::size_t few = 2 * leaf_width;  // maximum number of points that share a cell
   static constexpr std::size_t block = curve_block::size;
   static constexpr std::uint32_t bits = curve_block::bits;
 
@@ -154,7 +152,7 @@ class leaf_order {
       if (end - begin > most_copies_) left_out_.push_back({begin + most_copies_, end});
       return;
     }
-    // Two points differ in their cell at least, so that each level makes progress.
+    // The extreme points are in different cells, so that each level makes progress.
     const double scale = ((1U << bits) - 1) / extent;
     auto* const keys_of = simd::kernel<fill_curve_keys, void(curve_block&)>();
     for_each_chunk(policy, end - begin, 16 * block, [&](std::size_t from, std::size_t to) {
@@ -181,7 +179,7 @@ class leaf_order {
     }
   }
 
-  /// By key, then in the order given.
+  /// Sorts by key, stably.
   void sort(std::size_t begin, std::size_t end) {
     const auto first = entries_.begin() + static_cast<std::ptrdiff_t>(begin);
     const auto last = entries_.begin() + static_cast<std::ptrdiff_t>(end);
@@ -217,22 +215,22 @@ class leaf_order {
   std::vector<range> left_out_;
 };
 
-/// A point that is in no leaf because enough identical ones are.
+/// A point that is in no leaf because enough identical points are.
 struct surplus_copy {
   std::uint32_t index;
-  std::uint32_t kept;  ///< position in `members` of the first of those that are
+  std::uint32_t kept;  ///< position in `members` of the first identical point in a leaf
 };
 
-/// The leaves of a cloud and the boxes around them. About 18 bytes per point, and no more while it is made.
+/// The leaves of a cloud and their bounding boxes. About 18 bytes per point, also during construction.
 struct leaf_hierarchy {
   std::vector<point_row> leaves;
   std::vector<std::vector<box_row>> levels;  ///< [0]: boxes of the leaves; the last one is a single row
-  std::vector<std::uint32_t> members;        ///< indices of the points, leaf after leaf; the last one filled up with 0
+  std::vector<std::uint32_t> members;        ///< indices of the points, leaf after leaf; the last leaf is padded with 0
   std::vector<surplus_copy> left_out;        ///< identical points beyond `most_copies`, in no leaf
-  std::size_t in_leaves = 0;                 ///< points that are in the leaves
-  std::size_t finite = 0;                    ///< points that are in the leaves or left out
+  std::size_t in_leaves = 0;                 ///< number of points in the leaves
+  std::size_t finite = 0;                    ///< number of points in the leaves or left out
 
-  /// How many points the leaf holds.
+  /// Number of points in a leaf.
   [[nodiscard]] std::size_t size_of(std::size_t leaf) const noexcept {
     return std::min(leaf_width, in_leaves - leaf * leaf_width);
   }
@@ -248,7 +246,7 @@ struct leaf_hierarchy {
   return row;
 }
 
-/// `there`: for each point whether it is looked at; empty for all.
+/// Builds the hierarchy. `there`: per point, nonzero if it is included; empty for all.
 /// @pre most_copies > 0, fewer than 2^32 points; there is empty or as long as points
 template <execution_policy Policy>
 [[nodiscard]] leaf_hierarchy make_leaves(const Policy& policy, const point_view& points, std::size_t most_copies,

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The search for the nearest neighbours of all points of a cloud, leaf by leaf.
+/// Search for the nearest neighbours of all points of a cloud, leaf by leaf.
 #pragma once
 
 #include <algorithm>
@@ -19,14 +19,14 @@
 
 namespace orbis::cloud::detail {
 
-/// A row of boxes that is still to be looked at.
+/// A row of boxes that is not yet visited.
 struct open_row {
   std::uint32_t level;
   std::uint32_t row;
 };
 
-/// Gathers what rows of `level` hold boxes of (level 0: leaves; otherwise rows of the level below), as far as it is
-/// within `bound`, squared, of `box`. False if that is too many. `open` is scratch.
+/// Gathers the contents of rows of `level` (level 0: leaves; otherwise rows of the level below) that are within squared
+/// distance `bound` of `box`. Returns false if there are too many. `open` is scratch.
 [[nodiscard]] inline bool gather_near(const leaf_hierarchy& tree, std::uint32_t level, const knn_kernels& kernels,
                                       const box3& box, float bound, std::vector<open_row>& open, nearby_leaves& near) {
   near.count = 0;
@@ -52,7 +52,7 @@ struct open_row {
   return true;
 }
 
-/// Calls `f(member, squared distance)` for every point within `bound`, squared, of `q`, until it returns false.
+/// Calls `f(member, squared distance)` for every point within squared distance `bound` of `q`, until it returns false.
 /// `open` is scratch.
 template <class F>
 void for_each_within(const leaf_hierarchy& tree, const knn_kernels& kernels, const std::array<float, 3>& q, float bound,
@@ -68,7 +68,7 @@ void for_each_within(const leaf_hierarchy& tree, const knn_kernels& kernels, con
     std::uint32_t mask = kernels.near_boxes(tree.levels[next.level][next.row], box, bound, distance.data());
     for (; mask != 0; mask &= mask - 1) {
       const std::size_t child = next.row * leaf_width + static_cast<std::size_t>(std::countr_zero(mask));
-      if (child >= children) break;  // where the bound is infinite
+      if (child >= children) break;  // if the bound is infinite
       if (next.level != 0) {
         open.push_back({next.level - 1, static_cast<std::uint32_t>(child)});
         continue;
@@ -82,22 +82,21 @@ void for_each_within(const leaf_hierarchy& tree, const knn_kernels& kernels, con
   }
 }
 
-/// Finds, for one point after another along the curve, the squared distances to its `wanted` nearest
-/// points, itself included.
+/// Finds the squared distances from each point, in the order of the curve, to its `wanted` nearest points, itself
+/// included.
 ///
-/// Points that follow each other share their candidates: the leaves within a little more than the
-/// distance that sufficed for the points before. Each point then takes what lies within a little less
-/// than that, which is verified by counting: it holds all of the nearest if it holds enough. Where it
-/// does not, as for outliers and where the density leaps, the point is searched for by itself, within
-/// the distance that suffices among its neighbours on the curve. Where that is too far to be of use,
-/// it is searched for leaf by leaf from the nearest on. So a bad guess costs time at worst.
+/// Consecutive points share candidates: the leaves within a little more than the distance that sufficed for the
+/// previous points. Each point takes the candidates within a little less than that. The result is complete if it holds
+/// at least `wanted` points. Otherwise, as for outliers and at jumps of the density, the point is searched for
+/// separately within the distance that suffices for its neighbours on the curve. If that distance is too large to be
+/// useful, leaves are visited in ascending order of distance. A bad guess thus only costs time.
 ///
-/// Source of the search from the nearest box on: G. R. Hjaltason, H. Samet, "Distance browsing in
-/// spatial databases", ACM TODS 24, 1999.
+/// Source of the search by ascending box distance: G. R. Hjaltason, H. Samet, "Distance browsing in spatial databases",
+/// ACM TODS 24, 1999.
 class nearest_search {
  public:
-  /// `with_places`: it is to be found as well which points they are. `most_near_rows`: of leaves, that those of a row
-  /// share; a matter of speed.
+  /// Prepares a search. `with_places`: also record the places of the found points. `most_near_rows`: maximum number of
+  /// rows of leaves shared by the leaves of a row; affects speed only.
   /// @pre 0 < wanted <= points in the leaves
   nearest_search(const leaf_hierarchy& tree, const knn_kernels& kernels, std::size_t wanted, bool with_places = false,
                  std::size_t most_near_rows = 128)
@@ -105,7 +104,7 @@ class nearest_search {
         kernels_{kernels},
         wanted_{wanted},
         capacity_{3 * wanted + 64},
-        stride_{(capacity_ / leaf_width + 5) * leaf_width},  // kernels write beyond; rows begin at cache lines
+        stride_{(capacity_ / leaf_width + 5) * leaf_width},  // kernels write past the end; rows begin at cache lines
         shared_{192 + 2 * wanted},
         own_{192 + 2 * wanted},
         near_rows_{most_near_rows},
@@ -115,10 +114,10 @@ class nearest_search {
         hoped_{1.0F + 1.7F / std::sqrt(static_cast<float>(wanted))},
         reach_{1.5F * hoped_} {}
 
-  /// Searches for the points of one leaf, then calls `f(i, found, bound)` for the i-th of them in any
-  /// order. `found`: squared distances up to `bound`, the nearest among them; fewer than `wanted` where
-  /// squared distances overflow; sixteen times infinity stands after them. `f` may reorder them, and
-  /// returns the `wanted`-th smallest. `places_of` tells which points they are.
+  /// Searches for the points of one leaf, then calls `f(i, found, bound)` for the i-th point, in any order. `found`
+  /// holds squared distances up to `bound`, including the nearest; fewer than `wanted` if squared distances overflow;
+  /// sixteen times infinity follow. `f` may reorder them, and returns the `wanted`-th smallest. `places_of` returns
+  /// their places.
   template <class F>
   void visit_leaf(std::size_t l, F&& f) {
     search_leaf(l, [&](std::size_t first, std::size_t last, const box3& box) {
@@ -126,8 +125,8 @@ class nearest_search {
       for (std::size_t i = first; i != last; ++i) largest_[i] = f(i, found_of(i), bounds_[i]);
     });
   }
-  /// As `visit_leaf`, but sums up the nearest itself, and calls `f(i, found, sum)`. `sum` says nothing where fewer than
-  /// `wanted` were found.
+  /// As `visit_leaf`, but sums up the nearest distances itself and calls `f(i, found, sum)`. `sum` is meaningless if
+  /// fewer than `wanted` were found.
   template <class F>
   void visit_sums(std::size_t l, F&& f) {
     std::array<nearest_sum, leaf_width> sums;
@@ -141,14 +140,13 @@ class nearest_search {
     });
   }
 
-  /// Which points were found for the i-th of the leaf that is being visited, in the order of `found`, as places in
-  /// `leaf_hierarchy::members`; null where that is not known, as for outliers.
+  /// Returns the places in `leaf_hierarchy::members` of the points found for the i-th point of the visited leaf, in the
+  /// order of `found`; null if unknown, as for outliers.
   [[nodiscard]] const std::uint32_t* places_of(std::size_t i) const noexcept {
     return has_places_[i] ? places_.data() + i * stride_ : nullptr;
   }
 
-  /// Calls `f(member, squared distance)` for every point within `bound` of the i-th of the leaf that is being
-  /// visited.
+  /// Calls `f(member, squared distance)` for every point within `bound` of the i-th point of the visited leaf.
   template <class F>
   void visit_within(std::size_t l, std::size_t i, float bound, F&& f) {
     const std::array<float, 3> q = query(l, i);
@@ -175,7 +173,7 @@ class nearest_search {
   }
 
  private:
-  /// How many squared distances were found, all of those up to a bound.
+  /// Number of squared distances found, complete up to a bound.
   struct found_within {
     std::size_t count;
     float bound;
@@ -183,14 +181,14 @@ class nearest_search {
   };
   static constexpr float infinity = std::numeric_limits<float>::infinity();
   static constexpr float most = std::numeric_limits<float>::max();
-  static constexpr float most_spread = 32;  ///< squared, of points that share candidates, by `usual_`
-  static constexpr float spare = 1.3F;      ///< how much further than a leaf wants the rows near to it are looked for
+  static constexpr float most_spread = 32;  ///< squared, relative to `usual_`, of points that share candidates
+  static constexpr float spare = 1.3F;      ///< factor by which the search radius for near rows exceeds that of a leaf
 
   [[nodiscard]] std::array<float, 3> query(std::size_t l, std::size_t i) const noexcept {
     const point_row& leaf = tree_->leaves[l];
     return {leaf.axis[0][i], leaf.axis[1][i], leaf.axis[2][i]};
   }
-  /// Takes a point into a box unless that makes the box so large that sharing candidates does not pay.
+  /// Extends a box to a point unless the box becomes too large for sharing candidates to pay off.
   [[nodiscard]] bool grow(box3& box, const std::array<float, 3>& p) const noexcept {
     box3 grown;
     for (std::size_t a = 0; a != 3; ++a) {
@@ -204,8 +202,8 @@ class nearest_search {
 
   [[nodiscard]] std::span<float> found_of(std::size_t i) noexcept { return {found_.data() + i * stride_, counts_[i]}; }
 
-  /// Searches for the points of a leaf, run by run of points that share candidates: `f(first, last, box)`, where `box`
-  /// holds them, which sets their `largest_`.
+  /// Searches for the points of a leaf, run by run of points that share candidates. `f(first, last, box)` searches for
+  /// a run with bounding box `box` and sets `largest_`.
   template <class F>
   void search_leaf(std::size_t l, F&& f) {
     const std::size_t size = tree_->size_of(l);
@@ -221,7 +219,7 @@ class nearest_search {
       f(first, last, box);
       first = last;
     }
-    // The median: an outlier says nothing about its neighbours.
+    // The median is robust against outliers.
     const float median = kernels_.ranked(largest_.data(), size / 2 + 1);
     if (median <= most) usual_ = median;
   }
@@ -247,11 +245,12 @@ class nearest_search {
     bounds_[i] = result.bound;
     has_places_[i] = result.has_places;
   }
-  /// Gathers what the points within a box share, as far as `reach`, squared; nothing, and false, if that is too much.
+  /// Gathers the shared candidates of the points within a box, up to squared distance `reach`. If there are too many,
+  /// gathers none and returns false.
   bool share(std::size_t l, const box3& box, float reach) {
     const bool shared = gather_shared(l, box, reach);
     shared_reach_ = shared ? reach : -1.0F;
-    if (!shared) shared_.count = 0;  // not some of them
+    if (!shared) shared_.count = 0;  // discard a partial result
     return shared;
   }
   [[nodiscard]] found_within search_near(const nearby_leaves& near, std::size_t l, std::size_t i, float bound) {
@@ -263,11 +262,10 @@ class nearest_search {
             places != nullptr};
   }
 
-  /// Gathers the leaves near a box within leaf `l` into `shared_`. The box of its row holds those of its leaves, so
-  /// what is near to them is near to the row: the leaves of a row, which come one after the other, share the rows that
-  /// are.
+  /// Gathers the leaves near a box within leaf `l` into `shared_`. The box of a row contains those of its leaves, so
+  /// rows near a leaf are near the leaf's row; consecutive leaves of a row share these near rows.
   [[nodiscard]] bool gather_shared(std::size_t l, const box3& box, float bound) {
-    if (!have_near_rows(l / leaf_width, bound)) return gather_near(*tree_, 0, kernels_, box, bound, open_, shared_);
+    if (!ensure_near_rows(l / leaf_width, bound)) return gather_near(*tree_, 0, kernels_, box, bound, open_, shared_);
     return gather_rows(box, bound, shared_);
   }
   /// Gathers the leaves near a box within leaf `l` into `own_`.
@@ -275,7 +273,7 @@ class nearest_search {
     if (l / leaf_width == near_rows_of_ && bound <= near_rows_reach_) return gather_rows(box, bound, own_);
     return gather_near(*tree_, 0, kernels_, box, bound, open_, own_);
   }
-  /// Gathers the leaves near a box from the rows that are near.
+  /// Gathers the leaves near a box from the near rows.
   [[nodiscard]] bool gather_rows(const box3& box, float bound, nearby_leaves& near) {
     near.count = 0;
     std::array<float, leaf_width> distance;
@@ -293,8 +291,9 @@ class nearest_search {
     return true;
   }
 
-  /// Whether `near_rows_` are all rows of leaves within `bound`, squared, of a row; gathers them if they are not.
-  [[nodiscard]] bool have_near_rows(std::size_t row, float bound) {
+  /// Makes `near_rows_` hold all rows of leaves within squared distance `bound` of a row. Returns false if there are
+  /// too many.
+  [[nodiscard]] bool ensure_near_rows(std::size_t row, float bound) {
     if (row == near_rows_of_ && bound <= near_rows_reach_) return true;
     if (tree_->levels.size() == 1 || (row == near_rows_of_ && bound >= too_many_rows_)) return false;
     const box3 box = tree_->levels[1][row / leaf_width].child(row % leaf_width);
@@ -307,7 +306,7 @@ class nearest_search {
     return false;
   }
 
-  /// The `wanted` nearest and perhaps some more; fewer where squared distances overflow.
+  /// Finds the `wanted` nearest points and possibly more; fewer if squared distances overflow.
   [[nodiscard]] found_within search_alone(std::size_t l, std::size_t i) {
     const std::array<float, 3> q = query(l, i);
     float* const found = found_.data() + i * stride_;
@@ -325,13 +324,13 @@ class nearest_search {
     for (;;) {
       result = search_near(own_, l, i, bound);
       if (result.count <= capacity_) return result;
-      // Too many: of those seen so far, enough are nearer.
+      // Too many: the points seen so far include enough nearer ones.
       bound = kernels_.sum_nearest(found, result.count, wanted_, bound).largest_squared;
       if (bound == result.bound) return search_outwards(q, found);
     }
   }
 
-  /// The `wanted` nearest, found leaf by leaf from the nearest leaf on.
+  /// Finds the `wanted` nearest points by visiting leaves in ascending order of distance.
   [[nodiscard]] found_within search_outwards(const std::array<float, 3>& q, float* found) {
     float bound = most;
     std::size_t count = 0;
@@ -380,26 +379,26 @@ class nearest_search {
   std::size_t wanted_;
   std::size_t capacity_;
   std::size_t stride_;
-  nearby_leaves shared_;     ///< of a run of points
-  nearby_leaves own_;        ///< of one point
-  nearby_leaves near_rows_;  ///< rows of leaves that are near to one of them, ...
-  std::size_t near_rows_of_ = std::numeric_limits<std::size_t>::max();  ///< ... this one; none at first
-  float near_rows_reach_ = -1;      ///< how far, squared; negative where it is not known
-  float too_many_rows_ = infinity;  ///< asked for so far, squared, that row had too many
+  nearby_leaves shared_;                                                ///< candidates of a run of points
+  nearby_leaves own_;                                                   ///< candidates of one point
+  nearby_leaves near_rows_;                                             ///< rows of leaves near the row near_rows_of_
+  std::size_t near_rows_of_ = std::numeric_limits<std::size_t>::max();  ///< no row at first
+  float near_rows_reach_ = -1;      ///< squared distance up to which they are complete; negative if unknown
+  float too_many_rows_ = infinity;  ///< smallest squared distance at which the row had too many near rows
   line_vector<std::uint32_t> chosen_;
   line_vector<float> found_;
-  line_vector<std::uint32_t> places_;  ///< of what was found; empty where nobody asks
+  line_vector<std::uint32_t> places_;  ///< places of the found points; empty if not requested
   std::vector<pending> pending_;
   std::vector<open_row> open_;
-  // Of the points of the leaf that is being visited.
+  // State of the points of the visited leaf.
   std::array<std::uint32_t, leaf_width> counts_{};
   std::array<float, leaf_width> bounds_{};
   std::array<bool, leaf_width> has_places_{};
-  std::array<float, leaf_width> largest_{};  ///< the squared distance to the `wanted`-th nearest
-  float hoped_;              ///< what of `usual_` should suffice: its scatter falls with the number of neighbours
-  float reach_;              ///< what of `usual_` should suffice in any case
-  float shared_reach_ = -1;  ///< squared distance from the run's box within which `shared_` is all there is
-  float usual_ = -1;         ///< squared distance to the `wanted`-th nearest; negative where not known yet
+  std::array<float, leaf_width> largest_{};  ///< squared distance to the `wanted`-th nearest
+  float hoped_;  ///< factor of `usual_` that should suffice; its scatter falls with the number of neighbours
+  float reach_;  ///< factor of `usual_` that should suffice in any case
+  float shared_reach_ = -1;  ///< squared distance from the run's box up to which `shared_` is complete
+  float usual_ = -1;         ///< squared distance to the `wanted`-th nearest; negative if not yet known
 };
 
 }  // namespace orbis::cloud::detail

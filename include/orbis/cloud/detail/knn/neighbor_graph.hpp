@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The neighbours of all points of a cloud in little memory, for algorithms that go over them again and again.
+/// Compact storage of the neighbours of all points of a cloud, for algorithms that traverse them repeatedly.
 #pragma once
 
 #include <algorithm>
@@ -25,19 +25,20 @@
 
 namespace orbis::cloud::detail {
 
-/// The rows of `all_knn`, with the points they belong to. Points have *places*, their numbers along the curve of
-/// `leaf_order`, from 0 to size() - 1; identical points that are in no leaf come last. What is stored for each point
-/// should be stored by place: then what belongs to neighbours is close in memory.
+/// The rows of `all_knn`, with the points to which they belong. Points are identified by *places*, their numbers along
+/// the curve of `leaf_order`, from 0 to size() - 1; identical points that are in no leaf come last. Store per-point
+/// data by place, so that data of neighbours is close in memory.
 ///
-/// The points of a leaf have their neighbours in few leaves. These are listed once, and a neighbour is a byte: which of
-/// them, and which of its points. Where more than 16 leaves are listed it is two bytes, beyond 256 it is a place.
-/// Distances are computed again. About k + 3 bytes for each point of a surface, and 18 with its position and its index,
-/// where a `neighbor_table` has 8 k.
+/// The points of a leaf have their neighbours in few leaves. These are listed once, and a neighbour is encoded in one
+/// byte: index in the list, and point in the leaf. With more than 16 listed leaves a neighbour takes two bytes; with
+/// more than 256 it is a place. Distances are recomputed. About k + 3 bytes per point of a surface, and 18 for its
+/// position and index; a `neighbor_table` takes 8 k.
 class neighbor_graph {
  public:
   neighbor_graph() = default;
-  /// The `min(k, points - 1)` nearest other points of every point of `tree`. O(n k log k), the same for every policy;
-  /// 4 bytes for each index of the cloud meanwhile. @pre k > 0; `tree` was made for k + 1 copies; indices below `count`
+  /// Finds the `min(k, points - 1)` nearest other points of every point of `tree`. O(n k log k), the same for every
+  /// policy; 4 bytes per index of the cloud during construction. @pre k > 0; `tree` was made for k + 1 copies; indices
+  /// below `count`
   template <execution_policy Policy>
   neighbor_graph(const Policy& policy, leaf_hierarchy tree, std::size_t count, std::size_t k)
       : tree_{std::move(tree)}, width_{std::min(k, std::max<std::size_t>(tree_.finite, 1) - 1)} {
@@ -59,19 +60,19 @@ class neighbor_graph {
             start_[l] = static_cast<std::uint32_t>(words.size());
             writer.write(std::span{found}.first(tree_.size_of(l) * width_), place_of, words);
           });
-      rows_[begin / leaves_at_once].assign(words.begin(), words.end());  // without room to spare
+      rows_[begin / leaves_at_once].assign(words.begin(), words.end());  // without spare capacity
     });
   }
 
-  /// How many points there are, and how many neighbours each of them has.
+  /// Number of points, and number of neighbours of each.
   [[nodiscard]] std::size_t size() const noexcept { return tree_.in_leaves + tree_.left_out.size(); }
   [[nodiscard]] std::size_t width() const noexcept { return width_; }
   [[nodiscard]] const leaf_hierarchy& tree() const noexcept { return tree_; }
-  /// Which point of the cloud has a place.
+  /// Index in the cloud of the point at a place.
   [[nodiscard]] std::uint32_t index(std::size_t place) const noexcept {
     return is_in_leaf(place) ? tree_.members[place] : copy(place).index;
   }
-  /// The places of all points of a cloud of `count`; `no_place` of those that have none, since they are not finite.
+  /// Returns the places of all points of a cloud of `count`; `no_place` for non-finite points.
   static constexpr std::uint32_t no_place = std::numeric_limits<std::uint32_t>::max();
   [[nodiscard]] std::vector<std::uint32_t> places(std::size_t count) const {
     std::vector<std::uint32_t> out(count, no_place);
@@ -84,7 +85,7 @@ class neighbor_graph {
     const std::size_t i = at % leaf_width;
     return {leaf.axis[0][i], leaf.axis[1][i], leaf.axis[2][i]};
   }
-  /// Metres, as `all_knn` computes it.
+  /// Distance between the points at two places, metres, computed as in `all_knn`.
   [[nodiscard]] float distance(std::size_t a, std::size_t b) const noexcept {
     return std::sqrt(squared_distance(position(a), position(b)));
   }
@@ -92,7 +93,7 @@ class neighbor_graph {
   template <class F>
   ORBIS_ALWAYS_INLINE void for_each_neighbor(std::size_t place, std::size_t count, F&& f) const {
     assert(count <= width_);
-    if (!is_in_leaf(place)) {  // the first of its copies
+    if (!is_in_leaf(place)) {  // its neighbours are its copies
       const std::uint32_t kept = copy(place).kept;
       for (std::size_t n = 0; n != count; ++n) f(kept + static_cast<std::uint32_t>(n));
       return;
@@ -121,8 +122,8 @@ class neighbor_graph {
       f(leaves[code >> 4U] * leaf_bits + (code & 15U));
     }
   }
-  /// For each place the mean distance to its first `k` neighbours, or to all where there are fewer, metres; NaN where
-  /// there are none. O(n k). @pre k > 0
+  /// Computes for each place the mean distance to its first `k` neighbours, or to all if there are fewer, metres; NaN
+  /// without neighbours. O(n k). @pre k > 0
   template <execution_policy Policy>
   [[nodiscard]] std::vector<float> mean_distance(const Policy& policy, std::size_t k) const {
     const std::size_t count = std::min(k, width_);
@@ -136,7 +137,7 @@ class neighbor_graph {
     });
     return out;
   }
-  /// Bytes on the heap.
+  /// Heap memory in bytes.
   [[nodiscard]] std::size_t memory_bytes() const noexcept {
     std::size_t bytes = tree_.leaves.capacity() * sizeof(point_row) +
                         (tree_.members.capacity() + start_.capacity()) * sizeof(std::uint32_t) +
@@ -158,14 +159,14 @@ class neighbor_graph {
     return tree_.left_out[place - tree_.in_leaves];
   }
 
-  /// Writes the rows of one leaf after the other: how many leaves are listed, these, and a code for each neighbour.
+  /// Encodes the rows of one leaf at a time: the number of listed leaves, the leaves, and a code for each neighbour.
   class leaf_writer {
    public:
     void write(std::span<const neighbor<float>> found, std::span<const std::uint32_t> place_of,
                std::vector<std::uint32_t>& out) {
       leaves_.clear();
       codes_.clear();
-      std::uint32_t last = 0, slot = 0;  // neighbours of neighbours are mostly in the same leaf
+      std::uint32_t last = 0, slot = 0;  // consecutive neighbours are mostly in the same leaf
       for (const neighbor<float>& n : found) {
         const std::uint32_t place = place_of[n.index];
         const std::uint32_t leaf = place / leaf_bits;
@@ -204,8 +205,8 @@ class neighbor_graph {
 
   leaf_hierarchy tree_;
   std::size_t width_ = 0;
-  std::vector<std::uint32_t> start_;              ///< of each leaf, in the words of its chunk
-  std::vector<std::vector<std::uint32_t>> rows_;  ///< by chunks of leaves
+  std::vector<std::uint32_t> start_;              ///< start of each leaf in the words of its chunk
+  std::vector<std::vector<std::uint32_t>> rows_;  ///< one vector per chunk of leaves
 };
 
 }  // namespace orbis::cloud::detail

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The neighbours of the points of some leaves, as rows of a table.
+/// Neighbours of the points of some leaves, as rows of a table.
 #pragma once
 
 #include <algorithm>
@@ -20,11 +20,11 @@
 
 namespace orbis::cloud::detail {
 
-// Sorting a few dozen values by counting, for each of them, how many are smaller: n^2 comparisons, but
-// without a branch and many at a time.
+// Sorts a few dozen values by counting the smaller values for each: n^2 comparisons, but vectorised and without
+// branches.
 
-/// For each of `count` values its rank: the number of smaller ones, and of equal ones before it. @pre 16 more values
-/// can be read and written
+/// Computes the rank of each of `count` values: the number of smaller values and of equal values before it. @pre 16
+/// more values are readable and writable
 struct find_ranks {
   template <simd::target Target>
   static ORBIS_ALWAYS_INLINE void run(const std::int32_t* values, std::size_t count, std::int32_t* ranks) {
@@ -47,32 +47,33 @@ struct find_ranks {
   }
 };
 
-/// Points by their squared distance, those at the same one by index. Keeps its memory.
+/// Sorts points by squared distance, ties by index. Reuses its memory.
 class rank_sorter {
  public:
   void clear() noexcept { count_ = 0; }
   [[nodiscard]] std::size_t size() const noexcept { return count_; }
-  /// @pre distance_squared >= 0: the order of bits is that of values
+  /// Adds a point. @pre distance_squared >= 0: the order of bits is that of values
   void add(std::uint32_t index, float distance_squared) {
     if (count_ + 2 * room > keys_.size()) grow();
     std::memcpy(&keys_[count_], &distance_squared, sizeof distance_squared);
     indices_[count_++] = index;
   }
-  /// Takes the points at some places of `members` instead of all that were added. @pre as for `add`
+  /// Replaces the added points by those at the given places of `members`. @pre as for `add`
   void assign(std::span<const float> squared, const std::uint32_t* places, const std::uint32_t* members) {
     while (squared.size() + 2 * room > keys_.size()) grow();
     count_ = squared.size();
     std::memcpy(keys_.data(), squared.data(), squared.size_bytes());
     for (std::size_t i = 0; i != count_; ++i) indices_[i] = members[places[i]];
   }
-  /// Calls `f(rank, index, distance_squared)` for all, nearest first, until it returns false.
+  /// Calls `f(rank, index, distance_squared)` for all points, nearest first, until it returns false.
   template <class F>
   void for_each(F&& f) {
     if (count_ == 0) return;
     if (count_ <= most_ranked) {
       find_ranks_(keys_.data(), count_, ranks_.data());
       for (std::size_t i = 0; i != count_; ++i) sorted_[static_cast<std::size_t>(ranks_[i])] = pack(i);
-      // Equal ones by index. They are few, and what was just written one by one is read one by one.
+      // Sorts equal distances by index. They are few, and scalar reads can follow the preceding scalar writes without
+      // delay.
       std::uint64_t before = sorted_[0];
       for (std::size_t i = 1; i < count_; ++i) {
         const std::uint64_t here = sorted_[i];
@@ -97,8 +98,8 @@ class rank_sorter {
   }
 
  private:
-  static constexpr std::size_t room = 16;          // read and written beyond the last
-  static constexpr std::size_t most_ranked = 384;  // beyond this n log n wins
+  static constexpr std::size_t room = 16;          // accessible elements after the last
+  static constexpr std::size_t most_ranked = 384;  // above this, sorting in n log n is faster
 
   [[nodiscard]] std::uint64_t pack(std::size_t i) const noexcept {
     return std::uint64_t{static_cast<std::uint32_t>(keys_[i])} << 32U | indices_[i];
@@ -120,8 +121,8 @@ class rank_sorter {
   std::vector<std::uint64_t> sorted_;
 };
 
-/// Writes the nearest of what was gathered, but for the point itself, as a row. Returns the squared distance to the
-/// last of them.
+/// Writes the nearest gathered points, without the point itself, as a row. Returns the squared distance to the last of
+/// them.
 inline float write_row(rank_sorter& gathered, std::uint32_t self, std::span<neighbor<float>> row) {
   std::size_t written = 0;
   float last = 0.0F, last_squared = 0.0F;
@@ -140,12 +141,12 @@ inline float write_row(rank_sorter& gathered, std::uint32_t self, std::span<neig
   return last_squared;
 }
 
-/// Writes the row of the i-th point of leaf `l` from what `search` has found for it: `found`, up to `bound`, squared.
-/// Returns the squared distance to the last. `gathered` is scratch.
+/// Writes the row of the i-th point of leaf `l` from the search result `found`, complete up to squared distance
+/// `bound`. Returns the squared distance to the last neighbour. `gathered` is scratch.
 ORBIS_ALWAYS_INLINE float write_found(const leaf_hierarchy& tree, const knn_kernels& kernels, nearest_search& search,
                                       rank_sorter& gathered, std::size_t l, std::size_t i, std::span<float> found,
                                       float bound, std::span<neighbor<float>> row) {
-  const std::size_t wanted = row.size() + 1;  // with the point itself
+  const std::size_t wanted = row.size() + 1;  // including the point itself
   const std::uint32_t self = tree.members[l * leaf_width + i];
   if (const std::uint32_t* const places = search.places_of(i)) {
     gathered.assign(found, places, tree.members.data());
@@ -160,13 +161,13 @@ ORBIS_ALWAYS_INLINE float write_found(const leaf_hierarchy& tree, const knn_kern
   return largest;
 }
 
-/// For the points of the leaves [begin, end), calls `row_of(l, i)` for the i-th point of leaf `l`, writes its `width`
-/// nearest other points, nearest first, into the span that this returns, and calls `done(l)` after each leaf.
+/// For the points of the leaves [begin, end): calls `row_of(l, i)` for the i-th point of leaf `l`, writes its `width`
+/// nearest other points, nearest first, into the returned span, and calls `done(l)` after each leaf.
 /// @pre 0 < width < points in the leaves
 template <class RowOf, class Done>
 void find_neighbor_rows(const leaf_hierarchy& tree, const knn_kernels& kernels, std::size_t width, std::size_t begin,
                         std::size_t end, RowOf&& row_of, Done&& done) {
-  nearest_search search{tree, kernels, width + 1, true};  // with the point itself
+  nearest_search search{tree, kernels, width + 1, true};  // including the point itself
   rank_sorter gathered;
   for (std::size_t l = begin; l != end; ++l) {
     search.visit_leaf(l, [&](std::size_t i, std::span<float> found, float bound) ORBIS_INLINE_LAMBDA {

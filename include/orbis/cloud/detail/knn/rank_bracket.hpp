@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Selection by counting: between which values the one of a given rank lies.
+/// Selection by counting: interval that contains the value of a given rank.
 #pragma once
 
 #include <algorithm>
@@ -11,8 +11,8 @@
 
 namespace orbis::cloud::detail {
 
-/// Where the `wanted`-th smallest value lies: above `low`, which `at_low` values do not exceed, and
-/// not above `high`, which `at_high` values do not exceed.
+/// Interval (low, high] of the `wanted`-th smallest value. `at_low` values do not exceed `low`; `at_high` values do not
+/// exceed `high`.
 struct rank_bracket {
   float low;
   float high;
@@ -26,7 +26,7 @@ struct rank_bracket {
       low = at, at_low = count;
     }
   }
-  /// A value within; false if there is none.
+  /// Chooses a value inside the interval; false if there is none.
   [[nodiscard]] bool pick(int tries, std::size_t wanted, float& at) const noexcept {
     const float floor = std::max(low, 0.0F);
     if (tries < 6) {
@@ -34,7 +34,7 @@ struct rank_bracket {
       at = floor + (high - floor) * share;
       if (at > low && at < high) return true;
     }
-    // By halves of the bit patterns, which are ordered as the values are.
+    // Bisects the bit patterns, which have the same order as the values.
     const std::int64_t from = low < 0 ? -1 : std::int64_t{std::bit_cast<std::uint32_t>(low)};
     const std::int64_t to = std::bit_cast<std::uint32_t>(high);
     if (to - from <= 1) return false;
@@ -43,21 +43,21 @@ struct rank_bracket {
   }
 };
 
-/// A guess at the value that `rank` of `count` values do not exceed, where `bound` is the largest:
-/// between the squared distances in a plane and those in space.
+/// Estimates the value that `rank` of `count` values do not exceed, where `bound` is the largest: an interpolation
+/// between the distributions of squared distances in a plane and in space.
 [[nodiscard]] inline float guess_ranked(float bound, std::size_t rank, std::size_t count) noexcept {
   return bound * (1.0F - 0.92F * (1.0F - static_cast<float>(rank) / static_cast<float>(count)));
 }
 
-/// Narrows down where the `wanted`-th smallest of `count` values up to `bound` lies, until at most
-/// sixteen are left or all that are left are equal. `count_within(x)`: how many are at most `x`;
-/// `count_three(x)`: the same for three.
+/// Narrows the interval of the `wanted`-th smallest of `count` values up to `bound`, until at most sixteen values
+/// remain or all that remain are equal. `count_within(x)`: number of values at most `x`; `count_three(x)`: the same for
+/// three values at once.
 template <class Count, class CountThree>
 [[gnu::always_inline]] inline rank_bracket bracket_rank(float bound, std::size_t count, std::size_t wanted,
                                                         const Count& count_within, const CountThree& count_three) {
   rank_bracket bracket{-1.0F, bound, 0, count};
   if (count <= 16) return bracket;
-  // Most often three guesses, one of them a little low and one a little high, leave few values between.
+  // In most cases three guesses, one slightly low and one slightly high, leave few values between.
   constexpr std::size_t margin = 11;
   const std::array<float, 3> at{guess_ranked(bound, std::max(wanted, margin + 1) - margin, count),
                                 guess_ranked(bound, wanted, count),

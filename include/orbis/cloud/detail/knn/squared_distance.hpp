@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Squared distances that are the same bits under every compiler flag.
+/// Squared distances with the same bits under every compiler flag.
 #pragma once
 
 #include <array>
@@ -10,8 +10,8 @@
 
 namespace orbis::cloud::detail {
 
-/// `(dx^2 + dy^2) + dz^2`, each operation rounded in `S`: the order in which the common k-d trees
-/// sum, so that thresholds on it select the same points.
+/// Computes `(dx^2 + dy^2) + dz^2`, each operation rounded in `S`. This is the summation order of the common k-d trees,
+/// so that thresholds select the same points.
 template <std::floating_point S>
 [[nodiscard]] inline S squared_distance(const std::array<S, 3>& a, const std::array<S, 3>& b) noexcept {
   const S dx = a[0] - b[0];

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Loops over rows of depths for `depth_windows.hpp`, written for the compiler's vectoriser and compiled for several
-/// targets. Nothing in them is rounded but a division, so that all give the same bits.
+/// Loops over rows of depths for `depth_windows.hpp`, auto-vectorised and compiled for several targets. Only a division
+/// is rounded, so that all targets give the same bits.
 #pragma once
 
 #include <concepts>
@@ -14,10 +14,10 @@
 
 namespace orbis::cloud::detail {
 
-/// `f(i)` for the first `n` numbers, sixteen at a time as far as possible: loops of known length are what
-/// compilers turn into vector instructions at -O2.
+/// Calls `f(i)` for the first `n` numbers, sixteen at a time as far as possible: compilers vectorise loops of known
+/// length at -O2.
 template <class F>
-[[gnu::always_inline]] inline void in_sixteens(std::size_t n, F&& f) {
+[[gnu::always_inline]] inline void for_each_by_16(std::size_t n, F&& f) {
   std::size_t i = 0;
   for (; i + 16 <= n; i += 16) {
     for (std::size_t lane = 0; lane != 16; ++lane) f(i + lane);
@@ -30,25 +30,25 @@ struct widen_range {
   template <simd::target>
   static ORBIS_ALWAYS_INLINE void run(float* __restrict low, float* __restrict high, const float* other_low,
                                       const float* other_high, std::size_t n) {
-    in_sixteens(n, [&](std::size_t i) ORBIS_INLINE_LAMBDA {
+    for_each_by_16(n, [&](std::size_t i) ORBIS_INLINE_LAMBDA {
       low[i] = other_low[i] < low[i] ? other_low[i] : low[i];
       high[i] = other_high[i] > high[i] ? other_high[i] : high[i];
     });
   }
 };
-/// `x[i] = value` where it is not positive.
+/// Sets `x[i] = value` if it is not positive.
 struct replace_zeros {
   template <simd::target>
   static ORBIS_ALWAYS_INLINE void run(float* __restrict x, float value, std::size_t n) {
-    in_sixteens(n, [&](std::size_t i) ORBIS_INLINE_LAMBDA { x[i] = x[i] > 0.0F ? x[i] : value; });
+    for_each_by_16(n, [&](std::size_t i) ORBIS_INLINE_LAMBDA { x[i] = x[i] > 0.0F ? x[i] : value; });
   }
 };
-/// A row of stored depths in metres, 0 where there is none: what `camera::depth_view` says of each.
+/// Converts a row of stored depths to metres, 0 if missing, as `camera::depth_view` does.
 struct stored_to_metres {
   template <simd::target>
   static ORBIS_ALWAYS_INLINE void run(const std::uint16_t* stored, double scale, float least, float most,
                                       float* __restrict out, std::size_t n) {
-    in_sixteens(n, [&](std::size_t i) ORBIS_INLINE_LAMBDA {
+    for_each_by_16(n, [&](std::size_t i) ORBIS_INLINE_LAMBDA {
       const auto metres = static_cast<float>(static_cast<double>(stored[i]) / scale);
       const bool valid = (stored[i] != 0) & (stored[i] != std::numeric_limits<std::uint16_t>::max()) & (metres > 0.0F) &
                          (metres >= least) & (metres <= most);
@@ -57,7 +57,7 @@ struct stored_to_metres {
   }
 };
 
-/// The loops for the best instruction set. AVX-512 brings them nothing: they wait for memory.
+/// The loops, compiled for the best available instruction set. AVX-512 brings no gain: they are limited by memory.
 struct depth_row_kernels {
   void (*widen_range)(float*, float*, const float*, const float*, std::size_t) =
       simd::kernel<detail::widen_range, void(float*, float*, const float*, const float*, std::size_t), simd::avx2>();
@@ -67,7 +67,7 @@ struct depth_row_kernels {
       stored_to_metres, void(const std::uint16_t*, double, float, float, float*, std::size_t), simd::avx2>();
 };
 
-/// A row of any depth image in metres, 0 where there is none.
+/// Reads a row of any depth image in metres, 0 if missing.
 template <camera::depth_source Depth>
 void read_depth_row(const depth_row_kernels& kernels, const Depth& depth, int y, float* out) {
   const auto width = static_cast<std::size_t>(depth.width());

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The nearest and the farthest depth around every pixel of a depth image. `take` is in take_depth_windows.hpp.
+/// Nearest and farthest depth around every pixel of a depth image. `take` is defined in take_depth_windows.hpp.
 #pragma once
 
 #include <algorithm>
@@ -13,18 +13,18 @@
 
 namespace orbis::cloud::detail {
 
-/// For every pixel the extremes of the measured depths in the square window around it, and the depth
-/// in its middle, metres along the optical axis; and for every tile of `tile` x `tile` pixels the
-/// farthest of the farthest. Memory is kept from one image to the next.
+/// Extremes of the measured depths in the square window around every pixel, and the depth at its centre, metres along
+/// the optical axis; for every tile of `tile` x `tile` pixels, the maximum of the farthest depths. Memory is reused
+/// between images.
 class depth_windows {
  public:
   static constexpr int tile = 16;
-  /// Stands where there is no depth; compares as nearer than everything.
+  /// Marks a missing depth; compares as nearer than any depth.
   static constexpr float none = -std::numeric_limits<float>::infinity();
 
-  /// Takes in an image. `radius`: the window has 2 radius + 1 pixels a side. `nearest` is `none`
-  /// where any pixel of the window lies outside the image or has no depth: what hides there may be
-  /// nearer than all. O(width * height * radius). @pre radius >= 0
+  /// Reads an image. `radius`: the window has 2 radius + 1 pixels a side. `nearest` is `none` if any pixel of the
+  /// window is outside the image or has no depth, because an unmeasured surface may be nearer. O(width * height *
+  /// radius). @pre radius >= 0
   template <execution_policy Policy, camera::depth_source Depth>
   void take(const Policy& policy, const Depth& depth, int radius);
 
@@ -32,13 +32,13 @@ class depth_windows {
   [[nodiscard]] int height() const noexcept { return height_; }
   [[nodiscard]] int tiles_across() const noexcept { return tiles_across_; }
   [[nodiscard]] int tiles_down() const noexcept { return (height_ + tile - 1) / tile; }
-  /// Row after row; `none` where a pixel of the window has no depth.
+  /// Row-major; `none` if a pixel of the window has no depth.
   [[nodiscard]] const float* nearest() const noexcept { return nearest_.data(); }
-  /// `none` where no pixel of the window has a depth.
+  /// Row-major; `none` if no pixel of the window has a depth.
   [[nodiscard]] const float* farthest() const noexcept { return farthest_.data(); }
-  /// `none` where the pixel itself has no depth.
+  /// Row-major; `none` if the pixel itself has no depth.
   [[nodiscard]] const float* middle() const noexcept { return middle_.data(); }
-  /// The farthest depth in the windows of the tiles `[x0, x1] x [y0, y1]`. @pre they exist
+  /// Farthest depth in the windows of the tiles `[x0, x1] x [y0, y1]`. @pre they exist
   [[nodiscard]] float farthest_of_tiles(int x0, int y0, int x1, int y1) const noexcept {
     float out = none;
     for (int y = y0; y <= y1; ++y) {
@@ -55,7 +55,7 @@ class depth_windows {
   std::vector<float> nearest_;
   std::vector<float> farthest_;
   std::vector<float> middle_;
-  std::vector<float> row_nearest_;  ///< of the window's own row alone
+  std::vector<float> row_nearest_;  ///< of the window's own row only
   std::vector<float> row_farthest_;
   std::vector<float> tile_farthest_;
 };

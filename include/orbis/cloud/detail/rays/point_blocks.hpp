@@ -12,8 +12,8 @@
 
 namespace orbis::cloud::detail {
 
-/// The finite points of a cloud, along a space-filling curve, axis by axis; `block_size` consecutive
-/// ones make a block, `group_size` blocks a group. The last block is filled up with NaN.
+/// The finite points of a cloud in the order of a space-filling curve, axis by axis. `block_size` consecutive points
+/// form a block, `group_size` blocks a group. The last block is padded with NaN.
 struct point_blocks {
   static constexpr std::size_t block_size = 128;
   static constexpr std::size_t group_size = 16;
@@ -24,12 +24,12 @@ struct point_blocks {
   };
 
   std::array<std::vector<float>, 3> axis{};  ///< metres
-  std::vector<std::uint32_t> index{};        ///< which point of the cloud; as many as finite points
+  std::vector<std::uint32_t> index{};        ///< index in the cloud; one per finite point
   std::vector<box> blocks{};
   std::vector<box> groups{};
 };
 
-/// @pre boxes is not empty
+/// Bounding box of several boxes. @pre boxes is not empty
 [[nodiscard]] inline point_blocks::box hull_of(std::span<const point_blocks::box> boxes) {
   point_blocks::box hull = boxes.front();
   for (const point_blocks::box& b : boxes) {

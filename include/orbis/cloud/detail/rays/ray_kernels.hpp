@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The inner loops of `ray_evidence.hpp`. Every operation is rounded, so that all targets give the same bits.
+/// Inner loops of `ray_evidence.hpp`. Every operation is rounded, so that all targets give the same bits.
 #pragma once
 
 #include <array>
@@ -18,19 +18,19 @@
 
 namespace orbis::cloud::detail {
 
-/// Where a block's points lie in a view.
+/// Projection of a block's points into a view.
 struct seen_block {
   static constexpr std::size_t size = point_blocks::block_size;
-  alignas(64) std::array<std::int32_t, size> pixel;  ///< y * width + x; negative: not in the image
+  alignas(64) std::array<std::int32_t, size> pixel;  ///< y * width + x; negative: outside the image
   alignas(64) std::array<float, size> depth;         ///< of the point, metres; undefined outside the image
 };
 
-/// What a view says of a block's points; bit i of word w is point 16 w + i.
+/// Evidence of a view for a block's points; bit i of word w is point 16 w + i.
 struct block_verdict {
   static constexpr std::size_t words = point_blocks::block_size / 16;
   std::array<std::uint16_t, words> through;
   std::array<std::uint16_t, words> supported;
-  /// `f(i, supported)` for the points of which the view says something.
+  /// Calls `f(i, supported)` for the points with evidence.
   template <class F>
   void for_each(F&& f) const {
     for (std::size_t w = 0; w != words; ++w) {
@@ -42,10 +42,10 @@ struct block_verdict {
   }
 };
 
-/// A block's points, axis by axis.
+/// Coordinates of a block's points, axis by axis.
 using block_axes = std::array<const float*, 3>;
 
-/// A point in the camera frame.
+/// Transforms a point into the camera frame.
 [[nodiscard]] inline std::array<float, 3> in_camera(const ray_view& view, float x, float y, float z) noexcept {
   const std::array<float, 3> d{(x - view.origin[0]) - view.origin_rest[0], (y - view.origin[1]) - view.origin_rest[1],
                                (z - view.origin[2]) - view.origin_rest[2]};
@@ -57,7 +57,7 @@ using block_axes = std::array<const float*, 3>;
   return out;
 }
 
-/// Where the points lie in any camera's image.
+/// Projects points into the image of any camera.
 template <camera::camera_model Camera>
 void locate_by(const Camera& camera, const ray_view& view, const block_axes& points, seen_block& seen) {
   for (std::size_t i = 0; i != seen_block::size; ++i) {
@@ -74,7 +74,7 @@ void locate_by(const Camera& camera, const ray_view& view, const block_axes& poi
   }
 }
 
-/// Where the points lie in a pinhole's image.
+/// Projects points into the image of a pinhole camera.
 struct locate_in_pinhole {
   template <simd::target Target>
   static ORBIS_ALWAYS_INLINE void run(const ray_view& view, const block_axes& points, seen_block& seen) {
@@ -100,7 +100,7 @@ struct locate_in_pinhole {
   }
 };
 
-/// What the windows around their pixels say of the points.
+/// Evaluates the evidence of the windows around the points' pixels.
 struct judge_by_windows {
   template <simd::target Target>
   static ORBIS_ALWAYS_INLINE void run(const ray_view& view, const seen_block& seen, block_verdict& verdict) {
@@ -118,7 +118,7 @@ struct judge_by_windows {
         const lanes nearest = simd::gather(view.nearest, pixel, inside, nothing);
         const lanes margin = lanes(view.margin) + lanes(view.margin_growth) * (z * z);
         const auto near = [&](const lanes& depth) ORBIS_INLINE_LAMBDA { return simd::abs(depth - z) <= margin; };
-        // Mostly the nearest says it all, since rays do not pass through what it is near to.
+        // The nearest depth usually decides, since rays do not pass through points near it.
         auto measured = inside & near(nearest);
         auto open = simd::and_not(inside, measured);
         if (simd::any(open)) {
@@ -137,8 +137,8 @@ struct judge_by_windows {
   }
 };
 
-/// Adds one to the counters of the points with a bit in `words`, up to their largest number; or takes one from them.
-/// @pre to take from, none of these is zero
+/// Increments the counters of the points selected by the bits in `words`, up to the maximum value; or decrements them.
+/// @pre to decrement, none of them is zero
 template <bool Add>
 struct count_points {
   template <simd::target Target>
@@ -156,7 +156,7 @@ struct count_points {
   }
 };
 
-/// The loops for the best instruction set.
+/// The loops, compiled for the best available instruction set.
 struct ray_kernels {
   void (*locate)(const ray_view&, const block_axes&, seen_block&) =
       simd::kernel<locate_in_pinhole, void(const ray_view&, const block_axes&, seen_block&)>();

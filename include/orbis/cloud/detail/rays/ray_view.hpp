@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// One posed depth image as `ray_evidence.hpp` asks it, and which blocks of points it cannot judge.
+/// One posed depth image as `ray_evidence.hpp` uses it, and a test for blocks of points that it cannot judge.
 #pragma once
 
 #include <algorithm>
@@ -21,25 +21,25 @@
 
 namespace orbis::cloud::detail {
 
-/// A view in the numbers that its kernels use.
+/// Parameters of a view in the form its kernels use.
 struct ray_view {
   std::array<std::array<float, 3>, 3> rotation{};  ///< camera from world, row by row
-  std::array<float, 3> origin{};                   ///< of the camera in the world, metres, as the nearest float,
-  std::array<float, 3> origin_rest{};              ///< and what that leaves: coordinates may be large
-  float fx = 0, fy = 0, cx = 0, cy = 0;            ///< of a pinhole; half a pixel is added to cx and cy
+  std::array<float, 3> origin{};                   ///< camera position in the world, metres, rounded to float,
+  std::array<float, 3> origin_rest{};              ///< and the rounding error, since coordinates may be large
+  float fx = 0, fy = 0, cx = 0, cy = 0;            ///< pinhole parameters; half a pixel is added to cx and cy
   int width = 0;
   int height = 0;
-  float min_depth = 0;  ///< of points that are judged, metres; they have to be beyond it
+  float min_depth = 0;  ///< exclusive lower limit of the depth of judged points, metres
   float max_depth = 0;
   float margin = 0;  ///< margin + margin_growth z^2, metres
   float margin_growth = 0;
-  float slant = 0;  ///< how much of a window's depth range is added to the margin of rays that pass through
+  float slant = 0;  ///< part of a window's depth range that is added to the margin of rays that pass through
   const float* nearest = nullptr;
   const float* farthest = nullptr;
   const float* middle = nullptr;
 };
 
-/// Sets everything but the camera's and the windows' numbers. @pre the pose is finite
+/// Sets all members except those of the camera and the windows. @pre the pose is finite
 inline void place(ray_view& view, const se3& T_world_camera) {
   const mat3 rotation = T_world_camera.rotation_matrix();
   for (std::size_t a = 0; a != 3; ++a) {
@@ -51,8 +51,7 @@ inline void place(ray_view& view, const se3& T_world_camera) {
   }
 }
 
-/// The angle between the optical axis and the ray farthest from it, with some to spare, radians;
-/// empty where that is not known.
+/// Upper bound of the angle between the optical axis and the ray farthest from it, radians; empty if unknown.
 template <camera::camera_model Camera>
 [[nodiscard]] std::optional<double> view_angle(const Camera& camera) {
   constexpr int steps = 32;
@@ -68,8 +67,8 @@ template <camera::camera_model Camera>
   return 1.02 * angle + 0.02;
 }
 
-/// Tells blocks of points about which a view says nothing, by their bounding boxes. Errs on the side
-/// of asking.
+/// Finds blocks of points for which a view has no evidence, by their bounding boxes. Conservative: may accept blocks
+/// without evidence.
 template <camera::camera_model Camera>
 class block_test {
  public:
@@ -77,7 +76,7 @@ class block_test {
     if constexpr (!std::same_as<Camera, camera::pinhole>) angle_ = view_angle(camera);
   }
 
-  /// For the next questions. @pre the pose is finite
+  /// Sets the view of the following tests. @pre the pose is finite
   void place(const se3& T_world_camera, const ray_view& view, const depth_windows& windows) {
     rotation_ = transposed(T_world_camera.rotation_matrix());
     absolute_ = magnitudes(rotation_);
@@ -96,7 +95,7 @@ class block_test {
       half[a] = 0.5 * (high - low);
     }
     const vec3 c = rotation_ * (middle - origin_);
-    // The kernels' rounding is some 1e-6 of the distance.
+    // The kernels' rounding error is about 1e-6 of the distance.
     const double slack = 1e-5 * (norm(c) + norm(half));
     if constexpr (std::same_as<Camera, camera::pinhole>) {
       const vec3 h = absolute_ * half + filled<vec3>(slack);
@@ -123,7 +122,7 @@ class block_test {
     const auto [left, right] = pixels(low.x(), high.x(), k.fx, k.cx);
     const auto [top, bottom] = pixels(low.y(), high.y(), k.fy, k.cy);
     if (right < 0 || bottom < 0 || left > k.width - 1 || top > k.height - 1) return true;
-    // Hidden behind everything around?
+    // Skip the block if all depths around it are nearer than it.
     const auto tile_of = [](double pixel, int size) {
       return static_cast<int>(std::clamp(pixel, 0.0, size - 1.0)) / depth_windows::tile;
     };

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// How `depth_windows` takes in an image.
+/// Definition of `depth_windows::take`.
 #pragma once
 
 #include <algorithm>
@@ -26,7 +26,7 @@ void depth_windows::take(const Policy& policy, const Depth& depth, int radius) {
   for (auto* plane : {&nearest_, &farthest_, &middle_, &row_nearest_, &row_farthest_}) plane->resize(width * height);
   const depth_row_kernels kernels;
   for_each_chunk(policy, height, 32, [&](std::size_t begin, std::size_t end) {
-    std::vector<float> padded(width + 2 * r, 0.0F);  // beyond the borders there is no depth
+    std::vector<float> padded(width + 2 * r, 0.0F);  // no depth outside the image
     for (std::size_t y = begin; y != end; ++y) {
       read_depth_row(kernels, depth, static_cast<int>(y), padded.data() + r);
       float* const low = row_nearest_.data() + y * width;
@@ -45,7 +45,7 @@ void depth_windows::take(const Policy& policy, const Depth& depth, int radius) {
   tile_farthest_.assign(static_cast<std::size_t>(tiles_across_ * tiles_down), none);
   static_assert(tile == 16, "a chunk of rows is a row of tiles");
   for_each_chunk(policy, height, tile, [&](std::size_t begin, std::size_t end) {
-    std::vector<float> farthest(width, none);  // of each column
+    std::vector<float> farthest(width, none);  // per column
     std::vector<float> unused(width, none);
     for (std::size_t y = begin; y != end; ++y) {
       float* const low = nearest_.data() + y * width;

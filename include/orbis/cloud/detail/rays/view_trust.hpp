@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Which depth measurements can speak as evidence: not stray pixels, and not views whose pose is wrong.
+/// Selection of depth measurements that are valid evidence: excludes stray pixels, and views whose pose is wrong.
 #pragma once
 
 #include <algorithm>
@@ -30,8 +30,8 @@
 
 namespace orbis::cloud::detail {
 
-/// For each depth of a row how many of the eight around it agree with it. Most depths agree with two at least, which is
-/// found out many at a time. Reads sixteen depths beyond the rows.
+/// Counts for each depth of a row the agreeing depths of the eight around it. Most depths agree with at least two,
+/// which is tested vectorised. Reads sixteen depths beyond the rows.
 struct count_agreeing_depths {
   using signature = void(const float*, const float*, const float*, float, float, float*, std::size_t);
   template <simd::target Target>
@@ -60,10 +60,10 @@ struct count_agreeing_depths {
   }
 };
 
-/// The depth image in metres with stray pixels replaced: one with which fewer than two of those around it
-/// agree, within `margin + margin_growth z^2`, gets their median, or none where fewer than five have a
-/// depth. A stray pixel would testify for itself, and silence the rays of all pixels around it. O(pixels).
-/// `out` is resized if it has another size.
+/// Writes the depth image in metres with stray pixels replaced. A pixel is stray if fewer than two of the pixels around
+/// it agree with it within `margin + margin_growth z^2`. It gets their median, or no depth if fewer than five have one.
+/// A stray pixel would support itself and suppress the evidence of the rays around it. O(pixels). `out` is resized if
+/// its size differs.
 template <execution_policy Policy, camera::depth_source Depth>
 void remove_stray_pixels(const Policy& policy, const Depth& depth, float margin, float margin_growth,
                          image<float>& out) {
@@ -71,10 +71,10 @@ void remove_stray_pixels(const Policy& policy, const Depth& depth, float margin,
   const depth_row_kernels kernels;
   const auto count_agreeing = simd::kernel<count_agreeing_depths, count_agreeing_depths::signature, simd::avx2>();
   const auto width = static_cast<std::size_t>(depth.width());
-  constexpr std::size_t beside = 16;                           // the kernel reads as many beyond a row
+  constexpr std::size_t beside = 16;                           // the kernel reads this many depths beyond a row
   const std::size_t stride = beside + (width + 31) / 16 * 16;  // of padded rows
   for_each_chunk(policy, static_cast<std::size_t>(depth.height()), 16, [&](std::size_t begin, std::size_t end) {
-    std::vector<float> rows(4 * stride, 0.0F);  // three rows of depths, and the counts; there is no depth beside them
+    std::vector<float> rows(4 * stride, 0.0F);  // three rows of depths without neighbours, and the counts
     const auto row = [&](std::size_t y) { return rows.data() + y % 3 * stride + beside; };
     const auto read = [&](std::size_t y) {  // y + 1, so that it is never negative
       if (y == 0 || y > static_cast<std::size_t>(depth.height()))
@@ -107,16 +107,16 @@ void remove_stray_pixels(const Policy& policy, const Depth& depth, float margin,
   });
 }
 
-/// A view with the stray pixels of its depth replaced.
+/// A view whose depth image has its stray pixels replaced.
 struct cleaned_view {
   camera::depth_view<float> depth;
   se3 T_world_camera;
 };
 
-/// Cleans one view at a time. Keeps its memory.
+/// Cleans one view at a time. Reuses its memory.
 class view_cleaner {
  public:
-  /// The cleaned view; valid until the next call.
+  /// Returns the cleaned view; valid until the next call.
   template <execution_policy Policy, posed_depth View>
   [[nodiscard]] cleaned_view clean(const Policy& policy, const View& view, const ray_evidence_options& options) {
     remove_stray_pixels(policy, view.depth, options.margin, options.margin_growth, depth_);
@@ -127,44 +127,44 @@ class view_cleaner {
   image<float> depth_;
 };
 
-/// What is asked of views beside their trust: nothing.
-struct ask_nothing {
+/// Default callback for views: does nothing.
+struct no_view_action {
   template <class View>
   void operator()(const View&, const cleaned_view&, const depth_windows&) const noexcept {}
 };
 
 struct view_trust_options {
-  double conflict = 0.1;  ///< a view is distrusted beyond this,
-  double excess = 3;      ///< and beyond so many times the usual view's
-  int samples = 20;       ///< pixels across and down that each view is judged by; > 0
-  std::size_t least = 4;  ///< fewer views cannot outvote one
+  double conflict = 0.1;  ///< a view is distrusted if its conflict exceeds this
+  double excess = 3;      ///< and exceeds this multiple of the usual conflict
+  int samples = 20;       ///< samples across and down each view; > 0
+  std::size_t least = 4;  ///< with fewer views, none is distrusted
 };
 
-/// Views that do not agree with the others, by number, ascending; and how little.
+/// Views that contradict the others, by number, ascending, with measures of conflict.
 struct view_trust {
   std::vector<std::uint32_t> distrusted;
-  double worst_conflict = 0;  ///< of a view with the others, 0 to 1
+  double worst_conflict = 0;  ///< largest conflict of a view with the others, 0 to 1
   double usual_conflict = 0;  ///< the median over the trusted views
 };
 
-/// What a view and another one say of each other: how many of the samples in a tile of one the other one passes
-/// through and how many it supports.
+/// Mutual evidence of two views: the number of samples in a tile of one view that the other one passes through or
+/// supports.
 struct view_verdict {
   std::uint32_t other;
-  std::uint32_t rank;  ///< by chance: which verdicts stay where there are too many
+  std::uint32_t rank;  ///< pseudo-random, decides which verdicts are kept if there are too many
   std::uint16_t through;
   std::uint16_t all;  ///< passed through or supported
   [[nodiscard]] double conflict() const noexcept { return static_cast<double>(through) / all; }
 };
 
-/// The same for both views, whatever came before.
+/// Rank of a verdict, the same for both views and independent of the order of processing.
 [[nodiscard]] inline std::uint32_t verdict_rank(std::uint32_t of, std::uint32_t by, std::size_t tile) noexcept {
   return static_cast<std::uint32_t>(mix64((std::uint64_t{of} << 32U | by) ^ mix64(tile)) >> 32U);
 }
 
-/// The verdicts that one view has a part in. Of up to 128 views all are kept; beyond that as many, those of lowest
-/// rank, which is a fair sample. So memory grows with the views and not with their square, and a view that shares its
-/// part of the scene with few others loses nothing.
+/// Verdicts that involve one view. All are kept for up to 128 views. With more views the same number is kept, those of
+/// lowest rank, which is an unbiased sample. Memory thus grows linearly with the number of views, and a view that
+/// overlaps with few others loses no verdicts.
 class view_verdicts {
  public:
   static constexpr std::size_t most = std::size_t{128} * 2 * 16;  ///< 16 tiles of each view and of the other
@@ -185,11 +185,11 @@ class view_verdicts {
 
  private:
   [[nodiscard]] static bool lower(const view_verdict& a, const view_verdict& b) noexcept { return a.rank < b.rank; }
-  std::vector<view_verdict> kept_;  // the highest rank in front, once there are as many as may stay
+  std::vector<view_verdict> kept_;  // a heap with the highest rank in front once it is full
 };
 
-/// The median of the conflicts that a view has with those not left out; 0 where there are too few.
-/// `verdicts`: those that it has a part in.
+/// Median of the conflicts of a view with the views not left out; 0 if there are too few. `verdicts`: those that
+/// involve the view.
 [[nodiscard]] inline double conflict_of(std::span<const view_verdict> verdicts, std::span<const char> left_out) {
   std::vector<double> values;
   for (const view_verdict& c : verdicts) {
@@ -199,21 +199,21 @@ class view_verdicts {
   return quantile(values, 0.5);
 }
 
-/// Finds views whose pose is wrong by what they say of each other. A sample of the pixels of each is
-/// tested by all others (`ray_evidence`), tile by tile: a wrong pose is contradicted all over the
-/// image, a moving object in a part of it alone, so the median over the tiles counts. The worst view is left
-/// out until none stands out; if that would be half of them, all are trusted. Deterministic. `also(view, cleaned
-/// view, its windows)` is called for each view as well, so that who has other questions needs no pass of its own: views
-/// may be costly to look at. `samples`: of the views, if they were drawn before; otherwise each view is looked at once
-/// more. O(views (pixels + samples of all views)), and O(views) memory. @pre views' images have the camera's size; the
-/// samples are of these views
-template <execution_policy Policy, posed_depth_range Views, camera::camera_model Camera, class Also = ask_nothing>
+/// Finds views with wrong poses by comparing the views with each other. A sample of the pixels of each view is tested
+/// by all others (`ray_evidence`), tile by tile. A wrong pose is contradicted all over the image, a moving object only
+/// in a part of it, so the median over the tiles decides. The worst view is left out repeatedly until none stands out;
+/// if that would be half of them, all are trusted. Deterministic. Calls `also(view, cleaned view, its windows)` for
+/// each view, so that callers with further computations need no second pass: views may be costly to read. `samples`:
+/// samples of the views, if drawn before; otherwise each view is read once more. O(views (pixels + samples of all
+/// views)), and O(views) memory.
+/// @pre views' images have the camera's size; the samples are of these views
+template <execution_policy Policy, posed_depth_range Views, camera::camera_model Camera, class Also = no_view_action>
 [[nodiscard]] view_trust find_distrusted_views(const Policy& policy, const Views& views, const Camera& camera,
                                                const ray_evidence_options& evidence = {},
                                                const view_trust_options& options = {}, progress on_progress = {},
                                                const Also& also = {}, const view_samples* samples = nullptr) {
   constexpr std::uint32_t tiles = view_samples::tiles;
-  constexpr int enough = 6;  // samples of a tile that another view says something of
+  constexpr int enough = 6;  // minimum number of samples of a tile with evidence from another view
   const auto count = static_cast<std::uint32_t>(std::ranges::size(views));
   view_trust out;
   view_cleaner cleaner;
@@ -234,7 +234,7 @@ template <execution_policy Policy, posed_depth_range Views, camera::camera_model
     for (const auto& view : views) drawn.add(camera, view);
   const view_samples& asked = samples != nullptr ? *samples : drawn;
   assert(asked.views() == count);
-  const std::span<const std::uint32_t> place = asked.tile_of();  // view and tile
+  const std::span<const std::uint32_t> place = asked.tile_of();  // numbers of view and tile
 
   std::vector<view_verdicts> verdicts(count);
   ray_evidence_counter<Camera> counter{policy, asked.points(), camera, evidence};
@@ -286,7 +286,7 @@ template <execution_policy Policy, posed_depth_range Views, camera::camera_model
     if (conflicts[worst] <= options.conflict || conflicts[worst] <= options.excess * out.usual_conflict) break;
     left_out[worst] = 1;
     out.distrusted.push_back(worst);
-    if (2 * out.distrusted.size() >= count) {  // nobody knows who is right
+    if (2 * out.distrusted.size() >= count) {  // the views do not show which half is right
       out.distrusted.clear();
       break;
     }

@@ -16,7 +16,7 @@
 
 namespace orbis::cloud::detail {
 
-/// The indices, ascending, below `count` for which `keep` is true.
+/// Returns the indices, ascending, below `count` for which `keep` is true.
 template <std::predicate<std::size_t> Keep>
 [[nodiscard]] std::vector<std::uint32_t> indices_where(std::size_t count, Keep&& keep) {
   std::vector<std::uint32_t> out(count);
@@ -29,8 +29,8 @@ template <std::predicate<std::size_t> Keep>
   return out;
 }
 
-/// The indices, ascending, of the points that are not outliers by their score; those that have none
-/// (NaN) by what `policy` says, unless they are finite: a point that is alone stays.
+/// Returns the indices, ascending, of the points that are not outliers by their score. Points without a score (NaN):
+/// finite ones are kept (a single point), `policy` decides on the others.
 template <std::predicate<float> Outlier>
 [[nodiscard]] std::vector<std::uint32_t> inliers_by_score(const point_view& points, std::span<const float> score,
                                                           non_finite policy, Outlier&& outlier) {

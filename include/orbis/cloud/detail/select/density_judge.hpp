@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Where the threshold of a test of density lies: in a valley between two populations of points that
-/// do not lie on surfaces.
+/// Threshold of a density test: in a valley between two populations of points that do not lie on surfaces.
 #pragma once
 
 #include <algorithm>
@@ -16,7 +15,7 @@
 #include <utility>
 #include <vector>
 
-#include <orbis/cloud/detail/select/in_words.hpp>
+#include <orbis/cloud/detail/select/describe.hpp>
 #include <orbis/cloud/detail/select/log_density.hpp>
 #include <orbis/cloud/detail/select/surroundings.hpp>
 #include <orbis/cloud/filter_chain.hpp>
@@ -25,13 +24,13 @@
 
 namespace orbis::cloud::detail {
 
-/// A way to say what spacing is usual, and how well the cloud keeps to it.
+/// A reference for the usual spacing, and the spread of the cloud around it.
 struct reference {
   density_step step;
-  bulk width;  ///< of the residuals; the median is 0
+  bulk width;  ///< of the residuals, whose median is 0
 };
 
-/// Width of the bulk as it counts in the comparison of references.
+/// Width of the bulk used to compare references.
 [[nodiscard]] inline double width_of(const bulk& b) noexcept { return std::max(b.left_scale, 0.5 * b.right_scale); }
 
 [[nodiscard]] inline std::vector<float> finite_of(std::vector<float> values) {
@@ -39,7 +38,7 @@ struct reference {
   return values;
 }
 
-/// Moves the reference to the bulk's median, and measures the bulk.
+/// Shifts the reference to the bulk's median, and measures the bulk.
 template <execution_policy Policy>
 void center(const Policy& policy, surroundings& around, reference& r) {
   r.width = bulk_of(finite_of(around.residuals(policy, r.step)));
@@ -47,28 +46,28 @@ void center(const Policy& policy, surroundings& around, reference& r) {
   r.width.median = 0;
 }
 
-/// How eager a test is.
-struct test_manner {
-  double lowest = 0.55;         ///< threshold
-  double without_valley = 1.6;  ///< threshold for one population, if its bulk is not wider
-  bool shoulders = true;        ///< flying pixels make a shoulder on the bulk rather than a population apart
-  double least_ratio = 1.6;     ///< of a valley
-  bool needs_valley = false;    ///< without one nothing goes
+/// Options of a test.
+struct threshold_options {
+  double lowest = 0.55;         ///< lower limit of the threshold
+  double without_valley = 1.6;  ///< threshold for a single population, if its bulk is not wider
+  bool shoulders = true;     ///< detect a shoulder on the bulk, as flying pixels form, instead of a separate population
+  double least_ratio = 1.6;  ///< minimum ratio of a valley
+  bool needs_valley = false;  ///< without a valley remove nothing
 };
 
-/// Sparse points that lie on surfaces are no outliers, however many there are: regions seen from afar or
-/// at a grazing angle. So only the others make the histogram, and no threshold lies where the sparser
-/// points are surfaces by more than 40 %.
+/// Finds the threshold of a density test. Sparse points on surfaces are not outliers, whatever their number: regions
+/// seen from afar or at a grazing angle. So the histogram contains only the other points, and the threshold is beyond
+/// the spacing from which on more than 40 % of the sparser points lie on surfaces.
 template <execution_policy Policy>
 [[nodiscard]] density_evidence find_threshold(const Policy& policy, surroundings& around, const reference& r,
-                                              const test_manner& manner) {
+                                              const threshold_options& manner) {
   constexpr double first = 0.3;
   constexpr double bin_width = 0.08;
   constexpr std::size_t bins = 64;
   constexpr double most_surface = 0.4;
-  constexpr double chance = 10;  // points: fewer say nothing
+  constexpr double chance = 10;  // points; fewer are not significant
   const std::vector<float> residual = around.residuals(policy, r.step);
-  around.look_at_shapes(policy, residual, r.step.surface_line());
+  around.compute_shapes(policy, residual, r.step.surface_line());
   std::vector<float> loose;  // residuals of sparse points that are not on surfaces
   std::array<double, bins> all{};
   std::array<double, bins> surface{};
@@ -114,28 +113,28 @@ template <execution_policy Policy>
   return out;
 }
 
-[[nodiscard]] inline std::string in_words(const density_evidence& e) {
-  std::string out = joined({percent(e.removed), " of the points lie more than ", in_words(std::exp(e.threshold)),
+[[nodiscard]] inline std::string describe(const density_evidence& e) {
+  std::string out = joined({percent(e.removed), " of the points are more than ", describe(std::exp(e.threshold)),
                             " times sparser than usual"});
-  if (e.mode == filter_mode::range_log_statistical) out += " at their range";
-  if (e.mode == filter_mode::local_log_statistical) out += " around them";
-  out += " and on no surface";
+  if (e.mode == filter_mode::range_log_statistical) out += " for their range";
+  if (e.mode == filter_mode::local_log_statistical) out += " for their surroundings";
+  out += " and not on a surface";
   if (e.threshold == e.valley_position) {
-    out += joined(
-        {" (a population apart: the valley before it is ", in_words(e.valley_ratio), " times lower than its peak)"});
+    out += joined({" (a separate population: its peak is ", describe(e.valley_ratio),
+                   " times higher than the valley before it)"});
   } else if (e.shoulder > 0.01) {
-    out += joined({" (", percent(e.shoulder), " make a shoulder just outside the bulk, as flying pixels do)"});
+    out += joined({" (", percent(e.shoulder), " form a shoulder of the distribution, as flying pixels do)"});
   }
   return out;
 }
 
-/// Judges what is left of a cloud by its points alone, adds the steps that follow, and their reasons.
-/// The tests leave their removals in `around`.
+/// Judges the remaining points of a cloud by the points alone; adds the resulting steps and their reasons. The tests
+/// store their removals in `around`.
 template <execution_policy Policy>
 void judge_points(const Policy& policy, surroundings& around, const select_options& options, filter_choice& choice,
                   std::vector<std::string>& reasons) {
   filter_evidence& evidence = choice.evidence;
-  // The references: the narrower bulk wins, the simpler one with a head start.
+  // Choice of the reference: the narrower bulk wins, with a bonus for the simpler one.
   reference global;
   global.step.neighbors = options.neighbors;
   center(policy, around, global);
@@ -164,7 +163,8 @@ void judge_points(const Policy& policy, surroundings& around, const select_optio
   center(policy, around, local);
   evidence.local_scale = width_of(local.width);
 
-  // Applies a step; returns the share that it removes. Outliers are the fewer: what would take more is undone.
+  // Applies a step and returns the share that it removes. Undoes a step that removes too much, because outliers are a
+  // minority.
   const auto try_step = [&](const auto& step) {
     constexpr double most = 0.4;
     std::vector<char> before(around.gone().begin(), around.gone().end());
@@ -180,19 +180,19 @@ void judge_points(const Policy& policy, surroundings& around, const select_optio
     if (share > 0) choice.chain.emplace_back(step);
     return share;
   };
-  const auto test = [&](reference r, const test_manner& manner) {
+  const auto test = [&](reference r, const threshold_options& manner) {
     r.step.surface_spacing = usual.step.usual;
     density_evidence found = find_threshold(policy, around, r, manner);
     if (std::isfinite(found.threshold)) {
       density_step step = r.step;
       step.threshold = found.threshold;
       found.removed = try_step(step);
-      if (found.removed > 0) reasons.push_back(in_words(found));
+      if (found.removed > 0) reasons.push_back(describe(found));
     }
     evidence.density.push_back(found);
   };
   test(usual, {});
-  // A sensor's range can explain away outliers that are spread over all ranges: one reference for all sees them.
+  // A reference over range can hide outliers that are spread over all ranges; a constant reference detects them.
   if (by_range) {
     test(global, {.shoulders = false, .least_ratio = 3, .needs_valley = true});
   } else if (ranged && ranged->step.usual.slope > 0) {
@@ -208,7 +208,7 @@ void judge_points(const Policy& policy, surroundings& around, const select_optio
   if (evidence.isolated > 0)
     reasons.push_back(
         joined({percent(evidence.isolated), " are groups of fewer than ", std::to_string(isolation.min_size),
-                " points further than ", in_words(isolation.reach), " usual spacings from all others"}));
+                " points more than ", describe(isolation.reach), " usual spacings from all others"}));
   cluster_options cluster;
   cluster.min_size = std::clamp<std::size_t>(around.size() / 125, 30, 300);
   cluster.min_gap = 4;
@@ -216,7 +216,7 @@ void judge_points(const Policy& policy, surroundings& around, const select_optio
   if (evidence.clustered > 0)
     reasons.push_back(
         joined({percent(evidence.clustered), " are clusters of fewer than ", std::to_string(cluster.min_size),
-                " points that hang ", in_words(cluster.min_gap), " spacings or more from the surface"}));
+                " points at least ", describe(cluster.min_gap), " spacings from the surface"}));
 }
 
 }  // namespace orbis::cloud::detail

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// What a point's neighbours say beside their distance: what is usual around it, and whether it lies
-/// on a surface with them.
+/// Properties of a point's neighbourhood other than density: the usual value around it, and its deviation from a plane.
 #pragma once
 
 #include <algorithm>
@@ -25,8 +24,8 @@
 
 namespace orbis::cloud::detail {
 
-/// The `count` smallest of each column of a table of 16 columns, ascending, and the largest, into the rows of `out`:
-/// low quantiles, 16 at a time. No value is NaN.
+/// Writes the `count` smallest values of each column of a table of 16 columns, ascending, and the largest value, into
+/// the rows of `out`: low quantiles, 16 at a time. @pre no value is NaN
 struct smallest_of_columns {
   static constexpr std::size_t columns = 16;
   static constexpr std::size_t count = 5;
@@ -46,7 +45,7 @@ struct smallest_of_columns {
       for (std::size_t row = 0; row != rows; ++row) {
         lanes v = lanes::load(table + row * columns + x);
         largest = max(v, largest);
-        for (lanes& s : smallest) {  // pushes the larger ones out
+        for (lanes& s : smallest) {  // shifts the larger ones out
           const lanes low = min(v, s);
           v = max(v, s);
           s = low;
@@ -58,14 +57,14 @@ struct smallest_of_columns {
   }
 };
 
-/// For each place the value that is usual in its surroundings: the 35 % quantile over its 12 nearest neighbours, round
-/// after round, so that they reach further than the neighbours. Values that are not finite (NaN) stay and
-/// do not count; so do those of points without neighbours. O(n rounds), the same for every policy.
+/// Computes for each place the usual value in its surroundings: the 35 % quantile over its 12 nearest neighbours,
+/// repeated in rounds to reach beyond the neighbours. Non-finite values (NaN) and those of points without neighbours
+/// stay and do not count. O(n rounds), the same for every policy.
 /// @pre values has an entry for each place
 template <execution_policy Policy>
 [[nodiscard]] std::vector<float> smoothed_over_neighbors(const Policy& policy, const neighbor_graph& graph,
                                                          std::vector<float> values, int rounds = 4) {
-  static constexpr float inf = std::numeric_limits<float>::infinity();  // of what does not count
+  static constexpr float inf = std::numeric_limits<float>::infinity();  // for values that do not count
   constexpr std::size_t neighbors = smallest_of_columns::most_rows, columns = smallest_of_columns::columns;
   const auto rank_of = [](std::size_t count) {
     return static_cast<std::size_t>(0.35 * static_cast<double>(count - 1) + 0.5);
@@ -109,10 +108,10 @@ template <execution_policy Policy>
   return values;
 }
 
-/// How far a point and its neighbours are from lying in one plane, in units of their mean distance: the
-/// root of the sum of two squares, the neighbours' deviation from the plane that fits them best and the
-/// point's own distance to it. 0 in a plane, some 0.2 at an edge, 0.4 and more in a volume or beside a
-/// surface; infinity with fewer than four neighbours. @pre the neighbours are points of the cloud
+/// Deviation of a point and its neighbours from one plane, in units of their mean distance: the root of the sum of two
+/// squares, the neighbours' deviation from their best-fit plane and the point's own distance to it. 0 in a plane, about
+/// 0.2 at an edge, 0.4 and more in a volume or next to a surface; infinity with fewer than four neighbours. @pre the
+/// neighbours are points of the cloud
 template <point_range Points>
 [[nodiscard]] double off_plane(const Points& points, std::size_t i, std::span<const neighbor<float>> neighbors) {
   if (neighbors.size() < 4) return std::numeric_limits<double>::infinity();

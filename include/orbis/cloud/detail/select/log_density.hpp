@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The statistics on which a cloud is judged: how much sparser than its surroundings, or than what
-/// the sensor's range explains, each point lies, in natural logarithms.
+/// Statistics of density: natural logarithm of a point's spacing relative to its surroundings or to the spacing that
+/// the sensor's range explains.
 #pragma once
 
 #include <algorithm>
@@ -18,11 +18,11 @@
 
 namespace orbis::cloud::detail {
 
-/// Which of `count` values in ascending order the fraction `q` of them does not exceed. @pre count > 0
+/// Rank of the `q` quantile of `count` values in ascending order. @pre count > 0
 [[nodiscard]] inline std::ptrdiff_t quantile_rank(std::ptrdiff_t count, double q) noexcept {
   return static_cast<std::ptrdiff_t>(q * static_cast<double>(count - 1) + 0.5);
 }
-/// A value that the fraction `q` of `values` does not exceed; 0 for none. Reorders them. O(n).
+/// Returns the `q` quantile of `values`; 0 if empty. Reorders them. O(n).
 template <std::ranges::contiguous_range Values>
 [[nodiscard]] double quantile(Values&& values, double q) {
   if (std::ranges::empty(values)) return 0;
@@ -32,7 +32,7 @@ template <std::ranges::contiguous_range Values>
   return static_cast<double>(*at);
 }
 
-/// A value that half of the weight does not exceed; 0 for none. Entries are value and weight.
+/// Returns the weighted median; 0 if empty. Entries are value and weight.
 [[nodiscard]] inline double weighted_median(std::vector<std::array<double, 2>> entries) {
   std::sort(entries.begin(), entries.end());
   double total = 0;
@@ -45,11 +45,11 @@ template <std::ranges::contiguous_range Values>
   return 0;
 }
 
-/// The Theil-Sen line through the 40 % quantiles of log spacing in 24 bins of log range, weighted by the
-/// numbers of their points, so that ranges at which there are few points but outliers do not bend it; empty
-/// where fewer than four bins are populated. Range can only thin a cloud out, and no faster than its noise
-/// grows: the slope is clipped to 0 ... 2.5. Points of which one of the two is not finite do not count.
-/// O(n), 4 bytes for each point. @pre one range for each spacing
+/// Fits the Theil-Sen line through the 40 % quantiles of log spacing in 24 bins of log range. Bins are weighted by
+/// their numbers of points, so that ranges with few points other than outliers do not bend the line. Empty if fewer
+/// than four bins are populated. Spacing can only grow with range, and no faster than the noise: the slope is clipped
+/// to 0 ... 2.5. Points with a non-finite spacing or range do not count. O(n), 4 bytes per point. @pre one range for
+/// each spacing
 /// Source: P. K. Sen, "Estimates of the regression coefficient based on Kendall's tau", JASA 63, 1968.
 [[nodiscard]] inline std::optional<log_line> fit_log_line(std::span<const float> log_spacing,
                                                           std::span<const float> log_range) {
@@ -70,7 +70,7 @@ template <std::ranges::contiguous_range Values>
   if (!(width > 1e-6)) return std::nullopt;
   const auto bin_of = [&](double range) {
     const double bin = (range - low) / width;
-    return bin >= 0 && bin < bins ? static_cast<std::size_t>(bin) : bins;  // the last one holds what is left over
+    return bin >= 0 && bin < bins ? static_cast<std::size_t>(bin) : bins;  // the last one holds the rest
   };
   std::array<std::size_t, bins + 2> begin{};
   for_each_point([&](float, float range) { ++begin[bin_of(range) + 1]; });
@@ -103,9 +103,8 @@ template <std::ranges::contiguous_range Values>
   return line;
 }
 
-/// Where the bulk of some values lies, and how wide it is to either side: the median, and 1.4826
-/// times the median distance to it of the values below and above (for a normal distribution, its
-/// standard deviation).
+/// Location and width of the bulk of some values: the median, and on either side 1.4826 times the median distance of
+/// the values on that side from it (the standard deviation of a normal distribution).
 struct bulk {
   double median = 0;
   double left_scale = 0;
@@ -115,7 +114,7 @@ struct bulk {
   bulk out;
   out.median = quantile(values, 0.5);
   if (values.empty()) return out;
-  // Ranks of distances are those of values, from the other end on the left: no distances are stored.
+  // Ranks of distances follow from ranks of values, counted from the other end on the left; no distances are stored.
   const auto median = static_cast<float>(out.median);
   float* const begin = values.data();
   float* const end = begin + values.size();
@@ -133,13 +132,13 @@ struct bulk {
   return out;
 }
 
-/// The deepest valley of a distribution's upper tail.
+/// Deepest valley in the upper tail of a distribution.
 struct valley {
-  double position = 0;  ///< above the median
-  double ratio = 0;     ///< the later peak's height over the valley's
+  double position = 0;  ///< distance above the median
+  double ratio = 0;     ///< height of the later peak over that of the valley
 };
-/// Searches the smoothed histogram of `values - median` for the place in [lowest, 3.2] where the
-/// ratio of the highest later peak to the height is largest. O(n).
+/// Finds the place in [lowest, 3.2] of the smoothed histogram of `values - median` with the largest ratio of the
+/// highest later peak to its own height. O(n).
 [[nodiscard]] inline valley deepest_valley(std::span<const float> values, double median, double lowest) {
   constexpr double first = 0.3;
   constexpr double width = 0.08;
@@ -159,7 +158,7 @@ struct valley {
   for (std::size_t i = bins; i-- > 0;) {
     const double x = first + (static_cast<double>(i) + 0.5) * width;
     if (x < lowest) break;
-    // The 2 stands for shot noise: a bump of a few points is no peak.
+    // Adding 2 accounts for shot noise: a bump of a few points is no peak.
     const double ratio = (peak + 2) / (smooth[i] + 2);
     if (x <= 3.2 && ratio >= best.ratio) best = {x, ratio};
     peak = std::max(peak, smooth[i]);

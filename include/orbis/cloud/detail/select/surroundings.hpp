@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The neighbours of what is left of a cloud, and the tests that share them: of density, of isolation
-/// and of clusters.
+/// The neighbours of the remaining points of a cloud, and the tests that share them: density, isolation and clusters.
 #pragma once
 
 #include <algorithm>
@@ -28,11 +27,11 @@
 
 namespace orbis::cloud::detail {
 
-/// Values of some of the points 0 ... n - 1. A quarter of a byte for each point and four bytes for each value, and
-/// twice that while values are added.
+/// Values of a subset of the points 0 ... n - 1. A quarter of a byte per point and four bytes per value; twice that
+/// while values are added.
 class sparse_values {
  public:
-  /// Adds `value(i)` for each i < count that has none and for which `wanted(i)` is true. Both are called from several
+  /// Adds `value(i)` for each i < count without a value for which `wanted(i)` is true. Both are called from several
   /// threads. O(count), the same for every policy. @pre count is the same in all calls
   template <execution_policy Policy, class Wanted, class Value>
   void add(const Policy& policy, std::size_t count, const Wanted& wanted, const Value& value) {
@@ -61,7 +60,7 @@ class sparse_values {
   [[nodiscard]] bool has(std::size_t i) const noexcept {
     return i / 64 < words_.size() && (words_[i / 64].mask >> (i % 64) & 1U) != 0;
   }
-  /// NaN for points without a value.
+  /// Returns the value of a point; NaN if it has none.
   [[nodiscard]] float at(std::size_t i) const noexcept {
     if (!has(i)) return std::numeric_limits<float>::quiet_NaN();
     const word& w = words_[i / 64];
@@ -72,24 +71,24 @@ class sparse_values {
  private:
   struct word {
     std::uint64_t mask = 0;
-    std::uint32_t before = 0;  ///< values of the words before
+    std::uint32_t before = 0;  ///< number of values in the preceding words
   };
   std::vector<word> words_;
   std::vector<float> values_;
 };
 
-/// What is left of a cloud, with its neighbours. Points have the places of a `neighbor_graph`, in which everything is
-/// stored. Log spacings are NaN for points that have none: alone, or identical to all their neighbours.
-/// About 45 bytes for each point.
+/// The remaining points of a cloud with their neighbours. Points are identified by the places of a `neighbor_graph`;
+/// all data is stored by place. Log spacings are NaN for points without one: single points, or points identical to all
+/// their neighbours. About 45 bytes per point.
 class surroundings {
  public:
-  static constexpr std::size_t width = 12;       ///< neighbours in the graph, more if more are averaged
-  static constexpr std::size_t shape_width = 8;  ///< neighbours whose shape is looked at
-  static constexpr float bulk_end = 0.3F;        ///< less sparse than this beyond usual, log, is no matter of shape
+  static constexpr std::size_t width = 12;       ///< neighbours in the graph; more if more are averaged
+  static constexpr std::size_t shape_width = 8;  ///< neighbours whose shape is analysed
+  static constexpr float bulk_end = 0.3F;        ///< log spacing above usual up to which the shape is not analysed
 
-  /// `left`: for each point whether it is there; those that are not finite are not.
-  /// `ranges`: metres, for each point of the cloud, not finite or negative where unknown; empty if all are. They
-  /// outlive this.
+  /// Builds the neighbour graph. `left`: per point, nonzero if it is present; non-finite points are not. `ranges`:
+  /// metres, per point of the cloud, non-finite or negative if unknown; empty if all are unknown. The ranges
+  /// must outlive this object.
   template <execution_policy Policy>
   surroundings(const Policy& policy, const point_view& points, std::span<const char> left,
                std::span<const float> ranges, std::size_t neighbors)
@@ -99,29 +98,29 @@ class surroundings {
   }
 
   [[nodiscard]] std::size_t size() const noexcept { return graph_.size(); }
-  /// Of the point at place `i` in the cloud.
+  /// Index in the cloud of the point at place `i`.
   [[nodiscard]] std::uint32_t index(std::size_t i) const noexcept { return graph_.index(i); }
   [[nodiscard]] std::span<const float> log_spacing() const noexcept { return log_spacing_; }
   [[nodiscard]] bool has_range(std::size_t i) const noexcept {
     return !ranges_.empty() && std::isfinite(ranges_[index(i)]) && ranges_[index(i)] >= 0;
   }
-  /// NaN where it is not known.
+  /// Log range of a point; NaN if unknown.
   [[nodiscard]] float log_range(std::size_t i) const noexcept {
     return has_range(i) ? std::log(std::max(ranges_[index(i)], 1e-3F)) : nan;
   }
-  /// Points that a test has removed.
+  /// Per place, nonzero if a test removed the point.
   [[nodiscard]] std::span<const char> gone() const noexcept { return gone_; }
-  /// Takes removals back. @pre as many as points
+  /// Restores an earlier state of the removals. @pre one entry per point
   void restore(std::vector<char> gone) { gone_ = std::move(gone); }
 
-  /// The log spacing that is usual around each point.
+  /// Returns the usual log spacing around each point.
   template <execution_policy Policy>
   std::span<const float> local_spacing(const Policy& policy) {
     if (local_.empty()) local_ = smoothed_over_neighbors(policy, graph_, log_spacing_);
     return local_;
   }
 
-  /// How much sparser each point is than usual, log; NaN where that is not known.
+  /// Returns the log spacing of each point above the usual one; NaN if unknown.
   template <execution_policy Policy>
   [[nodiscard]] std::vector<float> residuals(const Policy& policy, const density_step& step) {
     std::vector<float> out(size());
@@ -134,15 +133,15 @@ class surroundings {
     return out;
   }
 
-  /// Works out the shape around the points that are sparser than the bulk by `residual` or by `usual`.
+  /// Computes the shapes around the points that are sparser than the bulk by `residual` or relative to `line`.
   template <execution_policy Policy>
-  void look_at_shapes(const Policy& policy, std::span<const float> residual, const log_line& line) {
+  void compute_shapes(const Policy& policy, std::span<const float> residual, const log_line& line) {
     flat_.add(
         policy, size(), [&](std::size_t i) { return residual[i] >= bulk_end || !is_bulk(line, i); },
         [&](std::size_t i) { return static_cast<float>(off_plane_at(i)); });
   }
-  /// Whether the point lies in a plane with its neighbours, or beside enough that do at its own scale.
-  /// @pre its shape and that of its sparse neighbours was looked at, with the same line
+  /// Returns true if the point lies in a plane with its neighbours, or next to enough points that do at its own scale.
+  /// @pre its shape and that of its sparse neighbours was computed with the same line
   [[nodiscard]] bool on_surface(std::size_t i, const surface_test& test, const log_line& line) const {
     const auto is_flat = [&](std::size_t j) { return double{flat_.at(j)} < test.flatness; };
     if (is_flat(i)) return true;
@@ -157,7 +156,7 @@ class surroundings {
   template <execution_policy Policy>
   void apply(const Policy& policy, const density_step& step) {
     const std::vector<float> residual = residuals(policy, step);
-    look_at_shapes(policy, residual, step.surface_line());
+    compute_shapes(policy, residual, step.surface_line());
     for_each_index(policy, size(), 1024, [&](std::size_t i) {
       if (gone_[i] == 0 && double{residual[i]} > step.threshold && !on_surface(i, step.surface, step.surface_line()))
         gone_[i] = 1;
@@ -176,7 +175,7 @@ class surroundings {
     }
     const cluster_options options{.neighbors = width, .reach = step.reach, .min_size = step.min_size, .min_gap = 0};
     remove_components(policy, spacing, options, [&](std::size_t i) {
-      return !std::isnan(log_spacing_[i]);  // identical points are not alone
+      return !std::isnan(log_spacing_[i]);  // identical points are not isolated
     });
   }
 
@@ -195,7 +194,7 @@ class surroundings {
   [[nodiscard]] bool is_bulk(const log_line& line, std::size_t i) const noexcept {
     return log_spacing_[i] - usual(line, i) < bulk_end;
   }
-  /// All that follows from the points.
+  /// Computes all data that depends on the points only.
   template <execution_policy Policy>
   void measure(const Policy& policy, leaf_hierarchy tree, std::size_t points, std::size_t neighbors) {
     graph_ = neighbor_graph{policy, std::move(tree), points, std::max(width, neighbors)};
@@ -207,7 +206,7 @@ class surroundings {
     });
   }
 
-  /// `off_plane` of the nearest neighbours.
+  /// Returns `off_plane` of the nearest neighbours.
   [[nodiscard]] double off_plane_at(std::size_t i) const {
     std::array<std::array<float, 3>, shape_width + 1> points;
     std::array<neighbor<float>, shape_width> row;
@@ -222,7 +221,7 @@ class surroundings {
     return off_plane(points, 0, std::span{row}.first(count));
   }
 
-  /// Removes the points of components that go, if `can_go(i)`.
+  /// Removes the points of the removable components for which `can_go(i)` is true.
   template <execution_policy Policy, class CanGo>
   void remove_components(const Policy& policy, std::span<const float> spacing, const cluster_options& options,
                          const CanGo& can_go) {
@@ -232,11 +231,11 @@ class surroundings {
     }
   }
 
-  std::span<const float> ranges_;  ///< of the cloud
+  std::span<const float> ranges_;  ///< per point of the cloud
   neighbor_graph graph_;
   std::vector<float> log_spacing_;
-  std::vector<float> local_;  ///< empty until asked for
-  sparse_values flat_;        ///< `off_plane` of those that were looked at
+  std::vector<float> local_;  ///< empty before the first use
+  sparse_values flat_;        ///< `off_plane` of the analysed points
   std::vector<char> gone_;
 };
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// What views say of a cloud, as a step of a chain.
+/// Evidence of views about a cloud, as a step of a chain.
 #pragma once
 
 #include <algorithm>
@@ -16,7 +16,7 @@
 #include <orbis/camera/model.hpp>
 #include <orbis/cloud/detail/rays/depth_windows.hpp>
 #include <orbis/cloud/detail/rays/view_trust.hpp>
-#include <orbis/cloud/detail/select/in_words.hpp>
+#include <orbis/cloud/detail/select/describe.hpp>
 #include <orbis/cloud/filter_chain.hpp>
 #include <orbis/cloud/filter_choice.hpp>
 #include <orbis/cloud/ray_evidence-inl.hpp>
@@ -25,13 +25,13 @@
 
 namespace orbis::cloud::detail {
 
-/// How many points a step removed, and why.
+/// Number of points that a step removed, by reason.
 struct ray_removals {
   std::size_t passed_through = 0;
   std::size_t unsupported = 0;
 };
 
-/// Clears `left` where the counts exclude a point.
+/// Clears `left` for the points that the counts exclude.
 [[nodiscard]] inline ray_removals remove_by_rays(const std::vector<ray_evidence>& scores, const ray_step& step,
                                                  std::span<char> left) {
   ray_removals out;
@@ -46,7 +46,7 @@ struct ray_removals {
   return out;
 }
 
-/// Clears `left` where the views exclude a point. If cancelled, nothing is removed.
+/// Clears `left` for the points that the views exclude. If cancelled, removes nothing.
 template <execution_policy Policy, posed_depth_range Views, camera::camera_model Camera>
 ray_removals apply_rays(const Policy& policy, const point_view& points, const ray_step& step, const Views& views,
                         const Camera& camera, std::span<char> left, bool& cancelled, progress on_progress) {
@@ -62,21 +62,21 @@ ray_removals apply_rays(const Policy& policy, const point_view& points, const ra
   return cancelled ? ray_removals{} : remove_by_rays(counter.scores(), step, left);
 }
 
-/// Whether a cloud was made of some views: nearly every point of a sample is in one of them.
+/// Tests if a cloud was made from some views: nearly every point of a sample is in one of them.
 template <camera::camera_model Camera>
-class made_of_views {
+class source_view_test {
  public:
   template <execution_policy Policy>
-  made_of_views(const Policy& policy, const point_view& points, const Camera& camera,
-                const ray_evidence_options& options)
+  source_view_test(const Policy& policy, const point_view& points, const Camera& camera,
+                   const ray_evidence_options& options)
       : counter_{policy, sample_of(points), camera, options} {}
 
   template <execution_policy Policy, posed_depth View>
   void add(const Policy& policy, const View& view) {
     counter_.add(policy, view);
   }
-  /// @pre all views were added
-  [[nodiscard]] bool verdict() const {
+  /// Returns true if the cloud was made from the views. @pre all views were added
+  [[nodiscard]] bool passed() const {
     const std::vector<ray_evidence> scores = counter_.scores();
     const auto supported = std::ranges::count_if(scores, [](const ray_evidence& e) { return e.supported > 0; });
     return static_cast<double>(supported) >= 0.98 * static_cast<double>(scores.size());
@@ -96,8 +96,8 @@ class made_of_views {
   ray_evidence_counter<Camera> counter_;
 };
 
-/// Judges a cloud by its views, clears `left` where they exclude a point, and adds the step and its
-/// reason. False if cancelled.
+/// Judges a cloud by its views, clears `left` for the points they exclude, and adds the step and its reason. Returns
+/// false if cancelled.
 template <execution_policy Policy, posed_depth_range Views, camera::camera_model Camera>
 [[nodiscard]] bool judge_views(const Policy& policy, const point_view& points, const Views& views, const Camera& camera,
                                const select_options& options, std::span<char> left, filter_choice& choice,
@@ -112,8 +112,8 @@ template <execution_policy Policy, posed_depth_range Views, camera::camera_model
     cancelled = cancelled || !on_progress(done, count);
     return !cancelled;
   };
-  // All views are counted at once, and those that turn out to be wrong are taken back: most views are looked at once.
-  made_of_views<Camera> sources{policy, points, camera, step.evidence};
+  // All views are counted, and the distrusted ones are subtracted afterwards, so that most views are read once.
+  source_view_test<Camera> sources{policy, points, camera, step.evidence};
   ray_evidence_counter<Camera> counter{policy, points, camera, step.evidence};
   view_trust trust = find_distrusted_views(
       policy, views, camera, step.evidence, {}, watched,
@@ -126,10 +126,10 @@ template <execution_policy Policy, posed_depth_range Views, camera::camera_model
   evidence.worst_conflict = trust.worst_conflict;
   evidence.usual_conflict = trust.usual_conflict;
   step.distrusted = std::move(trust.distrusted);
-  step.need_support = sources.verdict();
+  step.need_support = sources.passed();
   ray_removals removed;
   constexpr std::size_t most_counted = std::numeric_limits<std::uint16_t>::max();
-  if (count > most_counted && !step.distrusted.empty()) {  // counts may have come to their end
+  if (count > most_counted && !step.distrusted.empty()) {  // counts may be saturated
     removed = apply_rays(policy, points, step, views, camera, left, cancelled, {});
   } else {
     view_cleaner cleaner;
@@ -150,12 +150,12 @@ template <execution_policy Policy, posed_depth_range Views, camera::camera_model
   if (!step.distrusted.empty()) {
     const bool one = step.distrusted.size() == 1;
     why = joined({std::to_string(step.distrusted.size()), " of ", all, one ? " views contradicts" : " views contradict",
-                  " the others (by up to ", percent(trust.worst_conflict), ") and ", one ? "does" : "do",
-                  " not count; "});
+                  " the others (by up to ", percent(trust.worst_conflict), ") and ", one ? "is" : "are", " ignored; "});
   }
   why += joined({"the rays of ", all, " views pass through ", percent(evidence.passed_through), " of the points"});
   if (removed.unsupported > 0)
-    why += joined({", and ", percent(evidence.unsupported), " are in no trusted view but as stray pixels"});
+    why += joined(
+        {", and ", percent(evidence.unsupported), " are measured by no trusted view (stray pixels do not count)"});
   reasons.push_back(std::move(why));
   choice.chain.emplace_back(std::move(step));
   return true;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The points of every occupied voxel, gathered in the order of the cloud.
+/// Gathers the points of every occupied voxel in the order of the cloud.
 #pragma once
 
 #include <algorithm>
@@ -28,15 +28,15 @@
 
 namespace orbis::cloud::detail {
 
-/// What is left of a voxel in the end: the mean of its points, and of their colours.
+/// Result for a voxel: the mean of its points and of their colours.
 struct voxel_summary {
   std::array<float, 3> position{};
   rgb8 color;
 };
 
-/// How points become voxels: each voxel has a record, first `empty`, to which its points are added one after another in
-/// the order of the cloud, and `put(number, summary)` is called once for each voxel, numbered in the order in which
-/// they are first seen, after `resize(count)`. Different voxels at the same time.
+/// Accumulation of points into voxels. Each voxel has a record, initially `empty`, to which its points are added in the
+/// order of the cloud. After `resize(count)`, `put(number, summary)` is called once for each voxel, concurrently for
+/// different voxels; they are numbered in the order in which they first occur.
 template <bool Colored>
 struct centroid_fold {
   struct plain_record {
@@ -83,8 +83,8 @@ struct centroid_fold {
   }
 };
 
-/// Takes the points of [begin, end) into `block`, as many at a time as it holds, and calls `f(from, count)` for those
-/// of [from, from + count).
+/// Loads the points of [begin, end) into `block`, up to its capacity at a time, and calls `f(from, count)` for the
+/// points [from, from + count).
 template <class S, int CubeBits, class F>
 void for_each_block(point_block<S, CubeBits>& block, const basic_point_view<S>& points, std::size_t begin,
                     std::size_t end, F&& f) {
@@ -96,7 +96,7 @@ void for_each_block(point_block<S, CubeBits>& block, const basic_point_view<S>& 
   }
 }
 
-/// One pass with one table, first for `expected` voxels, which gives up at more than `most`: false.
+/// One pass with one table, initially sized for `expected` voxels. Returns false if there are more than `most` voxels.
 template <std::floating_point S, bool Colored>
 [[nodiscard]] bool fold_in_one_table(const basic_point_view<S>& points, double size, std::size_t expected,
                                      std::size_t most, centroid_fold<Colored>& fold) {
@@ -124,9 +124,9 @@ template <std::floating_point S, bool Colored>
   return true;
 }
 
-/// A cloud cut into parts, each with all points of its voxels in their order, as a rule of so few voxels that their
-/// table stays in the cache. A part is a random choice of cubes of 8^3 voxels: neighbours in the cloud are mostly
-/// neighbours in a part.
+/// A cloud partitioned so that each part holds all points of its voxels in their order, usually with few enough voxels
+/// for their table to stay in the cache. A part is a pseudo-random selection of cubes of 8^3 voxels, so that neighbours
+/// in the cloud are mostly neighbours in a part.
 ///
 /// Source: Shatdal, Kant, Naughton, "Cache conscious algorithms for relational query processing", VLDB 1994
 /// (partitioning before hashing).
@@ -150,7 +150,7 @@ class voxel_parts {
     std::unique_ptr<rgb8[]> colors;
     if constexpr (Colored) colors = std::make_unique_for_overwrite<rgb8[]>(starts_.back());
     std::vector<std::uint32_t> voxels(parts());
-    // Few chunks, as each has a table of its own.
+    // Few chunks, because each has its own table.
     const std::size_t chunks = policy.threads() <= 1 ? 1 : std::size_t{8} * policy.threads();
     const std::size_t width = std::max<std::size_t>(1, parts() / chunks);
     for_each_chunk(policy, parts(), width, [&](std::size_t begin, std::size_t end) {
@@ -160,7 +160,7 @@ class voxel_parts {
         table.clear(std::min<std::size_t>(starts_[part + 1] - starts_[part], usual_voxels));
         fill(table, block, part, fold);
         std::size_t at = starts_[part];
-        for (const auto& row : table.rows()) {  // what is left of them takes the place of the points
+        for (const auto& row : table.rows()) {  // the summaries overwrite the points
           const voxel_summary summary = fold.summary(row.record);
           if constexpr (Colored) colors[at] = summary.color;
           entries_[at++] = {std::bit_cast<std::array<std::uint32_t, 3>>(summary.position), row.first};
@@ -180,19 +180,19 @@ class voxel_parts {
 
  private:
   static constexpr std::size_t points_of_part = 2048;
-  static constexpr std::size_t usual_voxels = 2 * points_of_part;  ///< of a part at most, as a rule
+  static constexpr std::size_t usual_voxels = 2 * points_of_part;  ///< usual maximum for a part
   static constexpr std::size_t grain = std::size_t{1} << 15U;
   static constexpr std::uint16_t no_part = 0xffff;
   static constexpr std::uint16_t first_of_voxel = 0xfffe;
   static constexpr bool keeps_coordinates = std::is_same_v<S, float>;
 
-  /// A point: its coordinates as float, or its key where they are double; later a voxel's centroid and first point.
+  /// A point: its coordinates as float, or its key if they are double; later a voxel's centroid and first point.
   struct entry {
     std::array<std::uint32_t, 3> words;
     std::uint32_t index;
   };
 
-  /// The numbers of voxels by the first of their points.
+  /// Numbers of voxels by their first points.
   class first_points {
    public:
     template <execution_policy Policy>
@@ -221,7 +221,7 @@ class voxel_parts {
 
   template <execution_policy Policy>
   void distribute(const Policy& policy) {
-    // How many points each piece of the cloud has for each part, then where those begin.
+    // Count the points of each piece of the cloud for each part, then compute the offsets.
     std::vector<std::uint32_t> at((count_ + grain - 1) / grain * parts());
     for_each_chunk(policy, count_, grain, [&](std::size_t begin, std::size_t end) {
       const auto counts = at.begin() + static_cast<std::ptrdiff_t>(begin / grain * parts());
@@ -297,15 +297,15 @@ class voxel_parts {
   double size_;
   std::size_t count_;
   std::size_t bits_;
-  std::vector<std::uint32_t> starts_;         ///< of each part in the entries, and the end
-  std::unique_ptr<std::uint16_t[]> part_of_;  ///< of each point; in the end also a mark
+  std::vector<std::uint32_t> starts_;         ///< start of each part in the entries, and the end
+  std::unique_ptr<std::uint16_t[]> part_of_;  ///< part of each point; at the end also a mark
   table_memory<entry> memory_;
   entry* entries_ = nullptr;
 };
 
-/// About how many voxels are occupied, rather too many than too few, but at most as many as there are points: judged by
-/// a sample of them. Of the voxels that it finds, f1 are found once and f2 twice: those not found are at least
-/// f1^2 / (2 f2), and about twice as many where some have more points than others. @pre the cloud is not empty
+/// Estimates the number of occupied voxels from a sample of the points, rather too high than too low, and at most the
+/// number of points. With f1 sampled voxels found once and f2 found twice, at least f1^2 / (2 f2) voxels were not
+/// found, and about twice that number if the numbers of points per voxel vary. @pre the cloud is not empty
 ///
 /// Source: A. Chao, "Nonparametric estimation of the number of classes in a population", Scandinavian Journal of
 /// Statistics 11, 1984.
@@ -339,9 +339,9 @@ template <std::floating_point S>
   return twice == 0 ? at_most : std::min(at_most, 2 * table.rows().size() + once * once / twice);
 }
 
-/// Gathers the points of every voxel, see `centroid_fold`; the same for every policy. Points that have no cell are left
-/// out. O(n). Memory: for at most 2^17 points on one thread a table for them, else 20 bytes per point, 25 with
-/// colours; besides, for a while, a table that turns out to be too small, or that of the largest part.
+/// Gathers the points of every voxel, see `centroid_fold`; the same result for every policy. Skips points without a
+/// cell. O(n). Memory: for at most 2^17 points on one thread, a table for them, else 20 bytes per point, 25 with
+/// colours; temporarily also a table that turns out to be too small, or that of the largest part.
 /// @pre size > 0, fewer than 2^32 - 1 points
 template <execution_policy Policy, std::floating_point S, bool Colored>
 void fold_voxels(const Policy& policy, const basic_point_view<S>& points, double size, centroid_fold<Colored> fold) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The parts of `voxel_sums.hpp`: a brick of 8^3 voxels, and the index of bricks.
+/// Components of `voxel_sums.hpp`: a brick of 8^3 voxels, and the index of bricks.
 #pragma once
 
 #include <algorithm>
@@ -19,15 +19,15 @@
 
 namespace orbis::cloud::detail {
 
-/// A measurement in its brick.
+/// A measurement, relative to its brick.
 struct voxel_item {
   std::uint16_t cell;                   ///< x + 8 y + 64 z
-  std::array<std::uint16_t, 3> offset;  ///< within the voxel, of 1024
+  std::array<std::uint16_t, 3> offset;  ///< within the voxel, in 1/1024 of its edge
   rgb8 color;
   std::uint32_t range;  ///< millimetres
 };
 
-/// The measurements of a voxel. In words of 32 bits: with one of 64 it would be a tenth larger.
+/// Sums of the measurements of a voxel. Uses 32-bit words; a 64-bit member would enlarge it by a tenth.
 struct voxel_sum {
   std::array<std::uint32_t, 2> range_words{};  ///< low, high
   std::array<std::uint32_t, 3> offset{};
@@ -61,27 +61,27 @@ struct voxel_sum {
 /// The occupied voxels of a brick, in the order of their cells.
 class voxel_brick {
  public:
-  /// How many voxels are occupied.
+  /// Number of occupied voxels.
   [[nodiscard]] std::size_t size() const noexcept {
     return before_[7] + static_cast<std::size_t>(std::popcount(mask_[7]));
   }
   [[nodiscard]] std::size_t memory_bytes() const noexcept { return sums_.capacity() * sizeof(voxel_sum); }
   [[nodiscard]] bool contains(std::uint32_t cell) const noexcept { return (mask_[cell / 64] >> (cell % 64) & 1U) != 0; }
-  /// `f(cell)` for the occupied cells.
+  /// Calls `f(cell)` for the occupied cells.
   template <class F>
   void for_each_cell(F&& f) const {
     for_each_cell(mask_, f);
   }
-  /// Forgets the sums, and keeps which cells are occupied.
+  /// Frees the sums but keeps the set of occupied cells.
   void drop_sums() noexcept { std::vector<voxel_sum>{}.swap(sums_); }
-  /// `f(cell, sum)`. @pre the sums were not dropped
+  /// Calls `f(cell, sum)` for the occupied cells. @pre the sums were not dropped
   template <class F>
   void for_each(F&& f) const {
     assert(sums_.size() == size());
     for_each_cell(mask_, [&, i = std::size_t{0}](std::uint32_t cell) mutable { f(cell, sums_[i++]); });
   }
 
-  /// `for_each_run(f)` calls `f` with spans of items.
+  /// Adds items. `for_each_run(f)` calls `f` with spans of items.
   template <class Runs>
   void add(Runs&& for_each_run) {
     auto mask = mask_;
@@ -127,11 +127,11 @@ class voxel_brick {
   static constexpr std::uint32_t most = 1U << 22U;
   static constexpr std::size_t slack = 16;
 
-  /// The ranks of the occupied cells; the other entries mean nothing. Counting bits measurement by
-  /// measurement is slow on processors without an instruction for it.
+  /// Ranks of the occupied cells; other entries are undefined. Counting bits for each measurement is slow on processors
+  /// without a population count instruction.
   using rank_table = std::array<std::uint16_t, 512>;
   [[nodiscard]] rank_table all_ranks() const {
-    rank_table out;  // NOLINT: not all of it is needed
+    rank_table out;  // NOLINT: partly uninitialised by design
     for_each_cell(mask_, [&, i = std::uint16_t{0}](std::uint32_t cell) mutable { out[cell] = i++; });
     return out;
   }
@@ -151,7 +151,7 @@ class voxel_brick {
       count += static_cast<std::size_t>(std::popcount(mask[w]));
     }
   }
-  /// Makes room for further cells, from behind, in place.
+  /// Makes room for further cells, in place, from the end.
   void widen(const cell_mask& mask) {
     const cell_mask old = mask_;
     std::size_t from = sums_.size();
@@ -170,7 +170,7 @@ class voxel_brick {
   }
 
   cell_mask mask_{};
-  std::array<std::uint16_t, 8> before_{};  ///< how many cells come before each word of the mask
+  std::array<std::uint16_t, 8> before_{};  ///< number of cells before each word of the mask
   std::vector<voxel_sum> sums_;
 };
 

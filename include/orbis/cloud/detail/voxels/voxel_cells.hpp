@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// In which cell of a grid points lie, block by block.
+/// Cells of a grid that contain points, computed block by block.
 #pragma once
 
 #include <array>
@@ -15,8 +15,8 @@
 
 namespace orbis::cloud::detail {
 
-/// `cells[i] = floor(x[i] * inverse_size)`, in double, where the magnitude is below 2^31 - 1; elsewhere, and where x[i]
-/// is not a number, something for which `is_cell` is false. @pre count is a multiple of eight
+/// Computes `cells[i] = floor(x[i] * inverse_size)` in double if the magnitude is below 2^31 - 1; otherwise, and if
+/// x[i] is NaN, a value for which `is_cell` is false. @pre count is a multiple of eight
 template <std::floating_point S>
 struct voxel_cells {
   using signature = void(const S* x, std::size_t count, double inverse_size, std::int32_t* cells);
@@ -26,7 +26,7 @@ struct voxel_cells {
     using lanes = simd::vec<double, 8, Target>;
     for (std::size_t i = 0; i != count; i += lanes::count) {
       const lanes exact = simd::convert<double>(simd::vec<S, 8, Target>::load(x + i)) * lanes(inverse_size);
-      const lanes within = min(lanes(2147483647.0), max(lanes(-2147483648.0), exact));  // NaN goes to the lower end
+      const lanes within = min(lanes(2147483647.0), max(lanes(-2147483648.0), exact));  // NaN becomes the lower limit
       const lanes truncated = simd::convert<double>(simd::convert<std::int32_t>(within));
       const lanes floored = truncated - select(truncated > within, lanes(1.0), lanes(0.0));
       simd::convert<std::int32_t>(floored).store(cells + i);
@@ -34,10 +34,10 @@ struct voxel_cells {
   }
 };
 
-/// 32 mixed bits of a cell, the upper ones best; of a number or of lanes.
+/// Hash of a cell in 32 bits, the upper ones best mixed; for scalars or lanes.
 template <class U>
 [[nodiscard]] ORBIS_ALWAYS_INLINE constexpr U mixed_cell(const U& x, const U& y, const U& z) noexcept {
-  // Cells far apart may differ in their upper bits alone, which a product would lose.
+  // Distant cells may differ in their upper bits only, which a product would lose.
   U h = (x ^ (x >> 16)) * U(0x9e3779b1U) + (y ^ (y >> 16)) * U(0x85ebca77U) + (z ^ (z >> 16)) * U(0xc2b2ae3dU);
   h = (h ^ (h >> 15)) * U(0x2c1b3c6dU);
   return h ^ (h >> 14);
@@ -47,8 +47,8 @@ template <class U>
                     std::bit_cast<std::uint32_t>(key[2]));
 }
 
-/// `hashes[i] = mixed_key({x[i] >> bits, y[i] >> bits, z[i] >> bits})`: of cubes with an edge of 2^bits cells. @pre
-/// count is a multiple of eight
+/// Computes `hashes[i] = mixed_key({x[i] >> bits, y[i] >> bits, z[i] >> bits})`: hashes of cubes with an edge of 2^bits
+/// cells. @pre count is a multiple of eight
 struct voxel_hashes {
   using signature = void(const std::int32_t* x, const std::int32_t* y, const std::int32_t* z, std::size_t count,
                          int bits, std::uint32_t* hashes);
@@ -65,7 +65,7 @@ struct voxel_hashes {
   }
 };
 
-/// Some points of a cloud with their cells, axis by axis, and the hashes of cubes of 2^CubeBits cells.
+/// Points of a cloud with their cells, axis by axis, and the hashes of cubes of 2^CubeBits cells.
 template <std::floating_point S, int CubeBits = 0>
 class point_block {
  public:
@@ -74,7 +74,7 @@ class point_block {
   /// @pre size > 0, metres
   explicit point_block(double size) : inverse_size_{1.0 / size} {}
 
-  /// Takes `count` points; `point(i)` gives the coordinates of the i-th. @pre count <= capacity
+  /// Loads `count` points; `point(i)` returns the coordinates of the i-th. @pre count <= capacity
   template <class Point>
   void assign(std::size_t count, const Point& point) {
     for (std::size_t i = 0; i != count; ++i) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The occupied voxels of a cloud or of a part of it, in the order in which they are first seen.
+/// The occupied voxels of a cloud or of a part of it, in the order in which they first occur.
 #pragma once
 
 #include <algorithm>
@@ -17,11 +17,11 @@
 
 namespace orbis::cloud::detail {
 
-/// Rows by key, with what is needed of a row side by side: one or two misses of the cache for a voxel that is known,
-/// besides the one for its slot. Open addressing with linear probing, at most half full.
+/// Rows by key. A row is contiguous: an access to a known voxel costs one or two cache misses in addition to the one
+/// for its slot. Open addressing with linear probing, at most half full.
 ///
-/// Whether a voxel is new is hard to foretell, so that an update does the same for new ones and known ones: it reads a
-/// row, which is row 0 for an empty slot, and writes one, which is the next free one then.
+/// The branch on new voxels would be hard to predict, so an update does the same for new and known ones: it reads a
+/// row, which is row 0 for an empty slot, and writes one, which is then the next free row.
 template <class Record>
 class voxel_table {
   static_assert(std::is_trivially_copyable_v<Record> && std::is_trivially_default_constructible_v<Record>);
@@ -29,35 +29,34 @@ class voxel_table {
  public:
   struct row {
     voxel_key key;
-    std::uint32_t first;  ///< the point that made it
+    std::uint32_t first;  ///< point that created the row
     Record record;
   };
 
-  /// New rows begin with the record `empty`.
+  /// Makes an empty table. New rows begin with the record `empty`.
   explicit voxel_table(const Record& empty) : empty_{empty} { clear(0); }
 
-  /// Forgets the rows and makes room for `expected` ones. Keeps the memory.
+  /// Removes all rows and makes room for `expected` ones. Keeps the memory.
   void clear(std::size_t expected) {
     size_ = 0;
     make_room(std::max(expected, fewest));
   }
-  /// Makes room for `count` more rows than there are: for twice as many as before, but for `limit` at most, where it is
-  /// enough.
+  /// Makes room for `count` more rows. Doubles the capacity, up to `limit` if that suffices.
   void reserve_more(std::size_t count, std::size_t limit) {
     const std::size_t needed = size_ + count;
     if (needed <= most_) return;
-    salt_ *= 0x9e3779b1U;  // with the same order of hashes all rows would come to lie side by side
+    salt_ *= 0x9e3779b1U;  // with the same hash order all rows would cluster
     make_room(std::max(needed, std::min(2 * most_, limit)));
     for (std::size_t r = 1; r <= size_; ++r) slots_[free_slot(mixed_key(rows_[r].key))] = static_cast<std::uint32_t>(r);
   }
-  /// Brings into the cache what updates with these hashes will need, if the table is large.
+  /// Prefetches the memory that updates with these hashes will access, if the table is large.
   void expect(std::span<const std::uint32_t> hashes) const noexcept {
     if (slots_.size() < large) return;
     for (const std::uint32_t hash : hashes) __builtin_prefetch(&slots_[slot_of(hash)]);
     for (const std::uint32_t hash : hashes) __builtin_prefetch(&rows_[slots_[slot_of(hash)]]);
   }
-  /// `add(record)` for the record of a key, or for that of a new row, with `first`, if there is none. The record is a
-  /// copy that is stored afterwards. @pre hash == mixed_key(key), there is room for one more row
+  /// Calls `add(record)` on the record of a key, or on that of a new row with `first`. The record is a copy that is
+  /// stored afterwards. @pre hash == mixed_key(key), there is room for one more row
   template <class Add>
   void update(const voxel_key& key, std::uint32_t hash, std::uint32_t first, const Add& add) {
     std::size_t i = slot_of(hash);
@@ -80,23 +79,23 @@ class voxel_table {
  private:
   static constexpr std::size_t fewest = 64, large = std::size_t{1} << 16U;
 
-  /// Where to look for a key first.
+  /// First slot to probe for a hash.
   [[nodiscard]] std::size_t slot_of(std::uint32_t hash) const noexcept { return (hash * salt_) >> shift_; }
   [[nodiscard]] std::size_t free_slot(std::uint32_t hash) const noexcept {
     std::size_t i = slot_of(hash);
     while (slots_[i] != 0) i = (i + 1) & mask_;
     return i;
   }
-  /// For `most` rows; the slots are empty then.
+  /// Makes room for `most` rows; clears the slots.
   void make_room(std::size_t most) {
     if (capacity_ < most) {
-      auto rows = std::make_unique_for_overwrite<row[]>(most + 1);  // not touched before it is needed
+      auto rows = std::make_unique_for_overwrite<row[]>(most + 1);  // pages are not touched before use
       rows[0] = {{}, 0, empty_};
       if (size_ != 0) std::copy_n(&rows_[1], size_, &rows[1]);
       rows_ = std::move(rows);
       capacity_ = most;
     }
-    const std::size_t slots = std::min(std::bit_ceil(2 * most), std::size_t{1} << 32U);  // as many as hashes
+    const std::size_t slots = std::min(std::bit_ceil(2 * most), std::size_t{1} << 32U);  // one per hash at most
     slots_.assign(slots, 0);
     most_ = most;
     mask_ = slots - 1;
@@ -104,8 +103,8 @@ class voxel_table {
   }
 
   Record empty_;
-  std::unique_ptr<row[]> rows_;       ///< after row 0, which is what a new one begins as, size_ ones
-  std::vector<std::uint32_t> slots_;  ///< 2^(32 - shift_) numbers of rows, 0 for none
+  std::unique_ptr<row[]> rows_;       ///< row 0, the template of new rows, followed by size_ rows
+  std::vector<std::uint32_t> slots_;  ///< 2^(32 - shift_) row numbers, 0 for none
   std::size_t size_ = 0, most_ = 0, capacity_ = 0, mask_ = 0;
   std::uint32_t salt_ = 1;  ///< odd
   unsigned shift_ = 0;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The descent through the octree that finds the voxels which the rays of a view observe free.
+/// Descent through the octree that finds the voxels that the rays of a view observe free.
 #pragma once
 
 #include <algorithm>
@@ -19,21 +19,21 @@
 
 namespace orbis::octree::detail {
 
-/// What one thread finds.
+/// Results and scratch memory of one thread.
 struct descent_worker {
   struct free_brick {
     std::uint64_t name;
     std::array<std::uint64_t, 8> free;
   };
   std::vector<free_brick> bricks;
-  std::vector<std::uint32_t> unsure;  ///< rays that may cross the voxel at hand
+  std::vector<std::uint32_t> unsure;  ///< rays that may cross the current voxel
 
   [[nodiscard]] std::size_t memory_bytes() const noexcept {
     return bricks.capacity() * sizeof(bricks[0]) + unsure.capacity() * sizeof(unsure[0]);
   }
 };
 
-/// What one thread does with the nodes it is given. `Rays`: see depth_rays. `Saturated`: see depth_integrator::mark.
+/// Processing of nodes by one thread. `Rays`: see depth_rays. `Saturated`: see depth_integrator::mark.
 template <class Rays, class Saturated>
 struct depth_descent {
   using words = std::array<std::uint64_t, 8>;
@@ -42,9 +42,9 @@ struct depth_descent {
   descent_worker& own;
   const depth_sensor& sensor;
   const Rays& rays;
-  const scan_masks& hits;  ///< the voxels that rays end in
+  const scan_masks& hits;  ///< voxels that contain ends of rays
   const Saturated& saturated;
-  bool on_face;  ///< the camera's centre lies close to a face of its voxel
+  bool on_face;  ///< the camera's centre is close to a face of its voxel
 
   /// Finds the free voxels of the node at `level` > brick_level whose lowest voxel is `k`.
   void descend(const voxel_key& k, const float3& center, int level, bool inside) const {
@@ -77,7 +77,7 @@ struct depth_descent {
   }
   void add_brick(const voxel_key& k, const float3& center, bool full, bool inside) const {
     const std::uint64_t name = node_name(k, brick_level);
-    words skip{};  // voxels of which nothing needs to be known
+    words skip{};  // voxels whose state is not needed
     saturated(name, skip);
     if (const scan_brick* hit = hits.find(name))
       for (std::size_t i = 0; i != 8; ++i) skip[i] |= hit->occupied[i];
@@ -95,7 +95,7 @@ struct depth_descent {
     for (std::size_t i = 0; i != 8; ++i) any |= free[i] &= ~skip[i];
     if (any != 0) own.bricks.push_back({name, free});
   }
-  /// The camera's own voxel, and its neighbours if it is on a face, are seen to apart.
+  /// Skips the camera's own voxel, and its neighbours if the camera is on a face; they are handled separately.
   void skip_camera(const voxel_key& k, words& skip) const {
     const voxel_key& from = *sensor.key;
     const std::uint32_t around = on_face ? 1 : 0;
@@ -111,7 +111,7 @@ struct depth_descent {
     }
   }
 
-  /// The free voxels of a brick, as far as they are not to be skipped.
+  /// Finds the free voxels of a brick, except those in `skip`.
   void refine(const voxel_key& k, const float3& center, bool inside, const words& skip, words& free) const {
     const float3 low = sensor.corner(k);
     children octants;
@@ -173,7 +173,7 @@ struct depth_descent {
   }
   [[nodiscard]] bool test_box(const voxel_test& test, const pixel_box& box, float near_z) const {
     if ((box.u1 - box.u0) * (box.v1 - box.v0) < 1024) return rays.test(test, box, near_z, own.unsure);
-    // A voxel at the camera: most of its box are rays that pass it by, tile by tile.
+    // For a voxel near the camera, most rays of its box pass it, so the box is tested tile by tile.
     constexpr std::int32_t size = 128;
     for (std::int32_t v = box.v0 & -size; v <= box.v1; v += size)
       for (std::int32_t u = box.u0 & -size; u <= box.u1; u += size)
@@ -193,13 +193,13 @@ struct depth_descent {
   }
 };
 
-/// Marks in `masks` the free voxels below the nodes of a frame, each of the policy's threads with a worker of its own;
-/// see depth_descent.
+/// Marks the free voxels below the nodes of a frame in `masks`; each thread of the policy has its own worker. See
+/// depth_descent.
 template <execution_policy Policy, class Rays, class Saturated>
 void descend_nodes(const Policy& policy, const view_frame& frame, const depth_sensor& sensor, const Rays& rays,
                    bool on_face, scan_masks& masks, const Saturated& saturated, std::vector<descent_worker>& workers) {
   const std::size_t count = std::clamp<std::size_t>(policy.threads(), 1, std::max<std::size_t>(1, frame.nodes.size()));
-  if (workers.size() < count) workers.resize(count);  // only ever more: their memory is kept
+  if (workers.size() < count) workers.resize(count);  // never shrinks, to keep the memory
   std::atomic<std::size_t> next{0};
   for_each_index(policy, count, 1, [&](std::size_t i) {
     workers[i].bricks.clear();

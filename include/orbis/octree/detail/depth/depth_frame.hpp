@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// One depth image as the descent through the octree sees it.
+/// A depth image prepared for the descent through the octree.
 #pragma once
 
 #include <algorithm>
@@ -18,8 +18,8 @@
 
 namespace orbis::octree::detail {
 
-/// The view of a depth image: a ray for each pixel. Fill `ends` and, if need be, `map`, then call set_scene; see
-/// view_frame for the rest.
+/// The view of a depth image: one ray per pixel. Fill `ends` and, for cameras other than pinholes, `map`; then call
+/// set_scene. See view_frame for the further steps.
 struct depth_frame : view_frame {
   using sample_kernel = unsigned(const depth_scene&, const endpoint_image&, const child_offsets&, const float3&,
                                  const children&, unsigned);
@@ -29,10 +29,10 @@ struct depth_frame : view_frame {
   chosen_kernel<sample_children_kernel, sample_kernel, simd::avx2> sample;
   chosen_kernel<test_pixels_kernel, test_kernel> test_pixels;
   endpoint_image ends;
-  direction_index map;  ///< of cameras that are not pinholes
+  direction_index map;  ///< for cameras other than pinholes
 
-  /// Works out what the tests need to know about the image. `ray_error`: how far rays may be from their pixels', at
-  /// z = 1. @pre `ends` and, if need be, `map` are its own
+  /// Computes the parameters of the tests. `ray_error`: maximum deviation of rays from those of their pixels, at z = 1.
+  /// @pre `ends` and, if needed, `map` belong to the image
   void set_scene(const depth_sensor& sensor, float ray_error = 0.0F) {
     const pixel_rays& rays = ends.rays();
     const int width = rays.width(), height = rays.height();
@@ -50,8 +50,8 @@ struct depth_frame : view_frame {
     }
     set_spacing(half_diagonal());
   }
-  /// Whether there are so many rays that it is better to look at voxels than to walk them: where there
-  /// is less than a pixel for half a voxel's edge, most voxels would have to be tested one by one.
+  /// Returns true if the rays are dense enough for testing voxels to be faster than walking rays. With less than one
+  /// pixel per half voxel edge, most voxels would have to be tested individually.
   [[nodiscard]] bool is_dense(const end_counts& counts) const {
     return is_dense(counts.sum_z / static_cast<double>(counts.used + counts.truncated),
                     static_cast<double>(scene.voxel), static_cast<double>(std::max(scene.fx, scene.fy)));
@@ -64,14 +64,14 @@ struct depth_frame : view_frame {
   }
 };
 
-/// The rays of a depth image for the descent.
+/// Rays of a depth image for the descent.
 struct depth_rays {
   const depth_frame& frame;
   const depth_sensor& sensor;
   const void* ends;
-  ray_endpoint (*end_of)(const void* ends, int u, int v);  ///< where the ray of a pixel ends
+  ray_endpoint (*end_of)(const void* ends, int u, int v);  ///< end of the ray of a pixel
 
-  /// `end(u, v)` gives the ray_endpoint of a pixel.
+  /// `end(u, v)` returns the ray_endpoint of a pixel.
   template <class End>
   depth_rays(const depth_frame& f, const depth_sensor& s, const End& end)
       : frame{f}, sensor{s}, ends{&end}, end_of{[](const void* e, int u, int v) -> ray_endpoint {
@@ -85,7 +85,7 @@ struct depth_rays {
                           std::vector<std::uint32_t>& unsure) const {
     return frame.test_pixels(frame.ends, t, box, near_z, unsure);
   }
-  /// Whether a ray of `part` may cross the voxel, which lies in the tile of `size` x `size` pixels at (u, v).
+  /// Returns true if a ray of `part` may cross the voxel, which lies in the tile of `size` x `size` pixels at (u, v).
   [[nodiscard]] bool may_cross(const voxel_test& t, const pixel_box& part, std::int32_t u, std::int32_t v,
                                std::int32_t size) const {
     const pixel_rays& rays = frame.ends.rays();
@@ -94,7 +94,7 @@ struct depth_rays {
     const auto& tile = frame.map.tile_at(u, v, size);
     return tile.x0 <= tile.x1 && t.may_cross(tile.x0, tile.x1, tile.y0, tile.y1);
   }
-  /// Whether the walk of a ray that `test` was not sure of visits the voxel.
+  /// Returns true if the walk of a ray for which `test` was undecided visits the voxel.
   [[nodiscard]] bool visits(std::uint32_t number, const voxel_key& voxel) const {
     const auto [u, v] = frame.ends.pixel(number);
     return crosses(sensor, end_of(ends, u, v), voxel);

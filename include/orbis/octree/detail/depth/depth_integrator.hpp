@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The voxels that a depth image observes free and occupied. They are found voxel by voxel, by projection, instead of
-/// ray by ray, and are exactly those that the traversal of every ray finds.
+/// Finds the voxels that a depth image observes free and occupied. They are found voxel by voxel, by projection,
+/// instead of ray by ray, and are exactly those that the traversal of every ray finds.
 #pragma once
 
 #include <algorithm>
@@ -31,21 +31,21 @@
 
 namespace orbis::octree::detail {
 
-/// Marks the voxels of depth images. Keeps its memory from image to image.
+/// Marks the voxels of depth images. Reuses its memory between images.
 ///
-/// The octree is descended from a node around all rays. A node that no ray reaches is dropped, and a node whose voxels
-/// are all surely crossed is filled; a min/max pyramid of the ray ends tells both. What remains are voxels at surfaces
-/// and at the border of the view: such a voxel is free if the ray of one of its pixels crosses it. Where rounding
-/// could decide, the exact traversal of that ray does.
+/// The octree is descended from a node around all rays. Nodes that no ray reaches are dropped, and nodes whose voxels
+/// are all certainly crossed are filled; a min/max pyramid of the ray ends decides both. The remaining voxels are at
+/// surfaces and at the border of the view: such a voxel is free if the ray of one of its pixels crosses it. If rounding
+/// could change the result, the exact traversal of that ray decides.
 class depth_integrator {
  public:
-  /// Marks, in `masks`, what every_ray integration of the image's world points marks (see
-  /// append_world_points), except that voxels for which `saturated` says that a miss would not change
-  /// them may be missing among the free ones, and that an occupied voxel may be free as well or not.
-  /// The summary's voxel counts stay zero. The same voxels under every policy.
+  /// Marks the voxels in `masks` that the every_ray integration of the image's world points marks (see
+  /// append_world_points). Voxels that a miss would not change according to `saturated` may be missing from the free
+  /// ones, and an occupied voxel may or may not be free as well. The summary's voxel counts stay zero. The same voxels
+  /// under every policy.
   ///
-  /// `saturated(name, mask)` sets the bits of such voxels of a named brick; it may be called from several
-  /// threads. O(pixels + bricks seen + voxels at surfaces).
+  /// `saturated(name, mask)` sets the bits of such voxels of a named brick; it can be called from several threads.
+  /// O(pixels + bricks seen + voxels at surfaces).
   /// @pre depth and camera have the same size
   template <execution_policy Policy>
   integration_summary mark(const Policy& policy, const voxel_grid& grid, const depth_scan& scan,
@@ -65,7 +65,7 @@ class depth_integrator {
     }
     return {.used = ends.used, .truncated = ends.truncated, .rejected = ends.rejected};
   }
-  /// The part of `mark` that finds the occupied voxels.
+  /// Finds only the occupied voxels, as `mark` does.
   template <execution_policy Policy>
   integration_summary mark_ends(const Policy& policy, const voxel_grid& grid, const depth_scan& scan,
                                 const se3& T_world_camera, const integration_options& options, scan_masks& masks) {
@@ -103,7 +103,7 @@ class depth_integrator {
     }
   }
 
-  // -- every ray, for the few cases that need it
+  // -- traversal of every ray, for the few cases that need it
 
   template <class Use>
   void for_each_end(const depth_sensor& sensor, const depth_scan& scan, Use&& use) const {
@@ -124,7 +124,7 @@ class depth_integrator {
                  {.max_range = options.max_range, .mode = ray_mode::every_ray});
     masks.merge(walker_.masks());
   }
-  /// Walks the rays that go too far aside for the map, and forgets them.
+  /// Walks the rays outside the map's angular limits, and removes their ends.
   void walk_outer(const depth_sensor& sensor, const depth_scan& scan, scan_masks& masks) {
     for (const auto& [u, v] : frame_.map.outer()) {
       if (!(frame_.ends.z(v)[u] > 0.0F)) continue;

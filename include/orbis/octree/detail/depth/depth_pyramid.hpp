@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The nearest and the farthest ray end in any box of pixels, in four look-ups.
+/// Nearest and farthest ray end in any box of pixels, in four look-ups.
 ///
 /// The min/max mipmaps of A. Tevs, I. Ihrke, H.-P. Seidel, "Maximum mipmaps for fast, accurate, and
 /// scalable dynamic height field rendering", I3D 2008, with cells that overlap.
@@ -19,20 +19,20 @@
 
 namespace orbis::octree::detail {
 
-/// What a cell of the pyramid holds: in the upper half the farthest depth in it, rounded up, and in
-/// the lower half 65535 less the nearest one, rounded down. So both are maxima.
+/// Combines two cells of the pyramid. The upper half of a cell is the farthest depth in it, rounded up; the lower half
+/// is 65535 minus the nearest one, rounded down. Both are thus maxima.
 [[nodiscard]] constexpr std::uint32_t larger_halves(std::uint32_t a, std::uint32_t b) noexcept {
   return std::max(a & 0xffff0000U, b & 0xffff0000U) | std::max(a & 0xffffU, b & 0xffffU);
 }
 
-/// The larger halves of two vectors of cells.
+/// Combines two vectors of cells.
 template <class Cells>
 [[nodiscard]] ORBIS_ALWAYS_INLINE Cells larger_halves_of(const Cells& a, const Cells& b) noexcept {
   return simd::bits_as<std::uint32_t>(max(simd::bits_as<std::uint16_t>(a), simd::bits_as<std::uint16_t>(b)));
 }
 
-/// Two rows of depths to one row of cells of 2x2: `strict` counts a missing depth as 0, `some` leaves it out (0 if all
-/// are missing). Reads up to 16 values past the last cell's.
+/// Reduces two rows of depths to one row of cells of 2x2 pixels. `strict` counts a missing depth as 0; `some` ignores
+/// it (0 if all are missing). Reads up to 16 values past those of the last cell.
 struct first_cells_kernel {
   template <simd::target Target>
   static ORBIS_ALWAYS_INLINE void run(const float* upper, const float* lower, float scale, int cells,
@@ -60,7 +60,7 @@ struct first_cells_kernel {
   }
 };
 
-/// `out[i]`: the larger halves of `a[i]`, `a[i + 1]`, `b[i]` and `b[i + 1]`. @pre a[count], b[count] readable
+/// Sets `out[i]` to the combination of `a[i]`, `a[i + 1]`, `b[i]` and `b[i + 1]`. @pre a[count], b[count] readable
 struct overlap_kernel {
   template <simd::target Target>
   static ORBIS_ALWAYS_INLINE void run(const std::uint32_t* a, const std::uint32_t* b, int count,
@@ -76,25 +76,24 @@ struct overlap_kernel {
   }
 };
 
-/// Level k, from 1 on, has cells of 2^k x 2^k pixels; its entry (i, j) covers the cells i, i + 1 of
-/// the rows j, j + 1. A box that touches at most four cells in a row is covered by the entries of its
-/// first cell and of the last but one.
+/// Level k, from 1 on, has cells of 2^k x 2^k pixels; its entry (i, j) covers the cells i, i + 1 of the rows j, j + 1.
+/// A box that touches at most four cells in a row is covered by the entries of its first and its last but one cell.
 ///
-/// There are three families of entries that differ in what counts as the nearest end. Kind 0: the
-/// nearest pixel, 0 if one is without an end. Kind 1: of every aligned tile of 2x2 pixels those that
-/// have an end count, 0 if none does. Kind 2: the same with tiles of 4x4.
+/// There are three kinds of entries with different definitions of the nearest end. Kind 0: the nearest pixel, 0 if any
+/// has no end. Kind 1: the pixels with an end of every aligned tile of 2x2, 0 if none has one. Kind 2: the same with
+/// tiles of 4x4.
 class depth_pyramid {
  public:
   static constexpr int max_levels = 16;
 
-  /// `row(v)`: the depths at which the rays of image row v end, 0 where there is none, followed by 16
+  /// Builds the pyramid. `row(v)`: depths at which the rays of image row v end, 0 if they have no end, followed by 16
   /// zeros. `max_z`: the largest of them. O(pixels).
   template <class Row>
   void build(int width, int height, float max_z, Row&& row) {
     lay_out(width, height);
     if (width == 0 || height == 0) return;
     scale_ = max_z > 0.0F ? 65533.0F / max_z : 1.0F;
-    // A tile that sticks out of the image: below, the last row counts twice; on the right, ends are missing.
+    // Tiles that extend beyond the image: at the bottom, the last row counts twice; at the right, ends are missing.
     for (int j = 0; j != height_[1]; ++j)
       first_(row(2 * j), row(std::min(2 * j + 1, height - 1)), scale_, width_[1], strict_.data() + j * row_size_,
              some_.data() + j * row_size_);
@@ -116,7 +115,7 @@ class depth_pyramid {
     raise(2, 2, some_);
   }
 
-  /// Whether a ray of the aligned tile of `size` x `size` pixels from (u, v) on may end at `z` or beyond.
+  /// Returns true if a ray of the aligned tile of `size` x `size` pixels at (u, v) may end at `z` or beyond.
   /// @pre size is a power of two > 2
   [[nodiscard]] bool reaches(std::int32_t u, std::int32_t v, std::int32_t size, float z) const noexcept {
     const int level = std::countr_zero(static_cast<std::uint32_t>(size)) - 1;
@@ -125,10 +124,10 @@ class depth_pyramid {
     return static_cast<float>(cells_[static_cast<std::size_t>(begin_[k] + (v >> level) * width_[k] + (u >> level))] >>
                               16U) >= z * scale_;
   }
-  /// Depths times this are what the entries hold.
+  /// Factor from depths to the values of entries.
   [[nodiscard]] float scale() const noexcept { return scale_; }
   [[nodiscard]] int levels() const noexcept { return levels_; }
-  /// Where the entries of a level begin within a family, and from row to row.
+  /// Offset of each level's entries within a kind, and its row length.
   [[nodiscard]] const std::array<std::int32_t, max_levels>& begin() const noexcept { return begin_; }
   [[nodiscard]] const std::array<std::int32_t, max_levels>& width() const noexcept { return width_; }
   [[nodiscard]] const std::uint32_t* data() const noexcept { return cells_.data(); }
@@ -167,7 +166,7 @@ class depth_pyramid {
   [[nodiscard]] std::uint32_t* entries(std::size_t kind, int level) noexcept {
     return cells_.data() + kind * family_ + begin_[static_cast<std::size_t>(level)];
   }
-  /// The entries of a level from its cells.
+  /// Computes the entries of a level from its cells.
   void overlap(int level, std::vector<std::uint32_t>& cells, std::uint32_t* out) {
     const int w = width_[static_cast<std::size_t>(level)], h = height_[static_cast<std::size_t>(level)];
     const auto at = [&](int j) { return cells.data() + j * row_size_; };
@@ -175,7 +174,7 @@ class depth_pyramid {
     std::copy_n(at(h - 1), w + 1, at(h));
     for (int j = 0; j != h; ++j) overlap_(at(j), at(j + 1), w, out + static_cast<std::ptrdiff_t>(j) * w);
   }
-  /// The entries of all levels from `level` on, from the cells of `level`; `cells` is used up.
+  /// Computes the entries of all levels from `level` on, from the cells of `level`; overwrites `cells`.
   void raise(std::size_t kind, int level, std::vector<std::uint32_t>& cells) {
     for (;; ++level) {
       const std::uint32_t* const out = entries(kind, level);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A depth image and its camera without their types, so that the marking of depth images is compiled once for all.
+/// A type-erased depth image and camera, so that the marking of depth images is compiled once.
 #pragma once
 
 #include <cstdint>
@@ -12,7 +12,7 @@
 
 namespace orbis::octree::detail {
 
-/// A depth image of a type that is not our own; a depth_source.
+/// A depth_source of a user-defined type.
 struct other_depth {
   const void* source;
   int columns, rows;
@@ -23,7 +23,7 @@ struct other_depth {
   [[nodiscard]] float operator()(int u, int v) const { return read(source, u, v); }
 };
 
-/// Refers to the image and the camera that it is made from. Reading a pixel costs a switch over the types.
+/// Refers to the image and the camera passed to its constructor. Reading a pixel costs a switch over the types.
 class depth_scan {
  public:
   template <camera::depth_source Depth, camera::camera_model Camera>
@@ -36,16 +36,16 @@ class depth_scan {
                            [](const void* d, int u, int v) -> float { return (*static_cast<const Depth*>(d))(u, v); }};
   }
 
-  /// `f(image)` for the depth_view or other_depth.
+  /// Calls `f(image)` with the depth_view or other_depth.
   template <class F>
   decltype(auto) visit(F&& f) const {
     return std::visit(f, image_);
   }
-  /// Metres, or 0 where there is no measurement.
+  /// Depth in metres, or 0 without a measurement.
   [[nodiscard]] float depth(int u, int v) const {
     return visit([&](const auto& image) { return image(u, v); });
   }
-  /// Makes `rays` those of the camera.
+  /// Sets `rays` to those of the camera.
   void fit(pixel_rays& rays) const { fit_(camera_, rays); }
 
  private:

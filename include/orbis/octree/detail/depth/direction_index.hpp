@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Which pixels see a region of directions, for cameras of any model: known from the rays of the
-/// pixels alone, so that no projection has to be trusted.
+/// Index from regions of directions to the pixels that see them, for cameras of any model. It is computed from the rays
+/// of the pixels only, without using the projection.
 #pragma once
 
 #include <algorithm>
@@ -18,20 +18,20 @@
 
 namespace orbis::octree::detail {
 
-/// The plane z = 1 cut into cells of about 8x8 pixels. A cell knows how far the pixels whose rays it
-/// holds are off `focal * (x, y) + center`, and how densely it is covered with rays. Cells are joined
-/// to larger ones: entry (i, j) of level k stands for the cells i, i + 1 of the rows j, j + 1 of
-/// 2^k x 2^k cells each, so that one entry covers any region that is at most one cell of its level wide.
+/// The plane z = 1 divided into cells of about 8x8 pixels. A cell stores the deviations of its rays' pixels from `focal
+/// * (x, y) + center`, and how densely rays cover it. Cells are combined into larger ones: entry (i, j) of level k
+/// represents the cells i, i + 1 of the rows j, j + 1 of 2^k x 2^k cells each, so that one entry covers any region that
+/// is at most one cell of its level wide.
 class direction_index {
  public:
   static constexpr int max_levels = 16;
-  /// Rays that are further than this off the optical axis, in x or y at z = 1, are left out.
+  /// Rays further than this from the optical axis, in x or y at z = 1, are left out.
   static constexpr float widest = 3.0F;
 
   struct entry {
-    float least_u = infinity, most_u = -infinity;  ///< pixel less what it should be
+    float least_u = infinity, most_u = -infinity;  ///< pixel minus its affine estimate
     float least_v = infinity, most_v = -infinity;
-    /// Every point of the cells has a ray nearer than this (at z = 1); infinite if that is not known.
+    /// Maximum distance (at z = 1) of a point of the cells from a ray; infinite if unknown.
     float spacing = 0.0F;
     std::array<float, 3> unused{};
 
@@ -57,7 +57,7 @@ class direction_index {
     }
   };
 
-  /// Does nothing if these are the rays it knows already. O(pixels).
+  /// Builds the index; does nothing if it already holds these rays. O(pixels).
   void fit(const pixel_rays& rays) {
     if (version_ == rays.version()) return;
     version_ = rays.version();
@@ -79,10 +79,10 @@ class direction_index {
   [[nodiscard]] float max_y() const noexcept { return max_y_; }
   [[nodiscard]] const vec2f& focal() const noexcept { return focal_; }
   [[nodiscard]] const vec2f& center() const noexcept { return center_; }
-  /// The pixels whose rays are left out.
+  /// Pixels whose rays are left out.
   [[nodiscard]] const std::vector<std::array<std::int32_t, 2>>& outer() const noexcept { return outer_; }
 
-  /// The rays of the aligned tile of `size` x `size` pixels at (u, v). @pre size is 16, 32, 64 or 128
+  /// Bounds of the rays of the aligned tile of `size` x `size` pixels at (u, v). @pre size is 16, 32, 64 or 128
   [[nodiscard]] const tile& tile_at(std::int32_t u, std::int32_t v, std::int32_t size) const noexcept {
     const auto k = static_cast<std::size_t>(std::countr_zero(static_cast<std::uint32_t>(size)));
     return tiles_[k - 4][static_cast<std::size_t>((v >> k) * tile_columns(k) + (u >> k))];
@@ -96,10 +96,10 @@ class direction_index {
   [[nodiscard]] const std::array<std::int32_t, max_levels>& width() const noexcept { return width_; }
   [[nodiscard]] const std::array<std::int32_t, max_levels>& height() const noexcept { return height_; }
   [[nodiscard]] const entry* entries() const noexcept { return entries_.data(); }
-  /// The cell of a coordinate; grows with it.
+  /// Cell of a coordinate; monotonic.
   [[nodiscard]] std::int32_t column(float x) const noexcept { return cell((x - min_x_) * per_x_, width_[0]); }
   [[nodiscard]] std::int32_t row(float y) const noexcept { return cell((y - min_y_) * per_y_, height_[0]); }
-  /// The entry for the rays with x in [x0, x1] and y in [y0, y1].
+  /// Entry for the rays with x in [x0, x1] and y in [y0, y1].
   [[nodiscard]] const entry& at(float x0, float x1, float y0, float y1) const noexcept {
     const std::int32_t i0 = column(x0), i1 = column(x1), j0 = row(y0), j1 = row(y1);
     int level = 0;
@@ -123,7 +123,7 @@ class direction_index {
     return static_cast<std::int32_t>(std::clamp(at, 0.0F, static_cast<float>(count - 1)));
   }
 
-  /// The bounds of the rays, and the straight lines closest to pixels over rays.
+  /// Computes the bounds of the rays, and the linear fits of pixels over rays.
   void find_affine(const pixel_rays& rays) {
     min_x_ = min_y_ = infinity;
     max_x_ = max_y_ = -infinity;
@@ -185,12 +185,12 @@ class direction_index {
         cells_[k].spacing = b.u1 < 0 ? infinity : spacing_of(rays, i, j, b.u0, b.u1, b.v0, b.v1);
       }
   }
-  /// How far a point of cell (i, j), which holds rays of the given box of pixels only, may be from a ray.
+  /// Maximum distance of a point of cell (i, j), whose rays are all in the given box of pixels, from a ray.
   ///
-  /// Where the rays of a rectangle's left column lie left of the cell, those of its right column right
-  /// of it, and likewise above and below, its border goes once around every point of the cell, which
-  /// therefore lies in one of the triangles between neighbouring rays; and no point of a triangle is
-  /// farther from its nearest corner than the longest edge over the root of three.
+  /// If the rays of a rectangle's left column are left of the cell, those of its right column right of it, and likewise
+  /// above and below, the rectangle's border encloses every point of the cell. Each point is therefore in one of the
+  /// triangles between neighbouring rays, and no point of a triangle is farther from its nearest corner than the
+  /// longest edge divided by the root of three.
   [[nodiscard]] float spacing_of(const pixel_rays& rays, int i, int j, int u0, int u1, int v0, int v1) const {
     const float x0 = min_x_ + static_cast<float>(i) / per_x_, x1 = min_x_ + static_cast<float>(i + 1) / per_x_;
     const float y0 = min_y_ + static_cast<float>(j) / per_y_, y1 = min_y_ + static_cast<float>(j + 1) / per_y_;
@@ -204,7 +204,7 @@ class direction_index {
       for (int u = a; u <= b && around; ++u)
         around = rays.at(u, c).second < y0 - room_y && rays.at(u, d).second > y1 + room_y;
       if (!around) continue;
-      // Tiles of 4x4 that begin here may reach 4 pixels further.
+      // Tiles of 4x4 that begin here may extend 4 pixels further.
       const auto inside = [](int p, int size) { return std::clamp(p, 0, size - 2); };
       float longest = 0.0F;
       for (int v = inside(c - 4, rays.height()); v <= inside(d + 3, rays.height()); ++v)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Where the rays of a depth image end: how far along the optical axis, and in which voxel.
+/// Ends of the rays of a depth image: depth along the optical axis, and voxel.
 #pragma once
 
 #include <algorithm>
@@ -24,12 +24,11 @@
 
 namespace orbis::octree::detail {
 
-/// The rays of one depth image: how deep each of them ends, and which voxels hold ends. Keeps its
-/// memory from image to image.
+/// End depths of the rays of one depth image, and the voxels that contain ends. Reuses its memory between images.
 class endpoint_image {
  public:
-  /// Takes in an image: the depths at which rays end, and in `masks` the voxels of the ends that are
-  /// used, as occupied. O(pixels). @pre depth and camera have the same size
+  /// Reads an image: stores the depths at which rays end, and marks the voxels of used ends in `masks` as occupied.
+  /// O(pixels). @pre depth and camera have the same size
   template <execution_policy Policy>
   end_counts find_ends(const Policy& policy, const depth_sensor& sensor, const depth_scan& scan, scan_masks& masks) {
     find_ = simd::kernel<find_ends_kernel, find_kernel>();
@@ -65,25 +64,25 @@ class endpoint_image {
     resize(width, height);
     std::fill(z_.end() - pixel_rays::padding, z_.end(), 0.0F);
   }
-  /// The depths of all rows of that image, `stride()` for each.
+  /// Depths of all rows of that image, `stride()` values per row.
   [[nodiscard]] std::span<float> ends() noexcept { return std::span{z_}.first(z_.size() - pixel_rays::padding); }
-  /// Makes it the part of that image from pixel `first` of `ends()` on, the image of `camera`.
-  /// @pre there are no ends elsewhere; at least 16 columns are left over on the right
+  /// Reduces the image to the part from pixel `first` of `ends()` on, which is the image of `camera`.
+  /// @pre there are no ends elsewhere; at least 16 columns remain on the right
   void crop(const camera::pinhole& camera, std::uint32_t first) {
     rays_.fit(camera);
     first_ = first;
   }
 
   [[nodiscard]] const pixel_rays& rays() const noexcept { return rays_; }
-  /// Forgets the end of a pixel's ray.
+  /// Removes the end of a pixel's ray.
   void clear(int u, int v) noexcept { z_[first_ + number(u, v)] = 0.0F; }
-  /// The depths (metres) at which the rays of row `v` end, 0 where there is none; padded with zeros.
+  /// Depths (metres) at which the rays of row `v` end, 0 without an end; padded with zeros.
   [[nodiscard]] const float* z(int v) const noexcept {
     return z_.data() + first_ + static_cast<std::size_t>(v) * stride_;
   }
-  /// From row to row of `z`.
+  /// Offset between rows of `z`.
   [[nodiscard]] std::size_t stride() const noexcept { return stride_; }
-  /// One number for a pixel, and back.
+  /// Number of a pixel. See `pixel` for the inverse.
   [[nodiscard]] std::uint32_t number(int u, int v) const noexcept {
     return static_cast<std::uint32_t>(static_cast<std::size_t>(v) * stride_ + static_cast<std::size_t>(u));
   }
@@ -106,7 +105,7 @@ class endpoint_image {
   struct worker {
     scan_masks masks;
     end_counts counts;
-    std::vector<std::int32_t> keys;  ///< this row's and the last one's, x, y and z each
+    std::vector<std::int32_t> keys;  ///< keys of this row and the previous one, x, y and z each
     std::size_t row_size = 0;
     std::uint64_t name = 0;
     scan_brick* brick = nullptr;
@@ -125,7 +124,7 @@ class endpoint_image {
     void mark(scan_masks& in, const voxel_key& k) {
       const std::uint64_t n = node_name(k, brick_level);
       if (brick == nullptr || n != name) {
-        brick = &in.at(k);  // good until another one is asked for
+        brick = &in.at(k);  // valid until the next call
         name = n;
       }
       const std::uint32_t place = place_in_brick(k);
@@ -156,7 +155,7 @@ class endpoint_image {
       }
   }
 
-  /// The depths of row `v` in metres, 0 where there is no measurement.
+  /// Reads the depths of row `v` in metres, 0 without a measurement.
   template <class Depth>
   void metres(const Depth& depth, int v, float* z) const {
     if constexpr (requires { stored_type(depth); }) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Where the ray of a pixel ends, and the same for a row of pixels at a time.
+/// End of the ray of a pixel, and of the rays of a row of pixels.
 #pragma once
 
 #include <algorithm>
@@ -23,29 +23,29 @@
 
 namespace orbis::octree::detail {
 
-/// The end of one ray.
+/// End of one ray.
 struct ray_endpoint {
   enum class fate { none, used, truncated, rejected };
   fate what = fate::none;
-  float3 point{};   ///< where it ends, metres
-  voxel_key key{};  ///< the voxel it ends in
-  float z = 0.0F;   ///< its depth along the optical axis there, up to a few roundings
+  float3 point{};   ///< end point, metres
+  voxel_key key{};  ///< voxel of the end
+  float z = 0.0F;   ///< depth of the end along the optical axis, up to a few roundings
 };
 
 /// The sensor of one depth image.
 struct depth_sensor {
   voxel_grid grid;
   camera::float_pose pose;
-  std::optional<voxel_key> key;  ///< the voxel of the camera's centre
+  std::optional<voxel_key> key;  ///< voxel of the camera's centre
   double max_range;
-  float max_square;  ///< the largest squared distance that is within range
+  float max_square;  ///< the largest squared distance within range
 
   depth_sensor(const voxel_grid& g, const se3& T_world_camera, double range)
       : grid{g}, pose{T_world_camera}, max_range{range}, max_square{largest_square(range)} {
     if (is_finite(pose.centre)) key = grid.key(pose.centre);
   }
 
-  /// What becomes of the ray through (x, y, 1) that was measured to be `z` deep: the rules of point_integrator.
+  /// Returns the end of the ray through (x, y, 1) with measured depth `z`, by the rules of point_integrator.
   [[nodiscard]] ray_endpoint end(float x, float y, float z) const noexcept {
     if (!(z > 0.0F) || std::isnan(x)) return {};
     ray_endpoint e{.what = ray_endpoint::fate::used, .point = camera::world_point(pose, x, y, z), .key = {}, .z = z};
@@ -64,7 +64,7 @@ struct depth_sensor {
       e.what = ray_endpoint::fate::rejected;
     return e;
   }
-  /// The lower corner of a voxel, relative to the camera's centre, metres in the world frame.
+  /// Lower corner of a voxel, relative to the camera's centre, metres in the world frame.
   [[nodiscard]] float3 corner(const voxel_key& k) const {
     const double half = 0.5 * grid.resolution();
     const auto along = [&](std::uint32_t c, float centre) {
@@ -74,7 +74,7 @@ struct depth_sensor {
   }
 
  private:
-  /// The largest float whose root (in double) is at most `range`.
+  /// Largest float whose root (in double) is at most `range`.
   [[nodiscard]] static float largest_square(double range) noexcept {
     constexpr float most = std::numeric_limits<float>::infinity();
     if (std::isinf(range)) return most;
@@ -85,22 +85,22 @@ struct depth_sensor {
   }
 };
 
-/// One row of pixels on its way from depths to ends. Every array holds `width` values and is padded.
+/// A row of pixels during the conversion from depths to ends. Every array holds `width` values and is padded.
 struct end_row {
   int width = 0;
   const float* x = nullptr;
   const float* y = nullptr;
   bool one_y = false;  ///< y is a single value
-  float* z = nullptr;  ///< in: metres, 0 where there is nothing; out: where the ray ends, 0 if it does not count
-  std::array<std::int32_t*, 3> key{};  ///< out: the voxels of the ends that are used, -1 for the others
+  float* z = nullptr;  ///< in: metres, 0 if missing; out: depth of the ray's end, 0 if the ray does not count
+  std::array<std::int32_t*, 3> key{};  ///< out: voxels of used ends, -1 for other pixels
 };
 
-/// What a row or an image came to.
+/// Counts of a row or an image.
 struct end_counts {
   std::size_t used = 0, truncated = 0, rejected = 0;
-  bool leaves = false;  ///< a ray ends outside the voxel of the camera's centre
+  bool leaves = false;  ///< true if a ray ends outside the voxel of the camera's centre
   float max_z = 0.0F;
-  double sum_z = 0.0;  ///< of the rays that count; up to rounding
+  double sum_z = 0.0;  ///< over the rays that count; up to rounding
 
   void add(const end_counts& o) noexcept {
     used += o.used;
@@ -112,7 +112,7 @@ struct end_counts {
   }
 };
 
-/// Fills in where the rays of a row end.
+/// Computes the ends of a row of rays.
 struct find_ends_kernel {
   template <simd::target Target>
   static ORBIS_ALWAYS_INLINE void run(const depth_sensor& s, const end_row& row, end_counts& counts) noexcept {
@@ -134,7 +134,7 @@ struct find_ends_kernel {
       const floats z = floats::load(row.z + u), x = floats::load(row.x + u);
       const floats y = row.one_y ? floats(*row.y) : floats::load(row.y + u);
       const mask valid = (z > 0.0F) & (x == x);
-      // The arithmetic of camera::world_point.
+      // The same arithmetic as camera::world_point.
       const floats cx = x * z, cy = y * z;
       const auto along = [&](std::size_t i) ORBIS_INLINE_LAMBDA {
         const std::array<float, 3>& r = s.pose.rows[i];
@@ -146,7 +146,7 @@ struct find_ends_kernel {
       const mask within = square <= s.max_square;
       mask good = valid;
       if (any(and_not(valid, within))) {
-        // The root of a float, taken in double and rounded, is the root taken in float.
+        // The root of a float, computed in double and rounded, equals the root computed in float.
         const floats scale = sqrt(square);
         px = select(within, px, o[0] + dx / scale * range);
         py = select(within, py, o[1] + dy / scale * range);
@@ -185,8 +185,8 @@ struct find_ends_kernel {
   }
 };
 
-/// Bit i: the voxel of pixel `u + i` is neither that of the pixel before it nor that of the pixel above it, for 16
-/// pixels. `key[i][-1]` and `above[i]` must be readable; pixels without a voxel have -1.
+/// Returns a mask for 16 pixels; bit i: the voxel of pixel `u + i` differs from those of the previous pixel and of the
+/// pixel above. `key[i][-1]` and `above[i]` must be readable; pixels without a voxel have -1.
 struct fresh_keys_kernel {
   template <simd::target Target>
   static ORBIS_ALWAYS_INLINE unsigned run(const std::array<const std::int32_t*, 3>& key,
@@ -206,12 +206,12 @@ struct fresh_keys_kernel {
   }
 };
 
-/// What a depth_view stores.
+/// Type of the values stored by a depth_view.
 template <class T>
 T stored_type(const camera::depth_view<T>&);
 
-/// Metres of a row of stored depths, 0 where there is no measurement; see depth_view::operator(). `metres` has room for
-/// 15 more.
+/// Conversion of a row of stored depths to metres, 0 without a measurement; see depth_view::operator(). `metres` has
+/// room for 15 more values.
 template <class T>
 struct metres_row {
   const T* stored;

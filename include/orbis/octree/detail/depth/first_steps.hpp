@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The voxels around the one that rays start in, for rays that start on a face of it.
+/// Voxels around the start voxel, for rays that start on one of its faces.
 #pragma once
 
 #include <algorithm>
@@ -18,16 +18,16 @@
 
 namespace orbis::octree::detail {
 
-/// Of a range of directions the neighbours of the sensor's voxel that rays in it may pass through, before they leave
-/// all these neighbours for good: each axis has at most one step then.
+/// Finds the neighbours of the sensor's voxel that rays in a range of directions may pass through before they leave all
+/// these neighbours: each axis then has at most one step.
 class first_step_order {
  public:
   explicit first_step_order(const depth_sensor& sensor) noexcept
       : source_{sensor.grid, sensor.pose.centre, *sensor.key} {}
 
-  /// `low` and `high`: the least and the greatest coordinates of the directions, whose greatest one is about 1. Rays
-  /// may differ from them by some roundings of float. Bit (dx + 1) + 3 (dy + 1) + 9 (dz + 1) is the voxel that lies so
-  /// far away.
+  /// Returns the voxels as a bit mask. `low` and `high`: smallest and greatest coordinates of the directions, whose
+  /// largest coordinate is about 1. Rays may deviate from them by a few roundings of float. Bit (dx + 1) + 3 (dy + 1) +
+  /// 9 (dz + 1) is the voxel at offset (dx, dy, dz).
   [[nodiscard]] std::uint32_t voxels(float3 low, float3 high) const noexcept {
     for (std::size_t i = 0; i != 3; ++i) {
       low[i] -= 1e-5F;
@@ -51,12 +51,12 @@ class first_step_order {
 
  private:
   struct axis_range {
-    double least, most;    ///< coordinates of directions, without their signs
-    double first, second;  ///< the ways to the first face and to the second one, metres
+    double least, most;    ///< absolute coordinates of directions
+    double first, second;  ///< distances to the first and to the second face, metres
   };
 
   [[nodiscard]] static std::uint32_t voxels(const std::array<axis_range, 3>& axes, unsigned down) noexcept {
-    // Whether a face across i, `a` away, may come before one across j.
+    // True if a face across i, at distance `a`, may come before one across j.
     const auto may_precede = [&](std::size_t i, double a, std::size_t j, double b) {
       if (a == 0.0 && b == 0.0) return i > j;  // the walk finds them equal for every ray
       const double room = 1e-9 * (std::fabs(a) * axes[j].most + std::fabs(b) * axes[i].most);
@@ -87,7 +87,7 @@ class first_step_order {
   scan_origin source_;
 };
 
-/// Collects which of the 26 neighbours of the sensor's voxel rays pass through.
+/// Finds which of the 26 neighbours of the sensor's voxel rays pass through.
 class first_voxels {
  public:
   explicit first_voxels(const depth_sensor& sensor) noexcept : sensor_{sensor} {}
@@ -109,7 +109,7 @@ class first_voxels {
       seen_ |= 1U << (x + 3 * y + 9 * z);
     }
   }
-  /// Adds the rays of a box of cells of a view. `directions(box)`: the range of their directions in the world, see
+  /// Adds the rays of a box of cells of a view. `directions(box)`: range of their directions in the world, see
   /// first_step_order; `for_each(box, use)` calls `use` with the ray_endpoint of each ray until it returns false.
   template <class Directions, class ForEach>
   void add(const first_step_order& order, const pixel_box& box, const Directions& directions, const ForEach& for_each) {
@@ -121,7 +121,7 @@ class first_voxels {
     for_each(box, [&](const ray_endpoint& e) {
       add(e);
       any = true;
-      return is_cell;  // one ray of a larger box tells most
+      return is_cell;  // for a larger box one ray is usually representative
     });
     if (is_cell || !any || (may & ~seen_) == 0) return;
     const std::int32_t u = (box.u0 + box.u1) / 2, v = (box.v0 + box.v1) / 2;
@@ -139,7 +139,7 @@ class first_voxels {
 
  private:
   const depth_sensor& sensor_;
-  std::uint32_t seen_ = 0;  ///< of 3x3x3 voxels
+  std::uint32_t seen_ = 0;  ///< mask of 3x3x3 voxels
 };
 
 }  // namespace orbis::octree::detail

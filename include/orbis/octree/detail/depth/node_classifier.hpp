@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Certified classification of octree nodes against a depth image: no ray can touch the node, or rays surely cross
+/// Certified classification of octree nodes against a depth image: no ray can touch the node, rays certainly cross
 /// every voxel in it, or undecided.
 #pragma once
 
@@ -19,39 +19,38 @@
 
 namespace orbis::octree::detail {
 
-/// What the tests of nodes need to know about a frame. Positions are relative to the camera's centre.
+/// Parameters of the tests of nodes for a frame. Positions are relative to the camera's centre.
 ///
-/// The rays that count are those from the centre to the world points, rounded to float; the tests
-/// know the rays of the pixels, and nodes whose centres are rounded as well. With u = 2^-24 and c a
-/// node's centre:
-/// - the sum that makes a world point p errs by at most 10 u |p - t|_1 + u |t|_1, and seen from the node
-///   the first part shrinks with the distance;
-/// - rotating c with the rotation rounded to float errs by 7 u |c|_1, on top of 2 u |c|_1 with which c
-///   came, and each step down the octree adds u |c|_1: less than 25 u |c|_1 from a root of 16 levels;
-/// - the walk has its direction in float: u |c|_1; its sums in double are nothing beside.
-/// - the ray of a pinhole's pixel may be taken as (pixel - c) / f in float: 5 u |c|_1.
-/// All in all less than 45 u |c|_1 + 2 u |t|_1: `margin` is 64 u |c|_1 + 8 u |t|_1.
+/// The relevant rays are those from the centre to the world points, rounded to float; the tests use the rays of the
+/// pixels, and nodes with rounded centres. With u = 2^-24 and c a node's centre:
+/// - the sum that makes a world point p has an error of at most 10 u |p - t|_1 + u |t|_1, and relative to the node the
+///   first part shrinks with the distance;
+/// - rotating c with the rotation rounded to float has an error of 7 u |c|_1, in addition to the 2 u |c|_1 of c itself,
+///   and each step down the octree adds u |c|_1: less than 25 u |c|_1 from a root of 16 levels;
+/// - the walk has its direction in float: u |c|_1; the error of its sums in double is negligible;
+/// - the ray of a pinhole's pixel may be computed as (pixel - c) / f in float: 5 u |c|_1.
+/// The total is less than 45 u |c|_1 + 2 u |t|_1: `margin` is 64 u |c|_1 + 8 u |t|_1.
 struct depth_scene {
-  float3 x_axis{}, y_axis{}, z_axis{};               ///< of the camera, in the world
+  float3 x_axis{}, y_axis{}, z_axis{};               ///< axes of the camera, in the world
   float fx = 1, fy = 1, cx = 0, cy = 0;              ///< pixel = f * ray + c
   float per_fx = 1, per_fy = 1;                      ///< 1 / f
-  float last_u = 0, last_v = 0;                      ///< the last column and row
-  float min_x = 0, max_x = 0, min_y = 0, max_y = 0;  ///< of all rays
-  float margin_0 = 0, margin_1 = 0;                  ///< metres; and for each metre of |c|_1
-  float pixel_margin = 0.01F;                        ///< pixels, for the rounding of pixels
+  float last_u = 0, last_v = 0;                      ///< last column and row
+  float min_x = 0, max_x = 0, min_y = 0, max_y = 0;  ///< bounds of all rays
+  float margin_0 = 0, margin_1 = 0;                  ///< metres; and per metre of |c|_1
+  float pixel_margin = 0.01F;                        ///< allowance for the rounding of pixels
   float near_z = 0;                                  ///< nodes that come closer than this are not projected
-  /// Up to this depth a ball inside a voxel surely holds the ray of a pixel, an aligned tile of 2x2
-  /// pixels' rays, of 4x4; of pinholes, see dense().
+  /// Maximum depth at which a ball inside a voxel certainly contains the ray of a pixel, of an aligned tile of 2x2
+  /// pixels' rays, or of 4x4; for pinholes, see dense().
   std::array<float, 3> dense_z{};
-  float ball = 0, ball_slope = 0;        ///< the ball's radius is more than `ball - ball_slope * z`
+  float ball = 0, ball_slope = 0;        ///< the ball's radius exceeds `ball - ball_slope * z`
   float voxel = 0;                       ///< metres
-  const direction_index* map = nullptr;  ///< of cameras that are not pinholes
+  const direction_index* map = nullptr;  ///< for cameras other than pinholes
   const depth_pyramid* pyramid = nullptr;
-  /// Where every direction has a ray within a spacing (at z = 1), all rays of a tile of 1, 2x2 or 4x4 pixels that
-  /// contains the nearest ray lie within so many times the spacing.
+  /// Multiples of the ray spacing (at z = 1) within which all rays of a tile of 1, 2x2 or 4x4 pixels lie that contains
+  /// the ray nearest to a direction.
   std::array<float, 3> tiles{1.02F, 3.06F, 7.14F};
 
-  /// dense_z where every direction has a ray within `spacing`.
+  /// dense_z for a ray spacing of `spacing`.
   [[nodiscard]] float dense(std::size_t kind, float spacing) const noexcept {
     return ball / (tiles[kind] * spacing + ball_slope);
   }
@@ -63,13 +62,13 @@ struct pixel_box {
   std::int32_t u0, u1, v0, v1;
 };
 
-/// The offsets of a node's children from its centre.
+/// Offsets of a node's children from its centre.
 struct child_offsets {
   alignas(32) std::array<float, 8> x{}, y{}, z{};                    ///< in the camera frame
   alignas(32) std::array<float, 8> world_x{}, world_y{}, world_z{};  ///< in the world frame
   float half = 0;                                                    ///< half a child's edge
-  float half_z = 0;                                                  ///< half of what it measures along z
-  std::array<float, 4> half_side{};                                  ///< and across the sides of the view
+  float half_z = 0;                                                  ///< half of a child's extent along z
+  std::array<float, 4> half_side{};  ///< half of its extent across the sides of the view
 
   child_offsets() = default;
   child_offsets(const depth_scene& s, float half_edge) : half{half_edge} {
@@ -95,14 +94,14 @@ struct child_offsets {
   }
 };
 
-/// What is known about the eight children of a node.
+/// Classification of the eight children of a node.
 struct children {
   alignas(32) std::array<float, 8> x, y, z;                ///< centres in the camera frame
-  alignas(32) std::array<std::int32_t, 8> u0, u1, v0, v1;  ///< the pixels whose rays may touch them
-  alignas(32) std::array<float, 8> near_z;                 ///< rays that end before this do not touch them
+  alignas(32) std::array<std::int32_t, 8> u0, u1, v0, v1;  ///< pixels whose rays may touch them
+  alignas(32) std::array<float, 8> near_z;                 ///< rays that end before this depth do not touch them
   unsigned live = 0;                                       ///< bit i: a ray may touch child i
-  unsigned full = 0;                                       ///< every voxel of child i is surely crossed by a ray
-  unsigned inside = 0;                                     ///< child i projects into the image
+  unsigned full = 0;    ///< bit i: every voxel of child i is certainly crossed by a ray
+  unsigned inside = 0;  ///< bit i: child i projects into the image
 };
 
 /// a * b + c for bounds, see simd::approximate_multiply_add.
@@ -113,7 +112,7 @@ template <class V>
 }
 
 /// Classifies the children of the node whose centre is `c` in the camera frame. `inside`: the node projects into the
-/// image. What it says is right on every target; targets may differ in what they leave undecided.
+/// image. The result is correct on every target; targets may differ in which children stay undecided.
 struct classify_children_kernel {
   template <simd::target Target>
   static ORBIS_ALWAYS_INLINE void run(const depth_scene& s, const child_offsets& o, const float3& c, bool inside,
@@ -131,7 +130,7 @@ struct classify_children_kernel {
     near.store(out.near_z.data());
     mask live = far > 0.0F;
     if (!inside) {
-      // On the inner side of the view's four sides; `off` is positive towards larger slopes.
+      // Test against the four sides of the view; `off` is positive towards larger slopes.
       const auto side = [&](const floats& at, float sign, float slope, float half) ORBIS_INLINE_LAMBDA {
         const floats room = multiply_add(1.0F + std::fabs(slope), margin, half);
         const floats off = multiply_add(-slope, z, at);
@@ -143,7 +142,7 @@ struct classify_children_kernel {
     out.live = out.full = out.inside = 0;
     if (none(live)) return;
 
-    // The pixels that a child may project to: its centre's, plus or minus its extent across that ray.
+    // Pixels to which a child may project: that of its centre, plus or minus its extent across that ray.
     const mask projects = near > s.near_z;
     const floats near_1 = select(projects, near, floats(1.0F)), z_1 = select(projects, z, floats(1.0F));
     const floats inverse = 1.0F / (near_1 * z_1), per_z = inverse * near_1, per_near = inverse * z_1;
@@ -175,7 +174,7 @@ struct classify_children_kernel {
     u1 = select(projects, u1, floats(s.last_u));
     v1 = select(projects, v1, floats(s.last_v));
     const mask inner = projects & (u0 >= 0.0F) & (v0 >= 0.0F) & (u1 <= s.last_u) & (v1 <= s.last_v);
-    // Rounded up and down; the numbers are not negative but for -1.
+    // Rounded up and down; the numbers are >= -1.
     const auto first = [](const floats& p, float last) ORBIS_INLINE_LAMBDA {
       return -simd::convert<std::int32_t>(floor(-min(max(p, floats(0.0F)), floats(last + 1.0F))));
     };
@@ -195,7 +194,7 @@ struct classify_children_kernel {
     d.store(out.v0.data());
     e.store(out.v1.data());
 
-    // The level on which that many pixels are at most four cells: the logarithm of a third, rounded up.
+    // Level at which the box spans at most four cells: the logarithm of a third, rounded up.
     const depth_pyramid& pyramid = *s.pyramid;
     const floats third = simd::convert<float>(max(b - a, e - d)) * (1.0F / 3.0F);
     const integers level = min(max(log2_rounded_up(third), integers(1)), integers(pyramid.levels()));
@@ -221,19 +220,19 @@ struct classify_children_kernel {
     live = live & (farthest >= near * pyramid.scale()) & (farthest > 0.0F);
     const mask filled = (nearest > far * pyramid.scale()) & (far < dense_z[0]);
     out.live = simd::bits(live);
-    // Where there is a map, it is the spacing that says whether there are rays all over a child.
+    // With a map, the spacing decides if rays cover a whole child.
     const bool mapped = s.map != nullptr;
     out.inside = mapped ? 0 : out.live & simd::bits(inner);
     out.full = (mapped ? out.live & simd::bits(projects) : out.inside) & simd::bits(filled);
   }
 
  private:
-  /// The logarithm to base 2 of numbers >= 0, rounded up; 0 gives a large negative number.
+  /// Logarithm to base 2 of numbers >= 0, rounded up; a large negative number for 0.
   template <class Floats>
   static ORBIS_ALWAYS_INLINE auto log2_rounded_up(const Floats& x) noexcept {
     return ((simd::bits_as<std::int32_t>(x) + 0x7fffff) >> 23) - 127;
   }
-  /// Where the entries of a map for the rays of a rectangle begin, counted in floats.
+  /// Offset, in floats, of a map's entries for the rays of a rectangle.
   template <class Floats>
   static ORBIS_ALWAYS_INLINE auto entry_of(const direction_index& map, const Floats& x0, const Floats& x1,
                                            const Floats& y0, const Floats& y1) noexcept {

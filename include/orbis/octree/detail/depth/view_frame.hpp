@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A view of rays from one point as the descent through the octree sees it: the pyramid over their ends, and the nodes
-/// to begin with.
+/// A view of rays from one point, prepared for the descent through the octree: the pyramid over their ends, and the
+/// initial nodes.
 #pragma once
 
 #include <algorithm>
@@ -23,17 +23,17 @@
 
 namespace orbis::octree::detail {
 
-/// Where the rays of a view are at z = 1, and which pixel a ray belongs to: focal * (x, y) + center.
+/// Extent of the rays of a view at z = 1, and their pixels: focal * (x, y) + center.
 struct view_extent {
   float fx, fy, cx, cy;
   int width, height;
   float min_x, max_x, min_y, max_y;
 };
 
-/// Keeps its memory from view to view. Call set_view, build `pyramid`, call list_nodes.
+/// Reuses its memory between views. Call set_view, build `pyramid`, call list_nodes.
 struct view_frame {
   using classify_kernel = void(const depth_scene&, const child_offsets&, const float3&, bool, children&);
-  static constexpr int list_level = 5;  ///< of the nodes that threads share out among them
+  static constexpr int list_level = 5;  ///< level of the nodes that threads distribute among them
 
   struct node {
     voxel_key key;
@@ -45,11 +45,11 @@ struct view_frame {
   chosen_kernel<classify_children_kernel, classify_kernel, simd::avx2> classify;
   depth_pyramid pyramid;
   depth_scene scene;
-  std::vector<child_offsets> offsets;  ///< for each level, of a node's children at that level
-  std::vector<node> nodes;             ///< that rays may touch, at list_level
+  std::vector<child_offsets> offsets;  ///< per level, offsets of a node's children at that level
+  std::vector<node> nodes;             ///< nodes at list_level that rays may touch
 
-  /// Works out what the tests need to know of a view; what they need of the rays themselves is up to the caller.
-  /// `ray_error`: how far rays may be from where they are taken to be, at z = 1.
+  /// Computes the view's parameters of the tests; the caller sets those of the rays. `ray_error`: maximum deviation of
+  /// rays from their assumed directions, at z = 1.
   void set_view(const depth_sensor& sensor, const view_extent& e, float ray_error = 0.0F) {
     depth_scene& s = scene;
     const auto& rows = sensor.pose.rows;
@@ -87,11 +87,11 @@ struct view_frame {
   [[nodiscard]] pixel_box all_pixels() const noexcept {
     return {0, static_cast<std::int32_t>(scene.last_u), 0, static_cast<std::int32_t>(scene.last_v)};
   }
-  /// Where the rays of a box of pixels are, at z = 1.
+  /// Bounds of rays at z = 1.
   struct bounds_at_1 {
     float x0, x1, y0, y1;
   };
-  /// `room`: how far from the middle of its pixel a ray may be, pixels.
+  /// Bounds of the rays of a box of pixels. `room`: maximum distance in pixels of a ray from the centre of its pixel.
   [[nodiscard]] bounds_at_1 bounds(const pixel_box& box, float room) const noexcept {
     const auto edge = [&](std::int32_t pixel, float off, float centre, float per_f) {
       return (static_cast<float>(pixel) + off - centre) * per_f;
@@ -99,7 +99,7 @@ struct view_frame {
     return {edge(box.u0, -room, scene.cx, scene.per_fx), edge(box.u1, room, scene.cx, scene.per_fx),
             edge(box.v0, -room, scene.cy, scene.per_fy), edge(box.v1, room, scene.cy, scene.per_fy)};
   }
-  /// The least and the greatest coordinates of their directions in the world.
+  /// Smallest and greatest coordinates of the rays' directions in the world.
   [[nodiscard]] std::pair<float3, float3> directions(const pixel_box& box, float room) const noexcept {
     const auto [x0, x1, y0, y1] = bounds(box, room);
     std::pair<float3, float3> range;
@@ -115,12 +115,12 @@ struct view_frame {
   [[nodiscard]] float half_diagonal() const noexcept {
     return 0.5F * std::sqrt(1.0F / (scene.fx * scene.fx) + 1.0F / (scene.fy * scene.fy));
   }
-  /// Every direction of the view has a ray within `spacing`, unless its pixel has no end.
+  /// Sets the maximum distance of a direction of the view from a ray, except for pixels without an end.
   void set_spacing(float spacing) noexcept {
     for (std::size_t kind = 0; kind != 3; ++kind) scene.dense_z[kind] = scene.dense(kind, spacing);
   }
-  /// The lowest and the highest voxel of a box around all rays; empty if it comes close to the border
-  /// of the grid, where walks may end early.
+  /// Lowest and highest voxel of a box around all rays; empty if the box is close to the border of the grid, where
+  /// walks may end early.
   [[nodiscard]] std::optional<std::pair<voxel_key, voxel_key>> bounds_of(const depth_sensor& sensor,
                                                                          float max_z) const {
     std::array<std::array<std::uint32_t, 2>, 3> range;
@@ -144,8 +144,8 @@ struct view_frame {
     return std::pair{voxel_key{range[0][0], range[1][0], range[2][0]},
                      voxel_key{range[0][1], range[1][1], range[2][1]}};
   }
-  /// Whether the camera's centre is so close to a face of its voxel that the rounding of rays decides
-  /// for many of them on which side they leave.
+  /// Returns true if the camera's centre is so close to a face of its voxel that rounding decides for many rays on
+  /// which side they leave.
   [[nodiscard]] bool is_on_face(const depth_sensor& sensor) const {
     const double close = 64.0 * static_cast<double>(scene.margin(scene.voxel));
     const voxel_key& k = *sensor.key;
@@ -157,7 +157,7 @@ struct view_frame {
     return false;
   }
 
-  /// The nodes at list_level that rays may touch.
+  /// Lists the nodes at list_level that rays may touch.
   void list_nodes(const depth_sensor& sensor, const voxel_key& low, const voxel_key& high) {
     const std::uint32_t span = std::max({high.x - low.x, high.y - low.y, high.z - low.z});
     const int root_level = std::max(list_level, static_cast<int>(std::bit_width(span)));
@@ -194,7 +194,7 @@ struct view_frame {
   }
 
  private:
-  /// A node's centre in the camera frame.
+  /// Centre of a node in the camera frame.
   [[nodiscard]] float3 in_camera(const float3& corner, float half_edge) const {
     const float3 c{corner[0] + half_edge, corner[1] + half_edge, corner[2] + half_edge};
     const auto along = [&](const float3& axis) { return axis[0] * c[0] + axis[1] * c[1] + axis[2] * c[2]; };

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Which rays of a depth image cross a voxel: surely, surely not, or only the walk itself can tell.
+/// Classification of the rays of a depth image that cross a voxel: certainly, certainly not, or undecided.
 #pragma once
 
 #include <algorithm>
@@ -20,7 +20,7 @@
 
 namespace orbis::octree::detail {
 
-/// Whether traverse_ray visits `voxel` on its way to `end`.
+/// Returns true if traverse_ray visits `voxel` on its way to `end`.
 [[nodiscard]] inline bool crosses(const depth_sensor& sensor, const ray_endpoint& end,
                                   const voxel_key& voxel) noexcept {
   const voxel_key& from = *sensor.key;
@@ -31,7 +31,7 @@ namespace orbis::octree::detail {
   const std::array<std::uint32_t, 3> wanted{voxel.x, voxel.y, voxel.z};
   for (;;) {
     const std::size_t axis = cursor->axis();
-    if (cursor->at[axis] == wanted[axis] || !cursor->can_step(axis)) return false;  // it never turns back
+    if (cursor->at[axis] == wanted[axis] || !cursor->can_step(axis)) return false;  // a ray never turns back
     cursor->advance(axis);
     if (cursor->key() == end.key) return false;
     if (std::min(std::min(cursor->next[0], cursor->next[1]), cursor->next[2]) > cursor->reach) return false;
@@ -39,19 +39,19 @@ namespace orbis::octree::detail {
   }
 }
 
-/// One voxel that is to be tested against rays.
+/// A voxel prepared for tests against rays.
 ///
-/// A line in direction g crosses a cube with centre c and half edge h if no axis across an edge
-/// separates them: |c x g|_i <= h (|g_j| + |g_k|) for all i (S. Gottschalk, M. C. Lin, D. Manocha,
-/// "OBBTree", SIGGRAPH 1996). A ray that is cut off at z g has left the cube again if that point lies
-/// beyond a far face, and has not reached it if it lies before a near one. Nothing is divided.
+/// A line in direction g crosses a cube with centre c and half edge h if no axis across an edge separates them: |c x
+/// g|_i <= h (|g_j| + |g_k|) for all i (S. Gottschalk, M. C. Lin, D. Manocha, "OBBTree", SIGGRAPH 1996). A ray that
+/// ends at z g has left the cube if that point is beyond a far face, and has not reached it if the point is before a
+/// near one. No division is needed.
 ///
-/// Directions err by at most margin / |c| of their length (see depth_scene), which is `slack` beside
+/// Directions have an error of at most margin / |c| of their length (see depth_scene), which is `slack`, in addition to
 /// twice the margin in h. The axes are flipped so that c has no negative coordinate.
 struct voxel_test {
   float3 centre{}, x_axis{}, y_axis{}, z_axis{};  ///< relative to the camera's centre; flipped
   float half = 0, inner_half = 0, outer_half = 0, slack = 0, margin = 0, margin_1 = 0;
-  float3 before{};  ///< how far before the centre a ray may end along an axis: half, or no limit
+  float3 before{};  ///< maximum distance before the centre at which a ray may end, along each axis: half, or no limit
 
   voxel_test(const depth_scene& s, const float3& c, float half_edge) noexcept
       : half{half_edge}, margin{s.margin(std::fabs(c[0]) + std::fabs(c[1]) + std::fabs(c[2]))}, margin_1{s.margin_1} {
@@ -61,7 +61,7 @@ struct voxel_test {
       x_axis[i] = std::copysign(1.0F, c[i]) * s.x_axis[i];
       y_axis[i] = std::copysign(1.0F, c[i]) * s.y_axis[i];
       z_axis[i] = std::copysign(1.0F, c[i]) * s.z_axis[i];
-      // Within the slab of the camera itself there is no near face.
+      // There is no near face within the camera's own slab.
       before[i] = centre[i] < half + 2.0F * margin ? std::numeric_limits<float>::infinity() : half;
       l1 += centre[i];
     }
@@ -70,7 +70,7 @@ struct voxel_test {
     slack = 4.0F * half * margin / std::max(l1, half);
   }
 
-  /// Whether a ray of a tile of directions may cross the voxel.
+  /// Returns true if a ray of a tile of directions may cross the voxel.
   [[nodiscard]] bool may_cross(float x0, float x1, float y0, float y1) const noexcept {
     const float x = 0.5F * (x0 + x1), y = 0.5F * (y0 + y1), dx = 0.501F * (x1 - x0), dy = 0.501F * (y1 - y0);
     float3 g, e;
@@ -90,12 +90,12 @@ struct voxel_test {
   }
 };
 
-/// The numbers that decide about a ray and a cube, see voxel_test; for several rays, several cubes, or both.
+/// Terms that decide the crossing of a ray and a cube, see voxel_test; for several rays, several cubes, or both.
 template <class V>
 struct ray_and_cube {
   std::array<V, 3> direction;  ///< g
-  std::array<V, 3> size;       ///< of g along each axis
-  V length;                    ///< their sum
+  std::array<V, 3> size;       ///< absolute value of g along each axis
+  V length;                    ///< sum of the sizes
 
   ORBIS_ALWAYS_INLINE ray_and_cube(const float3& x_axis, const float3& y_axis, const float3& z_axis, const V& x,
                                    const V& y) noexcept {
@@ -110,20 +110,20 @@ struct ray_and_cube {
     const std::size_t j = (i + 1) % 3, k = (i + 2) % 3;
     return abs(multiply_add(centre[j], direction[k], -(centre[k] * direction[j])));
   }
-  /// The size across axis `i`.
+  /// Size across axis `i`.
   [[nodiscard]] ORBIS_ALWAYS_INLINE V width(std::size_t i) const noexcept {
     return size[(i + 1) % 3] + size[(i + 2) % 3];
   }
 };
 
-/// Of some rays, those that may cross a voxel, and those that surely do.
+/// Masks of the rays that may cross a voxel, and of those that certainly do.
 template <class V>
 struct voxel_crossing {
   typename V::mask_type may, sure;
 };
 
-/// Tests the rays `of` through (x, y, 1), which end at depth `z` > 0, against a voxel. Right on every target; targets
-/// may differ in what they leave undecided.
+/// Tests the rays `of` through (x, y, 1), which end at depth `z` > 0, against a voxel. Correct on every target; targets
+/// may differ in which rays stay undecided.
 template <class V>
 [[nodiscard]] ORBIS_ALWAYS_INLINE voxel_crossing<V> test_rays(const voxel_test& t, const V& x, const V& y, const V& z,
                                                               const typename V::mask_type& of) noexcept {
@@ -150,8 +150,8 @@ template <class V>
   return out;
 }
 
-/// Whether a ray of the box surely crosses the voxel. If not, the numbers of the pixels whose rays may cross it are
-/// appended to `unsure`, see endpoint_image::number. Rays that end before `near_z` do not.
+/// Returns true if a ray of the box certainly crosses the voxel. Otherwise appends the numbers of the pixels whose rays
+/// may cross it to `unsure`, see endpoint_image::number. Skips rays that end before `near_z`.
 struct test_pixels_kernel {
   template <simd::target Target>
   static ORBIS_ALWAYS_INLINE bool run(const endpoint_image& ends, const voxel_test& t, const pixel_box& box,
@@ -180,17 +180,17 @@ struct test_pixels_kernel {
   }
 };
 
-/// Where in a voxel's projection rays are sampled, and how far from its centre, in its edges.
+/// Positions in a voxel's projection at which rays are sampled, and their distance from its centre in edges.
 inline constexpr std::array<std::array<float, 2>, 5> sample_places{{{0, 0}, {-1, -1}, {1, -1}, {-1, 1}, {1, 1}}};
 inline constexpr float sample_spread = 0.3F;
 
-/// For each child a pixel close to its centre, the one of a few that is deepest. z < 0: none is wanted
+/// For each child the deepest of a few pixels close to its centre. z < 0: not wanted
 template <class Floats, class Integers>
 struct sampled_pixels {
   Floats z{-1.0F};
   Integers u{0}, v{0};
 
-  /// `depth_at(u, v)`: the depths of pixels.
+  /// `depth_at(u, v)`: depths of pixels.
   template <class Depth>
   ORBIS_ALWAYS_INLINE sampled_pixels(const depth_scene& s, const children& c, unsigned wanted,
                                      const Depth& depth_at) noexcept {
@@ -222,8 +222,8 @@ struct sampled_pixels {
   }
 };
 
-/// The children that a ray each, through (x, y, 1) to depth `z`, surely crosses. `world`: the parent's centre relative
-/// to the camera's. z <= 0: no ray
+/// Returns the children that are certainly crossed by one given ray each, through (x, y, 1) to depth `z`. `world`: the
+/// parent's centre relative to the camera's. z <= 0: no ray
 template <class Floats>
 [[nodiscard]] ORBIS_ALWAYS_INLINE auto children_crossed(const depth_scene& s, const child_offsets& o,
                                                         const float3& world, const Floats& x, const Floats& y,
@@ -248,7 +248,7 @@ template <class Floats>
   return sure & (beyond > room);
 }
 
-/// The children that are surely crossed by the deepest of a few rays that pass close to their centres. `world`: the
+/// Finds the children that are certainly crossed by the deepest of a few rays close to their centres. `world`: the
 /// parent's centre relative to the camera's.
 struct sample_children_kernel {
   template <simd::target Target>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Reads the nodes of OctoMap's files into bricks. See octomap_writers.hpp for what a node is.
+/// Readers of the nodes of OctoMap's files into bricks. See octomap_writers.hpp for the format of nodes.
 #pragma once
 
 #include <algorithm>
@@ -15,7 +15,7 @@
 
 namespace orbis::octree::detail {
 
-/// Bit 2 i of 16 moved to bit i; the others are ignored.
+/// Moves bit 2 i of 16 to bit i; ignores the others.
 [[nodiscard]] constexpr unsigned gather_bits(unsigned v) noexcept {
   v &= 0x5555U;
   v = (v | v >> 1U) & 0x3333U;
@@ -23,7 +23,7 @@ namespace orbis::octree::detail {
   return (v | v >> 4U) & 0xffU;
 }
 
-/// What the two readers have in common: the bytes that are left, and where what they hold goes.
+/// Common base of the two readers: the remaining bytes, and the destination.
 struct node_reader {
   brick_store<float>& store;
   std::span<const std::byte> left;
@@ -37,14 +37,15 @@ struct node_reader {
   }
 };
 inline constexpr const char* ends_early = "the data ends early";
-inline constexpr const char* no_children = "an inner node without children";
-inline constexpr const char* too_deep = "nodes below the deepest level";
+inline constexpr const char* no_children = "inner node without children";
+inline constexpr const char* too_deep = "node below the deepest level";
 
 /// Reads `.bt` nodes. Leaves get the model's bounds.
 template <octomap_model Model>
 class bt_reader : public node_reader {
  public:
-  /// Reads the inner node at `level` that starts at `key`, and all below it; false: see `problem`.
+  /// Reads the inner node at `level` that starts at `key`, and all nodes below it. On failure returns false and sets
+  /// `problem`.
   [[nodiscard]] bool read(const voxel_key& key, int level) {
     if (level == brick_level) return read_brick(key);
     unsigned codes = 0;
@@ -118,10 +119,11 @@ class bt_reader : public node_reader {
   }
 };
 
-/// Reads `.ot` nodes. Inner values are passed over: they follow from the leaves. -0 becomes 0.
+/// Reads `.ot` nodes. Skips inner values, which follow from the leaves. -0 becomes 0.
 class ot_reader : public node_reader {
  public:
-  /// Reads the node at `level` that starts at `key`, and all below it; false: see `problem`.
+  /// Reads the node at `level` that starts at `key`, and all nodes below it. On failure returns false and sets
+  /// `problem`.
   [[nodiscard]] bool read(const voxel_key& key, int level) {
     float value = 0;
     unsigned children = 0;
@@ -143,13 +145,13 @@ class ot_reader : public node_reader {
     value = std::bit_cast<float>(value_at(0)) + 0.0F;
     children = byte(4);
     left = left.subspan(5);
-    return children != 0 || std::isfinite(value) || give_up("a value that is not finite");
+    return children != 0 || std::isfinite(value) || give_up("non-finite value");
   }
   [[nodiscard]] std::uint32_t value_at(std::size_t i) const noexcept {
     return byte(i) | byte(i + 1) << 8U | byte(i + 2) << 16U | byte(i + 3) << 24U;
   }
-  /// Eight leaves at once, if they are eight leaves.
-  [[nodiscard]] bool take_eight(float* values) noexcept {
+  /// Reads the next eight nodes at once if they are all leaves.
+  [[nodiscard]] bool read_eight_leaves(float* values) noexcept {
     if (left.size() < 40) return false;
     unsigned children = 0;
     bool finite = true;
@@ -194,7 +196,7 @@ class ot_reader : public node_reader {
         std::fill(v, v + 8, value);
         continue;
       }
-      if (children == 0xff && take_eight(v)) continue;
+      if (children == 0xff && read_eight_leaves(v)) continue;
       for (unsigned rest = children; rest != 0; rest &= rest - 1) {
         if (!take(v[std::countr_zero(rest)], none)) return false;
         if (none != 0) return give_up(too_deep);

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Writes the nodes of OctoMap's files in preorder, from the bricks, a mask of 64 voxels at a time.
+/// Writers of the nodes of OctoMap's files in preorder, from the bricks, one mask of 64 voxels at a time.
 ///
-/// A `.bt` node is two bits for each child (0 unknown, 1 free, 2 occupied, 3 an inner node), an `.ot` node is a
-/// value and a bit for each child. What a node is depends on what is below it: its place stays empty while its
-/// children are written; then it is filled in, or taken back if it became a leaf.
+/// A `.bt` node is two bits per child (0 unknown, 1 free, 2 occupied, 3 an inner node); an `.ot` node is a value and a
+/// bit per child. The content of a node depends on the nodes below it: its space is reserved while its children are
+/// written, then filled in, or released if the node became a leaf.
 #pragma once
 
 #include <algorithm>
@@ -27,12 +27,12 @@
 
 namespace orbis::octree::detail {
 
-/// Bytes with room for more. They grow in place where the system can move pages.
+/// A growing byte buffer. It grows in place if the system can move pages.
 class node_buffer {
  public:
   [[nodiscard]] std::size_t size() const noexcept { return size_; }
   [[nodiscard]] std::string_view view() const noexcept { return {bytes_.get(), size_}; }
-  /// Makes room for `n` bytes and returns where they go.
+  /// Makes room for `n` bytes and returns their address.
   char* room(std::size_t n) {
     if (capacity_ - size_ < n) grow(n);
     return bytes_.get() + size_;
@@ -60,13 +60,13 @@ class node_buffer {
   std::size_t capacity_ = 0;
 };
 
-/// The nodes of a file, behind its header.
+/// Nodes of a file, without its header.
 struct octomap_nodes {
   node_buffer bytes;
   std::size_t nodes = 0;
 };
 
-/// Bit i of a byte moved to bit 2 i.
+/// Moves bit i of a byte to bit 2 i.
 inline constexpr auto spread_bits = [] {
   std::array<std::uint16_t, 256> table{};
   for (unsigned i = 0; i != 256; ++i)
@@ -79,10 +79,10 @@ inline void put_bytes16(char* out, unsigned v) noexcept {
   out[1] = static_cast<char>(v >> 8U);
 }
 
-/// Writes `.bt` nodes: the tree of what is likelier, free or occupied, pruned as OctoMap prunes it.
+/// Writes `.bt` nodes: the tree of the likelier states, free or occupied, pruned as OctoMap does.
 ///
-/// OctoMap prunes level by level from below and stops at the first level where nothing is to be done;
-/// only then can eight leaves that became equal stay unpruned. So does this.
+/// OctoMap prunes level by level from the bottom and stops at the first level without a node to prune; only in that
+/// case can eight equal leaves stay unpruned. This writer reproduces that.
 template <octomap_model Model>
 class bt_writer {
  public:
@@ -102,7 +102,7 @@ class bt_writer {
     return {std::move(out_), nodes_};
   }
 
-  // -- called by upper_walk
+  // -- interface of upper_walk
 
   struct open_node {
     std::size_t place;
@@ -154,13 +154,13 @@ class bt_writer {
     nodes_ = 1;
     (void)upper_walk<float, bt_writer>{parts, *this}.walk(root_level_);
   }
-  /// A root without children cannot be written: its children are.
+  /// The format cannot store a root without children, so its children are written.
   [[nodiscard]] octomap_nodes write_root(float value) {
     put_bytes16(out_.room(2), is_occupied<Model>(value) ? occupied_children : free_children);
     out_.set_size(2);
     return {std::move(out_), 9};
   }
-  /// @pre known != 0, and there is room for 2 * (1 + 8) bytes
+  /// Writes an octant. @pre known != 0, and there is room for 2 * (1 + 8) bytes
   [[nodiscard]] unsigned write_octant(std::uint64_t known, std::uint64_t occupied) {
     constexpr std::uint64_t all = ~std::uint64_t{0};
     if (known == all && (occupied == all || occupied == 0)) {
@@ -190,7 +190,7 @@ class bt_writer {
     nodes_ += count + static_cast<unsigned>(std::popcount(in_groups));
     return inner;
   }
-  /// Whether there is a 2x2x2 node whose voxels differ, but not in what is likelier.
+  /// Returns true if there is a 2x2x2 node whose voxels have different values but the same likelier state.
   [[nodiscard]] bool is_group_pruned(const std::vector<tree_part<float>>& parts) const {
     block<float> voxels;
     return std::any_of(parts.begin(), parts.end(), [&](const tree_part<float>& part) {
@@ -232,7 +232,7 @@ class ot_writer {
     return {std::move(out_), nodes};
   }
 
-  // -- called by upper_walk
+  // -- interface of upper_walk
 
   struct child {
     float value;

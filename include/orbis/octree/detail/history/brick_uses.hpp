@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Which scans observe something in which brick, and which octants have to be replayed.
+/// Index of the scans that observe each brick, and queue of the octants to replay.
 #pragma once
 
 #include <array>
@@ -17,31 +17,31 @@
 
 namespace orbis::octree::detail {
 
-/// What the scans say about the octants of a brick, and the voxels in which that differs from what is stored.
+/// Octants of a brick as the scans define them, and the voxels in which they differ from the stored ones.
 template <class T>
 struct replayed_brick {
   std::array<block<T>, 8> octants;
   std::array<std::uint64_t, 8> changed{};  ///< zero for octants that were not replayed
 };
 
-/// One scan's part of a brick: the scan's number and the part's place among scan_voxels::parts().
+/// One scan's part of a brick: the scan's number and the part's index in scan_voxels::parts().
 struct brick_use {
   std::uint32_t scan, part;
 };
 
-/// A brick, the scans that observe something in it in order, and its octants that are stale (bit i: octant i): they do
-/// not hold what these scans say.
+/// A brick, the scans that observe it in order, and its stale octants (bit i: octant i), which do not yet hold the
+/// result of these scans.
 struct used_brick {
   std::uint64_t name = 0;
   std::uint8_t stale = 0;
   std::vector<brick_use> uses;
 };
 
-/// All bricks that scans observe, and a queue of those that have stale octants. A brick that no scan uses is forgotten
-/// once it is not stale any more; its memory serves the next one.
+/// All bricks observed by scans, and a queue of those with stale octants. A brick without scans is removed once it is
+/// no longer stale; its memory is reused.
 class brick_uses {
  public:
-  /// The number of a brick, new or not; valid until it is forgotten. O(1).
+  /// Returns the number of a brick, adding it if needed; valid until the brick is removed. O(1).
   [[nodiscard]] std::uint32_t number_of(std::uint64_t name) {
     const std::uint32_t found = index_.find(name);
     if (found != hash_index::none) return found;
@@ -61,15 +61,15 @@ class brick_uses {
   [[nodiscard]] const used_brick& operator[](std::uint32_t number) const noexcept { return bricks_[number]; }
 
   /// Marks octants of a brick as stale.
-  void make_stale(std::uint32_t number, unsigned octants) {
+  void mark_stale(std::uint32_t number, unsigned octants) {
     if (octants == 0) return;
     used_brick& b = bricks_[number];
     if (b.stale == 0) queue_.push_back(number);
     b.stale = static_cast<std::uint8_t>(b.stale | octants);
   }
-  /// The bricks that have stale octants, those first that have been so for longest.
+  /// Bricks with stale octants, the longest stale first.
   [[nodiscard]] std::span<const std::uint32_t> stale() const noexcept { return std::span{queue_}.subspan(done_); }
-  /// The first `count` stale bricks are up to date.
+  /// Marks the first `count` stale bricks as up to date.
   void finish(std::size_t count) {
     assert(count <= stale().size());
     for (const std::uint32_t number : stale().first(count)) {
@@ -84,9 +84,9 @@ class brick_uses {
     queue_.erase(queue_.begin(), queue_.begin() + static_cast<std::ptrdiff_t>(done_));
     done_ = 0;
   }
-  /// How many bricks there are.
+  /// Number of bricks.
   [[nodiscard]] std::size_t size() const noexcept { return index_.size(); }
-  /// Bytes on the heap. O(bricks).
+  /// Heap memory in bytes. O(bricks).
   [[nodiscard]] std::size_t bytes() const noexcept {
     std::size_t n = index_.memory_bytes() + bricks_.capacity() * sizeof(used_brick) +
                     (free_.capacity() + queue_.capacity()) * sizeof(std::uint32_t);
@@ -97,7 +97,7 @@ class brick_uses {
  private:
   hash_index index_;
   std::vector<used_brick> bricks_;
-  std::vector<std::uint32_t> free_;   ///< numbers that are not in use
+  std::vector<std::uint32_t> free_;   ///< unused numbers
   std::vector<std::uint32_t> queue_;  ///< numbers of stale bricks, from done_ on
   std::size_t done_ = 0;
 };

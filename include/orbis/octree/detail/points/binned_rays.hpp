@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The rays of a scan, sorted into cells of direction.
+/// Rays of a scan, sorted into cells of direction.
 #pragma once
 
 #include <algorithm>
@@ -18,15 +18,15 @@
 
 namespace orbis::octree::detail {
 
-/// A ray in its window: through (x, y, 1), to depth z; and which ray it is.
+/// A ray in its window: through (x, y, 1), to depth z; and the number of the ray.
 struct binned_ray {
   float x, y, z;
   std::uint32_t number;
 };
 static_assert(sizeof(binned_ray) == 16);
 
-/// The rays of one window: of its cells the deepest end, 0 where there is none, and which ray that is; where the rays
-/// of a cell begin among those that are sorted. `rays` are all of them by number.
+/// Rays of one window. Per cell: the deepest end (0 if the cell is empty), the number of its ray, and the start of the
+/// cell's rays among the sorted ones. `rays` are all rays by number.
 struct window_rays {
   const float* z = nullptr;
   const std::int32_t* deepest = nullptr;
@@ -36,19 +36,19 @@ struct window_rays {
   const binned_ray* sorted = nullptr;
 };
 
-/// The cells of the rays of a batch. `left_out`, bit i: ray i lies in no window.
+/// Cells of the rays of a batch. `left_out`, bit i: ray i is in no window.
 struct ray_places {
   alignas(64) std::array<std::uint32_t, ray_batch::capacity> cell;
   ray_batch::bits left_out;
   float max_z;
 };
 
-/// What place_rays needs to know about windows.
+/// Parameters of the windows for place_rays.
 struct window_tables {
   float3 origin{};
-  std::array<float3, 3> axes{};  ///< of the cube
+  std::array<float3, 3> axes{};  ///< axes of the cube
   float per_cell = 1;
-  std::uint32_t nowhere = 0;  ///< the cell of rays that are in none
+  std::uint32_t nowhere = 0;  ///< the cell of rays in no window
   alignas(64) std::array<float, 16> min_x{}, min_y{};
   alignas(64) std::array<float, 16> width{}, height{};
   alignas(64) std::array<std::int32_t, 16> stride{}, begin{};
@@ -71,8 +71,8 @@ struct window_tables {
   }
 };
 
-/// Places the first `count` rays of a batch: `out` gets them as they are in their windows, numbered from `first` on.
-/// There must be room for a multiple of 16.
+/// Places the first `count` rays of a batch: writes them to `out` in window coordinates, numbered from `first` on.
+/// `out` needs room for a multiple of 16.
 struct place_rays_kernel {
   template <simd::target Target>
   static ORBIS_ALWAYS_INLINE void run(const window_tables& t, const ray_batch& rays, std::size_t count,
@@ -128,11 +128,11 @@ struct place_rays_kernel {
 
 using place_kernel = void(const window_tables&, const ray_batch&, std::size_t, std::uint32_t, binned_ray*, ray_places&);
 
-/// Sorts the rays of a scan by the cells of its windows. Keeps its memory from scan to scan.
+/// Sorts the rays of a scan by the cells of its windows. Reuses its memory between scans.
 class binned_rays {
  public:
   static constexpr std::size_t most_rays = std::size_t{1} << 24U;
-  /// A cell takes no more rays from one worker, so that no voxel has to be tested against too many.
+  /// Maximum number of rays per cell and worker, which limits the rays to test per voxel.
   static constexpr std::uint32_t most_in_cell = 255;
 
   /// Begins a scan of `count` points, which `workers` threads add.
@@ -151,9 +151,9 @@ class binned_rays {
     }
     place_ = simd::kernel<place_rays_kernel, place_kernel>();
   }
-  /// Adds the rays of a batch of `count` points, from the scan's `first` on. Those that must be walked instead are what
-  /// remains in `rays`. For several workers at a time. @pre no other worker adds the points from `first` on to the next
-  /// multiple of 256
+  /// Adds the rays of a batch of `count` points, from the scan's `first` on. The rays that must be walked instead
+  /// remain in `rays`. Can be called by several workers at once. @pre no other worker adds the points from `first` on
+  /// to the next multiple of 256
   void add(std::size_t worker, ray_batch& rays, std::size_t first, std::size_t count) {
     ray_places places;
     const binned_ray* const placed = rays_.data() + first;
@@ -176,7 +176,7 @@ class binned_rays {
     }
     rays.keep(places.left_out);
   }
-  /// Sorts the rays that have been added: `range(worker)` are the points that each worker added.
+  /// Sorts the added rays: `range(worker)` returns the points that each worker added.
   template <execution_policy Policy, class Range>
   void sort(const Policy& policy, Range&& range) {
     begin_.resize(cells_ + 1);
@@ -209,7 +209,7 @@ class binned_rays {
   }
 
   [[nodiscard]] std::size_t size() const noexcept { return begin_[cells_]; }
-  /// How deep rays end at most.
+  /// Maximum depth of the rays' ends.
   [[nodiscard]] float max_z() const noexcept { return max_z_; }
   [[nodiscard]] window_rays window(const direction_window& w) const noexcept {
     return {z_.data() + w.begin, deepest_.data() + w.begin, begin_.data() + w.begin, w.stride, rays_.data(),
@@ -226,10 +226,10 @@ class binned_rays {
 
  private:
   struct worker_bins {
-    /// Of each cell in one number: how many rays (8 bits), which is the deepest (24), how deep it is (32). The larger
-    /// number is the deeper ray. All zero between scans.
+    /// Per cell one packed number: the number of rays (8 bits), the index of the deepest one (24), and its depth (32).
+    /// The larger number is the deeper ray. All zero between scans.
     std::vector<std::uint64_t> bins;
-    std::vector<std::uint32_t> first;  ///< place of this worker's first ray in each cell
+    std::vector<std::uint32_t> first;  ///< position of this worker's first ray in each cell
     float max_z = 0.0F;
   };
 

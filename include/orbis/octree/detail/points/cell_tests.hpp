@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Which of the rays in some cells of direction cross a voxel.
+/// Tests of the rays in cells of direction against a voxel.
 #pragma once
 
 #include <algorithm>
@@ -19,7 +19,7 @@
 
 namespace orbis::octree::detail {
 
-/// As sample_children_kernel, a cell's deepest ray standing for it.
+/// As sample_children_kernel, with a cell's deepest ray as its representative.
 struct sample_cells_kernel {
   template <simd::target Target>
   static ORBIS_ALWAYS_INLINE unsigned run(const depth_scene& s, const window_rays& w, const child_offsets& o,
@@ -37,7 +37,7 @@ struct sample_cells_kernel {
   }
 };
 
-/// As test_pixels_kernel, for the rays of a box of cells. `unsure` gets the numbers of rays.
+/// As test_pixels_kernel, for the rays of a box of cells. Appends numbers of rays to `unsure`.
 struct test_cells_kernel {
   template <simd::target Target>
   static ORBIS_ALWAYS_INLINE bool run(const depth_scene& s, const window_rays& w, const voxel_test& t,
@@ -45,7 +45,7 @@ struct test_cells_kernel {
     using floats = simd::native_vec<float, Target>;
     constexpr std::size_t n = floats::count;
     const float least_z = std::max(near_z, std::numeric_limits<float>::min());
-    // The first `count` rays from `from` on.
+    // Tests the first `count` rays from `from` on.
     const auto is_crossed = [&](const binned_ray* from, std::size_t count) ORBIS_INLINE_LAMBDA {
       const float* const p = &from->x;
       const floats a = floats::load(p), b = floats::load(p + n), c = floats::load(p + 2 * n);
@@ -62,7 +62,7 @@ struct test_cells_kernel {
         unsure.push_back(from[std::countr_zero(left)].number);
       return false;
     };
-    const auto copy = [](const binned_ray* from, binned_ray* to) ORBIS_INLINE_LAMBDA {  // n rays
+    const auto copy = [](const binned_ray* from, binned_ray* to) ORBIS_INLINE_LAMBDA {  // copies n rays
       const float* const p = &from->x;
       float* const q = &to->x;
       const floats a = floats::load(p), b = floats::load(p + n), c = floats::load(p + 2 * n);
@@ -73,7 +73,7 @@ struct test_cells_kernel {
     alignas(64) std::array<float, n> steps;
     for (std::size_t i = 0; i != n; ++i) steps[i] = static_cast<float>(i) * s.per_fx;
     const floats x_steps = floats::load(steps.data());
-    // The rays of a few cells wait until there are enough of them.
+    // Rays of sparse cells are buffered until a full vector is available.
     alignas(64) std::array<binned_ray, 2 * n> some;
     std::size_t waiting = 0;
     for (std::int32_t v = box.v0; v <= box.v1; ++v) {
@@ -85,7 +85,7 @@ struct test_cells_kernel {
         if (none(wanted)) continue;
         const floats x = x_steps + (static_cast<float>(u) - s.cx) * s.per_fx;
         std::uint64_t may = simd::bits(wanted & cells.may_cross(x, y, z));
-        while (may != 0) {  // cells that are neighbours together
+        while (may != 0) {  // contiguous cells together
           const auto first = static_cast<std::ptrdiff_t>(std::countr_zero(may));
           const auto after = first + static_cast<std::ptrdiff_t>(std::countr_one(may >> first));
           may &= ~std::uint64_t{0} << (after & 63) & (after == 64 ? 0 : ~std::uint64_t{0});
@@ -107,15 +107,15 @@ struct test_cells_kernel {
   }
 
  private:
-  /// Which cells of directions may hold rays that cross the voxel, see voxel_test::may_cross and test_rays. (x, y): the
-  /// middle of a cell, z: its deepest ray's.
+  /// Finds the cells of directions that may contain rays that cross the voxel, see voxel_test::may_cross and test_rays.
+  /// (x, y): centre of a cell, z: depth of its deepest ray.
   struct tile_test {
     const voxel_test& t;
     float3 spread{}, reach{}, width{};
     float length = 0;
 
     tile_test(const depth_scene& s, const voxel_test& test) noexcept : t{test} {
-      const float half = s.pixel_margin;  // of a cell, in cells, and something for rounding
+      const float half = s.pixel_margin;  // of a cell, in cells, with an allowance for rounding
       for (std::size_t i = 0; i != 3; ++i)
         spread[i] = half * (std::fabs(t.x_axis[i]) * s.per_fx + std::fabs(t.y_axis[i]) * s.per_fy);
       length = spread[0] + spread[1] + spread[2];
@@ -135,7 +135,7 @@ struct test_cells_kernel {
       auto may = V::mask_type::first(V::count);
       for (std::size_t i = 0; i != 3; ++i) {
         may = may & (ray.off(i, centre) <= multiply_add(t.outer_half, ray.width(i), loose + width[i]));
-        // Nor may all rays end before the voxel.
+        // Not all rays may end before the voxel.
         may = may & (multiply_add(z, ray.direction[i] + spread[i], close - centre[i]) + t.before[i] >= 0.0F);
       }
       return may;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The voxels that many rays of a point cloud cross, found voxel by voxel instead of ray by ray.
+/// Finds the voxels that many rays of a point cloud cross, voxel by voxel instead of ray by ray.
 #pragma once
 
 #include <algorithm>
@@ -27,7 +27,7 @@
 
 namespace orbis::octree::detail {
 
-/// One window of a scan as the descent sees it.
+/// One window of a scan, prepared for the descent.
 struct window_frame : view_frame {
   using sample_kernel = unsigned(const depth_scene&, const window_rays&, const child_offsets&, const float3&,
                                  const children&, unsigned);
@@ -39,7 +39,7 @@ struct window_frame : view_frame {
   depth_sensor sensor{voxel_grid{1.0}, se3{}, 0.0};
   window_rays rays;
 
-  /// @pre there are rays in the window
+  /// Sets the window and its rays. @pre there are rays in the window
   void set_window(const direction_window& w, float cell, const window_rays& of) {
     rays = of;
     for (std::size_t i = 0; i != 3; ++i) sensor.pose.rows[i] = {w.axes[0][i], w.axes[1][i], w.axes[2][i]};
@@ -48,16 +48,16 @@ struct window_frame : view_frame {
     set_view(sensor,
              {focal, focal, -w.min_x * focal - 0.5F, -w.min_y * focal - 0.5F, w.width, w.height, w.min_x,
               w.min_x + static_cast<float>(w.width) * cell, w.min_y, w.min_y + static_cast<float>(w.height) * cell});
-    // A cell's rays are anywhere in it, not in its middle.
+    // A cell's rays can be anywhere in it.
     scene.pixel_margin += 0.5F + 4e-6F * focal;
     scene.tiles = {2.05F, 4.1F, 8.2F};
     set_spacing(half_diagonal());
   }
-  /// How far from the middle of its cell a ray may be, in cells.
+  /// Maximum distance in cells of a ray from the centre of its cell.
   [[nodiscard]] float room() const noexcept { return 0.51F + 4e-6F * scene.fx; }
 };
 
-/// The rays of a window for the descent, see depth_rays. `EndOf`: the ray_endpoint of a ray.
+/// Rays of a window for the descent, see depth_rays. `EndOf`: returns the ray_endpoint of a ray.
 template <class EndOf>
 struct cell_rays {
   const window_frame& frame;
@@ -80,11 +80,11 @@ struct cell_rays {
   }
 };
 
-/// Collects the rays of a scan and marks their voxels. Keeps its memory from scan to scan.
+/// Collects the rays of a scan and marks their voxels. Reuses its memory between scans.
 class dense_rays {
  public:
-  /// Looks at a sample of the scan's points, and says whether there are so many rays for its voxels that this is the
-  /// way to mark them. Nothing is done otherwise. O(1). `limit`: how far rays go at most, metres
+  /// Decides from a sample of the scan's points if the rays are dense enough for this method, and prepares it if so.
+  /// O(1). `limit`: maximum length of rays, metres
   template <class Point>
   [[nodiscard]] bool plan(const voxel_grid& grid, const float3& origin, std::size_t count, Point&& point,
                           double limit) {
@@ -95,18 +95,17 @@ class dense_rays {
     windows_.fit(sample_, rays, cell_edge * grid.resolution() / sample_.length, fewest_in_cell, most_in_cell);
     return is_worthwhile(grid.resolution());
   }
-  /// Begins a scan that is planned, and that `workers` threads add.
+  /// Begins a planned scan, which `workers` threads add.
   void start(const float3& origin, std::size_t count, std::size_t workers) {
     rays_.start(windows_, origin, count, workers);
   }
-  /// See binned_rays::add.
+  /// Adds the rays of a batch, see binned_rays::add.
   void add(std::size_t worker, ray_batch& rays, std::size_t first, std::size_t count) {
     rays_.add(worker, rays, first, count);
   }
-  /// Marks the voxels of the rays that have been added, except that voxels for which `saturated` says that a miss would
-  /// not change them may be missing, see depth_integrator::mark, and those that are occupied in `masks`. False, and
-  /// nothing is marked, if rays come too close to the border of the grid. `end_of(i)`: the ray_endpoint of the i-th
-  /// point.
+  /// Marks the voxels of the added rays. Voxels that a miss would not change according to `saturated` may be missing,
+  /// see depth_integrator::mark, as may those that are occupied in `masks`. Returns false, and marks nothing, if rays
+  /// come too close to the border of the grid. `end_of(i)`: the ray_endpoint of the i-th point.
   template <execution_policy Policy, class Range, class EndOf, class Saturated>
   [[nodiscard]] bool mark(const Policy& policy, const depth_sensor& sensor, Range&& range, const EndOf& end_of,
                           scan_masks& masks, const Saturated& saturated) {
@@ -145,8 +144,8 @@ class dense_rays {
  private:
   static constexpr std::size_t fewest_rays = 4096;
   static constexpr std::size_t most_sampled = 1024;
-  static constexpr double cell_edge = 0.25;                           ///< of a cell where rays end, in voxels
-  static constexpr double fewest_in_cell = 2.0, most_in_cell = 16.0;  ///< rays in a cell, on average
+  static constexpr double cell_edge = 0.25;  ///< edge in voxels of a cell at the ends of the rays
+  static constexpr double fewest_in_cell = 2.0, most_in_cell = 16.0;  ///< average number of rays per cell
 
   template <class EndOf>
   void walk_first_steps(const depth_sensor& sensor, const EndOf& end_of, scan_masks& masks) const {
@@ -166,10 +165,11 @@ class dense_rays {
     }
     around.mark(masks);
   }
-  /// Nanoseconds for a ray, as measured. A walk costs as much for each plane of voxels that the ray crosses. Here a ray
-  /// costs something in itself, and the fewer rays there are for a voxel, the more voxels must be tested one by one.
+  /// Compares measured costs in nanoseconds per ray. A walk has a constant cost per plane of voxels that the ray
+  /// crosses. This method has a constant cost per ray; the fewer rays per voxel, the more voxels must be tested
+  /// individually.
   [[nodiscard]] bool is_worthwhile(double voxel) const {
-    const double planes = sample_.length / voxel, apart = windows_.spacing * planes;  // apart: voxels, where rays end
+    const double planes = sample_.length / voxel, apart = windows_.spacing * planes;  // apart: voxels, at the ends
     return 6.0 + 1000.0 * apart * apart < 20.0 + 0.5 * planes;
   }
   template <class Point>

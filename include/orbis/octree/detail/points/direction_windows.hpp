@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The directions of a scan's rays, as windows on the faces of a cube around its origin.
+/// Directions of a scan's rays, as windows on the faces of a cube around its origin.
 #pragma once
 
 #include <algorithm>
@@ -17,39 +17,39 @@
 
 namespace orbis::octree::detail {
 
-/// A window on one face of the cube |x|, |y|, |z| <= 1, cut into square cells. Face 2 i is on the positive side of the
-/// cube's i-th axis, face 2 i + 1 on the negative one. Seen from the middle, z is the way to the face.
+/// A window on one face of the cube |x|, |y|, |z| <= 1, divided into square cells. Face 2 i is on the positive side of
+/// the cube's i-th axis, face 2 i + 1 on the negative one. The window's z axis points from the centre to the face.
 struct direction_window {
-  static constexpr std::int32_t padding = 16;  ///< empty cells after a row, at least
+  static constexpr std::int32_t padding = 16;  ///< minimum number of empty cells after a row
 
   std::array<float3, 3> axes{};  ///< x, y and z of the window, in the world
-  float min_x = 0, min_y = 0;    ///< where the first cell begins, at z = 1
+  float min_x = 0, min_y = 0;    ///< start of the first cell, at z = 1
   std::int32_t width = 0, height = 0;
-  std::int32_t stride = 0;  ///< from row to row
+  std::int32_t stride = 0;  ///< offset between rows
   std::uint32_t begin = 0;  ///< number of the first cell
 };
 
-/// What is known of some rays of a scan: those of a sample of its points.
+/// Statistics of the rays of a sample of a scan's points.
 struct sampled_rays {
   std::vector<vec3> directions;  ///< of length 1
   double length = 0.0;           ///< mean, metres
 };
 
-/// Windows that hold nearly all of a scan's rays. The cube is turned so that the rays of a camera, if they are, go
-/// through the middle of one face, along its sides.
+/// Windows that contain nearly all of a scan's rays. The cube is rotated so that the rays of a camera pass through the
+/// middle of one face, with the image sides parallel to its sides.
 struct direction_windows {
   static constexpr std::size_t faces = 6;
   static constexpr std::uint32_t most_cells = 1U << 22U;
 
   std::array<direction_window, faces> window{};
-  double spacing = 1;       ///< of the rays, at z = 1, if they are spread evenly over the windows
+  double spacing = 1;       ///< spacing of the rays at z = 1, if they are spread evenly over the windows
   float cell = 1;           ///< edge of a cell, at z = 1
-  std::uint32_t cells = 0;  ///< of all windows
+  std::uint32_t cells = 0;  ///< number of cells of all windows
 
-  /// Chooses windows for `count` rays of which a sample is known, with cells of edge `wanted` (at z = 1) or, where
-  /// these would hold few rays or many, such that they hold `fewest` or `most` on average. O(sample)
+  /// Chooses windows for `count` rays, based on a sample. The cells have edge `wanted` (at z = 1), adjusted so that
+  /// they contain between `fewest` and `most` rays on average. O(sample)
   void fit(const sampled_rays& sample, std::size_t count, double wanted, double fewest, double most) {
-    const mat3 turned = turn(sample.directions);
+    const mat3 turned = cube_rotation(sample.directions);
     std::array<float3, 3> axes;  // of the cube, in the world
     for (int i = 0; i != 3; ++i)
       for (int k = 0; k != 3; ++k)
@@ -72,7 +72,7 @@ struct direction_windows {
     float longest = 0.0F;
     for (box& b : boxes) {
       if (b.rays == 0) continue;
-      // The sample may miss what is furthest aside.
+      // The sample may miss the outermost rays.
       const float room = 1e-3F + 0.01F * std::max(b.x1 - b.x0, b.y1 - b.y0);
       b = {std::max(b.x0 - room, -1.0F), std::min(b.x1 + room, 1.0F), std::max(b.y0 - room, -1.0F),
            std::min(b.y1 + room, 1.0F), b.rays};
@@ -103,13 +103,13 @@ struct direction_windows {
       cells += static_cast<std::uint32_t>(w.stride) * static_cast<std::uint32_t>(w.height) + direction_window::padding;
     }
   }
-  /// The cube's axes that are x and y on the faces of an axis.
+  /// Cube axes that are x and y on the faces of an axis.
   [[nodiscard]] static constexpr int axis_x(int axis) noexcept { return axis == 0 ? 1 : 0; }
   [[nodiscard]] static constexpr int axis_y(int axis) noexcept { return axis == 2 ? 1 : 2; }
 
  private:
-  /// From the world to the cube. Rays all around: any will do.
-  [[nodiscard]] static mat3 turn(const std::vector<vec3>& directions) {
+  /// Rotation from the world to the cube; arbitrary for rays in all directions.
+  [[nodiscard]] static mat3 cube_rotation(const std::vector<vec3>& directions) {
     vec3 mean = zeros<vec3>();
     mat3 moments = zeros<mat3>();
     for (const vec3& d : directions) {
@@ -118,11 +118,11 @@ struct direction_windows {
     }
     if (!(norm(mean) > 0.6 * static_cast<double>(directions.size()))) return identity<mat3>();
     mean.normalize();
-    // Across the mean the rays spread furthest along a side of the image.
+    // Perpendicular to the mean, the rays have their largest spread along a side of the image.
     const mat3 across = identity<mat3>() - mean * transposed(mean);
     const symmetric_eigen<3> spread = eigen_of_symmetric<3>(across * moments * across);
     vec3 x = across * column_of(spread.vectors, 2);
-    if (squared_norm(x) < 0.5) x = mean.unitOrthogonal();  // rays that go the same way up to rounding: any side will do
+    if (squared_norm(x) < 0.5) x = mean.unitOrthogonal();  // parallel rays up to rounding: any side will do
     x.normalize();
     mat3 turned;
     turned << transposed(x), transposed(cross(mean, x)), transposed(mean);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Rays to points, cut off at a maximum range, many at a time.
+/// Rays to points, limited to a maximum range, computed in batches.
 #pragma once
 
 #include <array>
@@ -16,8 +16,7 @@
 
 namespace orbis::octree::detail {
 
-/// The ray from `origin` to a point, cut off at `limit` metres. @pre the point lies further away, at
-/// `distance`; limit >= 0
+/// Limits the ray from `origin` to a point to `limit` metres. @pre the point is further away, at `distance`; limit >= 0
 [[nodiscard]] inline float3 cut_off(const float3& origin, const float3& ray, double distance, double limit) noexcept {
   const auto scale = static_cast<float>(distance), range = static_cast<float>(limit);
   float3 end;
@@ -25,7 +24,7 @@ namespace orbis::octree::detail {
   return end;
 }
 
-/// Some rays: their ends, and how many voxels away along each axis these are from the origin's voxel.
+/// A batch of rays: their ends, and the offsets of the ends' voxels from the origin's voxel along each axis.
 struct ray_batch {
   static constexpr std::size_t capacity = point_batch::capacity;
   static constexpr std::size_t lanes = 8;
@@ -34,7 +33,7 @@ struct ray_batch {
   alignas(64) std::array<std::array<float, capacity>, 3> end{};
   alignas(64) std::array<std::array<std::int32_t, capacity>, 3> way{};
   bits hit{};  ///< bit i: ray i ends at a point
-  bits cut{};  ///< bit i: ray i is cut off; neither: there is no ray i
+  bits cut{};  ///< bit i: ray i is limited; if neither bit is set, there is no ray i
 
   void set(std::size_t i, const float3& to, const std::array<std::int32_t, 3>& cells, bool is_hit) noexcept {
     for (std::size_t axis = 0; axis != 3; ++axis) {
@@ -44,14 +43,14 @@ struct ray_batch {
     (is_hit ? hit : cut)[i >> 6U] |= std::uint64_t{1} << (i & 63U);
   }
   void clear() noexcept { hit = cut = {}; }
-  /// Takes out all rays but those of `left`.
+  /// Removes all rays except those of `left`.
   void keep(const bits& left) noexcept {
     for (std::size_t w = 0; w != left.size(); ++w) {
       hit[w] &= left[w];
       cut[w] &= left[w];
     }
   }
-  /// Eight bits from bit i on. @pre i is a multiple of eight
+  /// Returns eight bits from bit i on. @pre i is a multiple of eight
   [[nodiscard]] static std::uint32_t eight(const bits& b, std::size_t i) noexcept {
     return static_cast<std::uint32_t>(b[i >> 6U] >> (i & 63U)) & 0xffU;
   }
@@ -62,14 +61,14 @@ struct ray_batch {
   }
 };
 
-/// The rays of a batch from ray `i` on, as many as a vector holds. @pre i is a multiple of that
+/// One vector of rays of a batch from ray `i` on. @pre i is a multiple of the vector size
 template <simd::target Target>
 struct ray_lanes {
   using floats = simd::native_vec<float, Target>;
   using integers = simd::native_vec<std::int32_t, Target>;
   using mask = typename floats::mask_type;
   std::array<floats, 3> ray;  ///< from the origin to the end
-  mask leaves;                ///< that end outside the origin's voxel; the others visit nothing
+  mask leaves;                ///< rays that end outside the origin's voxel; the others visit no voxel
 
   ORBIS_ALWAYS_INLINE ray_lanes(const ray_batch& rays, const float3& origin, std::size_t i) noexcept {
     for (std::size_t axis = 0; axis != 3; ++axis)
@@ -79,18 +78,18 @@ struct ray_lanes {
     leaves = mask::from_bits(there & ((std::uint64_t{1} << floats::count) - 1)) &
              simd::mask_as<4>((way(0) | way(1) | way(2)) != integers(0));
   }
-  /// How far the rays reach along an axis; up to rounding.
+  /// Extent of the rays along an axis, up to rounding.
   [[nodiscard]] ORBIS_ALWAYS_INLINE floats along(const float3& a) const noexcept {
     return simd::approximate_multiply_add(floats(a[0]), ray[0],
                                           simd::approximate_multiply_add(floats(a[1]), ray[1], floats(a[2]) * ray[2]));
   }
 };
 
-/// The grid, and where the rays start.
+/// The grid, and the origin of the rays.
 struct ray_frame {
   const voxel_grid& grid;
   float3 origin;
-  voxel_key from;  ///< voxels are counted from here
+  voxel_key from;  ///< offsets of voxels are relative to this one
 };
 
 struct limit_rays_kernel {
@@ -108,7 +107,7 @@ struct limit_rays_kernel {
     const double per_metre = 1.0 / f.grid.resolution(), half = 0.5 * f.grid.cells();
     const auto per_metre_f = static_cast<float>(per_metre), half_f = static_cast<float>(half);
     const doubles limit(max_range);
-    constexpr double less = 1.0 - 0x1p-50;  // than one by more than the rounding of a square and of a root
+    constexpr double less = 1.0 - 0x1p-50;  // below one by more than the rounding of a square and of a root
     for (std::size_t i = 0; i < count; i += n) {
       const auto along = [&](std::size_t axis)
                              ORBIS_INLINE_LAMBDA { return floats::load(at[axis] + i) - floats(f.origin[axis]); };
@@ -141,7 +140,8 @@ struct limit_rays_kernel {
   }
 };
 
-/// The hits of a batch whose voxel is not that of the ray before: neighbouring points mostly end in the same one.
+/// Finds the hits of a batch whose voxel differs from that of the previous ray; neighbouring points mostly end in the
+/// same voxel.
 struct fresh_hits_kernel {
   template <simd::target Target>
   static ORBIS_ALWAYS_INLINE void run(const ray_batch& rays, std::size_t count, ray_batch::bits& fresh) noexcept {
@@ -153,7 +153,7 @@ struct fresh_hits_kernel {
         const std::int32_t* const way = rays.way[axis].data() + i;
         return integers::load(way) ^ integers::load(way - 1);
       };
-      std::uint64_t changed = (std::uint64_t{1} << n) - 1;  // the first have none before them
+      std::uint64_t changed = (std::uint64_t{1} << n) - 1;  // the first rays have no predecessor
       if (i != 0) changed = simd::bits((differs(0) | differs(1) | differs(2)) != integers(0));
       fresh[i >> 6U] |= changed << (i & 63U);
     }
@@ -174,7 +174,7 @@ using fresh_kernel = void(const ray_batch&, std::size_t, ray_batch::bits&);
 
 using limit_kernel = void(const ray_frame&, const point_batch&, double, std::size_t, ray_batch&);
 
-/// Finds the rays to `count` points, cut off at a limit in metres. To an end that lies outside the grid there is none.
+/// Computes the rays to `count` points, limited to a length in metres. There is no ray to an end outside the grid.
 /// @pre points can be read up to a multiple of 16; the limit is not negative
 [[nodiscard]] inline limit_kernel* limit_rays() noexcept { return simd::kernel<limit_rays_kernel, limit_kernel>(); }
 

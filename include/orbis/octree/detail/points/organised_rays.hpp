@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The voxels that the rays of an organised point cloud cross: one whose points are the pixels of a depth image, in
-/// their order, though nobody has said so. They are found as those of the depth image are.
+/// Finds the voxels that the rays of an organised point cloud cross. The points of such a cloud are the pixels of a
+/// depth image in their order; this is detected from the points. The voxels are found as for the depth image.
 #pragma once
 
 #include <algorithm>
@@ -26,26 +26,26 @@
 
 namespace orbis::octree::detail {
 
-/// The image that rays are placed in.
+/// Image in which rays are placed.
 struct pixel_placement {
   static constexpr std::int32_t nowhere = -1;
 
   float3 origin{};
   std::array<float3, 3> axes{};  ///< x, y and z of the camera, in the world
   float fx = 1, fy = 1, cx = 0, cy = 0;
-  float last_u = 0, last_v = 0;    ///< the last column and row
-  float error_u = 0, error_v = 0;  ///< how far from the middle of its pixel a ray may be
-  float far = 0;                   ///< rays that end deeper are better walked: the voxels around them have no others
+  float last_u = 0, last_v = 0;    ///< last column and row
+  float error_u = 0, error_v = 0;  ///< maximum distance of a ray from the centre of its pixel
+  float far = 0;  ///< rays that end deeper are walked, because the voxels around them have no other rays
   std::int32_t stride = 0;
 };
 
-/// The pixels of the rays of a batch, as row * stride + column, and the depths at which the rays end. `left_out`, bit
-/// i: ray i lies in the middle of no pixel, or ends too far away.
+/// Pixels of the rays of a batch, as row * stride + column, and the depths at which the rays end. `left_out`, bit i:
+/// ray i is not at the centre of a pixel, or ends too far away.
 struct pixel_places {
   alignas(64) std::array<std::int32_t, ray_batch::capacity> pixel;
   alignas(64) std::array<float, ray_batch::capacity> z;
   ray_batch::bits left_out;
-  struct bounds {  ///< of those that are placed; max_z = 0: there are none
+  struct bounds {  ///< of the placed rays; max_z = 0: none
     float max_z = 0.0F;
     float u0 = std::numeric_limits<float>::infinity(), u1 = -u0, v0 = u0, v1 = u1;
 
@@ -96,23 +96,23 @@ struct place_in_pixels_kernel {
 
 using place_in_pixels = void(const pixel_placement&, const ray_batch&, std::size_t, pixel_places&);
 
-/// Collects the rays of a scan and marks their voxels. Keeps its memory from scan to scan.
+/// Collects the rays of a scan and marks their voxels. Reuses its memory between scans.
 class organised_rays {
  public:
-  /// Whether the scan's points are the pixels of a depth image that has so many of them for its voxels that this is the
-  /// way to mark them. Nothing is done otherwise. O(1). `limit`: how far rays go at most, metres
+  /// Decides if the scan's points are the pixels of a depth image that is dense enough for this method, and prepares it
+  /// if so. O(1). `limit`: maximum length of rays, metres
   template <class Point>
   [[nodiscard]] bool plan(const voxel_grid& grid, const float3& origin, std::size_t count, Point&& point,
                           double limit) {
     if (count < fewest_rays || count > most_rays || !fit_.fit(origin, count, point, limit)) return false;
     voxel_ = grid.resolution();
-    // Where pixels have no points, here and there, those that have are further apart; holes are less bad. With few of
-    // them dense_rays does better, whose cells hold several rays.
+    // If scattered pixels have no points, the remaining ones are further apart; contiguous holes matter less. For
+    // sparse images dense_rays is better, because its cells contain several rays.
     if (fit_.filled() < 0.4) return false;
     const double filled = std::min(1.0, 1.25 * fit_.filled());
     return depth_frame::is_dense(fit_.mean_z(), voxel_, focal() * std::sqrt(filled));
   }
-  /// Begins a scan that is planned, and that `workers` threads add.
+  /// Begins a planned scan, which `workers` threads add.
   void start(const float3& origin, std::size_t count, std::size_t workers) {
     const camera::pinhole& camera = fit_.camera();
     frame_.ends.lay_out(camera.width(), camera.height());
@@ -139,8 +139,8 @@ class organised_rays {
     numbers_.resize(frame_.ends.ends().size());
     place_ = simd::kernel<place_in_pixels_kernel, place_in_pixels>();
   }
-  /// Adds the rays of a batch of `count` points, from the scan's `first` on. Those that must be walked instead are what
-  /// remains in `rays`. For several workers at a time.
+  /// Adds the rays of a batch of `count` points, from the scan's `first` on. The rays that must be walked instead
+  /// remain in `rays`. Can be called by several workers at once.
   void add(std::size_t worker, ray_batch& rays, std::size_t first, std::size_t count) {
     pixel_places places;
     place_(placement_, rays, count, places);
@@ -149,10 +149,10 @@ class organised_rays {
     within_[worker].add(places.within);
     rays.keep(places.left_out);
   }
-  /// Marks the voxels of the rays that have been added, except that voxels for which `saturated` says that a miss would
-  /// not change them may be missing, see depth_integrator::mark, and those that are occupied in `masks`. False, and
-  /// nothing is marked, if rays come too close to the border of the grid, or if there are many for the same pixels.
-  /// `end_of(i)`: the ray_endpoint of the i-th point. (Called as dense_rays::mark is, which asks for ranges.)
+  /// Marks the voxels of the added rays. Voxels that a miss would not change according to `saturated` may be missing,
+  /// see depth_integrator::mark, as may those that are occupied in `masks`. Returns false, and marks nothing, if rays
+  /// come too close to the border of the grid, or if many rays share a pixel. `end_of(i)`: the ray_endpoint of the i-th
+  /// point. (Has the signature of dense_rays::mark, which uses the ranges.)
   template <execution_policy Policy, class Range, class EndOf, class Saturated>
   [[nodiscard]] bool mark(const Policy& policy, const depth_sensor& scan, Range&&, const EndOf& end_of,
                           scan_masks& masks, const Saturated& saturated) {
@@ -196,19 +196,19 @@ class organised_rays {
  private:
   static constexpr std::size_t fewest_rays = 4096, most_rays = std::size_t{1} << 24U;
 
-  /// The smaller one decides how far rays are apart.
+  /// The smaller focal length determines the largest distance between rays.
   [[nodiscard]] double focal() const { return std::min(fit_.camera().k().fx, fit_.camera().k().fy); }
-  /// What the errors of rays come to beyond those that depth_scene allows for, which are 10 u |c|_1 for the rounding of
-  /// points, not to be counted twice, and 19 u |c|_1 that are left over. A ray may be off along x and along y, sqrt(2)
-  /// times the error in all, and floats that say so are wrong by some 7 u, and by the rounding of cx and cy.
+  /// Error of rays beyond the allowance of depth_scene. That allowance includes 10 u |c|_1 for the rounding of points,
+  /// not to be counted twice, and 19 u |c|_1 in reserve. A ray may deviate along x and along y, so by sqrt(2) times the
+  /// error in total; the float coordinates have errors of about 7 u, plus the rounding of cx and cy.
   [[nodiscard]] float ray_error() const {
     constexpr double u = 0x1p-24;
     const auto& k = fit_.camera().k();
     const double centre = std::max(k.cx / k.fx, k.cy / k.fy);
     return static_cast<float>(std::max(0.0, 1.5 * fit_.error() + (7.0 + 3.0 * centre - 29.0) * u));
   }
-  /// Cuts off the columns and rows around the image that no ray has been placed in, and says which pixel is the first
-  /// one then.
+  /// Crops the image to the columns and rows in which rays were placed. Returns the number of the pixel that becomes
+  /// the first one.
   std::uint32_t crop(const pixel_places::bounds& b) {
     camera::intrinsics k = fit_.camera().k();
     k.width = static_cast<int>(b.u1 - b.u0) + 1;
@@ -220,7 +220,8 @@ class organised_rays {
     frame_.ends.crop(camera::pinhole{k}, first);
     return first;
   }
-  /// The depth and the number of each pixel's first ray; `second_` gets the other rays. A thread for each band of rows.
+  /// Stores the depth and the number of each pixel's first ray; further rays go to `second_`. One thread per band of
+  /// rows.
   template <class Policy>
   void fill_image(const Policy& policy) {
     const std::span<float> ends = frame_.ends.ends();
@@ -266,11 +267,11 @@ class organised_rays {
   se3 pose_;
   pixel_placement placement_;
   place_in_pixels* place_ = nullptr;
-  std::vector<std::int32_t> pixel_;                 ///< of each ray
-  std::vector<float> z_;                            ///< at which it ends
-  std::vector<pixel_places::bounds> within_;        ///< of each worker's rays
-  std::vector<std::uint32_t> numbers_;              ///< of each pixel's ray, where it has one
-  std::vector<std::vector<std::uint32_t>> second_;  ///< of each band of rows: further rays of pixels that have one
+  std::vector<std::int32_t> pixel_;                 ///< pixel of each ray
+  std::vector<float> z_;                            ///< depth of its end
+  std::vector<pixel_places::bounds> within_;        ///< bounds of each worker's rays
+  std::vector<std::uint32_t> numbers_;              ///< number of each pixel's ray, if it has one
+  std::vector<std::vector<std::uint32_t>> second_;  ///< per band of rows: further rays of pixels that have one
   std::vector<descent_worker> workers_;
 };
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The camera that the points of a cloud were seen with, found from the points.
+/// Estimation of the camera with which the points of a cloud were measured.
 #pragma once
 
 #include <algorithm>
@@ -22,15 +22,15 @@
 
 namespace orbis::octree::detail {
 
-/// Finds the rotation and the intrinsics of a pinhole camera whose pixels the points of a cloud are, pixel by pixel
-/// along the rows or along the columns of the image; pixels may be missing, also whole rows. The camera's centre is
-/// known. Points on one row lie in a plane with the centre, so the rows give the x axis; then that pixels are equally
-/// far apart at z = 1 gives the z axis and the spacing. What that gives is refined by least squares (Gauss-Newton).
-/// Looks at about a thousand points, whatever the cloud's size. Keeps its memory.
+/// Estimates the rotation and the intrinsics of a pinhole camera from a cloud whose points are its pixels, in order
+/// along the rows or the columns of the image; pixels may be missing, including whole rows. The camera's centre is
+/// known. Points of one row lie in a plane through the centre, so the rows determine the x axis; the constant distance
+/// between pixels at z = 1 then determines the z axis and the spacing. The result is refined by least squares
+/// (Gauss-Newton). Reads about a thousand points, independent of the cloud's size. Reuses its memory.
 class pinhole_fit {
  public:
-  /// Whether the points were seen by such a camera, but for a few. `point(i)`: the i-th of `count` points as float3;
-  /// `limit`: how far rays go at most, metres.
+  /// Fits the camera. Returns true if nearly all points are consistent with it. `point(i)`: the i-th of `count` points
+  /// as float3; `limit`: maximum length of rays, metres.
   template <class Point>
   [[nodiscard]] bool fit(const float3& origin, std::size_t count, Point&& point, double limit) {
     if (count < most_runs * run_length) return false;
@@ -39,20 +39,20 @@ class pinhole_fit {
     };
     if (!take_runs(count, direction) || !find_x_axis() || !find_columns() || !find_rows()) return false;
     find_center();
-    // What is far aside may be out by a pixel at first.
+    // Pixel numbers far from the centre may initially be wrong by one.
     for (int step = 0; step != 4; ++step)
       if ((step % 2 == 0 && !number_pixels()) || !refine()) return false;
-    return set_image(count) && set_error() && holds(count, direction);
+    return set_image(count) && set_error() && verify(count, direction);
   }
 
   [[nodiscard]] const camera::pinhole& camera() const noexcept { return camera_; }
   /// R_world_camera.
   [[nodiscard]] so3 rotation() const { return so3{mat3(transposed(axes_))}; }
-  /// How far the rays of the points may be from those of their pixels, at z = 1, along x and along y.
+  /// Maximum deviation of the rays of points from those of their pixels, at z = 1, along x and along y.
   [[nodiscard]] double error() const noexcept { return error_; }
-  /// About which share of the image's pixels have points, the image being no larger than it must be.
+  /// Approximate share of the image's pixels with points, for the smallest possible image.
   [[nodiscard]] double filled() const noexcept { return filled_; }
-  /// How deep rays end on average, metres.
+  /// Mean depth of the rays' ends, metres.
   [[nodiscard]] double mean_z() const noexcept { return mean_z_; }
   [[nodiscard]] std::size_t memory_bytes() const noexcept {
     return runs_.capacity() * sizeof(run) + gaps_.capacity() * sizeof(double) + pixels_.capacity() * sizeof(pixel);
@@ -60,26 +60,26 @@ class pinhole_fit {
 
  private:
   static constexpr std::size_t most_runs = 128, run_length = 8;
-  static constexpr double straight = 1e-5;    ///< radians by which the points of a row may be off its plane
-  static constexpr double most_error = 1e-5;  ///< of rays, at z = 1
+  static constexpr double straight = 1e-5;    ///< maximum angle in radians between the points of a row and its plane
+  static constexpr double most_error = 1e-5;  ///< maximum error of rays, at z = 1
   static constexpr int widest = 4096;         ///< pixels
   static constexpr double widest_slope = 4.0;
 
-  /// Points that follow each other in the cloud, in a row of the image.
+  /// Consecutive points of the cloud in one row of the image.
   struct run {
-    std::array<vec3, run_length> d;  ///< of length 1
+    std::array<vec3, run_length> d;  ///< unit vectors
     vec3 normal;
-    double length;                    ///< of the first ray, metres
-    double x_gap = 0.0, x_way = 0.0;  ///< at z = 1: the least way from a point to the next; from the first to the last
+    double length;                    ///< length of the first ray, metres
+    double x_gap = 0.0, x_way = 0.0;  ///< at z = 1: smallest distance between neighbours; from the first to the last
     double y = 0.0;
   };
-  /// A ray, and the pixel that it is.
+  /// A ray and its pixel.
   struct pixel {
     vec3 d;
     double u, v;
   };
 
-  /// Runs that lie in one row each, all over the cloud.
+  /// Collects runs within single rows, from the whole cloud.
   template <class Direction>
   bool take_runs(std::size_t count, const Direction& direction) {
     runs_.clear();
@@ -113,7 +113,7 @@ class pinhole_fit {
       if (!(std::fabs(dot(r.normal, r.d[i])) < straight)) return false;
     return true;
   }
-  /// The x axis lies in the planes of all rows.
+  /// Finds the x axis, which lies in the planes of all rows.
   bool find_x_axis() {
     mat3 moments = zeros<mat3>();
     vec3 mean = zeros<vec3>();
@@ -131,7 +131,7 @@ class pinhole_fit {
     axes_ = rows(x, cross(z, x), z);
     return project();
   }
-  /// Works out where the runs are at z = 1; forgets those that are not in front of the camera.
+  /// Projects the runs to z = 1; removes those that are not in front of the camera.
   bool project() {
     std::erase_if(runs_, [&](run& r) {
       std::array<double, run_length> x;
@@ -149,8 +149,8 @@ class pinhole_fit {
     });
     return runs_.size() >= most_runs / 4;
   }
-  /// The way from column to column, and the z axis: if it is turned by t about x, a row that is seen at y has
-  /// its points (cos t - y sin t) as far apart as they are at z = 1.
+  /// Finds the column spacing and the z axis: if the z axis is rotated by t about x, a row seen at y has its points
+  /// (cos t - y sin t) times as far apart as at z = 1.
   bool find_columns() {
     gaps_.clear();
     for (const run& r : runs_) gaps_.push_back(r.x_gap);
@@ -164,7 +164,7 @@ class pinhole_fit {
       for (const run& r : runs_) {
         const double want = a + b * r.y, steps = std::round(r.x_way / want);
         if (!(std::fabs(r.x_gap - want) < close * want) || !(steps >= 1.0 && steps < 1e3)) continue;
-        // From the first loop on it is known how many steps there are to the last point.
+        // From the second iteration on, the number of steps to the last point is known.
         const double n = close > 0.1 ? 1.0 : steps, gap = close > 0.1 ? r.x_gap : r.x_way / steps;
         if (!(std::fabs(gap - want) < close * want)) continue;
         ++used;
@@ -187,7 +187,7 @@ class pinhole_fit {
     fx_ = 1.0 / std::hypot(a, b);
     return project();
   }
-  /// The way from row to row: the largest of which all ways between rows are multiples.
+  /// Finds the row spacing: the largest length of which all distances between rows are multiples.
   bool find_rows() {
     std::sort(runs_.begin(), runs_.end(), [](const run& a, const run& b) { return a.y < b.y; });
     gaps_.clear();
@@ -203,7 +203,7 @@ class pinhole_fit {
         double n = 0.0, sum = 0.0;
         for (const double gap : gaps_) {
           const double steps = std::round(gap / step);
-          if (steps > 40.0) continue;  // so many cannot be counted yet
+          if (steps > 40.0) continue;  // too many steps to count reliably yet
           ++tried;
           if (std::fabs(gap / step - steps) > close) continue;
           ++good;
@@ -220,7 +220,7 @@ class pinhole_fit {
     }
     return false;
   }
-  /// Lets the point that is nearest to the axis be in the middle of pixel (0, 0).
+  /// Places the point nearest to the axis at the centre of pixel (0, 0).
   void find_center() {
     double least = 1e30;
     for (const run& r : runs_) {
@@ -232,7 +232,7 @@ class pinhole_fit {
       cy_ = -fy_ * y;
     }
   }
-  /// Which pixels the first and the last points of the runs are. Forgets those that are none, if they are few.
+  /// Assigns pixels to the first and the last points of the runs. Removes points that fit no pixel, if they are few.
   bool number_pixels() {
     pixels_.clear();
     for (const run& r : runs_)
@@ -244,7 +244,7 @@ class pinhole_fit {
       }
     return 20 * pixels_.size() > 17 * 2 * runs_.size();
   }
-  /// One step of Gauss and Newton for the rotation and the intrinsics.
+  /// One Gauss-Newton step for the rotation and the intrinsics.
   bool refine() {
     matrix<7, 7> h = zeros<matrix<7, 7>>();
     matrix<7> g = zeros<matrix<7>>();
@@ -252,7 +252,7 @@ class pinhole_fit {
     for (const pixel& p : pixels_) {
       const vec3 c = axes_ * p.d;
       const double x = c.x() / c.z(), y = c.y() / c.z();
-      // The turn of the camera about its axes, fx, fy, cx, cy.
+      // Rotation about the camera's axes, fx, fy, cx, cy.
       matrix<7> ju, jv;
       ju << fx_ * x * y, -fx_ * (1.0 + x * x), fx_ * y, x, 0.0, 1.0, 0.0;
       jv << fy_ * (1.0 + y * y), -fy_ * x * y, -fy_ * x, 0.0, y, 0.0, 1.0;
@@ -261,7 +261,7 @@ class pinhole_fit {
       h += outer_product(ju, ju) + outer_product(jv, jv);
       g += ju * ru + jv * rv;
     }
-    // Where the view is so narrow that a turn and a shift are the same, any of them will do.
+    // In a very narrow view, rotation and shift are indistinguishable, and any solution will do.
     const auto solved = solve_semidefinite(h, matrix<7>(-g));
     if (!solved || !all_finite(*solved)) return false;
     const matrix<7>& step = *solved;
@@ -273,7 +273,8 @@ class pinhole_fit {
     cy_ += step[6];
     return fx_ > 0.0 && fy_ > 0.0;
   }
-  /// The image, with room around the pixels of the sample. Not of a very wide view, where floats are too coarse.
+  /// Sets the image, with a margin around the pixels of the sample. Fails for very wide views, for which floats are too
+  /// coarse.
   bool set_image(std::size_t count) {
     double u0 = pixels_.front().u, u1 = u0, v0 = pixels_.front().v, v1 = v0, z = 0.0;
     for (const pixel& p : pixels_) {
@@ -293,15 +294,16 @@ class pinhole_fit {
     camera_ = camera::pinhole{static_cast<int>(width), static_cast<int>(height), fx_, fy_, cx_, cy_};
     return true;
   }
-  /// From what is left between rays and pixels, which is the rounding of the points; and floats can tell no less.
+  /// Sets the error from the residuals between rays and pixels, which are the rounding of the points, and at least the
+  /// precision of float.
   bool set_error() {
     const double mean = std::sqrt(square_ / (2.0 * static_cast<double>(pixels_.size())));
     error_ = std::max(5e-7 * std::max(1.0, 0.5 * (1.0 + slope_ * slope_)), 8.0 * mean);
     return error_ < most_error && error_ * std::max(fx_, fy_) < 0.05;
   }
-  /// Whether it is so of other points as well, and which share of the image's pixels they are.
+  /// Verifies the camera with other points, and computes the share of the image's pixels with points.
   template <class Direction>
-  [[nodiscard]] bool holds(std::size_t count, const Direction& direction) {
+  [[nodiscard]] bool verify(std::size_t count, const Direction& direction) {
     std::size_t tried = 0, good = 0;
     random_bits random{2};
     for (std::size_t k = 0; k != most_runs; ++k) {
@@ -317,7 +319,7 @@ class pinhole_fit {
         ++good;
     }
     filled_ = static_cast<double>(count) * static_cast<double>(tried) / most_runs / size_;
-    return 50 * good > 49 * tried && filled_ < 1.1;  // or most pixels have several points
+    return 50 * good > 49 * tried && filled_ < 1.1;  // otherwise most pixels have several points
   }
 
   std::vector<run> runs_;
@@ -325,9 +327,9 @@ class pinhole_fit {
   std::vector<pixel> pixels_;
   mat3 axes_ = identity<mat3>();  ///< R_camera_world
   double fx_ = 0.0, fy_ = 0.0, cx_ = 0.0, cy_ = 0.0;
-  double square_ = 0.0;  ///< of what is left, at z = 1, all together
-  double size_ = 0.0;    ///< of the image without room around it, pixels
-  double slope_ = 0.0;   ///< of its sides, the largest
+  double square_ = 0.0;  ///< sum of squared residuals, at z = 1
+  double size_ = 0.0;    ///< size in pixels of the image without the margin
+  double slope_ = 0.0;   ///< largest slope of its sides
   double error_ = 0.0, mean_z_ = 0.0, filled_ = 0.0;
   camera::pinhole camera_;
 };

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Where rays from one voxel cross a stack of planes of voxel faces, several rays at a time, and the masks of bricks
-/// that follow from it.
+/// Computes the crossings of rays from one voxel with a stack of planes of voxel faces, several rays at a time, and the
+/// resulting masks of bricks.
 #pragma once
 
 #include <algorithm>
@@ -17,15 +17,15 @@
 
 namespace orbis::octree::detail {
 
-/// Rays that go forward along one axis. After its j-th plane (j = 1, 2 ... planes) a ray is in the cell
-/// (floor(u + j * du), floor(v + j * dv)), counted from the one it starts in. @pre |du|, |dv| <= 1
+/// Rays with positive direction along one axis. After its j-th plane (j = 1, 2 ... planes) a ray is in the cell
+/// (floor(u + j * du), floor(v + j * dv)), relative to its start cell. @pre |du|, |dv| <= 1
 struct queued_rays {
   static constexpr std::size_t lanes = 16;
   std::vector<double> u, du, v, dv;
   std::vector<std::int32_t> planes;
   std::vector<std::uint32_t> id;
 
-  /// Room for `count` rays, and for a whole group of lanes after any of them.
+  /// Makes room for `count` rays, and for a full vector after any of them.
   void fit(std::size_t count) {
     if (planes.size() >= count + lanes) return;
     u.resize(count + lanes);
@@ -40,37 +40,36 @@ struct queued_rays {
   }
 };
 
-/// Some consecutive planes and the layers of voxels between them, each a map of bytes in tiles of 8x8,
-/// a tile being a line of the cache and a layer of a brick. A byte of a plane says that a ray passes
-/// through there: the voxels on both sides are crossed. A byte of a layer is a voxel that a ray enters
-/// and leaves between two planes.
+/// Consecutive planes and the layers of voxels between them, each a byte map in tiles of 8x8. A tile is one cache line
+/// and one layer of a brick. A byte of a plane is set if a ray passes through there: the voxels on both sides are
+/// crossed. A byte of a layer is set for a voxel that a ray enters and leaves between two planes.
 struct plane_stack {
-  static constexpr unsigned fraction = 22;     ///< bits of a coordinate's fraction; ten are left for the cell
-  static constexpr std::uint32_t doubt = 12;   ///< no coordinate is wrong by more, in units of 2^-22 cells
-  static constexpr float order_doubt = 7e-6F;  ///< nor is the order of two crossings, in cells
+  static constexpr unsigned fraction = 22;     ///< fraction bits of a coordinate; ten bits are left for the cell
+  static constexpr std::uint32_t doubt = 12;   ///< maximum error of a coordinate, in units of 2^-22 cells
+  static constexpr float order_doubt = 7e-6F;  ///< maximum error of the order of two crossings, in cells
   static constexpr std::uint8_t marked = 0xff;
 
   std::uint8_t* planes = nullptr;
   std::uint8_t* layers = nullptr;
-  std::size_t size = 0;     ///< cells of a map
-  std::size_t stride = 0;   ///< from map to map; what lies between is for rays that are not there
-  unsigned log2_width = 0;  ///< of a map, in tiles, u being the fast axis
+  std::size_t size = 0;     ///< cells per map
+  std::size_t stride = 0;   ///< offset between maps; the gap is used by inactive lanes
+  unsigned log2_width = 0;  ///< width of a map in tiles; u is the fast axis
   std::int32_t low_u = 0;   ///< the map's first cell
   std::int32_t low_v = 0;
-  std::int32_t first = 0;  ///< number of the first plane; 0 is where the rays start, and nothing is to be done there
-  std::int32_t count = 0;  ///< planes
+  std::int32_t first = 0;  ///< number of the first plane; plane 0 is at the start of the rays and needs no marks
+  std::int32_t count = 0;  ///< number of planes
 
-  /// The number of the cell (u, v).
+  /// Number of the cell (u, v).
   [[nodiscard]] std::uint32_t cell(std::int32_t u, std::int32_t v) const noexcept {
     return at(static_cast<std::uint32_t>(u - low_u), static_cast<std::uint32_t>(v - low_v));
   }
-  /// The number of a cell whose u and v are counted from the map's first cell.
+  /// Number of a cell with u and v relative to the map's first cell.
   [[nodiscard]] std::uint32_t at(std::uint32_t u, std::uint32_t v) const noexcept {
     return ((v >> 3U << log2_width | u >> 3U) << 6U) | (v & 7U) << 3U | (u & 7U);
   }
 };
 
-/// Coordinates are fixed-point numbers without sign: ten bits of cell, plane_stack::fraction bits of fraction.
+/// Coordinates are unsigned fixed-point numbers: ten bits of cell, plane_stack::fraction bits of fraction.
 struct mark_crossings_kernel {
   template <simd::target Target>
   static ORBIS_ALWAYS_INLINE void run(const plane_stack& w, queued_rays& rays, std::size_t begin, std::size_t end,
@@ -87,7 +86,7 @@ struct mark_crossings_kernel {
     static_assert(n <= queued_rays::lanes);
     alignas(64) std::array<std::int32_t, 20 * n> between;  // cells of layers, written later
 
-    // The bits of a cell's number that come from u and from v.
+    // Bits of a cell's number that come from u and from v.
     const auto of_u = static_cast<std::int32_t>(w.at((8U << w.log2_width) - 1, 0));
     const integers bits_u(of_u), bits_v(~of_u), tile_columns(of_u & ~7);
     const words tile_rows(~((64U << w.log2_width) - 1));
@@ -110,7 +109,7 @@ struct mark_crossings_kernel {
       const doubles du_cells = doubles::load(rays.du.data() + r), dv_cells = doubles::load(rays.dv.data() + r);
       const auto start = [&](const double* at, std::int32_t low, const doubles& d) ORBIS_INLINE_LAMBDA {
         const doubles x = doubles::load(at) - double(low) + double(w.first) * d;
-        // The numbers reach 2^32: half of that is taken off for the conversion, which knows signed numbers.
+        // The values reach 2^32; half of that is subtracted for the conversion to signed numbers.
         const doubles fixed = floor(x * scale + double{plane_stack::doubt}) - 2147483648.0;
         return simd::bits_as<std::uint32_t>(simd::convert<std::int32_t>(fixed)) ^ words(0x80000000U);
       };
@@ -149,7 +148,7 @@ struct mark_crossings_kernel {
         const integers part_u = part_of(u), part_v = part_of(v);
         const integers cell = cell_at(u, v), changed = cell ^ last;
         const mask both = ((changed & bits_u) != integers(0)) & ((changed & bits_v) != integers(0));
-        // Which face was crossed first: the one that lies further behind, in units of the ray's own speed.
+        // The face crossed first is the one further back, in units of the ray's speed.
         const floats behind_u = simd::convert<float>(part_u ^ flip_u) * fv;
         const floats behind_v = simd::convert<float>(part_v ^ flip_v) * fu;
         const floats order = behind_u - behind_v;
@@ -174,8 +173,8 @@ struct mark_crossings_kernel {
   }
 
  private:
-  /// Marks the bytes at some cells. The numbers go through registers: read from memory they would have to wait for
-  /// the marks before them, whose addresses often agree in the last twelve bits.
+  /// Marks the bytes of some cells. The indices are kept in registers: loads from memory would wait for the preceding
+  /// stores, whose addresses often agree in the lowest twelve bits.
   template <class Cells>
   static ORBIS_ALWAYS_INLINE void mark(std::uint8_t* map, const Cells& cells) noexcept {
     const auto pairs = simd::bits_as<std::uint64_t>(cells);
@@ -192,31 +191,31 @@ struct mark_crossings_kernel {
 
 using crossings_kernel = void(const plane_stack&, queued_rays&, std::size_t, std::size_t, std::vector<std::uint32_t>&);
 
-/// Marks the rays [begin, end) in a stack of planes. Where arithmetic cannot tell for certain which cell or which
-/// order is right, the ray is appended to `doubtful` and taken out (planes = -1); what has been marked of it is right.
+/// Marks the rays [begin, end) in a stack of planes. If the arithmetic cannot decide a cell or an order with certainty,
+/// the ray is appended to `doubtful` and removed (planes = -1); its existing marks are correct.
 /// @pre the cells of the rays lie in the stack
 [[nodiscard]] inline crossings_kernel* mark_crossings() noexcept {
   return simd::kernel<mark_crossings_kernel, crossings_kernel>();
 }
 
-/// Where a window of planes lies in the grid.
+/// Position of a window of planes in the grid.
 struct stack_placement {
-  std::size_t axis = 0;                 ///< that the planes are across
-  std::int32_t step = 1;                ///< from plane to plane along it
-  std::array<std::int32_t, 3> start{};  ///< the voxel where the rays start
-  std::int32_t last = 0;                ///< the last layer of the window, from the start
-  std::uint32_t width = 0, rows = 0;    ///< of a map, in cells
+  std::size_t axis = 0;                 ///< axis perpendicular to the planes
+  std::int32_t step = 1;                ///< direction from plane to plane along the axis
+  std::array<std::int32_t, 3> start{};  ///< voxel in which the rays start
+  std::int32_t last = 0;                ///< last layer of the window, relative to the start
+  std::uint32_t width = 0, rows = 0;    ///< size of a map in cells
 
   [[nodiscard]] std::size_t axis_u() const noexcept { return axis == 0 ? 1 : 0; }
   [[nodiscard]] std::size_t axis_v() const noexcept { return axis == 2 ? 1 : 2; }
 };
 
-/// Bit i: whether any of the i-th bytes is set.
+/// Returns a mask; bit i is set if any of the i-th bytes is set.
 [[nodiscard]] inline std::uint64_t marks(const std::uint8_t* a, const std::uint8_t* b, const std::uint8_t* c) noexcept {
   using bytes = simd::vec<std::uint8_t, 64, simd::portable>;
   return simd::bits((bytes::load(a) | bytes::load(b) | bytes::load(c)) != bytes(0));
 }
-/// Eight layers of eight rows of eight voxels.
+/// Adds eight layers of eight rows of eight voxels to a brick.
 inline void add_brick(const std::array<std::uint64_t, 8>& layers, std::size_t axis, std::size_t iu, std::size_t iv,
                       scan_brick& to) noexcept {
   std::array<std::uint64_t, 16> spread;  // four voxels along u

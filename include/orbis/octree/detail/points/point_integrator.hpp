@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The voxels that a point cloud observes free and occupied.
+/// Finds the voxels that a point cloud observes free and occupied.
 #pragma once
 
 #include <algorithm>
@@ -30,8 +30,8 @@
 
 namespace orbis::octree::detail {
 
-/// Sets the bits of voxels, of the named brick, of which nothing needs to be known: a miss would not change them. A
-/// function and what it works on, so that no algorithm is compiled for each map. May be called from several threads.
+/// Callback that sets the bits of the voxels of a named brick that a miss would not change. It is type-erased, so that
+/// no algorithm is compiled for each map type. Can be called from several threads.
 struct saturated_voxels {
   using words = std::array<std::uint64_t, 8>;
 
@@ -43,19 +43,17 @@ struct saturated_voxels {
   }
 };
 
-/// Marks the voxels of one scan. The result depends neither on the order of the points nor on the
-/// number of threads. Keeps its memory from scan to scan.
+/// Marks the voxels of one scan. The result depends neither on the order of the points nor on the number of threads.
+/// Reuses its memory between scans.
 class point_integrator {
  public:
-  /// The voxels of the last scan; a voxel both free and occupied counts as occupied.
+  /// Voxels of the last scan; a voxel both free and occupied counts as occupied.
   [[nodiscard]] const scan_masks& masks() const noexcept { return workers_.front().masks; }
 
-  /// Marks the scan of some points, seen from `origin`. In mode every_ray,
-  /// voxels for which `saturated` says that a miss would not change them may be missing among the free ones, see
-  /// depth_integrator::mark. The
-  /// summary's voxel counts stay zero. Nothing is marked if the origin is not finite; rays are not
-  /// traversed if it lies outside the grid. O(points + voxels at surfaces), or O(points x voxels along a ray) where
-  /// there are few points for that many voxels.
+  /// Marks the scan of points seen from `origin`. In mode every_ray, voxels that a miss would not change according to
+  /// `saturated` may be missing from the free ones, see depth_integrator::mark. The summary's voxel counts stay zero.
+  /// Marks nothing if the origin is not finite; traverses no rays if it is outside the grid. O(points + voxels at
+  /// surfaces), or O(points x voxels along a ray) for few points per voxel.
   template <execution_policy Policy>
   integration_summary mark(const Policy& policy, const voxel_grid& grid, const point_view& point, const float3& origin,
                            const integration_options& options, const saturated_voxels& saturated = {}) {
@@ -86,8 +84,8 @@ class point_integrator {
     return finish(policy);
   }
 
-  /// The second half of mode `discretized` alone: marks the rays to the centres of the voxels that are
-  /// occupied in `ends`. @pre `ends` is not this marker's own
+  /// Second half of mode `discretized`: marks the rays to the centres of the voxels that are occupied in `ends`.
+  /// @pre `ends` is not this marker's own
   template <execution_policy Policy>
   integration_summary mark_centers(const Policy& policy, const voxel_grid& grid, const scan_masks& ends,
                                    const float3& origin, const integration_options& options) {
@@ -112,7 +110,7 @@ class point_integrator {
     limit_kernel* limit_batch = limit_rays();
     fresh_kernel* fresh_hits = find_fresh_hits();
 
-    /// Where the ray to a point ends that is known to be one; what limit_rays finds.
+    /// Returns the end of the ray to a valid point, as limit_rays computes it.
     [[nodiscard]] ray_endpoint end(const float3& p) const noexcept {
       const float3 ray = difference(p, origin);
       const double distance = length(ray);
@@ -123,17 +121,17 @@ class point_integrator {
     }
   };
 
-  /// What one thread collects.
+  /// Results and scratch memory of one thread.
   struct worker {
     scan_masks masks;
-    scan_masks ends;  ///< mode discretized: voxels that hold points, as occupied
+    scan_masks ends;  ///< mode discretized: voxels that contain points, as occupied
     integration_summary summary;
     ray_rasterizer sweep;
     point_batch batch;
-    std::size_t batched = 0;  ///< centres that are waiting in the batch
+    std::size_t batched = 0;  ///< number of centres waiting in the batch
     batch_keys keys;
     ray_batch rays;
-    std::array<std::uint64_t, 1024> seen;  ///< voxels that are marked: points of the next row of an image end in them
+    std::array<std::uint64_t, 1024> seen;  ///< recently marked voxels, in which points of the next image row often end
 
     void clear() noexcept {
       seen.fill(~std::uint64_t{0});
@@ -141,7 +139,7 @@ class point_integrator {
       ends.clear();
       summary = {};
     }
-    /// The points [begin, end) in mode every_ray. `take(begin, count)` may take rays out of `rays`, see
+    /// Adds the points [begin, end) in mode every_ray. `take(begin, count)` may remove rays from `rays`, see
     /// binned_rays::add.
     template <class Take>
     void add_points(const sensor& from, std::size_t begin, std::size_t end, const point_view& point, Take&& take) {
@@ -154,7 +152,7 @@ class point_integrator {
         begin += n;
       }
     }
-    /// The rays of the batch; their points are marked and counted.
+    /// Computes the rays of the batch; marks and counts their points.
     void find_rays(const sensor& from, std::size_t count) {
       const voxel_key base = from.key.value_or(voxel_key{});
       from.limit_batch({from.grid, from.origin, base}, batch, from.max_range, count, rays);
@@ -164,7 +162,7 @@ class point_integrator {
       summary.rejected += count - used - cut;
       ray_batch::bits fresh;
       from.fresh_hits(rays, count, fresh);
-      // A voxel as one number. Whether it is one of those seen lately cannot be foretold, so nothing branches.
+      // A voxel as one number. Its presence in `seen` is unpredictable, so the code has no branches.
       constexpr unsigned bits = 21;
       static_assert(max_tree_depth <= bits);
       std::array<std::uint64_t, ray_batch::capacity> unseen;
@@ -187,10 +185,10 @@ class point_integrator {
         masks.mark_occupied({at(0), at(1), at(2)});
       }
     }
-    /// The points [begin, end) in mode discretized.
+    /// Adds the points [begin, end) in mode discretized.
     template <class Points>
     void add_ends(const voxel_grid& grid, std::size_t begin, std::size_t end, const Points& point) {
-      scan_brick* brick = nullptr;  // of the last point; neighbours mostly lie in the same one
+      scan_brick* brick = nullptr;  // of the last point; neighbours are mostly in the same brick
       while (begin != end) {
         const std::size_t n = std::min(end - begin, point_batch::capacity);
         load_points(point, begin, n, batch);
@@ -206,7 +204,7 @@ class point_integrator {
         summary.rejected += keys.outside;
       }
     }
-    /// The centres of a brick's occupied voxels, like points.
+    /// Adds the centres of a brick's occupied voxels as points.
     void add_centers(const sensor& from, const scan_brick& b) {
       const voxel_key base = named_key(b.name);
       for_each_place(b.occupied, [&](std::uint32_t place) {
@@ -226,7 +224,7 @@ class point_integrator {
   };
 
   void prepare(unsigned threads, std::size_t count) {
-    // A thread that gets less than this many rays does not pay for the merging of its masks.
+    // With fewer rays, a thread costs more for merging its masks than it saves.
     const std::size_t useful = 1 + count / 4096;
     const std::size_t count_of_workers = std::clamp<std::size_t>(threads, 1, useful);
     if (workers_.size() < count_of_workers) workers_.resize(count_of_workers);
@@ -247,7 +245,7 @@ class point_integrator {
     });
     for (worker& w : active_) w.add_batched(from);
   }
-  /// A scan for which dense_ or organised_ has a plan; empty if it cannot be done.
+  /// Marks a scan by the method planned in dense_ or organised_; empty on failure.
   template <class Marker, class Policy>
   std::optional<integration_summary> mark_by(Marker& marker, const Policy& policy, const sensor& from,
                                              const point_view& point, const saturated_voxels& saturated) {
@@ -277,7 +275,7 @@ class point_integrator {
     for_each_index(policy, active_.size(), 1, [&](std::size_t i) { workers_[i].sweep.flush(workers_[i].masks); });
     return join_workers().summary;
   }
-  /// Adds what the others have to the first one.
+  /// Merges the results of all workers into the first one.
   worker& join_workers() {
     worker& all = workers_.front();
     for (std::size_t i = 1; i != active_.size(); ++i) {
@@ -300,8 +298,8 @@ class point_integrator {
 
   organised_rays organised_;
   dense_rays dense_;
-  std::vector<worker> workers_ = std::vector<worker>(1);  ///< only ever more: their memory is kept
-  std::span<worker> active_;                              ///< those of the current scan
+  std::vector<worker> workers_ = std::vector<worker>(1);  ///< never shrinks, to keep the memory
+  std::span<worker> active_;                              ///< workers of the current scan
 };
 
 }  // namespace orbis::octree::detail

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The voxels that points lie in, many points at a time.
+/// Computes the voxels of points in batches.
 #pragma once
 
 #include <array>
@@ -14,13 +14,13 @@
 
 namespace orbis::octree::detail {
 
-/// Some points, one array for each coordinate.
+/// A batch of points in structure-of-arrays layout.
 struct point_batch {
   static constexpr std::size_t capacity = 256;
   alignas(64) std::array<float, capacity> x, y, z;
 };
 
-/// x, y, z, x, y, z ... to one array for each coordinate.
+/// Deinterleaves x, y, z, x, y, z ... into one array per coordinate.
 struct load_triples_kernel {
   template <simd::target Target>
   static ORBIS_ALWAYS_INLINE void run(const float* points, std::size_t count, point_batch& batch) noexcept {
@@ -57,17 +57,17 @@ inline void load_points(const point_view& points, std::size_t begin, std::size_t
   load_triples(points.xyz + 3 * begin, count, batch);
 }
 
-/// The voxels of some points, in their order; a voxel that equals the one before may be left out. And the number of
-/// points that lie in none.
+/// Voxels of a batch of points, in order, possibly without consecutive duplicates; and the number of points in no
+/// voxel.
 struct batch_keys {
   alignas(64) std::array<std::uint32_t, point_batch::capacity + 16> x, y, z;
   std::size_t count = 0;
   std::size_t outside = 0;
 };
 
-/// Along one axis the cells of some coordinates, counted from the middle of the grid; what voxel_grid::key does.
-/// `inside` loses the lanes that lie outside the grid or are not numbers: of these the cell means nothing.
-/// `half`: half the width of the grid, in cells.
+/// Computes the cells of coordinates along one axis, relative to the middle of the grid, as voxel_grid::key does.
+/// Clears the lanes of `inside` for coordinates that are outside the grid or NaN; their cells are undefined. `half`:
+/// half the width of the grid, in cells.
 template <class Floats, class Mask>
 [[nodiscard]] ORBIS_ALWAYS_INLINE auto cells_along(const Floats& at, double per_metre, double half,
                                                    Mask& inside) noexcept {
@@ -76,8 +76,8 @@ template <class Floats, class Mask>
   return simd::convert<std::int32_t>(floor(cells));
 }
 
-/// The voxels along one axis as far as float arithmetic can tell; where it cannot, `sure` is cleared. The product errs
-/// by two roundings, so that a voxel is certain four of them away from its faces.
+/// Computes the voxels along one axis in float arithmetic; clears `sure` if the result is uncertain. The product has an
+/// error of two roundings, so a voxel is certain at a distance of four roundings from its faces.
 template <class Floats, class Mask>
 [[nodiscard]] ORBIS_ALWAYS_INLINE auto likely_keys(const Floats& at, float per_metre, float half, Mask& sure) noexcept {
   const Floats cells = at * per_metre, whole = floor(cells), above = cells - whole, size = abs(cells);
@@ -94,7 +94,7 @@ struct find_keys_kernel {
     constexpr std::size_t n = floats::count;
     const double per_metre = 1.0 / grid.resolution(), half = 0.5 * grid.cells();
     const integers middle(static_cast<std::int32_t>(half)), none(-1);
-    // All keys, one place further back, so that the key before each can be read; the first has none before it.
+    // All keys, shifted by one, so that the previous key of each can be read; the first has none.
     alignas(64) std::array<std::array<std::int32_t, point_batch::capacity + 32>, 3> all;
     for (auto& axis : all) axis[15] = -1;
     std::size_t used = 0, inside_count = 0;
@@ -104,7 +104,7 @@ struct find_keys_kernel {
       const integers y = cells_along(floats::load(points.y.data() + i), per_metre, half, inside) + middle;
       const integers z = cells_along(floats::load(points.z.data() + i), per_metre, half, inside) + middle;
       inside_count += simd::number_of(inside);
-      select(inside, x, none).store(all[0].data() + 16 + i);  // no voxel equals what lies outside
+      select(inside, x, none).store(all[0].data() + 16 + i);  // differs from every voxel if outside
       y.store(all[1].data() + 16 + i);
       z.store(all[2].data() + 16 + i);
     }
@@ -127,7 +127,7 @@ struct find_keys_kernel {
   }
 };
 
-/// The voxels of the first `count` points. @pre the arrays of `points` can be read up to a multiple of 16
+/// Finds the voxels of the first `count` points. @pre the arrays of `points` can be read up to a multiple of 16
 inline void find_keys(const voxel_grid& grid, const point_batch& points, std::size_t count, batch_keys& keys) noexcept {
   using signature = void(const voxel_grid&, const point_batch&, std::size_t, batch_keys&);
   simd::kernel<find_keys_kernel, signature>()(grid, points, count, keys);

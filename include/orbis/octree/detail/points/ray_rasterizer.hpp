@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Rasterises many rays from one point: finds exactly the voxels of traverse_ray, many times as fast.
+/// Rasterises many rays from one point: finds exactly the voxels of traverse_ray, many times faster.
 ///
 /// A traversal compares the distances at which a ray leaves its voxel along x, y and z. Only the outcomes of these
-/// comparisons matter. So instead of stepping along each ray, its crossings with the planes of voxel faces across its
-/// main axis are computed with known error, slab by slab for all rays, in maps that fit into the cache. Where the
+/// comparisons matter. Instead of stepping along each ray, this computes its crossings with the planes of voxel faces
+/// perpendicular to its main axis with known error, slab by slab for all rays, in maps that fit into the cache. If the
 /// error could change an outcome, the ray is traversed step by step.
 #pragma once
 
@@ -27,8 +27,8 @@
 
 namespace orbis::octree::detail {
 
-/// Collects the rays of one scan and marks their voxels. Keeps its memory from scan to scan: some megabytes, however
-/// long the rays are.
+/// Collects the rays of one scan and marks their voxels. Reuses its memory between scans: a few megabytes, independent
+/// of the length of the rays.
 class ray_rasterizer {
  public:
   /// Begins a scan from `origin` in voxel `from`.
@@ -42,8 +42,9 @@ class ray_rasterizer {
     mark_crossings_ = mark_crossings();
   }
 
-  /// Marks in `masks` what traverse_ray visits for the first `count` rays of a batch, now or when `flush` is called,
-  /// and perhaps the end of a ray that is a hit: a voxel that counts as occupied whatever crosses it.
+  /// Marks the voxels in `masks` that traverse_ray visits for the first `count` rays of a batch, immediately or when
+  /// `flush` is called. May also mark the end of a ray that is a hit, because such a voxel counts as occupied in any
+  /// case.
   void add(const ray_batch& rays, std::size_t count, scan_masks& masks) {
     for (std::size_t i = 0; i < count; i += ray_batch::lanes) {
       const std::uint32_t cut = ray_batch::eight(rays.cut, i);
@@ -62,7 +63,7 @@ class ray_rasterizer {
     }
   }
 
-  /// Marks the rays that are waiting.
+  /// Marks the waiting rays.
   void flush(scan_masks& masks) {
     if (grid_ == nullptr) return;
     for (std::size_t kind = 0; kind != queues_.size(); ++kind) rasterize(kind, masks);
@@ -82,16 +83,16 @@ class ray_rasterizer {
   }
 
  private:
-  static constexpr std::size_t max_waiting = 1U << 14U;  ///< rays that are rasterised at once
-  static constexpr double max_width = 448.0;             ///< of a map, in cells, when it is planned
-  static constexpr std::int32_t slab = 16;               ///< layers that are rasterised at once: two bricks
+  static constexpr std::size_t max_waiting = 1U << 14U;  ///< maximum number of rays rasterised at once
+  static constexpr double max_width = 448.0;             ///< maximum planned width of a map, in cells
+  static constexpr std::int32_t slab = 16;               ///< layers rasterised at once: two bricks
 
   struct waiting_ray {
     double u, du, v, dv;
     std::int32_t planes;
     float3 end;
   };
-  /// Of the slopes of some rays.
+  /// Bounds of the slopes of rays.
   struct bounds {
     float low_u = std::numeric_limits<float>::infinity(), high_u = -low_u;
     float low_v = low_u, high_v = high_u;
@@ -103,7 +104,7 @@ class ray_rasterizer {
     }
   };
 
-  /// The voxel that lies so far from the origin's.
+  /// Voxel at an offset from the origin's voxel.
   [[nodiscard]] voxel_key key(const std::array<std::int32_t, 3>& away) const noexcept {
     return {static_cast<std::uint32_t>(source_.from[0] + away[0]),
             static_cast<std::uint32_t>(source_.from[1] + away[1]),
@@ -114,7 +115,7 @@ class ray_rasterizer {
     fallback_.clear();
   }
 
-  /// A ray that has been prepared: to its queue; voxels that no plane marks are marked at once.
+  /// Queues a prepared ray; marks voxels that no plane marks immediately.
   void take(std::size_t lane, const float3& end, bool cut, scan_masks& masks) {
     const ray_setup& r = setup_;
     const std::int32_t kind = r.kind[lane], planes = r.planes[lane];
@@ -125,7 +126,7 @@ class ray_rasterizer {
     }
     const auto is = [lane](std::uint32_t bits) { return (bits >> lane & 1U) != 0; };
     const bool end_u = is(r.end_u), end_v = is(r.end_v);
-    // Of a ray that is cut off the end must stay unmarked; a plane marks the voxels on both sides.
+    // The end of a limited ray must stay unmarked; a plane marks the voxels on both sides.
     const std::int32_t marked_planes = cut ? planes - 1 : planes;
     if (cut || planes == 0 || (end_u && end_v)) {
       const std::int32_t u = r.cell_u[lane], v = r.cell_v[lane];
@@ -147,14 +148,14 @@ class ray_rasterizer {
     queue.push_back({r.u[lane], r.du[lane], r.v[lane], r.dv[lane], marked_planes, end});
     if (queue.size() == max_waiting) rasterize(number, masks);
   }
-  /// Where rays of a kind start, from the origin's voxel.
+  /// Start voxel of the rays of a kind, relative to the origin's voxel.
   [[nodiscard]] std::array<std::int32_t, 3> start_of(std::int32_t kind) const noexcept {
     const auto down = ray_setup::down(kind);
     std::array<std::int32_t, 3> at{};
     for (std::size_t i = 0; i != 3; ++i) at[i] = down[i] != 0 ? -source_.skipped[1][i] : source_.skipped[0][i];
     return at;
   }
-  /// Marks the n-th layer's cell of a ray, in steps from where it starts.
+  /// Marks the cell of a ray in its n-th layer, relative to the start of the ray.
   void mark_cell(std::int32_t kind, std::int32_t n, std::int32_t u, std::int32_t v, scan_masks& masks) const {
     std::array<std::int32_t, 3> at = start_of(kind);
     const std::size_t axis = ray_setup::axis(kind);
@@ -164,7 +165,7 @@ class ray_rasterizer {
     masks.mark_free(key(at));
   }
 
-  /// The slab of the last voxels that a ray with this many planes marks.
+  /// Slab of the last voxels that a ray with this number of planes marks.
   [[nodiscard]] static std::int32_t last_slab(std::int32_t origin, std::int32_t step, std::int32_t planes) noexcept {
     return std::abs((origin + step * planes) / slab - origin / slab);
   }
@@ -185,7 +186,7 @@ class ray_rasterizer {
       planes = std::max(planes, r.planes);
       all.add(slopes(r));
     }
-    // Rays that would need a wider map go into tiles of neighbouring directions.
+    // Rays that would need a wider map are grouped into tiles of neighbouring directions.
     const auto tiles = [&](float low, float high) {
       return 1 + static_cast<std::size_t>((high - low) * static_cast<float>(planes) / max_width);
     };
@@ -196,7 +197,7 @@ class ray_rasterizer {
                  : std::min(count - 1, static_cast<std::size_t>((x - low) / (high - low) * static_cast<float>(count)));
     };
     const auto slabs = static_cast<std::size_t>(last_slab(origin, step, planes)) + 1;
-    // Within a tile the rays that go furthest come first: those in a slab are then the first ones.
+    // Within a tile the longest rays come first, so that the rays of a slab are a prefix.
     const auto bucket = [&](const waiting_ray& r) {
       const std::size_t u = tile(static_cast<float>(r.du), all.low_u, all.high_u, tiles_u);
       const std::size_t v = tile(static_cast<float>(r.dv), all.low_v, all.high_v, tiles_v);
@@ -223,7 +224,7 @@ class ray_rasterizer {
       rays_.planes[to] = r.planes;
       rays_.id[to] = static_cast<std::uint32_t>(i);
     }
-    // counts_[b] is now where bucket b ends.
+    // counts_[b] is now the end of bucket b.
     doubtful_.clear();
     for (std::size_t t = 0; t != tiles_u * tiles_v; ++t) {
       const std::size_t first_bucket = t * slabs;
@@ -247,7 +248,7 @@ class ray_rasterizer {
   void mark_slab(stack_placement place, std::int32_t number, std::int32_t planes, const bounds& b, std::size_t begin,
                  std::size_t end, scan_masks& masks) {
     const std::int32_t origin = place.start[place.axis], step = place.step;
-    // The slab's layers, counted from the origin's along the rays.
+    // Layers of the slab, relative to the origin's layer along the rays.
     const std::int32_t low = (origin / slab + step * number) * slab;
     const std::int32_t first = number == 0 ? 0 : step > 0 ? low - origin : origin - (low + slab - 1);
     const std::int32_t last = place.last = std::min(step > 0 ? low + slab - 1 - origin : origin - low, planes);
@@ -288,7 +289,7 @@ class ray_rasterizer {
   std::vector<std::uint32_t> counts_, buckets_;
   std::vector<bounds> bounds_;
   std::vector<std::uint32_t> doubtful_;
-  std::vector<float3> fallback_;  ///< ends of rays that only the exact traversal can decide
+  std::vector<float3> fallback_;  ///< ends of rays that need the exact traversal
   setup_kernel* set_up_ = nullptr;
   crossings_kernel* mark_crossings_ = nullptr;
 };

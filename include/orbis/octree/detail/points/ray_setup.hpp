@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A ray as a straight line through planes of voxel faces, eight rays at a time.
+/// Setup of rays as straight lines through planes of voxel faces, eight rays at a time.
 #pragma once
 
 #include <algorithm>
@@ -17,21 +17,21 @@
 namespace orbis::octree::detail {
 
 /// Eight rays as lines over their main axis, see queued_rays. The kind of a ray: eight times its main axis, plus four
-/// if it goes down along it, one if it goes down along axis u, two if it goes down along v. Cells and planes are
-/// counted in steps from where the ray starts.
+/// if it is descending along it, one if it is descending along axis u, two if it is descending along v. Cells and
+/// planes are counted in steps from the start of the ray.
 struct ray_setup {
   static constexpr std::size_t lanes = ray_batch::lanes;
   static constexpr std::int32_t kinds = 24;
 
   alignas(64) std::array<double, lanes> u, du, v, dv;
   alignas(64) std::array<std::int32_t, lanes> kind;
-  alignas(64) std::array<std::int32_t, lanes> planes;          ///< that the ray crosses
-  alignas(64) std::array<std::int32_t, lanes> cell_u, cell_v;  ///< behind the last of them
-  // Bit i is of ray i.
-  std::uint32_t done = 0;    ///< the others are undecided and must be traversed step by step
-  std::uint32_t step_u = 0;  ///< crosses a face between the last two planes
+  alignas(64) std::array<std::int32_t, lanes> planes;          ///< number of planes that the ray crosses
+  alignas(64) std::array<std::int32_t, lanes> cell_u, cell_v;  ///< cell after the last plane
+  // Bit i refers to ray i.
+  std::uint32_t done = 0;    ///< rays that are decided; the others must be traversed step by step
+  std::uint32_t step_u = 0;  ///< crosses a face across u between the last two planes
   std::uint32_t step_v = 0;
-  std::uint32_t step_u_first = 0;  ///< the one across u comes first
+  std::uint32_t step_u_first = 0;  ///< the face across u comes first
   std::uint32_t end_u = 0;         ///< the same between the last plane and the end
   std::uint32_t end_v = 0;
   std::uint32_t end_u_first = 0;
@@ -41,7 +41,7 @@ struct ray_setup {
   }
   [[nodiscard]] static constexpr std::size_t axis_u(std::size_t axis) noexcept { return axis == 0 ? 1 : 0; }
   [[nodiscard]] static constexpr std::size_t axis_v(std::size_t axis) noexcept { return axis == 2 ? 1 : 2; }
-  /// Whether the rays go down each axis.
+  /// Per axis: 1 if the rays are descending along it, else 0.
   [[nodiscard]] static constexpr std::array<std::size_t, 3> down(std::int32_t kind) noexcept {
     std::array<std::size_t, 3> is{};
     const auto bit = [&](int i) { return static_cast<std::size_t>(kind >> i & 1); };
@@ -52,7 +52,7 @@ struct ray_setup {
   }
 };
 
-/// Voxels: the arithmetic of a traversal and the one here differ by less.
+/// Upper bound in voxels of the difference between the arithmetic of a traversal and the one here.
 inline constexpr double ray_doubt = 1e-8;
 /// Rays that cross more planes are traversed step by step.
 inline constexpr std::int32_t max_ray_planes = 4096;
@@ -96,7 +96,7 @@ struct set_up_rays_kernel {
       const doubles way = simd::convert<double>(integers::load(rays.way[axis].data() + i));
       expected[axis] = select(down[axis], -way, way) -
                        select(down[axis], doubles(source.skipped[1][axis]), doubles(source.skipped[0][axis]));
-      // Whether the traversal reaches the end's voxel before the ray's length stops it.
+      // True if the traversal reaches the end's voxel before the ray's length stops it.
       good = good & within(metres * speed[axis] - first[axis] + 1.0 - expected[axis]);
     }
     const mask y_main = speed[0] < speed[1];

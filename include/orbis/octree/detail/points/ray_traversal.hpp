@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The voxels along a ray.
+/// Traversal of the voxels along a ray.
 ///
-/// J. Amanatides, A. Woo, "A fast voxel traversal algorithm for ray tracing", Eurographics 1987, in
-/// the arithmetic that OctoMap uses (direction and length in float, parameters in double, ties to
-/// the last axis), so that the same voxels come out, bit for bit.
+/// J. Amanatides, A. Woo, "A fast voxel traversal algorithm for ray tracing", Eurographics 1987, with the arithmetic of
+/// OctoMap (direction and length in float, parameters in double, ties to the last axis), so that the voxels are
+/// identical.
 #pragma once
 
 #include <algorithm>
@@ -18,28 +18,28 @@
 
 namespace orbis::octree::detail {
 
-/// A point as OctoMap sees it.
+/// A point in OctoMap's precision.
 using float3 = std::array<float, 3>;
 
 [[nodiscard]] inline float3 difference(const float3& a, const float3& b) noexcept {
   return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
 }
-/// The length of `v`: the sum of squares in float, its root in double.
+/// Length of `v`: the sum of squares in float, its root in double.
 [[nodiscard]] inline double length(const float3& v) noexcept {
   const float squares = rounded_product(v[0], v[0]) + rounded_product(v[1], v[1]) + rounded_product(v[2], v[2]);
   return std::sqrt(static_cast<double>(squares));
 }
 
-/// The state of a walk: the voxel, and for each axis the ray parameter (metres) at which it is left.
+/// State of a walk: the voxel, and for each axis the ray parameter (metres) at which the ray leaves it.
 struct ray_traversal {
   std::array<std::uint32_t, 3> at{};
   std::array<std::int32_t, 3> step{};
   std::array<double, 3> next{};
   std::array<double, 3> delta{};
-  double reach = 0.0;     ///< length of the ray, where it has an end
-  std::uint32_t cells{};  ///< of the grid along each axis
+  double reach = 0.0;     ///< length of the ray, if it has an end
+  std::uint32_t cells{};  ///< width of the grid along each axis, in voxels
 
-  /// `half`: from a voxel's centre to its face, as a function of the step's sign.
+  /// `half`: offset from a voxel's centre to its face, as a function of the step's sign.
   template <class Half>
   ray_traversal(const voxel_grid& grid, const voxel_key& start, const float3& origin, const float3& direction,
                 Half&& half) noexcept
@@ -56,8 +56,8 @@ struct ray_traversal {
     }
   }
 
-  /// The cursor of a ray from `origin` in voxel `from` to `end`; empty if a float cannot tell its
-  /// direction because it is too short or too long.
+  /// Returns the state at the start of the ray from `origin` in voxel `from` to `end`; empty if the ray is too short or
+  /// too long for its direction to be represented in float.
   [[nodiscard]] static std::optional<ray_traversal> between(const voxel_grid& grid, const voxel_key& from,
                                                             const float3& origin, const float3& end) noexcept {
     float3 direction = difference(end, origin);
@@ -76,7 +76,7 @@ struct ray_traversal {
     if (next[0] < next[1]) return next[0] < next[2] ? 0 : 2;
     return next[1] < next[2] ? 1 : 2;
   }
-  /// Whether a step along `axis` stays inside the grid.
+  /// Returns true if a step along `axis` stays inside the grid.
   [[nodiscard]] bool can_step(std::size_t axis) const noexcept {
     return at[axis] + static_cast<std::uint32_t>(step[axis]) < cells;
   }
@@ -87,8 +87,8 @@ struct ray_traversal {
   [[nodiscard]] voxel_key key() const noexcept { return {at[0], at[1], at[2]}; }
 };
 
-/// Calls `visit(key)` for the voxels a ray from `origin` to `end` crosses: the origin's included,
-/// the end's not; nothing if both lie in one voxel.
+/// Calls `visit(key)` for the voxels that a ray from `origin` to `end` crosses, including the origin's but not the
+/// end's; no call if both are in one voxel.
 /// @pre from and to are the keys of origin and end
 template <class Visit>
 void traverse_ray(const voxel_grid& grid, const float3& origin, const voxel_key& from, const float3& end,

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The points of a scan as what integrates them reads them: floats in memory.
+/// Adapters from a scan's points to floats in memory, the input format of integration.
 #pragma once
 
 #include <array>
@@ -13,7 +13,7 @@
 
 namespace orbis::octree::detail {
 
-/// Points as floats x, y, z, x, y, z ... in memory.
+/// Points as contiguous floats x, y, z, x, y, z ...
 struct point_view {
   const float* xyz = nullptr;
   std::size_t count = 0;
@@ -23,7 +23,7 @@ struct point_view {
   }
 };
 
-/// Whether the points of a range are that already.
+/// True if the points of a range already have this format.
 template <class Points>
 concept float_triples = std::ranges::contiguous_range<Points> && requires(const std::ranges::range_value_t<Points>& p) {
   requires sizeof(p) == 3 * sizeof(float);
@@ -31,11 +31,11 @@ concept float_triples = std::ranges::contiguous_range<Points> && requires(const 
   { p[0] } -> std::convertible_to<float>;
 };
 
-/// Views ranges of any points: those that are floats in memory in place, others as copies that are rounded to float.
-/// Keeps the memory of the copies.
+/// Views ranges of any points: in place if they are contiguous floats, otherwise as copies rounded to float. Reuses the
+/// memory of the copies.
 class point_reader {
  public:
-  /// Valid until the next call, and as long as `points` are.
+  /// Returns a view, valid until the next call and as long as `points`.
   template <point_range Points>
   [[nodiscard]] point_view view(const Points& points) {
     const auto count = static_cast<std::size_t>(std::ranges::size(points));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// What finds the voxels of a scan, whose memory is kept from scan to scan.
+/// Reusable buffers of the algorithms that find the voxels of a scan.
 #pragma once
 
 #include <cstddef>
@@ -28,7 +28,7 @@ struct scan_buffers {
   }
 };
 
-/// Marks a depth image, in either mode. The masks are those of `buffers`; `summary` gets what became of the pixels.
+/// Marks a depth image, in either mode. Returns masks stored in `buffers`; writes the counts of pixels to `summary`.
 template <class Policy>
 const scan_masks& mark_depth(const Policy& policy, scan_buffers& buffers, const voxel_grid& grid,
                              const depth_scan& scan, const se3& T_world_camera, const integration_options& options,
@@ -38,7 +38,7 @@ const scan_masks& mark_depth(const Policy& policy, scan_buffers& buffers, const 
     summary = buffers.depth.mark(policy, grid, scan, T_world_camera, options, masks, saturated);
     return masks;
   }
-  // Whether a voxel is within range is decided at its centre, not at its points.
+  // The range test applies to a voxel's centre, not to its points.
   integration_options unlimited = options;
   unlimited.max_range = std::numeric_limits<double>::infinity();
   const std::size_t rejected = buffers.depth.mark_ends(policy, grid, scan, T_world_camera, unlimited, masks).rejected;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The origin of a scan's rays, and the first steps of rays whose origin lies on an edge of its voxel.
+/// Origin of a scan's rays, and the first steps of rays whose origin is on an edge of its voxel.
 #pragma once
 
 #include <array>
@@ -13,21 +13,21 @@
 
 namespace orbis::octree::detail {
 
-/// What all rays of a scan have in common.
+/// Common data of all rays of a scan.
 ///
-/// An origin on an edge or a corner of its voxel makes rays cross several faces at once, in an order
-/// that only the walk's own arithmetic tells. These first steps are then taken one by one
-/// (`first_steps`), and what is said of a ray here is counted from the voxel it is in afterwards.
+/// An origin on an edge or a corner of its voxel makes rays cross several faces at once, in an order that only the
+/// arithmetic of the walk determines. These first steps are taken individually (`first_steps`), and all data of a ray
+/// is relative to the voxel after them.
 struct scan_origin {
   float3 origin{};
-  std::array<std::int32_t, 3> from{};  ///< the origin's voxel
-  double edge = 0.0;                   ///< of a voxel, metres
+  std::array<std::int32_t, 3> from{};  ///< voxel of the origin
+  double edge = 0.0;                   ///< edge of a voxel, metres
   double per_metre = 0.0;
-  // Of each axis, in the positive direction and in the negative one:
+  // Per axis, in the positive and in the negative direction:
   std::array<std::array<double, 3>, 2> face{};           ///< from the origin to the first face, metres
-  std::array<std::array<double, 3>, 2> first{};          ///< to the first face that counts, voxels
-  std::array<std::array<std::int32_t, 3>, 2> skipped{};  ///< steps that do not count: 0 or 1
-  bool on_edge = false;                                  ///< whether there are any
+  std::array<std::array<double, 3>, 2> first{};          ///< to the first face that counts, in voxels
+  std::array<std::array<std::int32_t, 3>, 2> skipped{};  ///< number of skipped steps: 0 or 1
+  bool on_edge = false;                                  ///< true if any steps are skipped
 
   scan_origin() = default;
   scan_origin(const voxel_grid& grid, const float3& at, const voxel_key& key) noexcept
@@ -35,7 +35,7 @@ struct scan_origin {
         from{static_cast<std::int32_t>(key.x), static_cast<std::int32_t>(key.y), static_cast<std::int32_t>(key.z)},
         edge{grid.resolution()},
         per_metre{1.0 / grid.resolution()} {
-    constexpr double near = 1e-4;  // voxels; rays that cross another face first are traversed step by step
+    constexpr double near = 1e-4;  // in voxels; rays that cross another face first are traversed step by step
     const std::array<std::uint32_t, 3> k{key.x, key.y, key.z};
     const double half = 0.5 * grid.resolution();
     int on_faces = 0;
@@ -61,9 +61,9 @@ struct scan_origin {
   }
 };
 
-/// Takes the steps of a ray that do not count. Bit (dx + 1) + 3 (dy + 1) + 9 (dz + 1) of what is
-/// returned: the ray passes through the voxel that lies so far from the origin's; the last voxel is
-/// left out. 0 if the ray crosses another face before.
+/// Takes the skipped steps of a ray. Returns a mask; bit (dx + 1) + 3 (dy + 1) + 9 (dz + 1) is set if the ray passes
+/// through the voxel at offset (dx, dy, dz) from the origin's; the last voxel is excluded. Returns 0 if the ray crosses
+/// another face first.
 [[nodiscard]] inline std::uint32_t first_steps(const scan_origin& source, const float3& end,
                                                const std::array<std::size_t, 3>& down) noexcept {
   float3 direction = difference(end, source.origin);

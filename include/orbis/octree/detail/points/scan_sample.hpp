@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Some points of a scan that stand for all.
+/// Random sampling of the points of a scan.
 #pragma once
 
 #include <algorithm>
@@ -13,15 +13,15 @@
 
 namespace orbis::octree::detail {
 
-/// Somewhere in the k-th of so many equal stretches of [0, last]. At random: regular steps and the rows of a scan get
-/// into step.
+/// Returns a random place in the k-th of `stretches` equal parts of [0, last]. Randomness avoids aliasing between
+/// regular steps and the rows of a scan.
 [[nodiscard]] inline std::size_t place_in_stretch(std::size_t k, std::size_t stretches, std::size_t last,
                                                   random_bits& random) {
   const double place = (static_cast<double>(k) + random.uniform()) * static_cast<double>(last);
   return std::min(static_cast<std::size_t>(place / static_cast<double>(stretches)), last);
 }
-/// The ray to a point: how long it is, at most `limit` (metres), and in `direction` which way it goes (of length 1).
-/// Empty if there is no such ray: the point is the origin, not finite or very far away.
+/// Returns the length of the ray to a point, at most `limit` (metres), and stores its direction (length 1) in
+/// `direction`. Empty if there is no such ray: the point is the origin, not finite or very far away.
 [[nodiscard]] inline std::optional<double> length_of_ray(const float3& origin, const float3& p, double limit,
                                                          vec3& direction) {
   for (std::size_t axis = 0; axis != 3; ++axis)

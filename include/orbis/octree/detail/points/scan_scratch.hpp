@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The buffers of a scan where they are kept, without what they are made of: that is scan_buffers.hpp.
+/// Type-erased owner of a scan's buffers; scan_buffers.hpp defines them.
 #pragma once
 
 #include <algorithm>
@@ -13,7 +13,7 @@
 
 namespace orbis::octree::detail {
 
-/// What can be done with buffers by those who do not know their type.
+/// Operations on buffers of unknown type.
 struct scan_buffers_deleter {
   void (*destroy)(void*) = nullptr;
   std::size_t (*bytes)(const void*) = nullptr;
@@ -21,7 +21,7 @@ struct scan_buffers_deleter {
   void operator()(void* buffers) const { destroy(buffers); }
 };
 
-/// The buffers of a scan, made with the first one. A copy makes its own.
+/// Owns the buffers of a scan, created on first use. A copy creates its own.
 class scan_scratch {
  public:
   scan_scratch() = default;
@@ -31,7 +31,7 @@ class scan_scratch {
   scan_scratch& operator=(scan_scratch&&) noexcept = default;
   ~scan_scratch() = default;
 
-  /// Always of the same type, scan_buffers, of which nothing need be known elsewhere.
+  /// Returns the buffers. `Buffers` is always scan_buffers, whose definition is not needed elsewhere.
   template <class Buffers>
   [[nodiscard]] Buffers& get() {
     if (!buffers_)
@@ -40,7 +40,7 @@ class scan_scratch {
                    .bytes = [](const void* b) { return static_cast<const Buffers*>(b)->memory_bytes(); }}};
     return *static_cast<Buffers*>(buffers_.get());
   }
-  /// Of ranges of points, see point_reader.
+  /// Views a range of points, see point_reader.
   template <point_range Points>
   [[nodiscard]] point_view view(const Points& points) {
     return reader_.view(points);
@@ -54,7 +54,7 @@ class scan_scratch {
   point_reader reader_;
 };
 
-/// Any policy as the one type that algorithms are compiled for.
+/// Converts any policy to the type for which algorithms are compiled.
 template <execution_policy Policy>
 [[nodiscard]] parallel_policy as_parallel(const Policy& policy) {
   if constexpr (std::is_same_v<Policy, parallel_policy>)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A ray traversal that leaves a whole node at once.
+/// A ray traversal that leaves whole nodes in one step.
 #pragma once
 
 #include <array>
@@ -11,9 +11,9 @@
 
 namespace orbis::octree::detail {
 
-/// The walk of `ray_traversal`, able to leave a whole node at once: the parameters of the next steps along
-/// each axis are summed up in advance, in the same order, so that how many of them come before the
-/// node's face can be looked up instead of traversed.
+/// The walk of `ray_traversal`, with steps over whole nodes. The parameters of the next steps along each axis are
+/// precomputed, in the same order of summation, so that the number of steps before the node's face is looked up instead
+/// of traversed.
 class skipping_traversal {
  public:
   explicit skipping_traversal(const ray_traversal& c) noexcept
@@ -24,32 +24,32 @@ class skipping_traversal {
 
   [[nodiscard]] voxel_key key() const noexcept { return {at_[0], at_[1], at_[2]}; }
   [[nodiscard]] bool is_outside() const noexcept { return (at_[0] | at_[1] | at_[2]) >= cells_; }
-  /// Takes back the last step, along `axis`.
+  /// Reverts the last step, along `axis`.
   void step_back(std::size_t axis) noexcept { at_[axis] -= static_cast<std::uint32_t>(step_[axis]); }
 
   struct crossing {
     std::size_t axis;
-    double parameter;  ///< of the ray at the face
+    double parameter;  ///< parameter of the ray at the face
   };
-  /// One step.
+  /// Takes one step.
   crossing step() noexcept {
     const crossing face = first(ahead_[0][used_[0]], ahead_[1][used_[1]], ahead_[2][used_[2]]);
     at_[face.axis] += static_cast<std::uint32_t>(step_[face.axis]);
     if (++used_[face.axis] == count - 1) renew();
     return face;
   }
-  /// Where the ray leaves the node of edge `cells` that it is in.
-  struct way_out {
+  /// Exit of the ray from the node of edge `cells` that contains it.
+  struct node_exit {
     crossing face;
-    std::array<std::uint32_t, 3> steps;  ///< until outside along each axis, were it alone
+    std::array<std::uint32_t, 3> steps;  ///< steps to leave the node along each axis alone
   };
-  /// @pre cells is a power of two, at most 32
-  [[nodiscard]] way_out find_way_out(std::uint32_t cells) noexcept {
-    way_out way{};
+  /// Finds the exit from the current node. @pre cells is a power of two, at most 32
+  [[nodiscard]] node_exit find_node_exit(std::uint32_t cells) noexcept {
+    node_exit way{};
     const auto steps_along = [&](std::size_t i) {
       const std::uint32_t inside = at_[i] & (cells - 1);
       way.steps[i] = step_[i] > 0 ? cells - inside : inside + 1;
-      return used_[i] + way.steps[i] >= count - 1;  // step() wants one more
+      return used_[i] + way.steps[i] >= count - 1;  // step() reads one more
     };
     const bool short_x = steps_along(0), short_y = steps_along(1), short_z = steps_along(2);
     if (short_x || short_y || short_z) renew();
@@ -57,12 +57,12 @@ class skipping_traversal {
     way.face = first(last(0), last(1), last(2));
     return way;
   }
-  /// Takes all steps up to there.
-  void take(const way_out& way) noexcept {
+  /// Takes all steps up to an exit.
+  void take(const node_exit& way) noexcept {
     const double end = way.face.parameter;
     const auto take_along = [&](std::size_t i) {
-      // Steps are `delta` apart but for rounding, so only the one next to the face must be looked at. The
-      // first is less than a step before the ray, the last not before the face: nothing to clamp.
+      // Steps are `delta` apart up to rounding, so only the one next to the face must be examined. The first is less
+      // than one step before the ray and the last is not before the face, so clamping is not needed.
       const double* const next = ahead_[i].data() + used_[i];
       const double near = (end - next[0]) * per_step_[i] + 0.5;
       const auto sure = static_cast<std::uint32_t>(static_cast<std::int32_t>(near));
@@ -79,7 +79,7 @@ class skipping_traversal {
  private:
   static constexpr std::uint32_t count = 64;
 
-  /// The face that comes first; of those at the same place the last axis', as in ray_traversal.
+  /// Returns the face that comes first; at ties that of the last axis, as in ray_traversal.
   [[nodiscard]] static crossing first(double x, double y, double z) noexcept {
     const bool is_x = x < y && x < z, is_z = !(y < z) || (x < y && !is_x);
     const double parameter = x < y ? x : y;

@@ -32,7 +32,7 @@ struct update_block_kernel {
       const mask is_hit = mask::from_bits(occupied >> i), is_miss = mask::from_bits(free >> i);
       const values v = values::load(b.value.data() + i);
       const values sum = v + select(is_hit, values(M::hit), values(M::miss));
-      // A value at or beyond its bound stays, as after_hit and after_miss say.
+      // A value at or beyond its bound does not change, as in after_hit and after_miss.
       const mask moves = (is_hit & (v < high)) | (is_miss & (v > low));
       const values after = select(moves, min(max(sum, low), high), v);
       after.store(b.value.data() + i);
@@ -42,21 +42,21 @@ struct update_block_kernel {
   }
 };
 
-/// Gives the voxels `free` of `b` a miss and the voxels `occupied` a hit, see after_miss and after_hit. Returns the
-/// voxels whose value changed or became known. @pre free and occupied are disjoint
+/// Applies a miss to the voxels `free` of `b` and a hit to the voxels `occupied`, see after_miss and after_hit. Returns
+/// the voxels whose value changed or became known. @pre free and occupied are disjoint
 template <sensor_model M>
 std::uint64_t update_block(block<typename M::value_type>& b, std::uint64_t free, std::uint64_t occupied) noexcept {
   using signature = std::uint64_t(block<typename M::value_type>&, std::uint64_t, std::uint64_t);
   return simd::kernel<update_block_kernel<M>, signature>()(b, free, occupied);
 }
 
-/// Whether a miss cannot lower this value any more.
+/// Returns true if a miss cannot lower this value further.
 template <sensor_model Model>
 [[nodiscard]] constexpr bool is_saturated_free(typename Model::value_type v) noexcept {
   return v <= Model::clamp_min;
 }
 
-/// Whether the brick that contains `k` is part of a larger leaf that is saturated free.
+/// Returns true if the brick that contains `k` is part of a larger leaf that is saturated free.
 template <sensor_model Model>
 [[nodiscard]] bool is_saturated_leaf(const brick_store<typename Model::value_type>& store, const voxel_key& k) {
   if (!store.has_large()) return false;
@@ -76,17 +76,18 @@ void find_saturated(const brick_store<typename Model::value_type>& store, std::u
   for (std::uint32_t i = 0; i != 8; ++i) saturated[i] |= store.voxels_where(*b, i, is_saturated_free<Model>);
 }
 
-/// Of an octant, the voxels that changed, and those that had a miss without being saturated.
+/// Voxels of an octant that changed, and those that had a miss without being saturated.
 struct octant_change {
   std::uint64_t changed = 0, missed = 0;
 };
 
-/// Gives the voxels `occupied` of octant `octant` of `b` a hit and the voxels `free` a miss. @pre the two are disjoint
+/// Applies a hit to the voxels `occupied` of octant `octant` of `b` and a miss to the voxels `free`. @pre the two are
+/// disjoint
 template <sensor_model Model>
 octant_change apply_octant(brick_store<typename Model::value_type>& store, brick<typename Model::value_type>& b,
                            std::uint32_t octant, std::uint64_t occupied, std::uint64_t free) {
   using T = typename Model::value_type;
-  // Most of a room is saturated already: where nothing can change, nothing is unpacked.
+  // Most voxels of a room are already saturated; octants that cannot change are not unpacked.
   if (free != 0) free &= ~store.voxels_where(b, octant, is_saturated_free<Model>);
   if (occupied != 0) occupied &= ~store.voxels_where(b, octant, [](T v) { return v >= Model::clamp_max; });
   if ((free | occupied) == 0) return {};
@@ -97,8 +98,8 @@ octant_change apply_octant(brick_store<typename Model::value_type>& store, brick
   return {changed, free};
 }
 
-/// Applies a scan: every voxel marked occupied gets a hit, every other one marked free a miss. Counts them in
-/// `summary`, and records what changed in `log` unless that is null.
+/// Applies a scan: a hit to every voxel marked occupied, a miss to every other one marked free. Counts them in
+/// `summary`, and records the changes in `log` unless it is null.
 template <sensor_model Model>
 void apply_scan(brick_store<typename Model::value_type>& store, const scan_masks& scan, integration_summary& summary,
                 change_log* log) {
@@ -110,7 +111,7 @@ void apply_scan(brick_store<typename Model::value_type>& store, const scan_masks
       summary.occupied += static_cast<std::size_t>(std::popcount(occupied));
       matters = matters || occupied != 0;
     }
-    if (!matters) continue;  // a large leaf is split only where something changes
+    if (!matters) continue;  // a large leaf is split only if one of its voxels changes
     auto& b = store.make(key);
     for (std::uint32_t i = 0; i != 8; ++i) {
       if ((s.occupied[i] | s.free[i]) == 0) continue;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// How a map is stored. A hash finds chunks of 4x4x4 bricks. A brick has eight octants of 4x4x4 voxels. An octant is
-/// unknown, uniform (one value: this is pruning), or stored as indices into the values it has. Leaves bigger than a
-/// brick are kept apart, and are split when something inside changes.
+/// Storage of a map. A hash table finds chunks of 4x4x4 bricks. A brick has eight octants of 4x4x4 voxels. An octant is
+/// unknown, uniform (one value: this is the pruning), or stored as indices into its distinct values. Leaves larger than
+/// a brick are stored separately, and are split when a voxel inside changes.
 #pragma once
 
 #include <algorithm>
@@ -26,17 +26,17 @@
 
 namespace orbis::octree::detail {
 
-/// 8x8x8 voxels.
+/// A node of 8x8x8 voxels.
 template <class T>
 struct brick {
   std::uint64_t name = 0;    ///< see node_name
   std::uint8_t uniform = 0;  ///< bit i: octant i has one value, value[i]
   std::uint8_t dense = 0;    ///< bit i: octant i is stored voxel by voxel, in record at[i]
   std::array<std::uint32_t, 8> at{};
-  std::array<T, 8> value{};  ///< the largest value in octant i, if anything is known there
+  std::array<T, 8> value{};  ///< the largest value in octant i, if any is known
 
   [[nodiscard]] bool is_known() const noexcept { return (uniform | dense) != 0; }
-  /// Whether all 512 voxels have the same value.
+  /// Returns true if all 512 voxels have the same value.
   [[nodiscard]] bool is_uniform() const noexcept {
     bool same = uniform == 0xff;
     for (const T v : value) same &= v == value[0];
@@ -44,51 +44,51 @@ struct brick {
   }
 };
 
-/// All the bricks of a map. A copy shares everything with the original until one of them changes.
+/// All bricks of a map. A copy shares all data with the original until one of them changes.
 template <class T>
 class brick_store {
  public:
   static constexpr std::uint32_t none = hash_index::none;
 
-  /// 4x4x4 bricks in Morton order; `none` where there is no brick.
+  /// A node of 4x4x4 bricks in Morton order; `none` for missing bricks.
   struct chunk {
     std::uint64_t name = 0;
     std::array<std::uint32_t, 64> at{};
   };
 
-  // -- looking
+  // -- look-up
 
   [[nodiscard]] bool empty() const noexcept { return brick_count() == 0 && large_.empty(); }
   [[nodiscard]] std::size_t brick_count() const noexcept { return bricks_.size() - free_bricks_.size(); }
   [[nodiscard]] std::size_t chunk_count() const noexcept { return chunks_.size(); }
-  /// The chunk that contains `k`, or null.
+  /// Returns the chunk that contains `k`, or null.
   [[nodiscard]] const chunk* find_chunk(const voxel_key& k) const noexcept {
     const std::uint32_t i = index_.find(node_name(k, chunk_level));
     return i == none ? nullptr : &chunks_[i];
   }
-  /// The brick in a place of a chunk, or null.
+  /// Returns the brick at a place of a chunk, or null.
   [[nodiscard]] const brick<T>* find(const chunk& c, std::uint32_t place) const noexcept {
     return c.at[place] == none ? nullptr : &bricks_[c.at[place]];
   }
-  /// The brick that contains `k`, or null.
+  /// Returns the brick that contains `k`, or null.
   [[nodiscard]] const brick<T>* find(const voxel_key& k) const noexcept {
     const chunk* const c = find_chunk(k);
     return c == nullptr ? nullptr : find(*c, place_in_chunk(k));
   }
-  /// Whether there are leaves bigger than a brick.
+  /// Returns true if there are leaves larger than a brick.
   [[nodiscard]] bool has_large() const noexcept { return !large_.empty(); }
   [[nodiscard]] std::size_t large_count() const noexcept { return large_.size(); }
-  /// The value and level of the leaf bigger than a brick that contains `k`, if there is one.
+  /// Returns the value and level of the leaf larger than a brick that contains `k`, if it exists.
   [[nodiscard]] std::optional<std::pair<T, int>> find_large(const voxel_key& k) const noexcept {
     const auto* const leaf = large_.find(k);
     return leaf != nullptr ? std::optional{std::pair{leaf->value, named_level(leaf->name)}} : std::nullopt;
   }
-  /// That leaf's value, valid until the store changes, or null.
+  /// Returns that leaf's value, valid until the store changes, or null.
   [[nodiscard]] const T* find_large_value(const voxel_key& k) const noexcept {
     const auto* const leaf = large_.find(k);
     return leaf != nullptr ? &leaf->value : nullptr;
   }
-  /// The value of a place in a brick, empty where nothing is known.
+  /// Returns the value at a place in a brick, empty if unknown.
   [[nodiscard]] std::optional<T> value(const brick<T>& b, std::uint32_t place) const noexcept {
     const std::uint32_t octant = place >> 6U;
     if ((b.uniform >> octant & 1U) != 0) return b.value[octant];
@@ -98,26 +98,26 @@ class brick_store {
       return (r.known >> p & 1U) != 0 ? std::optional{r.at(p)} : std::nullopt;
     });
   }
-  /// The value of voxel `k`, empty where nothing is known.
+  /// Returns the value of voxel `k`, empty if unknown.
   [[nodiscard]] std::optional<T> value(const voxel_key& k) const noexcept {
     const brick<T>* const b = find(k);
     if (b != nullptr) return value(*b, place_in_brick(k));
     const auto* const leaf = large_.find(k);
     return leaf != nullptr ? std::optional{leaf->value} : std::nullopt;
   }
-  /// Octant `i` of `b` in place; valid until the store or `b` changes.
+  /// Views octant `i` of `b` in place; valid until the store or `b` changes.
   [[nodiscard]] octant_view<T> view(const brick<T>& b, std::uint32_t i) const noexcept {
     if ((b.uniform >> i & 1U) != 0) return {~std::uint64_t{0}, nullptr, 0, &b.value[i]};
     if ((b.dense >> i & 1U) == 0) return {};
     return pools_.read(b.at[i], [](const auto& r) { return r.view(); });
   }
-  /// The known voxels of octant `i` of `b`.
+  /// Mask of the known voxels of octant `i` of `b`.
   [[nodiscard]] std::uint64_t known(const brick<T>& b, std::uint32_t i) const noexcept {
     if ((b.uniform >> i & 1U) != 0) return ~std::uint64_t{0};
     if ((b.dense >> i & 1U) == 0) return 0;
     return pools_.read(b.at[i], [](const auto& r) { return r.known; });
   }
-  /// The known voxels of octant `i` of `b` for whose value `wanted` is true.
+  /// Mask of the known voxels of octant `i` of `b` for whose value `wanted` is true.
   template <std::predicate<T> Wanted>
   [[nodiscard]] std::uint64_t voxels_where(const brick<T>& b, std::uint32_t i, Wanted&& wanted) const noexcept {
     if ((b.uniform >> i & 1U) != 0) return wanted(b.value[i]) ? ~std::uint64_t{0} : 0;
@@ -149,21 +149,21 @@ class brick_store {
         if (c.at[place] != none) visit(bricks_[c.at[place]]);
     });
   }
-  /// Calls `visit(name, value)` for every leaf bigger than a brick, in no particular order.
+  /// Calls `visit(name, value)` for every leaf larger than a brick, unordered.
   template <class Visit>
   void for_each_large(Visit&& visit) const {
     for (std::size_t i = 0; i != large_.size(); ++i) visit(large_[i].name, large_[i].value);
   }
-  /// Bytes on the heap, those shared with copies included.
+  /// Heap memory in bytes, including memory shared with copies.
   [[nodiscard]] std::size_t memory_bytes() const noexcept {
     return index_.memory_bytes() + chunks_.memory_bytes() + bricks_.memory_bytes() + large_.memory_bytes() +
            free_bricks_.capacity() * sizeof(std::uint32_t) + pools_.memory_bytes();
   }
 
-  // -- changing
+  // -- modification
 
-  /// The brick that contains `k`, made if need be; splits a larger leaf. Valid until the next change
-  /// to another brick.
+  /// Returns the brick that contains `k`; creates it if needed, splitting a larger leaf. Valid until the next change to
+  /// another brick.
   [[nodiscard]] brick<T>& make(const voxel_key& k) {
     if (const std::uint32_t i = find_brick_index(k); i != none) return bricks_.writable(i);
     if (const auto* const leaf = large_.find(k)) {
@@ -172,7 +172,7 @@ class brick_store {
     }
     return add(k);
   }
-  /// Gives octant `i` of `b` one value for all its voxels.
+  /// Sets all voxels of octant `i` of `b` to one value.
   void make_uniform(brick<T>& b, std::uint32_t i, T value) {
     drop_record(b, i);
     b.uniform |= static_cast<std::uint8_t>(1U << i);
@@ -194,8 +194,8 @@ class brick_store {
     for (std::uint64_t rest = voxels.known; rest != 0; rest &= rest - 1)
       b.value[i] = std::max(b.value[i], voxels.value[static_cast<std::size_t>(std::countr_zero(rest))]);
   }
-  /// Stores the voxels `known` with the values that `p` gives them as octant `i` of `b`.
-  /// @pre p.count <= max_palette, its values are distinct and each is some known voxel's
+  /// Stores the voxels `known` with the values of palette `p` as octant `i` of `b`.
+  /// @pre p.count <= max_palette, its values are distinct and each is used by a known voxel
   void write_octant(brick<T>& b, std::uint32_t i, std::uint64_t known, const palette<T>& p) {
     if (known == 0) {
       drop_record(b, i);
@@ -209,8 +209,8 @@ class brick_store {
       b.value[i] = *std::max_element(p.value.begin(), p.value.begin() + p.count);
     }
   }
-  /// Gives every voxel of the node at `level` that starts at `k` the same value.
-  /// @pre nothing is known inside it
+  /// Sets every voxel of the node at `level` that starts at `k` to the same value.
+  /// @pre the whole node is unknown
   void set_node(const voxel_key& k, int level, T value) {
     if (level > brick_level) {
       large_.add(node_name(k, level), value);
@@ -233,10 +233,9 @@ class brick_store {
       write_octant(b, place >> 6U, voxels);
     }
   }
-  /// Replaces every value by `change(value)`, or by nothing where that is empty: the voxel becomes
-  /// unknown. `change` is called once or more for each value of an octant. Calls
-  /// `changed(name of the brick, octant, mask of voxels)` for what became different, but not for
-  /// leaves bigger than a brick. O(octants).
+  /// Replaces every value by `change(value)`; an empty result makes the voxel unknown. Calls `change` at least once for
+  /// each value of an octant. Calls `changed(name of the brick, octant, mask of voxels)` for changed voxels, except
+  /// those of leaves larger than a brick. O(octants).
   template <class Change, std::invocable<std::uint64_t, std::uint32_t, std::uint64_t> Changed>
   requires std::is_invocable_r_v<std::optional<T>, Change&, T> void transform(Change&& change, Changed&& changed) {
     std::vector<std::uint64_t> empty;
@@ -287,14 +286,14 @@ class brick_store {
     }
     if (emptied) erase_empty_chunks();
   }
-  /// Removes the leaves bigger than a brick whose names are given.
+  /// Removes the leaves larger than a brick with the given names.
   void erase_large(std::span<const std::uint64_t> names) {
     for (const std::uint64_t name : names) large_.erase(name);
   }
   void clear() { *this = {}; }
 
  private:
-  /// Gives octant `i` of `b` a record of its own in a pool, in use already or not.
+  /// Gives octant `i` of `b` its own record in a pool; replaces an existing one.
   void make_record(brick<T>& b, std::uint32_t i, unsigned number) {
     const auto bit = static_cast<std::uint8_t>(1U << i);
     if ((b.dense & bit) != 0 && octant_pools<T>::pool_of(b.at[i]) == number) return;
@@ -320,7 +319,7 @@ class brick_store {
     const chunk* const c = find_chunk(k);
     return c == nullptr ? none : c->at[place_in_chunk(k)];
   }
-  /// A new brick. @pre there is none that contains `k`
+  /// Adds a brick. @pre no brick contains `k`
   brick<T>& add(const voxel_key& k) {
     const std::uint64_t name = node_name(k, chunk_level);
     std::uint32_t c = index_.find(name);
@@ -356,7 +355,7 @@ class brick_store {
     if (empty()) clear();
   }
 
-  /// Replaces a large leaf by its brick that contains `k` and that brick's siblings on the way down.
+  /// Replaces a large leaf by its brick that contains `k` and the siblings of the nodes on the path to it.
   void split(std::uint64_t name, T value, const voxel_key& k) {
     large_.erase(name);
     voxel_key node = named_key(name);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The leaves bigger than a brick: few, and found by the name of any node they may be.
+/// Leaves larger than a brick: few, and found by the name of any node that they may be.
 #pragma once
 
 #include <array>
@@ -42,9 +42,9 @@ class large_leaves {
 
   [[nodiscard]] bool empty() const noexcept { return leaves_.empty(); }
   [[nodiscard]] std::size_t size() const noexcept { return leaves_.size(); }
-  /// In no particular order. @pre i < size()
+  /// Returns the i-th leaf, unordered. @pre i < size()
   [[nodiscard]] const leaf& operator[](std::size_t i) const noexcept { return leaves_[i]; }
-  /// The leaf that contains `k`, or null. O(levels that have any).
+  /// Returns the leaf that contains `k`, or null. O(levels with leaves).
   [[nodiscard]] const leaf* find(const voxel_key& k) const noexcept {
     for (unsigned levels = levels_; levels != 0; levels &= levels - 1) {
       const std::uint32_t i = index_.find(node_name(k, std::countr_zero(levels)));
@@ -52,7 +52,7 @@ class large_leaves {
     }
     return nullptr;
   }
-  /// @pre no other leaf overlaps the node
+  /// Adds a leaf. @pre no other leaf overlaps the node
   void add(std::uint64_t name, T value) {
     index_.set(name, static_cast<std::uint32_t>(leaves_.size()));
     leaves_.push_back({name, value});
@@ -61,7 +61,7 @@ class large_leaves {
     levels_ |= 1U << level;
   }
   void set_value(std::size_t i, T value) { leaves_.writable(i).value = value; }
-  /// Forgets the leaf with this name, if there is one; the last one takes its place.
+  /// Removes the leaf with this name, if it exists; the last one takes its place.
   void erase(std::uint64_t name) {
     const std::uint32_t i = index_.find(name);
     if (i == hash_index::none) return;
@@ -76,7 +76,7 @@ class large_leaves {
     leaves_.resize(leaves_.size() - 1);
     if (leaves_.empty()) *this = large_leaves{};
   }
-  /// Bytes on the heap, those shared with copies included.
+  /// Heap memory in bytes, including memory shared with copies.
   [[nodiscard]] std::size_t memory_bytes() const noexcept { return index_.memory_bytes() + leaves_.memory_bytes(); }
 
  private:

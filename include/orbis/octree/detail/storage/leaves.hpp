@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Visits the leaves of the pruned octree, which are found from the bricks alone.
+/// Visits the leaves of the pruned octree, which are derived from the bricks.
 #pragma once
 
 #include <algorithm>
@@ -33,16 +33,16 @@ namespace orbis::octree::detail {
 
 inline constexpr std::uint64_t low_bits = 0x0101010101010101;  ///< the first voxel of each group of eight
 
-/// Bit 8 i: byte i of `mask` is not zero.
+/// Returns a mask; bit 8 i is set if byte i of `mask` is not zero.
 [[nodiscard]] constexpr std::uint64_t bytes_with_any(std::uint64_t mask) noexcept {
   constexpr std::uint64_t rest = 0x7f * low_bits;
   return (((mask & rest) + rest) | mask) >> 7U & low_bits;
 }
-/// The leaves of an octant that is not one itself.
+/// Leaves of an octant that is not a leaf itself.
 struct octant_leaves {
-  std::uint64_t first;      ///< the lowest voxel of each leaf
-  std::uint64_t large;      ///< of these, the ones of 2x2x2 voxels
-  std::size_t inner_nodes;  ///< the octant, and its groups of 2x2x2 that are no leaves
+  std::uint64_t first;      ///< lowest voxel of each leaf
+  std::uint64_t large;      ///< subset of these that are leaves of 2x2x2 voxels
+  std::size_t inner_nodes;  ///< the octant, and its groups of 2x2x2 voxels that are not leaves
 };
 template <class T>
 [[nodiscard]] octant_leaves leaves_of(const octant_view<T>& o) noexcept {
@@ -61,7 +61,7 @@ template <class T>
   const std::uint64_t inner = bytes_with_any(o.known) & ~large;
   return {(o.known & inner * 0xff) | large, large, 1 + count_ones(inner)};
 }
-/// The lowest voxel of each place of an octant.
+/// Lowest voxel of each place of an octant.
 inline constexpr auto octant_offsets = [] {
   std::array<voxel_key, 64> offsets{};
   for (std::uint32_t i = 0; i != 64; ++i) offsets[i] = voxel_in_brick(i);
@@ -72,15 +72,15 @@ inline constexpr auto octant_offsets = [] {
   return {octant.x + k.x, octant.y + k.y, octant.z + k.z};
 }
 
-/// Calls `on_leaf(key, level, value)` for leaves from an octant on and `on_octant(key, brick, i)` for
-/// the other octants, which returns the inner nodes from there on. Returns the number of inner nodes.
+/// Calls `on_leaf(key, level, value)` for leaves of at least an octant, and `on_octant(key, brick, i)` for the other
+/// octants, which returns the number of inner nodes from there on. Returns the number of inner nodes.
 template <class T, class OnLeaf, class OnOctant>
 std::size_t walk_octants(const std::vector<tree_part<T>>& parts, int root_level, OnLeaf&& on_leaf,
                          OnOctant&& on_octant) {
   std::size_t inner = 0;
   for (std::size_t i = 0; i != parts.size(); ++i) {
     const tree_part<T>& part = parts[i];
-    // Its ancestors, but for those it has in common with the part before it.
+    // The ancestors of the part, except those it shares with the previous part.
     const auto differing = static_cast<int>(i == 0 ? 0 : std::bit_width(part.order ^ parts[i - 1].order));
     const int lowest_common = i == 0 ? root_level + 1 : brick_level + (differing + 2) / 3;
     inner += static_cast<std::size_t>(lowest_common - 1 - part.level);
@@ -118,7 +118,7 @@ std::size_t visit_octant(const voxel_key& key, const octant_view<T>& o, block<T>
   return leaves.inner_nodes;
 }
 
-/// The leaves of some parts of a store.
+/// Visits the leaves of some parts of a store.
 template <class T, class Visit>
 std::size_t visit_parts(const brick_store<T>& store, const std::vector<tree_part<T>>& parts, int root_level,
                         Visit&& visit) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Octants of 4x4x4 voxels as they are stored: the values there are, and for each voxel the index of
-/// its own. And the pools where they lie, one for each size of palette.
+/// Storage of octants of 4x4x4 voxels: the distinct values, and for each voxel the index of its value. The records are
+/// in pools, one per palette size.
 #pragma once
 
 #include <algorithm>
@@ -18,15 +18,15 @@
 
 namespace orbis::octree::detail {
 
-/// An octant where it is stored: its known voxels, and the index of each voxel's value, bit by bit.
+/// A stored octant: its known voxels, and the index of each voxel's value, bit by bit.
 template <class T>
 struct octant_view {
   std::uint64_t known = 0;
-  const std::uint64_t* plane = nullptr;  ///< `bits` masks: bit j of every voxel's index
+  const std::uint64_t* plane = nullptr;  ///< `bits` masks: mask j holds bit j of every voxel's index
   unsigned bits = 0;
   const T* value = nullptr;
 
-  /// The value of a place. @pre it is known
+  /// Value of a place. @pre it is known
   [[nodiscard]] T at(std::uint32_t place) const noexcept {
     unsigned index = 0;
     for (unsigned j = 0; j != bits; ++j) index |= static_cast<unsigned>(plane[j] >> place & 1U) << j;
@@ -80,7 +80,7 @@ struct packed_octant {
 /// Bit j of every place.
 inline constexpr std::array<std::uint64_t, 6> place_planes{0xaaaaaaaaaaaaaaaa, 0xcccccccccccccccc, 0xf0f0f0f0f0f0f0f0,
                                                            0xff00ff00ff00ff00, 0xffff0000ffff0000, 0xffffffff00000000};
-/// An octant of more values than that.
+/// An octant with more distinct values than palettes can hold.
 template <class T>
 struct plain_octant {
   std::uint64_t known = 0;
@@ -116,8 +116,8 @@ struct plain_octant {
   }
 };
 
-/// Records of octants, each known by a number: 3 bits for its pool, 29 for its place there. Pool p < 6 holds octants of
-/// up to 2^p values, pool `plain` those of more. Copies share pages until one of them writes.
+/// Records of octants, identified by numbers: 3 bits for the pool, 29 for the place in it. Pool p < 6 holds octants
+/// with up to 2^p values, pool `plain` those with more. Copies share pages until one of them is modified.
 template <class T>
 class octant_pools {
  public:
@@ -125,17 +125,17 @@ class octant_pools {
 
   [[nodiscard]] static constexpr unsigned pool_of(std::uint32_t record) noexcept { return record >> 29U; }
 
-  /// `use(record)`.
+  /// Calls `use(record)`.
   template <class Use>
   decltype(auto) read(std::uint32_t record, Use&& use) const {
     return with_pool(*this, pool_of(record), [&](const auto& p) { return use(p.items[place_of(record)]); });
   }
-  /// `use(record&)`, for writing.
+  /// Calls `use(record&)`, for writing.
   template <class Use>
   void write(std::uint32_t record, Use&& use) {
     with_pool(*this, pool_of(record), [&](auto& p) { use(p.items.writable(place_of(record))); });
   }
-  /// A record that is not in use, from the pool with this number.
+  /// Returns an unused record of the pool with this number.
   [[nodiscard]] std::uint32_t add(unsigned number) {
     return number << 29U | with_pool(*this, number, [](auto& p) {
              if (p.free.empty()) {
@@ -150,7 +150,7 @@ class octant_pools {
   void erase(std::uint32_t record) {
     with_pool(*this, pool_of(record), [&](auto& p) { p.free.push_back(place_of(record)); });
   }
-  /// Bytes on the heap, those shared with copies included.
+  /// Heap memory in bytes, including memory shared with copies.
   [[nodiscard]] std::size_t memory_bytes() const noexcept {
     std::size_t bytes = 0;
     std::apply(

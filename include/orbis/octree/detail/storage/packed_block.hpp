@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// 64 voxels as an index into the few values they have. Log-odds come from a handful of additions
-/// and two bounds, so that neighbours mostly share their values: an octant of a map takes a quarter
-/// of the room that its floats would, and loses nothing.
+/// 64 voxels as indices into their few distinct values. Log-odds result from a few additions and two bounds, so
+/// neighbours mostly share values: an octant of a map takes a quarter of the memory of its floats, without loss.
 #pragma once
 
 #include <array>
@@ -11,13 +10,13 @@
 
 namespace orbis::octree::detail {
 
-/// An octant of 4x4x4 voxels in the open, in Morton order. Unknown voxels hold 0.
+/// An unpacked octant of 4x4x4 voxels, in Morton order. Unknown voxels hold 0.
 template <class T>
 struct alignas(64) block {
   std::array<T, 64> value{};
   std::uint64_t known = 0;
 
-  /// Whether all voxels are known and have the same value, bit by bit.
+  /// Returns true if all voxels are known and have the same value, bit by bit.
   [[nodiscard]] bool is_uniform() const noexcept {
     if (known != ~std::uint64_t{0}) return false;
     bool same = true;
@@ -26,11 +25,11 @@ struct alignas(64) block {
   }
 };
 
-/// The most values an octant can have and still be stored as indices.
+/// Maximum number of values of an octant that is stored as indices.
 inline constexpr unsigned max_palette_bits = 5;
 inline constexpr unsigned max_palette = 1U << max_palette_bits;
 
-/// The distinct values of a block: `plane[j]` holds bit j of every voxel's index into `value`.
+/// Distinct values of a block: `plane[j]` holds bit j of every voxel's index into `value`.
 template <class T>
 struct palette {
   unsigned count = 0;  ///< more than max_palette: too many
@@ -45,7 +44,7 @@ struct palette {
   }
 };
 
-/// The voxels whose index is `i`, among those whose index has `bits` planes.
+/// Mask of the voxels whose index is `i`, for indices with `bits` planes.
 template <unsigned Bits>
 [[nodiscard]] constexpr std::uint64_t voxels_of_index(const std::uint64_t* plane, unsigned i) noexcept {
   std::uint64_t where = ~std::uint64_t{0};
@@ -59,8 +58,8 @@ template <unsigned Bits>
 template <class T>
 void find_palette(const block<T>& b, palette<T>& p) noexcept;
 
-/// Gives the voxels that `out` knows the values that `plane[0 ... bits)` choose among the 2^bits `values`, and the
-/// others 0.
+/// Sets the known voxels of `out` to the values that `plane[0 ... bits)` selects from the 2^bits `values`, and the
+/// others to 0.
 template <class T>
 void expand_palette(const T* values, const std::uint64_t* plane, unsigned bits, block<T>& out) noexcept;
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// To and from 64 voxels as an index into their values, with vectors: the functions that packed_block.hpp declares.
+/// Vectorised conversion of 64 voxels to and from indices into their values: definitions of the functions of
+/// packed_block.hpp.
 #pragma once
 
 #include <algorithm>
@@ -50,7 +51,7 @@ struct expand_palette_kernel {
                                       block<T>& out) noexcept {
     using index = simd::native_vec<std::int32_t, Target>;
     using lanes = simd::vec<T, index::count, Target>;
-    constexpr bool in_registers = sizeof(T) == 4 && index::count == 16;  // all values in two of them
+    constexpr bool in_registers = sizeof(T) == 4 && index::count == 16;  // all values fit into two registers
     lanes low, high;
     if constexpr (in_registers) {
       const std::size_t count = std::size_t{1} << bits;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// One scan as sets of voxels: which were crossed, which were hit. Bit masks per brick, so that
-/// marking a voxel a thousand times costs a thousand `or`s and no memory.
+/// One scan as sets of crossed and hit voxels. Uses bit masks per brick, so that marking a voxel a thousand times costs
+/// a thousand `or` operations and no memory.
 #pragma once
 
 #include <array>
@@ -16,15 +16,15 @@
 
 namespace orbis::octree::detail {
 
-/// What a scan says about one brick; word i is octant i.
+/// Masks of a scan for one brick; word i is octant i.
 struct scan_brick {
   std::uint64_t name = 0;
   std::array<std::uint64_t, 8> free{};
   std::array<std::uint64_t, 8> occupied{};
 };
 
-/// The voxels a scan touches. Reused from scan to scan; memory is given back only if a scan needed much
-/// less than one before it.
+/// The voxels that a scan observes. Reused between scans; memory is freed only if a scan needs much less than a
+/// previous one.
 class scan_masks {
  public:
   [[nodiscard]] const std::vector<scan_brick>& bricks() const noexcept { return bricks_; }
@@ -37,10 +37,10 @@ class scan_masks {
     index_.clear();
     bricks_.clear();
   }
-  /// The masks of the brick that contains `k`; valid until the next call.
+  /// Returns the masks of the brick that contains `k`; valid until the next call.
   [[nodiscard]] scan_brick& at(const voxel_key& k) { return named(node_name(k, brick_level)); }
 
-  /// The masks of a named brick, or null.
+  /// Returns the masks of a named brick, or null.
   [[nodiscard]] const scan_brick* find(std::uint64_t name) const noexcept {
     const std::uint32_t i = index_.find(name);
     return i == hash_index::none ? nullptr : &bricks_[i];
@@ -68,7 +68,7 @@ class scan_masks {
       free[place >> 6U] |= std::uint64_t{1} << (place & 63U);
     });
   }
-  /// Adds what `other` marked.
+  /// Adds the marks of `other`.
   void merge(const scan_masks& other) {
     for (const scan_brick& from : other.bricks_) {
       scan_brick& to = named(from.name);
@@ -94,7 +94,7 @@ class scan_masks {
 
   hash_index index_;
   std::vector<scan_brick> bricks_;
-  std::size_t last_ = 0;  ///< the brick asked for last: neighbours mostly lie in the same one
+  std::size_t last_ = 0;  ///< the last brick used; consecutive voxels are mostly in the same one
 };
 
 /// Calls `visit(place)` for the place in the brick of every bit set in `masks`.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A pruned octree down to its bricks, as a sorted list, for algorithms that visit all of it.
+/// A pruned octree down to its bricks, as a sorted list, for algorithms that visit the whole tree.
 #pragma once
 
 #include <algorithm>
@@ -12,17 +12,17 @@
 
 namespace orbis::octree::detail {
 
-/// A brick that is no leaf, or a leaf at least as large as one.
+/// A brick that is not a leaf, or a leaf of at least the size of a brick.
 template <class T>
 struct tree_part {
   std::uint64_t order;      ///< Morton order of its lowest brick
   voxel_key key;            ///< its lowest voxel
   int level;                ///< brick_level or more
   const brick<T>* content;  ///< null: a leaf
-  T value;                  ///< of a leaf
+  T value;                  ///< value of a leaf
 };
 
-/// The bricks and larger leaves of a store in Morton order. O(bricks).
+/// Returns the bricks and larger leaves of a store in Morton order. O(bricks).
 template <class T>
 [[nodiscard]] std::vector<tree_part<T>> stored_parts(const brick_store<T>& store) {
   std::vector<tree_part<T>> parts;
@@ -42,12 +42,12 @@ template <class T>
   return parts;
 }
 
-/// Merges every eight equal leaves that fill their parent, again and again. The root is not merged. `parts` are in
-/// Morton order.
+/// Repeatedly merges every eight equal leaves that fill their parent. The root is not merged. `parts` are in Morton
+/// order.
 template <class T>
 void merge_parts(std::vector<tree_part<T>>& parts, int root_level) {
-  // The merged ones take the place of those read already. Eight leaves of one size that end with a
-  // parent's last child are its children.
+  // Merged parts overwrite those already read. Eight leaves of one size that end with a parent's last child are its
+  // children.
   std::size_t size = 0;
   for (std::size_t i = 0; i != parts.size(); ++i) {
     parts[size++] = parts[i];
@@ -68,8 +68,8 @@ void merge_parts(std::vector<tree_part<T>>& parts, int root_level) {
   parts.erase(parts.begin() + static_cast<std::ptrdiff_t>(size), parts.end());
 }
 
-/// The parts of a store's pruned octree: its leaves from a brick on, and the bricks that have smaller
-/// ones. O(bricks).
+/// Returns the parts of a store's pruned octree: its leaves of at least the size of a brick, and the bricks that have
+/// smaller ones. O(bricks).
 template <class T>
 [[nodiscard]] std::vector<tree_part<T>> tree_parts(const brick_store<T>& store, int root_level) {
   std::vector<tree_part<T>> parts = stored_parts(store);
@@ -77,16 +77,16 @@ template <class T>
   return parts;
 }
 
-/// Walks the part of a tree above its bricks, children before parents: `Visitor` has `open()`, which
-/// begins an inner node and returns what collects its children by `add(i, child)`; `close(level,
-/// collected)`, which returns what its parent is to `add`; and `content(part)`, which does so for a part.
+/// Walks the part of a tree above its bricks, children before parents. `Visitor` has `open()`, which begins an inner
+/// node and returns a collector of its children with `add(i, child)`; `close(level, collected)`, which returns the
+/// value that the parent passes to `add`; and `content(part)`, which does so for a part.
 template <class T, class Visitor>
 class upper_walk {
  public:
   upper_walk(const std::vector<tree_part<T>>& parts, Visitor& visitor)
       : next_{parts.data()}, end_{parts.data() + parts.size()}, visitor_{visitor} {}
 
-  /// @pre the parts that are left begin with some inside one node at `level`, which are visited
+  /// Walks a node. @pre the remaining parts begin with some inside one node at `level`, which are visited
   auto walk(int level) {
     if (next_->level == level) return visitor_.content(*next_++);
     const auto shift = 3 * static_cast<unsigned>(level - 1 - brick_level);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Numbers as they stand in the reasons of a choice.
+/// Formatting of numbers and text for the reason of a choice.
 #pragma once
 
 #include <cstdio>
@@ -10,17 +10,17 @@
 
 namespace orbis::cloud::detail {
 
-[[nodiscard]] inline std::string in_words(double value) {
+[[nodiscard]] inline std::string describe(double value) {
   char text[32];
   std::snprintf(text, sizeof text, "%.3g", value);
   return text;
 }
-/// Parts of a sentence, one after the other. Sums of strings take long to compile.
+/// Concatenates parts of a sentence. Sums of strings take long to compile.
 [[nodiscard]] inline std::string joined(std::initializer_list<std::string_view> parts) {
   std::string out;
   for (const std::string_view part : parts) out += part;
   return out;
 }
-[[nodiscard]] inline std::string percent(double share) { return in_words(100 * share) + " %"; }
+[[nodiscard]] inline std::string percent(double share) { return describe(100 * share) + " %"; }
 
 }  // namespace orbis::cloud::detail
