@@ -3,6 +3,7 @@
 #include <vector>
 
 #include <orbis/cloud/radius.hpp>
+#include <orbis/core/simd/level.hpp>
 
 #include "cloud/clouds.hpp"
 #include "cloud/reference.hpp"

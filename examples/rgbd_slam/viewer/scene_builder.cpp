@@ -227,8 +227,8 @@ void scene_builder::make_room() {
 
 bool scene_builder::move_colors(std::size_t limit) {
   for (colored_keyframe& k : colored_) {
-    const auto& told = k.asked < graph_.poses.size() ? graph_.poses[k.asked] : std::nullopt;
-    const std::optional<se3> pose = told ? std::optional<se3>{{told->rotation(), told->translation()}} : std::nullopt;
+    const auto& known = k.asked < graph_.poses.size() ? graph_.poses[k.asked] : std::nullopt;
+    const std::optional<se3> pose = known ? std::optional<se3>{{known->rotation(), known->translation()}} : std::nullopt;
     if (pose.has_value() == k.placed.has_value() && (!pose || motion(*k.placed, *pose) < 0.5 * resolution_)) continue;
     if (limit-- == 0) return false;
     if (k.placed) for_each_point(k.samples, *k.placed, [&](const vec3f& p, orbis::rgb8 c) { colors_.remove(p, c); });
