@@ -97,7 +97,7 @@ namespace detail {
 
 /// A keyframe's depth image without what has moved away.
 template <camera::depth_source Depth>
-class standing_depth {
+class static_depth {
  public:
   /// Calls `use` with the image. Returns how many pixels were taken out.
   template <class Use>
@@ -174,7 +174,7 @@ template <class Octree, execution_policy Policy, keyframe_range Keyframes, camer
   of_masked.flying_pixels.reset();  // they are gone then
   dense_cloud dense{rays, of_masked};
   keyframe_points points;
-  standing_depth<depth_type> standing;
+  static_depth<depth_type> standing;
   cloud::view_samples samples;
   std::vector<std::vector<removed_cell>> moved;  // of those that are not skipped, as `place`: where they are among all
   std::vector<std::size_t> place;
@@ -337,7 +337,8 @@ struct live_octree {
   result<void> scan(const Keyframe& k, const Depth& depth) {
     // Not complete even before the filter: pixels of what moved away may be missing, and an end may come before the
     // filter's verdict.
-    return unless_kept(live.add_keyframe(policy, k.frame, depth, poses.back().T_world_camera, completeness::filtered));
+    return ignore_write_failure(
+        live.add_keyframe(policy, k.frame, depth, poses.back().T_world_camera, completeness::filtered));
   }
   result<typename Live::octree_type> unfiltered() {
     live.set_poses(poses, unlisted::hide);
@@ -351,7 +352,7 @@ struct live_octree {
     for (const keyframe_position& p : poses) frames.push_back(p.frame);
     const auto start = std::chrono::steady_clock::now();
     // What the live map has is without flying pixels and what has moved away.
-    auto edited = unless_kept(live.edit_depths(
+    auto edited = ignore_write_failure(live.edit_depths(
         policy, frames,
         [&](std::size_t number, const auto& depth, const image_view<std::uint16_t>& pixels) {
           cloud.remove_points(seq, depth, number, kept, pixels);
@@ -369,7 +370,7 @@ struct live_octree {
   }
   /// Where the images' file cannot be written to, they stay in memory: nothing is lost.
   template <class Done>
-  static result<void> unless_kept(Done done) {
+  static result<void> ignore_write_failure(Done done) {
     if (done || done.error().code == errc::write_failed) return {};
     return fail(std::move(done.error()));
   }

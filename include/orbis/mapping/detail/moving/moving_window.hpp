@@ -67,7 +67,7 @@ class moving_window {
       kept_.back().is_judged = true;
       return;
     }
-    if (judge_->is_full()) settle(judge_->views().front());
+    if (judge_->is_full()) record_verdict(judge_->views().front());
     const auto pose_of = [&](const auto& view) { return std::optional{at(view.frame).T_world_camera}; };
     const judged_keyframe& now = kept_.back().item;
     judge_->add(policy, now.number, stored_depths(now.keyframe.depth, copy_), T_world_camera, pose_of);
@@ -77,7 +77,7 @@ class moving_window {
   void finish() {
     if (judge_)
       for (auto& view : judge_->views())
-        if (!at(view.frame).is_judged) settle(view);
+        if (!at(view.frame).is_judged) record_verdict(view);
   }
   /// The next keyframe whose judgement stands, if there is one.
   [[nodiscard]] std::optional<judged_keyframe> pop() {
@@ -98,7 +98,7 @@ class moving_window {
     return kept_[static_cast<std::size_t>(number) - kept_.front().item.number];
   }
   template <class View>
-  void settle(View& view) {
+  void record_verdict(View& view) {
     static_cast<void>(judge_->judge(view));
     judge_->accept(view);
     entry& e = at(view.frame);
