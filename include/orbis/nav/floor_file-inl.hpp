@@ -22,7 +22,8 @@ ORBIS_INLINE result<void> save_floor_map(const std::filesystem::path& path, cons
   if (!path.has_filename()) return fail(errc::invalid_argument, path.string(), "has no file name; name a .yaml file");
   if (map.states.empty() || !fits(map.origin.x()) || !fits(map.origin.y()) ||
       !(fits(map.resolution) && map.resolution > 0))
-    return fail(errc::invalid_argument, path.string(), "the map is empty, or its origin or resolution is not finite");
+    return fail(errc::invalid_argument, path.string(),
+                "the map is empty, its origin is not finite, or its resolution is not positive");
   const std::filesystem::path image_path = std::filesystem::path{path}.replace_extension(".pgm");
   const std::string name = image_path.filename().string();
   if (image_path == path)
