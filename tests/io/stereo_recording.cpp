@@ -230,7 +230,7 @@ TEST_CASE("two lists or two folders of images are a stereo recording, rectified 
   CHECK(io::detect_stereo_format(folder.path()) == stereo_format::pairs);
   CHECK_THAT(message(), Catch::Matchers::Contains("the camera is not known"));
   folder.write("camera.toml", test::tiny_camera);
-  CHECK_THAT(message(), Catch::Matchers::Contains("needs a baseline"));
+  CHECK_THAT(message(), Catch::Matchers::Contains("the baseline is not known"));
   folder.write("camera.toml", test::tiny_camera + std::string{"baseline = 0.2\nfps = 10\n"});
   {
     const auto recording = io::open_stereo_recording(folder.path()).value();
@@ -265,7 +265,7 @@ TEST_CASE("a folder that is no stereo recording is told what was looked for") {
   CHECK_THAT(message_of(io::open_stereo_recording(folder.path() / "none")),
              Catch::Matchers::Contains("no such folder"));
   CHECK_THAT(message_of(io::open_stereo_recording(folder.path() / "readme.txt")),
-             Catch::Matchers::Contains("this is a file"));
+             Catch::Matchers::Contains("is a file; a recording is a folder"));
 }
 
 TEST_CASE("an image of another size than its camera's is refused") {

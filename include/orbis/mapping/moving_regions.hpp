@@ -7,7 +7,7 @@
 ///   std::vector<orbis::mapping::marked_pixel> marks;
 ///   for (const auto& f : slam.last_frame().value().features)
 ///     if (f.moving || f.tracked) marks.push_back({f.x, f.y, f.moving});
-///   if (regions.find(depth, marks)) regions.remove(depth, copy.view());  // copy: of what depth stores
+///   if (regions.find(depth, marks)) regions.remove(depth, copy.view());  // copy: of the stored values of depth
 /// @endcode
 #pragma once
 

@@ -7,7 +7,7 @@
 ///   orbis::nav::distance_field field{map, {.reach = 1.0}};
 ///   ...
 ///   map.integrate(depth, camera, T_world_camera);
-///   field.update(map);                                   // what changed since the last update
+///   field.update(map);                                   // changes since the last update
 ///   if (field.distance(p) < 0.3) slow_down();
 ///   const auto [metres, gradient] = field.distance_and_gradient(p);
 ///   const orbis::nav::distance_view now = field.view();   // for readers on other threads

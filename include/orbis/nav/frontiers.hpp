@@ -9,7 +9,7 @@
 ///   orbis::nav::frontiers frontiers{map};
 ///   ...
 ///   map.integrate(depth, camera, T_world_camera);
-///   frontiers.update(map);                                        // what changed since the last update
+///   frontiers.update(map);                                        // changes since the last update
 ///   for (const orbis::nav::frontier_cluster& c : frontiers.clusters({.min_size = 20})) consider(c.center);
 /// @endcode
 #pragma once

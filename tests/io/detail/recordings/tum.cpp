@@ -121,7 +121,7 @@ TEST_CASE("the ground truth is interpolated at the colour images") {
   CHECK(index.frames[0].T_world_camera.value().rotation().angle() == Approx(3.14159265358979 / 3.0));
   CHECK(index.frames[1].T_world_camera.value().translation().x() == Approx(5.0));
   CHECK_FALSE(index.frames[2].T_world_camera.has_value());
-  CHECK(mentions(index, "1 of 3 frames lie outside the ground truth"));
+  CHECK(mentions(index, "1 of 3 frames are outside the ground truth"));
   CHECK(index.ground_truth.size() == 2);
 
   folder.write("groundtruth.txt", "0.98 0 0 0 0 0 0 1\n1.04 nan 0 0 0 0 1 0\n");

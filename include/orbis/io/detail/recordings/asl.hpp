@@ -137,7 +137,7 @@ struct asl_camera {
     return true;
   });
   if (bad_line != 0)
-    return fail(errc::malformed, at_line(where, bad_line), "a pose must have a time, a position and a quaternion");
+    return fail(errc::malformed, at_line(where, bad_line), "a pose has a time, a position and a quaternion");
   std::stable_sort(poses.begin(), poses.end(), [](const auto& a, const auto& b) { return a.timestamp < b.timestamp; });
   return poses;
 }

@@ -126,13 +126,11 @@ class spill_file {
       if (n < 0 && errno == EINTR) continue;
       if (n < 0)
         return fail(errc::unreadable, path_.string(), "cannot be read: " + std::generic_category().message(errno));
-      if (n == 0)
-        return fail(errc::malformed, path_.string(),
-                    "is shorter than the data written to it; another program has truncated it");
+      if (n == 0) return fail(errc::malformed, path_.string(), "is shorter than the data written to it");
       done += static_cast<std::size_t>(n);
     }
     if (crc32c(bytes) != from.checksum)
-      return fail(errc::malformed, path_.string(), "the checksum is wrong: the data was changed after writing");
+      return fail(errc::malformed, path_.string(), "the checksum is wrong: the file is damaged");
     return bytes;
 #else
     static_cast<void>(from);
