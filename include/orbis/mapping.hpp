@@ -2,23 +2,23 @@
 /// @file
 /// Mapping: keyframes to dense clouds, filtered clouds and octrees.
 ///
-/// | header | what it is for |
+/// | header | contents |
 /// | --- | --- |
-/// | `batch.hpp` | `build_map`: from posed keyframes to a map, all at once |
+/// | `batch.hpp` | `build_map`: a map from posed keyframes in one batch |
 /// | `live_map.hpp` | `live_map`: an octree that grows with each keyframe and follows corrections of their poses |
-/// | `live_map_thread.hpp` | the same with a thread and a queue, and snapshots for readers |
-/// | `live_map_events.hpp` | what it tells and asks |
-/// | `depth_history.hpp` | the concept of what keeps the keyframes' depth images for it |
-/// | `dense_cloud.hpp` | the points of all keyframes as one cloud, which follows corrections of their poses |
-/// | `depth_store.hpp` | depth images of many keyframes, compressed without loss, within a budget |
-/// | `filter.hpp` | `filter_points`: the outlier filter, as a choice at run time |
-/// | `keyframe.hpp` | what mapping needs of a keyframe |
-/// | `masked_depth.hpp` | depth images from which pixels were removed |
-/// | `moving_filter.hpp` | takes out of a live map what has moved away, while the camera moves |
-/// | `moving_options.hpp` | how what has moved away is told from what is there |
-/// | `moving_regions.hpp` | takes out of a depth image what tracking has seen to move |
+/// | `live_map_thread.hpp` | a live map with its own thread, a queue, and snapshots for readers |
+/// | `live_map_events.hpp` | events and callbacks of a live map |
+/// | `depth_history.hpp` | the concept of a store for the keyframes' depth images |
+/// | `dense_cloud.hpp` | the points of all keyframes as one cloud that follows corrections of their poses |
+/// | `depth_store.hpp` | depth images of many keyframes, compressed without loss, within a memory budget |
+/// | `filter.hpp` | `filter_points`: the outlier filter, selected at run time |
+/// | `keyframe.hpp` | the keyframe that mapping reads |
+/// | `masked_depth.hpp` | depth images with removed pixels |
+/// | `moving_filter.hpp` | removes moved objects from a live map while the camera moves |
+/// | `moving_options.hpp` | thresholds for detecting moved objects |
+/// | `moving_regions.hpp` | removes from a depth image the objects that tracking has found to move |
 /// | `keyframe_points.hpp` | the points of one keyframe |
-/// | `upright.hpp` | which way is up in a depth image, so that a map can begin upright |
+/// | `upright.hpp` | the upward direction in a depth image, so that a map can begin upright |
 #pragma once
 
 #include <orbis/mapping/batch.hpp>

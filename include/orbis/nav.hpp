@@ -1,25 +1,25 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Everything in orbis::nav: what a robot needs to plan on a map.
+/// All of orbis::nav: planning and exploration on a map.
 ///
-/// | header | what it is for |
+/// | header | contents |
 /// | --- | --- |
-/// | distance_field.hpp | how far it is to the nearest obstacle of a map, and in which direction; follows the map |
-/// | floor_map.hpp | where a robot that drives can go: free, occupied and unknown cells of the floor |
-/// | floor_cost.hpp | costs near obstacles, as Nav2's costmaps have them |
+/// | distance_field.hpp | distance and direction to the nearest obstacle of a map; follows the map |
+/// | floor_map.hpp | free, occupied and unknown cells of the floor for a ground robot |
+/// | floor_cost.hpp | costs near obstacles, as in Nav2's costmaps |
 /// | floor_file.hpp | floor maps as files for the map servers of ROS and Nav2 |
-/// | floor_view.hpp | where a round robot fits on a floor, for paths in two dimensions |
-/// | frontiers.hpp | where known space ends and unknown space begins; follows the map |
-/// | view_gain.hpp | how much unknown space a camera would see |
-/// | next_view.hpp | where a robot that explores should look next |
+/// | floor_view.hpp | planning space of a round robot on a floor, in two dimensions |
+/// | frontiers.hpp | boundary between known free and unknown space; follows the map |
+/// | view_gain.hpp | amount of unknown space that a camera would see |
+/// | next_view.hpp | next best view of an exploring robot |
 /// | robot_shape.hpp | a ball, a vertical capsule, a vertical cylinder |
-/// | planning_view.hpp | whether a robot fits, at rest or along a segment; exact |
-/// | planning_space.hpp | what a path can be searched in, and what going costs |
-/// | path_search.hpp | cheapest ways of a robot through a map or over a floor |
-/// | replanning.hpp | whether changes of the map touch a path; a new path only then |
-/// | robot_trajectory.hpp | paths over time, within bounds on speed and acceleration |
-/// | squared_distances.hpp | the same without a map: exact squared distances in voxels |
-/// | map_access.hpp | how planning reads a map, also one of another library |
+/// | planning_view.hpp | exact test whether a robot fits, at rest or along a segment |
+/// | planning_space.hpp | the space of a path search, and the cost of moving in it |
+/// | path_search.hpp | cheapest paths of a robot through a map or over a floor |
+/// | replanning.hpp | checks a path after map changes, and replans only if it is blocked |
+/// | robot_trajectory.hpp | paths as trajectories in time, within bounds on speed and acceleration |
+/// | squared_distances.hpp | the distance field without a map: exact squared distances in voxels |
+/// | map_access.hpp | read access of planning to a map, also one of another library |
 #pragma once
 
 #include <orbis/nav/distance_field.hpp>

@@ -48,7 +48,7 @@ string(SUBSTRING "${text}" 0 ${length} half)
 file(WRITE ${WORK}/half.txt "${half}")
 fails(2 "half.txt:" half.txt --out no.txt)
 file(WRITE ${WORK}/range.txt "1 1 1\n1 0 2 3\n0 0 0 0 0 0 1 0 0\n1 1 1\n")
-fails(2 "range.txt:2: observation 0 is of camera 1" range.txt --out no.txt)
+fails(2 "range.txt:2: observation 0 refers to the nonexistent camera 1" range.txt --out no.txt)
 fails(2 "no/such/folder" noisy.txt --out no/such/folder/problem.txt)
 
 # Less than the half pixel of noise in each coordinate is what is left: the parameters take their share.

@@ -99,7 +99,7 @@ endforeach()
 summary(ate ${WORK}/person ate_rmse_m)
 check(ate LESS 0.02)
 summary(reason ${WORK}/person filter reason)
-check(reason MATCHES "has moved away")
+check(reason MATCHES "moved objects")
 summary(map_error ${WORK}/person map_error_m)
 check(map_error LESS 0.02)
 

@@ -117,20 +117,20 @@ TEST_CASE("A BAL problem that is written is read back to the bit") {
 }
 
 TEST_CASE("Damaged BAL files say in which line and what is wrong") {
-  refused("", "1", "begins with");
-  refused("\n\n3 4", "3", "begins with");
+  refused("", "1", "begin with");
+  refused("\n\n3 4", "3", "begin with");
   refused("two 3 4\n", "1", "\"two\"");
   refused("-2 3 4\n", "1", "\"-2\"");
   refused("2 1.5 4\n", "1", "\"1.5\"");
-  refused("99999999999999999999 1 1\n", "1", "begins with");
+  refused("99999999999999999999 1 1\n", "1", "begin with");
   refused("4000000000 1 1\n", "1", "4000000000 cameras");  // and asks for no memory
   refused("1 18446744073709551615 18446744073709551615\n", "1", "points");
   refused("1 1 1000\n" + observations, "1", "1000 observations");
   refused("2 1 1\n2 0 1 1\n" + cameras + "1 2 3", "2", "camera 2");
   refused("2 1 1\n1 1 1 1\n" + cameras + "1 2 3", "2", "point 1");
-  refused("2 1 1\n-1 0 1 1\n" + cameras + "1 2 3", "2", "\"-1\", which is no index");
+  refused("2 1 1\n-1 0 1 1\n" + cameras + "1 2 3", "2", "\"-1\", which is not an index");
   refused("2 1 1\n0.5 0 1 1\n" + cameras + "1 2 3", "2", "\"0.5\"");
-  refused("2 1 1\n0 0 one 1\n" + cameras + "1 2 3", "2", "\"one\", which is no number");
+  refused("2 1 1\n0 0 one 1\n" + cameras + "1 2 3", "2", "\"one\", which is not a number");
   refused("2 1 1\n0 0 1 nan\n" + cameras + "1 2 3", "2", "not finite");
   refused("2 1 1\n0 0 1 1\n" + cameras + "1 -inf 3", "13", "not finite");
   refused("2 1 1\n0 0 1 1\n" + cameras + "1 1e999 3", "13", "point 0");
@@ -139,8 +139,8 @@ TEST_CASE("Damaged BAL files say in which line and what is wrong") {
   refused("2 1 1\n0 0 1 1e\n" + cameras + "1 2 3", "2", "\"1e\"");
   refused(small + "4\n", "20", "\"4\"");
   refused(small + "\x01\xff\n", "20", "\"??\"");
-  refused("BZh91AY&SY", "1", "unpacked", errc::unsupported);
-  refused("\x1f\x8b\x08", "1", "unpacked", errc::unsupported);
+  refused("BZh91AY&SY", "1", "unpack it", errc::unsupported);
+  refused("\x1f\x8b\x08", "1", "unpack it", errc::unsupported);
   // Cut anywhere, it is no problem any more (but in the last number, which is one still).
   for (std::size_t length = 0; length != small.find("-7"); ++length)
     CHECK_FALSE(parse_bal(small.substr(0, length)).has_value());

@@ -62,7 +62,7 @@ TEST_CASE("what may be left out of a camera file has its default") {
 
 TEST_CASE("a key that is no setting of a camera is named, lest a misspelt one gets its default") {
   CHECK(message(camera_text() + "depth_scal = 1000.0\n")
-            .starts_with("camera.toml: depth_scal is not a setting of a camera; those are model, width, "));
+            .starts_with("camera.toml: depth_scal is not a setting of a camera; the settings are model, width, "));
   CHECK(message(camera_text() + "[left]\nfx = 1.0\n").starts_with("camera.toml: left is not a setting"));
   CHECK(message(camera_text("fx") + "f_x = 1.0\n") == "camera.toml: fx is missing");  // the first that is wrong
 }
@@ -151,7 +151,7 @@ TEST_CASE("tables nested without end are refused before they use up the stack") 
     CHECK(io::read_camera(folder.write("deep.toml", text)).error().code == orbis::errc::malformed);
   }
   CHECK(io::parse_camera(camera_text() + std::string(20000, '#')).error().to_string() ==
-        "is too large for a file of settings");
+        "is too large for a settings file");
 }
 
 TEST_CASE("A camera file may say when the rows of the images are taken") {

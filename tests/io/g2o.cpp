@@ -6,8 +6,8 @@
 #include <orbis/io/g2o.hpp>
 
 #include "support/catch.hpp"
-#include "support/synthetic/pose_graph.hpp"
 #include "support/data.hpp"
+#include "support/synthetic/pose_graph.hpp"
 #include "support/temporary_folder.hpp"
 
 using namespace orbis;
@@ -108,7 +108,7 @@ TEST_CASE("Damaged g2o files say in which line and what is wrong") {
   refused("VERTEX_SE3:QUAT 0 0 nan 0 0 0 0 1\n", errc::malformed, "1", "finite");
   refused("VERTEX_SE3:QUAT 0 0 1e999 0 0 0 0 1\n", errc::malformed, "1", "number");
   refused("VERTEX_SE3:QUAT 0 0 0 0 0 0 0 0\n", errc::malformed, "1", "quaternion");
-  refused(vertices + "\nVERTEX_SE3:QUAT 1 0 0 0 0 0 0 1\n", errc::malformed, "4", "vertex 1 is there twice");
+  refused(vertices + "\nVERTEX_SE3:QUAT 1 0 0 0 0 0 0 1\n", errc::malformed, "4", "vertex 1 is defined twice");
   refused(vertices + edge + "\n", errc::malformed, "3", "21 numbers");
   refused(vertices + edge + information.substr(0, information.size() - 3), errc::malformed, "3", "21 numbers");
   refused(vertices + edge + information + " 22\n", errc::malformed, "3", "\"22\"");

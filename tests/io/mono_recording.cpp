@@ -194,7 +194,8 @@ TEST_CASE("a folder that is no recording is told what was looked for and what is
   for (int i = 0; i != 12; ++i) folder.write("seq" + std::to_string(i) + "/x", "");
   CHECK_THAT(message_of(io::open_mono_recording(folder.path())), Contains("seq3/, seq4/ and 7 more"));
   CHECK_THAT(message_of(io::open_mono_recording(folder.path() / "none")), Contains("no such folder"));
-  CHECK_THAT(message_of(io::open_mono_recording(folder.path() / "readme.md")), Contains("this is a file"));
+  CHECK_THAT(message_of(io::open_mono_recording(folder.path() / "readme.md")),
+             Contains("is a file; a recording is a folder"));
 }
 
 TEST_CASE("an image of another size than the one camera is refused") {

@@ -126,7 +126,7 @@ TEST_CASE("of KITTI's folders only images count, each number once") {
   REQUIRE(recording.size() == 3);
   CHECK(recording.ground_truth().size() == 3);
   REQUIRE(recording.notes().size() == 1);
-  CHECK_THAT(recording.notes()[0], Catch::Matchers::Contains("1 images whose number there is twice"));
+  CHECK_THAT(recording.notes()[0], Catch::Matchers::Contains("1 images with a repeated number"));
   for (const char* const image : {"000000.png", "000001.jpeg", "000001.png", "000002.png"})
     std::filesystem::remove(folder.path() / "image_1" / image);
   CHECK_THAT(message_of(io::open_stereo_recording(folder.path())),
@@ -163,7 +163,7 @@ TEST_CASE("damaged files of KITTI are named with their line") {
              Catch::Matchers::Contains("not a rectified pair"));
   CHECK_THAT(message("times.txt", "0\n1\n0.5\n"), Catch::Matchers::Contains("times.txt:3: "));
   CHECK_THAT(message("poses.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n2 0 0 0 0 1 0 0 0 0 1 0\n"),
-             Catch::Matchers::Contains("poses.txt:2: the matrix is no rigid transform"));
+             Catch::Matchers::Contains("poses.txt:2: the matrix is not a rigid transform"));
   std::filesystem::remove(folder.path() / "times.txt");
   CHECK_THAT(message_of(io::open_stereo_recording(folder.path())), Catch::Matchers::Contains("times.txt"));
 }
@@ -206,7 +206,7 @@ TEST_CASE("settings of ASL cameras that are damaged or not known are refused in 
   CHECK_THAT(message("camera_model: pinhole", "camera_model: omni"), Contains("camera_model \"omni\""));
   CHECK_THAT(message("[7.0, 7.1", "[-7.0, 7.1"), Contains("focal lengths above zero"));
   CHECK_THAT(message("[7.0, 7.1", "[seven, 7.1"), Contains("must be a list of finite numbers"));
-  CHECK_THAT(message("data: [0.0", "data: [3.0"), Contains("T_BS: the matrix is no rigid transform"));
+  CHECK_THAT(message("data: [0.0", "data: [3.0"), Contains("T_BS: the matrix is not a rigid transform"));
   CHECK_THAT(message("1.0]", "1.0"), Contains("is a list without an end"));
   CHECK_THAT(message("rate_hz: 20", "- 20"), Contains("sensor.yaml:13: is not \"name: value\""));
   CHECK_THAT(message("rate_hz: 20", "rate_hz: 0"), Contains("rate_hz"));
@@ -230,7 +230,7 @@ TEST_CASE("two lists or two folders of images are a stereo recording, rectified 
   CHECK(io::detect_stereo_format(folder.path()) == stereo_format::pairs);
   CHECK_THAT(message(), Catch::Matchers::Contains("the camera is not known"));
   folder.write("camera.toml", test::tiny_camera);
-  CHECK_THAT(message(), Catch::Matchers::Contains("needs a baseline"));
+  CHECK_THAT(message(), Catch::Matchers::Contains("the baseline is not known"));
   folder.write("camera.toml", test::tiny_camera + std::string{"baseline = 0.2\nfps = 10\n"});
   {
     const auto recording = io::open_stereo_recording(folder.path()).value();
@@ -265,7 +265,7 @@ TEST_CASE("a folder that is no stereo recording is told what was looked for") {
   CHECK_THAT(message_of(io::open_stereo_recording(folder.path() / "none")),
              Catch::Matchers::Contains("no such folder"));
   CHECK_THAT(message_of(io::open_stereo_recording(folder.path() / "readme.txt")),
-             Catch::Matchers::Contains("this is a file"));
+             Catch::Matchers::Contains("is a file; a recording is a folder"));
 }
 
 TEST_CASE("an image of another size than its camera's is refused") {

@@ -23,7 +23,7 @@ TEST_CASE("settings are read with their tables") {
 TEST_CASE("what is no TOML is refused with its place and ends no program") {
   const auto message = [](const std::string& text) { return io::parse_toml(text, "f.toml").error().to_string(); };
   CHECK(message("a = 1\nb = = 2\n").starts_with("f.toml:2: not TOML: "));
-  CHECK(message("# gr\xfcn\n") == "f.toml: not TOML: no UTF-8");
+  CHECK(message("# gr\xfcn\n") == "f.toml: not TOML: not UTF-8");
   for (const std::string head : {"[", "[[", "[]", "[=", "[ \t=1]", "[[ ]]", "[\n]", "[[[a]]]", "[.a]", "[\xc3\xa9]"})
     CHECK(message("a = 1\n " + head + "\nb = 1") == "f.toml: not TOML: a table without a name");
 }
@@ -32,7 +32,7 @@ TEST_CASE("letters beyond ASCII stand in strings and comments only") {
   const auto message = [](const std::string& text) { return io::parse_toml(text, "f.toml").error().to_string(); };
   for (const std::string bad : {R"(ä = 1)", "a\xef\xbb\x81 = 1", R"(a = ä)", "a = 1 \xc2\xa0", R"(a = '#' ä)",
                                 R"(a = "\"" ä)", R"(a = ""ä"")", R"(a = '''x'''''ä)", "a = 1 # b\nä = 2"})
-    CHECK(message(bad) == "f.toml: not TOML: letters beyond ASCII want quotes");
+    CHECK(message(bad) == "f.toml: not TOML: characters beyond ASCII need quotes");
   for (const std::string good : {R"(# ä)", R"("ä" = 'ä')", R"(a = "\"ä" # ä)", R"(a = '\' # ä)", R"(a = '' # ä)",
                                  "a = \"\"\"ä\nä\"\"ä\"\"\"\"\" # '", "a = '''ä\n'ä'''\nb = 'ä'"})
     CHECK(io::parse_toml(good));
@@ -45,5 +45,5 @@ TEST_CASE("a file of settings has an end") {
   CHECK(io::read_toml(folder.write("a.toml", largest)));
   const auto more = io::read_toml(folder.write("b.toml", largest + "."));
   CHECK(more.error().code == orbis::errc::malformed);
-  CHECK(io::parse_toml(largest + ".").error().to_string() == "is too large for a file of settings");
+  CHECK(io::parse_toml(largest + ".").error().to_string() == "is too large for a settings file");
 }

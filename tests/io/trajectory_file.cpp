@@ -4,9 +4,9 @@
 
 #include <orbis/io/trajectory_file.hpp>
 
-#include "support/temporary_folder.hpp"
 #include "support/catch.hpp"
 #include "support/data.hpp"
+#include "support/temporary_folder.hpp"
 
 namespace io = orbis::io;
 using orbis::se3;
@@ -58,7 +58,7 @@ TEST_CASE("a bad pose is named with its line") {
   };
   CHECK(message("1.5 nan 0 0 0 0 0 1") == "gt.txt:3: a pose with NaN or infinity");
   CHECK(message("1.5 0 0 inf 0 0 0 1") == "gt.txt:3: a pose with NaN or infinity");
-  CHECK(message("1.5 0 0 0 0 0 0 0") == "gt.txt:3: a quaternion that is no rotation");
+  CHECK(message("1.5 0 0 0 0 0 0 0") == "gt.txt:3: the quaternion is zero or too large");
   CHECK(message("1.5 0 0 0 0 0 1").find("gt.txt:3: a pose has 8 numbers") == 0);
   CHECK(message("1.5 0 0 0 0 0 0 1 9").find("gt.txt:3: a pose has 8 numbers") == 0);
   CHECK(message("1.5 0 0 zero 0 0 0 1") == "gt.txt:3: \"zero\" is not a number");

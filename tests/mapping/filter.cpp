@@ -52,7 +52,7 @@ TEST_CASE("every filter that is asked for by name removes the point before the w
     CHECK(filtered.report.removed == 1);
     CHECK(filtered.report.points == s.points.size());
     CHECK(to_string(filtered.report.mode) == name);
-    CHECK(filtered.report.reason.starts_with("asked for; "));
+    CHECK(filtered.report.reason.starts_with("requested; "));
     CHECK(mapping::filter_points(seq, s.points, {}, s.views, s.camera, options).inliers == filtered.inliers);
   }
 }
@@ -64,6 +64,6 @@ TEST_CASE("rays cannot judge where there are no views, and none removes nothing"
     CHECK(filtered.inliers.size() == s.points.size());
     CHECK(filtered.report.removed == 0);
     CHECK(filtered.report.mode.empty());
-    CHECK(filtered.report.reason.starts_with("asked for"));
+    CHECK(filtered.report.reason.starts_with("requested"));
   }
 }

@@ -27,7 +27,7 @@ struct memory_depths {
   result<void> get(std::uint64_t frame, image<std::uint16_t>& out) const {
     const auto at = images.find(frame);
     if (at == images.end() || lost.contains(frame))
-      return fail(errc::not_found, "frame " + std::to_string(frame), "there is no depth image of it");
+      return fail(errc::not_found, "frame " + std::to_string(frame), "no depth image is stored for this frame");
     out = at->second;
     return {};
   }

@@ -1,17 +1,18 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// FCL's geometries (`fcl::Box`, `fcl::Convex`, a mesh as `fcl::BVHModel`, ...) against our octrees.
+/// Collision tests of FCL's geometries (`fcl::Box`, `fcl::Convex`, a mesh as `fcl::BVHModel`, ...) with the octrees of
+/// orbis.
 ///
-/// In place: a `fcl_shape` is a shape for `octree::overlaps`, which goes down the octree and asks FCL about single
-/// boxes only. Nothing is converted, and unknown space counts as the caller says:
+/// In place: a `fcl_shape` is a shape for `octree::overlaps`, which descends the octree and calls FCL for single boxes
+/// only. Nothing is converted, and the caller chooses the state of unknown space:
 ///
 /// @code
 ///   const orbis::interop::fcl_shape arm{std::make_shared<fcl::Capsuled>(0.05, 0.4), T_world_arm};
 ///   const bool hits = orbis::octree::overlaps(map, arm, {.unknown = orbis::octree::occupancy::occupied});
 /// @endcode
 ///
-/// Converted: `to_fcl` makes a `fcl::OcTree` for FCL's own functions and managers. It is a copy of the map as an
-/// octomap::OcTree, and for FCL unknown space is free.
+/// Converted: `to_fcl` returns a `fcl::OcTree` for FCL's own functions and managers. It is a copy of the map as an
+/// octomap::OcTree, and FCL treats unknown space as free.
 ///
 /// J. Pan, S. Chitta, D. Manocha, "FCL: A general purpose library for collision and proximity queries", ICRA 2012.
 #pragma once
@@ -37,8 +38,9 @@
 
 namespace orbis::interop {
 
-/// A geometry at a pose, as an `octree::overlap_shape`. A mesh is its triangles: voxels wholly inside of a closed one
-/// are not met. Answers are those of FCL for each box, to its tolerance (1e-6 for most pairs). The geometry is shared.
+/// A geometry at a pose, as an `octree::overlap_shape`. A mesh consists of its triangles: voxels entirely inside of a
+/// closed one do not overlap it. Results are those of FCL for each box, within its tolerance (1e-6 for most pairs). The
+/// geometry is shared.
 class fcl_shape {
  public:
   /// @pre geometry != nullptr; a finite pose
@@ -77,13 +79,13 @@ class fcl_shape {
 };
 
 #if FCL_HAVE_OCTOMAP
-/// The map for FCL's own functions, in which what our model calls occupied is occupied, and all else is free, unknown
-/// space too. A copy: O(voxels), and OctoMap's memory. Where FCL has been built with OctoMap.
+/// The map for FCL's own functions: occupied where the sensor model says so, free elsewhere, including unknown space. A
+/// copy: O(voxels), and OctoMap's memory. Requires FCL built with OctoMap.
 template <octree::octomap_model Model>
 [[nodiscard]] std::shared_ptr<fcl::OcTreed> to_fcl(const octree::occupancy_octree<Model>& map) {
   const std::shared_ptr<const octomap::OcTree> tree = to_octomap(map);
   auto out = std::make_shared<fcl::OcTreed>(tree);
-  // What is as likely as the threshold is occupied: FCL would take it for free, which it asks first.
+  // A probability equal to the threshold is occupied: FCL tests for free first, and would treat it as free.
   out->setFreeThres(std::nextafter(tree->getOccupancyThres(), 0.0));
   out->computeLocalAABB();
   return out;

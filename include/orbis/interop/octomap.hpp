@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Converts maps to `octomap::OcTree` and `octomap::ColorOcTree`, and these to maps; planning on an `octomap::OcTree`
-/// as it is.
+/// Converts maps to and from `octomap::OcTree` and `octomap::ColorOcTree`; planning on an `octomap::OcTree` in place.
 #pragma once
 
 #include <concepts>
@@ -24,14 +23,14 @@
 
 namespace orbis::interop {
 
-/// A payload of voxels that takes in colours and has one.
+/// A payload of voxels that accumulates colours and returns one.
 template <class P>
 concept color_payload = octree::voxel_payload<P> && requires(P& payload, const P& constant, const rgb8& color) {
   payload.update(color);
   { constant.color() } -> std::convertible_to<rgb8>;
 };
 
-/// A map, and the colours of its voxels.
+/// A map with the colours of its voxels.
 template <octree::sensor_model Model, color_payload Color>
 struct colored_map {
   octree::occupancy_octree<Model> map;
@@ -44,9 +43,9 @@ template <octree::octomap_model Model>
 [[nodiscard]] std::unique_ptr<octomap::OcTree> to_octomap(const octree::occupancy_octree<Model>& map) {
   return detail::make_tree<octomap::OcTree>(map, [](auto&&...) {});
 }
-/// Converts a map and its colours to an `octomap::ColorOcTree`. A leaf is split where the colours of its voxels
-/// differ, so that none is lost; OctoMap's own `prune()` would merge and average them. Inner nodes have the average of
-/// their children. For OctoMap white means no colour; colours of unknown voxels are left out. O(nodes).
+/// Converts a map and its colours to an `octomap::ColorOcTree`. A leaf is split where the colours of its voxels differ,
+/// so that none is lost; OctoMap's own `prune()` would merge and average them. Inner nodes have the average of their
+/// children. For OctoMap white means no colour; colours of unknown voxels are omitted. O(nodes).
 /// @pre map.tree_depth() == octree::default_tree_depth
 template <octree::octomap_model Model, color_payload Color>
 [[nodiscard]] std::unique_ptr<octomap::ColorOcTree> to_octomap(const octree::occupancy_octree<Model>& map,
@@ -63,8 +62,8 @@ template <octree::octomap_model Model = octree::log_odds<>>
   return detail::read_tree<Model>(tree, [](auto&&...) { return true; });
 }
 /// Converts an `octomap::ColorOcTree` to a map and the colours of its leaves, one observation each; colours of inner
-/// nodes are not read. Errors: those above, and unsupported for a leaf of more than 32x32x32
-/// voxels that has a colour, since each voxel takes its own.
+/// nodes are ignored. Errors: those above, and unsupported for a leaf of more than 32x32x32 voxels with a colour,
+/// because each voxel stores its own.
 template <octree::octomap_model Model = octree::log_odds<>, color_payload Color = octree::rgb_mean>
 [[nodiscard]] result<colored_map<Model, Color>> from_octomap(const octomap::ColorOcTree& tree) {
   octree::voxel_layer<Color> colors;
@@ -87,8 +86,8 @@ template <octree::octomap_model Model = octree::log_odds<>, color_payload Color 
 
 }  // namespace orbis::interop
 
-/// An `octomap::OcTree` for all of `nav`, in place. The tree has no log of changes: each `update` of a field compares
-/// everything. Only leaves are read, so that inner nodes need not be up to date.
+/// Access of `nav` to an `octomap::OcTree`, in place. The tree has no change log: each `update` of a field compares
+/// everything. Only leaves are read, so inner nodes need not be up to date.
 template <>
 struct orbis::nav::map_access<octomap::OcTree> {
   [[nodiscard]] static octree::voxel_grid grid(const octomap::OcTree& tree) {
@@ -132,7 +131,7 @@ struct orbis::nav::map_access<octomap::OcTree> {
       if (const octomap::OcTreeNode* const c = child(tree, node, i))
         descend(tree, c, octree::child_key(low, i, octree::node_cells(static_cast<int>(level) - 1)), level - 1, visit);
   }
-  /// Of an octant, or of any in a leaf.
+  /// States of an octant, or of any octant in a leaf.
   [[nodiscard]] static octree::octant_states states(const octomap::OcTree& tree, const octomap::OcTreeNode* node) {
     octree::octant_states s;
     const auto add = [&](const octomap::OcTreeNode* leaf, std::uint64_t voxels) {

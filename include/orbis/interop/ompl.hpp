@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// OMPL's planners on our maps: states and motions are judged by a planning space of `nav`, exactly.
+/// OMPL's planners on maps of orbis: a planning space of `nav` checks states and motions exactly.
 ///
 /// @code
 ///   const auto space = std::make_shared<ompl::base::RealVectorStateSpace>(3);   // or SE3StateSpace
@@ -33,12 +33,12 @@
 
 namespace orbis::interop {
 
-/// Where a state is, metres: the values of a `RealVectorStateSpace` of two or three dimensions, or of the first part of
-/// a compound space (`SE2StateSpace`, `SE3StateSpace`), which must be one. What else a state says does not matter: the
-/// robot's shape is the same whichever way it is turned about the vertical.
+/// Position of a state in metres: the values of a `RealVectorStateSpace` of two or three dimensions, or of the first
+/// part of a compound space (`SE2StateSpace`, `SE3StateSpace`), which must be one. The rest of the state is ignored:
+/// rotation about the vertical does not change the robot's shape.
 class ompl_position {
  public:
-  /// @pre such a space
+  /// @pre the space is of such a type
   explicit ompl_position(const ompl::base::StateSpace& space) : is_compound_{space.isCompound()} {
     const ompl::base::StateSpace* const part =
         is_compound_ ? space.as<ompl::base::CompoundStateSpace>()->getSubspace(0).get() : &space;
@@ -57,11 +57,11 @@ class ompl_position {
   unsigned dimensions_ = 3;
 };
 
-/// Says whether the robot is free in a state. Any number of threads may ask.
+/// Checks whether the robot is free in a state. Safe for concurrent use.
 template <nav::planning_space Space>
 class ompl_validity_checker : public ompl::base::StateValidityChecker {
  public:
-  /// What the space refers to must outlive it and stay as it is. @pre see ompl_position
+  /// Objects that the space refers to must outlive the checker and not change. @pre see ompl_position
   ompl_validity_checker(const ompl::base::SpaceInformationPtr& information, const Space& space)
       : StateValidityChecker{information}, position_{*information->getStateSpace()}, space_{space} {
     if constexpr (is_ball) specs_.clearanceComputationType = ompl::base::StateValidityCheckerSpecs::BOUNDED_APPROXIMATE;
@@ -70,8 +70,8 @@ class ompl_validity_checker : public ompl::base::StateValidityChecker {
   using StateValidityChecker::isValid;
 
   [[nodiscard]] bool isValid(const ompl::base::State* state) const override { return space_.is_free(position_(state)); }
-  /// Of a ball in space: how far it is to the nearest obstacle, metres; a lower bound, less than two voxels too small,
-  /// up to the reach of the field, and 0 where the ball may touch one. Of other robots 0. O(1).
+  /// For a ball in a 3D space: a lower bound on the distance to the nearest obstacle, metres; less than two voxels too
+  /// small, at most the reach of the field, and 0 if the ball may touch an obstacle. For other robots 0. O(1).
   [[nodiscard]] double clearance(const ompl::base::State* state) const override {
     if constexpr (is_ball)
       return std::max(0.0, space_.field().clearance(position_(state)) - space_.radius());
@@ -89,14 +89,14 @@ class ompl_validity_checker : public ompl::base::StateValidityChecker {
   Space space_;
 };
 
-/// Says whether the robot is free all the way from one state to another, in a straight line: in continuous space, not
-/// at samples. Any number of threads may ask, but the numbers of motions that OMPL counts are approximate then, as
-/// those of its own validator.
+/// Checks whether the robot is free on the straight segment from one state to another: in continuous space, not at
+/// samples. Safe for concurrent use, but OMPL's counts of motions are approximate then, as those of its own validator
+/// are.
 template <nav::planning_space Space>
 class ompl_motion_validator : public ompl::base::MotionValidator {
  public:
-  /// What the space refers to must outlive it and stay as it is. @pre see ompl_position; the state space interpolates
-  /// positions linearly
+  /// Objects that the space refers to must outlive the validator and not change. @pre see ompl_position; the state
+  /// space interpolates positions linearly
   ompl_motion_validator(const ompl::base::SpaceInformationPtr& information, const Space& space)
       : MotionValidator{information}, position_{*information->getStateSpace()}, space_{space} {}
 
@@ -105,7 +105,7 @@ class ompl_motion_validator : public ompl::base::MotionValidator {
     ++(is_free ? valid_ : invalid_);
     return is_free;
   }
-  /// The last valid state is at most a hundredth of a voxel before the first contact, and the way there is free.
+  /// The last valid state is at most a hundredth of a voxel before the first contact, and the segment up to it is free.
   [[nodiscard]] bool checkMotion(const ompl::base::State* a, const ompl::base::State* b,
                                  std::pair<ompl::base::State*, double>& last_valid) const override {
     if (checkMotion(a, b)) return true;
@@ -125,7 +125,7 @@ class ompl_motion_validator : public ompl::base::MotionValidator {
   Space space_;
 };
 
-/// Makes `information` judge states and motions by the space. Before its `setup()`.
+/// Sets the space as the checker of states and motions of `information`. Call it before `setup()`.
 /// @pre those of ompl_motion_validator
 template <nav::planning_space Space>
 void use_planning_space(const ompl::base::SpaceInformationPtr& information, const Space& space) {

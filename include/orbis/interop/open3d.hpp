@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Open3D's clouds (`open3d::geometry::PointCloud`). Every algorithm takes their `points_` in place, as a range of
-/// points. Filters return indices; `extract` copies the chosen points with their colours, normals and covariances:
+/// Open3D's clouds (`open3d::geometry::PointCloud`). Every algorithm accepts their `points_` in place, as a range of
+/// points. Filters return indices; `extract` copies the selected points with their colours, normals and covariances:
 ///
 /// @code
 ///   const auto keep = orbis::cloud::statistical_inliers(orbis::par, cloud.points_);
@@ -24,7 +24,7 @@
 
 namespace orbis::interop {
 
-/// Open3D's colours are 0 ... 1; what lies outside, or is not a number, is clamped.
+/// Converts a colour of Open3D (0 ... 1); values outside, and NaN, are clamped.
 [[nodiscard]] inline rgb8 color_from_open3d(const vec3& color) noexcept {
   const auto byte = [](double v) {
     return v > 0 ? static_cast<std::uint8_t>(std::lround(255.0 * std::min(v, 1.0))) : std::uint8_t{0};
@@ -41,7 +41,7 @@ namespace orbis::interop {
                                                           std::span<const std::uint32_t> indices) {
   open3d::geometry::PointCloud out;
   const auto take = [&](const auto& from, auto& to) {
-    if (from.size() != cloud.points_.size()) return;  // as Open3D counts: all have one, or none has
+    if (from.size() != cloud.points_.size()) return;  // Open3D's convention: all points have one, or none has
     to.reserve(indices.size());
     for (const std::uint32_t i : indices) {
       assert(i < from.size());
@@ -66,7 +66,7 @@ namespace orbis::interop {
   return out;
 }
 
-/// A copy as Open3D's, with the colours if there are any.
+/// A copy as an Open3D cloud, with the colours if there are any.
 [[nodiscard]] inline open3d::geometry::PointCloud to_open3d(const point_cloud& cloud) {
   open3d::geometry::PointCloud out;
   out.points_.reserve(cloud.size());

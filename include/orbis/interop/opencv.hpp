@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Views of OpenCV's images and points as types of orbis, and the other way round, without copies; conversions of
-/// keypoints and of the order of colours.
+/// Views of OpenCV's images and points as orbis types, and vice versa, without copies; conversions of keypoints and of
+/// the colour order.
 #pragma once
 
 #include <concepts>
@@ -23,7 +23,7 @@
 
 namespace orbis::interop {
 
-/// Three bytes in OpenCV's customary order.
+/// Three bytes in OpenCV's usual order.
 struct bgr8 {
   std::uint8_t b = 0, g = 0, r = 0;
   friend bool operator==(const bgr8&, const bgr8&) = default;
@@ -45,10 +45,9 @@ inline constexpr int cv_type = std::same_as<T, std::uint8_t>    ? CV_8UC1
                                : std::same_as<T, vec3>          ? CV_64FC3
                                                                 : CV_8UC3;
 
-/// The pixels of `mat` in place; `mat` (or another header of its data) must outlive the view. Three
-/// bytes are called `bgr8` or `rgb8` as the caller knows them to be: OpenCV does not say.
-/// Errors: unsupported, if the type is another, if there are more than two dimensions, or if rows
-/// are not a whole number of pixels apart. An empty matrix is an empty view.
+/// The pixels of `mat` in place; `mat` (or another header of its data) must outlive the view. The caller chooses `bgr8`
+/// or `rgb8` for three bytes: OpenCV does not record the order. Errors: unsupported, if the type differs, if there are
+/// more than two dimensions, or if rows are not a whole number of pixels apart. An empty matrix gives an empty view.
 template <shared_pixel T>
 [[nodiscard]] result<image_view<const T>> view_as(const cv::Mat& mat) {
   if (mat.empty()) return image_view<const T>{};
@@ -64,11 +63,10 @@ template <shared_pixel T>
   return image_view<const T>{mat.ptr<T>(), mat.cols, mat.rows, stride};
 }
 
-/// The points of `mat` in place, row after row: S = float: CV_32FC3 of any shape (an organised cloud, a
-/// row, a column) or CV_32FC1 with three columns, a point in each row; S = double: CV_64FC3, CV_64FC1.
-/// `mat` (or another header of its data) must outlive the points. Of rows with more than x, y and z,
-/// `mat.colRange(0, 3)` are the points. An empty matrix has none.
-/// Errors: unsupported, if the type or the shape is another.
+/// The points of `mat` in place, row by row. S = float: CV_32FC3 of any shape (an organised cloud, a row, a column) or
+/// CV_32FC1 with three columns, a point in each row; S = double: CV_64FC3, CV_64FC1. `mat` (or another header of its
+/// data) must outlive the points. For rows with more than x, y and z pass `mat.colRange(0, 3)`. An empty matrix has no
+/// points. Errors: unsupported, if the type or the shape differs.
 template <std::floating_point S>
 requires(sizeof(S) == 4 || sizeof(S) == 8) [[nodiscard]] result<strided_points<S>> points_in(const cv::Mat& mat) {
   constexpr int depth = sizeof(S) == 4 ? CV_32F : CV_64F;
@@ -97,7 +95,7 @@ template <shared_pixel T>
   return {view.height(), view.width(), cv_type<T>, view.data(), static_cast<std::size_t>(view.stride()) * sizeof(T)};
 }
 
-/// A `cv::Mat` header over pixels that must not change; they must outlive it. `cv::Mat` has no const: only read from
+/// A `cv::Mat` header over constant pixels; the pixels must outlive it. `cv::Mat` has no const data: do not write to
 /// it.
 template <shared_pixel T>
 [[nodiscard]] const cv::Mat mat_over(image_view<const T> view) {  // NOLINT(readability-const-return-type)
@@ -114,7 +112,7 @@ template <shared_pixel T>
   return rgb;
 }
 
-/// A CV_8UC3 matrix in OpenCV's customary order, a copy.
+/// A CV_8UC3 matrix in OpenCV's usual order, a copy.
 [[nodiscard]] inline cv::Mat to_bgr(image_view<const rgb8> view) {
   cv::Mat mat(view.height(), view.width(), CV_8UC3);
   for (int y = 0; y != view.height(); ++y)
@@ -123,7 +121,7 @@ template <shared_pixel T>
   return mat;
 }
 
-/// Angles: OpenCV's are degrees (-1: none), ours radians (none is 0).
+/// A keypoint of OpenCV. Angles: degrees in OpenCV (-1: none), radians in orbis (none is 0).
 [[nodiscard]] inline features::keypoint from_cv(const cv::KeyPoint& k) {
   constexpr float radians = std::numbers::pi_v<float> / 180.0F;
   return {k.pt.x, k.pt.y, k.size, k.angle < 0.0F ? 0.0F : k.angle * radians, k.response, k.octave};

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// PCL's clouds. Every algorithm takes a `pcl::PointCloud` in place, as a range of points. Filters return indices into
-/// the cloud; `extract` copies the chosen points with all their fields:
+/// PCL's clouds. Every algorithm accepts a `pcl::PointCloud` in place, as a range of points. Filters return indices
+/// into the cloud; `extract` copies the selected points with all their fields:
 ///
 /// @code
 ///   const auto keep = orbis::cloud::statistical_inliers(orbis::par, cloud);   // cloud: pcl::PointCloud<P>
@@ -29,7 +29,7 @@
 
 namespace orbis::interop {
 
-/// A point of PCL's with a colour.
+/// A point type of PCL with a colour.
 template <class P>
 concept colored_pcl_point = point_like<P> && requires(P& p, const P& constant) {
   { constant.r } -> std::convertible_to<std::uint8_t>;
@@ -38,15 +38,15 @@ concept colored_pcl_point = point_like<P> && requires(P& p, const P& constant) {
   p.r = p.g = p.b = std::uint8_t{};
 };
 
-/// A point's colour.
+/// The colour of a point.
 template <colored_pcl_point P>
 [[nodiscard]] constexpr rgb8 color_of(const P& point) noexcept {
   return {point.r, point.g, point.b};
 }
 
-/// Where the cloud's points were seen from, metres in its frame: `sensor_origin_`. PCL leaves zeros
-/// where it is not known: zeros are taken as the origin of an organised cloud, which one sensor took, and as unknown
-/// for any other.
+/// Position from which the cloud's points were observed, metres in its frame: `sensor_origin_`. PCL uses zeros for an
+/// unknown origin: zeros count as the origin for an organised cloud, which one sensor measured, and as unknown for
+/// other clouds.
 template <point_like P>
 [[nodiscard]] std::optional<vec3> sensor_origin(const pcl::PointCloud<P>& cloud) {
   const vec3 origin = cloud.sensor_origin_.template head<3>().template cast<double>();
@@ -54,8 +54,8 @@ template <point_like P>
   return origin;
 }
 
-/// The points of an organised cloud as an image, in place.
-/// Errors: unsupported, if the cloud is not organised. An empty cloud is an empty view.
+/// The points of an organised cloud as an image, in place. Errors: unsupported, if the cloud is not organised. An empty
+/// cloud gives an empty view.
 template <point_like P>
 [[nodiscard]] result<image_view<const P>> image_of(const pcl::PointCloud<P>& cloud) {
   if (cloud.empty()) return image_view<const P>{};
@@ -66,8 +66,8 @@ template <point_like P>
   return image_view<const P>{cloud.points.data(), static_cast<int>(cloud.width), static_cast<int>(cloud.height)};
 }
 
-/// The points with the given indices, in their order, with all of their fields; header and sensor pose
-/// are the cloud's. @pre every index < cloud.size()
+/// The points with the given indices, in their order, with all of their fields; header and sensor pose are those of the
+/// cloud. @pre every index < cloud.size()
 template <point_like P>
 [[nodiscard]] pcl::PointCloud<P> extract(const pcl::PointCloud<P>& cloud, std::span<const std::uint32_t> indices) {
   pcl::PointCloud<P> out;
@@ -86,7 +86,7 @@ template <point_like P>
   return out;
 }
 
-/// A copy of the points, and of their colours where they have some.
+/// A copy of the points, with their colours if they have any.
 template <point_like P>
 [[nodiscard]] point_cloud from_pcl(const pcl::PointCloud<P>& cloud) {
   point_cloud out;
@@ -102,7 +102,7 @@ template <point_like P>
   return out;
 }
 
-/// A copy as PCL's; colours where both sides have some, PCL's defaults for all other fields.
+/// A copy as a PCL cloud; colours if both sides have them, PCL's defaults for all other fields.
 template <point_like P = pcl::PointXYZRGB>
 [[nodiscard]] pcl::PointCloud<P> to_pcl(const point_cloud& cloud) {
   pcl::PointCloud<P> out;
@@ -128,7 +128,7 @@ template <point_like P = pcl::PointXYZRGB>
 
 }  // namespace orbis::interop
 
-/// So that filters that ask for ranges find the origin in the cloud.
+/// Origin of the cloud for filters that need ranges.
 template <orbis::point_like P>
 struct orbis::cloud::cloud_traits<pcl::PointCloud<P>> {
   [[nodiscard]] static std::optional<vec3> sensor_origin(const pcl::PointCloud<P>& cloud) {

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Points that lie in a buffer at regular distances, in place: matrices, images of points, packed
-/// messages, columns of a table.
+/// Points at regular distances in a buffer, in place: matrices, images of points, packed messages, columns of a table.
 ///
-/// Eigen's matrices need none of this: `m.colwise()` and `m.rowwise()` are ranges of points already.
+/// Eigen's matrices do not need it: `m.colwise()` and `m.rowwise()` are ranges of points already.
 #pragma once
 
 #include <array>
@@ -14,12 +13,12 @@
 
 namespace orbis::interop {
 
-/// Where the points are, in numbers of the type `S`.
+/// Placement of the points in the buffer, in units of `S`.
 struct point_layout {
   std::ptrdiff_t point_stride = 3;       ///< from one point to the next
   std::ptrdiff_t coordinate_stride = 1;  ///< from x to y, and from y to z
-  std::size_t row_length = 0;            ///< points in a row; 0: all of them are in one
-  std::ptrdiff_t row_stride = 0;         ///< from the first point of a row to that of the next
+  std::size_t row_length = 0;            ///< points in a row; 0: all points are in one row
+  std::ptrdiff_t row_stride = 0;         ///< from the first point of a row to the first point of the next
 };
 
 namespace detail {
@@ -42,13 +41,13 @@ using strided_view =
 
 }  // namespace detail
 
-/// A view of `size` points of coordinates `S`; each is read as a `std::array<S, 3>`. A `point_range`
-/// that owns nothing: the buffer must outlive it.
+/// A view of `size` points with coordinates `S`; each is read as a `std::array<S, 3>`. A non-owning `point_range`: the
+/// buffer must outlive it.
 template <std::floating_point S>
 class strided_points : public detail::strided_view<S> {
  public:
   constexpr strided_points() = default;
-  /// `data`: x of the first point. @pre the buffer holds all of the points; rows are full
+  /// `data`: x of the first point. @pre the buffer contains all points; rows are full
   constexpr strided_points(const S* data, std::size_t size, const point_layout& layout = {})
       : detail::strided_view<S>{{0, static_cast<std::ptrdiff_t>(size)}, {data, layout}} {
     assert(layout.row_length == 0 || size % layout.row_length == 0);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The functions of bal.hpp.
+/// Function definitions of bal.hpp.
 #pragma once
 
 #include <charconv>

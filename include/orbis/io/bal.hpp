@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Bundle adjustment problems in the text format of "Bundle Adjustment in the Large": the numbers of
-/// cameras, points and observations; for each observation its camera, its point and the pixel; nine
-/// numbers for each camera; three for each point. Any blanks may stand between them.
+/// Bundle adjustment problems in the text format of "Bundle Adjustment in the Large": the numbers of cameras, points
+/// and observations; for each observation its camera, its point and the pixel; nine numbers for each camera; three for
+/// each point. Numbers are separated by any white space.
 ///
 /// Source: S. Agarwal, N. Snavely, S. M. Seitz, R. Szeliski, "Bundle adjustment in the large", ECCV 2010,
 /// and https://grail.cs.washington.edu/projects/bal.
@@ -18,22 +18,22 @@
 
 namespace orbis::io {
 
-/// The problem in `text`; `where` names the source in errors. Linear in the length of the text, memory in
-/// proportion to it whatever the first line says. Errors, with the line: malformed; unsupported
-/// (compressed, as the files of the project's site are).
+/// The problem in `text`; `where` names the source in errors. Linear in the length of the text; memory is proportional
+/// to it, whatever the first line says. Errors, with the line: malformed; unsupported (compressed, as the files of the
+/// project's site are).
 [[nodiscard]] result<bal_problem> parse_bal(std::string_view text, const std::filesystem::path& where = {});
 
-/// Reads all of a stream; see `parse_bal`. Errors: unreadable, malformed, unsupported.
+/// Reads a whole stream; see `parse_bal`. Errors: unreadable, malformed, unsupported.
 [[nodiscard]] result<bal_problem> read_bal(std::istream& in, const std::filesystem::path& where = {});
 
 /// Reads a BAL file; see `parse_bal`. Errors: not_found, unreadable, malformed, unsupported.
 [[nodiscard]] result<bal_problem> read_bal(const std::filesystem::path& path);
 
-/// The problem as text, with as many digits as it takes to read the same numbers back.
+/// The problem as text, with enough digits to read the same numbers back.
 /// @pre the observations' indices are in range
 [[nodiscard]] std::string format_bal(const bal_problem& problem);
 
-/// Writes a BAL file, whole or not at all. Errors: write_failed.
+/// Writes a BAL file atomically. Errors: write_failed.
 result<void> write_bal(const std::filesystem::path& path, const bal_problem& problem);
 
 }  // namespace orbis::io

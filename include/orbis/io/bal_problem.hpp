@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Bundle adjustment problems as "Bundle Adjustment in the Large" has them.
+/// Bundle adjustment problems in the form of "Bundle Adjustment in the Large".
 ///
-/// A camera is an angle-axis rotation R, a translation t, a focal length f and two coefficients of radial
-/// distortion k1, k2. It sees X at -f (1 + k1 r^2 + k2 r^4) d with p = R X + t, d = (p.x, p.y) / p.z and
-/// r = |d|: it looks along its negative z axis, and pixels count from the middle of the image, y upwards.
+/// A camera consists of an angle-axis rotation R, a translation t, a focal length f and two coefficients of radial
+/// distortion k1, k2. It projects X to -f (1 + k1 r^2 + k2 r^4) d with p = R X + t, d = (p.x, p.y) / p.z and r = |d|:
+/// it looks along its negative z axis; the origin of pixels is the centre of the image, y upwards.
 ///
 /// Source: S. Agarwal, N. Snavely, S. M. Seitz, R. Szeliski, "Bundle adjustment in the large", ECCV 2010,
 /// and https://grail.cs.washington.edu/projects/bal.
@@ -21,22 +21,22 @@
 
 namespace orbis::io {
 
-/// `point` seen by `camera`, both as indices.
+/// Observation of `point` by `camera`, both as indices.
 struct bal_observation {
   std::uint32_t camera = 0;
   std::uint32_t point = 0;
-  vec2 pixel = zeros<vec2>();  ///< from the middle of the image, y upwards
+  vec2 pixel = zeros<vec2>();  ///< relative to the centre of the image, y upwards
 };
 
-/// Cameras, points, and which sees which where.
+/// Cameras, points and observations.
 struct bal_problem {
   std::vector<std::array<double, 9>> cameras;  ///< rotation (angle-axis, radians), translation, f, k1, k2
-  std::vector<vec3> points;                    ///< in the world, in the file's unit of length
+  std::vector<vec3> points;                    ///< in the world frame, in the file's unit of length
   std::vector<bal_observation> observations;   ///< in the file's order
 };
 
-/// Where a camera of the format sees a point; empty in the plane of its centre, and for what is not
-/// finite. Points behind the camera have a pixel too, as the residuals of the paper have it.
+/// Projection of a point by a camera of the format; empty in the plane of the camera's centre, and for values that are
+/// not finite. Points behind the camera have a pixel too, as in the residuals of the paper.
 [[nodiscard]] inline std::optional<vec2> project_bal(std::span<const double, 9> camera, const vec3& point) {
   const vec3 p = so3::exp(vec3(camera[0], camera[1], camera[2])) * point + vec3(camera[3], camera[4], camera[5]);
   const vec2 d = head<2>(p) / p.z();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The functions of camera_file.hpp.
+/// Function definitions of camera_file.hpp.
 #pragma once
 
 #include <algorithm>
@@ -28,12 +28,12 @@
 namespace orbis::io {
 namespace detail {
 
-/// Reads the fields of a camera table; the first failure is kept.
+/// Reads the fields of a camera table; keeps the first failure.
 class camera_fields {
  public:
   camera_fields(const toml::table& table, std::string where) : table_{table}, where_{std::move(where)} {}
 
-  /// The number called `name`; it has to satisfy `ok`, described by `wanted`.
+  /// The number called `name`; it must satisfy `ok`, which `wanted` describes in errors.
   template <class Ok>
   double number(const char* name, std::optional<double> fallback, const char* wanted, Ok&& ok) {
     const auto node = table_[name];
@@ -80,13 +80,13 @@ class camera_fields {
     }
     return values;
   }
-  /// Rejects a key that is none of `known`: a setting that was meant and misspelt must not get its default.
+  /// Rejects keys that are not in `known`, so that a misspelt setting does not silently get its default.
   void accept_only(std::initializer_list<std::string_view> known) {
     for (const auto& [key, value] : table_) {
       if (std::find(known.begin(), known.end(), key.str()) != known.end()) continue;
       std::string names;
       for (const std::string_view name : known) names += (names.empty() ? "" : ", ") + std::string{name};
-      reject(std::string{key.str()}.c_str(), "is not a setting of a camera; those are " + names);
+      reject(std::string{key.str()}.c_str(), "is not a setting of a camera; the settings are " + names);
     }
   }
   void reject(const char* name, const std::string& why) {
@@ -182,7 +182,7 @@ ORBIS_INLINE result<void> write_camera(const std::filesystem::path& path, const 
       const auto& d = model.distortion();
       for (const double value : {d.k1, d.k2, d.k3, d.k4}) add(value);
     } else {
-      static_assert(std::is_same_v<Model, camera::pinhole>, "a camera model whose distortion is not written");
+      static_assert(std::is_same_v<Model, camera::pinhole>, "a camera model without code to write its distortion");
     }
   });
   return write_file_atomically(path, [&](std::ostream& out) {

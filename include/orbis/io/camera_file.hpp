@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// `camera.toml`: the settings of an RGB-D camera as a file.
+/// `camera.toml`: a file with the settings of an RGB-D camera.
 ///
 /// @code
 ///   model = "radtan"      # pinhole | radtan | kannala_brandt
@@ -28,19 +28,17 @@
 
 namespace orbis::io {
 
-/// The camera that `text` in TOML describes. `where` names the source in errors.
-/// Errors: malformed, naming the field (missing, of the wrong type, NaN, out of range, a distortion
-/// list of a length the model does not have, a key that is no setting; more than `max_toml_bytes`); unsupported (a
-/// model we do not know).
+/// The camera described by `text` in TOML. `where` names the source in errors. Errors: malformed, naming the field
+/// (missing, of the wrong type, NaN, out of range, a distortion list whose length does not fit the model, an unknown
+/// key; more than `max_toml_bytes`); unsupported (an unknown model).
 [[nodiscard]] result<camera::camera_settings> parse_camera(std::string_view text,
                                                            const std::filesystem::path& where = {});
 
 /// Reads a camera file; see `parse_camera`. Errors: not_found, unreadable, malformed, unsupported.
 [[nodiscard]] result<camera::camera_settings> read_camera(const std::filesystem::path& path);
 
-/// Writes a camera file, whole or not at all, such that reading it gives the same settings exactly (the times of the
-/// shutter but for rounding).
-/// Errors: write_failed.
+/// Writes a camera file atomically, such that reading it gives exactly the same settings (shutter times up to
+/// rounding). Errors: write_failed.
 result<void> write_camera(const std::filesystem::path& path, const camera::camera_settings& settings);
 
 }  // namespace orbis::io

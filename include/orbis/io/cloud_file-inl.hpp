@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The functions of cloud_file.hpp.
+/// Function definitions of cloud_file.hpp.
 #pragma once
 
 #include <string>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Point clouds from files, by what the file is.
+/// Point clouds from files in any supported format.
 #pragma once
 
 #include <filesystem>
@@ -11,9 +11,9 @@
 
 namespace orbis::io {
 
-/// Reads a PLY or PCD file: what it is, its first bytes say (PLY), or else its name's ending.
-/// `origin` is taken off the coordinates before they become floats: for clouds far from where their coordinates begin.
-/// Errors: not_found, unreadable, malformed, unsupported (neither of the two).
+/// Reads a PLY or PCD file, detected by its first bytes (PLY) or otherwise by its extension. `origin` is subtracted
+/// from the coordinates before they are converted to float: for clouds far from their coordinate origin. Errors:
+/// not_found, unreadable, malformed, unsupported (neither of the two).
 [[nodiscard]] result<point_cloud> read_cloud(const std::filesystem::path& path, const vec3& origin = zeros<vec3>());
 
 }  // namespace orbis::io

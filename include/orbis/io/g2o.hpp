@@ -17,20 +17,19 @@
 
 namespace orbis::io {
 
-/// The graph in `text`; vertices and edges may come in any order. `where` names the source in errors;
-/// quaternions of any positive norm are normalised. Text without lines gives an empty graph.
-/// Errors, with the line: malformed; unsupported (a kind of vertex or edge that is not in three
-/// dimensions with poses alone).
+/// The graph in `text`; vertices and edges may be in any order. `where` names the source in errors; quaternions of any
+/// positive norm are normalised. Text without lines gives an empty graph. Errors, with the line: malformed; unsupported
+/// (a vertex or edge type other than 3D poses).
 [[nodiscard]] result<g2o_graph> parse_g2o(std::string_view text, const std::filesystem::path& where = {});
 
 /// Reads a g2o file; see `parse_g2o`. Errors: not_found, unreadable, malformed, unsupported.
 [[nodiscard]] result<g2o_graph> read_g2o(const std::filesystem::path& path);
 
-/// The graph as text, with as many digits as it takes to read the same numbers back.
-/// @pre ids and fixed have one entry for each vertex
+/// The graph as text, with enough digits to read the same numbers back.
+/// @pre ids and fixed have one entry per vertex
 [[nodiscard]] std::string format_g2o(const g2o_graph& graph);
 
-/// Writes a g2o file, whole or not at all. Errors: write_failed.
+/// Writes a g2o file atomically. Errors: write_failed.
 result<void> write_g2o(const std::filesystem::path& path, const g2o_graph& graph);
 
 }  // namespace orbis::io

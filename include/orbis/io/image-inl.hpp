@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The functions of image.hpp.
+/// Function definitions of image.hpp.
 #pragma once
 
 #include <orbis/core/file.hpp>
@@ -12,7 +12,7 @@
 namespace orbis::io {
 
 namespace detail {
-/// More than an image file of `max_image_pixels` has, compressed or not.
+/// Maximum size of an image file: more than one of `max_image_pixels` has, compressed or not.
 inline constexpr std::uintmax_t max_image_bytes = std::uintmax_t{1} << 30;
 }  // namespace detail
 

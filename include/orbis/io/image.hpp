@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Colour and depth images from files, by what the file is and not by what it is called.
+/// Colour and depth images from files; the format is detected from the content, not the name.
 #pragma once
 
 #include <cstdint>
@@ -11,11 +11,11 @@
 
 namespace orbis::io {
 
-/// A PNG (8 or 16 bit, grey, palette, with or without alpha) or JPEG as 8-bit colour.
+/// Reads a PNG (8 or 16 bit, grey, palette, with or without alpha) or JPEG as 8-bit colour.
 /// Errors: not_found, unreadable, malformed (damaged, truncated, more than 1 GiB), unsupported (another format).
 [[nodiscard]] result<image<rgb8>> read_color(const std::filesystem::path& path);
 
-/// A 16-bit grey PNG, as stored (no scale applied).
+/// Reads a 16-bit grey PNG, as stored (no scale applied).
 /// Errors: not_found, unreadable, malformed (damaged, truncated, more than 1 GiB), unsupported (anything else).
 [[nodiscard]] result<image<std::uint16_t>> read_depth(const std::filesystem::path& path);
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The functions of jpeg.hpp.
+/// Function definitions of jpeg.hpp.
 #pragma once
 
 #include <cassert>
@@ -21,11 +21,11 @@ ORBIS_INLINE result<image<rgb8>> decode_jpeg(std::string_view bytes, const std::
 
 ORBIS_INLINE result<std::string> encode_jpeg(image_view<const rgb8> pixels, int quality) {
   assert(1 <= quality && quality <= 100);
-  if (pixels.empty()) return fail(errc::invalid_argument, {}, "a JPEG without pixels");
+  if (pixels.empty()) return fail(errc::invalid_argument, {}, "an image without pixels cannot be encoded as JPEG");
   detail::jpeg_encoder encoder;
   if (encoder.write(pixels, quality)) return encoder.take();
-  if (encoder.out_of_memory()) return fail(errc::exception, {}, "no memory");
-  return fail(errc::invalid_argument, {}, "no JPEG: " + encoder.message());
+  if (encoder.out_of_memory()) return fail(errc::exception, {}, "out of memory");
+  return fail(errc::invalid_argument, {}, "cannot be encoded as JPEG: " + encoder.message());
 }
 
 }  // namespace orbis::io

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// JPEG images, decoded and encoded with libjpeg(-turbo). A damaged or truncated file is an error, never a half
-/// grey image.
+/// JPEG images, decoded and encoded with libjpeg(-turbo). A damaged or truncated file is an error; partially decoded
+/// images are never returned.
 #pragma once
 
 #include <string>
@@ -12,16 +12,17 @@
 
 namespace orbis::io {
 
-/// Whether `bytes` begin as a JPEG file does.
+/// Returns true if `bytes` begin like a JPEG file.
 [[nodiscard]] inline bool is_jpeg(std::string_view bytes) noexcept { return bytes.starts_with("\xFF\xD8\xFF"); }
 
-/// A JPEG as 8-bit colour; grey is spread over the channels. `where` names the source in errors.
-/// Errors: malformed (damaged or truncated; a colour space without a way to RGB; more scans than such an image needs,
-/// for each costs O(pixels)). O(pixels x scans).
+/// Decodes a JPEG to 8-bit colour; grey is copied to all channels. `where` names the source in errors. Errors:
+/// malformed (damaged or truncated; a colour space that cannot be converted to RGB; more scans than such an image
+/// needs, because each costs O(pixels)). O(pixels x scans).
 [[nodiscard]] result<image<rgb8>> decode_jpeg(std::string_view bytes, const std::string& where = {});
 
-/// A baseline JPEG of an image, with half the resolution for colour. `quality`: 1 (small) ... 100 (like the image).
-/// Errors: invalid_argument (no pixels, or more than 65500 in a row or column), exception (no memory). O(pixels).
+/// Encodes an image as a baseline JPEG, with half the resolution for colour. `quality`: 1 (small) ... 100 (close to the
+/// image). Errors: invalid_argument (no pixels, or more than 65500 in a row or column), exception (out of memory).
+/// O(pixels).
 /// @pre 1 <= quality <= 100
 [[nodiscard]] result<std::string> encode_jpeg(image_view<const rgb8> pixels, int quality = 85);
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The functions of mono_recording.hpp.
+/// Function definitions of mono_recording.hpp.
 #pragma once
 
 #include <cassert>
@@ -83,7 +83,8 @@ ORBIS_INLINE result<mono_recording> open_mono_recording(const std::filesystem::p
   if (!index) return fail(index.error());
   if (camera_file) index->files.push_back(*camera_file);
   if (!camera) camera = index->camera;
-  if (!options.camera && !camera_file && index->color) camera->model = index->color->model;  // images as they are
+  if (!options.camera && !camera_file && index->color)
+    camera->model = index->color->model;  // colour images are not resampled
   if (!camera)
     return fail(errc::invalid_argument, folder.string(),
                 "the camera is not known: put a camera.toml into the folder, or name a camera");

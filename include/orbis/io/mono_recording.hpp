@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Recordings of one camera without depth, whatever their format.
+/// Recordings of one camera without depth, in any supported format.
 ///
 /// @code
 ///   const auto recording = orbis::io::open_mono_recording(path).value();
@@ -28,9 +28,9 @@
 
 namespace orbis::io {
 
-/// The layouts of recordings that have the images of one camera. `automatic`: look which one it is. `tum`: a list
-/// `rgb.txt` (or `left.txt`). `kitti`: `image_0` (or 2, 1, 3) with `calib.txt` and `times.txt`. `asl`: `mav0/cam0`, or
-/// a camera's folder alone. `rgbd`: the colour images of what `open_recording` reads. `images`: a plain folder of
+/// The layouts of recordings that contain the images of one camera. `automatic`: detected. `tum`: a list `rgb.txt` (or
+/// `left.txt`). `kitti`: `image_0` (or 2, 1, 3) with `calib.txt` and `times.txt`. `asl`: `mav0/cam0`, or a single
+/// camera's folder. `rgbd`: the colour images of recordings that `open_recording` reads. `images`: a plain folder of
 /// images.
 enum class mono_format { automatic, tum, kitti, asl, rgbd, images };
 
@@ -49,34 +49,34 @@ enum class mono_format { automatic, tum, kitti, asl, rgbd, images };
 
 struct mono_recording_options {
   mono_format format = mono_format::automatic;
-  std::optional<camera::camera_settings> camera{};  ///< instead of what the recording says
+  std::optional<camera::camera_settings> camera{};  ///< replaces the camera of the recording
 };
 
-/// A list of images that are read when asked for. Thread-safe.
+/// A list of images that are read on request. Thread-safe.
 class mono_recording {
  public:
   /// @pre !index.frames.empty()
   mono_recording(detail::recording_index index, camera::camera_settings camera, mono_format format);
 
   [[nodiscard]] std::size_t size() const noexcept { return index_.frames.size(); }
-  /// Seconds. @pre i < size()
+  /// Time in seconds. @pre i < size()
   [[nodiscard]] double timestamp(std::size_t i) const { return index_.frames[i].timestamp; }
   /// The file of image `i`. @pre i < size()
   [[nodiscard]] const std::filesystem::path& path(std::size_t i) const { return index_.frames[i].color; }
   [[nodiscard]] const camera::camera_settings& camera() const noexcept { return camera_; }
   /// All poses of the ground truth, not only those at frames; empty if there is none.
   [[nodiscard]] const trajectory& ground_truth() const noexcept { return index_.ground_truth; }
-  /// Never `automatic`.
+  /// The format; never `automatic`.
   [[nodiscard]] mono_format format() const noexcept { return format_; }
-  /// What is worth a warning: lines left out, images without a time.
+  /// Warnings: skipped lines, images without a time.
   [[nodiscard]] std::span<const std::string> notes() const noexcept { return index_.notes; }
-  /// Every file that the recording is read from: lists, poses, camera, and all images.
+  /// All files of the recording: lists, poses, camera, and all images.
   [[nodiscard]] std::vector<std::filesystem::path> files() const;
 
   /// Reads frame `i`. Errors: not_found, unreadable, malformed (damaged, or of another size than the camera's),
   /// unsupported. @pre i < size()
   [[nodiscard]] result<camera::mono_frame> frame(std::size_t i) const;
-  /// Reads the image of frame `i` alone. Errors as above. @pre i < size()
+  /// Reads only the image of frame `i`. Errors as above. @pre i < size()
   [[nodiscard]] result<image<rgb8>> color(std::size_t i) const;
 
  private:
@@ -85,16 +85,16 @@ class mono_recording {
   mono_format format_;
 };
 
-/// Which format the images of one camera in `folder` have; `automatic` if none is recognised.
+/// Detects the format of the images of one camera in `folder`; `automatic` if none is recognised.
 [[nodiscard]] mono_format detect_mono_format(const std::filesystem::path& folder);
 
-/// Opens the recording in `folder` as that of one camera: reads its lists, poses and camera, not yet its images (of
-/// KITTI one, for its size). Depth and the images of further cameras are passed over.
+/// Opens the recording in `folder` as that of one camera: reads its lists, poses and camera, but not its images (for
+/// KITTI one, for its size). Ignores depth and the images of further cameras.
 ///
-/// The camera is the option's; else that of `camera.toml` in the folder; else what the format's own files or the
-/// folder's name tell; else this fails.
-/// Errors: not_found, unreadable, unsupported (no known format, or a camera of an unknown model), no_data (nothing in
-/// it), malformed (with file and line), invalid_argument (no camera known).
+/// The camera is, in this order: that of the options; that of `camera.toml` in the folder; that of the format's own
+/// files or the folder's name. Without any of these the function fails.
+/// Errors: not_found, unreadable, unsupported (no known format, or a camera of an unknown model), no_data (no images),
+/// malformed (with file and line), invalid_argument (no camera known).
 [[nodiscard]] result<mono_recording> open_mono_recording(const std::filesystem::path& folder,
                                                          const mono_recording_options& options = {});
 

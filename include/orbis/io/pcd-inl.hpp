@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The functions of pcd.hpp.
+/// Function definitions of pcd.hpp.
 #pragma once
 
 #include <algorithm>

@@ -2,9 +2,8 @@
 /// @file
 /// Point clouds in PCD files (version 0.7: ascii, binary, binary_compressed).
 ///
-/// Source: the Point Cloud Library's documentation of the file format. Points that are not finite are
-/// kept: in an organised cloud the place of a point says which pixel it came from. The viewpoint is
-/// not applied.
+/// Source: the Point Cloud Library's documentation of the file format. Points that are not finite are kept: in an
+/// organised cloud the index of a point determines its pixel. The viewpoint is not applied.
 #pragma once
 
 #include <filesystem>
@@ -17,17 +16,17 @@
 
 namespace orbis::io {
 
-/// A PCD file in memory: `x y z` of any type, and `rgb` or `rgba` (packed, float or integer) where
-/// they are there. All else is passed over. `origin` is taken off the coordinates before they become floats.
-/// Errors: malformed (damaged, truncated), unsupported (no x, y and z).
+/// Parses a PCD file in memory: `x y z` of any type, and `rgb` or `rgba` (packed, float or integer) if present. Ignores
+/// all other fields. `origin` is subtracted from the coordinates before they are converted to float. Errors: malformed
+/// (damaged, truncated), unsupported (no x, y and z).
 [[nodiscard]] result<point_cloud> parse_pcd(std::string_view bytes, const std::string& where = {},
                                             const vec3& origin = zeros<vec3>());
 
 /// Reads a PCD file; see `parse_pcd`. Errors: not_found, unreadable, malformed, unsupported.
 [[nodiscard]] result<point_cloud> read_pcd(const std::filesystem::path& path);
 
-/// Writes a cloud as a PCD file (binary_compressed), whole or not at all: `x y z`, and `rgb` (packed into a float, as
-/// PCL has it) if there are colours. Errors: write_failed, invalid_argument (more than 4 GiB).
+/// Writes a cloud as a PCD file (binary_compressed) atomically: `x y z`, and `rgb` (packed into a float, as in PCL) if
+/// there are colours. Errors: write_failed, invalid_argument (more than 4 GiB).
 result<void> write_pcd(const std::filesystem::path& path, const point_cloud& cloud);
 
 }  // namespace orbis::io

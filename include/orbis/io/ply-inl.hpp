@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The functions of ply.hpp.
+/// Function definitions of ply.hpp.
 #pragma once
 
 #include <algorithm>

@@ -27,15 +27,15 @@ enum class ply_encoding { ascii, binary };  ///< binary: little-endian
 
 struct ply_options {
   ply_encoding encoding = ply_encoding::binary;
-  /// Added to the coordinates as they are written, metres: what `parse_ply` took off. If it is not zero they are
-  /// written as double.
+  /// Added to the coordinates on writing, metres: the origin that `parse_ply` subtracted. If it is not zero,
+  /// coordinates are written as double.
   vec3 origin = zeros<vec3>();
 };
 
-/// The vertices of a PLY file in memory: `x y z` of any type and, where they are there, `red green
-/// blue` (8-bit as they are, 16-bit scaled, floating point from 0 to 1). All else is passed over. `origin` is taken off
-/// the coordinates before they become floats, which are no finer than half a metre at 5000 km.
-/// Errors: malformed (damaged, truncated), unsupported (no vertices with x, y and z).
+/// Parses the vertices of a PLY file in memory: `x y z` of any type and, if present, `red green blue` (8-bit unchanged,
+/// 16-bit scaled, floating point from 0 to 1). Ignores everything else. `origin` is subtracted from the coordinates
+/// before they are converted to float, whose resolution is half a metre at 5000 km. Errors: malformed (damaged,
+/// truncated), unsupported (no vertices with x, y and z).
 [[nodiscard]] result<point_cloud> parse_ply(std::string_view bytes, const std::string& where = {},
                                             const vec3& origin = zeros<vec3>());
 
@@ -49,7 +49,7 @@ struct ply_vertex {
   rgb8 color{};
 };
 
-/// Points of any type, seen as vertices: `read(of, begin, out)` gives those from `begin` on.
+/// Points of any type as vertices: `read(of, begin, out)` returns those from `begin` on.
 struct ply_vertices {
   const void* of = nullptr;
   void (*read)(const void* of, std::size_t begin, std::span<ply_vertex> out) = nullptr;
@@ -57,14 +57,14 @@ struct ply_vertices {
   bool colored = false;
 };
 
-/// Writes vertices, block by block.
+/// Writes vertices in blocks.
 [[nodiscard]] result<void> write_ply_vertices(const std::filesystem::path& path, const ply_vertices& vertices,
                                               const ply_options& options);
 
 }  // namespace detail
 
-/// Writes points (as float), and their colours if there are any, as a PLY file, whole or not at all.
-/// @pre colors.empty() || colors.size() == size of points. Errors: write_failed.
+/// Writes points (as float), and their colours if there are any, as a PLY file atomically. @pre colors.empty() ||
+/// colors.size() == size of points. Errors: write_failed.
 template <point_range Points>
 result<void> write_ply(const std::filesystem::path& path, const Points& points, std::span<const rgb8> colors,
                        const ply_options& options = {}) {
@@ -84,7 +84,8 @@ result<void> write_ply(const std::filesystem::path& path, const Points& points, 
 /// Writes a cloud as a PLY file: `x y z`, with `red green blue` if it has colours.
 result<void> write_ply(const std::filesystem::path& path, const point_cloud& cloud, const ply_options& options = {});
 
-/// Writes the points of a cloud that a filter kept, without making a cloud of them. @pre indices are of the cloud
+/// Writes the points of a cloud that a filter kept, without copying them to another cloud. @pre indices are of the
+/// cloud
 result<void> write_ply(const std::filesystem::path& path, const point_cloud& cloud,
                        std::span<const std::uint32_t> indices, const ply_options& options = {});
 

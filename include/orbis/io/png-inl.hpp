@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The functions of png.hpp.
+/// Function definitions of png.hpp.
 #pragma once
 
 #include <bit>

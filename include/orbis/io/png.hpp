@@ -13,24 +13,23 @@
 
 namespace orbis::io {
 
-/// Whether `bytes` begin as a PNG file does.
+/// Returns true if `bytes` begin like a PNG file.
 [[nodiscard]] inline bool is_png(std::string_view bytes) noexcept { return bytes.starts_with("\x89PNG\r\n\x1a\n"); }
 
-/// Any PNG as 8-bit colour: grey is spread over the channels, 16 bits are scaled to 8, a palette is
-/// looked up, an alpha channel is dropped. `where` names the source in errors.
-/// Errors: malformed (damaged or truncated).
+/// Decodes any PNG to 8-bit colour: grey is copied to all channels, 16 bits are scaled to 8, a palette is resolved, an
+/// alpha channel is dropped. `where` names the source in errors. Errors: malformed (damaged or truncated).
 [[nodiscard]] result<image<rgb8>> decode_png_color(std::string_view bytes, const std::string& where = {});
 
-/// A 16-bit grey PNG. Errors: malformed; unsupported (not 16-bit grey).
+/// Decodes a 16-bit grey PNG. Errors: malformed; unsupported (not 16-bit grey).
 [[nodiscard]] result<image<std::uint16_t>> decode_png_depth(std::string_view bytes, const std::string& where = {});
 
-/// The bytes of a PNG file: 8-bit colour, 8-bit grey or 16-bit grey, as the pixel type says.
-/// For one version of zlib, equal pixels give equal bytes. @pre !view.empty()
+/// Encodes a PNG file: 8-bit colour, 8-bit grey or 16-bit grey, according to the pixel type. With the same version of
+/// zlib, equal pixels give equal bytes. @pre !view.empty()
 [[nodiscard]] std::string encode_png(image_view<const rgb8> view);
 [[nodiscard]] std::string encode_png(image_view<const std::uint8_t> view);
 [[nodiscard]] std::string encode_png(image_view<const std::uint16_t> view);
 
-/// Writes a PNG file, whole or not at all. Errors: write_failed, invalid_argument (empty image).
+/// Writes a PNG file atomically. Errors: write_failed, invalid_argument (empty image).
 result<void> write_png(const std::filesystem::path& path, image_view<const rgb8> view);
 result<void> write_png(const std::filesystem::path& path, image_view<const std::uint8_t> view);
 result<void> write_png(const std::filesystem::path& path, image_view<const std::uint16_t> view);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The functions of recording.hpp.
+/// Function definitions of recording.hpp.
 #pragma once
 
 #include <cassert>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// RGB-D recordings on disk, whatever their format.
+/// RGB-D recordings on disk, in any supported format.
 ///
 /// @code
 ///   for (const auto& frame : orbis::io::open_recording(path).value()) slam.track(frame);
@@ -32,7 +32,7 @@ namespace detail {
 class color_registration;
 }
 
-/// The layouts we read. `automatic`: look which one it is.
+/// The supported layouts. `automatic`: detected.
 enum class recording_format { automatic, tum, seven_scenes, icl_nuim, scannet };
 
 /// The name of a format: "tum", "7scenes", "icl", "scannet", "auto".
@@ -49,39 +49,37 @@ enum class recording_format { automatic, tum, seven_scenes, icl_nuim, scannet };
 
 struct recording_options {
   recording_format format = recording_format::automatic;
-  std::optional<camera::camera_settings> camera{};  ///< instead of what the recording says
+  std::optional<camera::camera_settings> camera{};  ///< replaces the camera of the recording
   double max_time_difference = 0.020;               ///< between a colour and its depth image, seconds
 };
 
-/// A list of frames that are read when asked for. Reading is thread-safe through `frame`, not through
-/// iterators.
+/// A list of frames that are read on request. `frame` is thread-safe; iterators are not.
 class recording {
  public:
   /// @pre !index.frames.empty()
   recording(detail::recording_index index, camera::camera_settings camera, recording_format format);
 
   [[nodiscard]] std::size_t size() const noexcept { return index_.frames.size(); }
-  /// Of the colour image, seconds. @pre i < size()
+  /// Time of the colour image, seconds. @pre i < size()
   [[nodiscard]] double timestamp(std::size_t i) const { return index_.frames[i].timestamp; }
   [[nodiscard]] const camera::camera_settings& camera() const noexcept { return camera_; }
   /// All poses of the ground truth, not only those at frames; empty if there is none.
   [[nodiscard]] const trajectory& ground_truth() const noexcept { return index_.ground_truth; }
-  /// Never `automatic`.
+  /// The format; never `automatic`.
   [[nodiscard]] recording_format format() const noexcept { return format_; }
-  /// What is worth a warning: images without a partner, lines left out, depth that is not registered.
+  /// Warnings: images without a partner, skipped lines, depth that is not registered.
   [[nodiscard]] std::span<const std::string> notes() const noexcept { return index_.notes; }
-  /// Every file that the recording is read from: lists, poses, camera, and all images.
+  /// All files of the recording: lists, poses, camera, and all images.
   [[nodiscard]] std::vector<std::filesystem::path> files() const;
 
   /// Reads frame `i`. Colour and depth have the camera's size. Errors: not_found, unreadable,
   /// malformed (damaged, or of another size than the camera's), unsupported. @pre i < size()
   [[nodiscard]] result<camera::rgbd_frame> frame(std::size_t i) const;
-  /// Reads the colour image of frame `i` alone. Errors as above. @pre i < size()
+  /// Reads only the colour image of frame `i`. Errors as above. @pre i < size()
   [[nodiscard]] result<image<rgb8>> color(std::size_t i) const;
 
-  /// Goes over the frames once, reading each when it is reached. Ends at the first frame that cannot
-  /// be read; then the recording's `status` says why. The frame a reference was taken to lives until
-  /// the iterator moves on.
+  /// Single pass over the frames; reads each one when it is reached. Ends at the first frame that cannot be read; the
+  /// recording's `status` has the reason then. A reference to a frame is valid until the iterator advances.
   class iterator {
    public:
     using iterator_category = std::input_iterator_tag;
@@ -111,45 +109,45 @@ class recording {
     std::shared_ptr<const camera::rgbd_frame> frame_;  // shared, so that an iterator can be copied
   };
 
-  /// Starts over, and clears `status`. The recording must outlive the iterator and stay in place.
+  /// Starts again, and clears `status`. The recording must outlive the iterator and stay in place.
   [[nodiscard]] iterator begin() {
     status_ = {};
     return iterator(*this);
   }
   [[nodiscard]] std::default_sentinel_t end() const noexcept { return {}; }
-  /// Why the last iteration ended before the last frame, if it did.
+  /// The reason why the last iteration ended before the last frame, if it did.
   [[nodiscard]] const result<void>& status() const noexcept { return status_; }
 
  private:
   [[nodiscard]] result<image<std::uint16_t>> read_sized_depth(const std::filesystem::path& path) const;
-  /// The colour image as the camera of depth sees it.
+  /// The colour image as seen from the depth camera.
   [[nodiscard]] result<image<rgb8>> read_registered(const std::filesystem::path& path,
                                                     image_view<const std::uint16_t> depth) const;
 
   detail::recording_index index_;
   camera::camera_settings camera_;
   recording_format format_;
-  std::shared_ptr<const detail::color_registration> registration_;  // where colour is to be resampled
+  std::shared_ptr<const detail::color_registration> registration_;  // set if colour is resampled
   result<void> status_;
 };
 
-/// Which format the recording in `folder` has; `automatic` if none is recognised.
+/// Detects the format of the recording in `folder`; `automatic` if none is recognised.
 [[nodiscard]] recording_format detect_format(const std::filesystem::path& folder);
 
 namespace detail {
 
-/// The index of the recording in `folder`, and its format in place of `automatic`. Errors: as `open_recording`.
+/// The index of the recording in `folder`; replaces a `format` of `automatic` by the detected one. Errors: as
+/// `open_recording`.
 [[nodiscard]] result<recording_index> index_recording(const std::filesystem::path& folder, recording_format& format,
                                                       double max_time_difference);
 
 }  // namespace detail
 
-/// Opens the recording in `folder`: reads its lists, poses and camera, not yet its images.
+/// Opens the recording in `folder`: reads its lists, poses and camera, but not its images.
 ///
-/// The camera is the option's; else that of `camera.toml` in the folder; else what the format's own
-/// files or the folder's name tell; else this fails.
-/// Errors: not_found, unreadable, unsupported (no known format), no_data (nothing in it), malformed
-/// (with file and line), invalid_argument (no camera known).
+/// The camera is, in this order: that of the options; that of `camera.toml` in the folder; that of the format's own
+/// files or the folder's name. Without any of these the function fails. Errors: not_found, unreadable, unsupported (no
+/// known format), no_data (no frames), malformed (with file and line), invalid_argument (no camera known).
 [[nodiscard]] result<recording> open_recording(const std::filesystem::path& folder,
                                                const recording_options& options = {});
 

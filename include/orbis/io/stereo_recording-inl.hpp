@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The functions of stereo_recording.hpp.
+/// Function definitions of stereo_recording.hpp.
 #pragma once
 
 #include <algorithm>
@@ -22,19 +22,19 @@
 namespace orbis::io {
 namespace detail {
 
-// A plain folder of stereo images: `left.txt` (or `rgb.txt`) and `right.txt`, lists as TUM has them, or numbered
-// images in `left` (or `rgb`) and `right`; `camera.toml`, and possibly `groundtruth.txt`.
+// A plain folder of stereo images: `left.txt` (or `rgb.txt`) and `right.txt`, lists in the format of TUM, or numbered
+// images in `left` (or `rgb`) and `right`; `camera.toml`, and optionally `groundtruth.txt`.
 //
-// Rectified images have one camera, with its `baseline`. Others have a second one in `camera_right.toml`, and its
-// place in `T_left_right.txt`: a 4x4 matrix from the right camera's frame to the left one's, metres.
+// Rectified images have one camera, with its `baseline`. Others have a second one in `camera_right.toml`, and its pose
+// in `T_left_right.txt`: a 4x4 matrix from the right camera's frame to the left one's, metres.
 
-/// Whether `folder` looks like one of stereo images.
+/// Returns true if `folder` looks like a plain folder of stereo images.
 [[nodiscard]] inline bool is_image_pairs(const std::filesystem::path& folder) {
   const bool lists = present(folder / "right.txt") && !first_present(folder, {"left.txt", "rgb.txt"}).empty();
   return lists || (present(folder / "right") && !first_present(folder, {"left", "rgb"}).empty());
 }
 
-/// The numbered images in `folder`, at `fps` images a second. Errors: no_data.
+/// The numbered images in `folder`, at `fps` images per second. Errors: no_data.
 [[nodiscard]] inline result<std::vector<stamped_file>> numbered_images(const std::filesystem::path& folder, double fps,
                                                                        std::vector<std::string>& notes) {
   std::vector<stamped_file> files;
@@ -46,7 +46,7 @@ namespace detail {
   return in_order_of_time(folder, std::move(files), notes);
 }
 
-/// The index of such a folder. `camera`: instead of `camera.toml`. Errors: not_found (a file), unreadable, no_data,
+/// The index of such a folder. `camera` replaces `camera.toml`. Errors: not_found (a file), unreadable, no_data,
 /// malformed (with file and line), invalid_argument (no camera, or no baseline).
 [[nodiscard]] inline result<stereo_index> index_image_pairs(const std::filesystem::path& folder,
                                                             double max_time_difference,
@@ -77,10 +77,9 @@ namespace detail {
     images.files.insert(images.files.end(), {right_file, place_file});
   } else {
     if (!camera->baseline)
-      return fail(
-          errc::invalid_argument, folder.string(),
-          "the distance of the two cameras is not known: camera.toml needs a baseline, or camera_right.toml and "
-          "T_left_right.txt have to be there");
+      return fail(errc::invalid_argument, folder.string(),
+                  "the baseline is not known: add baseline to camera.toml, or add camera_right.toml and "
+                  "T_left_right.txt");
     index.cameras = {camera->model, camera->model, se3{so3{}, vec3{*camera->baseline, 0.0, 0.0}}};
   }
 
@@ -158,7 +157,7 @@ ORBIS_INLINE result<stereo_recording> open_stereo_recording(const std::filesyste
   const char* const cameras = format == stereo_format::kitti ? "calib.txt" : "sensor.yaml";
   if (has_cameras && options.camera)
     return fail(errc::invalid_argument, folder.string(),
-                std::string{"the two cameras are those of "} + cameras + ", no other one can be named");
+                std::string{"the two cameras are those of "} + cameras + "; remove the camera from the options");
   const auto read_index = [&]() -> result<detail::stereo_index> {
     switch (format) {
       case stereo_format::kitti: return detail::index_kitti(folder);
@@ -174,8 +173,8 @@ ORBIS_INLINE result<stereo_recording> open_stereo_recording(const std::filesyste
   auto index = read_index();
   if (!index) return fail(index.error());
   if (const auto unused = folder / "camera.toml"; has_cameras && detail::present(unused))
-    index->images.notes.push_back(unused.string() + ": not used, the two cameras are those of " + cameras);
-  // Before the maps of the rectification are made, whose size a wrong number may put beyond all memory.
+    index->images.notes.push_back(unused.string() + ": not used; the two cameras are those of " + cameras);
+  // Check before the rectification maps are made: a wrong size may exceed the memory.
   const auto& file = index->images.frames.front().color;
   const camera::any_camera& left = index->cameras.left;
   if (const auto first = detail::sized(read_color(file), file, left.width(), left.height()); !first)

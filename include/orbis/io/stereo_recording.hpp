@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Stereo recordings on disk, whatever their format, as rectified pairs.
+/// Stereo recordings on disk as rectified pairs, in any supported format.
 ///
 /// @code
 ///   const auto recording = orbis::io::open_stereo_recording(path).value();
@@ -30,8 +30,8 @@
 
 namespace orbis::io {
 
-/// The layouts of stereo recordings we read. `automatic`: look which one it is. `pairs`: `left.txt` and `right.txt`, or
-/// numbered images in `left` and `right`, with `camera.toml`.
+/// The supported layouts of stereo recordings. `automatic`: detected. `pairs`: `left.txt` and `right.txt`, or numbered
+/// images in `left` and `right`, with `camera.toml`.
 enum class stereo_format { automatic, kitti, asl, pairs };
 
 /// The name of a format: "kitti", "asl", "pairs", "auto".
@@ -47,41 +47,41 @@ enum class stereo_format { automatic, kitti, asl, pairs };
 
 struct stereo_recording_options {
   stereo_format format = stereo_format::automatic;
-  std::optional<camera::camera_settings> camera{};  ///< instead of camera.toml; of `pairs` only
+  std::optional<camera::camera_settings> camera{};  ///< replaces camera.toml; only for `pairs`
   double max_time_difference = 0.005;               ///< between a left and its right image, seconds
   camera::rectify_options rectify{};
 };
 
-/// A list of pairs that are read, and rectified if they are not, when asked for. Thread-safe.
+/// A list of pairs that are read, and rectified if necessary, on request. Thread-safe.
 class stereo_recording {
  public:
   /// @pre !index.images.frames.empty(); `straight` is of `index.cameras`
   stereo_recording(detail::stereo_index index, camera::rectification straight, stereo_format format);
 
   [[nodiscard]] std::size_t size() const noexcept { return index_.images.frames.size(); }
-  /// Of the left image, seconds. @pre i < size()
+  /// Time of the left image, seconds. @pre i < size()
   [[nodiscard]] double timestamp(std::size_t i) const { return index_.images.frames[i].timestamp; }
   /// The rectified camera of both images, with the baseline.
   [[nodiscard]] camera::camera_settings camera() const {
     return {
         .model = straight_.camera(), .fps = index_.fps, .baseline = straight_.baseline(), .shutter = index_.shutter};
   }
-  /// The cameras as they are.
+  /// The original cameras, before rectification.
   [[nodiscard]] const camera::stereo_rig<camera::any_camera>& cameras() const noexcept { return index_.cameras; }
   [[nodiscard]] const camera::rectification& rectification() const noexcept { return straight_; }
   /// All poses of the ground truth, of the rectified left camera; empty if there is none.
   [[nodiscard]] const trajectory& ground_truth() const noexcept { return index_.images.ground_truth; }
-  /// Never `automatic`.
+  /// The format; never `automatic`.
   [[nodiscard]] stereo_format format() const noexcept { return format_; }
-  /// What is worth a warning: images without a partner, lines left out.
+  /// Warnings: images without a partner, skipped lines.
   [[nodiscard]] std::span<const std::string> notes() const noexcept { return index_.images.notes; }
-  /// Every file that the recording is read from: lists, poses, cameras, and all images.
+  /// All files of the recording: lists, poses, cameras, and all images.
   [[nodiscard]] std::vector<std::filesystem::path> files() const;
 
   /// Reads frame `i`. Errors: not_found, unreadable, malformed (damaged, or of another size than its camera's),
   /// unsupported. @pre i < size()
   [[nodiscard]] result<camera::stereo_frame> frame(std::size_t i) const;
-  /// Reads the left image of frame `i` alone. Errors as above. @pre i < size()
+  /// Reads only the left image of frame `i`. Errors as above. @pre i < size()
   [[nodiscard]] result<image<rgb8>> left(std::size_t i) const;
 
  private:
@@ -92,14 +92,14 @@ class stereo_recording {
   stereo_format format_;
 };
 
-/// Which format the stereo recording in `folder` has; `automatic` if none is recognised.
+/// Detects the format of the stereo recording in `folder`; `automatic` if none is recognised.
 [[nodiscard]] stereo_format detect_stereo_format(const std::filesystem::path& folder);
 
-/// Opens the stereo recording in `folder`: reads its lists, poses and cameras, and rectifies the cameras; of its images
-/// only the first left one, for its size.
-/// Errors: not_found, unreadable, unsupported (no known format, or a camera of an unknown model), no_data (nothing in
-/// it), malformed (with file and line; an image of another size than its camera's), invalid_argument (no camera known,
-/// another camera for a format that has its own, or cameras that cannot be rectified).
+/// Opens the stereo recording in `folder`: reads its lists, poses and cameras, and rectifies the cameras; reads only
+/// the first left image, for its size. Errors: not_found, unreadable, unsupported (no known format, or a camera of an
+/// unknown model), no_data (no pairs), malformed (with file and line; an image of another size than its camera's),
+/// invalid_argument (no camera known, a camera option for a format with its own cameras, or cameras that cannot be
+/// rectified).
 [[nodiscard]] result<stereo_recording> open_stereo_recording(const std::filesystem::path& folder,
                                                              const stereo_recording_options& options = {});
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The functions of synthetic.hpp.
+/// Function definitions of synthetic.hpp.
 #pragma once
 
 #include <cassert>
@@ -18,7 +18,7 @@ namespace orbis::io {
 
 namespace detail::synthetic {
 
-/// All that does not change while frames are taken.
+/// Data that does not change between frames.
 struct recorded_room {
   recorded_room(const synthetic_options& options, const camera::intrinsics& k)
       : path{options.path, options.seed,
@@ -37,7 +37,7 @@ struct recorded_room {
 
 [[nodiscard]] inline tl::unexpected<error> no_such_frame(std::size_t i, std::size_t count) {
   return fail(errc::invalid_argument, "frame",
-              "there is no frame " + std::to_string(i) + " among " + std::to_string(count));
+              "frame " + std::to_string(i) + " does not exist; the recording has " + std::to_string(count) + " frames");
 }
 
 }  // namespace detail::synthetic

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Synthetic recordings: a furnished room, a hand-held camera, and the truth about both.
+/// Synthetic recordings: a furnished room, a hand-held camera, and the ground truth of both.
 ///
 /// @code
 ///   orbis::io::synthetic_recording room{{.frames = 300, .seed = 7}};
@@ -37,7 +37,7 @@ namespace detail::synthetic {
 class scene;
 struct recorded_room;
 
-/// A policy with as many threads. What is rendered does not depend on them.
+/// A policy with the same number of threads. The rendered images do not depend on it.
 template <execution_policy Policy>
 [[nodiscard]] parallel_policy threads_of(const Policy& policy) {
   if constexpr (std::is_same_v<Policy, parallel_policy>)
@@ -48,13 +48,13 @@ template <execution_policy Policy>
 
 }  // namespace detail::synthetic
 
-/// A recording of a hand-held camera going once round a furnished room, with everything known
-/// exactly. Frames are independent: each can be asked for in any order, from several threads, and is
-/// the same bytes on every machine (the pose apart, whose last bit may differ).
+/// A recording of a hand-held camera moving once round a furnished room, with exact ground truth. Frames are
+/// independent: they may be requested in any order and from several threads, and are byte for byte equal on every
+/// machine (except the pose, whose last bit may differ).
 ///
-/// The room stands on z = 0 with the origin in the middle of its floor. The surfaces' textures are painted when they
-/// are seen first, which takes a few tenths of a second for the first frames at 640x480, and some 50 MB in the end;
-/// copies share them.
+/// The floor of the room is at z = 0 with the origin at its centre. The surfaces' textures are painted when they are
+/// first seen, which takes a few tenths of a second for the first frames at 640x480, and some 50 MB in the end; copies
+/// share them.
 class synthetic_recording {
  public:
   class iterator;
@@ -64,12 +64,12 @@ class synthetic_recording {
 
   [[nodiscard]] std::size_t size() const noexcept { return static_cast<std::size_t>(options_.frames); }
   [[nodiscard]] bool empty() const noexcept { return size() == 0; }
-  /// Seconds.
+  /// Time in seconds.
   [[nodiscard]] double timestamp(std::size_t i) const noexcept { return static_cast<double>(i) / options_.fps; }
   [[nodiscard]] const synthetic_options& options() const noexcept { return options_; }
-  /// The distance (metres, unsigned) of a point of the world to the nearest surface that a camera could see: the error
-  /// of a map point. Exact in front of the surfaces; behind them, where solids overlap, the distance to the hull of the
-  /// one that the point is deepest in. What moves does not count. O(solids of the room)
+  /// The distance (metres, unsigned) of a point of the world to the nearest surface visible to a camera: the error of a
+  /// map point. Exact in front of the surfaces; behind them, where solids overlap, the distance to the hull of the one
+  /// that the point is deepest in. Ignores moving solids. O(solids of the room)
   [[nodiscard]] double surface_distance(const vec3& p_world) const noexcept;
   /// The room's solids, for tests of this component (io/detail/synthetic/scene.hpp).
   [[nodiscard]] const detail::synthetic::scene& scene() const noexcept;
@@ -81,7 +81,7 @@ class synthetic_recording {
             .baseline = options_.sensor.baseline,
             .shutter = options_.sensor.shutter};
   }
-  /// Both cameras of `stereo_frame`: as `camera()`, with the distance of the two.
+  /// The camera of `stereo_frame`: as `camera()`, with the baseline.
   [[nodiscard]] camera::camera_settings stereo_camera() const {
     camera::camera_settings both = camera();
     both.baseline = options_.sensor.stereo_baseline;
@@ -92,32 +92,32 @@ class synthetic_recording {
   /// The exact poses of all frames.
   [[nodiscard]] trajectory ground_truth() const;
 
-  /// Frame `i` as the sensor sees it. Errors: invalid_argument if there is no frame `i`.
+  /// Frame `i` as measured by the sensor. Errors: invalid_argument if there is no frame `i`.
   [[nodiscard]] result<camera::rgbd_frame> frame(std::size_t i) const;
 
-  /// Frame `i` as the sensor sees it, made on the policy's threads. Errors: as `frame`.
+  /// Frame `i` as measured by the sensor, rendered on the policy's threads. Errors: as `frame`.
   template <execution_policy Policy>
   [[nodiscard]] result<camera::rgbd_frame> render(const Policy& policy, std::size_t i) const {
     return render_on(detail::synthetic::threads_of(policy), i);
   }
 
-  /// Frame `i` as a stereo camera sees it, whose left camera is `camera()` and whose right one stands
-  /// `stereo_camera().baseline` to the right of it. Errors: as `frame`.
+  /// Frame `i` of a stereo camera, whose left camera is `camera()` and whose right one is `stereo_camera().baseline` to
+  /// the right of it. Errors: as `frame`.
   [[nodiscard]] result<camera::stereo_frame> stereo_frame(std::size_t i) const;
   template <execution_policy Policy>
   [[nodiscard]] result<camera::stereo_frame> render_stereo(const Policy& policy, std::size_t i) const {
     return render_stereo_on(detail::synthetic::threads_of(policy), i);
   }
 
-  /// Colour, depth (metres) and angles of frame `i` without any error of the sensor.
-  /// Errors: invalid_argument if there is no frame `i`.
+  /// Colour, depth (metres) and angles of frame `i` without sensor errors. Errors: invalid_argument if there is no
+  /// frame `i`.
   template <execution_policy Policy>
   [[nodiscard]] result<detail::synthetic::exact_view> exact(const Policy& policy, std::size_t i) const {
     return exact_on(detail::synthetic::threads_of(policy), i);
   }
 
-  /// What a camera of any model sees from any place in the room: depths in metres along its axis, without any error; 0
-  /// where a pixel has no ray, and everywhere from outside of the room. What moves is not there.
+  /// Exact depth image of a camera of any model at any pose in the room: depths in metres along its axis; 0 where a
+  /// pixel has no ray, and everywhere if the camera is outside of the room. Ignores moving solids.
   template <execution_policy Policy, camera::camera_model Camera>
   [[nodiscard]] image<float> exact_depth(const Policy& policy, const Camera& camera, const se3& T_world_camera) const {
     image<float> depth(camera.width(), camera.height());
@@ -130,7 +130,7 @@ class synthetic_recording {
     return depth;
   }
 
-  /// Iteration renders one frame after the other.
+  /// Iteration renders one frame after another.
   [[nodiscard]] iterator begin() const;
   [[nodiscard]] iterator end() const;
 
@@ -138,15 +138,15 @@ class synthetic_recording {
   [[nodiscard]] result<camera::rgbd_frame> render_on(const parallel_policy& policy, std::size_t i) const;
   [[nodiscard]] result<camera::stereo_frame> render_stereo_on(const parallel_policy& policy, std::size_t i) const;
   [[nodiscard]] result<detail::synthetic::exact_view> exact_on(const parallel_policy& policy, std::size_t i) const;
-  /// From a place along a ray to the nearest surface, in lengths of the ray; 0 if there is none.
+  /// Distance from a point along a ray to the nearest surface, in lengths of the ray; 0 if there is none.
   [[nodiscard]] double depth_along(const vec3& origin, const vec3& ray) const;
 
   synthetic_options options_;
   camera::intrinsics k_;
-  std::shared_ptr<const detail::synthetic::recorded_room> room_;  // copies share it
+  std::shared_ptr<const detail::synthetic::recorded_room> room_;  // shared by copies
 };
 
-/// A single pass over the frames; a frame lives until the iterator moves on.
+/// A single pass over the frames; a frame is valid until the iterator advances.
 class synthetic_recording::iterator {
  public:
   using iterator_concept = std::input_iterator_tag;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// What a synthetic recording shows, how its camera moves, and which errors its sensor has.
+/// Options of a synthetic recording: the room, the camera's motion, and the errors of the sensor.
 #pragma once
 
 #include <cstdint>
@@ -14,61 +14,60 @@ struct synthetic_scene_options {
   double length = 6.0;           ///< along x, metres
   double width = 5.0;            ///< along y, metres
   double height = 3.0;           ///< metres
-  double size_jitter = 0.05;     ///< relative; how far length and width vary with the seed
+  double size_jitter = 0.05;     ///< relative variation of length and width with the seed
   bool furniture = true;         ///< false: bare walls
-  int poor_walls = 1;            ///< how many of the four walls are nearly without texture, 0..4
+  int poor_walls = 1;            ///< number of the four walls that have almost no texture, 0..4
   double texture_density = 1.0;  ///< scales the number of patches painted on every surface; 0: none
-  bool person = false;           ///< somebody who walks round the room, against the camera's way, at 1 m/s
-  double wall_period = 0.0;      ///< metres; above 0 all walls bear one picture that repeats itself at this distance
+  bool person = false;           ///< adds a person who walks round the room, against the camera's direction, at 1 m/s
+  double wall_period = 0.0;      ///< metres; if above 0 all walls show one picture that repeats at this distance
 };
 
-/// How the camera moves. The path starts at rest, goes once round (360 degrees of yaw) on an ellipse
-/// about the room's middle while looking outward, and rests at its first view again for the last
-/// `overlap` of the time, so that a loop can close. With `sees_floor` it goes round a second time on a larger ellipse,
-/// and looks inward and down.
+/// The motion of the camera. The path starts at rest, makes one round (360 degrees of yaw) on an ellipse about the
+/// room's centre while looking outward, and rests at its first view again for the last `overlap` of the time, so that a
+/// loop can close. With `sees_floor` it makes a second round on a larger ellipse, looking inward and down.
 struct synthetic_path_options {
   double semi_axis_x = 0.80;  ///< of the ellipse, metres
   double semi_axis_y = 0.60;  ///< metres
   double height = 1.35;       ///< of the camera above the floor, metres
   double pitch = -0.20;       ///< mean pitch, radians; negative looks down
-  double overlap = 0.05;      ///< share of the time spent at the first view again
+  double overlap = 0.05;      ///< fraction of the time spent at the first view again
   bool sees_floor = false;    ///< adds a round that looks inward and down at the floor
-  double wobble = 1.0;        ///< scales the slow swaying in height, distance, yaw, pitch and roll
-  double jitter = 1.0;        ///< scales the trembling of the hand (millimetres, tenths of degrees)
+  double wobble = 1.0;        ///< scales the slow sway in height, distance, yaw, pitch and roll
+  double jitter = 1.0;        ///< scales the tremor of the hand (millimetres, tenths of degrees)
 };
 
-/// Errors of a Kinect- or Astra-like camera; the value 0 (or false) switches one off.
+/// Errors of a Kinect- or Astra-like camera; 0 (or false) disables one.
 ///
 /// Depth: axial noise of deviation 0.0012 + 0.0019 (z - 0.4)^2 metres and lateral noise, both from
 /// C. V. Nguyen, S. Izadi, D. Lovell, "Modeling Kinect sensor noise for improved 3D reconstruction and
 /// tracking", 3DIMPVT 2012; disparity in steps of 1/8 pixel (K. Khoshelham, S. O. Elberink, "Accuracy
 /// and resolution of Kinect depth data", Sensors 2012).
 struct synthetic_sensor_options {
-  double min_depth = 0.4;  ///< metres; nearer is not measured
-  double max_depth = 4.5;  ///< metres; further is not measured; 0: no limit
+  double min_depth = 0.4;  ///< metres; smaller depths are not measured
+  double max_depth = 4.5;  ///< metres; larger depths are not measured; 0: no limit
 
-  double axial_noise = 1.0;       ///< factor on the published deviation
-  double lateral_noise = 0.5;     ///< deviation in pixels of where a ray near a depth edge ends up
-  double flying_pixels = 0.15;    ///< share of the pixels on a depth edge that lie between its two sides
+  double axial_noise = 1.0;       ///< factor on the published standard deviation
+  double lateral_noise = 0.5;     ///< standard deviation in pixels of the position of a ray near a depth edge
+  double flying_pixels = 0.15;    ///< fraction of the pixels on a depth edge with a depth between its two sides
   double disparity_step = 0.125;  ///< resolution of the disparity, pixels of the infrared camera
   double infrared_focal = 580.0;  ///< of the infrared camera, pixels: disparity = focal * baseline / depth
   double baseline = 0.075;        ///< from projector to camera, metres
   double grazing_angle = 1.45;    ///< radians from the normal: surfaces seen flatter are lost; dropping out
                                   ///< begins 0.15 radians before
   bool shadow = true;             ///< no depth where the projector (on the right) does not reach
-  double dropouts = 0.002;        ///< share of pixels lost anywhere
-  double stray_depths = 0.0;      ///< share of pixels with a random depth in front of the surface: dust, rain, spray
+  double dropouts = 0.002;        ///< fraction of pixels lost anywhere
+  double stray_depths = 0.0;      ///< fraction of pixels with a random depth in front of the surface: dust, rain, spray
 
   double stereo_baseline = 0.12;  ///< from the camera to the second one of a stereo pair, metres
 
-  double colour_noise = 2.0;  ///< deviation in grey values
-  int motion_blur = 1;        ///< pictures averaged over the exposure time; 1: none
+  double colour_noise = 2.0;  ///< standard deviation in grey values
+  int motion_blur = 1;        ///< images averaged over the exposure time; 1: none
   double exposure = 0.015;    ///< seconds; for motion blur
 
-  /// When the rows of an image are taken; a frame has the pose and the time of its colour image's middle.
+  /// Times of the rows of an image; a frame has the pose and the time of its colour image's middle.
   camera::shutter shutter{};
 
-  /// A camera that sees the truth: only the rounding to whole depth units is left.
+  /// An ideal sensor: only the rounding to whole depth units remains.
   [[nodiscard]] static synthetic_sensor_options ideal() noexcept {
     return {.min_depth = 0.0,
             .max_depth = 0.0,
@@ -85,13 +84,13 @@ struct synthetic_sensor_options {
 
 /// Options of `synthetic_recording`.
 struct synthetic_options {
-  int frames = 400;           ///< how many
+  int frames = 400;           ///< number of frames
   double fps = 30.0;          ///< frames per second
   std::uint64_t seed = 1;     ///< of the room, its textures, the path and the noise
   int width = 640;            ///< pixels
   int height = 480;           ///< pixels
   double depth_scale = 5000;  ///< stored depth / depth_scale = metres; 5000 reaches 13 m
-  int frames_around = 0;      ///< number of frames of a round of the path; 0: all frames are the path
+  int frames_around = 0;      ///< number of frames per round of the path; 0: all frames make up the path
   synthetic_scene_options scene{};
   synthetic_path_options path{};
   synthetic_sensor_options sensor{};

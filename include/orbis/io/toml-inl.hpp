@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The functions of toml.hpp.
+/// Function definitions of toml.hpp.
 #pragma once
 
 #include <algorithm>
@@ -14,7 +14,7 @@ namespace orbis::io {
 
 namespace detail {
 
-/// Whether each line that begins as the head of a table has a key in it: toml++ 3.3 takes that for granted.
+/// Returns true if each line that begins like the head of a table has a key in it: toml++ 3.3 assumes that.
 [[nodiscard]] inline bool has_keys_in_heads(std::string_view text) noexcept {
   const auto skip_blanks = [](std::string_view& line) {
     line.remove_prefix(std::min(line.find_first_not_of(" \t"), line.size()));
@@ -38,9 +38,9 @@ namespace detail {
   return true;
 }
 
-/// Whether all is ASCII that stands beside strings and comments, as TOML wants it: toml++ 3.3 asks of some other
-/// characters whether they are blanks, and does not know.
-[[nodiscard]] inline bool is_ascii_beside_texts(std::string_view text) noexcept {
+/// Returns true if all characters outside of strings and comments are ASCII, as TOML requires: toml++ 3.3 tests some
+/// other characters for being blanks, and handles them incorrectly.
+[[nodiscard]] inline bool is_ascii_outside_strings(std::string_view text) noexcept {
   if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
   for (std::size_t i = 0; i < text.size();) {
     const char c = text[i];
@@ -57,12 +57,13 @@ namespace detail {
     const bool has_lines = text.substr(i).starts_with(three);
     for (i += has_lines ? 3 : 1; i < text.size(); ++i) {
       if (c == '"' && text[i] == '\\') {
-        ++i;  // whatever it is
+        ++i;  // any escaped character
       } else if (!has_lines && text[i] == '\n') {
-        break;  // an error, where toml++ ends
+        break;  // an error; toml++ stops there too
       } else if (text[i] == c && (!has_lines || text.substr(i).starts_with(three))) {
         i += has_lines ? 3 : 1;
-        for (int more = 0; has_lines && more != 2 && i < text.size() && text[i] == c; ++more) ++i;  // of the string
+        for (int more = 0; has_lines && more != 2 && i < text.size() && text[i] == c; ++more)
+          ++i;  // part of the string
         break;
       }
     }
@@ -74,10 +75,10 @@ namespace detail {
 
 ORBIS_INLINE result<toml::table> parse_toml(std::string_view text, const std::filesystem::path& where) {
   const auto reject = [&](const char* why) { return fail(errc::malformed, where.string(), why); };
-  if (text.size() > max_toml_bytes) return reject("is too large for a file of settings");
-  if (!is_utf8(text)) return reject("not TOML: no UTF-8");
+  if (text.size() > max_toml_bytes) return reject("is too large for a settings file");
+  if (!is_utf8(text)) return reject("not TOML: not UTF-8");
   if (!detail::has_keys_in_heads(text)) return reject("not TOML: a table without a name");
-  if (!detail::is_ascii_beside_texts(text)) return reject("not TOML: letters beyond ASCII want quotes");
+  if (!detail::is_ascii_outside_strings(text)) return reject("not TOML: characters beyond ASCII need quotes");
   try {
     return toml::parse(text, std::string_view{});
   } catch (const toml::parse_error& e) {

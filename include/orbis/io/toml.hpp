@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Settings in TOML from bytes that nobody has looked at, by toml++.
+/// Settings in TOML from untrusted bytes, parsed by toml++.
 #pragma once
 
 #include <cstddef>
@@ -14,15 +14,15 @@
 
 namespace orbis::io {
 
-/// The largest text that is read. toml++ works its way down nested tables by recursion, as deep as there are dots in
-/// the text; this much does not use up a stack.
+/// Maximum size of a text. toml++ descends nested tables recursively, as deep as the number of dots in the text; this
+/// size does not overflow the stack.
 inline constexpr std::size_t max_toml_bytes = 16384;
 
-/// The table that `text` is. `where` names the source in errors. Errors: malformed, with the line where it is known (no
-/// TOML; more than `max_toml_bytes`; a list of lists over several lines, whose lines could be heads of tables).
+/// Parses `text` as a table. `where` names the source in errors. Errors: malformed, with the line if known (not TOML;
+/// more than `max_toml_bytes`; a list of lists over several lines, whose lines could be heads of tables).
 [[nodiscard]] result<toml::table> parse_toml(std::string_view text, const std::filesystem::path& where = {});
 
-/// Reads a file of settings; see `parse_toml`. Errors: not_found, unreadable, malformed.
+/// Reads a settings file; see `parse_toml`. Errors: not_found, unreadable, malformed.
 [[nodiscard]] result<toml::table> read_toml(const std::filesystem::path& path);
 
 }  // namespace orbis::io

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The functions of trajectory_file.hpp.
+/// Function definitions of trajectory_file.hpp.
 #pragma once
 
 #include <algorithm>
@@ -37,7 +37,7 @@ ORBIS_INLINE result<trajectory> parse_trajectory(std::string_view text, const st
     }
     if (!detail::trimmed(line).empty()) return reject("a pose has 8 numbers: timestamp tx ty tz qx qy qz qw");
     const so3::quaternion q(v[7], v[4], v[5], v[6]);
-    if (!(q.norm() > 1e-6) || !std::isfinite(q.norm())) return reject("a quaternion that is no rotation");
+    if (!(q.norm() > 1e-6) || !std::isfinite(q.norm())) return reject("the quaternion is zero or too large");
     poses.push_back({v[0], se3(so3(q), vec3(v[1], v[2], v[3]))});
     return true;
   });

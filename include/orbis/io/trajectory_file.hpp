@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Trajectories in the TUM RGB-D benchmark's text format: `timestamp tx ty tz qx qy qz qw`, seconds
-/// and metres, one pose `T_world_camera` a line, `#` for comments.
+/// Trajectories in the text format of the TUM RGB-D benchmark: `timestamp tx ty tz qx qy qz qw`, seconds and metres,
+/// one pose `T_world_camera` per line, `#` for comments.
 #pragma once
 
 #include <filesystem>
@@ -20,8 +20,8 @@ namespace orbis::io {
 /// Reads a trajectory file; see `parse_trajectory`. Errors: not_found, unreadable, malformed.
 [[nodiscard]] result<trajectory> read_trajectory(const std::filesystem::path& path);
 
-/// Writes a trajectory file, whole or not at all: 9 decimals for the time, 9 significant digits for
-/// the rest. Errors: write_failed.
+/// Writes a trajectory file atomically: 9 decimals for the time, 9 significant digits for the rest. Errors:
+/// write_failed.
 result<void> write_trajectory(const std::filesystem::path& path, const trajectory& poses);
 
 }  // namespace orbis::io

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// From posed keyframes to a map, all at once: dense cloud, filtered cloud, octrees.
+/// A map from posed keyframes in one batch: dense cloud, filtered cloud, octrees.
 #pragma once
 
 #include <chrono>
@@ -39,19 +39,19 @@ namespace orbis::mapping {
 
 struct map_options {
   dense_options dense{};
-  /// Takes what has moved away out of the depth images before they become points: cells that the rays of the keyframes
-  /// just before and after pass through, see moving_filter. (Rays that a filter asks are those of the images as they
-  /// came.) Of depth images that are no depth_view<std::uint16_t>, what is farther away than 16 m says nothing. Empty:
-  /// the filter judges it as it judges anything else.
+  /// Removes moved objects from the depth images before they become points: cells that rays of the keyframes just
+  /// before and after pass through, see moving_filter. (A filter by ray evidence uses the rays of the original images.)
+  /// For depth images that are not a depth_view<std::uint16_t>, depths beyond 16 m are ignored. Empty: moved objects
+  /// are left to the filter.
   std::optional<moving_filter_options> moving{};
   filter_options filter{};
   double resolution = 0.05;                   ///< of the octrees, metres; > 0
-  octree::integration_options integration{};  ///< of every keyframe's depth image into the octrees
-  bool unfiltered_octree = true;              ///< build the octree of the cloud before the filter as well
+  octree::integration_options integration{};  ///< of every keyframe's depth image
+  bool unfiltered_octree = true;              ///< also build the octree of the cloud before the filter
 };
 
-/// A map that depth images of this camera can be integrated into, made of its resolution in metres; what
-/// `octree::occupancy_octree` is.
+/// A map such as `octree::occupancy_octree`: constructible from its resolution in metres, and with depth images of this
+/// camera integrated into it.
 template <class M, class Camera>
 concept depth_map = std::constructible_from<M, double> && std::movable<M> &&
     requires(M& map, const camera::depth_view<float>& depth, const Camera& camera, const se3& T_world_camera,
@@ -59,27 +59,27 @@ concept depth_map = std::constructible_from<M, double> && std::movable<M> &&
   map.integrate(seq, depth, camera, T_world_camera, options);
 };
 
-/// What was taken out of the depth images, for it had moved away.
+/// Pixels removed from the depth images because they show moved objects.
 struct moving_count {
-  std::size_t keyframes = 0;  ///< that have lost any pixel
+  std::size_t keyframes = 0;  ///< that lost pixels
   std::size_t pixels = 0;     ///< of the whole images, whatever the stride
 };
 
-/// The map, and how it came to be.
+/// The map and a report of how it was built.
 template <class Octree>
 struct built_map {
-  point_cloud cloud{};                        ///< all keyframes' points, in the world
-  cloud::flying_pixel_count flying_pixels{};  ///< left out before they became points, if that was asked for
-  moving_count moving{};                      ///< left out before that, if it was asked for
+  point_cloud cloud{};                        ///< points of all keyframes, in the world frame
+  cloud::flying_pixel_count flying_pixels{};  ///< removed before points were made, if requested
+  moving_count moving{};                      ///< removed before that, if requested
   std::vector<std::uint32_t> inliers{};       ///< indices into `cloud` of the points that the filter kept, ascending
   filter_report filter{};
   std::optional<Octree> unfiltered_octree{};
-  Octree octree;                               ///< of the points that the filter kept, each seen from its own keyframe
-  std::vector<double> insert_ms{};             ///< into `octree`, for each keyframe
-  std::vector<double> insert_ms_unfiltered{};  ///< into `unfiltered_octree`, for each keyframe, if it is built
+  Octree octree;                    ///< of the points that the filter kept, each observed from its own keyframe
+  std::vector<double> insert_ms{};  ///< per keyframe, insertion into `octree`
+  std::vector<double> insert_ms_unfiltered{};  ///< per keyframe, insertion into `unfiltered_octree`, if it is built
   std::size_t skipped = 0;                     ///< keyframes without a finite pose
 
-  /// The points that the filter kept, copied.
+  /// A copy of the points that the filter kept.
   [[nodiscard]] point_cloud filtered_cloud() const { return cloud::extract(cloud, inliers); }
 };
 
@@ -92,14 +92,14 @@ namespace detail {
 [[nodiscard]] inline std::string reason_of(const moving_count& moving) {
   return std::to_string(moving.pixels) + " pixels of " + std::to_string(moving.keyframes) +
          (moving.keyframes == 1 ? " keyframe show" : " keyframes show") +
-         " what has moved away, as the rays of other keyframes pass through it, and were left out";
+         " moved objects (rays of other keyframes pass through them) and were removed";
 }
 
-/// A keyframe's depth image without what has moved away.
+/// A keyframe's depth image without moved objects.
 template <camera::depth_source Depth>
-class standing_depth {
+class static_depth {
  public:
-  /// Calls `use` with the image. Returns how many pixels were taken out.
+  /// Calls `use` with the image. Returns the number of removed pixels.
   template <class Use>
   std::size_t with(const Depth& depth, const std::vector<removed_cell>& cells, const moving_filter_options& options,
                    const Use& use) {
@@ -120,15 +120,15 @@ class standing_depth {
   image<mapping::depth_pixel<Depth>> copy_;
 };
 
-/// The steps of `build_map`. `into.wants(k, whole)` says whether it lacks this keyframe's depth image, of which, unless
-/// it is `whole`, something has moved away; `into.scan(k, depth)` takes one depth image before the filter of the cloud;
-/// `into.unfiltered()` gives the map of these. `into.filtered(cloud, kept, depths, ms, progress)` gives the map after
-/// that filter: `depths(use)` calls `use(k, depth)` with what it leaves of each depth image.
+/// The steps of `build_map`. `into.wants(k, whole)` returns true if it lacks this keyframe's depth image; `whole` is
+/// false if moved objects were removed from the image. `into.scan(k, depth)` takes one depth image before the filter of
+/// the cloud; `into.unfiltered()` returns the map of these. `into.filtered(cloud, kept, depths, ms, progress)` returns
+/// the map after that filter: `depths(use)` calls `use(k, depth)` with the remaining pixels of each depth image.
 template <class Octree, execution_policy Policy, keyframe_range Keyframes, camera::camera_model Camera, class Into>
 [[nodiscard]] result<built_map<Octree>> build_map_into(const Policy& policy, const Keyframes& keyframes,
                                                        const Camera& camera, const map_options& options,
                                                        const progress& on_progress, Into& into) {
-  if (std::ranges::size(keyframes) == 0) return fail(errc::no_data, "keyframes", "there are none");
+  if (std::ranges::size(keyframes) == 0) return fail(errc::no_data, "keyframes", "the range is empty");
   if (!(options.resolution > 0) || !std::isfinite(options.resolution))
     return fail(errc::invalid_argument, "resolution", "must be positive");
   if (options.dense.stride <= 0) return fail(errc::invalid_argument, "stride", "must be positive");
@@ -164,19 +164,20 @@ template <class Octree, execution_policy Policy, keyframe_range Keyframes, camer
   const std::size_t total = (2U + looks) * std::ranges::size(keyframes);
   std::size_t done = 0;
 
-  // One pass for all that can be made of a keyframe by itself: depth images are costly to have.
+  // One pass for everything that is made from a single keyframe: depth images are expensive to obtain.
   using keyframe_type = std::ranges::range_value_t<Keyframes>;
   using depth_type = std::remove_cvref_t<decltype(std::declval<const keyframe_type&>().depth)>;
   using pixel = mapping::depth_pixel<depth_type>;
   built_map<Octree> map{.octree = Octree{options.resolution}};
   const camera::ray_table rays{camera};
   dense_options of_masked = options.dense;
-  of_masked.flying_pixels.reset();  // they are gone then
+  of_masked.flying_pixels.reset();  // already removed
   dense_cloud dense{rays, of_masked};
   keyframe_points points;
-  standing_depth<depth_type> standing;
+  static_depth<depth_type> standing;
   cloud::view_samples samples;
-  std::vector<std::vector<removed_cell>> moved;  // of those that are not skipped, as `place`: where they are among all
+  std::vector<std::vector<removed_cell>>
+      moved;  // per keyframe that is not skipped; `place`: their positions in the range
   std::vector<std::size_t> place;
   image<pixel> masked(camera.width(), camera.height());
   const auto mask = [&](const auto& depth) {
@@ -235,7 +236,7 @@ template <class Octree, execution_policy Policy, keyframe_range Keyframes, camer
     window.finish();
     if (auto added = add_judged(); !added) return fail(std::move(added.error()));
     while (samples.views() != at) samples.skip();
-  }  // the keyframes in the window are freed
+  }  // frees the keyframes in the window
   if (options.unfiltered_octree) {
     auto octree = into.unfiltered();
     if (!octree) return fail(std::move(octree.error()));
@@ -284,7 +285,7 @@ template <class Octree, execution_policy Policy, keyframe_range Keyframes, camer
   return map;
 }
 
-/// Into octrees of their own.
+/// Builds separate octrees.
 template <class Octree, class Policy, class Camera>
 struct fresh_octrees {
   const Policy& policy;
@@ -319,7 +320,7 @@ struct fresh_octrees {
   }
 };
 
-/// Into a live map, which has most of the keyframes already.
+/// Updates a live map, which contains most of the keyframes already.
 template <class Live, class Policy>
 struct live_octree {
   const Policy& policy;
@@ -329,15 +330,16 @@ struct live_octree {
   template <class Keyframe>
   result<bool> wants(const Keyframe& k, bool whole) {
     if (!poses.empty() && !(poses.back().frame < k.frame))
-      return fail(errc::invalid_argument, "keyframes", "their frame numbers do not ascend");
+      return fail(errc::invalid_argument, "keyframes", "frame numbers are not ascending");
     poses.push_back({k.frame, se3(k.T_world_camera)});
     return !whole || !live.contains(k.frame) || live.is_filtered(k.frame);
   }
   template <class Keyframe, class Depth>
   result<void> scan(const Keyframe& k, const Depth& depth) {
-    // Not complete even before the filter: pixels of what moved away may be missing, and an end may come before the
-    // filter's verdict.
-    return unless_kept(live.add_keyframe(policy, k.frame, depth, poses.back().T_world_camera, completeness::filtered));
+    // Marked as filtered even before the cloud filter: pixels of moved objects may be missing, and processing may end
+    // before the cloud filter's result.
+    return ignore_write_failure(
+        live.add_keyframe(policy, k.frame, depth, poses.back().T_world_camera, completeness::filtered));
   }
   result<typename Live::octree_type> unfiltered() {
     live.set_poses(poses, unlisted::hide);
@@ -350,8 +352,8 @@ struct live_octree {
     std::vector<std::uint64_t> frames;
     for (const keyframe_position& p : poses) frames.push_back(p.frame);
     const auto start = std::chrono::steady_clock::now();
-    // What the live map has is without flying pixels and what has moved away.
-    auto edited = unless_kept(live.edit_depths(
+    // The images in the live map are already without flying pixels and moved objects.
+    auto edited = ignore_write_failure(live.edit_depths(
         policy, frames,
         [&](std::size_t number, const auto& depth, const image_view<std::uint16_t>& pixels) {
           cloud.remove_points(seq, depth, number, kept, pixels);
@@ -367,9 +369,9 @@ struct live_octree {
     if (auto done = live.finish(policy); !done) return fail(std::move(done.error()));
     return live.snapshot();
   }
-  /// Where the images' file cannot be written to, they stay in memory: nothing is lost.
+  /// If the images cannot be written to their file, they stay in memory: nothing is lost.
   template <class Done>
-  static result<void> unless_kept(Done done) {
+  static result<void> ignore_write_failure(Done done) {
     if (done || done.error().code == errc::write_failed) return {};
     return fail(std::move(done.error()));
   }
@@ -377,19 +379,19 @@ struct live_octree {
 
 }  // namespace detail
 
-/// Takes what has moved away out of the depth images, if that is asked for, adds the keyframes to a cloud, filters it,
-/// and integrates each keyframe's depth image without the pixels whose point of the cloud the filter removed
-/// (`dense_cloud::masked_depth`), with rays from where that keyframe was. Filtering the whole cloud lets one keyframe's
-/// points judge another's; the automatic filter asks the keyframes' depth images as well which points their rays pass
-/// through. The octrees are those that a `live_map` makes of the same depth images and poses, bit for bit.
+/// Removes moved objects from the depth images, if requested, adds the keyframes to a cloud, filters it, and integrates
+/// each keyframe's depth image without the pixels whose point of the cloud the filter removed
+/// (`dense_cloud::masked_depth`), with rays from the keyframe's pose. Filtering the whole cloud compares points of
+/// different keyframes; the automatic filter also uses the points that rays of the keyframes' depth images pass
+/// through. The octrees are bit for bit those that a `live_map` builds from the same depth images and poses.
 ///
-/// The range is gone through twice and, as the filter asks, up to three times more. Of its values
-/// `options.moving->keyframes` + 1 are kept at a time, where that is asked for, otherwise one: they can be copied, or
-/// the range gives them anew, and what they refer to lasts as long as they do.
+/// The range is traversed twice and, depending on the filter, up to three times more. At most
+/// `options.moving->keyframes` + 1 of its values are kept at a time if that is set, otherwise one. So values must be
+/// copyable or returned again by the range, and valid as long as they are kept.
 ///
-/// Keyframes whose pose is not finite are skipped and counted. Errors: `no_data` if there is no
-/// keyframe; `invalid_argument` if an image's size is not the camera's, or an option is out of range;
-/// `cancelled`. The same result for every policy. `on_progress` counts the keyframes of all passes.
+/// Keyframes whose pose is not finite are skipped and counted. Errors: `no_data` if there is no keyframe;
+/// `invalid_argument` if an image's size is not the camera's, or an option is out of range; `cancelled`. The same
+/// result for every policy. `on_progress` counts the keyframes of all passes.
 template <class Octree = octree::occupancy_octree<>, execution_policy Policy, keyframe_range Keyframes,
           camera::camera_model Camera>
 requires depth_map<Octree, Camera>
@@ -400,17 +402,16 @@ requires depth_map<Octree, Camera>
   return detail::build_map_into<Octree>(policy, keyframes, camera, options, on_progress, into);
 }
 
-/// As above, by a live map that grew while these keyframes were made: they are moved to the poses that they have now,
-/// those that it does not have are added, others are hidden, and then the filter's verdict is taken over. The octrees
-/// are bit for bit those of the function above. Keyframes have a member `frame`, the index by which the live map knows
-/// them, and come in the order of these. The times in the result are those of handing over images, without replaying;
-/// after the filter, their mean.
-/// `options.resolution` and `options.integration` are those of the live map, and the unfiltered octree is always made.
-/// Errors, in addition: `invalid_argument` if the frame numbers do not ascend; those of the live map, but for images
-/// that stay in memory because they cannot be written to their file. After an error the live map may have some of the
-/// keyframes' images and poses already; another call sets it right. @pre what the live map has was added with the
-/// depth that `keyframe_points::masked` leaves under `point_options(options.dense)`, but for keyframes that are
-/// `live_map::is_filtered`, which get it again
+/// As above, with a live map that grew while these keyframes were made: moves its keyframes to their present poses,
+/// adds missing ones, hides others, and then applies the result of the filter. The octrees are bit for bit those of the
+/// function above. Keyframes have a member `frame`, their index in the live map, and are in ascending order of it. The
+/// times in the result are those of passing images to the map, without replaying; after the filter, their mean.
+/// `options.resolution` and `options.integration` are those of the live map, and the unfiltered octree is always built.
+/// Errors, in addition: `invalid_argument` if the frame numbers are not ascending; those of the live map, except if
+/// images stay in memory because they cannot be written to their file. After an error the live map may contain some of
+/// the new images and poses already; calling the function again corrects it. @pre the images in the live map are those
+/// that `keyframe_points::masked` returns with `point_options(options.dense)`, except for keyframes that are
+/// `live_map::is_filtered`, which are added again
 template <execution_policy Policy, keyframe_range Keyframes, octree::replayable_octree Octree,
           camera::camera_model Camera, depth_history Depths>
 requires requires(const std::ranges::range_value_t<Keyframes>& k) {

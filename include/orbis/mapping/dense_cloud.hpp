@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The points of all keyframes' depth images as one cloud in the world, which follows corrections of their poses.
+/// The points of all keyframes' depth images as one cloud in the world frame that follows corrections of their poses.
 #pragma once
 
 #include <algorithm>
@@ -33,23 +33,23 @@ struct dense_options {
   int stride = 2;           ///< every stride-th pixel of every stride-th row; > 0
   float min_depth = 0.0F;   ///< metres along the optical axis
   float max_depth = 4.0F;   ///< metres along the optical axis
-  double voxel_size = 0.0;  ///< metres; points in one voxel become their centroid. 0: every point stays
-  /// Pixels between two surfaces are left out before they become points; empty: they are not looked for.
+  double voxel_size = 0.0;  ///< metres; points in one voxel become their centroid. 0: every point is kept
+  /// Removal of pixels between two surfaces before they become points; empty: none is removed.
   std::optional<cloud::flying_pixel_options> flying_pixels{};
 };
 
-/// Which pixels of a keyframe become points of the cloud.
+/// Options of the pixels that become points of the cloud.
 [[nodiscard]] inline keyframe_point_options point_options(const dense_options& options) {
   return {options.stride, options.min_depth, options.max_depth, options.flying_pixels};
 }
 
-/// A cloud that grows by keyframes, and follows them when their poses change.
+/// A cloud that grows by keyframes, and follows changes of their poses.
 ///
-/// With a voxel size, memory follows the surface that is seen (about 50 bytes for each voxel, and 20 for
-/// each measurement of the largest keyframe), without one the number of measurements. Either way the cloud is a
-/// function of the keyframes and the poses they were put to last: after corrections without a tolerance it is, byte for
-/// byte, the one that would have been built with the corrected poses from the start. With a voxel size not even the
-/// order of the keyframes matters.
+/// With a voxel size, memory is proportional to the observed surface (about 50 bytes for each voxel, and 20 for each
+/// measurement of the largest keyframe), without one to the number of measurements. In both cases the cloud depends
+/// only on the keyframes and their latest poses: after corrections without a tolerance it is, byte for byte, the cloud
+/// built with the corrected poses from the start. With a voxel size it does not depend on the order of the keyframes
+/// either.
 class dense_cloud {
  public:
   /// @pre options.stride > 0, options.voxel_size >= 0
@@ -58,17 +58,16 @@ class dense_cloud {
     assert(options.stride > 0 && options.voxel_size >= 0);
   }
 
-  /// Adds a keyframe's points; returns how many measurements there were. The keyframe's number is the count
-  /// of those added before it. Colours are kept if every keyframe has them.
-  /// O(pixels). @pre the images have the size of the ray table; the pose is finite; with a voxel size, fewer than
-  /// 2^22 measurements in a voxel; not after `finish`
+  /// Adds a keyframe's points; returns the number of measurements. The keyframe's number is the count of those added
+  /// before it. Colours are kept if every keyframe has them. O(pixels). @pre the images have the size of the ray table;
+  /// the pose is finite; with a voxel size, fewer than 2^22 measurements in a voxel; not after `finish`
   template <execution_policy Policy, keyframe_like Keyframe>
   std::size_t add_keyframe(const Policy& policy, const Keyframe& k) {
     assert(!finished_);
     frames_.push_back({});
     return put(policy, k, frames_.size() - 1);
   }
-  /// Takes back keyframe `number`. Only the images of `k` are looked at.
+  /// Removes keyframe `number`. Reads only the images of `k`.
   /// O(pixels). @pre it was added with the same images and has not been removed; not after `finish`
   template <execution_policy Policy, keyframe_like Keyframe>
   void remove(const Policy& policy, const Keyframe& k, std::size_t number) {
@@ -84,18 +83,18 @@ class dense_cloud {
     colored_ -= f.colored ? 1 : 0;
     f = {};
   }
-  /// Moves keyframe `number` to the pose that `k` has now. O(pixels).
+  /// Moves keyframe `number` to the present pose of `k`. O(pixels).
   /// @pre it was added with the same images and has not been removed; the pose is finite; not after `finish`
   template <execution_policy Policy, keyframe_like Keyframe>
   void move(const Policy& policy, const Keyframe& k, std::size_t number) {
     remove(policy, k, number);
     put(policy, k, number);
   }
-  /// Moves all keyframes whose pose has changed since they were put where they are: in any bit, or, with a `tolerance`
-  /// (metres, >= 0), so far that a point of their view, which ends at `max_depth`, moves by more than that; where
-  /// `max_depth` is not finite, in any bit. Returns how many. `keyframes`: all that were added, in that order; those
-  /// that were removed are passed over. O(keyframes + pixels of those that moved), with a tolerance O(pixels of one
-  /// image) more. @pre the number of keyframes is the number of those added; the poses are finite; not after `finish`
+  /// Moves all keyframes whose pose has changed since they were last placed: in any bit or, with a `tolerance` (metres,
+  /// >= 0), by so much that a point of their view, which ends at `max_depth`, moves by more than the tolerance (in any
+  /// bit if `max_depth` is not finite). Returns their number. `keyframes`: all that were added, in that order; removed
+  /// ones are skipped. O(keyframes + pixels of those that moved), with a tolerance O(pixels of one image) more. @pre
+  /// the number of keyframes is the number of those added; the poses are finite; not after `finish`
   template <execution_policy Policy, keyframe_range Keyframes>
   std::size_t reassemble(const Policy& policy, const Keyframes& keyframes, double tolerance = 0.0) {
     assert(std::ranges::size(keyframes) == frames_.size() && tolerance >= 0 && !finished_);
@@ -117,14 +116,14 @@ class dense_cloud {
     return moved;
   }
 
-  /// Whether keyframe `number` was added and not removed.
+  /// Returns true if keyframe `number` was added and not removed.
   [[nodiscard]] bool contains(std::size_t number) const noexcept {
     return number < frames_.size() && frames_[number].present;
   }
-  /// The number of points.
+  /// Number of points.
   [[nodiscard]] std::size_t size() const noexcept { return merging() ? voxels_.size() : size_; }
-  /// The cloud so far, in the world: voxel by voxel in the order of `cloud::voxel_sums`, or keyframe by
-  /// keyframe. O(size()), and O(bricks log bricks) with a voxel size. @pre not after `finish`
+  /// The present cloud in the world frame: voxel by voxel in the order of `cloud::voxel_sums`, or keyframe by keyframe.
+  /// O(size()), and O(bricks log bricks) with a voxel size. @pre not after `finish`
   template <execution_policy Policy = sequential_policy>
   [[nodiscard]] point_cloud cloud(const Policy& policy = {}) const {
     assert(!finished_);
@@ -137,9 +136,9 @@ class dense_cloud {
     }
     return out;
   }
-  /// For each point of the cloud the distance in metres that it was seen from; with a voxel size, the mean
-  /// of the measurements in the voxel, to the millimetre. (A mean can be taken back; a shortest one, whose
-  /// keyframe is removed, could not.) O(size()). @pre not after `finish`
+  /// The distance (metres) from which each point of the cloud was observed; with a voxel size, the mean of the
+  /// measurements in the voxel, to the millimetre. (A mean can be updated when a keyframe is removed; a minimum could
+  /// not.) O(size()). @pre not after `finish`
   template <execution_policy Policy = sequential_policy>
   [[nodiscard]] std::vector<float> ranges(const Policy& policy = {}) const {
     assert(!finished_);
@@ -148,15 +147,15 @@ class dense_cloud {
     for (const frame& f : frames_) out.insert(out.end(), f.ranges.begin(), f.ranges.end());
     return out;
   }
-  /// Says that the cloud and the ranges were read for the last time, and no keyframe will come, go or move: what these
-  /// need is freed. With a voxel size a few bytes for each voxel are left, for `select`, `masked_depth` and
-  /// `measurements`; without one nothing is freed. O(bricks).
+  /// Ends the changes: call it after the last use of `cloud` and `ranges`; no keyframe may be added, removed or moved
+  /// afterwards. Frees the memory for these. With a voxel size a few bytes for each voxel remain, for `select`,
+  /// `masked_depth` and `measurements`; without one nothing is freed. O(bricks).
   void finish() {
     finished_ = true;
     voxels_.finish();
     std::vector<cloud::voxel_measurements>{}.swap(parts_);
   }
-  /// How many pixels of the keyframes' whole images were looked at, and how many of them were left out.
+  /// Number of examined pixels of the keyframes' whole images, and of those removed.
   [[nodiscard]] cloud::flying_pixel_count flying_pixels() const noexcept {
     cloud::flying_pixel_count sum;
     for (const frame& f : frames_) {
@@ -165,7 +164,7 @@ class dense_cloud {
     }
     return sum;
   }
-  /// All memory that is held beside the ray table, bytes.
+  /// Memory in use without the ray table, bytes.
   [[nodiscard]] std::size_t memory_bytes() const noexcept {
     std::size_t bytes = voxels_.memory_bytes() + frames_.capacity() * sizeof(frame);
     for (const cloud::voxel_measurements& part : parts_) bytes += part.memory_bytes();
@@ -176,20 +175,20 @@ class dense_cloud {
     return bytes;
   }
 
-  /// Which points of the cloud are kept, in a form made for questions. Valid until the cloud changes.
+  /// The points of the cloud to keep, in a form for fast queries. Valid until the cloud changes.
   class selection {
    public:
-    /// Everything.
+    /// Keeps every point.
     selection() = default;
 
    private:
     friend class dense_cloud;
     [[nodiscard]] bool is_everything() const noexcept { return !voxels_ && first_of_frame_.empty(); }
-    std::vector<char> kept_;                           ///< where points are not merged
-    std::optional<cloud::voxel_sums::choice> voxels_;  ///< where they are
+    std::vector<char> kept_;                           ///< used if points are not merged
+    std::optional<cloud::voxel_sums::choice> voxels_;  ///< used if points are merged
     std::vector<std::size_t> first_of_frame_;
   };
-  /// `kept`: one entry for each point of the cloud, not 0 where it is kept.
+  /// `kept`: one entry for each point of the cloud, not 0 to keep it.
   [[nodiscard]] selection select(std::vector<char> kept) const {
     assert(kept.size() == size());
     selection out;
@@ -206,10 +205,10 @@ class dense_cloud {
     return out;
   }
   /// The whole depth image of keyframe `number` (every pixel, whatever the stride; the stored values, see `view_like`)
-  /// without what the cloud leaves out: 0 where the depth is out of range, where flying pixels were looked for and
-  /// found, and where the point of the cloud that the pixel belongs to is not in `kept`. A pixel between the strides
-  /// belongs to the point in its voxel, or else to the point of its block of stride x stride pixels if their depths
-  /// agree within 3 cm + 2 %; a pixel that belongs to no point is left out. O(pixels). @pre as for `measurements`
+  /// with 0 in the pixels that the cloud leaves out: those with a depth out of range, flying pixels if they are
+  /// removed, and pixels that belong to a point that is not in `kept`. A pixel between the strides belongs to the point
+  /// in its voxel, or otherwise to the point of its block of stride x stride pixels if their depths agree within 3 cm +
+  /// 2 %; a pixel that belongs to no point is left out. O(pixels). @pre as for `measurements`
   template <execution_policy Policy, keyframe_like Keyframe>
   [[nodiscard]] auto masked_depth(const Policy& policy, const Keyframe& k, std::size_t number,
                                   const selection& kept = {}) const {
@@ -223,16 +222,16 @@ class dense_cloud {
                   number, kept, out.view());
     return out;
   }
-  /// The second half of `masked_depth`: sets the pixels of `out`, a copy of what `depth` stores, to 0 whose point of
-  /// the cloud is not kept, or for which no point speaks. O(pixels). @pre contains(number), and `depth` is its image as
-  /// `keyframe_points::masked` leaves it
+  /// The second half of `masked_depth`: sets to 0 the pixels of `out`, a copy of the stored values of `depth`, that
+  /// belong to no point of the cloud or to one that is not kept. O(pixels). @pre contains(number), and `depth` is its
+  /// image after `keyframe_points::masked`
   template <execution_policy Policy, camera::depth_source Depth>
   void remove_points(const Policy& policy, const Depth& depth, std::size_t number, const selection& kept,
                      image_view<depth_pixel<Depth>> out) const {
     assert(contains(number));
     if (kept.is_everything()) return;
     keyframe_point_options points = point_options(options_);
-    points.flying_pixels.reset();  // they are gone
+    points.flying_pixels.reset();  // already removed
     const se3& T_world_camera = frames_[number].T_world_camera;
     keyframe_points reader;  // const functions share no memory
     if (!kept.voxels_) {
@@ -257,7 +256,7 @@ class dense_cloud {
         policy, depth, rays_, points, T_world_camera, [&](std::size_t part, int x, int y, const vec3f& point, float) {
           std::optional<bool> is_kept = readers[part].find(point.cast<double>());
           if (!is_kept && !is_like_its_block(depth, x, y)) is_kept = false;
-          if (!is_kept) {  // by its block's point
+          if (!is_kept) {  // decided by the point of its block
             const auto block =
                 keyframe_points::point_at(depth, x - x % options_.stride, y - y % options_.stride, rays_, points, pose);
             is_kept = block && readers[part].find(block->template cast<double>()).value_or(false);
@@ -265,9 +264,8 @@ class dense_cloud {
           if (!*is_kept) out(x, y) = 0;
         });
   }
-  /// The measurements of keyframe `number` in the world, where it was added or moved to last, of those
-  /// alone whose point of the cloud is in `kept`. Only the images of `k` are looked at. O(pixels).
-  /// @pre contains(number), and its images are those of `k`
+  /// The measurements of keyframe `number` in the world frame, at its latest pose, whose point of the cloud is in
+  /// `kept`. Reads only the images of `k`. O(pixels). @pre contains(number), and its images are those of `k`
   template <execution_policy Policy, keyframe_like Keyframe>
   [[nodiscard]] std::vector<vec3f> measurements(const Policy& policy, const Keyframe& k, std::size_t number,
                                                 const selection& kept = {}) const {
@@ -309,7 +307,7 @@ class dense_cloud {
     bool present = false;
     bool colored = false;
     cloud::flying_pixel_count flying{};
-    point_cloud cloud{};  ///< where points are not merged
+    point_cloud cloud{};  ///< used if points are not merged
     std::vector<float> ranges{};
   };
 
@@ -338,7 +336,7 @@ class dense_cloud {
     return f.cloud.size();
   }
 
-  /// Fills `parts_`, or `plain_` where points are not merged.
+  /// Fills `parts_`, or `plain_` if points are not merged.
   template <execution_policy Policy, keyframe_like Keyframe>
   [[nodiscard]] cloud::flying_pixel_count measure(const Policy& policy, const Keyframe& k, const se3& T_world_camera) {
     const image_view<const rgb8> color = k.color;
@@ -378,10 +376,10 @@ class dense_cloud {
   cloud::voxel_sums voxels_;
   std::vector<frame> frames_;
   bool finished_ = false;
-  std::size_t size_ = 0;     ///< points, where they are not merged
-  std::size_t present_ = 0;  ///< keyframes,
-  std::size_t colored_ = 0;  ///< and how many of them have colours
-  // Kept for their memory.
+  std::size_t size_ = 0;     ///< points, if they are not merged
+  std::size_t present_ = 0;  ///< number of keyframes
+  std::size_t colored_ = 0;  ///< number of keyframes with colours
+  // Members to reuse their memory.
   keyframe_points reader_;
   std::vector<cloud::voxel_measurements> parts_;
   std::vector<plain_points> plain_;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// What keeps the depth images of keyframes for the live map.
+/// A store of the keyframes' depth images for the live map.
 #pragma once
 
 #include <concepts>
@@ -11,15 +11,15 @@
 
 namespace orbis::mapping {
 
-/// Keeps depth images by the index of their frame, and gives them back pixel by pixel.
+/// Stores depth images by the index of their frame, and returns them exactly.
 ///
-/// `put(frame, pixels)` keeps a copy, in place of the image that was there. On an error the image is kept even so, or
-/// `get` fails for it from then on.
+/// `put(frame, pixels)` stores a copy, and replaces an image of the same frame. After an error the image is stored
+/// nevertheless, or `get` fails for it from then on.
 ///
-/// `get(frame, out)` copies it to `out`, whose size changes to the image's. If it is const, several threads may call it
-/// at once.
+/// `get(frame, out)` copies the image to `out`, whose size changes to the image's. If it is const, several threads may
+/// call it concurrently.
 ///
-/// `erase(frame)` forgets it, if it is there.
+/// `erase(frame)` removes the image, if it exists.
 template <class S>
 concept depth_history = std::movable<S> &&
     requires(S& store, std::uint64_t frame, image_view<const std::uint16_t> pixels, image<std::uint16_t>& out) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Depth images of many keyframes in little memory: compressed without loss, and in a file where that is not enough.
+/// Depth images of many keyframes in little memory: compressed without loss, and spilled to a file beyond a budget.
 ///
 /// @code
 ///   mapping::depth_store depths{{.memory_budget = 64 << 20, .spill_file = "depths.tmp"}};
@@ -29,21 +29,21 @@
 namespace orbis::mapping {
 
 struct depth_store_options {
-  /// Of the compressed images in memory, bytes. What was used longest ago goes to the spill file first.
+  /// Memory budget of the compressed images, bytes. The least recently used ones are spilled first.
   std::size_t memory_budget = std::size_t{64} << 20U;
-  /// A file that does not exist yet, in a folder that does. It is created when it is needed first, and loses its name
+  /// Path of a file that does not exist yet, in an existing folder. It is created when it is first needed, and unlinked
   /// at once: it vanishes with the store, or with the process. Empty: everything stays in memory.
   std::filesystem::path spill_file{};
 };
 
-/// Depth images by number, as they were put in, pixel by pixel.
+/// Depth images by number, stored exactly.
 ///
-/// An image takes .05 to .2 of its 16 bits a pixel, whether it comes from a real or from a simulated sensor, because a
-/// depth camera that measures disparity has few distinct depths (`detail/depth/depth_codec.hpp`). An image of pure
-/// noise stays as large as it is. Pixels are numbers: scale and meaning are the caller's. Depth in `float` metres is
-/// not kept; its lowest bits are noise, which does not compress.
+/// An image takes .05 to .2 of its 16 bits per pixel, from real and simulated sensors, because a depth camera that
+/// measures disparity has few distinct depths (`detail/depth/depth_codec.hpp`). An image of pure noise is not
+/// compressed. Pixels are numbers: scale and meaning are the caller's. Depth in `float` metres is not supported; its
+/// lowest bits are noise, which does not compress.
 ///
-/// Any number of threads may call const members, `get` among them, as long as none calls another one. May be moved.
+/// Any number of threads may call const members, including `get`, while none calls another one. Movable.
 class depth_store {
  public:
   explicit depth_store(depth_store_options options = {})
@@ -51,24 +51,24 @@ class depth_store {
     if (!options.spill_file.empty()) spills_ = true;
   }
 
-  /// Keeps `depth` under the number `frame`, in place of the image that was there. Error: write_failed, where an image
-  /// had to go to the spill file and could not: the disk is full, the folder is not there, or the file exists already.
-  /// Nothing is lost then: this image and the others are kept, in memory and beyond the budget, and the next call tries
-  /// again. Linear in the pixels, about 2 ms for 640 x 480.
+  /// Stores `depth` under the number `frame`, and replaces an image with that number. Error: write_failed if an image
+  /// could not be written to the spill file: the disk is full, the folder does not exist, or the file exists already.
+  /// Nothing is lost then: this image and the others stay in memory, beyond the budget, and the next call tries again.
+  /// Linear in the pixels, about 2 ms for 640 x 480.
   result<void> put(std::uint64_t frame, image_view<const std::uint16_t> depth) {
     return put(frame, depth, encoder_.encode(depth));
   }
 
-  /// Compresses images for `put`, so that several threads can, each with a packer of its own. Keeps about 2 bytes a
+  /// Compresses images for `put`, so that several threads can do it, each with its own packer. Uses about 2 bytes per
   /// pixel and 130 kB.
   class packer {
    public:
     packer() = default;
-    packer(packer&&) noexcept = default;  // a copy would refer to this one's bytes
+    packer(packer&&) noexcept = default;  // a copy would refer to the original's bytes
     packer& operator=(packer&&) noexcept = default;
-    /// O(pixels).
+    /// Compresses an image. O(pixels).
     void pack(image_view<const std::uint16_t> depth) { packed_ = encoder_.encode(depth); }
-    /// On the heap.
+    /// Bytes on the heap.
     [[nodiscard]] std::size_t bytes() const noexcept { return encoder_.bytes(); }
 
    private:
@@ -76,17 +76,17 @@ class depth_store {
     detail::depth_encoder encoder_;
     std::span<const std::byte> packed_;
   };
-  /// The same with an image that was just packed. @pre packed.pack(depth) was its last call
+  /// The same with an image that was just packed. @pre the last call of `packed` was pack(depth)
   result<void> put(std::uint64_t frame, image_view<const std::uint16_t> depth, const packer& packed) {
     return put(frame, depth, packed.packed_);
   }
 
-  /// Copies the image of `frame` to `out`, whose size changes to the image's. An image in the file stays there.
-  /// Errors: not_found; unreadable or malformed, where the spill file fails or is damaged (`out` is empty then).
-  /// Linear in the pixels, about 1 ms for 640 x 480.
+  /// Copies the image of `frame` to `out`, whose size changes to the image's. A spilled image stays in the file.
+  /// Errors: not_found; unreadable or malformed if the spill file fails or is damaged (`out` is empty then). Linear in
+  /// the pixels, about 1 ms for 640 x 480.
   result<void> get(std::uint64_t frame, image<std::uint16_t>& out) const {
     const auto at = entries_.find(frame);
-    if (at == entries_.end()) return fail(errc::not_found, name(frame), "there is no depth image of it");
+    if (at == entries_.end()) return fail(errc::not_found, name(frame), "no depth image is stored for this frame");
     const entry& e = at->second;
     std::atomic_ref{e.last_use}.store(std::atomic_ref{uses_}.fetch_add(1) + 1);
     if (out.width() != e.width || out.height() != e.height) out = image<std::uint16_t>(e.width, e.height);
@@ -105,7 +105,7 @@ class depth_store {
     return fail(std::move(why));
   }
 
-  /// Forgets the image of `frame`; false where there is none.
+  /// Removes the image of `frame`. Returns false if there is none.
   bool erase(std::uint64_t frame) {
     const auto at = entries_.find(frame);
     if (at == entries_.end()) return false;
@@ -119,13 +119,13 @@ class depth_store {
   }
 
   [[nodiscard]] bool contains(std::uint64_t frame) const { return entries_.contains(frame); }
-  /// Frees the memory that `put` works in; the next call of it gets it again.
+  /// Frees the buffers of `put`; its next call allocates them again.
   void free_buffers() { encoder_ = {}; }
-  /// How many images there are.
+  /// Number of images.
   [[nodiscard]] std::size_t size() const noexcept { return entries_.size(); }
-  /// Of the compressed images that are in memory.
+  /// Size of the compressed images in memory.
   [[nodiscard]] std::size_t bytes_in_memory() const noexcept { return bytes_in_memory_; }
-  /// Of the compressed images that are in the spill file.
+  /// Size of the compressed images in the spill file.
   [[nodiscard]] std::size_t bytes_spilled() const noexcept { return bytes_spilled_; }
 
  private:
@@ -169,7 +169,7 @@ class depth_store {
     }
     return {};
   }
-  /// What was used after the list was made is younger than all that is in it.
+  /// Images used after the list was made are more recently used than all in it.
   void list_uses() {
     for (const auto& [frame, e] : entries_)
       if (!e.spilled) oldest_.push_back({e.last_use, frame});
@@ -181,7 +181,7 @@ class depth_store {
   bool spills_ = false;
   detail::depth_encoder encoder_;
   std::unordered_map<std::uint64_t, entry> entries_;
-  std::vector<use> oldest_;  // of some time ago, the oldest at the back; looked through before a new one is made
+  std::vector<use> oldest_;  // of some time ago, the oldest at the back; searched before a new one is made
   std::size_t bytes_in_memory_ = 0, bytes_spilled_ = 0;
   alignas(8) mutable std::uint64_t uses_ = 0;
 };

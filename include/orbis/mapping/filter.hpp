@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The outlier filter of a map, as a choice at run time, with a report of what it did.
+/// The outlier filter of a map, selected at run time, with a report.
 #pragma once
 
 #include <algorithm>
@@ -30,13 +30,13 @@
 namespace orbis::mapping {
 
 enum class filter_kind {
-  automatic,  ///< chosen by the cloud: `cloud::filter_automatically`
+  automatic,  ///< selected from the cloud: `cloud::filter_automatically`
   none,
   statistical,
   radius,
   log_statistical,
   cluster,
-  ray_evidence  ///< by the keyframes' depth images; where there are none every point stays
+  ray_evidence  ///< by the keyframes' depth images; without depth images every point is kept
 };
 
 struct filter_options {
@@ -49,14 +49,14 @@ struct filter_options {
   cloud::ray_evidence_options ray_evidence{};
 };
 
-/// What a filter did, and why.
+/// Report of a filter: its steps, thresholds, and reason.
 struct filter_report {
   cloud::filter_chain mode{};  ///< its steps; `to_string` gives their names, such as "log-statistical+cluster"
   std::string reason{};
-  std::size_t points = 0;  ///< before
+  std::size_t points = 0;  ///< before filtering
   std::size_t removed = 0;
   double seconds = 0;
-  std::optional<cloud::filter_choice> choice{};  ///< where the cloud chose
+  std::optional<cloud::filter_choice> choice{};  ///< set if the filter was selected automatically
 };
 
 struct filtered_indices {
@@ -78,8 +78,8 @@ namespace detail {
   return all;
 }
 
-/// `automatically(select_options)` is the automatic filter, `by_rays(ray_evidence_options)` gives the
-/// inliers by ray evidence.
+/// `automatically(select_options)` is the automatic filter, `by_rays(ray_evidence_options)` returns the inliers by ray
+/// evidence.
 template <execution_policy Policy, point_range Points, class Automatic, class ByRays>
 [[nodiscard]] filtered_indices filter_by_kind(const Policy& policy, const Points& points, std::span<const float> ranges,
                                               const filter_options& options, Automatic&& automatically,
@@ -101,20 +101,20 @@ template <execution_policy Policy, point_range Points, class Automatic, class By
     }
     case filter_kind::none:
       out.inliers = all_indices(report.points);
-      report.reason = "asked for";
+      report.reason = "requested";
       break;
     case filter_kind::statistical: {
       cloud::statistical_result result = cloud::statistical_filter(policy, points, options.statistical);
       out.inliers = std::move(result.inliers);
       report.mode = {options.statistical};
-      report.reason = "asked for; mean distance to " + std::to_string(options.statistical.neighbors) +
+      report.reason = "requested; mean distance to " + std::to_string(options.statistical.neighbors) +
                       " neighbors at most " + in_millimetres(result.threshold);
       break;
     }
     case filter_kind::radius:
       out.inliers = cloud::radius_inliers(policy, points, options.radius);
       report.mode = {options.radius};
-      report.reason = "asked for; at least " + std::to_string(options.radius.min_neighbors) + " neighbors within " +
+      report.reason = "requested; at least " + std::to_string(options.radius.min_neighbors) + " neighbors within " +
                       in_millimetres(options.radius.radius);
       break;
     case filter_kind::log_statistical: {
@@ -124,7 +124,7 @@ template <execution_policy Policy, point_range Points, class Automatic, class By
                                          .neighbors = options.log_statistical.neighbors,
                                          .usual = {result.median, 0},
                                          .threshold = result.threshold}};
-      report.reason = "asked for; mean distance to " + std::to_string(options.log_statistical.neighbors) +
+      report.reason = "requested; mean distance to " + std::to_string(options.log_statistical.neighbors) +
                       " neighbors at most " + in_millimetres(result.threshold_distance);
       break;
     }
@@ -132,7 +132,7 @@ template <execution_policy Policy, point_range Points, class Automatic, class By
       cloud::cluster_result result = cloud::cluster_filter(policy, points, options.cluster);
       out.inliers = std::move(result.inliers);
       report.mode = {options.cluster};
-      report.reason = "asked for; " +
+      report.reason = "requested; " +
                       std::to_string(std::count(result.removed.begin(), result.removed.end(), char{1})) + " of " +
                       std::to_string(result.sizes.size()) + " components are smaller than " +
                       std::to_string(result.min_size) + " points and apart from the others";
@@ -141,7 +141,7 @@ template <execution_policy Policy, point_range Points, class Automatic, class By
     case filter_kind::ray_evidence:
       out.inliers = by_rays(options.ray_evidence);
       report.mode = {cloud::ray_step{.evidence = options.ray_evidence}};
-      report.reason = "asked for; points that the rays of other keyframes pass through";
+      report.reason = "requested; points that rays of other keyframes pass through";
       break;
   }
   report.removed = report.points - out.inliers.size();
@@ -151,8 +151,7 @@ template <execution_policy Policy, point_range Points, class Automatic, class By
 
 }  // namespace detail
 
-/// Runs the filter. `ranges`: for each point the distance from which it was seen, metres, or empty.
-/// O(n log n).
+/// Runs the filter. `ranges`: for each point the distance from which it was observed, metres, or empty. O(n log n).
 template <execution_policy Policy, point_range Points>
 [[nodiscard]] filtered_indices filter_points(const Policy& policy, const Points& points, std::span<const float> ranges,
                                              const filter_options& options = {}) {
@@ -162,20 +161,19 @@ template <execution_policy Policy, point_range Points>
       [&](const cloud::ray_evidence_options&) { return detail::all_indices(std::ranges::size(points)); });
   if (options.kind == filter_kind::ray_evidence) {
     out.report.mode.clear();
-    out.report.reason = "asked for ray evidence, but there are no depth images whose rays could give any";
+    out.report.reason = "requested ray evidence, which needs depth images: every point is kept";
   }
   return out;
 }
 
-/// How often `filter_points` looks at each view.
+/// Number of passes of `filter_points` over the views.
 [[nodiscard]] constexpr std::size_t view_passes(const filter_options& options) noexcept {
   if (options.kind == filter_kind::ray_evidence) return options.ray_evidence.resolve_ghosts ? 2 : 1;
   return options.kind == filter_kind::automatic ? 1 : 0;
 }
 
-/// The same, and the automatic filter listens to the views that the points come from, too.
-/// `on_progress` counts the views, as often as they are looked at (`view_passes`); if it cancels, all points
-/// stay. @pre the images have the camera's size
+/// The same; the automatic filter also uses the views that the points come from. `on_progress` counts the views, in
+/// each pass (`view_passes`); if it cancels, all points are kept. @pre the images have the camera's size
 template <execution_policy Policy, point_range Points, cloud::posed_depth_range Views, camera::camera_model Camera>
 [[nodiscard]] filtered_indices filter_points(const Policy& policy, const Points& points, std::span<const float> ranges,
                                              const Views& views, const Camera& camera,

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// What mapping needs of a keyframe.
+/// The keyframe that mapping reads.
 #pragma once
 
 #include <cstdint>
@@ -12,8 +12,7 @@
 
 namespace orbis::mapping {
 
-/// A depth image in place, the colour image registered to it, and where the camera was. The images
-/// belong to the caller.
+/// A depth image in place, the colour image registered to it, and the camera pose. The caller owns the images.
 template <camera::depth_source Depth = camera::depth_view<std::uint16_t>>
 struct keyframe {
   Depth depth;
@@ -21,7 +20,7 @@ struct keyframe {
   se3 T_world_camera;
 };
 
-/// Anything with a keyframe's members.
+/// Any type with the members of a keyframe.
 template <class K>
 concept keyframe_like = requires(const K& k) {
   requires camera::depth_source<std::remove_cvref_t<decltype(k.depth)>>;
@@ -29,7 +28,7 @@ concept keyframe_like = requires(const K& k) {
   { k.T_world_camera } -> std::convertible_to<se3>;
 };
 
-/// A range of keyframes that can be gone through more than once.
+/// A range of keyframes that can be traversed more than once.
 template <class R>
 concept keyframe_range =
     std::ranges::forward_range<R> && std::ranges::sized_range<R> && keyframe_like<std::ranges::range_value_t<R>>;

@@ -47,17 +47,17 @@ namespace orbis::mapping {
 struct live_map_options {
   double resolution = 0.05;                   ///< the edge of a voxel, metres; > 0
   octree::integration_options integration{};  ///< of every depth image
-  /// A keyframe stays where it is in the map until its pose has moved a point of its view by more than this, in voxels.
-  /// 0: until any bit of the pose has changed, so that the map is the one of the present poses whenever nothing is
-  /// pending. >= 0
+  /// Tolerance in voxels: a keyframe is moved in the map when its pose moves a point of its view by more than this. 0:
+  /// when any bit of the pose changes, so that the map is that of the present poses whenever nothing is pending. >= 0
   double tolerance = 0.25;
-  /// So many keyframes are moved before the map follows: more is less work, less is sooner. > 0
+  /// Number of keyframes that are moved before the map is updated: a larger number is less work, a smaller one is
+  /// sooner. > 0
   std::size_t keyframes_per_replay = 16;
-  /// The most frames between keyframes that are in the map at a time; what is older is dropped. 0: keyframes only.
+  /// Maximum number of frames between keyframes in the map; older ones are dropped. 0: keyframes only.
   std::size_t max_frames = 0;
 };
 
-/// The pose of a keyframe; anything with these members will do.
+/// The pose of a keyframe; any type with these members works.
 struct keyframe_position {
   std::uint64_t frame = 0;  ///< index of its frame
   se3 T_world_camera;
@@ -68,35 +68,35 @@ concept keyframe_position_like = requires(const P& p) {
   { p.T_world_camera } -> std::convertible_to<se3>;
 };
 
-/// What becomes of keyframes that are not among the given poses: they keep their poses, or are taken out of the map
-/// until they are given a pose again, as those of another map of the atlas are.
+/// Treatment of keyframes that are not among the given poses: they keep their poses, or are removed from the map until
+/// they get a pose again, such as those of another map of the atlas.
 enum class unlisted { keep, hide };
 
-/// Whether the depth image of a keyframe is what the camera measured, or without pixels that a filter has judged.
+/// State of a keyframe's depth image: as the camera measured it, or without pixels removed by a filter.
 enum class completeness { complete, filtered };
 
-/// How far to go in one call of live_map::correct.
+/// Limits of one call of live_map::correct.
 struct correction_limits {
-  /// A keyframe or a few dozen bricks that were begun are finished.
+  /// Time limit; a keyframe or a few dozen bricks that were begun are finished.
   std::chrono::nanoseconds time = std::chrono::nanoseconds::max();
-  std::optional<vec3> robot{};  ///< in the world; keyframes near it are moved first
+  std::optional<vec3> robot{};  ///< position in the world frame; keyframes near it are moved first
 };
 
-/// What a call of live_map::correct has done.
+/// Result of a call of live_map::correct.
 struct correction_progress {
   std::size_t keyframes = 0;  ///< moved
-  std::size_t bricks = 0;     ///< brought up to date
-  bool done = false;          ///< nothing is left to do
+  std::size_t bricks = 0;     ///< updated
+  bool done = false;          ///< true if nothing is left to do
 };
 
-/// An occupancy octree of the depth images of keyframes. It keeps what each keyframe observed (see
+/// An occupancy octree of the depth images of keyframes. It stores the observations of each keyframe (see
 /// octree::scan_history) and its depth image (in `Depths`), so that a keyframe can be moved, changed and removed.
 ///
-/// When nothing is pending, the map is the one that `integrate` makes of the depth images in the order of their frames,
-/// each from the pose that it was marked with (`used_pose`), bit for bit: with tolerance 0 and after `finish` from the
-/// present poses, otherwise from poses within the tolerance. It depends neither on policies nor on limits of time.
+/// When nothing is pending, the map is bit for bit the one that `integrate` builds from the depth images in the order
+/// of their frames, each from the pose that it was marked with (`used_pose`): with tolerance 0 and after `finish` from
+/// the present poses, otherwise from poses within the tolerance. It depends neither on policies nor on time limits.
 ///
-/// One thread at a time; see live_map_thread.hpp for a map with a thread of its own. With orbis::compiled, an octree of
+/// For one thread at a time; live_map_thread.hpp has a map with its own thread. With orbis::compiled, an octree of
 /// another model than log_odds<> needs octree/scan_history-inl.hpp as well.
 template <octree::replayable_octree Octree, camera::camera_model Camera, depth_history Depths = depth_store>
 class live_map {
@@ -116,10 +116,10 @@ class live_map {
 
   // -- scans
 
-  /// Adds a keyframe, or gives one that is there another depth image and pose. `frame`: the index of its frame, which
-  /// orders keyframes; `depth`: as it goes into the map, without the pixels that a filter removed; `T_world_camera`: if
-  /// it is not finite, the keyframe waits for a pose outside of the map. The newest keyframe is in the map at once.
-  /// `what` is only noted, see is_filtered. Error: that of `Depths::put`; the keyframe is in the map even so.
+  /// Adds a keyframe, or replaces the depth image and pose of an existing one. `frame`: the index of its frame, which
+  /// orders keyframes; `depth`: as integrated into the map, without the pixels that a filter removed; `T_world_camera`:
+  /// if it is not finite, the keyframe waits outside of the map for a pose. The newest keyframe is in the map at once.
+  /// `what` is only stored, see is_filtered. Error: that of `Depths::put`; the keyframe is in the map nevertheless.
   /// O(marking, see octree::scan_marker) and Depths::put. @pre depth has the camera's size
   template <execution_policy Policy>
   result<octree::integration_summary> add_keyframe(const Policy& policy, std::uint64_t frame, const depth_view& depth,
@@ -145,32 +145,32 @@ class live_map {
     if (auto kept = depths_.put(frame, depth.pixels()); !kept) return fail(std::move(kept.error()));
     return summary;
   }
-  /// Gives a keyframe another depth image: the later verdict of a filter, with the pixels set to 0 that it removes.
-  /// The map follows with `correct`. Errors: not_found; that of `Depths::put`.
+  /// Replaces the depth image of a keyframe: a later result of a filter, which sets the removed pixels to 0. The map
+  /// follows with `correct`. Errors: not_found; that of `Depths::put`.
   /// @pre depth has the camera's size
   template <execution_policy Policy>
   result<void> set_depth(const Policy& policy, std::uint64_t frame, const depth_view& depth) {
     const entry* const k = find(frame);
-    if (k == nullptr) return fail(errc::not_found, "keyframe " + std::to_string(frame), "there is no such keyframe");
+    if (k == nullptr) return fail(errc::not_found, "keyframe " + std::to_string(frame), "the map has no such keyframe");
     const se3 pose = k->wanted ? *k->wanted : se3{so3{}, filled<vec3>(std::numeric_limits<double>::quiet_NaN())};
     if (auto added = add_keyframe(policy, frame, depth, pose, completeness::filtered); !added)
       return fail(std::move(added.error()));
     return {};
   }
-  /// Takes pixels out of the depth images of several keyframes: `remove_pixels(i, depth, pixels)` sets to 0 in
-  /// `pixels`, a copy of what `depth` stores, what is to go from the image of `frames[i]`; it is called on several
-  /// threads. As many keyframes as there are threads are changed together, or none of them if it throws. The map
-  /// follows with `correct`. Stops when `on_progress`, which counts the keyframes, returns false. Errors: not_found,
-  /// before anything is done; that of `Depths::get`, whose keyframe is removed while those together with it stay as
-  /// they are; that of `Depths::put`, but not before all is done; cancelled. For each keyframe O(pixels), Depths::get
-  /// and put, and marking. @pre no frame is named twice
+  /// Removes pixels from the depth images of several keyframes: `remove_pixels(i, depth, pixels)` sets the pixels to
+  /// remove from the image of `frames[i]` to 0 in `pixels`, a copy of the stored values of `depth`; it is called on
+  /// several threads. Keyframes are changed in groups of one per thread, or the whole group is unchanged if it throws.
+  /// The map follows with `correct`. Stops when `on_progress`, which counts the keyframes, returns false. Errors:
+  /// not_found, before anything is changed; that of `Depths::get`, whose keyframe is removed while the rest of its
+  /// group is unchanged; that of `Depths::put`, after all keyframes are processed; cancelled. For each keyframe
+  /// O(pixels), Depths::get and put, and marking. @pre no frame is named twice
   template <execution_policy Policy, class RemovePixels>
   result<void> edit_depths(const Policy& policy, std::span<const std::uint64_t> frames,
                            const RemovePixels& remove_pixels, progress on_progress = {}) {
     assert(are_different(frames));
     for (const std::uint64_t frame : frames)
       if (find(frame) == nullptr)
-        return fail(errc::not_found, "keyframe " + std::to_string(frame), "there is no such keyframe");
+        return fail(errc::not_found, "keyframe " + std::to_string(frame), "the map has no such keyframe");
     result<void> kept{};
     const std::size_t at_once = std::max(1U, policy.threads());
     for (std::size_t next = 0; next != frames.size();) {
@@ -202,11 +202,11 @@ class live_map {
     }
     return kept;
   }
-  /// Adds a frame between keyframes, whose pose was measured relative to `keyframe`: it is marked from there, wherever
-  /// the keyframe is in the map. It makes the map denser in time, and is not kept for corrections: it leaves the map
-  /// when there are more than `max_frames`, when its keyframe moves, is hidden or removed, and with `finish`. Any depth
-  /// source. False if frames are not wanted, the keyframe is not in the map, the pose is not finite, or the frame is a
-  /// keyframe. O(marking). @pre depth has the camera's size
+  /// Adds a frame between keyframes whose pose was measured relative to `keyframe`: it is marked from there, at the
+  /// keyframe's pose in the map. It makes the map denser in time, and is not kept for corrections: it is removed from
+  /// the map when there are more than `max_frames`, when its keyframe moves, is hidden or removed, and with `finish`.
+  /// Accepts any depth source. Returns false if `max_frames` is 0, the keyframe is not in the map, the pose is not
+  /// finite, or the frame is a keyframe. O(marking). @pre depth has the camera's size
   template <execution_policy Policy, camera::depth_source Depth>
   bool add_frame(const Policy& policy, std::uint64_t frame, const Depth& depth, std::uint64_t keyframe,
                  const se3& T_keyframe_camera) {
@@ -215,13 +215,13 @@ class live_map {
     if (options_.max_frames == 0 || k == nullptr || !k->used || find(frame) != nullptr || !if_finite(T_keyframe_camera))
       return false;
     std::erase_if(frames_, [&](const transient& t) { return t.frame == frame; });
-    // Several are dropped at a time: the bricks that they share are replayed once.
+    // Drops several at a time: the bricks that they share are replayed once.
     if (frames_.size() >= options_.max_frames) drop_oldest_frames(1 + options_.max_frames / 4);
     history_.set(policy, frame, depth, camera_, *k->used * T_keyframe_camera, options_.integration);
     frames_.push_back({frame, keyframe});
     return true;
   }
-  /// Forgets a keyframe, which was culled; the map follows with `correct`. False if there is none. O(its bricks).
+  /// Removes a culled keyframe; the map follows with `correct`. Returns false if there is none. O(its bricks).
   bool remove(std::uint64_t frame) {
     entry* const k = find(frame);
     if (k == nullptr) return false;
@@ -233,9 +233,9 @@ class live_map {
 
   // -- corrections
 
-  /// Tells the present poses of keyframes, in any order; the map follows with `correct`. Frames that are no keyframes
-  /// of the map are passed over; a pose that is not finite hides its keyframe. Returns how many keyframes wait for
-  /// being moved. O(poses x log keyframes), about 0.1 us each.
+  /// Sets the present poses of keyframes, in any order; the map follows with `correct`. Frames that are not keyframes
+  /// of the map are skipped; a pose that is not finite hides its keyframe. Returns the number of keyframes that wait to
+  /// be moved. O(poses x log keyframes), about 0.1 us each.
   template <std::ranges::input_range Poses>
   requires keyframe_position_like<std::ranges::range_value_t<Poses>> std::size_t set_poses(
       const Poses& poses, unlisted others = unlisted::keep) {
@@ -251,11 +251,11 @@ class live_map {
         if (k.listed != round_) want(k, std::nullopt);
     return waiting_;
   }
-  /// Moves keyframes whose poses are out of tolerance to where they are now, those first whose view moved most and that
-  /// are close to the robot, and brings the map up to date, until the time is over. Every call does something, if there
-  /// is something to do.
-  /// Error: that of `Depths::get`. The keyframe whose image is lost is removed, the others go on with the next call.
-  /// O(keyframes) and, for each keyframe that is moved, marking and replaying; nothing if nothing is pending.
+  /// Moves keyframes whose poses are out of tolerance to their present poses, first those whose view moved most and
+  /// that are close to the robot, and updates the map, until the time is over. Every call makes progress if anything is
+  /// pending. Error: that of `Depths::get`. The keyframe whose image is lost is removed; the next call continues with
+  /// the others. O(keyframes) and, for each keyframe that is moved, marking and replaying; nothing if nothing is
+  /// pending.
   template <execution_policy Policy>
   result<correction_progress> correct(const Policy& policy, const correction_limits& limits = {}) {
     correction_progress progress;
@@ -290,8 +290,8 @@ class live_map {
     progress.done = pending() == 0;
     return progress;
   }
-  /// Moves every keyframe whose pose differs in any bit, drops the frames between keyframes, and brings the map up to
-  /// date: it is the map made afresh of the present keyframes and poses. Returns what was done. Errors: those of
+  /// Moves every keyframe whose pose differs in any bit, drops the frames between keyframes, and updates the map: it
+  /// then equals the map rebuilt from the present keyframes and poses. Returns the work done. Errors: those of
   /// `correct`.
   template <execution_policy Policy>
   result<correction_progress> finish(const Policy& policy) {
@@ -307,22 +307,22 @@ class live_map {
     }
     return all;
   }
-  /// How much is left to do: keyframes that wait for being moved, and bricks that are not up to date. O(1).
+  /// Amount of pending work: keyframes that wait to be moved plus bricks that are out of date. O(1).
   [[nodiscard]] std::size_t pending() const noexcept { return waiting_ + history_.stale_bricks(); }
 
-  // -- looking
+  // -- queries
 
-  /// The map as it is; readable at any time.
+  /// The present map; readable at any time.
   [[nodiscard]] const Octree& map() const noexcept { return history_.map(); }
-  /// A copy, which shares its memory with the map until that changes: for readers on other threads. O(pages of 4 KB).
+  /// A copy for readers on other threads; it shares memory with the map and clones on change. O(pages of 4 KB).
   [[nodiscard]] Octree snapshot() const { return history_.map(); }
-  /// Which voxels changed, see octree::scan_history::changes.
+  /// Log of changed voxels, see octree::scan_history::changes.
   [[nodiscard]] const octree::change_log& changes() const noexcept { return history_.changes(); }
   [[nodiscard]] octree::change_log& changes() noexcept { return history_.changes(); }
   [[nodiscard]] const Camera& camera() const noexcept { return camera_; }
   [[nodiscard]] const live_map_options& options() const noexcept { return options_; }
   [[nodiscard]] const Depths& depths() const noexcept { return depths_; }
-  /// How many keyframes there are, in the map or hidden; how many frames between them are in the map.
+  /// Number of keyframes, in the map or hidden; number of frames between them in the map.
   [[nodiscard]] std::size_t size() const noexcept { return keyframes_.size(); }
   [[nodiscard]] std::size_t frames() const noexcept { return frames_.size(); }
   [[nodiscard]] bool contains(std::uint64_t frame) const noexcept { return find(frame) != nullptr; }
@@ -331,14 +331,14 @@ class live_map {
     const entry* const k = find(frame);
     return k == nullptr ? std::nullopt : k->used;
   }
-  /// The pose that a keyframe was given last, at which `correct` will have put it; empty if it is hidden, or is none.
-  /// O(log keyframes).
+  /// The latest pose given for a keyframe, to which `correct` moves it; empty if it is hidden or not a keyframe. O(log
+  /// keyframes).
   [[nodiscard]] std::optional<se3> wanted_pose(std::uint64_t frame) const {
     const entry* const k = find(frame);
     return k == nullptr ? std::nullopt : k->wanted;
   }
-  /// Whether a keyframe's depth image is without pixels that a filter has judged: it was given by `set_depth`, or said
-  /// to be so by `add_keyframe`. O(log keyframes).
+  /// Returns true if a keyframe's depth image is without pixels removed by a filter: it was set by `set_depth`, or
+  /// declared so in `add_keyframe`. O(log keyframes).
   [[nodiscard]] bool is_filtered(std::uint64_t frame) const noexcept {
     const entry* const k = find(frame);
     return k != nullptr && k->filtered;
@@ -360,11 +360,11 @@ class live_map {
  private:
   struct entry {
     std::uint64_t frame = 0;
-    std::optional<se3> used;    ///< as it is in the map
-    std::optional<se3> wanted;  ///< as it is to be; empty: not in the map
+    std::optional<se3> used;    ///< pose in the map
+    std::optional<se3> wanted;  ///< target pose; empty: not in the map
     double scale = 1.0;         ///< of its depth image, see camera::depth_view
     float min_depth = 0.0F, max_depth = 0.0F;
-    double reach = 0.0;  ///< the largest depth that counts, metres
+    double reach = 0.0;  ///< largest depth used, metres
     bool waiting = false;
     bool filtered = false;
     std::uint64_t listed = 0;  ///< the last call of set_poses that named it
@@ -379,7 +379,7 @@ class live_map {
     double urgency;
     std::uint64_t frame;
   };
-  /// What one thread needs to mark a keyframe.
+  /// Memory of one thread for marking a keyframe.
   struct worker {
     image<std::uint16_t> depth, edited;
     result<void> read;
@@ -387,7 +387,7 @@ class live_map {
     octree::scan_voxels voxels;
     packer packed;
 
-    /// Compresses the edited image, if that can be done beside other threads.
+    /// Compresses the edited image, if that can run in parallel with other threads.
     void pack() {
       if constexpr (packs) packed.pack(edited.view());
     }
@@ -425,7 +425,7 @@ class live_map {
     waiting_ += static_cast<std::size_t>(waiting) - static_cast<std::size_t>(k.waiting);
     k.waiting = waiting;
   }
-  /// Takes a keyframe out of the map.
+  /// Removes a keyframe from the map.
   void hide(entry& k) {
     k.wanted.reset();
     set_waiting(k, false);
@@ -445,7 +445,7 @@ class live_map {
     set_waiting(k, !k.used || (tolerance > 0 ? frustum_.displacement(*k.used, *pose, k.reach) > tolerance
                                              : differ(*k.used, *pose)));
   }
-  /// The keyframes that wait, the most urgent first; equal ones in the order of their frames.
+  /// Lists the waiting keyframes, the most urgent first; equal ones in the order of their frames.
   void list_by_priority(const std::optional<vec3>& robot) {
     queue_.clear();
     if (waiting_ == 0) return;
@@ -459,7 +459,7 @@ class live_map {
       return a.urgency != b.urgency ? a.urgency > b.urgency : a.frame < b.frame;
     });
   }
-  /// Moves `count` keyframes of the queue, each on a thread of its own.
+  /// Moves `count` keyframes of the queue, each on its own thread.
   template <class Policy>
   result<void> move_next(const Policy& policy, std::size_t next, std::size_t count) {
     group_.clear();
@@ -479,8 +479,8 @@ class live_map {
     }
     return {};
   }
-  /// Reads the depth images of these keyframes, and calls `work(policy, i)` for those that could be read, each on a
-  /// thread of its own if there are several. A keyframe whose image is lost is removed.
+  /// Reads the depth images of these keyframes, and calls `work(policy, i)` for those that could be read, each on its
+  /// own thread if there are several. A keyframe whose image is lost is removed.
   template <class Policy, class Work>
   result<void> read_and_work(const Policy& policy, std::span<const std::uint64_t> frames, const Work& work) {
     const std::size_t count = frames.size();
@@ -509,7 +509,7 @@ class live_map {
   [[nodiscard]] static depth_view view_of(const entry& k, const image<std::uint16_t>& pixels) {
     return depth_view{pixels.view(), k.scale, k.min_depth, k.max_depth};
   }
-  /// Drops frames between keyframes.
+  /// Drops the oldest frames between keyframes.
   void drop_oldest_frames(std::size_t count) {
     count = std::min(count, frames_.size());
     for (std::size_t i = 0; i != count; ++i) history_.remove(frames_[i].frame);
@@ -528,10 +528,10 @@ class live_map {
   Depths depths_;
   octree::scan_history<Octree> history_;
   std::vector<entry> keyframes_;   ///< by frame
-  std::vector<transient> frames_;  ///< in the order they came
-  std::size_t waiting_ = 0;        ///< keyframes
+  std::vector<transient> frames_;  ///< in order of arrival
+  std::size_t waiting_ = 0;        ///< number of waiting keyframes
   std::size_t moved_since_replay_ = 0;
-  std::uint64_t round_ = 0;  ///< of set_poses
+  std::uint64_t round_ = 0;  ///< number of calls of set_poses
   std::vector<ranked> queue_;
   std::vector<std::uint64_t> group_;  ///< keyframes that are moved together
   std::vector<worker> workers_;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// What a live map with a thread of its own tells, and what it asks.
+/// Events and callbacks of a live map with its own thread.
 #pragma once
 
 #include <cstddef>
@@ -15,78 +15,78 @@
 
 namespace orbis::mapping {
 
-/// The map at one moment. It does not change any more.
+/// The map at one moment. It is immutable.
 template <class Octree>
 struct live_map_snapshot {
   Octree map;
   std::uint64_t revision = 0;  ///< of the change log
-  std::size_t keyframes = 0;   ///< that were added and not removed
+  std::size_t keyframes = 0;   ///< added and not removed
   std::size_t frames = 0;      ///< between keyframes, in the map
-  std::size_t pending = 0;     ///< keyframes and bricks that wait for a correction; 0: the map is right
+  std::size_t pending = 0;     ///< keyframes and bricks that wait for a correction; 0: the map is up to date
 };
 
-/// What a depth image is for.
+/// Use of a depth image.
 enum class depth_use : std::uint8_t {
   keyframe,  ///< add_keyframe
   frame      ///< add_frame: between keyframes
 };
 
-/// A keyframe or frame went into the map, and readers see it.
+/// A keyframe or frame was inserted into the map, and is visible to readers.
 struct insertion_event {
   std::uint64_t frame = 0;
   bool is_keyframe = false;
-  double milliseconds = 0.0;        ///< wall time of the work: `prepare`, judging, marking, keeping the depth image
-  double delay_milliseconds = 0.0;  ///< from the call that added it until readers see it
-  std::size_t waiting = 0;          ///< keyframes and frames that still wait
+  double milliseconds = 0.0;        ///< wall time of the work: `prepare`, judging, marking, storing the depth image
+  double delay_milliseconds = 0.0;  ///< from the call that added it until it is visible to readers
+  std::size_t waiting = 0;          ///< keyframes and frames still waiting
 };
-/// A depth image was left out, because too many were waiting.
+/// A depth image was dropped because too many were waiting.
 struct overflow_event {
   std::uint64_t frame = 0;
   depth_use use = depth_use::keyframe;
 };
-/// The map did not take a frame between keyframes: see live_map::add_frame.
+/// The map rejected a frame between keyframes: see live_map::add_frame.
 struct refusal_event {
   std::uint64_t frame = 0;
   std::uint64_t keyframe = 0;
 };
-/// Nothing waits for a correction any more.
+/// No keyframe or brick waits for a correction any more.
 struct live_correction_event {
   std::size_t keyframes = 0;  ///< moved
-  std::size_t bricks = 0;     ///< brought up to date
-  double milliseconds = 0.0;  ///< wall time that it took, without insertions between its parts
+  std::size_t bricks = 0;     ///< updated
+  double milliseconds = 0.0;  ///< wall time of the correction, without insertions between its parts
 };
 
-/// Where the SLAM system says that the keyframes are.
+/// Poses of the keyframes from the SLAM system.
 struct keyframe_poses {
   std::vector<keyframe_position> poses{};  ///< the present ones; other keyframes are hidden
-  std::vector<std::uint64_t> removed{};    ///< frames of keyframes that will never have a pose again
+  std::vector<std::uint64_t> removed{};    ///< frames of keyframes that will never get a pose again
 };
 
-/// Callbacks; any of them may be empty. All but `overflowed` are called on the map's thread, and `published` for the
-/// first, empty map by the constructor. They must not wait for the map, or destroy it. If one throws on the map's
-/// thread, that ends, see live_map_thread::failure.
+/// Callbacks; any of them may be empty. All except `overflowed` are called on the map's thread; the constructor calls
+/// `published` for the first, empty map. They must not wait for the map, or destroy it. An exception on the map's
+/// thread ends that thread, see live_map_thread::failure.
 template <class Octree>
 struct live_map_listeners {
-  std::function<void()> started{};  ///< first of all, on the map's thread: to name it, or to lower its priority
-  /// Fills in the present poses and returns true, or returns false if the poses are what they were at the last call;
-  /// with `always`, fills them in whatever they are. What is hidden keeps its depth image, which costs memory, for it
-  /// may come back with its map of the atlas; what was culled and shall not stay in the map is to be told as removed.
+  std::function<void()> started{};  ///< called first, on the map's thread: to name it, or to lower its priority
+  /// Fills in the present poses and returns true, or returns false if the poses have not changed since the last call;
+  /// with `always`, fills them in in any case. Hidden keyframes keep their depth images, which costs memory, because
+  /// they may return with their map of the atlas. List culled keyframes in `removed` to drop them from the map.
   std::function<bool(keyframe_poses& now, bool always)> poll_poses{};
-  /// May change a depth image before it goes in: a filter sets the pixels to 0 that it removes. On the map's thread,
-  /// so that nobody else waits for it.
+  /// May change a depth image before it is inserted: a filter sets the pixels that it removes to 0. Called on the map's
+  /// thread, so that no other thread waits for it.
   std::function<void(std::uint64_t frame, depth_use use, image_view<std::uint16_t> pixels)> prepare{};
   std::function<void(const insertion_event&)> inserted{};
-  std::function<void(const overflow_event&)> overflowed{};  ///< on the thread that adds
+  std::function<void(const overflow_event&)> overflowed{};  ///< on the thread that adds the image
   std::function<void(const refusal_event&)> refused{};
   std::function<void(const live_correction_event&)> corrected{};
-  /// A new snapshot, and the log of what changed up to it; the log may be read during the call.
+  /// A new snapshot, and the log of changes up to it; the log may be read during the call.
   std::function<void(const live_map_snapshot<Octree>&, const octree::change_log&)> published{};
-  /// A depth image could not be kept or read, see live_map; or the thread ended, see live_map_thread::failure.
+  /// A depth image could not be stored or read, see live_map; or the thread ended, see live_map_thread::failure.
   std::function<void(const error&)> failed{};
 };
 
 /// A `live_map_listeners::poll_poses` that reads the keyframe poses of a SLAM system. The system must outlive the map's
-/// thread. Keyframes that SLAM has culled stay hidden in the map; `live_map_thread::remove` frees their memory.
+/// thread. Culled keyframes stay hidden in the map; `live_map_thread::remove` frees their memory.
 template <class Slam>
 [[nodiscard]] auto follow_keyframes(const Slam& slam) {
   return [&slam, seen = typename Slam::revision_type{}](keyframe_poses& now, bool always) mutable {
@@ -101,11 +101,11 @@ template <class Slam>
 struct live_map_counters {
   std::size_t keyframes = 0;          ///< inserted
   std::size_t frames = 0;             ///< inserted, between keyframes
-  std::size_t dropped_keyframes = 0;  ///< left out because too many were waiting
+  std::size_t dropped_keyframes = 0;  ///< dropped because too many were waiting
   std::size_t dropped_frames = 0;     ///< the same, between keyframes
-  std::size_t refused_frames = 0;     ///< that the map did not take
+  std::size_t refused_frames = 0;     ///< rejected by the map
   std::size_t corrections = 0;        ///< finished
-  std::size_t most_waiting = 0;       ///< depth images, at any time
+  std::size_t most_waiting = 0;       ///< maximum number of waiting depth images
 };
 
 }  // namespace orbis::mapping

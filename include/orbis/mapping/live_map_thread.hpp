@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A live map with a thread of its own: keyframes and poses go in without waiting, snapshots come out.
+/// A live map with its own thread: callers add keyframes and poses without waiting, and read snapshots.
 ///
 /// @code
 ///   using live = orbis::mapping::live_map_thread<orbis::octree::occupancy_octree<>, orbis::camera::pinhole>;
@@ -51,24 +51,24 @@ namespace orbis::mapping {
 
 struct live_map_thread_options {
   live_map_options map{};
-  unsigned threads = 1;          ///< that work on the map, its own included; > 0
-  std::size_t max_waiting = 16;  ///< keyframes and frames that wait for being inserted; > 0
-  /// How long `add_keyframe` waits for room where only keyframes wait; then the keyframe is left out.
+  unsigned threads = 1;          ///< threads that work on the map, including its own; > 0
+  std::size_t max_waiting = 16;  ///< maximum number of waiting keyframes and frames; > 0
+  /// Maximum time that `add_keyframe` waits for room if only keyframes are waiting; afterwards the keyframe is dropped.
   std::chrono::milliseconds patience{100};
-  /// A correction goes on for this long before keyframes that came meanwhile are inserted.
+  /// Duration of a correction before keyframes that arrived meanwhile are inserted.
   std::chrono::microseconds correction_slice{5000};
   std::chrono::milliseconds poll_interval{30};  ///< between two calls of live_map_listeners::poll_poses
-  /// Takes out what has moved away, see moving_filter; empty: everything stays. Then poses are asked for before each
-  /// keyframe as well, and the keyframe goes in where it is by then.
+  /// Removal of moved objects, see moving_filter; empty: none. If set, poses are also polled before each keyframe, and
+  /// the keyframe is inserted at its pose of that moment.
   std::optional<moving_filter_options> moving{};
 };
 
-/// A live_map with a thread and a bounded queue. What is asked for is done in order; corrections go on, in slices,
-/// while nothing else waits, and one slice after each insertion. Where the queue is full, frames between keyframes give
-/// way first, the oldest of them; then `add_keyframe` waits for a while; then the keyframe is left out. All of it is
-/// counted and told. Poses that come faster than they are taken are merged.
+/// A live_map with a thread and a bounded queue. Requests are processed in order; corrections run in slices while no
+/// request waits, and one slice after each insertion. If the queue is full, frames between keyframes are dropped first,
+/// the oldest of them; then `add_keyframe` waits for a while; then the keyframe is dropped. All drops are counted and
+/// reported. Poses that arrive faster than they are processed are merged.
 ///
-/// All member functions may be called from any thread, but `stop` and the destructor from one only.
+/// All member functions are thread-safe, except that `stop` and the destructor must be called from one thread only.
 template <octree::replayable_octree Octree, camera::camera_model Camera, depth_history Depths = depth_store>
 class live_map_thread {
  public:
@@ -89,43 +89,42 @@ class live_map_thread {
   }
   live_map_thread(const live_map_thread&) = delete;
   live_map_thread& operator=(const live_map_thread&) = delete;
-  /// Waits for the running step; what waits is dropped.
+  /// Waits for the running step; drops waiting requests.
   ~live_map_thread() { stop(); }
 
-  // -- what goes in
+  // -- input
 
-  /// Adds a keyframe, see live_map::add_keyframe; the image is copied, and goes through `prepare` on the map's thread.
-  /// False if it was left out: too many keyframes wait, or the thread ended. O(pixels), and at most `patience` of
-  /// waiting. @pre depth has the camera's size
+  /// Adds a keyframe, see live_map::add_keyframe; the image is copied, and passed to `prepare` on the map's thread.
+  /// Returns false if it was dropped: too many keyframes wait, or the thread ended. O(pixels), and waits at most
+  /// `patience`. @pre depth has the camera's size
   bool add_keyframe(std::uint64_t frame, const depth_view& depth, const se3& T_world_camera) {
     return add_scan({.kind = job::keyframe, .frame = frame, .T = T_world_camera}, depth);
   }
-  /// Adds a frame between keyframes, see live_map::add_frame, as above. Never waits. False if it was left out; whether
-  /// the map takes it is told by `refused`. O(pixels). @pre depth has the camera's size
+  /// Adds a frame between keyframes, see live_map::add_frame, as above. Never waits. Returns false if it was dropped;
+  /// `refused` reports frames that the map rejects. O(pixels). @pre depth has the camera's size
   bool add_frame(std::uint64_t frame, const depth_view& depth, std::uint64_t keyframe, const se3& T_keyframe_camera) {
     return add_scan({.kind = job::between, .frame = frame, .keyframe_of = keyframe, .T = T_keyframe_camera}, depth);
   }
-  /// Forgets a keyframe, see live_map::remove.
+  /// Removes a keyframe, see live_map::remove.
   void remove(std::uint64_t frame) { push({.kind = job::removal, .frame = frame}); }
-  /// Tells the present poses, see live_map::set_poses.
+  /// Sets the present poses, see live_map::set_poses.
   void set_poses(std::vector<keyframe_position> poses, unlisted others = unlisted::keep) {
     push({.kind = job::positions, .poses = std::move(poses), .others = others});
   }
-  /// Where the robot is (metres, world): corrections begin near it.
+  /// Sets the robot's position (metres, world frame): corrections begin near it.
   void set_robot(const vec3& position) {
     const std::lock_guard lock{mutex_};
     robot_ = position;
   }
 
-  // -- what comes out
+  // -- output
 
-  /// The last snapshot. Never waits for the map: the lock is held for the copy of a pointer. O(1).
+  /// The latest snapshot. Never waits for the map: the lock is held for copying a pointer. O(1).
   [[nodiscard]] std::shared_ptr<const snapshot_type> latest() const {
     const std::lock_guard lock{published_mutex_};
     return latest_;
   }
-  /// The last snapshot in which nothing waited for a correction: the map of before as long as a correction goes on.
-  /// O(1).
+  /// The latest snapshot without pending corrections; unchanged while a correction is in progress. O(1).
   [[nodiscard]] std::shared_ptr<const snapshot_type> settled() const {
     const std::lock_guard lock{published_mutex_};
     return settled_;
@@ -134,9 +133,9 @@ class live_map_thread {
     const std::lock_guard lock{mutex_};
     return counters_;
   }
-  /// Why the thread ended by itself, if it did: an exception of a listener or of `Depths`, or want of memory. It was
-  /// told by `failed` as well. What waits is dropped then, calls that wait return, nothing goes in any more, and the
-  /// snapshots stay as they are. Code: errc::exception.
+  /// The reason why the thread ended by itself, if it did: an exception of a listener or of `Depths`, or out of memory.
+  /// It was also reported to `failed`. Waiting requests are dropped then, waiting calls return, no input is accepted
+  /// any more, and the snapshots do not change. Code: errc::exception.
   [[nodiscard]] std::optional<error> failure() const {
     const std::lock_guard lock{mutex_};
     return failure_;
@@ -144,19 +143,19 @@ class live_map_thread {
 
   // -- waiting
 
-  /// Waits until everything that was asked for is done and nothing waits for a correction, or the thread ended. Not to
-  /// be called by callbacks.
+  /// Waits until all requests are processed and nothing waits for a correction, or the thread ended. Must not be called
+  /// by callbacks.
   void wait() {
     if (listeners_.poll_poses) push({.kind = job::poll});  // poses may have moved since the last poll
     wait_until_idle();
   }
-  /// Makes the map the one of all present keyframes and poses, see live_map::finish, and waits for it, as above.
+  /// Updates the map to all present keyframes and poses, see live_map::finish, and waits for it, as above.
   void finish() {
     push({.kind = job::finish});
     wait_until_idle();
   }
-  /// Ends the thread, and gives the map to the caller; what waits is dropped. After a failure the map may be destroyed,
-  /// and nothing else: a step was broken off. Not to be called by callbacks.
+  /// Ends the thread, and returns the map to the caller; drops waiting requests. After a failure the map may only be
+  /// destroyed: a step was interrupted. Must not be called by callbacks.
   map_type& stop() {
     {
       const std::lock_guard lock{mutex_};
@@ -171,7 +170,7 @@ class live_map_thread {
   using clock = std::chrono::steady_clock;
   using job = detail::map_job;
 
-  // -- the queue; `mutex_` guards it
+  // -- the queue, guarded by `mutex_`
 
   [[nodiscard]] bool is_idle() const noexcept { return jobs_.empty() && !busy_ && pending_ == 0; }
   void wait_until_idle() const {
@@ -204,7 +203,7 @@ class live_map_thread {
         dropped = jobs_.pop_frame();
         if (!dropped && j.kind != job::between)
           changed_.wait_for(lock, options_.patience, [&] { return ends_ || !is_full(); });
-        if (!dropped && is_full()) dropped = jobs_.pop_frame();  // one that came while this one waited
+        if (!dropped && is_full()) dropped = jobs_.pop_frame();  // one that arrived while this one waited
       }
       if (ends_) return false;
       added = !is_full();
@@ -223,7 +222,7 @@ class live_map_thread {
     if (dropped && listeners_.overflowed) listeners_.overflowed({dropped->frame, use_of(*dropped)});
     return added;
   }
-  /// A copy in memory that was used before, if there is any.
+  /// A copy, in reused memory if available.
   [[nodiscard]] image<std::uint16_t> copy_of(image_view<const std::uint16_t> pixels) {
     image<std::uint16_t> copy;
     {
@@ -253,7 +252,7 @@ class live_map_thread {
     try {
       why.message = what;
     } catch (...) {
-      why.message = "no memory";  // short: it needs none
+      why.message = "no memory";  // short enough to need no allocation
     }
     {
       const std::lock_guard lock{mutex_};
@@ -263,13 +262,13 @@ class live_map_thread {
       try {
         failure_ = why;
       } catch (...) {
-        failure_ = error{errc::exception, "live map", "no memory"};
+        failure_ = error{errc::exception, "live map", "out of memory"};
       }
     }
     changed_.notify_all();
     try {
       report(why);
-    } catch (...) {  // there is nobody left to tell
+    } catch (...) {  // a failing listener cannot be notified
     }
   }
   void work() {
@@ -314,12 +313,12 @@ class live_map_thread {
       case job::keyframe: {
         bool judged = moving_.has_value();
         if (moving_ && listeners_.poll_poses) {
-          // Keyframes judge each other by their poses, which have to be of one moment: those of now, this one's too.
+          // Keyframes are compared at poses of one moment: the present ones, including that of the new keyframe.
           const keyframe_poses& now = poll(true);
           const auto at = std::ranges::find(now.poses, j.frame, &keyframe_position::frame);
           judged = at != now.poses.end();
           if (judged) j.T = at->T_world_camera;
-          if (!judged) moving_->forget(j.frame);  // what it has is of another image, if anything
+          if (!judged) moving_->forget(j.frame);  // its data may be of another image
           if (std::ranges::find(now.removed, j.frame) != now.removed.end()) break;
         }
         const auto added = judged ? moving_->add_keyframe(policy_, map_, j.frame, depth, j.T)
@@ -358,7 +357,7 @@ class live_map_thread {
     }
     if (inserted) tell_insertion(j, waiting, milliseconds_since(start));
   }
-  /// Asks for the present poses and tells the map; what was answered, nothing if poses are what they were.
+  /// Polls the present poses and passes them to the map. Returns the reply: empty if the poses have not changed.
   const keyframe_poses& poll(bool always = false) {
     polled_.poses.clear();
     polled_.removed.clear();
@@ -374,11 +373,11 @@ class live_map_thread {
     map_.set_poses(polled_.poses, unlisted::hide);
     return polled_;
   }
-  /// How many of the last keyframes wait for a judgement by the newest.
+  /// Number of the last keyframes that wait for a judgement by the newest.
   [[nodiscard]] std::size_t due() const noexcept { return moving_ ? moving_->due() : 0; }
   void revise(std::chrono::nanoseconds time) {
     const auto start = clock::now();
-    while (due() != 0) {  // one at least, however short the time is
+    while (due() != 0) {  // at least one, however short the time is
       if (const auto revised = moving_->revise(policy_, map_); !revised) report(revised.error());
       if (clock::now() - start >= time) return;
     }
@@ -387,7 +386,7 @@ class live_map_thread {
     const auto start = clock::now();
     const auto progress = map_.correct(policy_, {.time = options_.correction_slice, .robot = robot});
     correction_.milliseconds += milliseconds_since(start);
-    if (!progress) {  // the keyframe whose image is lost is gone
+    if (!progress) {  // the keyframe whose image is lost was removed
       report(progress.error());
       if (map_.pending() == 0) tell_correction();
       return;
@@ -427,7 +426,7 @@ class live_map_thread {
       return;
     auto next = std::make_shared<const snapshot_type>(
         snapshot_type{map_.snapshot(), revision, map_.size(), map_.frames(), pending});
-    std::shared_ptr<const snapshot_type> before_latest, before_settled;  // let go of without the lock
+    std::shared_ptr<const snapshot_type> before_latest, before_settled;  // released without the lock
     {
       const std::lock_guard lock{published_mutex_};
       before_latest = std::exchange(latest_, next);
@@ -449,7 +448,7 @@ class live_map_thread {
   mutable std::mutex mutex_;
   mutable std::condition_variable changed_;
   detail::map_jobs jobs_;
-  std::vector<image<std::uint16_t>> spare_;  ///< images whose memory can be used again
+  std::vector<image<std::uint16_t>> spare_;  ///< images whose memory is reused
   std::size_t pending_ = 0;                  ///< of the map
   bool busy_ = false;
   bool ends_ = false;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Depth images from which pixels were removed: in the form of the image that they come from.
+/// Depth images with removed pixels, in the form of the original image.
 #pragma once
 
 #include <orbis/camera/depth.hpp>
@@ -21,7 +21,7 @@ struct depth_pixel<camera::depth_view<T>> {
 
 }  // namespace detail
 
-/// What a copy of the depth image consists of: the stored values of a `camera::depth_view`, otherwise metres.
+/// Pixel type of a copy of the depth image: the stored values of a `camera::depth_view`, otherwise metres.
 template <camera::depth_source Depth>
 using depth_pixel = typename detail::depth_pixel<Depth>::type;
 
@@ -34,8 +34,8 @@ template <camera::depth_source Depth>
     return depth(x, y);
 }
 
-/// `masked` holds the stored values of `depth`, and 0 where they were removed: a view of it in which the others mean
-/// what they mean in `depth`.
+/// A view of `masked`, which contains the stored values of `depth` and 0 in removed pixels; the other values have the
+/// same meaning as in `depth`.
 template <camera::depth_source Depth>
 [[nodiscard]] camera::depth_view<depth_pixel<Depth>> view_like(const Depth& depth,
                                                                image_view<const depth_pixel<Depth>> masked) {

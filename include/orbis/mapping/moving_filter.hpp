@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Removes moving objects from a live map: the pixels of the last keyframes that the rays of other keyframes pass
-/// through are taken out of their depth images while the camera moves.
+/// Removes moving objects from a live map while the camera moves: the pixels of the last keyframes that rays of other
+/// keyframes pass through are removed from their depth images.
 ///
-/// The log-odds of a voxel become those of free space only if more rays pass through it than end in it. Somebody who
-/// walks through a room leaves voxels in which one or two scans end and which few later scans see. The depth images of
-/// a few keyframes tell more, because each measurement says that the space before its end is empty.
-/// `cloud/ray_evidence.hpp` does the same for a whole cloud, and names its sources. Coarse depth images that decide and
-/// can be overruled later are described by G. Kim, A. Kim, "Remove, then Revert: Static Point Cloud Map Construction
-/// Using Multiresolution Range Images", IROS 2020.
+/// The log-odds of a voxel become those of free space only if more rays pass through it than end in it. A person
+/// walking through a room leaves voxels in which one or two scans end and which few later scans see. The depth images
+/// of a few keyframes contain more information, because each measurement indicates that the space before its end is
+/// empty. `cloud/ray_evidence.hpp` does the same for a whole cloud, and cites its sources. Coarse depth images with
+/// decisions that can be reverted later are described by G. Kim, A. Kim, "Remove, then Revert: Static Point Cloud Map
+/// Construction Using Multiresolution Range Images", IROS 2020.
 #pragma once
 
 #include <algorithm>
@@ -32,14 +32,14 @@
 
 namespace orbis::mapping {
 
-/// Judges the last keyframes of a live map by each other, and gives the map the result: a later keyframe whose rays
-/// pass through what an earlier one shows takes it out, and one that shows it again brings it back. A keyframe goes in
-/// first, and the others are judged by it afterwards, one at a time, so that nothing waits for that. The result is a
-/// depth image with fewer pixels (`live_map::set_depth`), so that the map stays the one of these images and the
-/// keyframes' poses. Keyframes are compared at the poses that the map was told last (`live_map::wanted_pose`), for
+/// Compares the last keyframes of a live map with each other, and applies the result to the map: a later keyframe whose
+/// rays pass through a surface of an earlier one removes it, and one that shows it again restores it. A keyframe is
+/// inserted first, and the others are judged by it afterwards, one at a time, so that no insertion waits for that. The
+/// result is a depth image with fewer pixels (`live_map::set_depth`), so that the map remains that of these images and
+/// the keyframes' poses. Keyframes are compared at the latest poses given to the map (`live_map::wanted_pose`), because
 /// those are of one moment; in the map, a keyframe that waits for a correction is still at an earlier one.
 ///
-/// Keeps the last keyframes' depth images: 3.5 bytes a pixel for each. Memory is kept from keyframe to keyframe.
+/// Stores the last keyframes' depth images: 3.5 bytes per pixel for each. Memory is reused from keyframe to keyframe.
 template <camera::camera_model Camera>
 class moving_filter {
  public:
@@ -49,10 +49,10 @@ class moving_filter {
   explicit moving_filter(Camera camera, const moving_filter_options& options = {})
       : judge_{std::move(camera), options} {}
 
-  /// live_map::add_keyframe, without the pixels that the last keyframes look through. These are due for a judgement
-  /// then, see revise. A keyframe with a pose that is not finite goes to the map as it is. The same for every policy.
-  /// Errors: those of live_map::add_keyframe and set_depth. O(pixels + cells x keyframes), and marking.
-  /// @pre as for live_map::add_keyframe; `map` is always the same
+  /// live_map::add_keyframe without the pixels that rays of the last keyframes pass through. The last keyframes are due
+  /// for a judgement afterwards, see revise. A keyframe with a pose that is not finite is added to the map unchanged.
+  /// The same for every policy. Errors: those of live_map::add_keyframe and set_depth. O(pixels + cells x keyframes),
+  /// and marking. @pre as for live_map::add_keyframe; `map` is always the same
   template <execution_policy Policy, octree::replayable_octree Octree, depth_history Depths>
   result<octree::integration_summary> add_keyframe(const Policy& policy, live_map<Octree, Camera, Depths>& map,
                                                    std::uint64_t frame, const depth_view& depth,
@@ -75,14 +75,14 @@ class moving_filter {
     if (added && !settled) return fail(std::move(settled.error()));
     return added;
   }
-  /// How many of the last keyframes have not been judged by all others that there are. O(keyframes).
+  /// Number of the last keyframes that have not been judged by all others of the window. O(keyframes).
   [[nodiscard]] std::size_t due() const noexcept {
     return static_cast<std::size_t>(std::ranges::count_if(judge_.views(), [](const auto& v) { return is_due(v); }));
   }
-  /// Judges one of the last keyframes that are due, and gives the map its image (live_map::set_depth) if it is judged
-  /// otherwise than before; the map follows with `correct`. To be called until nothing is due, or the next keyframe is
-  /// more urgent: what is due then is judged with that one. Errors: those of live_map::set_depth; the keyframe is
-  /// judged even so. O(cells), and marking if the image changes.
+  /// Judges one of the last keyframes that are due, and updates its image in the map (live_map::set_depth) if the
+  /// verdict has changed; the map follows with `correct`. Call it until nothing is due, or the next keyframe is more
+  /// urgent: the remaining ones are judged with that one. Errors: those of live_map::set_depth; the keyframe is judged
+  /// nevertheless. O(cells), and marking if the image changes.
   template <execution_policy Policy, octree::replayable_octree Octree, depth_history Depths>
   result<void> revise(const Policy& policy, live_map<Octree, Camera, Depths>& map) {
     for (auto& v : judge_.views()) {
@@ -92,9 +92,9 @@ class moving_filter {
     }
     return {};
   }
-  /// Judges this keyframe no more, nor by it: it was removed, or has got another image.
+  /// Drops a keyframe from the comparison: it was removed, or its image was replaced.
   void forget(std::uint64_t frame) { judge_.forget(frame); }
-  /// Which share of a kept keyframe's cells is taken out; empty if it is not kept. O(cells).
+  /// Share of a keyframe's cells that is removed; empty if it is not among the last keyframes. O(cells).
   [[nodiscard]] std::optional<double> removed_share(std::uint64_t frame) const {
     for (const auto& v : judge_.views())
       if (v.frame == frame)
@@ -113,7 +113,7 @@ class moving_filter {
     return [&map](const view& v) { return map.wanted_pose(v.frame); };
   }
   [[nodiscard]] bool leaves_next(const view& v) const { return judge_.is_full() && &v == &judge_.views().front(); }
-  /// Judges a keyframe that is in the map, and changes its image there if enough of it differs.
+  /// Judges a keyframe of the map, and updates its image there if enough of it differs.
   template <class Policy, class Map>
   result<void> change(const Policy& policy, Map& map, view& v) {
     const std::size_t differ = judge_.judge(v);

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// What moves in a depth image, by some pixels of which it is known whether they show something that moves.
+/// Moving regions of a depth image, grown from pixels that are known to be moving or static.
 ///
 /// @code
 ///   orbis::mapping::moving_regions<orbis::camera::pinhole> regions{camera};
 ///   std::vector<orbis::mapping::marked_pixel> marks;
 ///   for (const auto& f : slam.last_frame().value().features)
 ///     if (f.moving || f.tracked) marks.push_back({f.x, f.y, f.moving});
-///   if (regions.find(depth, marks)) regions.remove(depth, copy.view());  // copy: of what depth stores
+///   if (regions.find(depth, marks)) regions.remove(depth, copy.view());  // copy: of the stored values of depth
 /// @endcode
 #pragma once
 
@@ -32,26 +32,26 @@
 
 namespace orbis::mapping {
 
-/// A pixel of which it is known whether it shows something that moves.
+/// A pixel that is known to be moving or static.
 struct marked_pixel {
   float x = 0.0F, y = 0.0F;
   bool moves = false;
 };
 
 struct moving_region_options {
-  /// How far along a surface what a marked pixel shows may reach, metres.
+  /// Maximum distance along a surface from a marked pixel, metres.
   float reach = 0.8F;
-  /// So many marked pixels that move there have to be at least, else nothing is taken out.
+  /// Minimum number of moving marks in the image; with fewer, nothing is removed.
   std::size_t least_marks = 5;
 };
 
-/// Grows marked pixels along the surfaces of a depth image, those that move and those that stand still at once: what is
-/// nearer to one that moves, moves with it. Surfaces end where depth leaps. A keyframe without what moves in it can go
-/// into a map: tracking tells of what moves before the camera at once (`slam::tracked_feature::moving`), also of
-/// somebody who goes along with it, whom no later ray passes through; `moving_filter` tells of what tracking has not
-/// seen.
+/// Grows marked pixels along the surfaces of a depth image, moving and static ones at the same time: a cell moves if
+/// its nearest mark moves. Surfaces end at depth discontinuities. A keyframe without moving objects can be integrated
+/// into a map: tracking detects moving objects in front of the camera at once (`slam::tracked_feature::moving`), also a
+/// person walking along with the camera, whom no later ray passes through; `moving_filter` detects moved objects that
+/// tracking has missed.
 ///
-/// Works on cells of 4x4 pixels. Keeps its memory: nothing is allocated after some images. For one thread at a time.
+/// Works on cells of 4x4 pixels. Reuses its memory: allocates nothing after some images. For one thread at a time.
 template <camera::camera_model Camera>
 class moving_regions {
  public:
@@ -59,7 +59,7 @@ class moving_regions {
   explicit moving_regions(const Camera& camera, const moving_region_options& options = {})
       : options_{options}, grid_{camera} {}
 
-  /// Finds the regions that move. Returns whether there are any. O(pixels + cells log cells), at once where no mark
+  /// Finds the moving regions. Returns true if there are any. O(pixels + cells log cells); returns at once if no mark
   /// moves. @pre the image has the camera's size
   template <camera::depth_source Depth>
   [[nodiscard]] bool find(const Depth& depth, std::span<const marked_pixel> marks) {
@@ -74,8 +74,8 @@ class moving_regions {
     return !removed_.empty();
   }
 
-  /// Writes what `depth` stores to `out`, with 0 where it shows something that moves. Returns how many pixels these
-  /// are. O(pixels). @pre the image that `find` was called with; `out` has its size
+  /// Writes the stored values of `depth` to `out`, with 0 in moving regions. Returns the number of removed pixels.
+  /// O(pixels). @pre the image that `find` was called with; `out` has its size
   template <camera::depth_source Depth>
   std::size_t remove(const Depth& depth, image_view<depth_pixel<Depth>> out) const {
     for (int y = 0; y != depth.height(); ++y)
@@ -85,7 +85,7 @@ class moving_regions {
 
  private:
   enum class label : std::uint8_t { unknown, stands, moves };
-  /// A cell that is reached, from a mark on its surface.
+  /// A cell reached from a mark on its surface.
   struct step {
     float way;  ///< metres
     std::uint32_t cell;
@@ -109,7 +109,8 @@ class moving_regions {
       if (std::isnan(grid_.rays[i].x())) depth_[i] = 0.0F;
   }
 
-  /// `visit(neighbour)` for the cells around one that lie on the same surface; returns whether all do that have depth.
+  /// Calls `visit(neighbour)` for the adjacent cells on the same surface. Returns true if all adjacent cells with depth
+  /// are.
   template <class Visit>
   bool around(std::size_t cell, const Visit& visit) const {
     const int x = static_cast<int>(cell) % grid_.across, y = static_cast<int>(cell) / grid_.across;
@@ -145,7 +146,7 @@ class moving_regions {
         continue;
       const auto cell = static_cast<std::size_t>(static_cast<int>(y) * grid_.across + static_cast<int>(x));
       if (depth_[cell] == 0.0F) continue;
-      // At an edge it is not clear which of the surfaces a mark is for.
+      // At an edge it is ambiguous which surface a mark belongs to.
       if (around(cell, [](std::size_t) {}))
         push({0.0F, static_cast<std::uint32_t>(cell), m.moves ? label::moves : label::stands});
     }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Which way is up in a depth image, so that a map can begin upright.
+/// The upward direction in a depth image, so that a map can begin upright.
 ///
 /// @code
 ///   const mapping::upright_view view = mapping::find_upright(frame.depth_metres(), camera::ray_table{camera});
@@ -32,18 +32,18 @@ namespace detail {
 
 struct found_up {
   vec3 up;              ///< unit vector
-  double fixing = 0.0;  ///< how many normals fix it, in the direction in which it is known least
-  double along = 0.0;   ///< how many normals lie along it
+  double fixing = 0.0;  ///< weight of the normals that determine it, in the direction in which it is known least
+  double along = 0.0;   ///< weight of the normals along it
 };
 
-/// How well a normal at an angle of sine `off` fits; 1 if exactly, 0 from `reach` on. (Tukey's biweight.)
+/// Weight of a normal at an angle of sine `off`; 1 at 0, 0 from `reach` on. (Tukey's biweight.)
 [[nodiscard]] inline double fit_of(double off, double reach) noexcept {
   const double t = off / reach;
   const double u = 1.0 - t * t;
   return u > 0 ? u * u : 0.0;
 }
 
-/// What normals say about the direction `up`.
+/// Weights of the normals along and across the direction `up`.
 struct up_ballot {
   double along = 0.0, across = 0.0;  ///< weights
   mat3 spread = zeros<mat3>();       ///< of the normals across, minus that of the normals along it
@@ -62,8 +62,8 @@ struct up_ballot {
   }
 };
 
-/// The direction within `max_tilt` radians of -y that most normals lie along or across; nothing where no normal does,
-/// or where it cannot be told from a turned one. O(normals), for some thousand directions.
+/// The direction within `max_tilt` radians of -y that most normals are along or perpendicular to; empty if no normal
+/// is, or if rotating the direction fits equally well. O(normals), for some thousand directions.
 [[nodiscard]] inline std::optional<found_up> vote_for_up(std::span<const vec3> normals, double max_tilt) {
   constexpr double degree = std::numbers::pi / 180.0;
   const double wide = std::sin(10.0 * degree);
@@ -71,7 +71,7 @@ struct up_ballot {
     double sum = 0.0;
     for (const vec3& n : normals) {
       const double c = dot(n, up), along = c * c;
-      // Floors and tables are seen from above. Half for walls, which fit many directions.
+      // Floors and tables are observed from above. Weight 0.5 for walls, which fit many directions.
       sum += 0.5 * fit_of(c, reach) + (c > 0 ? 1.0 : 0.5) * fit_of(std::sqrt(std::max(0.0, 1.0 - along)), reach);
     }
     return sum * up.y() * up.y();
@@ -114,13 +114,13 @@ struct up_ballot {
 namespace detail {
 
 struct planar_blocks {
-  std::vector<vec3> normals;   ///< of the flat blocks, in the camera's frame, towards the camera
-  std::size_t with_depth = 0;  ///< blocks that are mostly measured, flat or not
+  std::vector<vec3> normals;   ///< of the flat blocks, in the camera frame, towards the camera
+  std::size_t with_depth = 0;  ///< blocks with depth in most pixels, flat or not
 };
 
 /// Fits a plane to each block of a grid of about 27 by 20 blocks. On a plane `n . p = 1` the inverse depth is linear in
-/// the ray: `1 / z = n . (x, y, 1)`. Blocks whose inverse depths are off by more than a few thousandths, two percent
-/// where they are far, are not flat: the noise of depth grows with depth.
+/// the ray: `1 / z = n . (x, y, 1)`. Blocks whose inverse depths deviate by more than a few thousandths, two percent at
+/// far range, are not flat: the noise of depth grows with depth.
 template <camera::depth_source Depth>
 [[nodiscard]] planar_blocks find_planar_blocks(const Depth& depth, const camera::ray_table& rays) {
   constexpr int blocks_across = 27;
@@ -167,12 +167,12 @@ template <camera::depth_source Depth>
 
 }  // namespace detail
 
-/// What the direction of up was found from.
+/// Source of the upward direction.
 enum class upright_source {
-  gravity,  ///< measured, and given by the caller
+  gravity,  ///< measured, and passed by the caller
   floor,    ///< a floor, tables or a ceiling in the depth image, with or without walls
-  walls,    ///< at least two walls in different directions, and not enough of a floor
-  assumed   ///< nothing: the camera is taken to be held level, its -y axis up
+  walls,    ///< at least two walls in different directions, and too little floor
+  assumed   ///< none: the camera is assumed to be level, its -y axis up
 };
 
 /// The name of a source: "gravity", "floor", "walls", "assumed".
@@ -187,28 +187,28 @@ enum class upright_source {
 }
 
 struct upright_options {
-  /// Where gravity pulls, in the camera's frame (x right, y down, z forward), of any length: minus what an
-  /// accelerometer at rest measures. Not finite or zero: as if it were not given.
+  /// Direction of gravity in the camera frame (x right, y down, z forward), of any length: the negative of the reading
+  /// of an accelerometer at rest. Ignored if not finite or zero.
   std::optional<vec3> gravity_camera{};
-  double max_tilt = 50.0 * std::numbers::pi / 180.0;  ///< radians between up and the camera's -y axis, at most
-  double min_support = 0.06;  ///< share of the image's blocks with depth that have to fix the direction
+  double max_tilt = 50.0 * std::numbers::pi / 180.0;  ///< maximum angle between up and the camera's -y axis, radians
+  double min_support = 0.06;  ///< minimum share of the image's blocks with depth that determine the direction
 };
 
 struct upright_view {
-  /// Turns vectors of the camera's frame into an upright world: z up, x the horizontal part of where the camera looks.
+  /// Rotates vectors from the camera frame to an upright world: z up, x the horizontal part of the viewing direction.
   so3 R_world_camera;
   upright_source source = upright_source::assumed;
-  /// From 0 (assumed) to 1 (gravity): how large a share of the image's blocks with depth fixes the direction. Where it
-  /// is above 0.2, the error was below 2 degrees in what we tried.
+  /// From 0 (assumed) to 1 (gravity): share of the image's blocks with depth that determine the direction. Above 0.2,
+  /// the error was below 2 degrees in our tests.
   double confidence = 0.0;
 
-  /// The direction of up in the camera's frame; a unit vector.
+  /// The upward direction in the camera frame; a unit vector.
   [[nodiscard]] vec3 up_camera() const { return R_world_camera.inverse() * vec3(0.0, 0.0, 1.0); }
 };
 
-/// The rotation to a world with z up, in which the camera looks along x as far as that is horizontal: with `up_camera`
-/// a unit vector of the camera's frame. A camera that looks straight up or down has the top of its image, or the
-/// bottom, along x.
+/// The rotation to a world with z up in which x is the horizontal part of the viewing direction; `up_camera`: a unit
+/// vector in the camera frame. For a camera that looks straight up or down, x is the direction of the top of its image,
+/// or of the bottom.
 [[nodiscard]] inline so3 upright_rotation(const vec3& up_camera) {
   vec3 ahead = vec3(0.0, 0.0, 1.0) - up_camera.z() * up_camera;
   if (norm(ahead) < 1e-3) {
@@ -219,18 +219,18 @@ struct upright_view {
   return so3{rows(ahead, cross(up_camera, ahead), up_camera)};
 }
 
-/// The upright world of a depth image: from gravity where it is given, else from planes.
+/// The upright world of a depth image: from gravity if it is given, otherwise from planes.
 ///
 /// Planes are fitted to the blocks of a grid of some hundreds, in inverse depth, where a plane is linear and the noise
-/// of a disparity sensor is even. Each block votes for the directions along its normal (a floor, a table, a ceiling)
-/// and across it (a wall); directions beyond `max_tilt` are left out, and those far from the camera's -y axis weigh
-/// less. The best of them is refined by least squares over the blocks that agree: the eigenvector of the smallest
-/// eigenvalue of `sum(wall normals n n^T) - sum(floor normals n n^T)`. If the image does not fix a direction (nothing
-/// flat, one wall only), the camera is taken to be level, and the source says so.
+/// of a disparity sensor is uniform. Each block votes for the directions along its normal (a floor, a table, a ceiling)
+/// and perpendicular to it (a wall); directions beyond `max_tilt` are excluded, and those far from the camera's -y axis
+/// have less weight. The best direction is refined by least squares over the blocks that agree: the eigenvector of the
+/// smallest eigenvalue of `sum(wall normals n n^T) - sum(floor normals n n^T)`. If the image does not determine a
+/// direction (nothing flat, one wall only), the camera is assumed to be level, and `source` is `assumed`.
 ///
-/// Source: the vote of normals for a frame of right angles is after J. Straub, O. Freifeld, G. Rosman, J. J. Leonard,
-/// J. W. Fisher III, "The Manhattan frame model: Manhattan world inference in the space of surface normals", T-PAMI 40,
-/// 2018; here only up has to be found, so walls need not be at right angles.
+/// The voting of normals for an orthogonal frame is based on J. Straub, O. Freifeld, G. Rosman, J. J. Leonard, J. W.
+/// Fisher III, "The Manhattan frame model: Manhattan world inference in the space of surface normals", T-PAMI 40, 2018;
+/// here only the upward direction is estimated, so walls need not be perpendicular.
 ///
 /// O(pixels), a few milliseconds for 640 x 480. @pre depth and rays have the same size
 template <camera::depth_source Depth>

@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// How far it is to the nearest obstacle of an occupancy map: a truncated Euclidean distance field that follows the
-/// map.
+/// A truncated Euclidean distance field of an occupancy map: the distance to the nearest obstacle. It follows the map.
 ///
 /// @code
 ///   map.track_changes();
 ///   orbis::nav::distance_field field{map, {.reach = 1.0}};
 ///   ...
 ///   map.integrate(depth, camera, T_world_camera);
-///   field.update(map);                                   // what changed since the last update
+///   field.update(map);                                   // changes since the last update
 ///   if (field.distance(p) < 0.3) slow_down();
 ///   const auto [metres, gradient] = field.distance_and_gradient(p);
 ///   const orbis::nav::distance_view now = field.view();   // for readers on other threads
@@ -36,39 +35,39 @@
 namespace orbis::nav {
 
 struct distance_field_options {
-  double reach = 1.0;  ///< distances beyond are not told apart, metres; 1 to 181 voxels
-  /// What a voxel of which nothing is known counts as: an obstacle, or free.
+  double reach = 1.0;  ///< maximum distance; larger ones are reported as `reach`, metres; 1 to 181 voxels
+  /// State that an unknown voxel counts as: occupied or free.
   octree::occupancy unknown = octree::occupancy::occupied;
-  /// Obstacles and what is none change places: how deep inside of obstacles it is, 0 where there is none. See
+  /// Exchanges obstacles and free space: the field is then the depth inside of obstacles, 0 outside of them. See
   /// signed_distance.
   bool inside = false;
-  /// For how many bricks of 8x8x8 voxels (2.9 kB each) leaves of the map that are larger than a brick may make room:
-  /// a file of a few bytes can be a leaf as large as the grid. What goes beyond is left out, see `is_complete`.
+  /// Maximum number of bricks of 8x8x8 voxels (2.9 kB each) for leaves of the map that are larger than a brick: a file
+  /// of a few bytes can be a leaf as large as the grid. Leaves beyond the limit are left out, see `is_complete`.
   std::size_t max_bricks = std::size_t{1} << 19U;
 };
 
-/// A distance and its gradient: dimensionless, of length about 1 where one obstacle is nearest.
+/// A distance and its gradient: dimensionless, of length about 1 where a single obstacle is nearest.
 struct distance_with_gradient {
   double distance = 0.0;  ///< metres
   vec3 gradient = zeros<vec3>();
 };
 
-/// Distances in metres. A voxel's distance is the one between its centre and the centre of the nearest voxel that is an
-/// obstacle: 0 in obstacles, and nowhere more than `reach()`. The grid's outside counts as unknown.
+/// Distances in metres. The distance of a voxel is the one between its centre and the centre of the nearest obstacle
+/// voxel: 0 in obstacles, and at most `reach()`. Space outside of the grid counts as unknown.
 template <class Voxels>
 class metric_distances {
  public:
-  /// The distance of the voxel that `p` (metres) lies in. O(1), about 20 ns.
+  /// The distance of the voxel that contains `p` (metres). O(1), about 20 ns.
   template <point_like P>
   [[nodiscard]] double distance(const P& p) const noexcept {
     const auto k = grid_.key(p);
     return k ? distance(*k) : metres(voxels_.elsewhere());
   }
   [[nodiscard]] double distance(const octree::voxel_key& k) const noexcept { return metres(voxels_.squared(k)); }
-  /// Interpolated linearly along each axis between the centres of the eight voxels around `p` (metres): continuous, and
-  /// the gradient is its derivative. Beyond the centres of the grid's outermost voxels there are no others: where the
-  /// outside is an obstacle it counts as one, else the outermost values stay as they are up to the grid's edge, and
-  /// outside of it there is `reach()`. O(1), about 50 ns.
+  /// Interpolates linearly along each axis between the centres of the eight voxels around `p` (metres). The distance is
+  /// continuous, and the gradient is its derivative. Beyond the centres of the outermost voxels of the grid: if the
+  /// outside is an obstacle it counts as one; otherwise the outermost values extend to the edge of the grid, and the
+  /// distance outside of it is `reach()`. O(1), about 50 ns.
   template <point_like P>
   [[nodiscard]] distance_with_gradient distance_and_gradient(const P& p) const noexcept {
     const auto c = coordinates<double>(p);
@@ -106,7 +105,7 @@ class metric_distances {
     const double along_y = mix(x10 - x00, x11 - x01, w);
     return {mix(y0, y1, w), vec3{along_x, along_y, y1 - y0} / cell};
   }
-  /// How far from `p` (metres) there is certainly no point of an obstacle's cube, at least; 0 in obstacles. O(1).
+  /// Radius (metres) around `p` in which there is certainly no point of an obstacle's cube; 0 in obstacles. O(1).
   template <point_like P>
   [[nodiscard]] double clearance(const P& p) const noexcept {
     const auto k = grid_.key(p);
@@ -120,7 +119,7 @@ class metric_distances {
   [[nodiscard]] const octree::voxel_grid& grid() const noexcept { return grid_; }
   /// The largest distance, metres.
   [[nodiscard]] double reach() const noexcept { return reach_; }
-  /// Of a squared distance in voxels, metres.
+  /// Distance in metres of a squared distance in voxels.
   [[nodiscard]] double metres(std::uint16_t squared) const noexcept {
     return squared == squared_distance_view::far
                ? reach_
@@ -139,13 +138,14 @@ class metric_distances {
   double reach_;
 };
 
-/// The distances at one moment, for readers. It shares memory with the field it was taken of, and does not change.
+/// The distances at one moment, for readers. It shares memory with the field that it was made from, and does not
+/// change.
 using distance_view = metric_distances<squared_distance_view>;
 
-/// The signed distance at `p` (metres) and its gradient, of two fields of one map: one as usual, and one that is made
-/// with `inside`. Positive outside of obstacles and negative in them, where it leads out along the gradient; from
-/// -reach to reach, and interpolated as both are. Where two voxels touch, one of which is an obstacle, it goes from
-/// minus to plus the edge of a voxel, and is 0 on the face between them. O(1).
+/// Signed distance at `p` (metres) and its gradient, from two fields of one map: a normal one, and one with the option
+/// `inside`. The distance is positive outside of obstacles and negative in them, where the gradient points outwards;
+/// its range is [-reach, reach], and it is interpolated like both fields. Between two adjacent voxels of which one is
+/// an obstacle, it changes from minus to plus the edge of a voxel, and is 0 on the face between them. O(1).
 ///
 /// @code
 ///   const orbis::nav::distance_field outside{map, {.reach = 1.0}}, inside{map, {.reach = 0.5, .inside = true}};
@@ -158,40 +158,42 @@ template <class Outside, class Inside, point_like P>
   return {to.distance - out.distance, to.gradient - out.gradient};
 }
 
-/// The distance field of a map. It is, bit for bit, the one made afresh of the map as it is, whatever the order of
-/// changes, with obstacles that come and go; no box has to be named. See squared_distances.hpp for how.
+/// The distance field of a map. It is bit for bit equal to one rebuilt from the present map, whatever the order of
+/// changes, including obstacles that appear and vanish. It needs no bounds. The algorithm is described in
+/// squared_distances.hpp.
 ///
-/// One thread at a time. Readers on other threads use a `view()`, which is taken on the field's own thread.
+/// For one thread at a time. Readers on other threads use a `view()`, made on the thread that updates the field.
 class distance_field : public metric_distances<squared_distances> {
  public:
-  /// Of an empty map. @pre options.reach is 1 to 181 times the resolution
+  /// A field of an empty map. @pre options.reach is 1 to 181 times the resolution
   explicit distance_field(const octree::voxel_grid& grid, const distance_field_options& options = {})
       : metric_distances{grid,
                          {static_cast<int>(std::ceil(options.reach / grid.resolution() - 1e-9)), grid.cells(),
                           (options.unknown == octree::occupancy::occupied) != options.inside},
                          options.reach},
         options_{options} {}
-  /// Of `map` as it is.
+  /// A field of `map`.
   template <planning_map Map>
   explicit distance_field(const Map& map, const distance_field_options& options = {})
       : distance_field{map_access<Map>::grid(map), options} {
     update(map);
   }
 
-  /// Follows the map: by its change log (`map.changes()`), where it has one that knows all since the last update, else
-  /// by comparing everything: after what the log does not record (see occupancy_octree::track_changes), and each time
-  /// while changes are not tracked. Costs what squared_distances::update costs, and comparing everything O(bricks of
-  /// the field + octants of the map) more. Of a leaf of 256 voxels' edge or more, only what is within reach of its
-  /// faces costs time and memory; where such a leaf is new or gone since everything was compared last, the field is
-  /// made afresh. @pre the same map every time, of the same grid
+  /// Follows the map by its change log (`map.changes()`) if it has one that covers all changes since the last update.
+  /// Otherwise it compares everything: after changes that the log does not record (see
+  /// occupancy_octree::track_changes), and each time if changes are not tracked. Costs as much as
+  /// squared_distances::update; comparing everything takes O(bricks of the field + octants of the map) more. Of a leaf
+  /// with an edge of 256 voxels or more, only the part within reach of its faces costs time and memory; if such a leaf
+  /// appeared or vanished since everything was last compared, the field is rebuilt. @pre the same map every time, of
+  /// the same grid
   template <planning_map Map>
   void update(const Map& map) {
     assert(map_access<Map>::grid(map) == grid_);
     follower_.follow(map, changed_in(map), [&] { compare_all(map); });
   }
-  /// Follows a copy of the map (a snapshot), with the log of the map that it is a copy of. `revision`: of the log when
-  /// the copy was made. The log may have gone on since then, and the copy may be
-  /// older than the one before: the field becomes that of the copy.
+  /// Follows a copy of the map (a snapshot) with the log of the original map. `revision`: of the log when the copy was
+  /// made. The log may be newer than the copy, and the copy may be older than the previous one: the field becomes that
+  /// of the copy.
   ///
   /// @code
   ///   listeners.published = [&](const auto& snapshot, const octree::change_log& log) {  // of a live_map_thread
@@ -204,30 +206,30 @@ class distance_field : public metric_distances<squared_distances> {
     assert(map_access<Map>::grid(copy) == grid_);
     follower_.follow(log, revision, changed_in(copy), [&] { compare_all(copy); });
   }
-  /// Follows the map by comparing everything, whatever its log says.
+  /// Follows the map by comparing everything, without the log.
   template <planning_map Map>
   void update_all(const Map& map) {
     assert(map_access<Map>::grid(map) == grid_);
     compare_all(map);
-    follower_.see(map);
+    follower_.mark_read(map);
   }
 
-  /// The centre of the obstacle nearest to the voxel that `p` lies in, metres; empty if there is none within reach.
+  /// The centre of the obstacle nearest to the voxel that contains `p`, metres; empty if there is none within reach.
   template <point_like P>
   [[nodiscard]] std::optional<vec3> nearest_obstacle(const P& p) const {
     const auto k = grid_.key(p);
     const auto found = k ? voxels_.nearest(*k) : std::nullopt;
     return found ? std::optional{grid_.center(*found)} : std::nullopt;
   }
-  /// What readers on other threads need. To be called on the field's own thread (the one that updates it), between two
-  /// updates: after each, for example, and handed over under a lock or by an atomic shared pointer. It shares its
-  /// memory with the field and does not change; it may be read by several threads at once, copied, and destroyed on
-  /// any. O(bricks): a pointer and an atomic increment for each 4 of them; the field then clones what it writes to, 4
-  /// kB at a time. On the field's own thread ask the field itself.
+  /// A view for readers on other threads. Call it on the thread that updates the field, between two updates, for
+  /// example after each one, and pass it on under a lock or by an atomic shared pointer. It shares its memory with the
+  /// field and does not change; several threads may read it at once, and it may be copied and destroyed on any thread.
+  /// O(bricks): a pointer and an atomic increment for each 4 of them; the field then clones the parts that it writes
+  /// to, 4 kB at a time. On the updating thread query the field itself.
   [[nodiscard]] distance_view view() const { return {grid_, voxels_.view(), reach_}; }
-  /// False if leaves of the map were left out because of `max_bricks`: they count as unknown, at least in places where
-  /// the field stores nothing. With unknown space as obstacle distances are then at most too short; with unknown space
-  /// as free, obstacles are missing. Of a field that is made with `inside` it is the other way round.
+  /// False if leaves of the map were left out because of `max_bricks`: they count as unknown, at least where the field
+  /// stores nothing. If unknown space counts as an obstacle, distances are then at most too short; if it counts as
+  /// free, obstacles are missing. With the option `inside` it is the opposite.
   [[nodiscard]] bool is_complete() const noexcept { return is_complete_; }
   [[nodiscard]] const distance_field_options& options() const noexcept { return options_; }
   /// Bytes on the heap.
@@ -247,7 +249,7 @@ class distance_field : public metric_distances<squared_distances> {
       apply();
     };
   }
-  /// From which level on leaves are told to the field as cubes.
+  /// Minimum level of leaves that are added to the field as cubes.
   static constexpr int cube_level = 8;
 
   template <planning_map Map>
@@ -258,8 +260,8 @@ class distance_field : public metric_distances<squared_distances> {
     }
     apply();
   }
-  /// Lists the octants that may be different in the map, and begins a field that has nothing yet with the cubes. False
-  /// if the cubes that it began with are no longer those of the map.
+  /// Lists the octants that may differ in the map, and begins an empty field with the cubes. Returns false if the cubes
+  /// that it began with are no longer those of the map.
   template <planning_map Map>
   bool find_differences(const Map& map) {
     octants_.clear();
@@ -282,7 +284,7 @@ class distance_field : public metric_distances<squared_distances> {
       const voxel_cube node{low, level};
       const bool is_in_cube = voxels_.is_in_cube(node);
       if (is_in_cube) in_cubes += volume(level);
-      if (mask == (is_in_cube ? ~elsewhere : elsewhere)) return;  // as where nothing is stored
+      if (mask == (is_in_cube ? ~elsewhere : elsewhere)) return;  // equal to the value where nothing is stored
       if (level >= cube_level && mask == (is_in_cube ? elsewhere : ~elsewhere)) {
         const std::uint64_t more = voxels_.bricks_of(node);
         if (!is_in_cube && cubes_.bricks + more > options_.max_bricks) {
@@ -309,14 +311,14 @@ class distance_field : public metric_distances<squared_distances> {
           }
     });
     if (!cubes.empty()) voxels_.begin(cubes);
-    // Parts of a cube that the map no longer knows are not visited.
+    // Parts of a cube that have become unknown in the map are not visited.
     return is_same && (is_first || in_cubes == cubes_.volume);
   }
-  /// Of a node, in voxels.
+  /// Volume of a node in voxels.
   [[nodiscard]] static std::uint64_t volume(int level) noexcept { return std::uint64_t{1} << (3 * level); }
   void apply() {
     voxels_.update(octants_);
-    // What usual updates need is kept, so that these allocate nothing.
+    // Keep the capacity that usual updates need, so that they allocate nothing.
     constexpr std::size_t few = (std::size_t{1} << 20U) / sizeof(octant_obstacles);
     if (octants_.capacity() > std::max(few, 8 * voxels_.brick_count())) octants_ = std::vector<octant_obstacles>();
   }
@@ -330,7 +332,7 @@ class distance_field : public metric_distances<squared_distances> {
   std::vector<octant_obstacles> octants_;
   struct {
     std::uint64_t bricks = 0, volume = 0;
-  } cubes_;  ///< those that the field began with, together
+  } cubes_;  ///< totals of the cubes that the field began with
   bool is_complete_ = true;
 };
 

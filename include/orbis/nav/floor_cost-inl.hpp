@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The functions of floor_cost.hpp.
+/// Function definitions of floor_cost.hpp.
 #pragma once
 
 #include <algorithm>
@@ -35,7 +35,7 @@ ORBIS_INLINE image<float> squared_floor_distances(const image<floor_state>& stat
       if (last >= 0) offer(x, last);
     }
   }
-  // The lower envelope of the parabolas of a column: which of them is the lowest, and from where on.
+  // The lower envelope of the parabolas of a column: the lowest parabola, and where it begins.
   std::vector<double> column(static_cast<std::size_t>(height)), begin(column.size());
   std::vector<int> lowest(column.size());
   for (int x = 0; x != width; ++x) {

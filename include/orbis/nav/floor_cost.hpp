@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// What it costs to drive past obstacles: a floor map inflated as the costmaps of Nav2 are.
+/// Costs of driving near obstacles: a floor map inflated like the costmaps of Nav2.
 #pragma once
 
 #include <cstdint>
@@ -10,29 +10,29 @@
 
 namespace orbis::nav {
 
-/// The values of a cost map that mean something of their own, as Nav2 names them.
+/// Special values of a cost map, with Nav2's names.
 namespace floor_cost {
 inline constexpr std::uint8_t free_space = 0;
-inline constexpr std::uint8_t inscribed = 253;  ///< a robot whose middle is here touches an obstacle
+inline constexpr std::uint8_t inscribed = 253;  ///< a robot whose centre is here touches an obstacle
 inline constexpr std::uint8_t lethal = 254;     ///< an obstacle
 inline constexpr std::uint8_t no_information = 255;
 }  // namespace floor_cost
 
 struct inflation_options {
   double radius = 0.2;             ///< of the robot, metres ("inscribed radius")
-  double inflation_radius = 0.55;  ///< beyond, obstacles cost nothing, metres
-  double cost_scaling = 3.0;       ///< how fast the cost falls, per metre
+  double inflation_radius = 0.55;  ///< metres; obstacles farther away cost nothing
+  double cost_scaling = 3.0;       ///< rate at which the cost falls, per metre
 };
 
-/// The squared distance of each cell to the nearest occupied one, between the middles, in cells; a large number if
-/// nothing is occupied. Exact up to 4096 cells, and rounded to a float beyond. O(cells).
+/// The squared distance of each cell to the nearest occupied one, between their centres, in cells; a large number if no
+/// cell is occupied. Exact up to 4096 cells, and rounded to a float beyond. O(cells).
 ///
 /// P. Felzenszwalb, D. Huttenlocher, "Distance transforms of sampled functions", Theory of Computing 8, 2012.
 [[nodiscard]] image<float> squared_floor_distances(const image<floor_state>& states);
 
 /// The costs of the cells of a floor map, by Nav2's rule: 254 in obstacles; 253 where the robot's circle touches one
-/// (the middles of the cells are at most `radius` apart); 252 exp(-cost_scaling (d - radius)), rounded down, up to the
-/// inflation radius; 0 beyond; and 255 where nothing is known, unless an obstacle is within `radius`. O(cells).
+/// (the cell centres are at most `radius` apart); 252 exp(-cost_scaling (d - radius)), rounded down, up to the
+/// inflation radius; 0 beyond; and 255 in unknown cells, unless an obstacle is within `radius`. O(cells).
 /// @pre 0 <= radius; cost_scaling >= 0
 [[nodiscard]] image<std::uint8_t> inflate(const floor_map& map, const inflation_options& options = {});
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The functions of floor_file.hpp.
+/// Function definitions of floor_file.hpp.
 #pragma once
 
 #include <array>
@@ -19,16 +19,19 @@ namespace orbis::nav {
 
 ORBIS_INLINE result<void> save_floor_map(const std::filesystem::path& path, const floor_map& map) {
   const auto fits = [&](double number) { return std::isfinite(number); };
-  if (!path.has_filename()) return fail(errc::invalid_argument, path.string(), "is not the name of a file");
+  if (!path.has_filename()) return fail(errc::invalid_argument, path.string(), "has no file name; name a .yaml file");
   if (map.states.empty() || !fits(map.origin.x()) || !fits(map.origin.y()) ||
       !(fits(map.resolution) && map.resolution > 0))
-    return fail(errc::invalid_argument, path.string(), "the map is empty, or its place or resolution is not a number");
+    return fail(errc::invalid_argument, path.string(),
+                "the map is empty, its origin is not finite, or its resolution is not positive");
   const std::filesystem::path image_path = std::filesystem::path{path}.replace_extension(".pgm");
   const std::string name = image_path.filename().string();
-  if (image_path == path) return fail(errc::invalid_argument, path.string(), "is the name of the image");
+  if (image_path == path)
+    return fail(errc::invalid_argument, path.string(), "ends in .pgm, the name of the image; name a .yaml file");
   for (const char c : name)
     if (c == '"' || c == '\\' || static_cast<unsigned char>(c) < 0x20)
-      return fail(errc::invalid_argument, path.string(), "has a character in its name that cannot stand in the file");
+      return fail(errc::invalid_argument, path.string(),
+                  "has a quotation mark, a backslash or a control character in its name; rename it");
   const auto number = [](double v) {
     std::array<char, 32> text{};
     const auto end = std::to_chars(text.data(), text.data() + text.size(), v).ptr;

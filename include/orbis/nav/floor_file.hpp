@@ -10,11 +10,11 @@
 
 namespace orbis::nav {
 
-/// Writes `path` (a `.yaml` file) and beside it an image of the same name that ends in `.pgm`: 0 is occupied, 254 free,
-/// 205 unknown, the row of the largest y first. The thresholds are those with which both `map_server` and Nav2 read all
-/// three back ("trinary"): `free_thresh` is 0.196, for with 0.25, which Nav2 writes by default, unknown cells are read
-/// as free. Each file is replaced at once, the image first. Errors: write_failed, invalid_argument (no name, or one
-/// that ends in .pgm, or has a quotation mark, a backslash or a control character in it; an empty map, or one whose
+/// Writes `path` (a `.yaml` file) and next to it an image of the same name that ends in `.pgm`: 0 is occupied, 254
+/// free, 205 unknown, the row of the largest y first. With the thresholds in the file, both `map_server` and Nav2 read
+/// all three states back ("trinary"): `free_thresh` is 0.196, because with 0.25, Nav2's default, unknown cells are read
+/// as free. Each file is replaced atomically, the image first. Errors: write_failed, invalid_argument (no file name, or
+/// one that ends in .pgm or contains a quotation mark, a backslash or a control character; an empty map, or one whose
 /// origin or resolution is not finite; nothing is written then).
 [[nodiscard]] result<void> save_floor_map(const std::filesystem::path& path, const floor_map& map);
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The functions of floor_map.hpp.
+/// Function definitions of floor_map.hpp.
 #pragma once
 
 #include <algorithm>
@@ -22,7 +22,7 @@ namespace orbis::nav {
 
 namespace detail {
 
-/// On so many octants on top of large leaves find_floor looks: one second's work.
+/// Maximum number of octants on top of large leaves that find_floor examines: one second's work.
 inline constexpr std::uint64_t most_octants_on_leaves = std::uint64_t{1} << 24U;
 
 }  // namespace detail
@@ -62,8 +62,8 @@ std::optional<double> find_floor(const Map& map) {
 
 namespace detail {
 
-/// Each value becomes the extreme of those at most `radius` away along both axes: of ranges whose length doubles, and
-/// of two of these that overlap. `nothing` is as no value. O(values x log radius).
+/// Replaces each value by the extreme of the values at most `radius` away along both axes: combines ranges of doubling
+/// lengths, and finally two of these that overlap. `nothing` counts as no value. O(values x log radius).
 template <class Extreme>
 void spread_extremes(image<int>& values, int radius, int nothing, const Extreme& extreme) {
   std::vector<int> line;
@@ -83,13 +83,13 @@ void spread_extremes(image<int>& values, int radius, int nothing, const Extreme&
   for (int x = 0; x != values.width(); ++x) along(&values(x, 0), &values(0, 1) - &values(0, 0), values.height());
 }
 
-/// Surfaces of columns, and which of them a robot gets to.
+/// Surfaces of columns, and those that a robot can reach.
 class floor_search {
  public:
   static constexpr int none = no_level;
 
-  /// Levels are those of `columns`; `lowest` and `highest`: between which surfaces are looked for; `clear` and `step`
-  /// in voxels.
+  /// Levels are those of `columns`; `lowest` and `highest`: range of the levels of surfaces; `clear` and `step` in
+  /// voxels.
   floor_search(const voxel_columns& columns, int lowest, int highest, int clear, int step, octree::occupancy unknown)
       : columns_{columns},
         lowest_{lowest},
@@ -101,8 +101,8 @@ class floor_search {
     find_surfaces();
   }
 
-  /// Drives from all surfaces within a step of level `floor`, and keeps the lowest of each column.
-  void drive(int floor) {
+  /// Floods from all surfaces within a step of level `floor`, and keeps the lowest reached surface of each column.
+  void flood(int floor) {
     std::vector<std::uint32_t> waiting;
     const auto get_to = [&](std::size_t surface) {
       if (reached_[surface]) return;
@@ -125,7 +125,7 @@ class floor_search {
       });
     }
   }
-  /// The lowest surface of each column that the robot gets to, or `none`.
+  /// The lowest reachable surface of each column, or `none`.
   [[nodiscard]] const image<int>& levels() const noexcept { return levels_; }
 
   [[nodiscard]] floor_state judge_surface(int x, int y, double steepest) const {
@@ -138,17 +138,17 @@ class floor_search {
     if (is_edge || is_steep(x, y, steepest)) return floor_state::occupied;
     return columns_.next_unknown(x, y, level) > level + clear_ ? floor_state::free : in_doubt();
   }
-  /// A column without a surface that the robot gets to, beside a floor at `level`.
+  /// State of a column without a reachable surface, next to a floor at `level`.
   [[nodiscard]] floor_state judge_other(int x, int y, int level) const {
     const int from = std::max(level + step_ + 1, 0);
     if (columns_.next_occupied(x, y, from) <= level + step_ + clear_) return floor_state::occupied;
-    // Beneath level 0 and beyond the last nothing is known, unless there the grid ends.
+    // Below level 0 and above the last level everything is unknown, unless the grid ends there.
     const int deepest = columns_.low().z == 0 ? std::max(level - step_, 0) : level - step_;
     if (deepest >= 0 && columns_.next_occupied(x, y, deepest) > level && columns_.next_unknown(x, y, deepest) > level)
       return floor_state::occupied;
     return in_doubt();
   }
-  /// How far is_steep looks, in cells. Before judging, and after driving.
+  /// Sets the radius of is_steep, in cells. Call it before judging and after driving.
   void set_radius(int radius) {
     radius_ = std::min(radius, std::max(levels_.width(), levels_.height()));
     // Sums of integers are faster, if they fit.
@@ -165,8 +165,8 @@ class floor_search {
     spread_extremes(high_, radius_, none, [](int a, int b) { return std::max(a, b); });
   }
 
-  /// For each column the level of the nearest one that has any, by steps to the four neighbours; of several the lowest.
-  /// `otherwise` if there is none.
+  /// For each column the level of the nearest column that has one, by steps to the four neighbours; of several the
+  /// lowest. `otherwise` if there is none.
   [[nodiscard]] image<int> spread_levels(int otherwise) const {
     image<int> spread = levels_;
     std::vector<std::array<int, 2>> border, next;
@@ -237,8 +237,8 @@ class floor_search {
     first_.push_back(static_cast<std::uint32_t>(surfaces_.size()));
     reached_.resize(surfaces_.size());
   }
-  /// Whether the floor around rises by more than a step, and its plane by least squares is steeper than `steepest`
-  /// (tangent). Columns count that differ by at most a step for each cell that they are away: no ledges.
+  /// Returns true if the floor around rises by more than a step, and its least-squares plane is steeper than `steepest`
+  /// (tangent). Columns that differ by at most a step per cell of distance count, so that ledges do not.
   [[nodiscard]] bool is_steep(int x, int y, double steepest) const {
     const int level = levels_(x, y);
     if (high_(x, y) - low_(x, y) <= step_ || step_ == 0) return false;
@@ -286,7 +286,7 @@ result<floor_map> make_floor_map(const Map& map, const ground_robot& robot, cons
   constexpr std::uint64_t most_words = std::uint64_t{1} << 26U;
   const octree::voxel_grid& grid = map_access<Map>::grid(map);
   const double cell = grid.resolution();
-  const auto limited = [&](double voxels) {  // no more than the grid has: a limit may be infinite
+  const auto limited = [&](double voxels) {  // at most the size of the grid: a limit may be infinite
     return static_cast<int>(std::min(voxels, static_cast<double>(std::min(grid.cells(), 1U << 24U))));
   };
   const auto voxels = [&](double metres) { return limited(std::ceil(metres / cell - 1e-6)); };
@@ -317,7 +317,7 @@ result<floor_map> make_floor_map(const Map& map, const ground_robot& robot, cons
   const auto level_of = [&](std::uint32_t key) { return static_cast<int>(key) - static_cast<int>(columns->low().z); };
 
   detail::floor_search search{*columns, level_of(lowest), level_of(highest), clear, step, options.unknown};
-  search.drive(level_of(*floor_key));
+  search.flood(level_of(*floor_key));
   search.set_radius(std::max(1, limited(std::round(robot.radius / cell))));
   const image<int> beside = search.spread_levels(level_of(*floor_key));
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Where a round robot fits on a floor, for paths in two dimensions.
+/// Planning space of a round robot on a floor, for paths in two dimensions.
 ///
 /// @code
 ///   const auto floor = orbis::nav::make_floor_map(map, robot);
@@ -26,25 +26,26 @@
 
 namespace orbis::nav {
 
-/// Whether a disc is free on a floor, at rest or on its way along a segment: whether it has no point in common with the
-/// square of a cell that is occupied. The answers are exact. A disc that leaves the map meets unknown cells there.
+/// Tests whether a disc is free on a floor, at rest or moving along a segment: whether it has no point in common with
+/// the square of an occupied cell. The answers are exact. Space outside of the map counts as unknown cells.
 ///
-/// A `planning_space`, of which the z coordinate does not count: two places have the distance that they have seen from
-/// above, and a path is reported at the height of the floor in the cells of its points. It refers to the floor map,
-/// which must stay as it is while it is used. Any number of threads may ask.
+/// A `planning_space` that ignores z: the distance of two places is the horizontal one, and a path is reported at the
+/// height of the floor in the cells of its points. It refers to the floor map, which must not change while the view is
+/// used. Safe for concurrent queries.
 class floor_view {
  public:
   static constexpr int dimensions = 2;
 
-  /// `radius`: of the robot, metres. `unknown`: what cells count as of which nothing is known. O(cells).
+  /// `radius`: of the robot, metres. `unknown`: state that unknown cells count as. O(cells).
   /// @pre radius > 0; less than 2^21 cells along x and y; the options'
   floor_view(const floor_map& map, double radius, const planning_options& options = {},
              octree::occupancy unknown = octree::occupancy::occupied)
       : map_{&map}, radius_{radius}, options_{options} {
     look_at_obstacles(unknown, [&](int x, int y) { return map.states(x, y); });
   }
-  /// For the middle of a robot on a cost map (see inflate), which knows its radius: cells from `inscribed` on are
-  /// obstacles, and a metre costs 1 + clearance_weight cost / 252 in the others; preferred_clearance does not count.
+  /// For the centre of a robot on a cost map (see inflate), which accounts for its radius: cells with at least
+  /// `inscribed` are obstacles, and a metre costs 1 + clearance_weight cost / 252 in the others; preferred_clearance is
+  /// ignored.
   /// @pre as above; costs are those of `map`, and outlive the view
   floor_view(const floor_map& map, const image<std::uint8_t>& costs, const planning_options& options = {},
              octree::occupancy unknown = octree::occupancy::occupied)
@@ -57,7 +58,7 @@ class floor_view {
                                                 : floor_state::free;
     });
   }
-  // Neither would outlive the view.
+  // A temporary would not outlive the view.
   floor_view(const floor_map&&, double, const planning_options& = {},
              octree::occupancy = octree::occupancy::occupied) = delete;
   floor_view(const floor_map&&, const image<std::uint8_t>&, const planning_options& = {},
@@ -65,29 +66,29 @@ class floor_view {
   floor_view(const floor_map&, const image<std::uint8_t>&&, const planning_options& = {},
              octree::occupancy = octree::occupancy::occupied) = delete;
 
-  /// Whether the disc around `p` (metres) touches no obstacle. False outside of the map or the region. O(1) away from
-  /// obstacles, O((radius / resolution)^2) near them.
+  /// Returns true if the disc around `p` (metres) touches no obstacle. False outside of the map or the region. O(1)
+  /// away from obstacles, O((radius / resolution)^2) near them.
   [[nodiscard]] bool is_free(const vec3& p) const { return is_free(p, p); }
-  /// Whether it touches none on its straight way from `a` to `b` (metres). O(length / distance to the obstacles), and
-  /// the cells of the box around each 4 cells of the way near them.
+  /// Returns true if the disc touches no obstacle on the straight segment from `a` to `b` (metres). O(length / distance
+  /// to the obstacles), plus near obstacles the cells of the box around each 4 cells of the segment.
   [[nodiscard]] bool is_free(const vec3& a, const vec3& b) const { return is_free(a, b, 0.0); }
   /// The same for a disc whose radius is larger by `by` (metres). @pre by >= 0
   [[nodiscard]] bool is_free(const vec3& a, const vec3& b, double by) const {
     if (!key(a) || !key(b)) return false;
     const double radius = radius_ + by;
-    return detail::is_way_free(
+    return detail::is_segment_free(
         placed(a), placed(b), resolution(), [&](const vec3& p) { return margin(p, radius); },
         [&](const vec3& p, const vec3& q) { return overlaps(p, q, radius); });
   }
-  /// The same.
+  /// Equal to `is_free(a, b)`.
   [[nodiscard]] bool is_surely_free(const vec3& a, const vec3& b) const { return is_free(a, b); }
-  /// Whether the disc in the middle of a cell is free. @pre contains(k)
+  /// Returns true if the disc at the centre of a cell is free. @pre contains(k)
   [[nodiscard]] bool is_free(const octree::voxel_key& k) const {
     const double m = margin(center(k), radius_);
     return m != detail::blocked && (m >= 0.0 || !overlaps(center(k), center(k), radius_));
   }
 
-  /// See planning_options. @pre contains(k)
+  /// Cost of a metre in the cell, see planning_options. @pre contains(k)
   [[nodiscard]] double density(const octree::voxel_key& k) const {
     const int x = static_cast<int>(k.x), y = static_cast<int>(k.y);
     const double near = costs_ == nullptr ? detail::clearance_density(options_, distance(x, y) - radius_)
@@ -96,7 +97,7 @@ class floor_view {
                                                       (floor_cost::inscribed - 1);
     return is_unknown(x, y) ? near * options_.unknown_cost : near;
   }
-  /// Whether a way costs its length everywhere.
+  /// Returns true if every path costs its length.
   [[nodiscard]] bool is_uniform() const noexcept {
     return options_.clearance_weight == 0.0 && options_.unknown_cost == 1.0;
   }
@@ -107,12 +108,12 @@ class floor_view {
     if (!cell) return std::nullopt;
     return octree::voxel_key{static_cast<std::uint32_t>((*cell)[0]), static_cast<std::uint32_t>((*cell)[1]), 0};
   }
-  /// Whether the cell is in the map, and its middle in the region.
+  /// Returns true if the cell is in the map, and its centre in the region.
   [[nodiscard]] bool contains(const octree::voxel_key& k) const noexcept {
     return k.x < static_cast<std::uint32_t>(map_->states.width()) &&
            k.y < static_cast<std::uint32_t>(map_->states.height()) && k.z == 0 && is_in_region(center(k));
   }
-  /// The middle of a cell, metres; z = 0.
+  /// The centre of a cell, metres; z = 0.
   [[nodiscard]] vec3 center(const octree::voxel_key& k) const noexcept {
     const vec2 p = map_->center(static_cast<int>(k.x), static_cast<int>(k.y));
     return {p.x(), p.y(), 0.0};
@@ -123,9 +124,9 @@ class floor_view {
     return {std::clamp(p.x(), map_->origin.x(), map_->origin.x() + width * resolution()),
             std::clamp(p.y(), map_->origin.y(), map_->origin.y() + height * resolution()), 0.0};
   }
-  /// With z = 0.
+  /// `p` with z = 0.
   [[nodiscard]] vec3 placed(const vec3& p) const noexcept { return {p.x(), p.y(), 0.0}; }
-  /// At the height of the floor in its cell or, where the robot does not get to, at that of the floor as a whole.
+  /// `p` at the height of the floor in its cell or, where the robot does not go, at the height of the floor as a whole.
   [[nodiscard]] vec3 on_ground(const vec3& p) const {
     const auto cell = map_->cell(p);
     const double height = cell && !map_->heights.empty() ? map_->heights((*cell)[0], (*cell)[1]) : map_->floor;
@@ -133,12 +134,12 @@ class floor_view {
   }
 
   [[nodiscard]] const floor_map& map() const noexcept { return *map_; }
-  /// Of each cell: how far the nearest obstacle is, squared, in cells; with a seam of one cell around the map. See
+  /// Squared distance of each cell to the nearest obstacle, in cells; with a border of one cell around the map. See
   /// squared_floor_distances.
   [[nodiscard]] const image<float>& squared_distances() const noexcept { return squared_; }
   /// The edge of a cell, metres.
   [[nodiscard]] double resolution() const noexcept { return map_->resolution; }
-  /// Of the robot, metres; 0 on a cost map.
+  /// Radius of the robot, metres; 0 on a cost map.
   [[nodiscard]] double radius() const noexcept { return radius_; }
 
  private:
@@ -151,7 +152,7 @@ class floor_view {
     const auto blocks = [&](floor_state s) {
       return s == floor_state::occupied || (s == floor_state::unknown && unknown_blocks);
     };
-    // A seam of unknown cells stands for all outside.
+    // A border of unknown cells represents everything outside.
     image<floor_state> states(width + 2, height + 2, unknown_blocks ? floor_state::occupied : floor_state::free);
     for (int y = 0; y != height; ++y)
       for (int x = 0; x != width; ++x)
@@ -167,11 +168,11 @@ class floor_view {
     const auto& r = options_.region;
     return !r || (p.x() >= r->min.x() && p.y() >= r->min.y() && p.x() <= r->max.x() && p.y() <= r->max.y());
   }
-  /// Of the middles of the cell and the nearest obstacle, metres.
+  /// Distance between the centres of the cell and the nearest obstacle, metres.
   [[nodiscard]] double distance(int x, int y) const {
     return std::sqrt(static_cast<double>(squared_(x + 1, y + 1))) * resolution();
   }
-  /// See detail::is_way_free. An obstacle's square is half a cell to half a diagonal nearer than its middle.
+  /// See detail::is_segment_free. An obstacle's square is half a cell to half a diagonal nearer than its centre.
   [[nodiscard]] double margin(const vec3& p, double radius) const {
     const auto cell = map_->cell(p);
     if (!cell) return -radius - resolution();
@@ -180,14 +181,14 @@ class floor_view {
     if (d + off - 0.4999 * resolution() < radius) return detail::blocked;
     return d - off - 0.7072 * resolution() - radius;
   }
-  /// Whether what the disc sweeps touches an obstacle. @pre z = 0
+  /// Returns true if the swept disc touches an obstacle. @pre z = 0
   [[nodiscard]] bool overlaps(const vec3& a, const vec3& b, double radius) const {
     const octree::capsule way{a, b, radius};
     const octree::bounding_box box = bounds_of(way);
-    const auto index = [&](double p, double origin, int cells) {  // in squared_, which has a seam
+    const auto index = [&](double p, double origin, int cells) {  // in squared_, which has a border
       return std::clamp(static_cast<int>(std::floor((p - origin) / resolution())) + 1, 0, cells - 1);
     };
-    const double edge = resolution();  // faces that only touch are found as well
+    const double edge = resolution();  // includes faces that only touch
     const int left = index(box.min.x() - 0.5 * edge, map_->origin.x(), squared_.width());
     const int right = index(box.max.x() + 0.5 * edge, map_->origin.x(), squared_.width());
     const int low = index(box.min.y() - 0.5 * edge, map_->origin.y(), squared_.height());
@@ -206,7 +207,7 @@ class floor_view {
   const image<std::uint8_t>* costs_ = nullptr;
   double radius_ = 0.0;
   planning_options options_;
-  image<float> squared_{};  ///< see squared_floor_distances, with a seam of one cell
+  image<float> squared_{};  ///< see squared_floor_distances, with a border of one cell
 };
 
 }  // namespace orbis::nav

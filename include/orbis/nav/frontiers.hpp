@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Where the known space of a map ends and the unknown begins: what a robot that explores has to look at next.
+/// The frontier of a map: the boundary between known free and unknown space, for exploration.
 ///
 /// B. Yamauchi, "A frontier-based approach for autonomous exploration", CIRA 1997.
 ///
@@ -9,7 +9,7 @@
 ///   orbis::nav::frontiers frontiers{map};
 ///   ...
 ///   map.integrate(depth, camera, T_world_camera);
-///   frontiers.update(map);                                        // what changed since the last update
+///   frontiers.update(map);                                        // changes since the last update
 ///   for (const orbis::nav::frontier_cluster& c : frontiers.clusters({.min_size = 20})) consider(c.center);
 /// @endcode
 #pragma once
@@ -44,7 +44,7 @@ struct frontier_octant {
   friend bool operator==(const frontier_octant&, const frontier_octant&) = default;
 };
 
-/// Frontier voxels that hang together: each is one of the 26 neighbours of another one.
+/// A connected set of frontier voxels: each is one of the 26 neighbours of another one.
 struct frontier_cluster {
   std::size_t size = 0;                    ///< voxels
   vec3 center = zeros<vec3>();             ///< mean of the voxels' centres, metres
@@ -53,9 +53,9 @@ struct frontier_cluster {
 };
 
 struct frontier_options {
-  /// How many octants on the faces of leaves of the map that are larger than 8x8x8 voxels are looked at: a file of a
-  /// few bytes can be a leaf as large as the grid, whose faces have 1.6e9. What goes beyond is left out, see
-  /// `is_complete`.
+  /// Maximum number of octants to examine on the faces of leaves of the map that are larger than 8x8x8 voxels: a file
+  /// of a few bytes can be a leaf as large as the grid, whose faces have 1.6e9. Octants beyond the limit are left out,
+  /// see `is_complete`.
   std::size_t max_octants = std::size_t{1} << 24U;
 };
 
@@ -63,20 +63,20 @@ struct cluster_options {
   std::size_t min_size = 1;  ///< of a cluster, voxels
 };
 
-/// The frontier of a map: the free voxels of which one of the six neighbours across a face is unknown. What lies
-/// outside of the grid is not unknown: nobody can look there. The frontier is that of the map as it is, whatever the
-/// order of changes.
+/// The frontier of a map: the free voxels with an unknown voxel among their six face neighbours. Space outside of the
+/// grid does not count as unknown, because it cannot be observed. The frontier depends only on the present map, not on
+/// the order of changes.
 ///
-/// Octants are bit masks, so that a few shifts and ands give the frontier of 64 voxels. Only masks with a voxel in them
-/// are kept, 48 to 64 bytes for each. One thread at a time.
+/// Octants are bit masks, so that a few shifts and ands give the frontier of 64 voxels. Only nonempty masks are stored,
+/// 48 to 64 bytes for each. For one thread at a time.
 class frontiers {
  public:
-  /// Of an empty map.
+  /// The frontier of an empty map.
   explicit frontiers(const octree::voxel_grid& grid, const frontier_options& options = {})
       : grid_{grid},
         last_{octree::morton_code({grid.cells() - 1, grid.cells() - 1, grid.cells() - 1}) >> 6U},
         options_{options} {}
-  /// Of `map` as it is.
+  /// The frontier of `map`.
   template <planning_map Map>
   explicit frontiers(const Map& map, const frontier_options& options = {})
       : frontiers{map_access<Map>::grid(map), options} {
@@ -84,42 +84,42 @@ class frontiers {
   }
 
   /// Follows the map by its change log, as distance_field::update does. O(octants that changed) on average; if the log
-  /// does not know, O(octants of the map + octants on the faces of its larger leaves). @pre the same map every time, of
-  /// the same grid
+  /// does not reach back far enough, O(octants of the map + octants on the faces of its larger leaves). @pre the same
+  /// map every time, of the same grid
   template <planning_map Map>
   void update(const Map& map) {
     assert(map_access<Map>::grid(map) == grid_);
-    follower_.follow(map, changed_in(map), [&] { make_afresh(map); });
+    follower_.follow(map, changed_in(map), [&] { rebuild(map); });
   }
   /// Follows a copy of the map, as distance_field::update does.
   /// @pre revision <= log.revision(); copies of the same map every time, of the same grid
   template <planning_map Map>
   void update(const Map& copy, const octree::change_log& log, std::uint64_t revision) {
     assert(map_access<Map>::grid(copy) == grid_);
-    follower_.follow(log, revision, changed_in(copy), [&] { make_afresh(copy); });
+    follower_.follow(log, revision, changed_in(copy), [&] { rebuild(copy); });
   }
-  /// Looks at the whole map, whatever its log says.
+  /// Examines the whole map, without the log.
   template <planning_map Map>
   void update_all(const Map& map) {
     assert(map_access<Map>::grid(map) == grid_);
-    make_afresh(map);
-    follower_.see(map);
+    rebuild(map);
+    follower_.mark_read(map);
   }
 
-  /// How many voxels there are. O(1)
+  /// Number of frontier voxels. O(1)
   [[nodiscard]] std::size_t size() const noexcept { return size_; }
   [[nodiscard]] bool empty() const noexcept { return size_ == 0; }
-  /// False if leaves of the map were left out because of `max_octants`: voxels on their faces are missing, but for
-  /// those beside later changes.
+  /// False if leaves of the map were left out because of `max_octants`: voxels on their faces are missing, except those
+  /// next to later changes.
   [[nodiscard]] bool is_complete() const noexcept { return is_complete_; }
-  /// Whether the voxel belongs to the frontier; false outside of the grid. O(1)
+  /// Returns true if the voxel belongs to the frontier; false outside of the grid. O(1)
   [[nodiscard]] bool contains(const octree::voxel_key& k) const noexcept {
     if (std::max({k.x, k.y, k.z}) >= grid_.cells()) return false;
     const std::uint64_t code = octree::morton_code(k);
     const std::uint32_t i = index_.find(code >> 6U);
     return i != hash_index::none && (found_[i].mask >> (code & 63U) & 1U) != 0;
   }
-  /// All octants in which there is a voxel of the frontier, in Morton order. O(n log n)
+  /// All octants that contain a frontier voxel, in Morton order. O(n log n)
   [[nodiscard]] std::vector<frontier_octant> octants() const {
     std::vector<std::uint32_t> order(found_.size());
     std::iota(order.begin(), order.end(), 0U);
@@ -129,8 +129,8 @@ class frontiers {
     for (const std::uint32_t i : order) out.push_back({octree::morton_key(found_[i].name << 6U), found_[i].mask});
     return out;
   }
-  /// The voxels by what hangs together: the largest cluster first, of equal ones that with the lowest voxel along the
-  /// Morton curve. O(n log n)
+  /// The connected components of the frontier: the largest cluster first, of equal ones that with the lowest voxel
+  /// along the Morton curve. O(n log n)
   [[nodiscard]] std::vector<frontier_cluster> clusters(const cluster_options& options = {}) const;
 
   [[nodiscard]] const octree::voxel_grid& grid() const noexcept { return grid_; }
@@ -141,11 +141,11 @@ class frontiers {
 
  private:
   struct entry {
-    std::uint64_t name;  ///< of the octant: its Morton code
+    std::uint64_t name;  ///< Morton code of the octant
     std::uint64_t mask;
   };
 
-  /// Octants of a map by their Morton codes. Some are remembered by the low bits of these: one of each place in a cube.
+  /// Cache of octants of a map by their Morton codes, addressed by the low bits: one octant for each place in a cube.
   template <class Octants>
   class octant_cache {
    public:
@@ -165,7 +165,7 @@ class frontiers {
     std::array<octree::octant_states, 1024> states_;
   };
 
-  /// Calls `visit(name, is above)` for the octants beside that of Morton code `name`, as far as they lie in the grid.
+  /// Calls `visit(name, is above)` for the face neighbours of the octant with Morton code `name` that lie in the grid.
   template <unsigned Axis, class Visit>
   void for_each_beside(std::uint64_t name, Visit&& visit) const {
     constexpr std::uint64_t one = std::uint64_t{1} << Axis, along = 0x1249249249249249U << Axis;
@@ -173,13 +173,13 @@ class frontiers {
     if (here != 0) visit(others | ((here - one) & along), std::false_type{});
     if (here != (last_ & along)) visit(others | (((here | ~along) + one) & along), std::true_type{});
   }
-  /// The frontier in an octant. `octants`: of the map.
+  /// The frontier in an octant. `octants`: reads the map.
   template <class Octants>
   [[nodiscard]] std::uint64_t frontier_in(Octants& octants, std::uint64_t name) const {
     const octree::octant_states here = octants(name);
     const std::uint64_t free = here.free();
     if (free == 0) return 0;
-    std::uint64_t found = 0;  // that a neighbour is unknown, of any voxel
+    std::uint64_t found = 0;  // voxels with an unknown neighbour
     const auto look = [&]<unsigned Axis>(std::integral_constant<unsigned, Axis>) {
       found |= detail::moved_up(~here.known, Axis) | detail::moved_down(~here.known, Axis);
       for_each_beside<Axis>(name, [&](std::uint64_t beside, auto is_above) {
@@ -216,13 +216,13 @@ class frontiers {
       stale_.erase(std::unique(stale_.begin(), stale_.end()), stale_.end());
       octant_cache octants{map_access<Map>::octants(map)};
       for (const std::uint64_t name : stale_) set(name, frontier_in(octants, name));
-      // What usual updates need is kept, so that these allocate nothing.
+      // Keep the capacity that usual updates need, so that they allocate nothing.
       constexpr std::size_t few = (std::size_t{1} << 20U) / sizeof(std::uint64_t);
       if (stale_.capacity() > std::max(few, 8 * found_.size())) stale_ = {};
     };
   }
   template <class Map>
-  void make_afresh(const Map& map) {
+  void rebuild(const Map& map) {
     index_.clear();
     found_.clear();
     size_ = 0;
@@ -232,7 +232,7 @@ class frontiers {
     map_access<Map>::for_each_octant(map, [&](const octree::voxel_key& low, int level, const octree::octant_states& s) {
       if (s.free() == 0) return;
       const std::uint32_t cells = octree::node_cells(level);
-      // Of larger cubes, all of whose octants are the same: if everything is known, the outermost octants.
+      // A larger cube has equal octants: if everything is known, only the outermost ones can have frontier voxels.
       const bool is_hollow = ~s.known == 0;
       if (level > 3) {
         const std::uint64_t n = cells / 4, inner = is_hollow ? n - 2 : 0;
@@ -288,7 +288,7 @@ class frontiers {
 };
 
 inline std::vector<frontier_cluster> frontiers::clusters(const cluster_options& options) const {
-  // Pieces that hang together within an octant, and then the pieces that touch.
+  // Connected pieces within an octant; then the pieces that touch are joined.
   struct piece {
     std::uint32_t octant;
     std::uint64_t mask;
@@ -314,13 +314,14 @@ inline std::vector<frontier_cluster> frontiers::clusters(const cluster_options& 
     return p;
   };
   for (std::uint32_t i = 0; i != all.size(); ++i)
-    for (int direction = 14; direction != 27; ++direction) {  // half of the 26: the others look back
+    for (int direction = 14; direction != 27;
+         ++direction) {  // half of the 26: the others are tested from the other side
       const std::array<int, 3> offset{direction % 3 - 1, direction / 3 % 3 - 1, direction / 9 - 1};
       if (detail::dilated(all[i].mask, offset) == 0) continue;
       const auto along = [](std::uint32_t c, int by) { return c + static_cast<std::uint32_t>(4 * by); };
       const octree::voxel_key k{along(all[i].octant.x, offset[0]), along(all[i].octant.y, offset[1]),
                                 along(all[i].octant.z, offset[2])};
-      const bool is_inside = std::max({k.x, k.y, k.z}) < grid_.cells();  // below 0 it wraps around
+      const bool is_inside = std::max({k.x, k.y, k.z}) < grid_.cells();  // coordinates below 0 wrap around
       const std::uint32_t other = is_inside ? places.find(octree::morton_code(k) >> 6U) : hash_index::none;
       if (other == hash_index::none) continue;
       for (std::uint32_t a = first[i]; a != first[i + 1]; ++a)

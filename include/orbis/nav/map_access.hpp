@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// How planning reads an occupancy map: ours, a snapshot of it, or a type of yours by a trait.
+/// Read access of planning to an occupancy map: an octree, a snapshot of it, or a user-defined type with a trait.
 #pragma once
 
 #include <concepts>
@@ -14,32 +14,33 @@
 
 namespace orbis::nav {
 
-/// What planning needs of a map. Specialise it for a type of yours with `grid`, `octants` and `for_each_octant` of the
-/// one for octrees below; the map is read in place and not copied. The others may be left out: `state` and
-/// `overlaps` are then made of `octants`, and octants in a box picked out of all, which takes more time.
+/// Access of planning to a map. Specialise it for a user-defined type with `grid`, `octants` and `for_each_octant` of
+/// the specialisation for octrees below; the map is read in place and not copied. The other functions are optional:
+/// `state` and `overlaps` are then implemented with `octants`, and octants in a box are selected from all octants,
+/// which is slower.
 template <class Map>
 struct map_access;
 
-/// Our octrees.
+/// Access to the octrees of orbis.
 template <octree::octree_map Map>
 struct map_access<Map> {
   /// The grid of voxels.
   [[nodiscard]] static const octree::voxel_grid& grid(const Map& map) noexcept { return map.grid(); }
-  /// A function that says what is known of the octant of 4x4x4 voxels that contains a voxel, as long as the map stays
-  /// as it is.
+  /// A function that returns the states of the octant of 4x4x4 voxels that contains a voxel. Valid while the map does
+  /// not change.
   [[nodiscard]] static octree::octant_reader<Map> octants(const Map& map) { return octree::octant_reader<Map>{map}; }
-  /// Calls `visit(lowest voxel, level, states)` for every octant (level 2) of which something is known; larger cubes
-  /// whose octants have all the same states may be visited as one. Each voxel once, in any order.
+  /// Calls `visit(lowest voxel, level, states)` for every octant (level 2) with known voxels; larger cubes whose
+  /// octants all have the same states may be visited as one. Each voxel once, in any order.
   template <class Visit>
   static void for_each_octant(const Map& map, Visit&& visit) {
     octree::for_each_octant(map, visit);
   }
-  /// The same for those that have a voxel in a box.
+  /// The same for octants that have a voxel in a box.
   template <class Visit>
   static void for_each_octant(const Map& map, const octree::key_box& box, Visit&& visit) {
     octree::for_each_octant(map, box, visit);
   }
-  /// What is known of a voxel.
+  /// State of a voxel.
   [[nodiscard]] static octree::occupancy state(const Map& map, const octree::voxel_key& k) {
     const auto v = map.store().value(k);
     if (!v) return octree::occupancy::unknown;
@@ -52,7 +53,7 @@ struct map_access<Map> {
   }
 };
 
-/// A map for planning: one with a `map_access`.
+/// A map for planning: a type with a `map_access`.
 template <class Map>
 concept planning_map = requires(const Map& map, const octree::voxel_key& k,
                                 void (*visit)(const octree::voxel_key&, int, const octree::octant_states&)) {

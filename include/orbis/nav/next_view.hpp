@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Where a robot that explores should look next.
+/// The next best view of an exploring robot.
 ///
 /// @code
 ///   const auto places = orbis::nav::places_of(frontiers.clusters({.min_size = 20}), map.grid());
@@ -37,16 +37,16 @@
 
 namespace orbis::nav {
 
-/// Places of a frontier to look at: a large cluster is cut into the cubes of a lattice, and the mean of each cube's
-/// voxels is a place (metres). Larger clusters first. `spacing`: edge of the cubes, metres, rounded to a power of two
-/// of voxels, at least 4.
+/// Places of a frontier to look at: splits large clusters by the cubes of a lattice; the mean of each cube's voxels is
+/// a place (metres). Larger clusters come first. `spacing`: edge of the cubes, metres, rounded to a power of two of
+/// voxels, at least 4.
 [[nodiscard]] inline std::vector<vec3> places_of(std::span<const frontier_cluster> clusters,
                                                  const octree::voxel_grid& grid, double spacing = 0.8) {
   const double levels = std::round(std::log2(std::max(4.0, spacing / grid.resolution())));
   const int level = static_cast<int>(std::clamp(levels, 2.0, static_cast<double>(grid.depth())));
   std::vector<vec3> places;
   for (const frontier_cluster& c : clusters) {
-    // Octants are in Morton order: those of a cube follow each other.
+    // Octants are in Morton order: those of a cube are consecutive.
     for (std::size_t i = 0; i != c.octants.size();) {
       const octree::voxel_key cube = octree::node_key(c.octants[i].octant, level);
       vec3 sum = zeros<vec3>();
@@ -69,23 +69,23 @@ struct next_view_options {
   int candidates = 12;         ///< poses for each place
   double min_distance = 0.5;   ///< of the camera from the place, metres
   double max_distance = 2.0;   ///< metres
-  double max_elevation = 0.5;  ///< how far the camera looks up or down at most, radians
-  double min_gain = 0.0;       ///< unknown space that makes a view worth while, cubic metres
-  /// How much a way costs: a view is worth exp(-lambda * length) of what it shows, 1 / metres.
+  double max_elevation = 0.5;  ///< maximum elevation of the camera's axis, up or down, radians
+  double min_gain = 0.0;       ///< minimum unknown space of a view, cubic metres
+  /// Penalty for path length: the utility of a view is its gain times exp(-lambda * length), 1 / metres.
   double lambda = 0.2;
   path_options path{};
-  std::uint64_t seed = 1;  ///< of the candidates
+  std::uint64_t seed = 1;  ///< of the random candidates
 };
 
 enum class next_view_status : std::uint8_t {
   found,
-  /// None of the candidates shows enough from where the robot is free. They are random: where little is left to see, or
-  /// the robot barely fits, others may.
+  /// None of the candidates where the robot is free sees enough. Candidates are random: another seed may find a view if
+  /// little is left to see or the robot barely fits.
   nothing_to_see,
-  start_outside,  ///< the robot itself is outside of the grid or the region, or its position not finite
+  start_outside,  ///< the robot is outside of the grid or the region, or its position is not finite
   start_blocked,  ///< it touches an obstacle
-  unreachable,    ///< no way leads to any of the candidates
-  gave_up         ///< none was found after path.max_expanded cells, which does not say that there is none
+  unreachable,    ///< no path leads to any of the candidates
+  gave_up         ///< no path was found after path.max_expanded cells; one may exist
 };
 
 [[nodiscard]] constexpr std::string_view to_string(next_view_status s) noexcept {
@@ -100,13 +100,13 @@ enum class next_view_status : std::uint8_t {
   return "unknown";
 }
 
-/// A view, and the way there; or why there is none, and nothing else.
+/// A view and the path to it; or only the reason why there is none.
 struct next_view {
   next_view_status status = next_view_status::nothing_to_see;
-  se3 T_world_camera{};       ///< the camera's axes: x to the right, y down, z ahead; x is level
-  vec3 place = zeros<vec3>();  ///< that it looks at, metres
-  double gain = 0.0;          ///< unknown space that it would see, cubic metres
-  double utility = 0.0;       ///< gain * exp(-lambda * length of the path); 0 if that is too small for a double
+  se3 T_world_camera{};        ///< the camera's axes: x to the right, y down, z forward; x is level
+  vec3 place = zeros<vec3>();  ///< that the camera looks at, metres
+  double gain = 0.0;           ///< unknown space that the camera would see, cubic metres
+  double utility = 0.0;        ///< gain * exp(-lambda * length of the path); 0 if that is too small for a double
   found_path path{};
 };
 
@@ -117,19 +117,19 @@ struct next_view {
   return {so3{columns(right, cross(ahead, right), ahead)}, from};
 }
 
-/// The best of random views of the places, from where the robot (whose camera is at its reference point) is free and
-/// to where a path leads, of those whose gain is more than 0 and at least `min_gain`. The best is the one
-/// of the greatest utility, gain * exp(-lambda * length of the path): H. H. Gonzalez-Banos, J.-C. Latombe, "Navigation
-/// strategies for exploring indoor environments", International Journal of Robotics Research 21, 2002. Paths are looked
-/// for only as long as a straight one could still be the best, and none to where neither the straight way nor free
-/// cells lead. The world has z up.
+/// The best random view of the places, among those with a gain greater than 0 and at least `min_gain` where the robot
+/// (whose camera is at its reference point) is free and that it can reach. The best has the greatest utility, gain *
+/// exp(-lambda * length of the path): H. H. Gonzalez-Banos, J.-C. Latombe, "Navigation strategies for exploring indoor
+/// environments", International Journal of Robotics Research 21, 2002. A path is searched only while a straight one
+/// could still be the best, and only if the straight segment is free or free cells connect both ends. The world has z
+/// up.
 ///
-/// All searches that find no way expand less than 2 `path.max_expanded` cells together, whatever the number of
-/// candidates: each one at most half of what is left of that. So where more can be reached than so many cells, as where
-/// unknown space is free and no region is named, some may give up; then the best of the views to which a path was found
-/// is taken, if there is any.
+/// All failed searches together expand less than 2 `path.max_expanded` cells, whatever the number of candidates: each
+/// one at most half of the remaining number. So if more cells than that are reachable, for example because unknown
+/// space is free and no region is given, some searches may give up; the result is then the best of the views to which a
+/// path was found, if there is one.
 ///
-/// The same arguments give the same view. Usually a millisecond for each candidate, and what find_path costs.
+/// The same arguments give the same view. Typically a millisecond per candidate, plus the cost of find_path.
 /// @pre 0 < min_distance <= max_distance; 0 <= max_elevation < pi / 2; lambda >= 0
 template <planning_map Map, robot_shape Shape, camera::camera_model Camera>
 [[nodiscard]] next_view next_best_view(const planning_view<Map, Shape>& view, std::span<const vec3> places,
@@ -139,7 +139,7 @@ template <planning_map Map, robot_shape Shape, camera::camera_model Camera>
   assert(options.max_elevation >= 0.0 && options.max_elevation < 1.5707963267948966);
   struct candidate {
     next_view view;
-    double bound = 0.0;  ///< of the logarithm of its utility, if the straight way is free
+    double bound = 0.0;  ///< of the logarithm of its utility, if the straight segment is free
   };
   if (!view.key(position)) return {.status = next_view_status::start_outside};
   if (!view.is_free(position)) return {.status = next_view_status::start_blocked};

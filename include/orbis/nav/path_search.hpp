@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Cheapest ways of a robot through a map or over a floor.
+/// Cheapest paths of a robot through a map or over a floor.
 ///
 /// @code
 ///   const orbis::nav::planning_view view{map, field, 0.2};
@@ -29,12 +29,12 @@ namespace orbis::nav {
 
 enum class path_status : std::uint8_t {
   found,
-  start_outside,  ///< of the grid or the region, or not finite
-  start_blocked,  ///< the robot touches an obstacle where it starts
+  start_outside,  ///< the start is outside of the grid or the region, or not finite
+  start_blocked,  ///< the robot touches an obstacle at the start
   goal_outside,
   goal_blocked,
-  unreachable,  ///< both are free, and no way leads from one to the other on the grid
-  gave_up       ///< after `max_expanded` cells
+  unreachable,  ///< both ends are free, and no path on the grid connects them
+  gave_up       ///< `max_expanded` cells were expanded without a result
 };
 
 [[nodiscard]] constexpr std::string_view to_string(path_status s) noexcept {
@@ -50,36 +50,36 @@ enum class path_status : std::uint8_t {
   return "unknown";
 }
 
-/// How a path is searched.
+/// Method of the path search.
 enum class path_method : std::uint8_t {
-  /// Lazy Theta*: straight over many cells where nothing is in between; shorter, but no optimum is proven. Where more
-  /// than the length counts (see planning_options), it adds up costs along each of these ways, and takes several times
-  /// as long as `grid` for a path that is hardly better.
+  /// Lazy Theta*: straight over many cells where nothing is in between; shorter, but not proven optimal. If costs other
+  /// than the length count (see planning_options), it adds up costs along each segment, and takes several times as long
+  /// as `grid` for a path that is hardly better.
   any_angle,
-  grid  ///< A*: no way in steps from cell to neighbouring cell is cheaper
+  grid  ///< A*: optimal among paths in steps from cell to neighbouring cell
 };
 
 struct path_options {
   path_method method = path_method::any_angle;
-  /// Of `any_angle`: how many times as much what is left of the way counts as what lies behind; finite and >= 1. At 1
-  /// it looks at ten times as many cells, for paths that are mostly shorter by less than a tenth of a percent.
+  /// Weight of the heuristic for `any_angle`; finite and >= 1. With 1 the search expands ten times as many cells, for
+  /// paths that are mostly less than a tenth of a percent shorter.
   double heuristic_weight = 1.1;
-  bool shorten = true;  ///< pull the path straight; else it goes from middle to middle of cells
-  /// Cells to look at before giving up. Whether the goal can be reached at all, the nearest place that can, and the way
-  /// there are looked for with as many each.
+  bool shorten = true;  ///< pull the path straight; otherwise it goes from cell centre to cell centre
+  /// Maximum number of expanded cells. The limit applies separately to the test whether the goal is reachable, to the
+  /// search for the nearest reachable place, and to the search for a path there.
   std::size_t max_expanded = 2'000'000;
-  std::size_t max_checks = 2'000;  ///< straight ways to check in shortening
+  std::size_t max_checks = 2'000;  ///< maximum number of segments checked by shortening
 };
 
-/// A path, or why there is none.
+/// A path, or the reason why there is none.
 struct found_path {
   path_status status = path_status::unreachable;
-  /// From the start to the goal, metres. If there is no way to the goal, but the start is free: to the middle of the
-  /// cell nearest to the goal of all that were reached (nothing if the goal is not finite).
+  /// From the start to the goal, metres. If no path leads to the goal but the start is free: to the centre of the
+  /// reached cell nearest to the goal (empty if the goal is not finite).
   std::vector<vec3> points{};
   double length = 0.0;       ///< of the points, metres
-  double cost = 0.0;         ///< see planning_options: the length where nothing else counts; heights of floors do not
-  std::size_t expanded = 0;  ///< cells that were looked at in searches; 0 if the straight way was taken at once
+  double cost = 0.0;         ///< see planning_options; equals the length in a uniform space. Excludes heights of floors
+  std::size_t expanded = 0;  ///< number of expanded cells; 0 if the straight segment was taken at once
 };
 
 /// The length of a polyline, in the unit of its points.
@@ -89,7 +89,7 @@ struct found_path {
   return sum;
 }
 
-/// What a polyline costs, see planning_options. O(cells on the way), or O(points) if the space is uniform.
+/// Cost of a polyline, see planning_options. O(cells on the polyline), or O(points) if the space is uniform.
 /// @pre the points lie in the space
 template <planning_space Space>
 [[nodiscard]] double cost_of(const Space& space, const std::vector<vec3>& points) {
@@ -99,11 +99,10 @@ template <planning_space Space>
   return sum;
 }
 
-/// Makes a path cheaper as long as the robot fits: leaves points out that are not needed, and cuts corners. Both ends
-/// stay. The result never costs more (see cost_of) and, in a uniform space, is never longer; each of its segments is
-/// free (`space.is_free`). It ends after `max_checks` segments have been checked, or when little is gained.
-/// O(max_checks) checks of segments and, where the space is not uniform, as many times the costs of the way between the
-/// ends of a segment.
+/// Makes a path cheaper while the robot fits: removes unnecessary points and cuts corners. Both ends stay. The result
+/// never costs more (see cost_of) and, in a uniform space, is never longer; each of its segments is free
+/// (`space.is_free`). Ends after `max_checks` segments have been checked, or when little is gained. O(max_checks)
+/// checks of segments and, if the space is not uniform, O(max_checks) costs of the path between the ends of a segment.
 /// @pre each segment of `points` is free
 template <planning_space Space>
 void shorten_path(const Space& space, std::vector<vec3>& points, std::size_t max_checks = 2'000) {
@@ -115,7 +114,7 @@ void shorten_path(const Space& space, std::vector<vec3>& points, std::size_t max
   const auto cost = [&](const vec3& a, const vec3& b) {
     return detail::cost_of(space, space.placed(a), space.placed(b));
   };
-  // Whether one can go straight from a point to a later one, for no more than over those between them.
+  // True if the segment from a point to a later one is free and costs no more than the path between them.
   const auto is_shortcut = [&](std::size_t i, std::size_t j) {
     if (!is_free(points[i], points[j])) return false;
     if (space.is_uniform()) return true;
@@ -144,7 +143,7 @@ void shorten_path(const Space& space, std::vector<vec3>& points, std::size_t max
       while (farthest > i + 1 && !is_shortcut(i, farthest)) --farthest;
       erase_between(i, farthest);
     }
-    for (std::size_t i = 1; i + 1 < points.size(); ++i) {  // a corner, cut equally far on both sides
+    for (std::size_t i = 1; i + 1 < points.size(); ++i) {  // cuts a corner equally far on both sides
       const vec3 a = points[i - 1], b = points[i], c = points[i + 1];
       const auto on = [](const vec3& p, const vec3& q, double share) -> vec3 { return p + share * (q - p); };
       const double around = space.is_uniform() ? 0.0 : cost(a, b) + cost(b, c);
@@ -166,14 +165,14 @@ void shorten_path(const Space& space, std::vector<vec3>& points, std::size_t max
 
 namespace detail {
 
-/// Whether the straight way, which is free, costs no more than its length: no other one is cheaper.
+/// Returns true if the cost of the free segment equals its length: no path is cheaper then.
 template <planning_space Space>
 [[nodiscard]] bool costs_its_length(const Space& space, const vec3& a, const vec3& b) {
   return space.is_uniform() || cost_of(space, a, b) <= norm(b - a) * (1.0 + 1e-9);
 }
 
-/// Searches over the middles of cells, from a start that is free to a goal (finite) or, where none of `exits` can be
-/// reached and `or_near`, to the cell nearest to it of those that can. Sets the points, and what was expanded.
+/// Searches over cell centres from a free start to a finite goal or, if none of `exits` can be reached and `or_near` is
+/// set, to the reachable cell nearest to the goal. Sets the points and the number of expanded cells.
 template <planning_space Space>
 [[nodiscard]] search_end search_cells(const Space& space, const vec3& start, const vec3& goal,
                                       const std::vector<octree::voxel_key>& exits, const path_options& options,
@@ -183,17 +182,17 @@ template <planning_space Space>
   };
   const auto ended = [&](auto& search, search_end how) {
     out.expanded += search.expanded();
-    out.points = search.way();
+    out.points = search.path();
     return how;
   };
-  // Most ways are found soon. What takes longer may be a goal that is enclosed: without a look from its side, all that
-  // can be reached would be searched for it.
+  // Most paths are found soon. If the search takes longer, the goal may be enclosed: without a flood from its side, all
+  // reachable cells would be expanded.
   const std::size_t most = options.max_expanded, soon = std::min<std::size_t>(1'000, most);
   auto search = make_search();
   search_end end = search.run(start, goal, exits, exits.empty() ? 0 : soon);
   if (!exits.empty() && (end != search_end::stopped || soon == most)) return ended(search, end);
   cell_floods floods{space, start, search.doors(start), goal};
-  if (!exits.empty() && floods.may_reach_any(exits, most)) return ended(search, search.go_on(most));
+  if (!exits.empty() && floods.may_reach_any(exits, most)) return ended(search, search.resume(most));
   out.expanded += search.expanded();
   if (!or_near) return search_end::exhausted;
   if (const auto nearest = floods.nearest(most)) {
@@ -202,25 +201,24 @@ template <planning_space Space>
     if (end == search_end::found) return ended(to_nearest, search_end::exhausted);
     out.expanded += to_nearest.expanded();
   }
-  auto all = make_search();  // free cells between which steps are blocked
+  auto all = make_search();  // cells connected by free cells, with blocked steps between them
   static_cast<void>(all.run(start, goal, {}, most));
   return ended(all, search_end::exhausted);
 }
 
 }  // namespace detail
 
-/// A way of the robot `from` a start `to` a goal (metres): the straight one if that is free and costs its length; else
-/// a cheap one over the middles of cells (see path_method), made shorter in continuous space afterwards, or the
-/// straight one if no other one leads there. Without `shorten` always one over the middles of cells. Every
-/// segment is free by `space.is_free`: the robot touches no obstacle anywhere on it. Where it cannot go, `status` says
-/// why
-/// (also a passage between two middles of cells is not seen that is wide enough for the robot only off the grid), and
-/// the path leads to the nearest point that is reached.
+/// A path of the robot `from` a start `to` a goal (metres): the straight segment if it is free and costs its length;
+/// otherwise a cheap path over cell centres (see path_method), shortened in continuous space afterwards, or the
+/// straight segment if no other path leads there. Without `shorten` always a path over cell centres. Every segment is
+/// free by `space.is_free`: the robot touches no obstacle anywhere on it. If the goal cannot be reached, `status` gives
+/// the reason and the path leads to the nearest reachable point. A passage between two cell centres that is wide enough
+/// for the robot only off the grid is not found.
 ///
-/// O(n log n) for n cells expanded, 16 kB for each 8x8x8 voxels (2 kB for each 8x8 cells of a floor) looked at, and
-/// `max_checks` ways to check in shortening. A goal that cannot be reached costs little if it, or the start, is in a
-/// small enclosure, or if it lies in an obstacle. If not, as where unknown space is free and no region is named, it is
-/// looked for until `max_expanded` cells have been seen.
+/// O(n log n) for n expanded cells, 16 kB for each 8x8x8 voxels (2 kB for each 8x8 cells of a floor) visited, and
+/// `max_checks` segments to check in shortening. An unreachable goal costs little if it, or the start, is in a small
+/// enclosure, or if it is in an obstacle. Otherwise, for example if unknown space is free and no region is given, the
+/// search expands `max_expanded` cells.
 /// @pre options.heuristic_weight is finite and >= 1
 template <planning_space Space>
 [[nodiscard]] found_path find_path(const Space& space, const vec3& from, const vec3& to,

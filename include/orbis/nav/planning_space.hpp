@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// What a path is searched in: places on a regular grid, and straight ways that a robot can go or not.
+/// The space of a path search: places on a regular grid, and straight segments that are free or blocked.
 #pragma once
 
 #include <concepts>
@@ -11,38 +11,40 @@
 
 namespace orbis::nav {
 
-/// What going costs beside its length, and where one may go at all. A way costs the integral of the density along it
-/// (metres), in which a cell's density is
+/// Costs of moving in addition to length, and the region of the search. A path costs the integral of the density along
+/// it (metres). The density of a cell is
 ///
 ///     (1 + clearance_weight (1 - d / preferred_clearance)^2) u,    d < preferred_clearance
 ///
-/// with d the distance of the robot's hull to the nearest obstacle when the robot stands in the middle of the cell
-/// (metres, to about a cell), the bracket 1 for greater d, and u = `unknown_cost` where nothing is known of the cell,
-/// else 1. No way costs less than its length.
+/// with d the distance of the robot's hull to the nearest obstacle when the robot is at the centre of the cell (metres,
+/// accurate to about a cell), the parenthesis 1 for greater d, and u = `unknown_cost` in unknown cells, otherwise 1. No
+/// path costs less than its length.
 struct planning_options {
-  /// The robot's reference point stays in this box, metres; empty: anywhere on the grid.
+  /// Box that the robot's reference point stays in, metres; empty: anywhere on the grid.
   std::optional<octree::bounding_box> region{};
   double clearance_weight = 0.0;     ///< >= 0; 0: only the length counts
-  double preferred_clearance = 0.3;  ///< metres; > 0. The field should reach so much beyond the robot
-  /// Of a metre through what is unknown, where that counts as free; >= 1.
+  double preferred_clearance = 0.3;  ///< metres; > 0. The reach of the field should exceed the robot by this distance
+  /// Cost of a metre through unknown space if that counts as free; >= 1.
   double unknown_cost = 1.0;
 };
 
-/// Where a path can be searched: `planning_view` in space, `floor_view` on the floor. Positions are in metres; cells
-/// have keys, of which floors leave z at 0.
+/// A space of a path search: `planning_view` in three dimensions, `floor_view` on a floor. Positions are in metres;
+/// cells have keys, with z = 0 on floors.
 ///
 /// - `dimensions`: 2 or 3, the axes along which cells have neighbours;
 /// - `resolution()`: the edge of a cell, metres;
 /// - `key(p)`: the cell of a position; empty outside of the grid and of the region, and if not finite;
-/// - `contains(k)`: whether a cell is in the grid, and its middle in the region;
-/// - `center(k)`: its middle;
-/// - `clamped(p)`: the point of the grid nearest to `p`, which is finite (where the search for a goal outside heads);
-/// - `is_free(k)`, `is_free(p)`, `is_free(a, b)`: whether the robot fits in the middle of a cell, at a position, and
-///   everywhere on the straight way between two positions. The last one is the first where both ends are the same;
-/// - `is_surely_free(a, b)`: a test for the same that costs little, and may be false where the way is free;
-/// - `density(k)`: what a metre costs in a cell, at least 1; `is_uniform()`: whether it is 1 everywhere;
-/// - `placed(p)`: the position as it is searched for: on a floor with z = 0;
-/// - `on_ground(p)`: the position as it is reported: with the floor's height, where there is a floor.
+/// - `contains(k)`: whether a cell is in the grid, and its centre in the region;
+/// - `center(k)`: the centre of a cell;
+/// - `clamped(p)`: the point of the grid nearest to the finite position `p` (the target of a search for a goal
+///   outside);
+/// - `is_free(k)`, `is_free(p)`, `is_free(a, b)`: whether the robot fits at the centre of a cell, at a position, and
+///   everywhere on the straight segment between two positions. If both ends are equal, the last one equals
+///   `is_free(p)`;
+/// - `is_surely_free(a, b)`: a cheap test for the same that may be false although the segment is free;
+/// - `density(k)`: the cost of a metre in a cell, at least 1; `is_uniform()`: whether it is 1 everywhere;
+/// - `placed(p)`: the position as used in the search: on a floor with z = 0;
+/// - `on_ground(p)`: the position as reported: on a floor at its height.
 template <class S>
 concept planning_space = requires(const S& space, const vec3& p, const octree::voxel_key& k) {
   requires S::dimensions == 2 || S::dimensions == 3;
@@ -61,11 +63,10 @@ concept planning_space = requires(const S& space, const vec3& p, const octree::v
   { space.on_ground(p) } -> std::convertible_to<vec3>;
 };
 
-/// A planning space that says of thicker robots, too, whether they fit: what make_trajectory needs.
+/// A planning space that also tests inflated robots, as make_trajectory needs.
 ///
-/// - `is_free(a, b, by)`: true only if nothing that is within `by` (metres, >= 0) of what the robot sweeps on its
-/// straight
-///   way from `a` to `b` is an obstacle, and both ends are in the space.
+/// - `is_free(a, b, by)`: true only if no obstacle is within `by` (metres, >= 0) of the volume that the robot sweeps on
+///   the straight segment from `a` to `b`, and both ends are in the space.
 template <class S>
 concept inflatable_space = planning_space<S> && requires(const S& space, const vec3& p, double by) {
   { space.is_free(p, p, by) } -> std::same_as<bool>;

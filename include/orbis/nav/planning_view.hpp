@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Where a robot fits: an occupancy map and its distance field as one, exact in continuous space.
+/// Planning space of a robot in an occupancy map with its distance field, exact in continuous space.
 #pragma once
 
 #include <algorithm>
@@ -27,7 +27,7 @@
 namespace orbis::nav {
 namespace detail {
 
-/// What is known of a voxel. @pre in the grid
+/// State of a voxel. @pre in the grid
 template <planning_map Map>
 [[nodiscard]] octree::occupancy state_of(const Map& map, const octree::voxel_key& k) {
   if constexpr (requires { map_access<Map>::state(map, k); }) {
@@ -40,7 +40,7 @@ template <planning_map Map>
   }
 }
 
-/// The search of `octants_overlap`.
+/// Recursive search of `octants_overlap`.
 template <class Octants, octree::overlap_shape Shape>
 class octant_overlap_search {
  public:
@@ -52,7 +52,7 @@ class octant_overlap_search {
     const double edge = grid_.resolution() * (grid_.cells() / 2);
     const bool is_inside = all_at_most(filled<vec3>(-edge), bounds.min) && all_at_most(bounds.max, filled<vec3>(edge));
     if (unknown_blocks_ && !is_inside) return true;
-    // Faces that only touch are found as well.
+    // Includes faces that only touch.
     const auto keys =
         octree::keys_between(grid_, shifted(bounds.min, -grid_.resolution()), shifted(bounds.max, grid_.resolution()));
     if (!keys) return false;
@@ -92,7 +92,7 @@ class octant_overlap_search {
   bool unknown_blocks_;
 };
 
-/// octree::overlaps by the octants of a map. O(octants that the shape touches).
+/// octree::overlaps, implemented with the octants of a map. O(octants that the shape touches).
 template <planning_map Map, octree::overlap_shape Shape>
 [[nodiscard]] bool octants_overlap(const Map& map, const Shape& shape, const octree::overlap_options& options) {
   const bool unknown_blocks = options.unknown == octree::occupancy::occupied;
@@ -109,22 +109,22 @@ template <planning_map Map, octree::overlap_shape Shape>
 
 }  // namespace detail
 
-/// Whether a robot is free, at rest or on its way along a segment. The answer is that of `octree::overlaps` for the
-/// robot's shape or what it sweeps (for a ball: a capsule), with what unknown space counts as in the field: it is not
-/// sampled, and not taken from the middles of voxels; they differ at most where the robot just touches a voxel, by
-/// rounding. The field says it where obstacles are far away, or so near that
-/// the robot touches one in any case, and only in the narrow band between them the map is asked.
+/// Tests whether a robot is free, at rest or moving along a segment. The answer is that of `octree::overlaps` for the
+/// robot's shape or the volume that it sweeps (for a ball: a capsule), with unknown space treated as in the field. It
+/// is neither sampled nor taken from voxel centres; the two differ at most by rounding, where the robot just touches a
+/// voxel. The field alone decides if obstacles are far away, or so near that the robot certainly touches one; only in
+/// the narrow band between these the map is read.
 ///
-/// A `planning_space`. It refers to the map and the field; both must stay as they are while it is used. Any number of
-/// threads may ask.
+/// A `planning_space`. It refers to the map and the field; neither may change while it is used. Safe for concurrent
+/// queries.
 template <planning_map Map, robot_shape Shape = ball>
 class planning_view {
  public:
   static constexpr int dimensions = 3;
 
-  /// The field should reach at least two voxels farther than the robot's radius, and be complete (`is_complete`); if
-  /// not, that costs time only: of a field that is not complete, just distances for costs are taken.
-  /// @pre the shape's; the options'; the field is that of the map, up to date, and of obstacles (not `inside`)
+  /// The reach of the field should be at least two voxels more than the robot's radius, and the field complete
+  /// (`is_complete`). Otherwise queries only take longer: an incomplete field is used only for distances in costs. @pre
+  /// those of the shape and of the options; the field is that of the map, up to date, and of obstacles (not `inside`)
   planning_view(const Map& map, const distance_field& field, const Shape& shape, const planning_options& options = {})
       : map_{&map}, field_{&field}, shape_{shape}, cover_{cover_of(shape)}, options_{options} {
     assert(cover_.inner > 0.0 && map_access<Map>::grid(map) == field.grid() && !field.options().inside);
@@ -134,7 +134,7 @@ class planning_view {
   planning_view(const Map& map, const distance_field& field, double radius,
                 const planning_options& options = {}) requires std::same_as<Shape, ball>
       : planning_view{map, field, ball{radius}, options} {}
-  // Neither would outlive the view.
+  // Temporaries would not outlive the view.
   planning_view(const Map&&, const distance_field&, const Shape&, const planning_options& = {}) = delete;
   planning_view(const Map&, const distance_field&&, const Shape&, const planning_options& = {}) = delete;
   planning_view(const Map&&, const distance_field&, double,
@@ -144,36 +144,36 @@ class planning_view {
                 const planning_options& = {}) requires std::same_as<Shape, ball>
   = delete;
 
-  /// Whether the robot with its reference point at `p` (metres) touches no obstacle. False if `p` is not finite, or
-  /// outside of the region. O(1) away from obstacles, and what `overlaps` costs near them.
+  /// Returns true if the robot with its reference point at `p` (metres) touches no obstacle. False if `p` is not
+  /// finite, or outside of the region. O(1) away from obstacles; near them as expensive as `overlaps`.
   [[nodiscard]] bool is_free(const vec3& p) const { return is_free(p, p); }
-  /// Whether the robot touches no obstacle on its straight way from `a` to `b` (metres). False if an end is outside of
-  /// the region, or the way longer than four edges of the map's grid. O(length / distance to the obstacles), and what
-  /// `overlaps` costs for each 4 voxels near them.
+  /// Returns true if the robot touches no obstacle on the straight segment from `a` to `b` (metres). False if an end is
+  /// outside of the region, or the segment longer than four edges of the map's grid. O(length / distance to the
+  /// obstacles), plus the cost of `overlaps` for each 4 voxels near them.
   [[nodiscard]] bool is_free(const vec3& a, const vec3& b) const {
     const double cell = resolution();
     if (!is_in_region(a) || !is_in_region(b) || !is_short(a, b)) return false;
     squared_distance_view::reader reader{field_->voxels()};
-    return detail::is_way_free(
+    return detail::is_segment_free(
         a, b, cell, [&](const vec3& p) { return margin(reader, p); },
         [&](const vec3& p, const vec3& q) { return overlaps(p, q); });
   }
-  /// Whether nothing within `by` (metres) of what the robot sweeps on that way is an obstacle: is_free for a thicker
-  /// robot, exact for a ball and a vertical capsule. For a vertical cylinder it is one that is thicker and higher by as
-  /// much, for a shape of yours a vertical capsule around the balls that cover it. @pre by >= 0
+  /// Returns true if no obstacle is within `by` (metres) of the volume that the robot sweeps on that segment: is_free
+  /// for an inflated robot, exact for a ball and a vertical capsule. A vertical cylinder is inflated in radius and
+  /// height, a user-defined shape to a vertical capsule around the balls that cover it. @pre by >= 0
   [[nodiscard]] bool is_free(const vec3& a, const vec3& b, double by) const {
     const planning_view<Map, decltype(detail::grown(shape_, by))> thicker{*map_, *field_, detail::grown(shape_, by),
                                                                           options_};
     return thicker.is_free(a, b);
   }
-  /// Whether a way is free as far as the field alone can tell: true only if `is_free(a, b)` is, and false also where
-  /// that would have to ask the map. O(length / distance to the obstacles).
+  /// Returns true if the field alone proves a segment free: true only if `is_free(a, b)` is, and false also if that
+  /// would have to read the map. O(length / distance to the obstacles).
   [[nodiscard]] bool is_surely_free(const vec3& a, const vec3& b) const {
     if (!is_in_region(a) || !is_in_region(b) || !is_short(a, b)) return false;
     squared_distance_view::reader reader{field_->voxels()};
-    return detail::is_way_surely_free(a, b, resolution(), [&](const vec3& p) { return margin(reader, p); });
+    return detail::is_segment_certainly_free(a, b, resolution(), [&](const vec3& p) { return margin(reader, p); });
   }
-  /// Whether the robot with its reference point in the middle of voxel `k` is free. @pre contains(k)
+  /// Returns true if the robot with its reference point at the centre of voxel `k` is free. @pre contains(k)
   [[nodiscard]] bool is_free(const octree::voxel_key& k) const {
     squared_distance_view::reader reader{field_->voxels()};
     const vec3 p = center(k);
@@ -181,7 +181,7 @@ class planning_view {
     return m != detail::blocked && (m >= 0.0 || !overlaps(p, p));
   }
 
-  /// See planning_options. @pre contains(k)
+  /// Cost of a metre in the voxel, see planning_options. @pre contains(k)
   [[nodiscard]] double density(const octree::voxel_key& k) const {
     double sum = 1.0;
     if (options_.clearance_weight > 0.0) {
@@ -194,7 +194,7 @@ class planning_view {
       sum *= options_.unknown_cost;
     return sum;
   }
-  /// Whether a way costs its length everywhere.
+  /// Returns true if every path costs its length.
   [[nodiscard]] bool is_uniform() const noexcept {
     return options_.clearance_weight == 0.0 && options_.unknown_cost == 1.0;
   }
@@ -203,20 +203,20 @@ class planning_view {
   [[nodiscard]] std::optional<octree::voxel_key> key(const vec3& p) const {
     return is_in_region(p) ? grid().key(p) : std::nullopt;
   }
-  /// Whether the voxel is in the grid and its middle in the region.
+  /// Returns true if the voxel is in the grid and its centre in the region.
   [[nodiscard]] bool contains(const octree::voxel_key& k) const noexcept {
     return std::max({k.x, k.y, k.z}) < grid().cells() && (!options_.region || is_in_region(center(k)));
   }
-  /// The middle of a voxel, metres.
+  /// The centre of a voxel, metres.
   [[nodiscard]] vec3 center(const octree::voxel_key& k) const noexcept { return grid().center(k); }
   /// The point of the grid that is nearest to `p`, metres.
   [[nodiscard]] vec3 clamped(const vec3& p) const {
     const double edge = 0.5 * resolution() * grid().cells();
     return entrywise_min(entrywise_max(p, filled<vec3>(-edge)), filled<vec3>(edge));
   }
-  /// `p` as it is.
+  /// `p` unchanged.
   [[nodiscard]] const vec3& placed(const vec3& p) const noexcept { return p; }
-  /// `p` as it is: there is no floor.
+  /// `p` unchanged: there is no floor.
   [[nodiscard]] const vec3& on_ground(const vec3& p) const noexcept { return p; }
 
   [[nodiscard]] const Map& map() const noexcept { return *map_; }
@@ -226,7 +226,7 @@ class planning_view {
   [[nodiscard]] double resolution() const noexcept { return grid().resolution(); }
   [[nodiscard]] const Shape& shape() const noexcept { return shape_; }
   [[nodiscard]] const planning_options& options() const noexcept { return options_; }
-  /// Of the robot, metres.
+  /// Radius of the robot, metres.
   [[nodiscard]] double radius() const noexcept { return shape_.radius; }
 
  private:
@@ -241,7 +241,7 @@ class planning_view {
   [[nodiscard]] vec3 ball_at(const vec3& p, int i) const noexcept {
     return {p.x(), p.y(), p.z() + cover_.low + i * cover_.spacing};
   }
-  /// See detail::is_way_free.
+  /// See detail::is_segment_free.
   [[nodiscard]] double margin(squared_distance_view::reader& reader, const vec3& p) const {
     if (!field_->is_complete()) return -cover_.outer;
     double least = field_->reach();
@@ -252,13 +252,14 @@ class planning_view {
     }
     return least;
   }
-  /// The same for one of the balls that cover the robot. Its middle is about as far from obstacles as the middles of
-  /// voxels around it are, and an obstacle's cube is half a voxel to half a diagonal nearer than its own middle.
+  /// The margin of one of the balls that cover the robot. Its centre is about as far from obstacles as the centres of
+  /// the voxels around it are, and an obstacle's cube is half a voxel to half a diagonal nearer than its centre.
   [[nodiscard]] double ball_margin(squared_distance_view::reader& reader, const vec3& q) const {
     const double cell = resolution();
     const auto k = grid().key(q);
     if (!k) return -cover_.outer;
-    double least = 0.0, most = std::numeric_limits<double>::infinity();  // to the middle of the nearest obstacle
+    double least = 0.0,
+           most = std::numeric_limits<double>::infinity();  // distances to the centre of the nearest obstacle
     const auto look = [&](const octree::voxel_key& at, const vec3& away) {
       const std::uint16_t squared = reader.squared(at);
       const bool is_far = squared == squared_distance_view::far;
@@ -271,7 +272,7 @@ class planning_view {
     const auto is_certain = [&] {
       return most - 0.4999 * cell < cover_.inner || least - 0.8661 * cell - cover_.outer > 0.5 * cell;
     };
-    // Beyond the grid's last voxel the field says nothing of obstacles in the grid.
+    // Beyond the last voxel of the grid the field has no distances to obstacles in the grid.
     if (!is_certain() && away != zeros<vec3>())
       for (unsigned i = 1; i != 8; ++i) {
         const auto beside = [&](unsigned bit, int axis) { return (i & bit) == 0 ? 0 : away[axis] < 0.0 ? -1 : 1; };

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Paths while the map changes: whether a change touches the path, and a new path only then.
+/// Paths in a changing map: tests whether a change blocks the path, and replans only then.
 ///
 /// @code
 ///   orbis::nav::replanner planner{goal};
@@ -12,7 +12,7 @@
 ///   }
 /// @endcode
 ///
-/// On a floor the same with a `floor_view` of the new floor map each time.
+/// On a floor, pass a `floor_view` of the new floor map each time.
 #pragma once
 
 #include <algorithm>
@@ -38,7 +38,7 @@
 namespace orbis::nav {
 
 namespace detail {
-/// A view of a map that records its changes, for a robot of a shape.
+/// A view of a map that records its changes, with a swept robot shape.
 template <class Space>
 concept follows_changes = requires(const Space& space) {
   requires has_change_log<std::remove_cvref_t<decltype(space.map())>>;
@@ -47,24 +47,24 @@ concept follows_changes = requires(const Space& space) {
 };
 }  // namespace detail
 
-/// Watches whether a path stays free while the map changes. By the map's change log it looks only at what has changed:
-/// the segments along which the robot sweeps over an octant (4x4x4 voxels) with a change are tested again, exactly. If
-/// the log does not know, all are, as on floors and on maps that have no log. Obstacles that vanish elsewhere are not
-/// its business: a shorter way that opens is not seen.
+/// Monitors whether a path stays free while the map changes. It uses the map's change log: it tests exactly those
+/// segments again along which the robot sweeps over a changed octant (4x4x4 voxels). It tests all segments if the log
+/// does not reach back far enough, on floors, and on maps without a log. It does not notice shorter paths that open
+/// when obstacles vanish.
 class path_monitor {
  public:
-  /// Watches nothing.
+  /// A monitor without a path.
   path_monitor() = default;
-  /// @pre `points` is free in the map as `space` has it: each of its segments
+  /// @pre each segment of `points` is free in the map of `space`
   template <planning_space Space>
   path_monitor(const Space& space, std::vector<vec3> points) : points_{std::move(points)} {
-    if constexpr (detail::follows_changes<Space>) follower_.see(space.map());
+    if constexpr (detail::follows_changes<Space>) follower_.mark_read(space.map());
   }
 
-  /// The first segment that is not free any more (that from points()[i] to points()[i + 1]), since the path was given
-  /// or last checked. Once one is blocked, it is tested each time. O(changed octants x segments), few operations for
-  /// each, and what `is_free` costs for the segments that are tested.
-  /// @pre the same map every time (of floors: one of the same world), and a view of it as it is
+  /// The first segment (from points()[i] to points()[i + 1]) that is no longer free since the path was given or last
+  /// checked. A blocked segment is tested again each time. O(changed octants x segments), few operations for each, plus
+  /// the cost of `is_free` for the segments that are tested. @pre the same map every time (of floors: one of the same
+  /// world), and a view of its present state
   template <planning_space Space>
   [[nodiscard]] std::optional<std::size_t> first_blocked(const Space& space) {
     const std::size_t segments = points_.empty() ? 0 : points_.size() - 1;
@@ -84,12 +84,12 @@ class path_monitor {
     }
     return std::nullopt;
   }
-  /// How many segments the last call of first_blocked tested.
+  /// Number of segments that the last call of first_blocked tested.
   [[nodiscard]] std::size_t tested() const noexcept { return tested_; }
   [[nodiscard]] const std::vector<vec3>& points() const noexcept { return points_; }
 
-  /// The robot is at `position` (metres): what lies behind it on the path is not watched any more, and the path begins
-  /// with `position` now. The way from there to the next point is tested again, unless `position` is the path's point.
+  /// Sets the robot's position (metres): drops the part of the path that the robot has passed; the path now begins with
+  /// `position`. The segment from there to the next point is tested again, unless `position` is the path's point.
   void advance(const vec3& position) {
     if (points_.size() < 2 || position == points_.front()) return;
     is_suspect_.resize(points_.size() - 1);
@@ -111,7 +111,7 @@ class path_monitor {
   }
 
  private:
-  /// Marks the segments along which the robot sweeps over an octant that has changed.
+  /// Marks the segments along which the robot sweeps over a changed octant.
   template <class Space>
   void suspect(const Space& space, const octree::change_log& log, std::uint64_t since) {
     sweeps_.clear();
@@ -133,17 +133,17 @@ class path_monitor {
   std::size_t tested_ = 0;
 };
 
-/// Keeps a path to a goal while the map changes and the robot goes. It plans once, and again only when what is left of
-/// the path is blocked, from where the robot is then. While there is no path, it tries again whenever the map has
-/// changed or the robot has moved; of a map that is not ours and has no log, that is each time.
+/// Maintains a path to a goal while the map changes and the robot moves. It plans once, and again from the robot's
+/// position only if the rest of the path is blocked. Without a path, it tries again whenever the map has changed or the
+/// robot has moved; for a user-defined map without a log, that is each time.
 class replanner {
  public:
-  /// `goal`: metres.
+  /// Sets the goal, in metres.
   explicit replanner(const vec3& goal, const path_options& options = {}) : goal_{goal}, options_{options} {}
 
-  /// The path from `position` (metres) to the goal, as find_path has it: the one there was, without what lies behind,
-  /// or a new one; on a floor at its present height. Valid until the next call.
-  /// @pre those of path_monitor::first_blocked
+  /// The path from `position` (metres) to the goal, as found by find_path: the previous one without the part already
+  /// passed, or a new one; on a floor at its present height. Valid until the next call. @pre those of
+  /// path_monitor::first_blocked
   template <planning_space Space>
   const found_path& update(const Space& space, const vec3& position) {
     if (path_.status == path_status::found && planned_ != 0) {
@@ -165,13 +165,13 @@ class replanner {
     ++planned_;
     return path_;
   }
-  /// How many times it has looked for a path.
+  /// Number of path searches so far.
   [[nodiscard]] std::size_t planned() const noexcept { return planned_; }
   [[nodiscard]] const found_path& path() const noexcept { return path_; }
   [[nodiscard]] const vec3& goal() const noexcept { return goal_; }
 
  private:
-  /// What is an obstacle on a floor, and where.
+  /// Obstacles of a floor, with the placement of the map.
   struct floor_obstacles {
     double resolution = 0.0;
     vec2 origin = zeros<vec2>();
@@ -181,7 +181,7 @@ class replanner {
   [[nodiscard]] static floor_obstacles obstacles_of(const floor_view& floor) {
     return {floor.resolution(), floor.map().origin, floor.squared_distances()};
   }
-  /// Whether the map may be another than when a path was looked for last.
+  /// Returns true if the map may have changed since the last path search.
   template <class Space>
   [[nodiscard]] bool has_changed(const Space& space) {
     bool changed = true;
@@ -197,7 +197,7 @@ class replanner {
   template <class Space>
   void see(const Space& space) {
     if constexpr (detail::follows_changes<Space>)
-      tried_.see(space.map());
+      tried_.mark_read(space.map());
     else if constexpr (std::derived_from<Space, floor_view>)
       tried_floor_ = path_.status == path_status::found ? floor_obstacles{} : obstacles_of(space);
   }

@@ -24,14 +24,14 @@ struct vertical_capsule {
   double radius = 0.2;
   double low = 0.2, high = 0.8;
 };
-/// Everything that is at most `radius` beside the vertical line through the reference point, and `low` to `high` above
-/// it, metres. @pre radius > 0; low < high
+/// All points at a horizontal distance of at most `radius` from the vertical line through the reference point, and
+/// `low` to `high` above it, metres. @pre radius > 0; low < high
 struct vertical_cylinder {
   double radius = 0.2;
   double low = 0.0, high = 1.0;
 };
 
-/// What a shape touches while its reference point goes straight from `a` to `b`.
+/// The volume that a shape sweeps while its reference point moves straight from `a` to `b`.
 template <class Shape>
 struct swept_shape {
   vec3 a = zeros<vec3>(), b = zeros<vec3>();
@@ -47,12 +47,14 @@ struct swept_shape {
   return {vec3{b.min.x(), b.min.y(), std::min(s.a.z(), s.b.z()) + s.shape.low},
           vec3{b.max.x(), b.max.y(), std::max(s.a.z(), s.b.z()) + s.shape.high}};
 }
-/// Exact: the segment may as well be stretched in the box as in the robot.
+/// Exact: stretches the box by the segment instead of the robot.
 [[nodiscard]] inline bool touches(const swept_shape<vertical_capsule>& s, const octree::bounding_box& box) noexcept {
-  const octree::bounding_box stretched{box.min - s.shape.high * vec3(0.0, 0.0, 1.0), box.max - s.shape.low * vec3(0.0, 0.0, 1.0)};
+  const octree::bounding_box stretched{box.min - s.shape.high * vec3(0.0, 0.0, 1.0),
+                                       box.max - s.shape.low * vec3(0.0, 0.0, 1.0)};
   return touches(octree::capsule{s.a, s.b, s.shape.radius}, stretched);
 }
-/// Exact: the robot meets the box where its heights do (a piece of the way) and, seen from above, its circle does.
+/// Exact: the robot touches the box where its height range does (a part of the motion) and, seen from above, its circle
+/// does.
 [[nodiscard]] inline bool touches(const swept_shape<vertical_cylinder>& s, const octree::bounding_box& box) noexcept {
   const double rise = s.b.z() - s.a.z();
   const double lowest = box.min.z() - s.shape.high, highest = box.max.z() - s.shape.low;  // of the reference point
@@ -69,7 +71,7 @@ struct swept_shape {
                  octree::bounding_box{above(box.min), above(box.max)});
 }
 
-/// What it touches on its way from `a` to `b`, metres.
+/// The volume swept on the straight segment from `a` to `b`, metres.
 [[nodiscard]] inline octree::capsule swept(const ball& s, const vec3& a, const vec3& b) { return {a, b, s.radius}; }
 [[nodiscard]] inline swept_shape<vertical_capsule> swept(const vertical_capsule& s, const vec3& a, const vec3& b) {
   return {a, b, s};
@@ -78,9 +80,9 @@ struct swept_shape {
   return {a, b, s};
 }
 
-/// Balls on the vertical line through the reference point that say where a shape is, from outside and inside: `count`
-/// of them from `low` above it on, `spacing` apart (metres). Balls of radius `outer` cover the shape, and those of
-/// radius `inner` lie in it.
+/// Balls on the vertical line through the reference point that bound a shape from outside and inside: `count` balls
+/// from `low` above the reference point on, `spacing` apart (metres). Balls of radius `outer` cover the shape, and
+/// those of radius `inner` are in it.
 struct ball_cover {
   double low = 0.0, spacing = 0.0;
   int count = 1;
@@ -88,7 +90,7 @@ struct ball_cover {
 };
 
 namespace detail {
-/// How many balls a thing of this height (metres) is covered by: not more than a few dozen, however thin it is.
+/// Number of balls that cover an object of this height (metres): at most a few dozen, however thin it is.
 [[nodiscard]] inline int pieces_of(double height, double radius) noexcept {
   return static_cast<int>(std::ceil(std::min(height / radius, 40.0)));
 }
@@ -106,8 +108,8 @@ namespace detail {
   return {s.low + spacing / 2, spacing, pieces, std::hypot(s.radius, spacing / 2), std::min(s.radius, spacing / 2)};
 }
 
-/// A robot that keeps its attitude: `swept(shape, a, b)` is what it touches on a straight way, for `octree::overlaps`,
-/// and `cover_of(shape)` are balls that spare most of these tests.
+/// A robot that keeps its attitude: `swept(shape, a, b)` is the volume that it sweeps on a straight segment, for
+/// `octree::overlaps`, and `cover_of(shape)` returns balls that avoid most of these tests.
 template <class S>
 concept robot_shape = std::copyable<S> && requires(const S& shape, const vec3& p) {
   { swept(shape, p, p) } -> octree::overlap_shape;
@@ -123,7 +125,7 @@ namespace detail {
 [[nodiscard]] inline vertical_cylinder grown(const vertical_cylinder& s, double by) {
   return {s.radius + by, s.low - by, s.high + by};
 }
-/// Of any other shape: around the balls that cover it.
+/// For any other shape: a capsule around the balls that cover it.
 template <robot_shape Shape>
 [[nodiscard]] vertical_capsule grown(const Shape& s, double by) {
   const ball_cover c = cover_of(s);

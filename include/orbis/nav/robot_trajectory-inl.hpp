@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The functions of robot_trajectory.hpp.
+/// Function definitions of robot_trajectory.hpp.
 #pragma once
 
 #include <limits>
@@ -39,7 +39,7 @@ ORBIS_INLINE void robot_trajectory::set_times(const motion_limits& limits, const
     std::size_t piece;
     double s, length, a, b;
   };
-  constexpr int parts = 16;  // of a corner
+  constexpr int parts = 16;  // pieces of a corner
   std::vector<interval> all;
   std::vector<double> u{0.0};
   const double top = limits.speed * limits.speed;
@@ -53,7 +53,7 @@ ORBIS_INLINE void robot_trajectory::set_times(const motion_limits& limits, const
     if (p != 0 && stops[p]) u.back() = 0.0, ++stops_;
     for (int k = 0; k != n; ++k) {
       const double h = piece.length / n, s = k * h;
-      // |q'| is least and |q''| greatest in the middle.
+      // |q'| is least and |q''| greatest in the middle of a corner.
       const auto far = std::max(norm(piece.first(s)), norm(piece.first(s + h)));
       const auto near = std::max(norm(piece.second(s)), norm(piece.second(s + h)));
       all.push_back({p, s, h, is_line ? 1.0 : far, is_line ? 0.0 : near});
@@ -82,7 +82,7 @@ ORBIS_INLINE void robot_trajectory::set_times(const motion_limits& limits, const
       add(here.piece, here.s, here.length, u[i], u[i + 1]);
       continue;
     }
-    // A line: faster, at full speed, slower.
+    // On a line: accelerate, move at full speed, brake.
     const double twice = 2.0 * limits.acceleration;
     const double peak = std::min(top, 0.5 * (u[i] + u[i + 1] + twice * here.length));
     const double up = std::min((peak - u[i]) / twice, here.length);

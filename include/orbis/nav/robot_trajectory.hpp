@@ -27,7 +27,7 @@ struct motion_limits {
   double acceleration = 1.0;  ///< in any direction, metres / second^2
 };
 
-/// Where a robot is at a moment.
+/// State of a moving robot at one moment.
 struct motion_state {
   vec3 position = zeros<vec3>();      ///< metres
   vec3 velocity = zeros<vec3>();      ///< metres / second
@@ -35,14 +35,14 @@ struct motion_state {
 };
 
 /// A piece of a path over a parameter from 0 to `length`: a straight line along `direction`, or a corner that turns
-/// from `direction` to `turned`. There, with l = parameter / length, the derivative goes from one unit vector to the
-/// other,
+/// from `direction` to `turned`. In a corner, with l = parameter / length, the derivative turns from one unit vector to
+/// the other,
 ///
 ///     q' = (1 - w) direction + w turned,    w = l^2 (3 - 2 l),
 ///
 /// so that |q'| <= 1, and with q'' = 0 at both ends: lines and corners join with continuous velocity and curvature. It
-/// is the Bezier curve of degree 4 whose control points lie on both legs of the corner, half of the length long: its
-/// end, the middle of the leg, the corner (see corner_points).
+/// is the Bezier curve of degree 4 whose control points are on both legs of the corner, each half of the length long:
+/// the end of the leg, its middle, the corner (see corner_points).
 struct path_piece {
   vec3 start = zeros<vec3>();
   vec3 direction = vec3(1.0, 0.0, 0.0), turned = vec3(1.0, 0.0, 0.0);  ///< of length 1
@@ -52,12 +52,12 @@ struct path_piece {
     const double l = s / length, w = l * l * l * (1.0 - 0.5 * l);  // the integral over l
     return start + length * ((l - w) * direction + w * turned);
   }
-  /// q'.
+  /// The first derivative q'.
   [[nodiscard]] vec3 first(double s) const {
     const double l = s / length, w = l * l * (3.0 - 2.0 * l);
     return (1.0 - w) * direction + w * turned;
   }
-  /// q''.
+  /// The second derivative q''.
   [[nodiscard]] vec3 second(double s) const {
     const double l = s / length;
     return 6.0 * l * (1.0 - l) / length * (turned - direction);
@@ -71,41 +71,41 @@ struct path_piece {
 };
 
 /// Positions, velocities and accelerations over time, from rest to rest. Velocity is continuous; acceleration jumps
-/// within its bound: at both ends, where braking sets in, in corners. Made by make_trajectory.
+/// within its bound: at both ends, at the start of braking, and in corners. Made by make_trajectory.
 class robot_trajectory {
  public:
-  /// Along pieces that follow each other, as fast as the limits allow. `stops[i]`: whether it stops where piece i
-  /// starts. `start`: where it is if there are no pieces. @pre as many stops as pieces; limits finite and > 0
+  /// A trajectory along consecutive pieces, as fast as the limits allow. `stops[i]`: true to stop at the start of piece
+  /// i. `start`: the position if there are no pieces. @pre stops.size() == pieces.size(); limits finite and > 0
   robot_trajectory(const vec3& start, std::vector<path_piece> pieces, const std::vector<bool>& stops,
                    const motion_limits& limits);
 
-  /// Seconds.
+  /// Duration in seconds.
   [[nodiscard]] double duration() const noexcept { return knots_.empty() ? 0.0 : knots_.back().time; }
-  /// The state at `time` seconds, at rest before 0 and after `duration()`. O(log n)
+  /// The state at `time` seconds; at rest before 0 and after `duration()`. O(log n)
   [[nodiscard]] motion_state at(double time) const;
-  /// The lines and corners that it follows.
+  /// The lines and corners of the trajectory.
   [[nodiscard]] const std::vector<path_piece>& pieces() const noexcept { return pieces_; }
-  /// How many times it stops on the way.
+  /// Number of stops on the way.
   [[nodiscard]] std::size_t stops() const noexcept { return stops_; }
 
  private:
-  /// From here to the next one the parameter's second derivative in time is constant.
+  /// Start of an interval in which the second time derivative of the parameter is constant.
   struct knot {
     double time;
     std::size_t piece;
-    double s;      ///< the piece's parameter
-    double speed;  ///< of the parameter
-    double gain;   ///< its derivative in time
+    double s;      ///< parameter of the piece
+    double speed;  ///< speed of the parameter
+    double gain;   ///< time derivative of the speed
   };
 
-  /// Sets the knots: the fastest way within the limits. Over an interval of a piece, with the square u of the
+  /// Computes the knots of the fastest motion within the limits. Over an interval of a piece, with the square u of the
   /// parameter's speed linear in the parameter, |q'| <= a and |q''| <= b,
   ///
   ///     speed^2 <= a^2 u,    |acceleration| <= a |du| / (2 h) + b u,
   ///
-  /// hence bounds on u at one end by u at the other: a pass forward and one backward, as in J. E. Bobrow, S. Dubowsky,
-  /// J. S. Gibson, "Time-optimal control of robotic manipulators along specified paths", International Journal of
-  /// Robotics Research 4(3), 1985. `stops`: the pieces at whose start it stops.
+  /// so that u at one end bounds u at the other: a pass forward and one backward, as in J. E. Bobrow, S. Dubowsky, J.
+  /// S. Gibson, "Time-optimal control of robotic manipulators along specified paths", International Journal of Robotics
+  /// Research 4(3), 1985. `stops`: the pieces at whose start the robot stops.
   void set_times(const motion_limits& limits, const std::vector<bool>& stops);
 
   vec3 start_ = zeros<vec3>(), end_ = zeros<vec3>();
@@ -116,9 +116,9 @@ class robot_trajectory {
 
 namespace detail {
 
-/// Whether a robot stays free along a Bezier curve. The curve lies in the convex hull of its control points, and so
-/// nowhere farther from the segment between its ends than the farthest of them: a thicker robot along that segment is
-/// free, or else each half of the curve is looked at in turn. Nothing is sampled.
+/// Returns true if a robot is free along a Bezier curve. The curve is in the convex hull of its control points. So its
+/// distance from the segment between its ends is at most that of the farthest control point. Tests a robot inflated by
+/// that distance along the segment, and if that is not free, each half of the curve recursively. Nothing is sampled.
 template <inflatable_space Space>
 [[nodiscard]] bool is_free_curve(const Space& space, const std::array<vec3, 5>& points, int halvings = 6) {
   const vec3 along = points[4] - points[0];
@@ -131,35 +131,35 @@ template <inflatable_space Space>
   const double rounding = 1e-9 * space.resolution();
   if (space.is_free(points[0], points[4], away + rounding)) return true;
   if (halvings == 0 || !space.is_free(points[0], points[4])) return false;
-  // By de Casteljau's rule.
+  // De Casteljau's algorithm.
   std::array<vec3, 5> left = points, right = points;
   for (std::size_t n = 4; n != 0; --n) {
     for (std::size_t i = 0; i != n; ++i) right[i] = 0.5 * (right[i] + right[i + 1]);
     left[5 - n] = right[0];
   }
-  // `right` holds the points of the second half, `left` those of the first.
+  // `right` holds the control points of the second half, `left` those of the first.
   return is_free_curve(space, left, halvings - 1) && is_free_curve(space, right, halvings - 1);
 }
 
 }  // namespace detail
 
 /// A trajectory along a polyline, from rest to rest, within the limits. Corners are rounded (see path_piece) as far as
-/// the robot fits: each rounded corner is certified as a whole by the exact test of what a thicker robot (of a shape of
-/// yours: the balls that cover it) sweeps along pieces of the curve's convex hull. Where none of some sizes fits, the
-/// robot stops at the corner. So the robot is free all the time. Speed and acceleration stay within the limits
-/// everywhere, not at samples alone.
+/// the robot fits: each rounded corner is certified as a whole by the exact test of the volume that an inflated robot
+/// (of a user-defined shape: the balls that cover it) sweeps along pieces of the curve's convex hull. If none of
+/// several sizes fits, the robot stops at the corner. So the robot is free all the time. Speed and acceleration are
+/// within the limits everywhere, not only at samples.
 ///
-/// On a floor (`floor_view`) the points keep the heights that they have. Between them height is linear, so that the
-/// robot may be at another one: `view.on_ground(position)` says which. The limits hold for the polyline's motion.
+/// On a floor (`floor_view`) the points keep their heights. Between them height is linear, so that the robot's true
+/// height may differ: `view.on_ground(position)` returns it. The limits hold for the polyline's motion.
 ///
-/// Points that follow each other at the same place, or less than 1e-100 m apart, count once. O(points), and what
-/// `is_free` costs.
+/// Consecutive points at the same place, or less than 1e-100 m apart, count once. O(points), plus the cost of
+/// `is_free`.
 /// @pre points is not empty; each segment is free (space.is_free), as those of find_path are; limits finite and > 0
 template <inflatable_space Space>
 [[nodiscard]] robot_trajectory make_trajectory(const Space& space, const std::vector<vec3>& points,
                                                const motion_limits& limits = {}) {
   assert(!points.empty());
-  constexpr double least = 1e-100;  // of a leg that has a direction: its square is a number
+  constexpr double least = 1e-100;  // minimum length of a leg with a direction: its square does not underflow
   std::vector<vec3> corners;
   for (const vec3& p : points)
     if (corners.empty() || norm(p - corners.back()) > least) corners.push_back(p);
@@ -185,7 +185,7 @@ template <inflatable_space Space>
     }
     const vec3 next = corners[i + 1] - corners[i];
     const vec3 turned = normalized(next);
-    // What two corners share is halved.
+    // Two corners share a leg equally.
     const double room = std::min(norm(leg) * (i == 1 ? 1.0 : 0.5), norm(next) * (i + 1 == last ? 1.0 : 0.5));
     bool rounded = false;
     for (double share = 1.0; share > 0.01 && !rounded; share *= 0.5) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The functions of squared_distances.hpp.
+/// Function definitions of squared_distances.hpp.
 #pragma once
 
 #include <cmath>
@@ -43,7 +43,7 @@ ORBIS_INLINE void squared_distances::begin(std::span<const voxel_cube> cubes) {
   assert(stages_.empty() && !has_cubes());
   begin_update();
   for (const voxel_cube& c : cubes) directory_.add_cube(place_of(octree::node_key(c.low, c.level)), c.level - 3);
-  // What is near a face is worked out as a whole. An obstacle has the same value as all around it: nothing is stored.
+  // Everything near a face is computed. An obstacle has the same value as all voxels around it: nothing is stored.
   const auto work_out = [&](const detail::brick_place& p) {
     const std::uint32_t found = directory_.find(p);
     if (!directory_.is_inside(p) || is_brick(found) || is_full(found)) return;
@@ -61,7 +61,7 @@ ORBIS_INLINE void squared_distances::begin(std::span<const voxel_cube> cubes) {
     for (int z = first; z <= last; ++z)
       for (int y = first; y <= last; ++y)
         for (int x = first; x <= last; ++x) {
-          // Past what lies between the faces.
+          // Skip the bricks between the faces.
           if (x == first + reach && !is_near(x) && !is_near(y) && !is_near(z)) x = last - reach + 1;
           work_out({low.x + x, low.y + y, low.z + z});
         }
@@ -92,7 +92,7 @@ ORBIS_INLINE void squared_distances::finish_update() {
   spread_along_z();
   for (std::size_t i = 0; i != used_kept_; ++i) stages_[kept_[i].brick].kept = none;
   remove_needless();
-  // Buffers of the size of usual updates are kept, so that these allocate nothing.
+  // Keep buffers of the size of usual updates, so that these allocate nothing.
   constexpr std::size_t few = std::size_t{1} << 20U;
   const std::size_t field = stages_.size() * (sizeof(stages) + sizeof(brick_values));
   if (buffer_bytes() > std::max(few, field / 8)) release_buffers();
@@ -118,8 +118,8 @@ ORBIS_INLINE std::uint32_t squared_distances::make(const detail::brick_place& p)
   return number;
 }
 
-/// Whether a brick says what would be said of its place without it. Distances do only if all stages do: no value is
-/// less than the distance.
+/// Returns true if removing a brick would not change any value. Distances are unchanged only if all stages are: no
+/// value is less than the distance.
 ORBIS_INLINE bool squared_distances::is_needless(std::uint32_t brick) const {
   const std::uint16_t without = value_without_brick(directory_.without_number(places_[brick]));
   const stages& s = stages_[brick];
@@ -132,13 +132,13 @@ ORBIS_INLINE bool squared_distances::is_needless(std::uint32_t brick) const {
 ORBIS_INLINE void squared_distances::remove_needless() {
   needless_.insert(needless_.end(), stale_space_.begin(), stale_space_.end());
   std::erase_if(needless_, [&](std::uint32_t i) { return !is_needless(i); });
-  // From the last: the brick that takes the place of a removed one stays.
+  // From the last one: the brick that replaces a removed one stays valid.
   std::sort(needless_.begin(), needless_.end(), std::greater{});
   needless_.erase(std::unique(needless_.begin(), needless_.end()), needless_.end());
   for (const std::uint32_t i : needless_) remove(i);
 }
 
-/// The last brick takes its number.
+/// The last brick takes the number of the removed one.
 ORBIS_INLINE void squared_distances::remove(std::uint32_t brick) {
   const auto last = static_cast<std::uint32_t>(stages_.size() - 1);
   directory_.erase(places_[brick]);
@@ -176,7 +176,7 @@ ORBIS_INLINE int squared_distances::range_of(std::uint16_t least) const noexcept
 
 // -- the obstacles
 
-/// Takes over the masks, and lists the rows of eight voxels that changed.
+/// Copies the masks, and lists the rows of eight voxels that changed.
 ORBIS_INLINE void squared_distances::set_obstacles(std::span<const octant_obstacles> octants) {
   detail::brick_place last{-1, -1, -1};
   std::uint32_t number = none;
@@ -195,7 +195,7 @@ ORBIS_INLINE void squared_distances::set_obstacles(std::span<const octant_obstac
     std::array<std::uint8_t, 64>& rows = stages_[number].obstacles;
     const std::uint32_t x = o.octant.x & 4U, y = o.octant.y & 4U, z = o.octant.z & 4U;
     for (std::uint32_t i = 0; i != 16; ++i) {
-      // Of the bits of a Morton code, x has 0 and 3, y 1 and 4, z 2 and 5.
+      // In a Morton code, x has bits 0 and 3, y bits 1 and 4, z bits 2 and 5.
       const std::uint32_t row_y = i & 3U, row_z = i >> 2U;
       const std::uint32_t low = (row_y & 1U) << 1U | (row_y & 2U) << 3U | (row_z & 1U) << 2U | (row_z & 2U) << 4U;
       const auto four = static_cast<std::uint8_t>((o.mask >> low & 3U) | (o.mask >> (low + 8) & 3U) << 2U);
@@ -221,7 +221,7 @@ ORBIS_INLINE void squared_distances::list_row(const detail::brick_place& p, std:
 ORBIS_INLINE void squared_distances::update_rows() {
   const std::span<const std::uint64_t> rows{rows_};
   for (std::size_t first = 0; first != rows.size();) {
-    // Rows of a line whose distances may depend on each other are worked out together.
+    // Rows of a line whose distances may depend on each other are computed together.
     std::size_t last = first + 1;
     while (last != rows.size() && rows[last] - rows[last - 1] <= static_cast<std::uint64_t>(2 * bricks_in_reach_ + 1) &&
            rows[last] >> 18U == rows[first] >> 18U)
@@ -235,7 +235,7 @@ ORBIS_INLINE void squared_distances::update_line(std::span<const std::uint64_t> 
   const auto brick_x = [](std::uint64_t row) { return static_cast<int>(row & 0x3ffffU); };
   const auto y = static_cast<int>(rows.front() >> 18U & 0x1fffffU), z = static_cast<int>(rows.front() >> 39U);
   const int first = brick_x(rows.front()) - bricks_in_reach_, last = brick_x(rows.back()) + bricks_in_reach_;
-  const int from = first - bricks_in_reach_;  // what reaches the first
+  const int from = first - bricks_in_reach_;  // the rows that reach the first one
   const auto count = static_cast<std::size_t>(last + bricks_in_reach_ - from + 1);
   const auto row = static_cast<std::uint32_t>((z & 7) * 8 + (y & 7));
   line_.resize(count);
@@ -247,7 +247,7 @@ ORBIS_INLINE void squared_distances::update_line(std::span<const std::uint64_t> 
     line_[i] = bricks.find({from + static_cast<int>(i), y >> 3, z >> 3});
     line_bits_[i] = is_brick(line_[i]) ? stages_[line_[i]].obstacles[row] : row_bits(line_[i]);
   }
-  // From the voxel before, or behind, each eight to the nearest obstacle on that side.
+  // Distances of each group of eight from the voxel before, or after, to the nearest obstacle on that side.
   constexpr int beyond = far_along - 1;
   int d = beyond;
   for (std::size_t i = 0; i != count; ++i) {
@@ -287,7 +287,8 @@ ORBIS_INLINE void squared_distances::update_line(std::span<const std::uint64_t> 
 
 namespace detail {
 
-/// The squares of those of eight distances along x that are less than the others, eight times, for the rows of a slice.
+/// Offers the squares of those of eight distances along x that are less than the others, eight times, for the rows of a
+/// slice.
 inline void offer_row(std::uint64_t from, std::uint64_t other, slice_offer& out) noexcept {
   const auto a = std::bit_cast<std::array<std::uint8_t, 8>>(from);
   const auto b = std::bit_cast<std::array<std::uint8_t, 8>>(other);
@@ -320,7 +321,7 @@ ORBIS_INLINE void squared_distances::keep_plane(std::uint32_t brick, unsigned ch
 
 ORBIS_INLINE void squared_distances::spread_along_y() {
   detail::slice_offer offer;
-  // Calls visit(place of a target brick, z in it, squares, the least of these) for the slices that the row can reach.
+  // Calls visit(place of a target brick, z in it, squares, the least of these) for the slices within reach of the row.
   const auto for_each_target = [&](const along_change& c, auto&& visit) {
     const int range = range_of(offer.least);
     const detail::brick_place p = places_[c.brick];
@@ -331,7 +332,7 @@ ORBIS_INLINE void squared_distances::spread_along_y() {
     }
   };
   std::optional<detail::brick_directory::cursor> bricks{directory_};
-  for (const along_change& c : along_) {  // what rose
+  for (const along_change& c : along_) {  // distances that rose
     detail::offer_row(c.before, c.after, offer);
     if (offer.least == detail::no_offer) continue;
     for_each_target(c, [&](const detail::brick_place& p, int z, const std::uint16_t* squares, int gap) {
@@ -350,7 +351,7 @@ ORBIS_INLINE void squared_distances::spread_along_y() {
     for (int z = 0; z != 8; ++z)
       if ((stages_[i].stale_plane >> z & 1) != 0) make_plane(i, z);
   }
-  for (const along_change& c : along_) {  // what fell
+  for (const along_change& c : along_) {  // distances that fell
     detail::offer_row(c.after, c.before, offer);
     if (offer.least == detail::no_offer) continue;
     for_each_target(c, [&](const detail::brick_place& p, int z, const std::uint16_t* squares, int gap) {
@@ -372,7 +373,7 @@ ORBIS_INLINE void squared_distances::spread_along_y() {
   for (const std::uint32_t i : stale_plane_) stages_[i].stale_plane = 0;
 }
 
-/// Works a slice of `plane` out of the rows within reach.
+/// Computes a slice of `plane` from the rows within reach.
 ORBIS_INLINE void squared_distances::make_plane(std::uint32_t brick, int z) {
   const detail::brick_place p = places_[brick];
   alignas(64) detail::slice best;
@@ -393,7 +394,7 @@ ORBIS_INLINE void squared_distances::make_plane(std::uint32_t brick, int z) {
     }
   }
   stages& s = stages_[brick];
-  // Once more as a slice with none beside it: for the bound.
+  // Once more as a slice without neighbours, to apply the bound.
   s.plane_top[static_cast<std::size_t>(z)] =
       kernels_.combine_slices(best.data(), nullptr, nullptr, 0, bound(), s.plane.data() + 64 * z);
 }
@@ -402,7 +403,7 @@ ORBIS_INLINE void squared_distances::make_plane(std::uint32_t brick, int z) {
 
 ORBIS_INLINE void squared_distances::spread_along_z() {
   detail::slice_offer offer;
-  // Calls visit(place of a target brick, its slice at which the source would be, first and last slice in reach).
+  // Calls visit(place of a target brick, position of the source relative to its slices, first and last slice in reach).
   const auto for_each_target = [&](const detail::brick_place& p, int z, auto&& visit) {
     const int range = range_of(offer.least), at = p.z * 8 + z;
     for (int bz = (at - range) >> 3; bz <= (at + range) >> 3; ++bz)
@@ -460,7 +461,7 @@ ORBIS_INLINE void squared_distances::spread_along_z() {
   for (const std::uint32_t i : stale_space_) stages_[i].stale_space = 0;
 }
 
-/// Works slices of the result out of the planes within reach.
+/// Computes slices of the result from the planes within reach.
 ORBIS_INLINE void squared_distances::make_space(std::uint32_t brick, unsigned slices) {
   static constexpr detail::slice obstacles{};
   const detail::brick_place p = places_[brick];

@@ -11,9 +11,9 @@
 ///     plane(x, y, z) = min over j of along(x, j, z)^2 + (y - j)^2
 ///     space(x, y, z) = min over k of plane(x, y, k) + (z - k)^2
 ///
-/// A change goes through the stages and ends where a value stays as it was. In each stage, sources that rose make
-/// those slices of 8x8 voxels stale in which a value equals what the source offered before: it may have been the least,
-/// and the slice is worked out again, once. Sources that fell lower their targets. So the values do not depend on the
+/// A change propagates through the stages and ends where a value is unchanged. In each stage, sources that rose mark
+/// those slices of 8x8 voxels as stale in which a value equals the source's previous offer: it may have been the least,
+/// and the slice is computed again, once. Sources that fell lower their targets. So the values do not depend on the
 /// order of changes.
 #pragma once
 
@@ -43,35 +43,36 @@ struct octant_obstacles {
   std::uint64_t mask = 0;
 };
 
-/// A node of an octree: a cube of 2^level voxels along each edge, at multiples of that.
+/// A node of an octree: a cube with an edge of 2^level voxels, aligned to multiples of that.
 struct voxel_cube {
   octree::voxel_key low;  ///< any voxel of it
   int level = 0;
 };
 
-/// The distances at one moment, for readers. A copy shares its memory with the field it was taken of, and is not
-/// changed by it.
+/// The distances at one moment, for readers. A copy shares memory with the field that it was made from, and later
+/// updates do not change it.
 class squared_distance_view {
  public:
-  /// The value beyond the reach.
+  /// The value of voxels beyond the reach.
   static constexpr std::uint16_t far = detail::far_away;
 
   /// The squared distance between the centre of voxel `k` and that of the nearest obstacle, in voxels; 0 in obstacles;
-  /// `far` if that is more than the reach. O(1), about 10 ns.
+  /// `far` if it exceeds the reach. O(1), about 10 ns.
   [[nodiscard]] std::uint16_t squared(const octree::voxel_key& k) const noexcept {
     const std::uint32_t n = directory_.find(place_of(k));
     return is_brick(n) ? values_[n][index_of(k)] : value_without_brick(n);
   }
-  /// Whether the brick of 8x8x8 voxels that contains `k` is stored. O(1).
+  /// Returns true if the brick of 8x8x8 voxels that contains `k` is stored. O(1).
   [[nodiscard]] bool is_stored(const octree::voxel_key& k) const noexcept {
     return is_brick(directory_.find(place_of(k)));
   }
-  /// How far it looks, in voxels.
+  /// Maximum distance, in voxels.
   [[nodiscard]] int reach() const noexcept { return reach_; }
-  /// The value outside of the grid, and of all bricks but those that lie in a cube (see squared_distances::begin).
+  /// The value outside of the grid, and in all bricks that are not stored, except those in a cube (see
+  /// squared_distances::begin).
   [[nodiscard]] std::uint16_t elsewhere() const noexcept { return elsewhere_; }
-  /// Calls `visit(lowest voxel, values)` for every brick that is stored: 8x8x8 squared distances, x fastest. What is
-  /// not stored has the value `elsewhere()`, or in cubes that the field began with the opposite: 0 or `far`. In no
+  /// Calls `visit(lowest voxel, values)` for every stored brick: 8x8x8 squared distances, x fastest. Bricks that are
+  /// not stored have the value `elsewhere()`, or in cubes that the field began with the opposite: 0 or `far`. In no
   /// particular order.
   template <class Visit>
   void for_each_brick(Visit&& visit) const {
@@ -84,7 +85,7 @@ class squared_distance_view {
   }
   [[nodiscard]] std::size_t brick_count() const noexcept { return values_.size(); }
 
-  /// Squared distances of voxels of which each lies near the one before. The view must outlive it and stay as it is.
+  /// Reads squared distances of voxels, each near the one before. The view must outlive the reader and not change.
   class reader {
    public:
     explicit reader(const squared_distance_view& view) noexcept : view_{&view}, cursor_{view.directory_} {}
@@ -117,9 +118,9 @@ class squared_distance_view {
     return {static_cast<std::int32_t>(k.x >> 3U), static_cast<std::int32_t>(k.y >> 3U),
             static_cast<std::int32_t>(k.z >> 3U)};
   }
-  /// Whether what the directory says is the number of a brick.
+  /// Returns true if a result of the directory is the number of a brick.
   [[nodiscard]] static bool is_brick(std::uint32_t found) noexcept { return found < detail::brick_directory::inner; }
-  /// The value of all voxels of a brick that is not stored, of which the directory said `found`: 0 or `far`.
+  /// The value of all voxels of a brick that is not stored, where `found` is the result of the directory: 0 or `far`.
   [[nodiscard]] std::uint16_t value_without_brick(std::uint32_t found) const noexcept {
     return found == detail::brick_directory::inner ? static_cast<std::uint16_t>(far - elsewhere_) : elsewhere_;
   }
@@ -134,78 +135,77 @@ class squared_distance_view {
   std::uint16_t elsewhere_;
 };
 
-/// Distances that follow their obstacles: after any sequence of updates the values are, bit for bit, those of a field
-/// made afresh of the same obstacles. No box has to be named: memory follows what is near obstacles or, where all is an
-/// obstacle that is not named (`elsewhere_is_obstacle`), what is free: about 2.9 kB for each 8x8x8 voxels of which one
-/// is within reach, given back when none is any more.
+/// Distances that follow their obstacles: after any sequence of updates the values are bit for bit those of a field
+/// rebuilt from the same obstacles. It needs no bounds. Memory is proportional to the space near obstacles or, if space
+/// without information is an obstacle (`elsewhere_is_obstacle`), to the free space: about 2.9 kB for each 8x8x8 voxels
+/// of which one is within reach, released when none is any more.
 ///
-/// One thread at a time. Readers on other threads use copies of `view()`, see there.
+/// For one thread at a time. Readers on other threads use copies of `view()`.
 class squared_distances : public squared_distance_view {
  public:
-  /// `reach`: how far distances are known, in voxels. `cells`: of the grid, along an axis.
-  /// `elsewhere_is_obstacle`: what voxels are of which nothing was said, and all that lies outside of the grid.
-  /// @pre 1 <= reach <= 181; cells is a multiple of 8
+  /// `reach`: maximum distance, in voxels. `cells`: of the grid, along an axis. `elsewhere_is_obstacle`: true if voxels
+  /// that were never set, and all space outside of the grid, are obstacles. @pre 1 <= reach <= 181; cells is a multiple
+  /// of 8
   squared_distances(int reach, std::uint32_t cells, bool elsewhere_is_obstacle);
 
-  /// Says that these cubes are the opposite of what lies elsewhere: full of obstacles, or free. Only bricks within
-  /// reach of their faces are stored: outside of what is full, inside of what is free (see bricks_of).
-  /// @pre before the first update; disjoint cubes of level 6 or more, in the grid
+  /// Sets these cubes to the opposite of the space elsewhere: full of obstacles, or free. Only bricks within reach of
+  /// their faces are stored: outside of full cubes, inside of free ones (see bricks_of). @pre before the first update;
+  /// disjoint cubes of level 6 or more, in the grid
   void begin(std::span<const voxel_cube> cubes);
-  /// How many bricks of the field one cube alone makes at most. O(1).
+  /// Maximum number of bricks that one cube alone adds to the field. O(1).
   [[nodiscard]] std::uint64_t bricks_of(const voxel_cube& cube) const noexcept;
-  /// Whether a node (level 2 or more) lies in one of the cubes that the field began with. O(levels).
+  /// Returns true if a node (level 2 or more) is in one of the cubes that the field began with. O(levels).
   [[nodiscard]] bool is_in_cube(const voxel_cube& node) const noexcept {
     return directory_.has_cubes() && directory_.is_in_cube(place_of(node.low), std::max(node.level - 3, 0));
   }
   [[nodiscard]] bool has_cubes() const noexcept { return directory_.has_cubes(); }
 
-  /// Says which voxels of these octants are obstacles now; all others stay what they are. Each octant is named once.
+  /// Sets the obstacles in these octants; all other voxels keep their state. Each octant is named once.
   ///
-  /// O(changes x reach^3) at worst: an obstacle alone in free space is the nearest one of all voxels within reach, and
-  /// all these are written, 64 at a time; when it goes, their slices of 64 are worked out again in O(reach) each.
-  /// Typically obstacles are surfaces, and most changes end after a few voxels, where another obstacle is nearer; and
-  /// what several neighbours change is worked out once.
-  /// Memory that a large update needs beside the field (up to its size) is given back at its end; small ones allocate
-  /// nothing but new bricks.
+  /// O(changes x reach^3) in the worst case: a single obstacle in free space is the nearest one of all voxels within
+  /// reach, and all these are written, 64 at a time; when it vanishes, their slices of 64 are computed again in
+  /// O(reach) each. Typically obstacles are surfaces: most changes end after a few voxels, where another obstacle is
+  /// nearer, and voxels that several neighbours change are computed once. Memory that a large update needs in addition
+  /// to the field (up to its size) is released at its end; small ones allocate nothing except new bricks.
   /// @pre keys lie in the grid
   void update(std::span<const octant_obstacles> octants);
 
-  /// Whether voxel `k` is an obstacle. O(1).
+  /// Returns true if voxel `k` is an obstacle. O(1).
   [[nodiscard]] bool is_obstacle(const octree::voxel_key& k) const noexcept { return squared(k) == 0; }
   /// The obstacle nearest to voxel `k`, or one of them if several are; empty if there is none within reach. The nearest
-  /// may be one that was never named (see `elsewhere_is_obstacle`). O(reach).
+  /// may be one that was never set (see `elsewhere_is_obstacle`). O(reach).
   [[nodiscard]] std::optional<octree::voxel_key> nearest(const octree::voxel_key& k) const;
 
-  /// What readers need. It is part of the field: to be read or copied on the field's own thread (the one that updates
-  /// it), between two updates. A copy stays as it is, and may be handed to other threads, read by several of them at
-  /// once, and destroyed on any. A copy costs a pointer and an atomic increment for each 4 bricks, and 40 to 80 bytes
-  /// for each block of 8x8x8 bricks (the directory); afterwards the field clones what it writes to, 4 kB at a time. On
-  /// the field's own thread no copy is needed.
+  /// A view for readers. It is part of the field: read or copy it on the thread that updates the field, between two
+  /// updates. A copy does not change; it may be passed to other threads, read by several of them at once, and destroyed
+  /// on any. A copy costs a pointer and an atomic increment for each 4 bricks, and 40 to 80 bytes for each block of
+  /// 8x8x8 bricks (the directory); afterwards the field clones the parts that it writes to, 4 kB at a time. On the
+  /// updating thread no copy is needed.
   [[nodiscard]] const squared_distance_view& view() const noexcept { return *this; }
-  /// Bytes on the heap, those shared with copies of the view included.
+  /// Bytes on the heap, including those shared with copies of the view.
   [[nodiscard]] std::size_t memory_bytes() const noexcept;
 
  private:
   static constexpr std::uint32_t none = detail::brick_directory::none;
   static constexpr std::uint8_t far_along = 0xff;
 
-  /// What is kept of a brick beside its distances (1728 bytes). Arrays are in rows along x: z * 64 + y * 8 + x.
+  /// Data of a brick in addition to its distances (1728 bytes). Arrays are in rows along x: z * 64 + y * 8 + x.
   struct stages {
     alignas(64) std::array<std::uint16_t, 512> plane;
     std::array<std::uint8_t, 512> along;
     std::array<std::uint8_t, 64> obstacles;  ///< row z * 8 + y, bit x
-    std::array<std::uint64_t, 8> octants;    ///< the same as it was given
+    std::array<std::uint64_t, 8> octants;    ///< the same, as passed to update
     std::array<std::uint16_t, 8> plane_top;  ///< the largest value of each slice
     std::array<std::uint16_t, 8> space_top;
     std::uint32_t kept = none;     ///< number of the copy of `plane` from before the update
-    std::uint8_t stale_plane = 0;  ///< slices to work out again
+    std::uint8_t stale_plane = 0;  ///< slices to compute again
     std::uint8_t stale_space = 0;
   };
   /// `plane` as it was before an update.
   struct kept_plane {
     alignas(64) std::array<std::uint16_t, 512> plane;
     std::uint32_t brick;
-    std::uint8_t changed;  ///< slices that may be different now
+    std::uint8_t changed;  ///< slices that may have changed
   };
   struct along_change {
     std::uint32_t brick;
@@ -219,7 +219,7 @@ class squared_distances : public squared_distance_view {
   void remove(std::uint32_t brick);
   [[nodiscard]] std::size_t buffer_bytes() const noexcept;
   void release_buffers();
-  /// Of a brick that is not stored: whether it is full of obstacles, and a row of them as bits.
+  /// For a brick that is not stored: true if it is full of obstacles, and a row of it as bits.
   [[nodiscard]] bool is_full(std::uint32_t found) const noexcept { return value_without_brick(found) == 0; }
   [[nodiscard]] std::uint8_t row_bits(std::uint32_t found) const noexcept { return is_full(found) ? 0xff : 0; }
   [[nodiscard]] std::uint16_t bound() const noexcept { return static_cast<std::uint16_t>(reach_ * reach_); }
@@ -227,10 +227,10 @@ class squared_distances : public squared_distance_view {
   [[nodiscard]] const std::uint16_t* squares(int distance) const noexcept {
     return squares_.data() + 8 * (distance + squares_pad_);
   }
-  /// How far an offer of `least` reaches, in voxels; < 0 if nowhere.
+  /// Maximum distance at which an offer of `least` matters, in voxels; < 0 if nowhere.
   [[nodiscard]] int range_of(std::uint16_t least) const noexcept;
 
-  /// Forgets the lists of changes of the update before, and takes those of this one through all stages.
+  /// Clears the change lists of the previous update; propagates those of this one through all stages.
   void begin_update();
   void finish_update();
   void set_obstacles(std::span<const octant_obstacles> octants);
@@ -258,7 +258,7 @@ class squared_distances : public squared_distance_view {
   detail::block_vector<kept_plane> kept_;
   std::size_t used_kept_ = 0;
   std::vector<std::uint32_t> stale_plane_, stale_space_;
-  std::vector<std::uint32_t> needless_;  ///< bricks that may be as elsewhere
+  std::vector<std::uint32_t> needless_;  ///< bricks that may have become unnecessary
 };
 
 }  // namespace orbis::nav

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// How much unknown space a camera would see from somewhere.
+/// Amount of unknown space that a camera would see from a pose.
 #pragma once
 
 #include <algorithm>
@@ -25,21 +25,21 @@
 namespace orbis::nav {
 
 struct view_gain_options {
-  double max_range = 4.0;  ///< how far the camera sees, metres along the ray
-  int pixel_step = 8;      ///< a ray for each so many columns and rows of the image
-  /// Unknown space that counts; all of it if empty. Where a map ends in unknown space on all sides, a box around what
-  /// is to be explored keeps rays that slip through a gap from finding the world outside.
+  double max_range = 4.0;  ///< range of the camera, metres along the ray
+  int pixel_step = 8;      ///< spacing of the rays in columns and rows of the image
+  /// Box in which unknown space counts; empty: everywhere. If a map ends in unknown space on all sides, a box around
+  /// the space to explore keeps rays that slip through a gap from counting the world outside.
   std::optional<octree::bounding_box> bounds{};
 };
 
-/// Counts the unknown voxels that a camera would see: its rays go through free and unknown space up to the first
-/// occupied voxel. Each voxel counts once, however many rays pass it. That is the most that a view can make known, as
-/// what is unknown may hide what is behind it: H. H. Gonzalez-Banos, J.-C. Latombe, "Navigation strategies for
-/// exploring indoor environments", International Journal of Robotics Research 21, 2002. Rays that are farther apart
-/// than a voxel miss some.
+/// Counts the unknown voxels that a camera would see: its rays pass through free and unknown space up to the first
+/// occupied voxel. Each voxel counts once, however many rays pass it. This is an upper bound on what a view can make
+/// known, because unknown space may hide the space behind it: H. H. Gonzalez-Banos, J.-C. Latombe, "Navigation
+/// strategies for exploring indoor environments", International Journal of Robotics Research 21, 2002. Rays that are
+/// more than a voxel apart miss some.
 ///
-/// It remembers what it reads of the map, so that poses near each other are fast. The map must outlive it and stay as
-/// it is. One thread at a time.
+/// It caches the parts of the map that it reads, so that poses near each other are fast. The map must outlive it and
+/// not change. For one thread at a time.
 template <planning_map Map, camera::camera_model Camera>
 class view_gain {
  public:
@@ -47,7 +47,7 @@ class view_gain {
   view_gain(const Map& map, const Camera& camera, const view_gain_options& options = {})
       : grid_{map_access<Map>::grid(map)}, octants_{map_access<Map>::octants(map)}, max_range_{options.max_range} {
     assert(std::isfinite(max_range_) && max_range_ > 0.0 && options.pixel_step > 0);
-    const auto first = [&](int size) { return std::min(options.pixel_step / 2, (size - 1) / 2); };  // one at least
+    const auto first = [&](int size) { return std::min(options.pixel_step / 2, (size - 1) / 2); };  // at least one
     for (int y = first(camera.height()); y < camera.height(); y += options.pixel_step)
       for (int x = first(camera.width()); x < camera.width(); x += options.pixel_step)
         if (const std::optional<vec3> ray = camera.unproject(vec2{double(x), double(y)}))
@@ -55,7 +55,8 @@ class view_gain {
     if (options.bounds) counted_ = octree::keys_between(grid_, options.bounds->min, options.bounds->max);
     counts_any_ = !options.bounds || counted_;
   }
-  view_gain(const Map&&, const Camera&, const view_gain_options& = {}) = delete;  // it would not outlive the gain
+  view_gain(const Map&&, const Camera&,
+            const view_gain_options& = {}) = delete;  // a temporary would not outlive the gain
 
   /// The number of unknown voxels seen from a pose; 0 from outside of the grid. O(voxels along the rays)
   [[nodiscard]] std::size_t operator()(const se3& T_world_camera) {
@@ -69,7 +70,7 @@ class view_gain {
   }
 
  private:
-  /// What is known of an octant of 4x4x4 voxels, and which of its voxels the view of this number has counted.
+  /// States of an octant of 4x4x4 voxels, and those of its voxels that the view of this number has counted.
   struct octant {
     octree::octant_states states;
     std::uint64_t counted = 0;
@@ -89,10 +90,11 @@ class view_gain {
     return o;
   }
 
-  /// From voxel to voxel: J. Amanatides, A. Woo, "A fast voxel traversal algorithm for ray tracing", Eurographics 1987.
+  /// Traverses the voxels of a ray: J. Amanatides, A. Woo, "A fast voxel traversal algorithm for ray tracing",
+  /// Eurographics 1987.
   void cast(const vec3& origin, const octree::voxel_key& start, const vec3& direction) {
     std::array<std::uint32_t, 3> at{start.x, start.y, start.z};
-    std::array<double, 3> next{}, apart{};  // where the ray enters the next voxel along an axis, metres
+    std::array<double, 3> next{}, apart{};  // positions where the ray enters the next voxel along an axis, metres
     std::array<std::uint32_t, 3> step{};
     for (std::size_t i = 0; i != 3; ++i) {
       const double d = direction[static_cast<Eigen::Index>(i)];
@@ -102,7 +104,7 @@ class view_gain {
       const double to_face = 0.5 * grid_.resolution() + (d < 0.0 ? -ahead : ahead);
       next[i] = d == 0.0 ? apart[i] : std::max(0.0, to_face) / std::abs(d);
     }
-    constexpr std::array<unsigned, 4> spread{0, 1, 8, 9};  // a coordinate's two bits along the Morton curve
+    constexpr std::array<unsigned, 4> spread{0, 1, 8, 9};  // the two bits of a coordinate along the Morton curve
     octant* here = nullptr;
     for (;;) {
       const octree::voxel_key k{at[0], at[1], at[2]};
@@ -119,7 +121,7 @@ class view_gain {
       next[axis] += apart[axis];
       const std::uint32_t before = at[axis];
       at[axis] += step[axis];
-      if (at[axis] >= grid_.cells()) return;  // below 0 it wraps around
+      if (at[axis] >= grid_.cells()) return;  // coordinates below 0 wrap around
       if ((before ^ at[axis]) >> 2U != 0) here = nullptr;
     }
   }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Makes the nodes of OctoMap's trees of those of a map, and the other way round.
+/// Converts between the nodes of OctoMap's trees and those of a map.
 #pragma once
 
 #include <algorithm>
@@ -28,7 +28,7 @@
 
 namespace orbis::interop::detail {
 
-/// Gives the protected building blocks of a tree to the builder below.
+/// Exposes protected members of a tree to the builder below.
 template <class Tree>
 class open_tree : public Tree {
  public:
@@ -41,8 +41,8 @@ class open_tree : public Tree {
   }
 };
 
-/// Makes OctoMap's nodes of those an `.ot` file would have. `finish_leaf(tree, node, code, level)` is
-/// called for each leaf in Morton order.
+/// Builds OctoMap's nodes from those of an `.ot` file. Calls `finish_leaf(tree, node, code, level)` for each leaf in
+/// Morton order.
 template <class Tree, class FinishLeaf>
 class tree_builder {
  public:
@@ -68,7 +68,7 @@ class tree_builder {
 template <class Tree, octree::octomap_model Model, class FinishLeaf>
 [[nodiscard]] std::unique_ptr<Tree> make_tree(const octree::occupancy_octree<Model>& map, FinishLeaf finish_leaf) {
   assert(map.tree_depth() == octree::default_tree_depth);
-  // The `.ot` format holds every node with its value in preorder, behind a text header.
+  // The `.ot` format stores every node with its value in preorder, after a text header.
   const std::string file = octree::ot_bytes(map);
   constexpr std::string_view end_of_header = "\ndata\n";
   const std::size_t nodes = file.find(end_of_header) + end_of_header.size();
@@ -89,8 +89,7 @@ template <class Tree, octree::octomap_model Model, class FinishLeaf>
 /// The level of an octant, the largest node that occupancy_octree::edit_octant changes in one call.
 inline constexpr int octant_level = 2;
 
-/// Makes a map of OctoMap's nodes. `see_leaf(node, key, level)` is called for each leaf and returns whether to
-/// go on.
+/// Builds a map from OctoMap's nodes. Calls `see_leaf(node, key, level)` for each leaf; it returns false to stop.
 template <class Tree, class Model, class SeeLeaf>
 class tree_reader {
  public:
@@ -98,7 +97,7 @@ class tree_reader {
   tree_reader(const Tree& tree, octree::occupancy_octree<Model>& map, SeeLeaf& see_leaf)
       : tree_{tree}, map_{map}, see_leaf_{see_leaf} {}
 
-  /// Reads a node at `level`; false: see problem().
+  /// Reads a node at `level`. Returns false on an error, see problem().
   [[nodiscard]] bool read(const node& n, const octree::voxel_key& key, int level) {
     if (!tree_.nodeHasChildren(&n)) {
       float value = 0;
@@ -130,9 +129,9 @@ class tree_reader {
   }
   [[nodiscard]] bool take(const node& n, const octree::voxel_key& key, int level, float& value) {
     value = n.getLogOdds() + 0.0F;  // -0 becomes 0
-    if (!std::isfinite(value)) return give_up(errc::malformed, "a value that is not finite");
+    if (!std::isfinite(value)) return give_up(errc::malformed, "a log-odds value is not finite");
     return see_leaf_(n, key, level) ||
-           give_up(errc::unsupported, "a leaf of more than 32x32x32 voxels that has a colour");
+           give_up(errc::unsupported, "a leaf of more than 32x32x32 voxels has a colour; expand it first");
   }
   [[nodiscard]] bool read_octant(const node& n, const octree::voxel_key& key, octree::block<float>& voxels) {
     return for_each_child(n, [&](unsigned g, const node& group) {
@@ -161,7 +160,9 @@ class tree_reader {
 template <octree::octomap_model Model, class Tree, class SeeLeaf>
 [[nodiscard]] result<octree::occupancy_octree<Model>> read_tree(const Tree& tree, SeeLeaf see_leaf) {
   if (tree.getTreeDepth() != static_cast<unsigned>(octree::default_tree_depth))
-    return fail(errc::unsupported, "octomap tree", "is " + std::to_string(tree.getTreeDepth()) + " levels deep");
+    return fail(errc::unsupported, "octomap tree",
+                "is " + std::to_string(tree.getTreeDepth()) + " levels deep, not " +
+                    std::to_string(octree::default_tree_depth));
   octree::occupancy_octree<Model> map{tree.getResolution(), octree::default_tree_depth};
   tree_reader<Tree, Model, SeeLeaf> reader{tree, map, see_leaf};
   if (tree.getRoot() != nullptr && !reader.read(*tree.getRoot(), {}, octree::default_tree_depth))
@@ -169,7 +170,7 @@ template <octree::octomap_model Model, class Tree, class SeeLeaf>
   return map;
 }
 
-/// Gives leaves the colours of their voxels, in Morton order.
+/// Sets the colours of leaves from their voxels, in Morton order.
 template <class Color>
 class leaf_painter {
  public:

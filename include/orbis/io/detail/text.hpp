@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The little text parsing that the readers share: lines, fields and numbers, independent of the
-/// locale.
+/// Text parsing shared by the readers: lines, fields and numbers, independent of the locale.
 #pragma once
 
 #include <charconv>
@@ -16,21 +15,21 @@
 
 namespace orbis::io::detail {
 
-/// "path:line", for the `where` of an error.
+/// Returns "path:line", for the `where` of an error.
 [[nodiscard]] inline std::string at_line(const std::filesystem::path& path, std::size_t line) {
   return path.string() + ":" + std::to_string(line);
 }
 
 [[nodiscard]] constexpr bool is_blank(char c) noexcept { return c == ' ' || c == '\t' || c == '\r' || c == '\n'; }
 
-/// Without blanks (CR and LF among them) at either end.
+/// The text without blanks (including CR and LF) at either end.
 [[nodiscard]] constexpr std::string_view trimmed(std::string_view text) noexcept {
   while (!text.empty() && is_blank(text.front())) text.remove_prefix(1);
   while (!text.empty() && is_blank(text.back())) text.remove_suffix(1);
   return text;
 }
 
-/// Takes the next field off the front of `text`; empty when there is none left.
+/// Removes the next field from the front of `text` and returns it; empty if there is none.
 [[nodiscard]] constexpr std::string_view next_field(std::string_view& text) noexcept {
   text = trimmed(text);
   std::size_t end = 0;
@@ -40,7 +39,7 @@ namespace orbis::io::detail {
   return field;
 }
 
-/// Takes the next line, without its end, off the front of `text`. @pre !text.empty()
+/// Removes the next line from the front of `text` and returns it without its end. @pre !text.empty()
 [[nodiscard]] constexpr std::string_view next_line(std::string_view& text) noexcept {
   const std::size_t end = text.find('\n');
   std::string_view line = text.substr(0, end);
@@ -49,8 +48,7 @@ namespace orbis::io::detail {
   return line;
 }
 
-/// Whether all of `field` is a number; if so it is in `value`. Reads "nan" and "inf" for floating
-/// point.
+/// Parses the whole `field` as a number. Returns false if it is not one. Accepts "nan" and "inf" for floating point.
 template <class T>
 requires std::integral<T> || std::floating_point<T>
 [[nodiscard]] bool parse_number(std::string_view field, T& value) noexcept {
@@ -59,8 +57,8 @@ requires std::integral<T> || std::floating_point<T>
   return failure == std::errc{} && end == field.data() + field.size();
 }
 
-/// Calls `visit(line, number)` for every line that is neither blank nor a comment (`#`), trimmed and
-/// numbered from 1, while `visit` returns true. A byte order mark is passed over.
+/// Calls `visit(line, number)` for every line that is neither blank nor a comment (`#`), trimmed and numbered from 1,
+/// while `visit` returns true. Skips a byte order mark.
 template <std::predicate<std::string_view, std::size_t> Visit>
 void for_each_line(std::string_view text, Visit&& visit) {
   if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);

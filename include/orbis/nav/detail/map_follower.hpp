@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// What has to be looked at again of something that was derived from a map, by the map's change log.
+/// Finds the parts of a map that changed since they were last read, from the map's change log.
 #pragma once
 
 #include <algorithm>
@@ -20,39 +20,38 @@ concept has_change_log = requires(const Map& map) {
   { map.changes() } -> std::convertible_to<const octree::change_log&>;
 };
 
-/// Remembers which revision of a map was seen last.
+/// Stores the last revision of a map that was read.
 class map_follower {
  public:
-  /// Brings something up to date with `map` by `some(log, since)` or `all()`, as below; by `all()` if the map has no
-  /// log.
+  /// Updates derived data from `map` by `some(log, since)` or `all()`, as below; by `all()` if the map has no log.
   template <class Map, class Some, class All>
   void follow(const Map& map, Some&& some, All&& all) {
     if constexpr (has_change_log<Map>) {
       const octree::change_log& log = map.changes();
-      if (seen_ && *seen_ > log.revision()) seen_.reset();  // a map that was moved in
+      if (seen_ && *seen_ > log.revision()) seen_.reset();  // another map was moved into `map`
       follow(log, log.revision(), some, all);
     } else {
       all();
     }
   }
-  /// The same for a copy of the map of `log`, made at `revision`. Calls `some(log, since)` if all that may be different
-  /// from what was seen last has changed after revision `since`, `all()` if the log does not know, and nothing if this
-  /// revision was the last one.
+  /// The same for a copy of the map of `log`, made at `revision`. Calls `some(log, since)` if all possible differences
+  /// from the last revision read are changes after revision `since`, `all()` if the log does not reach back that far,
+  /// and nothing if this revision was read last.
   template <class Some, class All>
   void follow(const octree::change_log& log, std::uint64_t revision, Some&& some, All&& all) {
     assert(revision <= log.revision());
-    // Where both are older than the log, it names more octants than have changed between them, never fewer.
+    // If both revisions are older than the log, it names more octants than have changed between them, never fewer.
     const std::uint64_t since = seen_ ? std::min(*seen_, revision) : 0;
-    const std::optional<std::uint64_t> seen = std::exchange(seen_, std::nullopt);  // should one of these throw
+    const std::optional<std::uint64_t> seen = std::exchange(seen_, std::nullopt);  // in case one of these throws
     if (!seen || since < log.complete_since() || log.revision() == 0)
       all();
     else if (*seen != revision)
       some(log, since);
     seen_ = revision;
   }
-  /// The present revision of `map` has been seen.
+  /// Marks the present revision of `map` as read.
   template <class Map>
-  void see(const Map& map) {
+  void mark_read(const Map& map) {
     seen_.reset();
     if constexpr (has_change_log<Map>) seen_ = map.changes().revision();
   }

@@ -34,7 +34,7 @@ TEST_CASE("a lack of memory ends the encoding of a JPEG, anywhere, with that as 
       break;
     }
     REQUIRE(bytes.error().code == orbis::errc::exception);
-    REQUIRE(bytes.error().message == "no memory");
+    REQUIRE(bytes.error().message == "out of memory");
   }
   CHECK(refused > 2);
 }

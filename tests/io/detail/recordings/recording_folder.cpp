@@ -30,5 +30,5 @@ TEST_CASE("frames without ground truth stay without and are counted") {
   io::detail::attach_ground_truth(index, 0.02);
   CHECK(index.frames[1].T_world_camera.has_value());
   CHECK_FALSE(index.frames[2].T_world_camera.has_value());
-  CHECK(index.notes == std::vector<std::string>{"1 of 3 frames lie outside the ground truth"});
+  CHECK(index.notes == std::vector<std::string>{"1 of 3 frames are outside the ground truth"});
 }

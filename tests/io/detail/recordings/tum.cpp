@@ -47,10 +47,10 @@ TEST_CASE("images are paired by time whatever the lists look like") {
     CHECK(index.frames[i].depth.filename() == expected);
     CHECK_FALSE(index.frames[i].T_world_camera.has_value());
   }
-  CHECK(mentions(index, "rgb.txt: not in the order of time"));
-  CHECK(mentions(index, "depth.txt:2: left out"));
+  CHECK(mentions(index, "rgb.txt: not in order of time"));
+  CHECK(mentions(index, "depth.txt:2: skipped"));
   CHECK(mentions(index, "1 of 4 colour images have no depth image"));
-  CHECK(mentions(index, "1 of 4 depth images are left out"));
+  CHECK(mentions(index, "1 of 4 depth images are skipped"));
 }
 
 TEST_CASE("the time allowed between colour and depth can be chosen") {
@@ -88,7 +88,7 @@ TEST_CASE("an association list decides and may name depth first") {
     CHECK(index.frames[0].color.filename() == "1.00.png");
     CHECK(index.frames[0].depth.filename() == "1.04.png");
     CHECK(index.frames[1].depth.filename() == "1.30.png");
-    CHECK(mentions(index, pass == 0 ? "associations.txt:3: left out" : "not in the order"));
+    CHECK(mentions(index, pass == 0 ? "associations.txt:3: skipped" : "not in order"));
     folder.write("associations.txt", "1.30 depth/1.30.png 1.03 rgb/1.03.png\n1.04 depth/1.04.png 1.00 rgb/1.00.png\n");
   }
 }
@@ -121,7 +121,7 @@ TEST_CASE("the ground truth is interpolated at the colour images") {
   CHECK(index.frames[0].T_world_camera.value().rotation().angle() == Approx(3.14159265358979 / 3.0));
   CHECK(index.frames[1].T_world_camera.value().translation().x() == Approx(5.0));
   CHECK_FALSE(index.frames[2].T_world_camera.has_value());
-  CHECK(mentions(index, "1 of 3 frames lie outside the ground truth"));
+  CHECK(mentions(index, "1 of 3 frames are outside the ground truth"));
   CHECK(index.ground_truth.size() == 2);
 
   folder.write("groundtruth.txt", "0.98 0 0 0 0 0 0 1\n1.04 nan 0 0 0 0 1 0\n");
@@ -136,7 +136,7 @@ TEST_CASE("a time stamp that an association list repeats gives one frame") {
   const auto frames = io::detail::read_associations(folder / "associations.txt", notes).value();
   REQUIRE(frames.size() == 2);
   CHECK(frames[0].color.filename() == "a.png");
-  CHECK(notes.back().find("1 lines with a repeated time stamp left out") != std::string::npos);
+  CHECK(notes.back().find("1 lines with a repeated time stamp skipped") != std::string::npos);
 }
 
 TEST_CASE("the folder's name tells the camera of the benchmark's sequences") {
@@ -185,8 +185,8 @@ TEST_CASE("a list of nothing but rubbish is said so in few words") {
   for (int i = 0; i != 5000; ++i) text += "x\n";
   REQUIRE(io::detail::parse_image_list(text, "rgb.txt", notes).value().size() == 1);
   REQUIRE(notes.size() == 11);
-  CHECK(notes.front() == "rgb.txt:2: left out, not a time stamp and a file name");
-  CHECK(notes.back() == "rgb.txt: 4990 more lines left out");
+  CHECK(notes.front() == "rgb.txt:2: skipped, not a time stamp and a file name");
+  CHECK(notes.back() == "rgb.txt: 4990 more lines skipped");
   notes.clear();
   REQUIRE(io::detail::parse_associations(text, "both.txt", notes).value().size() == 1);
   CHECK(notes.size() == 11);

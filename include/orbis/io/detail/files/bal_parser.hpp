@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Reads the text format of "Bundle Adjustment in the Large".
+/// Parser of the text format of "Bundle Adjustment in the Large".
 #pragma once
 
 #include <charconv>
@@ -22,7 +22,7 @@
 
 namespace orbis::io::detail {
 
-/// The file number by number, with the line for errors.
+/// Reads the file number by number, with the line for errors.
 class bal_parser {
  public:
   bal_parser(std::string_view text, const std::filesystem::path& where)
@@ -50,18 +50,18 @@ class bal_parser {
     return text + "\"";
   }
 
-  /// The number that comes next; `what` it is, for the error. `of` numbers the thing it belongs to.
+  /// Reads the next number. `what` and `of`: kind and index of the object that it belongs to, for errors.
   template <class T>
   bool read(T& value, const char* what, std::size_t of) {
     skip_blanks();
     const auto named = [&] { return std::string{what} + " " + std::to_string(of); };
-    if (at_ == end_) return reject("the file ends early: " + named() + " is not all there");
+    if (at_ == end_) return reject("the file ends early: " + named() + " is incomplete");
     const char* first = at_;
     if (*first == '+' && end_ - first > 1 && first[1] != '-') ++first;
     const auto [last, failure] = std::from_chars(first, end_, value);
     if (failure != std::errc{} || (last != end_ && !is_blank(*last)))
       return reject(named() + " has " + quoted_field() +
-                    (std::is_integral_v<T> ? ", which is no index" : ", which is no number"));
+                    (std::is_integral_v<T> ? ", which is not an index" : ", which is not a number"));
     if constexpr (std::is_floating_point_v<T>)
       if (!std::isfinite(value)) return reject(named() + " has " + quoted_field() + ", which is not finite");
     at_ = last;
@@ -71,25 +71,25 @@ class bal_parser {
   bool read_header(bal_problem& problem) {
     const std::string_view text{at_, static_cast<std::size_t>(end_ - at_)};
     if (text.starts_with("BZh") || text.starts_with("\x1f\x8b"))
-      return reject("is compressed and has to be unpacked first", errc::unsupported);
+      return reject("is compressed; unpack it first", errc::unsupported);
     if (text.starts_with("\xEF\xBB\xBF")) at_ += 3;
     std::uint64_t counts[3];
     for (std::uint64_t& count : counts) {
       skip_blanks();
       const auto [last, failure] = std::from_chars(at_, end_, count);
       if (failure != std::errc{} || (last != end_ && !is_blank(*last)))
-        return reject("a file begins with the numbers of its cameras, points and observations" +
-                      (at_ == end_ ? std::string{} : ", and " + quoted_field() + " is none"));
+        return reject("the file must begin with the numbers of cameras, points and observations" +
+                      (at_ == end_ ? std::string{} : ", not with " + quoted_field()));
       at_ = last;
     }
-    // A number takes a blank and a digit at least: what cannot follow is not allocated for.
+    // A number takes at least a blank and a digit: allocate only for numbers that can follow.
     const auto fitting = static_cast<std::uint64_t>(end_ - at_) / 2;
     const auto [cameras, points, observations] = counts;
     constexpr std::uint64_t most = std::numeric_limits<std::uint32_t>::max();
     if (cameras > fitting / 9 || points > fitting / 3 || observations > fitting / 4 ||
         9 * cameras + 3 * points + 4 * observations > fitting || cameras > most || points > most)
-      return reject("there are not as many numbers in the file as " + std::to_string(cameras) + " cameras, " +
-                    std::to_string(points) + " points and " + std::to_string(observations) + " observations have");
+      return reject("the file is too short for " + std::to_string(cameras) + " cameras, " + std::to_string(points) +
+                    " points and " + std::to_string(observations) + " observations");
     problem.cameras.resize(static_cast<std::size_t>(cameras));
     problem.points.resize(static_cast<std::size_t>(points), zeros<vec3>());
     problem.observations.resize(static_cast<std::size_t>(observations));
@@ -101,12 +101,12 @@ class bal_parser {
       bal_observation& o = problem.observations[k];
       if (!read(o.camera, "observation", k)) return false;
       if (o.camera >= problem.cameras.size())
-        return reject("observation " + std::to_string(k) + " is of camera " + std::to_string(o.camera) +
-                      ", which there is not");
+        return reject("observation " + std::to_string(k) + " refers to the nonexistent camera " +
+                      std::to_string(o.camera));
       if (!read(o.point, "observation", k)) return false;
       if (o.point >= problem.points.size())
-        return reject("observation " + std::to_string(k) + " is of point " + std::to_string(o.point) +
-                      ", which there is not");
+        return reject("observation " + std::to_string(k) + " refers to the nonexistent point " +
+                      std::to_string(o.point));
       if (!read(o.pixel.x(), "observation", k) || !read(o.pixel.y(), "observation", k)) return false;
     }
     return true;
@@ -124,7 +124,7 @@ class bal_parser {
 
   bool ends() {
     skip_blanks();
-    return at_ == end_ || reject("there is more in the file than belongs there: " + quoted_field());
+    return at_ == end_ || reject("the file continues after the last point: " + quoted_field());
   }
 
   const std::filesystem::path& where_;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Reads g2o's text format.
+/// Parser of g2o's text format.
 #pragma once
 
 #include <cmath>
@@ -22,7 +22,7 @@
 
 namespace orbis::io::detail {
 
-/// The file line by line; edges name vertices by id until all are known.
+/// Reads the file line by line; edges refer to vertices by id until all are known.
 class g2o_parser {
  public:
   explicit g2o_parser(const std::filesystem::path& where) : where_{where} {}
@@ -59,8 +59,8 @@ class g2o_parser {
     if (tag == "VERTEX_SE3:QUAT") return read_vertex(line);
     if (tag == "EDGE_SE3:QUAT") return read_edge(line);
     if (tag == "FIX") return read_fix(line);
-    if (tag.starts_with("PARAMS_")) return true;  // of sensors; these edges use none
-    return reject(quoted(tag) + " is none of VERTEX_SE3:QUAT, EDGE_SE3:QUAT and FIX", errc::unsupported);
+    if (tag.starts_with("PARAMS_")) return true;  // of sensors; the supported edges use none
+    return reject(quoted(tag) + " is not one of VERTEX_SE3:QUAT, EDGE_SE3:QUAT, FIX", errc::unsupported);
   }
 
   bool read_vertex(std::string_view line) {
@@ -68,7 +68,7 @@ class g2o_parser {
     se3 pose;
     if (!read_id(line, id) || !read_pose(line, pose) || !ends(line)) return false;
     if (!index_.emplace(id, static_cast<std::uint32_t>(graph_.ids.size())).second)
-      return reject("vertex " + std::to_string(id) + " is there twice");
+      return reject("vertex " + std::to_string(id) + " is defined twice");
     graph_.ids.push_back(id);
     graph_.vertices.push_back(pose);
     return true;
@@ -114,13 +114,13 @@ class g2o_parser {
     for (double& value : v)
       if (!read_number(line, value, "a pose has 7 numbers, x y z qx qy qz qw")) return false;
     const so3::quaternion q(v[6], v[3], v[4], v[5]);
-    if (!(q.norm() > 1e-6) || !std::isfinite(q.norm())) return reject("a quaternion that is no rotation");
+    if (!(q.norm() > 1e-6) || !std::isfinite(q.norm())) return reject("the quaternion is zero or too large");
     pose = se3(so3(q), vec3(v[0], v[1], v[2]));
     return true;
   }
   bool ends(std::string_view line) {
     const std::string_view rest = next_field(line);
-    return rest.empty() || reject("there is more on the line than belongs there: " + quoted(rest));
+    return rest.empty() || reject("the line continues after its last number: " + quoted(rest));
   }
 
   void resolve() {
@@ -129,7 +129,7 @@ class g2o_parser {
       const auto at = index_.find(id);
       if (at == index_.end()) {
         number_ = line;
-        return reject("vertex " + std::to_string(id) + " is nowhere in the file");
+        return reject("vertex " + std::to_string(id) + " is not defined in the file");
       }
       index = at->second;
       return true;

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A JPEG decoder and a JPEG encoder, from and into bytes in memory.
+/// A JPEG decoder and encoder for bytes in memory.
 ///
-/// libjpeg reports errors by `longjmp` here, with a message and nothing printed. Every function that calls `setjmp`
-/// keeps nothing but trivial locals, so that no destructor is jumped over.
+/// libjpeg reports errors by `longjmp`, with a message and without printing. Functions that call `setjmp` have only
+/// trivial locals, so that no destructor is skipped.
 #pragma once
 
 #include <algorithm>
@@ -23,14 +23,14 @@
 
 namespace orbis::io::detail {
 
-/// What an error of libjpeg leaves behind. Whoever calls libjpeg sets `jump` before.
+/// Error state of libjpeg. Callers of libjpeg set `jump` first.
 struct jpeg_errors {
-  jpeg_error_mgr base{};  // first: libjpeg hands a pointer to it back to us
+  jpeg_error_mgr base{};  // first: libjpeg passes a pointer to it back
   std::jmp_buf jump{};
   char message[JMSG_LENGTH_MAX] = "";
-  bool ends_at_warning = false;  ///< of a decoder
+  bool ends_at_warning = false;  ///< for a decoder
 
-  /// What libjpeg gets. Valid as long as this stays where it is.
+  /// The error manager to pass to libjpeg. Valid while this object stays in place.
   [[nodiscard]] jpeg_error_mgr* manager() {
     jpeg_std_error(&base);
     base.error_exit = [](j_common_ptr info) {
@@ -44,12 +44,12 @@ struct jpeg_errors {
   [[nodiscard]] static jpeg_errors& of(jpeg_error_mgr* manager) { return *reinterpret_cast<jpeg_errors*>(manager); }
 };
 
-/// A decoder over bytes in memory.
+/// A decoder of bytes in memory.
 class jpeg_decoder {
  public:
   explicit jpeg_decoder(std::string_view bytes) : size_{bytes.size()} {
     info_.err = errors_.manager();
-    // A decoder that goes on after a bad code makes up pixels.
+    // A decoder that continues after an invalid code invents pixels.
     errors_.base.emit_message = [](j_common_ptr info, int level) {
       jpeg_errors& own = jpeg_errors::of(info->err);
       if (level >= 0 || info->err->num_warnings++ != 0) return;
@@ -74,19 +74,19 @@ class jpeg_decoder {
   jpeg_decoder& operator=(const jpeg_decoder&) = delete;
   ~jpeg_decoder() { jpeg_destroy_decompress(&info_); }
 
-  /// Reads up to the pixels. False: see `message`.
+  /// Reads the header. Returns false on an error, see `message`.
   bool read_header() {
     if (setjmp(errors_.jump) != 0) return false;
     jpeg_create_decompress(&info_);
     info_.src = &source_;
     jpeg_read_header(&info_, TRUE);
-    // A Huffman-coded block of 64 pixels takes a bit at least; arithmetic coding a little less.
+    // A Huffman-coded block of 64 pixels takes at least one bit; with arithmetic coding slightly less.
     const std::uint64_t pixels = std::uint64_t{info_.image_width} * info_.image_height;
     const std::uint64_t pixels_of_byte = info_.arith_code != FALSE ? 2048 : 512;
     if (pixels > (std::uint64_t{1} << 28) || (pixels > (1U << 20) && pixels > pixels_of_byte * size_))
       return give_up("claims more pixels than the file can hold");
     if (jpeg_has_multiple_scans(&info_) != FALSE) {
-      // Each scan goes over all pixels again, and a scan of few bytes may say nothing; the coefficients are all kept.
+      // Each scan traverses all pixels again, and may have only a few bytes; all coefficients are kept in memory.
       if (pixels > (std::uint64_t{1} << 26)) return give_up("has several scans, and too many pixels for that");
       progress_.most_scans =
           static_cast<int>(std::clamp<std::uint64_t>((std::uint64_t{1} << 30) / (pixels + 1), 16, 500));
@@ -100,18 +100,18 @@ class jpeg_decoder {
     return true;
   }
 
-  /// Decodes to 8-bit colour. False: see `message`. @pre read_header() was true
+  /// Decodes to 8-bit colour. Returns false on an error, see `message`. @pre read_header() was true
   bool read_pixels(rgb8* to) {
     if (setjmp(errors_.jump) != 0) return false;
     info_.out_color_space = JCS_RGB;
-    info_.err->num_warnings = 0;  // what a header is warned about does not change pixels
+    info_.err->num_warnings = 0;  // warnings about a header do not affect pixels
     errors_.ends_at_warning = true;
     jpeg_start_decompress(&info_);
     while (info_.output_scanline < info_.output_height) {
       auto* row = reinterpret_cast<JSAMPROW>(to + std::size_t{info_.output_scanline} * info_.output_width);
       jpeg_read_scanlines(&info_, &row, 1);
     }
-    errors_.ends_at_warning = false;  // nor does what follows them
+    errors_.ends_at_warning = false;  // nor do warnings about data after the pixels
     jpeg_finish_decompress(&info_);
     return true;
   }
@@ -122,7 +122,7 @@ class jpeg_decoder {
 
  private:
   struct progress {
-    jpeg_progress_mgr base{};  // first: libjpeg hands a pointer to it back to us
+    jpeg_progress_mgr base{};  // first: libjpeg passes a pointer to it back
     int most_scans = 0;
   };
 
@@ -148,11 +148,11 @@ class jpeg_encoder {
  public:
   jpeg_encoder() {
     info_.err = errors_.manager();
-    // Not `jpeg_mem_dest`: after an error nobody knows whether its buffer was freed.
+    // Not `jpeg_mem_dest`: after an error it is unknown whether its buffer was freed.
     info_.client_data = this;
     destination_.init_destination = [](j_compress_ptr info) { make_room(info); };
     destination_.empty_output_buffer = [](j_compress_ptr info) -> boolean {
-      make_room(info);  // all of it is full, whatever `free_in_buffer` says
+      make_room(info);  // the buffer is full, whatever `free_in_buffer` is
       return TRUE;
     };
     destination_.term_destination = [](j_compress_ptr info) {
@@ -164,7 +164,7 @@ class jpeg_encoder {
   jpeg_encoder& operator=(const jpeg_encoder&) = delete;
   ~jpeg_encoder() { jpeg_destroy_compress(&info_); }
 
-  /// Encodes an image. False: see `out_of_memory` and `message`. @pre it was not called before
+  /// Encodes an image. Returns false on an error, see `out_of_memory` and `message`. Call it once.
   bool write(image_view<const rgb8> pixels, int quality) {
     if (setjmp(errors_.jump) != 0) return false;
     jpeg_create_compress(&info_);
@@ -178,16 +178,16 @@ class jpeg_encoder {
     jpeg_start_compress(&info_, TRUE);
     while (info_.next_scanline < info_.image_height) {
       const rgb8* const row = pixels.data() + static_cast<std::ptrdiff_t>(info_.next_scanline) * pixels.stride();
-      auto* bytes = const_cast<JSAMPLE*>(reinterpret_cast<const JSAMPLE*>(row));  // which libjpeg does not change
+      auto* bytes = const_cast<JSAMPLE*>(reinterpret_cast<const JSAMPLE*>(row));  // libjpeg does not change it
       jpeg_write_scanlines(&info_, &bytes, 1);
     }
     jpeg_finish_compress(&info_);
     return true;
   }
 
-  /// The JPEG, which is given away. @pre write() was true
+  /// Moves the JPEG out. @pre write() was true
   [[nodiscard]] std::string take() { return std::move(bytes_); }
-  /// Whether it was a lack of memory that ended `write`.
+  /// Returns true if `write` failed because it ran out of memory.
   [[nodiscard]] bool out_of_memory() const { return errors_.base.msg_code == JERR_OUT_OF_MEMORY; }
   [[nodiscard]] std::string message() const { return errors_.message; }
 
@@ -201,7 +201,7 @@ class jpeg_encoder {
     }
     return true;
   }
-  /// Room behind what is full. No exception goes through libjpeg.
+  /// Extends the buffer after the written bytes. No exception passes through libjpeg.
   static void make_room(j_compress_ptr info) {
     auto* own = static_cast<jpeg_encoder*>(info->client_data);
     const std::size_t full = own->bytes_.size();

@@ -2,9 +2,9 @@
 /// @file
 /// The LZF compression of `binary_compressed` PCD files.
 ///
-/// The stream is a row of items, each led by a byte c. Below 32: c + 1 literal bytes follow.
-/// Otherwise a copy: length c >> 5 (if that is 7, plus the next byte) plus 2, from
-/// ((c & 31) << 8 | next byte) + 1 bytes back in the output; it may overlap what it writes.
+/// The stream is a sequence of items, each starting with a byte c. Below 32: c + 1 literal bytes follow. Otherwise a
+/// copy: length c >> 5 (if that is 7, plus the next byte) plus 2, from ((c & 31) << 8 | next byte) + 1 bytes back in
+/// the output; it may overlap its own output.
 #pragma once
 
 #include <algorithm>
@@ -17,10 +17,10 @@
 
 namespace orbis::io::detail {
 
-/// The most bytes `size` compressed ones can stand for: a copy of 264 bytes takes 3.
+/// Maximum number of bytes that `size` compressed ones expand to: a copy of 264 bytes takes 3.
 [[nodiscard]] constexpr std::uint64_t lzf_max_output(std::uint64_t size) noexcept { return size * 88 + 32; }
 
-/// Exactly `size` bytes from `compressed`; empty if it is damaged, or holds more or less than that.
+/// Exactly `size` bytes decompressed from `compressed`; empty if it is damaged or expands to another size.
 [[nodiscard]] inline std::optional<std::string> lzf_decompress(std::string_view compressed, std::size_t size) {
   if (size > lzf_max_output(compressed.size())) return std::nullopt;
   std::string out;
@@ -48,8 +48,8 @@ namespace orbis::io::detail {
   return out;
 }
 
-/// `data`, compressed: greedy, with one remembered position for each hash of three bytes. Data that
-/// does not compress grows by one byte in 32.
+/// Compresses `data`: greedy, with one stored position for each hash of three bytes. Incompressible data grows by one
+/// byte in 32.
 [[nodiscard]] inline std::string lzf_compress(std::string_view data) {
   constexpr std::size_t max_distance = 8192, max_length = 264, none = static_cast<std::size_t>(-1);
   constexpr unsigned hash_bits = 14;
@@ -61,7 +61,7 @@ namespace orbis::io::detail {
   };
 
   std::string out;
-  std::size_t literals = 0;  // the first byte not yet written
+  std::size_t literals = 0;  // the first literal not yet written
   const auto write_literals = [&](std::size_t end) {
     while (literals != end) {
       const std::size_t count = std::min<std::size_t>(32, end - literals);

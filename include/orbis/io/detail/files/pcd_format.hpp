@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The header of a PCD file, and its points as text or as binary numbers.
+/// The header of a PCD file, and its points as text or binary numbers.
 #pragma once
 
 #include <array>
@@ -26,9 +26,9 @@ struct pcd_field {
   std::string name;
   std::size_t size = 0;         ///< bytes of one element
   char type = 0;                ///< F, I or U
-  std::size_t count = 1;        ///< elements for each point
-  std::size_t offset = 0;       ///< in a point, bytes
-  std::size_t first_token = 0;  ///< in a line of text
+  std::size_t count = 1;        ///< elements per point
+  std::size_t offset = 0;       ///< within a point, bytes
+  std::size_t first_token = 0;  ///< within a line of text
 
   [[nodiscard]] std::optional<scalar_type> scalar() const {
     using enum scalar_type;
@@ -45,8 +45,8 @@ struct pcd_header {
   std::vector<pcd_field> fields;
   std::uint64_t width = 0, height = 1, points = 0;
   std::size_t point_size = 0;  ///< bytes
-  std::size_t tokens = 0;      ///< numbers for each point
-  std::size_t lines = 0;       ///< of the header
+  std::size_t tokens = 0;      ///< numbers per point
+  std::size_t lines = 0;       ///< number of lines of the header
   pcd_data data = pcd_data::ascii;
 
   [[nodiscard]] const pcd_field* find(std::string_view name) const {
@@ -56,7 +56,7 @@ struct pcd_header {
   }
 };
 
-/// Takes the header off the front of `bytes`.
+/// Parses the header and removes it from the front of `bytes`.
 inline result<pcd_header> take_pcd_header(std::string_view& bytes, const std::string& where) {
   constexpr std::size_t max_point_size = 1 << 16;
   pcd_header header;
@@ -115,7 +115,7 @@ inline result<pcd_header> take_pcd_header(std::string_view& bytes, const std::st
   if (!has_width) header.width = header.points;
   constexpr std::uint64_t limit = std::uint64_t{1} << 40;
   if (header.width > limit || header.height > limit || (header.height != 0 && header.width > limit / header.height))
-    return bad("absurd WIDTH and HEIGHT");
+    return bad("WIDTH times HEIGHT is too large");
   if (!has_points) header.points = header.width * header.height;
   if (header.points != header.width * header.height) return bad("POINTS is not WIDTH times HEIGHT");
   for (pcd_field& f : header.fields) {
@@ -124,12 +124,12 @@ inline result<pcd_header> take_pcd_header(std::string_view& bytes, const std::st
     f.first_token = header.tokens;
     header.point_size += f.size * f.count;
     header.tokens += f.count;
-    if (header.point_size > max_point_size) return bad("absurdly large points");
+    if (header.point_size > max_point_size) return bad("points of more than 65536 bytes");
   }
   return header;
 }
 
-/// The fields of a header that make a cloud.
+/// The fields of a header that a cloud is read from.
 struct pcd_columns {
   std::array<const pcd_field*, 3> xyz{};
   const pcd_field* color = nullptr;
@@ -143,12 +143,12 @@ inline std::uint32_t packed_rgb(const rgb8& c) {
   return static_cast<std::uint32_t>(c.r) << 16 | static_cast<std::uint32_t>(c.g) << 8 | c.b;
 }
 
-/// From lines of text. Errors: malformed, with the line.
+/// Reads points from lines of text. Errors: malformed, with the line.
 inline result<point_cloud> read_pcd_text(std::string_view body, const pcd_header& header, const pcd_columns& columns,
                                          const vec3& origin, const std::string& where) {
-  if (header.points > (body.size() + 1) / (2 * header.tokens))  // numbers of a digit each, and what separates them
+  if (header.points > (body.size() + 1) / (2 * header.tokens))  // one digit per number, plus separators
     return fail(errc::malformed, where,
-                "the data end early: there cannot be " + std::to_string(header.points) + " points in them");
+                "the data end early: they are too short for " + std::to_string(header.points) + " points");
   point_cloud cloud;
   cloud.points.reserve(static_cast<std::size_t>(header.points));
   std::vector<std::string_view> tokens(header.points == 0 ? 0 : header.tokens);
@@ -176,12 +176,14 @@ inline result<point_cloud> read_pcd_text(std::string_view body, const pcd_header
     bad_line = 0;
     return true;
   });
-  if (bad_line != 0) return fail(errc::malformed, where + ":" + std::to_string(bad_line), "not a point of this file");
+  if (bad_line != 0)
+    return fail(errc::malformed, where + ":" + std::to_string(bad_line),
+                "the line does not match the fields of the header");
   if (cloud.size() != header.points) return fail(errc::malformed, where, "the data end early");
   return cloud;
 }
 
-/// From binary data. `at(field, i)`: where the field of point i lies.
+/// Reads points from binary data. `at(field, i)`: address of the field of point i.
 template <class At>
 point_cloud read_pcd_binary(const pcd_header& header, const pcd_columns& columns, const vec3& origin, At&& at) {
   const auto n = static_cast<std::size_t>(header.points);

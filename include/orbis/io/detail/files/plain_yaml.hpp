@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The little YAML that camera files are written in: names with a value, one level of names below a name, lists of
-/// numbers in brackets.
+/// The subset of YAML used by camera files: names with a value, one level of nested names, lists of numbers in
+/// brackets.
 #pragma once
 
 #include <algorithm>
@@ -19,20 +19,20 @@
 
 namespace orbis::io::detail {
 
-/// The values of a file by name; a name below another one is "outer.inner".
+/// The values of a file by name; a nested name is "outer.inner".
 class plain_yaml {
  public:
-  /// More than any camera needs.
+  /// Maximum size of a file; camera files are far smaller.
   static constexpr std::size_t max_bytes = 65536;
 
-  /// Errors: malformed, with the line (what is not of this form, a name twice, a list without an end); too large a
-  /// text.
+  /// Parses a file. Errors: malformed, with the line (not of this form, a repeated name, a list without an end); too
+  /// large a text.
   [[nodiscard]] static result<plain_yaml> parse(std::string_view text, const std::filesystem::path& where) {
-    if (text.size() > max_bytes) return fail(errc::malformed, where.string(), "is too large for a file of settings");
+    if (text.size() > max_bytes) return fail(errc::malformed, where.string(), "is too large for a settings file");
     if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
     plain_yaml all;
     all.where_ = where;
-    std::string outer;  // the name that indented names are below
+    std::string outer;  // the parent of indented names
     for (std::size_t number = 1; !text.empty(); ++number) {
       const std::string_view raw = without_comment(next_line(text));
       const std::string_view line = trimmed(raw);
@@ -43,7 +43,7 @@ class plain_yaml {
       const std::string_view name = trimmed(line.substr(0, std::min(colon, line.size())));
       if (colon == std::string_view::npos || !is_name(name) || (colon + 1 < line.size() && !is_blank(line[colon + 1])))
         return reject("is not \"name: value\"");
-      if (indented && outer.empty()) return reject("is indented below nothing");
+      if (indented && outer.empty()) return reject("is indented without a name above it");
       std::string value{trimmed(line.substr(colon + 1))};
       const std::size_t begins = number;
       while (value.starts_with('[') && value.back() != ']') {
@@ -57,13 +57,13 @@ class plain_yaml {
       if (!indented) outer = value.empty() ? std::string{name} : std::string{};
       if (value.empty()) continue;
       std::string full = indented ? outer + "." + std::string{name} : std::string{name};
-      if (all.find(full) != nullptr) return reject("has the name " + full + " a second time");
+      if (all.find(full) != nullptr) return reject("defines " + full + " a second time");
       all.entries_.push_back({std::move(full), std::move(value), begins});
     }
     return all;
   }
 
-  /// The text of a value, without quotes. Errors: malformed (it is not there).
+  /// The text of a value, without quotes. Errors: malformed (missing).
   [[nodiscard]] result<std::string> text(std::string_view name) const {
     const entry* const e = find(name);
     if (e == nullptr) return missing(name);
@@ -72,7 +72,7 @@ class plain_yaml {
       value = value.substr(1, value.size() - 2);
     return std::string{value};
   }
-  /// A list of finite numbers, or one. Errors: malformed (it is not there, or is none).
+  /// The finite numbers of a list, or a single one. Errors: malformed (missing, or not numbers).
   [[nodiscard]] result<std::vector<double>> numbers(std::string_view name) const {
     const entry* const e = find(name);
     if (e == nullptr) return missing(name);
@@ -90,7 +90,7 @@ class plain_yaml {
     }
     return all;
   }
-  /// As `numbers`, exactly `count` of them.
+  /// Like `numbers`, with exactly `count` of them.
   [[nodiscard]] result<std::vector<double>> numbers(std::string_view name, std::size_t count) const {
     auto all = numbers(name);
     if (all && all->size() != count)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The header of a PLY file, and its body number by number.
+/// The header of a PLY file, and a reader of the numbers of its body.
 #pragma once
 
 #include <bit>
@@ -21,7 +21,7 @@ namespace orbis::io::detail {
 struct ply_property {
   std::string name;
   scalar_type type = scalar_type::float32;
-  std::optional<scalar_type> count;  ///< of a list: the type of its length
+  std::optional<scalar_type> count;  ///< for a list: the type of its length
 };
 struct ply_element {
   std::string name;
@@ -46,7 +46,7 @@ inline std::optional<scalar_type> ply_type(std::string_view name) {
   return std::nullopt;
 }
 
-/// Takes the header off the front of `bytes`.
+/// Parses the header and removes it from the front of `bytes`.
 inline result<ply_header> take_ply_header(std::string_view& bytes, const std::string& where) {
   ply_header header;
   const auto bad = [&](std::string why) { return fail(errc::malformed, where, "PLY header: " + std::move(why)); };
@@ -97,12 +97,12 @@ inline result<ply_header> take_ply_header(std::string_view& bytes, const std::st
   return bad("ends early");
 }
 
-/// Reads numbers one after the other from the body, in whichever encoding.
+/// Reads the numbers of the body in order, in any encoding.
 class ply_body {
  public:
   ply_body(std::string_view bytes, ply_format format) : left_{bytes}, format_{format} {}
 
-  /// False at the end of the data, or if there is no number of that type.
+  /// Reads a number. Returns false at the end of the data, or if there is no number of that type.
   bool next(scalar_type type, double& value) {
     if (format_ == ply_format::ascii) return parse_number(next_field(left_), value);
     const std::size_t size = size_of(type);
@@ -119,7 +119,7 @@ class ply_body {
     return true;
   }
   [[nodiscard]] std::size_t bytes_left() const { return left_.size(); }
-  /// The least bytes that a property takes.
+  /// Minimum number of bytes of a property.
   [[nodiscard]] std::size_t least_size(const ply_property& property) const {
     if (format_ == ply_format::ascii) return 1;
     return size_of(property.count.value_or(property.type));

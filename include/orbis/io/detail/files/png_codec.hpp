@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A PNG decoder and an encoder over bytes in memory.
+/// A PNG decoder and encoder for bytes in memory.
 ///
-/// libpng reports errors by `longjmp`. Every function here that calls `setjmp` keeps nothing but
-/// trivial locals, so that no destructor is jumped over; whatever owns memory lives in its caller.
+/// libpng reports errors by `longjmp`. Functions that call `setjmp` have only trivial locals, so that no destructor is
+/// skipped; objects that own memory are in the caller.
 #pragma once
 
 #include <bit>
@@ -27,7 +27,7 @@
 
 namespace orbis::io::detail {
 
-/// More than any camera has; keeps what a header can make us allocate within reason.
+/// Maximum number of pixels: more than any camera has; limits the memory that a header can request.
 inline constexpr std::uint64_t max_image_pixels = std::uint64_t{1} << 28;
 
 struct png_trouble {
@@ -54,7 +54,7 @@ inline void png_take(png_structp png, png_bytep to, std::size_t count) {
   source->left -= count;
 }
 
-/// A decoder over bytes in memory.
+/// A decoder of bytes in memory.
 class png_decoder {
  public:
   explicit png_decoder(std::string_view bytes)
@@ -63,7 +63,7 @@ class png_decoder {
   png_decoder& operator=(const png_decoder&) = delete;
   ~png_decoder() { png_destroy_read_struct(&png_, &info_, nullptr); }
 
-  /// Reads up to the pixels. False: see `message`.
+  /// Reads the header. Returns false on an error, see `message`.
   bool read_header() {
     if (size_ < 8 || png_sig_cmp(source_.data, 0, 8) != 0) return give_up("is not a PNG file");
     if (setjmp(trouble_.jump) != 0) return false;
@@ -73,7 +73,7 @@ class png_decoder {
     if (info_ == nullptr) throw std::bad_alloc{};
     png_set_user_limits(png_, 1U << 20, 1U << 20);
     png_set_chunk_malloc_max(png_, 1U << 23);
-    // What is not needed for pixels is passed over: a thousand texts of 8 kB each may stand for 8 GB.
+    // Skip data other than pixels: a thousand texts of 8 kB each may expand to 8 GB.
     png_set_keep_unknown_chunks(png_, PNG_HANDLE_CHUNK_NEVER, nullptr, -1);
     png_set_read_fn(png_, &source_, png_take);
     png_read_info(png_, info_);
@@ -81,14 +81,14 @@ class png_decoder {
     height_ = png_get_image_height(png_, info_);
     bits_ = png_get_bit_depth(png_, info_);
     color_type_ = png_get_color_type(png_, info_);
-    // Deflate makes at most 1032 bytes of one.
+    // Deflate expands a byte to at most 1032 bytes.
     const std::uint64_t raw = std::uint64_t{height_} * (std::uint64_t{png_get_rowbytes(png_, info_)} + 1);
     if (std::uint64_t{width_} * height_ > max_image_pixels || raw > 1032 * std::uint64_t{size_} + 1024)
       return give_up("claims more pixels than the file can hold");
     return true;
   }
 
-  /// Decodes into rows of `rowbytes` bytes. False: see `message`. @pre read_header() was true
+  /// Decodes into rows of `rowbytes` bytes. Returns false on an error, see `message`. @pre read_header() was true
   bool read_pixels(unsigned char* to, std::size_t rowbytes, void (*transform)(png_structp)) {
     if (setjmp(trouble_.jump) != 0) return false;
     transform(png_);
@@ -176,7 +176,7 @@ std::string encode_png(image_view<const T> view) {
                      view.stride() * static_cast<std::ptrdiff_t>(sizeof(T)), static_cast<std::uint32_t>(view.width()),
                      static_cast<std::uint32_t>(view.height()), std::same_as<T, std::uint16_t> ? 16 : 8,
                      std::same_as<T, rgb8> ? PNG_COLOR_TYPE_RGB : PNG_COLOR_TYPE_GRAY))
-    throw std::bad_alloc{};  // nothing else can go wrong in memory
+    throw std::bad_alloc{};  // the only possible failure in memory
   return bytes;
 }
 

@@ -11,10 +11,10 @@
 
 namespace orbis::io::detail {
 
-/// The number types a cloud file may store.
+/// The number types that a cloud file may store.
 enum class scalar_type { int8, uint8, int16, uint16, int32, uint32, int64, uint64, float32, float64 };
 
-/// Bytes of a number.
+/// Size of a number, bytes.
 [[nodiscard]] constexpr std::size_t size_of(scalar_type type) noexcept {
   switch (type) {
     case scalar_type::int8:

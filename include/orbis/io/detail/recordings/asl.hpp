@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Recordings in the ASL layout, as EuRoC MAV and TUM-VI have it: `mav0/cam0` and `mav0/cam1`, each with `data.csv`,
-/// `data/` and `sensor.yaml`, and `mav0/state_groundtruth_estimate0` (or `mocap0`).
+/// Recordings in the ASL layout of EuRoC MAV and TUM-VI: `mav0/cam0` and `mav0/cam1`, each with `data.csv`, `data/` and
+/// `sensor.yaml`, and `mav0/state_groundtruth_estimate0` (or `mocap0`).
 ///
 /// Source: M. Burri et al., "The EuRoC micro aerial vehicle datasets", IJRR 35 (2016). Times are nanoseconds. Poses are
-/// those of a body; `T_BS` of `sensor.yaml` says where a sensor is on it.
+/// those of a body; `T_BS` of `sensor.yaml` is the pose of a sensor on it.
 #pragma once
 
 #include <algorithm>
@@ -34,15 +34,14 @@
 
 namespace orbis::io::detail {
 
-/// A camera and its place on the body.
+/// A camera and its pose on the body.
 struct asl_camera {
   camera::any_camera model;
   se3 T_body_camera;
   double rate = 20.0;  ///< images per second
 };
 
-/// The text of a camera's `sensor.yaml`. Errors: malformed (with file and line), unsupported (a model that we do not
-/// know).
+/// Parses a camera's `sensor.yaml`. Errors: malformed (with file and line), unsupported (an unknown model).
 [[nodiscard]] inline result<asl_camera> parse_asl_camera(std::string_view text, const std::filesystem::path& where) {
   const auto yaml = plain_yaml::parse(text, where);
   if (!yaml) return fail(yaml.error());
@@ -94,8 +93,8 @@ struct asl_camera {
   return camera;
 }
 
-/// The text of a camera's `data.csv`: `nanoseconds,file` a line; files are in `folder`. Unreadable lines are left out
-/// and noted. Errors: no_data (no line is left).
+/// Parses a camera's `data.csv`: `nanoseconds,file` per line; files are in `folder`. Unreadable lines are skipped and
+/// noted. Errors: no_data (no line remains).
 [[nodiscard]] inline result<std::vector<stamped_file>> parse_asl_list(std::string_view text,
                                                                       const std::filesystem::path& list,
                                                                       const std::filesystem::path& folder,
@@ -116,8 +115,8 @@ struct asl_camera {
   return in_order_of_time(list, std::move(files), notes);
 }
 
-/// The text of the ground truth's `data.csv`: nanoseconds, position and quaternion (w first) of the body, and what else
-/// there is. Errors: malformed, with the line.
+/// Parses the `data.csv` of the ground truth: nanoseconds, position and quaternion (w first) of the body; further
+/// columns are ignored. Errors: malformed, with the line.
 [[nodiscard]] inline result<trajectory> parse_asl_poses(std::string_view text, const std::filesystem::path& where) {
   trajectory poses;
   std::size_t bad_line = 0;
@@ -143,14 +142,14 @@ struct asl_camera {
   return poses;
 }
 
-/// The folder that holds `cam0` and `cam1`; empty if there is none.
+/// The folder that contains `cam0` and `cam1`; empty if there is none.
 [[nodiscard]] inline std::filesystem::path asl_root(const std::filesystem::path& folder) {
   for (const auto& root : {folder / "mav0", folder})
     if (present(root / "cam0" / "sensor.yaml") || present(root / "cam0" / "data.csv")) return root;
   return {};
 }
 
-/// Whether `folder` looks like a recording in the ASL layout with two cameras.
+/// Returns true if `folder` looks like a recording in the ASL layout with two cameras.
 [[nodiscard]] inline bool is_asl(const std::filesystem::path& folder) {
   const auto root = asl_root(folder);
   return !root.empty() && present(root / "cam1");
@@ -162,8 +161,8 @@ struct asl_images {
   std::vector<stamped_file> files;
 };
 
-/// What a camera's folder says: its `sensor.yaml` and `data.csv`, which are added to the files of `to`. Errors:
-/// not_found (a file), unreadable, no_data, malformed (with file and line), unsupported.
+/// Reads a camera's folder: its `sensor.yaml` and `data.csv`, which are added to the files of `to`. Errors: not_found
+/// (a file), unreadable, no_data, malformed (with file and line), unsupported.
 [[nodiscard]] inline result<asl_images> read_asl_images(const std::filesystem::path& where, recording_index& to) {
   const auto settings = read_file(where / "sensor.yaml", plain_yaml::max_bytes), list = read_file(where / "data.csv");
   if (!settings) return fail(settings.error());
@@ -176,8 +175,8 @@ struct asl_images {
   return asl_images{*std::move(camera), *std::move(files)};
 }
 
-/// Reads the ground truth beside the cameras' folders, if there is one, as poses of a camera, and gives the frames of
-/// `index` theirs. Errors: unreadable, malformed (with file and line).
+/// Reads the ground truth next to the cameras' folders, if there is one, as poses of a camera, and sets the poses of
+/// the frames of `index`. Errors: unreadable, malformed (with file and line).
 [[nodiscard]] inline result<void> read_asl_truth(const std::filesystem::path& root, const se3& T_body_camera,
                                                  recording_index& index) {
   for (const char* const name : {"state_groundtruth_estimate0", "mocap0"}) {
@@ -196,12 +195,12 @@ struct asl_images {
   return {};
 }
 
-/// The index of a recording in the ASL layout. Images are paired within `max_time_difference` seconds; what finds no
-/// partner is noted. Errors: not_found (a file), unreadable, no_data, malformed (with file and line), unsupported.
+/// The index of a recording in the ASL layout. Images are paired within `max_time_difference` seconds; images without a
+/// partner are noted. Errors: not_found (a file), unreadable, no_data, malformed (with file and line), unsupported.
 [[nodiscard]] inline result<stereo_index> index_asl(const std::filesystem::path& folder, double max_time_difference) {
   const auto root = asl_root(folder);
   if (root.empty())
-    return fail(errc::not_found, (folder / "mav0" / "cam0").string(), "no such folder with sensor.yaml");
+    return fail(errc::not_found, (folder / "mav0" / "cam0").string(), "no such folder; it must contain sensor.yaml");
   stereo_index index;
   const auto left = read_asl_images(root / "cam0", index.images);
   if (!left) return fail(left.error());

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The colour image as the depth camera would have seen it, where the two are different cameras.
+/// Registration of colour images to the depth camera, if the two are different cameras.
 #pragma once
 
 #include <algorithm>
@@ -16,7 +16,7 @@
 
 namespace orbis::io::detail {
 
-/// Averages of n x n pixels; what is left over at the right and at the bottom is dropped. @pre n >= 1
+/// Averages of n x n pixels; drops remaining columns and rows at the right and at the bottom. @pre n >= 1
 [[nodiscard]] inline image<rgb8> reduced(image_view<const rgb8> in, int n) {
   image<rgb8> out{in.width() / n, in.height() / n};
   const auto count = static_cast<unsigned>(n * n);
@@ -34,23 +34,26 @@ namespace orbis::io::detail {
   return out;
 }
 
-/// Gives each pixel of a depth image its colour. Colour goes to depth and not the other way, so that depth stays as it
-/// was measured: a depth image of more pixels would be made up between them, and have holes where surfaces end. Where
-/// the two cameras are apart, a pixel's depth says where the colour image has it; a pixel without depth is taken to be
-/// far away. A colour image of higher resolution is averaged first.
+/// Assigns a colour to each pixel of a depth image. Colour is resampled to depth and not the other way, so that depth
+/// stays as measured: a depth image with more pixels would need interpolation, and have holes where surfaces end. If
+/// the two cameras are apart, a pixel's depth determines its position in the colour image; a pixel without depth counts
+/// as far away. A colour image of higher resolution is averaged first.
 class color_registration {
  public:
   color_registration(const color_camera& color, const camera::pinhole& depth)
       : color_{color},
         depth_{depth},
-        shrink_{static_cast<int>(std::lround(std::clamp(color.model.k().fx / depth.k().fx, 1.0, most(color.model))))} {}
+        shrink_{static_cast<int>(
+            std::lround(std::clamp(color.model.k().fx / depth.k().fx, 1.0, max_reduction(color.model))))} {}
 
-  /// Whether `register_color` wants the depth image: the two cameras are more than a tenth of a millimetre apart.
+  /// Returns true if `register_color` needs the depth image: the two cameras are more than a tenth of a millimetre
+  /// apart.
   [[nodiscard]] bool needs_depth() const noexcept { return norm(color_.T_color_depth.translation()) > 1e-4; }
   [[nodiscard]] const camera::pinhole& color() const noexcept { return color_.model; }
 
-  /// Black where the colour image has nothing. `depth_scale`: stored depth per metre. `depth` may be empty unless
-  /// `needs_depth`. O(pixels of both). @pre `color` has the size of the colour camera, `depth` that of the depth camera
+  /// The colour image as seen from the depth camera; black where there is no colour. `depth_scale`: stored depth per
+  /// metre. `depth` may be empty unless `needs_depth`. O(pixels of both). @pre `color` has the size of the colour
+  /// camera, `depth` that of the depth camera
   [[nodiscard]] image<rgb8> register_color(image_view<const rgb8> color, image_view<const std::uint16_t> depth,
                                            double depth_scale) const {
     assert(color.width() == color_.model.width() && color.height() == color_.model.height());
@@ -71,11 +74,11 @@ class color_registration {
   }
 
  private:
-  /// A pixel is to be left.
-  [[nodiscard]] static double most(const camera::pinhole& color) {
+  /// Maximum reduction factor: at least one pixel must remain.
+  [[nodiscard]] static double max_reduction(const camera::pinhole& color) {
     return std::max(1, std::min(color.width(), color.height()));
   }
-  /// Bilinear, at `pixel` of the image that was not reduced.
+  /// Samples bilinearly at `pixel` of the original image, before reduction.
   void sample(image_view<const rgb8> from, const vec2& pixel, rgb8& to) const {
     const vec2 at((pixel.x() + 0.5) / shrink_ - 0.5, (pixel.y() + 0.5) / shrink_ - 0.5);
     const double right = from.width() - 1, bottom = from.height() - 1;

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// ICL-NUIM recordings in their TUM-compatible layout: `rgb/N.png`, `depth/N.png`, possibly
-/// `associations.txt` and `*.gt.freiburg`.
+/// ICL-NUIM recordings in their TUM-compatible layout: `rgb/N.png`, `depth/N.png`, optionally `associations.txt` and
+/// `*.gt.freiburg`.
 ///
-/// Source: A. Handa et al., "A benchmark for RGB-D visual odometry, 3D reconstruction and SLAM", ICRA
-/// 2014. The time stamps there are frame numbers, of a camera at 30 Hz. The poses there are those of
-/// a left-handed camera with y up, while the images are stored top down; they are mirrored here, so
-/// that poses and images fit together in our frames (y down).
+/// Source: A. Handa et al., "A benchmark for RGB-D visual odometry, 3D reconstruction and SLAM", ICRA 2014. The time
+/// stamps are frame numbers of a camera at 30 Hz. The poses are those of a left-handed camera with y up, while the
+/// images are stored top down; they are mirrored here, so that poses and images agree in the frames of orbis (y down).
 #pragma once
 
 #include <algorithm>
@@ -51,22 +50,22 @@ inline std::vector<recording_entry> icl_numbered_frames(const std::filesystem::p
       ++without_depth;
   }
   if (without_depth != 0)
-    notes.push_back(std::to_string(without_depth) + " colour images have no depth image and are left out");
+    notes.push_back(std::to_string(without_depth) + " colour images have no depth image and are skipped");
   std::stable_sort(frames.begin(), frames.end(),
                    [](const recording_entry& a, const recording_entry& b) { return a.timestamp < b.timestamp; });
   return frames;
 }
 
-/// A pose of the left-handed frames (y up) in ours (y down): mirrored at the x-z plane.
+/// Converts a pose of the left-handed frames (y up) to one with y down: mirrors it at the x-z plane.
 inline se3 mirrored_y(const se3& pose) {
   const auto& q = pose.rotation().unit_quaternion();
   const vec3& t = pose.translation();
   return se3(so3(so3::quaternion(q.w(), -q.x(), q.y(), -q.z())), vec3(t.x(), -t.y(), t.z()));
 }
 
-/// Whether `folder` looks like an ICL-NUIM recording: numbered images without a list of their times.
-/// With `associations.txt` and `groundtruth.txt`, which that data set does not have, it is a TUM one:
-/// neither its camera nor its mirrored world may be guessed.
+/// Returns true if `folder` looks like an ICL-NUIM recording: numbered images without a list of their times. A folder
+/// with `associations.txt` and `groundtruth.txt`, which that data set does not have, is a TUM recording: neither its
+/// camera nor a mirrored world may be assumed.
 [[nodiscard]] inline bool is_icl_nuim(const std::filesystem::path& folder) {
   if (present(folder / "rgb.txt") || !present(folder / "rgb") || !present(folder / "depth")) return false;
   if (!icl_ground_truth(folder).empty()) return true;
@@ -74,8 +73,8 @@ inline se3 mirrored_y(const se3& pose) {
   return present(folder / "rgb" / "0.png") || present(folder / "rgb" / "1.png");
 }
 
-/// The index of an ICL-NUIM recording; the camera is the data set's own. Whole-numbered time stamps
-/// become seconds at 30 frames per second. Errors: as `index_tum`.
+/// The index of an ICL-NUIM recording, with the data set's camera. Whole-numbered time stamps are converted to seconds
+/// at 30 frames per second. Errors: as `index_tum`.
 [[nodiscard]] inline result<recording_index> index_icl_nuim(const std::filesystem::path& folder) {
   constexpr double frames_per_second = 30.0;
   recording_index index;

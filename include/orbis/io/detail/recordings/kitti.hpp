@@ -31,7 +31,7 @@
 
 namespace orbis::io::detail {
 
-/// The numbers in one line, at most `N`. Empty if there are not exactly `N`, or one is not finite.
+/// The numbers of a line. Empty if there are not exactly `N`, or one is not finite.
 template <std::size_t N>
 [[nodiscard]] std::optional<std::array<double, N>> numbers_of(std::string_view line) {
   std::array<double, N> all{};
@@ -40,19 +40,19 @@ template <std::size_t N>
   return trimmed(line).empty() ? std::optional{all} : std::nullopt;
 }
 
-/// The place of a camera with this projection matrix, K [I t], in the frame of camera 0, metres.
+/// The pose of a camera with this projection matrix, K [I t], in the frame of camera 0, metres.
 [[nodiscard]] inline se3 kitti_place(const std::array<double, 12>& p) {
   return se3{so3{}, -vec3{(p[3] - p[2] * p[11]) / p[0], (p[7] - p[6] * p[11]) / p[5], p[11]}};
 }
 
-/// The camera of a rectified pair: focal lengths, principal point, and metres between the two.
+/// The camera of a rectified pair: focal lengths, principal point, and baseline in metres.
 struct kitti_calibration {
   double fx = 0.0, fy = 0.0, cx = 0.0, cy = 0.0, baseline = 0.0;
-  se3 T_first_left;  ///< the left camera's place in the frame of camera 0
+  se3 T_first_left;  ///< pose of the left camera in the frame of camera 0
 };
 
-/// The projection matrix `P<camera>:` in the text of `calib.txt`, by rows. Errors: malformed (it is missing, is none,
-/// or has a focal length that is not above zero).
+/// Parses the projection matrix `P<camera>:` of `calib.txt`, row by row. Errors: malformed (missing, not a matrix, or a
+/// focal length that is not above zero).
 [[nodiscard]] inline result<std::array<double, 12>> parse_kitti_projection(std::string_view text, int camera,
                                                                            const std::filesystem::path& where) {
   const std::string wanted = "P" + std::to_string(camera);
@@ -72,8 +72,8 @@ struct kitti_calibration {
   return p;
 }
 
-/// The text of `calib.txt`: projection matrices `P<number>:` of 12 numbers. Errors: malformed (a matrix is missing or
-/// is none, or the cameras do not stand side by side).
+/// Parses `calib.txt`: projection matrices `P<number>:` of 12 numbers. Errors: malformed (a matrix is missing or
+/// invalid, or the cameras are not a rectified pair).
 [[nodiscard]] inline result<kitti_calibration> parse_kitti_calibration(std::string_view text, int left, int right,
                                                                        const std::filesystem::path& where) {
   const auto l = parse_kitti_projection(text, left, where), r = parse_kitti_projection(text, right, where);
@@ -87,7 +87,7 @@ struct kitti_calibration {
   return k;
 }
 
-/// The text of `times.txt`: seconds, one a line. Errors: malformed, with the line (no number, or not ascending).
+/// Parses `times.txt`: seconds, one per line. Errors: malformed, with the line (not a number, or not ascending).
 [[nodiscard]] inline result<std::vector<double>> parse_kitti_times(std::string_view text,
                                                                    const std::filesystem::path& where) {
   std::vector<double> times;
@@ -98,12 +98,13 @@ struct kitti_calibration {
     times.push_back((*t)[0]);
     return true;
   });
-  if (bad_line != 0) return fail(errc::malformed, at_line(where, bad_line), "a line has one time, later than the last");
+  if (bad_line != 0)
+    return fail(errc::malformed, at_line(where, bad_line), "a line must have one time, later than the previous one");
   return times;
 }
 
-/// The text of a file of poses: the first three rows of `T_world_camera`, 12 numbers a line. Errors: malformed, with
-/// the line (not 12 numbers, no rigid transform).
+/// Parses a file of poses: the first three rows of `T_world_camera`, 12 numbers per line. Errors: malformed, with the
+/// line (not 12 numbers, not a rigid transform).
 [[nodiscard]] inline result<std::vector<se3>> parse_kitti_poses(std::string_view text,
                                                                 const std::filesystem::path& where) {
   std::vector<se3> poses;
@@ -120,8 +121,8 @@ struct kitti_calibration {
   return poses;
 }
 
-/// The poses of a sequence, of its camera 0: `poses.txt` in its folder, or the benchmark's file in `../../poses`; empty
-/// if there are none. Adds the file to those of `index`, and a note if there are not as many as `times`. Errors:
+/// The poses of camera 0 of a sequence: `poses.txt` in its folder, or the benchmark's file in `../../poses`; empty if
+/// there are none. Adds the file to those of `index`, and a note if their number differs from `times`. Errors:
 /// unreadable, malformed (with the line).
 [[nodiscard]] inline result<std::vector<se3>> read_kitti_poses(const std::filesystem::path& folder, std::size_t times,
                                                                recording_index& index) {
@@ -141,7 +142,7 @@ struct kitti_calibration {
   return std::vector<se3>{};
 }
 
-/// Adds frame number `n` with its time and its pose, where there is one.
+/// Adds frame number `n` with its time and, if there is one, its pose.
 inline void add_kitti_frame(std::size_t n, const std::vector<double>& times, const std::vector<se3>& poses,
                             const std::filesystem::path& color, const std::filesystem::path& depth,
                             recording_index& index) {
@@ -151,14 +152,14 @@ inline void add_kitti_frame(std::size_t n, const std::vector<double>& times, con
   index.ground_truth.push_back({times[n], poses[n]});
 }
 
-/// Brings the frames of a sequence into the order of time; of two with one number the first stays. `left_out`: images
-/// that became no frame. Errors: no_data, and those of `check_first_frame`.
+/// Sorts the frames of a sequence by time; of frames with the same number keeps the first. `left_out`: images that are
+/// in no frame. Errors: no_data, and those of `check_first_frame`.
 [[nodiscard]] inline result<void> sort_kitti_frames(const std::filesystem::path& folder, std::size_t left_out,
                                                     recording_index& index) {
   if (index.frames.empty() && left_out != 0)
     return fail(errc::no_data, folder.string(),
                 "none of " + std::to_string(left_out) + " images makes a frame: " +
-                    "each wants a time in times.txt, and of two cameras a partner of "
+                    "each needs a time in times.txt and, with two cameras, a partner of "
                     "the same name");
   const auto keep_first = [](auto& list) {
     const auto earlier = [](const auto& a, const auto& b) { return a.timestamp < b.timestamp; };
@@ -170,12 +171,11 @@ inline void add_kitti_frame(std::size_t n, const std::vector<double>& times, con
   keep_first(index.frames);
   keep_first(index.ground_truth);
   if (const std::size_t twice = all - index.frames.size(); twice != 0)
-    index.notes.push_back(std::to_string(twice) + " images whose number there is twice are left out");
+    index.notes.push_back(std::to_string(twice) + " images with a repeated number are skipped");
   return check_first_frame(index, folder);
 }
 
-/// The folders of the left and right images, and the numbers of these cameras; grey ones first. Empty if there are
-/// none.
+/// The numbers of the left and right cameras, whose folders exist; grey ones first. Empty if there are none.
 [[nodiscard]] inline std::optional<std::pair<int, int>> kitti_cameras(const std::filesystem::path& folder) {
   for (const auto& [left, right] : {std::pair{0, 1}, std::pair{2, 3}})
     if (present(folder / ("image_" + std::to_string(left))) && present(folder / ("image_" + std::to_string(right))))
@@ -183,13 +183,13 @@ inline void add_kitti_frame(std::size_t n, const std::vector<double>& times, con
   return std::nullopt;
 }
 
-/// Whether `folder` looks like a sequence of KITTI odometry.
+/// Returns true if `folder` looks like a sequence of KITTI odometry.
 [[nodiscard]] inline bool is_kitti(const std::filesystem::path& folder) {
   return kitti_cameras(folder) && present(folder / "calib.txt");
 }
 
-/// The index of a sequence. Images without a partner or a time are left out and noted. Errors: not_found (a folder, a
-/// file), unreadable, malformed (with file and line), no_data (no pair); those of the first image, which tells the
+/// The index of a sequence. Images without a partner or a time are skipped and noted. Errors: not_found (a folder, a
+/// file), unreadable, malformed (with file and line), no_data (no pair); those of the first image, which determines the
 /// size.
 [[nodiscard]] inline result<stereo_index> index_kitti(const std::filesystem::path& folder) {
   const auto cameras = kitti_cameras(folder);
@@ -223,7 +223,7 @@ inline void add_kitti_frame(std::size_t n, const std::vector<double>& times, con
     add_kitti_frame(n, *times, *poses, image, right / image.filename(), images);
   }
   if (lonely != 0)
-    images.notes.push_back(std::to_string(lonely) + " left images have no right image or no time and are left out");
+    images.notes.push_back(std::to_string(lonely) + " left images have no right image or no time and are skipped");
   if (const auto ok = sort_kitti_frames(folder, lonely, images); !ok) return fail(ok.error());
   const auto first = read_color(images.frames.front().color);
   if (!first) return fail(first.error());

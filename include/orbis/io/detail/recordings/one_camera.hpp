@@ -29,22 +29,22 @@
 
 namespace orbis::io::detail {
 
-/// How far a pose may be from an image, seconds, where the poses stand in a file of their own.
+/// Maximum time between a pose and an image, seconds, if the poses are in a separate file.
 inline constexpr double mono_pose_distance = 0.020;
 
-// --- lists as TUM has them ----------------------------------------------------------------------
+// --- lists in the layout of TUM -----------------------------------------------------------------
 
 /// The list of a camera's images; empty if there is none.
 [[nodiscard]] inline std::filesystem::path image_list_of(const std::filesystem::path& folder) {
   return first_present(folder, {"rgb.txt", "left.txt"});
 }
 
-/// The index of the images that `rgb.txt` or `left.txt` names. Errors: not_found, unreadable, no_data, malformed
-/// (ground truth, with its line).
+/// The index of the images listed in `rgb.txt` or `left.txt`. Errors: not_found, unreadable, no_data, malformed (ground
+/// truth, with its line).
 [[nodiscard]] inline result<recording_index> index_image_list(const std::filesystem::path& folder) {
   recording_index index;
   auto list = image_list_of(folder);
-  if (list.empty()) list = folder / "rgb.txt";  // an error that names it
+  if (list.empty()) list = folder / "rgb.txt";  // to name it in the error
   const auto files = read_image_list(list, index.notes);
   if (!files) return fail(files.error());
   index.files.push_back(list);
@@ -81,19 +81,19 @@ inline constexpr double mono_pose_distance = 0.020;
 
 // --- KITTI --------------------------------------------------------------------------------------
 
-/// The number of the camera whose images a sequence of KITTI has: left ones first, grey ones first.
+/// The number of the camera whose images a KITTI sequence contains: left ones first, grey ones first.
 [[nodiscard]] inline std::optional<int> kitti_camera(const std::filesystem::path& folder) {
   for (const int i : {0, 2, 1, 3})
     if (present(folder / ("image_" + std::to_string(i)))) return i;
   return std::nullopt;
 }
 
-/// Whether `folder` looks like a sequence of KITTI odometry with at least one camera.
+/// Returns true if `folder` looks like a sequence of KITTI odometry with at least one camera.
 [[nodiscard]] inline bool is_kitti_camera(const std::filesystem::path& folder) {
   return kitti_camera(folder) && present(folder / "calib.txt");
 }
 
-/// The index of one camera of a sequence. The poses are those of this camera: the file's are of camera 0. Errors: as
+/// The index of one camera of a sequence. The poses are converted from camera 0 of the file to this camera. Errors: as
 /// `index_kitti`.
 [[nodiscard]] inline result<recording_index> index_kitti_camera(const std::filesystem::path& folder) {
   const auto camera = kitti_camera(folder);
@@ -121,7 +121,7 @@ inline constexpr double mono_pose_distance = 0.020;
     else
       ++lonely;
   }
-  if (lonely != 0) index.notes.push_back(std::to_string(lonely) + " images have no time and are left out");
+  if (lonely != 0) index.notes.push_back(std::to_string(lonely) + " images have no time and are skipped");
   if (const auto ok = sort_kitti_frames(folder, lonely, index); !ok) return fail(ok.error());
   const auto first = read_color(index.frames.front().color);
   if (!first) return fail(first.error());
@@ -139,7 +139,7 @@ inline constexpr double mono_pose_distance = 0.020;
   return paths;
 }
 
-/// Where a plain folder has its images: itself, or one of the usual names in it; empty if there are none.
+/// The folder with the images of a plain folder: itself, or one of the usual names in it; empty if there are none.
 [[nodiscard]] inline std::filesystem::path image_folder_of(const std::filesystem::path& folder) {
   if (!images_in(folder).empty()) return folder;
   for (const char* const name : {"rgb", "color", "images", "left", "data"})
@@ -147,11 +147,11 @@ inline constexpr double mono_pose_distance = 0.020;
   return {};
 }
 
-/// What the names of images say about their times: `1305031102.1753.png` is a time in seconds,
-/// `1403636579763555584.png` one in nanoseconds (as long a number is no other), and `frame_000123.png` frame 123. Where
-/// names say nothing in common, their order is that of the images, which `in_order` tells.
+/// Times derived from the names of images: `1305031102.1753.png` is a time in seconds, `1403636579763555584.png` one in
+/// nanoseconds (only times are that long), and `frame_000123.png` frame 123. If the names have no common form, the
+/// images keep their order, and `in_order` is true.
 struct times_of_names {
-  std::vector<double> times;  ///< seconds, of each name
+  std::vector<double> times;  ///< seconds, per name
   bool in_order = false;
 };
 [[nodiscard]] inline times_of_names times_from_names(const std::vector<std::filesystem::path>& names, double fps) {
@@ -194,9 +194,8 @@ struct times_of_names {
 }
 
 /// The index of a plain folder of images, PNG or JPEG, in it or in `rgb`, `color`, `images`, `left` or `data`. Their
-/// order is that which their names tell (`times_from_names`), and their times are those of `times.txt` (seconds, one a
-/// line), or of the names. `fps`: of images that are numbered. Errors: no_data, unreadable, malformed (with file and
-/// line).
+/// order is determined by their names (`times_from_names`), and their times are those of `times.txt` (seconds, one per
+/// line), or of the names. `fps`: rate of numbered images. Errors: no_data, unreadable, malformed (with file and line).
 [[nodiscard]] inline result<recording_index> index_image_folder(const std::filesystem::path& folder, double fps) {
   recording_index index;
   const auto where = image_folder_of(folder);
@@ -208,7 +207,7 @@ struct times_of_names {
   const times_of_names found = times_from_names(names, fps);
   std::vector<stamped_file> files;
   for (std::size_t i = 0; i != names.size(); ++i) files.push_back({found.times[i], names[i]});
-  // Numbers without leading zeros are not in the order of their names.
+  // Numbers without leading zeros are not in alphabetical order.
   std::stable_sort(files.begin(), files.end(), [](const auto& a, const auto& b) { return a.timestamp < b.timestamp; });
   if (const auto file = folder / "times.txt"; present(file)) {
     const auto text = read_file(file);
@@ -223,7 +222,7 @@ struct times_of_names {
     index.files.push_back(file);
   } else if (found.in_order) {
     index.notes.push_back(where.string() +
-                          ": the names of the images are no numbers and no times, they are taken in "
+                          ": the names of the images are neither numbers nor times; they are read in "
                           "alphabetical order");
   }
   auto ordered = in_order_of_time(where, std::move(files), index.notes);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// What the readers of recording formats share: folders, and the checks of an index.
+/// Functions shared by the readers of recording formats: folders, and checks of an index.
 #pragma once
 
 #include <algorithm>
@@ -20,7 +20,7 @@
 
 namespace orbis::io::detail {
 
-/// The image that was read from `path`, if it has the size of its camera. Errors: malformed, and those of `read`.
+/// The image read from `path`, if it has the size of its camera. Errors: malformed, and those of `read`.
 template <class T>
 [[nodiscard]] result<image<T>> sized(result<image<T>> read, const std::filesystem::path& path, int width, int height) {
   if (!read || (read->width() == width && read->height() == height)) return read;
@@ -29,8 +29,8 @@ template <class T>
                   " pixels, the camera " + std::to_string(width) + "x" + std::to_string(height));
 }
 
-/// Gives every frame the ground truth's pose at its time: interpolated where poses are at most 0.2 s
-/// apart, else the nearest within `max_distance` seconds.
+/// Sets the pose of every frame from the ground truth at its time: interpolated if poses are at most 0.2 s apart,
+/// otherwise the nearest within `max_distance` seconds.
 inline void attach_ground_truth(recording_index& index, double max_distance) {
   std::size_t without = 0;
   for (recording_entry& frame : index.frames) {
@@ -39,13 +39,13 @@ inline void attach_ground_truth(recording_index& index, double max_distance) {
   }
   if (!index.ground_truth.empty() && without != 0)
     index.notes.push_back(std::to_string(without) + " of " + std::to_string(index.frames.size()) +
-                          " frames lie outside the ground truth");
+                          " frames are outside the ground truth");
 }
 
-/// Fails if a frame list is empty or its first images do not exist: the list is wrong as a whole.
-/// Later images are looked for when they are read. Errors: no_data, not_found.
+/// Fails if a frame list is empty or its first images do not exist: the whole list is wrong then. Later images are
+/// checked when they are read. Errors: no_data, not_found.
 inline result<void> check_first_frame(const recording_index& index, const std::filesystem::path& where) {
-  if (index.frames.empty()) return fail(errc::no_data, where.string(), "there is not one frame in this recording");
+  if (index.frames.empty()) return fail(errc::no_data, where.string(), "the recording has no frames");
   for (const std::filesystem::path& path : {index.frames.front().color, index.frames.front().depth}) {
     std::error_code ignored;
     if (!path.empty() && !std::filesystem::exists(path, ignored))
@@ -64,20 +64,20 @@ inline result<void> check_first_frame(const recording_index& index, const std::f
   return paths;
 }
 
-/// Whether a file's name ends as an image's that we read.
+/// Returns true if the name of a file has the extension of a supported image format.
 [[nodiscard]] inline bool is_image_name(const std::filesystem::path& path) {
   std::string ending = path.extension().string();
   for (char& c : ending) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
   return ending == ".png" || ending == ".jpg" || ending == ".jpeg";
 }
 
-/// Whether there is something called `path`.
+/// Returns true if `path` exists.
 [[nodiscard]] inline bool present(const std::filesystem::path& path) {
   std::error_code ignored;
   return std::filesystem::exists(path, ignored);
 }
 
-/// The first of these that is in `folder`; empty if there is none.
+/// The first of these names that exists in `folder`; empty if there is none.
 [[nodiscard]] inline std::filesystem::path first_present(const std::filesystem::path& folder,
                                                          std::initializer_list<const char*> names) {
   for (const char* const name : names)
@@ -85,8 +85,8 @@ inline result<void> check_first_frame(const recording_index& index, const std::f
   return {};
 }
 
-/// What is in a folder, for a message: "holds calib.txt, 120 .png files, left/". At most eight items, each a folder, a
-/// file, or all files with one ending.
+/// Summary of a folder for a message: "holds calib.txt, 120 .png files, left/". At most eight items, each a folder, a
+/// file, or all files with one extension.
 [[nodiscard]] inline std::string describe_content(const std::filesystem::path& folder) {
   constexpr std::size_t most = 8;
   std::vector<std::string> items;
@@ -103,7 +103,7 @@ inline result<void> check_first_frame(const recording_index& index, const std::f
       items.insert(items.end(), names.begin(), names.end());
     else
       items.push_back(std::to_string(names.size()) +
-                      (ending.empty() ? " files without an ending" : " " + ending + " files"));
+                      (ending.empty() ? " files without an extension" : " " + ending + " files"));
   }
   if (items.empty()) return "is empty";
   std::string text = "holds ";
@@ -112,16 +112,16 @@ inline result<void> check_first_frame(const recording_index& index, const std::f
   return text;
 }
 
-/// Whether there is a folder. Errors: not_found, unsupported (a file).
+/// Fails if `folder` does not exist or is a file. Errors: not_found, unsupported (a file).
 [[nodiscard]] inline result<void> check_folder(const std::filesystem::path& folder) {
   std::error_code ignored;
   if (!present(folder)) return fail(errc::not_found, folder.string(), "no such folder");
   if (!std::filesystem::is_directory(folder, ignored))
-    return fail(errc::unsupported, folder.string(), "a recording is a folder, this is a file");
+    return fail(errc::unsupported, folder.string(), "is a file; a recording is a folder");
   return {};
 }
 
-/// That a folder is no recording: what was looked for, and what there is instead.
+/// Error for a folder that is not a recording, with the expected files and its actual content.
 [[nodiscard]] inline error unknown_recording(const std::filesystem::path& folder, const std::string& looked_for) {
   return {errc::unsupported, folder.string(), looked_for + "; the folder " + describe_content(folder)};
 }

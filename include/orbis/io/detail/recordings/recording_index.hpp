@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// What the readers of recording formats hand to `recording`: a list of frames, not yet read.
+/// Index that the readers of recording formats pass to `recording`: a list of frames, not yet read.
 #pragma once
 
 #include <filesystem>
@@ -15,28 +15,28 @@
 
 namespace orbis::io::detail {
 
-/// A colour camera, and where the depth camera is in its frame.
+/// A colour camera, and the pose of the depth camera in its frame.
 struct color_camera {
   camera::pinhole model;
   se3 T_color_depth;
 };
 
-/// One frame: its files and what is known about their moment.
+/// One frame: its files, time and pose.
 struct recording_entry {
   double timestamp = 0.0;  ///< of the colour image, seconds
   std::filesystem::path color;
-  std::filesystem::path depth;        ///< empty where there is one camera only
-  std::optional<se3> T_world_camera;  ///< ground truth, where there is one
+  std::filesystem::path depth;        ///< empty for one camera only
+  std::optional<se3> T_world_camera;  ///< ground truth, if there is one
 };
 
 /// A recording without its pixels.
 struct recording_index {
-  std::vector<recording_entry> frames;  ///< in the order of time, never empty when handed out
+  std::vector<recording_entry> frames;  ///< in order of time, never empty when returned
   trajectory ground_truth;
-  std::optional<camera::camera_settings> camera;  ///< where the format's own files tell
-  std::optional<color_camera> color;              ///< where colour is to be resampled to the camera of depth
-  std::vector<std::string> notes;                 ///< what a user should be warned about
-  std::vector<std::filesystem::path> files;       ///< that were read for this; images are not among them
+  std::optional<camera::camera_settings> camera;  ///< if the format's own files contain it
+  std::optional<color_camera> color;              ///< set if colour has to be resampled to the depth camera
+  std::vector<std::string> notes;                 ///< warnings for the user
+  std::vector<std::filesystem::path> files;       ///< files that were read for the index, without images
 };
 
 }  // namespace orbis::io::detail

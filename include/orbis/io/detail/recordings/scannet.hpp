@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// ScanNet's scenes as its tools export them: `color/N.jpg`, `depth/N.png`, `pose/N.txt`, and in `intrinsic` (or beside
-/// the folders) `intrinsic_color.txt`, `intrinsic_depth.txt`, `extrinsic_color.txt`, `extrinsic_depth.txt`.
+/// ScanNet's scenes as exported by its tools: `color/N.jpg`, `depth/N.png`, `pose/N.txt`, and in `intrinsic` (or next
+/// to the folders) `intrinsic_color.txt`, `intrinsic_depth.txt`, `extrinsic_color.txt`, `extrinsic_depth.txt`.
 ///
 /// Source: A. Dai et al., "ScanNet: richly-annotated 3D reconstructions of indoor scenes", CVPR 2017, and the data
 /// set's page. Depth is in millimetres and has fewer pixels than colour; poses are from camera to world, with
-/// infinities where the camera was lost. The extrinsics are from a camera to what both share, and mostly the identity.
+/// infinities where the camera was lost. The extrinsics are from a camera to a common frame, and mostly the identity.
 #pragma once
 
 #include <algorithm>
@@ -29,9 +29,9 @@
 
 namespace orbis::io::detail {
 
-/// The file of a ScanNet scene that says `what` ("intrinsic_depth"); empty if there is none.
+/// The file of a ScanNet scene for `what` ("intrinsic_depth"); empty if there is none.
 [[nodiscard]] inline std::filesystem::path scannet_file(const std::filesystem::path& folder, const std::string& what) {
-  std::string plural = what;  // so in the data set's smaller edition
+  std::string plural = what;  // spelling of the data set's smaller edition
   plural.insert(plural.find('_'), "s");
   for (const auto& path :
        {folder / "intrinsic" / (what + ".txt"), folder / (what + ".txt"), folder / (plural + ".txt")})
@@ -39,13 +39,13 @@ namespace orbis::io::detail {
   return {};
 }
 
-/// Whether `folder` looks like an exported scene of ScanNet.
+/// Returns true if `folder` looks like an exported scene of ScanNet.
 [[nodiscard]] inline bool is_scannet(const std::filesystem::path& folder) {
   return present(folder / "color") && present(folder / "depth") && !scannet_file(folder, "intrinsic_depth").empty();
 }
 
-/// The index of an exported scene, at 30 frames per second by the frames' numbers. Its frames are those of the depth
-/// camera; see `color_registration`. Errors: not_found, unreadable, no_data, malformed (with the file).
+/// The index of an exported scene, with times from the frame numbers at 30 frames per second. Its frames are those of
+/// the depth camera; see `color_registration`. Errors: not_found, unreadable, no_data, malformed (with the file).
 [[nodiscard]] inline result<recording_index> index_scannet(const std::filesystem::path& folder) {
   constexpr double frames_per_second = 30.0;
   recording_index index;
@@ -79,7 +79,7 @@ namespace orbis::io::detail {
   std::stable_sort(index.ground_truth.begin(), index.ground_truth.end(), earlier);
   if (const auto ok = check_first_frame(index, folder); !ok) return fail(ok.error());
   if (without_depth != 0)
-    index.notes.push_back(std::to_string(without_depth) + " colour images have no depth image and are left out");
+    index.notes.push_back(std::to_string(without_depth) + " colour images have no depth image and are skipped");
   if (without_pose != 0)
     index.notes.push_back(std::to_string(without_pose) + " of " + std::to_string(index.frames.size()) +
                           " frames have no pose: the camera was lost there");
@@ -90,7 +90,7 @@ namespace orbis::io::detail {
   if (!first_depth) return fail(first_depth.error());
   const auto camera_of = [&](const char* what, int width, int height) -> result<camera::pinhole> {
     auto file = scannet_file(folder, what);
-    if (file.empty()) file = folder / "intrinsic" / (std::string{what} + ".txt");  // an error that names it
+    if (file.empty()) file = folder / "intrinsic" / (std::string{what} + ".txt");  // to name it in the error
     const auto k = read_camera_matrix(file);
     if (!k) return fail(k.error());
     index.files.push_back(file);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Recordings as the 7-Scenes data set has them: `frame-XXXXXX.color.png` (or `.jpg`),
-/// `frame-XXXXXX.depth.png`, `frame-XXXXXX.pose.txt`, possibly `camera-intrinsics.txt`.
+/// Recordings in the layout of the 7-Scenes data set: `frame-XXXXXX.color.png` (or `.jpg`), `frame-XXXXXX.depth.png`,
+/// `frame-XXXXXX.pose.txt`, optionally `camera-intrinsics.txt`.
 ///
 /// Source: J. Shotton et al., "Scene coordinate regression forests for camera relocalization in RGB-D
 /// images", CVPR 2013. Depth is in millimetres, 0 and 65535 are invalid; colour and depth come from
@@ -29,10 +29,9 @@
 
 namespace orbis::io::detail {
 
-/// The pose `T_world_camera` in a text with a 4x4 matrix. Its rotation may be off by a few
-/// parts in a thousand, as those of 7-Scenes are: the nearest rotation is taken.
-/// Errors: malformed, with the line (not 16 numbers, NaN or infinity, a matrix that is no rigid transform by more than
-/// 5 %).
+/// Parses the pose `T_world_camera` from a text with a 4x4 matrix. Its rotation may deviate by a few parts in a
+/// thousand, as in 7-Scenes: the result has the nearest rotation. Errors: malformed, with the line (not 16 numbers, NaN
+/// or infinity, a matrix that deviates from a rigid transform by more than 5 %).
 [[nodiscard]] inline result<se3> parse_pose_matrix(std::string_view text, const std::filesystem::path& path) {
   double m[16];
   std::size_t count = 0, last_line = 0;
@@ -59,7 +58,7 @@ namespace orbis::io::detail {
   const bool last_row =
       std::abs(m[12]) < 1e-3 && std::abs(m[13]) < 1e-3 && std::abs(m[14]) < 1e-3 && std::abs(m[15] - 1.0) < 1e-3;
   if (!last_row || determinant(r) < 0.0 || largest_magnitude(mat3(transposed(r) * r - identity<mat3>())) > 0.05)
-    return fail(errc::malformed, path.string(), "the matrix is no rigid transform");
+    return fail(errc::malformed, path.string(), "the matrix is not a rigid transform");
   const auto rotation = nearest_rotation(r);
   if (!rotation) return fail(errc::malformed, path.string(), rotation.error().message);
   return se3(*rotation, vec3(m[3], m[7], m[11]));
@@ -72,7 +71,7 @@ namespace orbis::io::detail {
   return parse_pose_matrix(*text, path);
 }
 
-/// A 3x3 camera matrix as text, possibly as the upper left part of a 4x4 one. Errors: malformed.
+/// Parses a 3x3 camera matrix, or the upper left part of a 4x4 one. Errors: malformed.
 [[nodiscard]] inline result<mat3> parse_camera_matrix(std::string_view text, const std::filesystem::path& path) {
   double values[16];
   int count = 0;
@@ -103,7 +102,7 @@ namespace orbis::io::detail {
 
 inline constexpr std::string_view seven_scenes_color[] = {".color.png", ".color.jpg"};
 
-/// Whether `name` is a colour image's; if so, its stem and number.
+/// Returns true if `name` is that of a colour image; sets its stem and number then.
 inline bool seven_scenes_frame(const std::string& name, std::string& stem, unsigned& number) {
   if (!name.starts_with("frame-")) return false;
   for (const std::string_view ending : seven_scenes_color) {
@@ -123,7 +122,7 @@ inline bool has_seven_scenes_frames(const std::filesystem::path& folder) {
   return false;
 }
 
-/// The sub-folders seq-XX with frames in them.
+/// The subfolders seq-XX that contain frames.
 inline std::vector<std::filesystem::path> seven_scenes_sequences(const std::filesystem::path& folder) {
   std::vector<std::filesystem::path> found;
   for (const auto& path : list_folder(folder))
@@ -131,16 +130,15 @@ inline std::vector<std::filesystem::path> seven_scenes_sequences(const std::file
   return found;
 }
 
-/// Whether `folder` looks like a 7-Scenes recording (or a scene with such recordings in seq-XX).
+/// Returns true if `folder` looks like a 7-Scenes recording (or a scene with such recordings in seq-XX).
 [[nodiscard]] inline bool is_seven_scenes(const std::filesystem::path& folder) {
   return has_seven_scenes_frames(folder) || !seven_scenes_sequences(folder).empty();
 }
 
-/// The index of a 7-Scenes recording, at 30 frames per second by the frames' numbers. A scene folder
-/// with a single seq-XX stands for that. `camera-intrinsics.txt` is taken to be the depth camera's;
-/// its image size is read from the first depth image.
-/// Errors: no_data, not_found, unreadable, malformed (a pose, with its file), invalid_argument (a
-/// scene with several sequences).
+/// The index of a 7-Scenes recording, with times from the frame numbers at 30 frames per second. A scene folder with a
+/// single seq-XX is replaced by that folder. `camera-intrinsics.txt` is assumed to be the depth camera's; its image
+/// size is read from the first depth image. Errors: no_data, not_found, unreadable, malformed (a pose, with its file),
+/// invalid_argument (a scene with several sequences).
 [[nodiscard]] inline result<recording_index> index_seven_scenes(std::filesystem::path folder) {
   if (!has_seven_scenes_frames(folder)) {
     const auto sequences = seven_scenes_sequences(folder);
@@ -177,8 +175,8 @@ inline std::vector<std::filesystem::path> seven_scenes_sequences(const std::file
                    [](const stamped_pose& a, const stamped_pose& b) { return a.timestamp < b.timestamp; });
   if (const auto ok = check_first_frame(index, folder); !ok) return fail(ok.error());
   if (without_depth != 0)
-    index.notes.push_back(std::to_string(without_depth) + " colour images have no depth image and are left out");
-  index.notes.push_back("colour and depth are not registered in this format: colours are a little off");
+    index.notes.push_back(std::to_string(without_depth) + " colour images have no depth image and are skipped");
+  index.notes.push_back("colour and depth are not registered in this format: colours are slightly misaligned");
 
   std::filesystem::path intrinsics = folder / "camera-intrinsics.txt";
   if (!present(intrinsics)) intrinsics = folder.parent_path() / "camera-intrinsics.txt";

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// What the readers of stereo recordings hand to `stereo_recording`: a list of pairs, not yet read, and the cameras.
+/// Index that the readers of stereo recordings pass to `stereo_recording`: a list of pairs, not yet read, and the
+/// cameras.
 #pragma once
 
 #include <optional>
@@ -14,11 +15,11 @@ namespace orbis::io::detail {
 
 /// A stereo recording without its pixels.
 struct stereo_index {
-  /// Of each frame `color` is the left image and `depth` the right one; poses are those of the left camera.
+  /// In each frame `color` is the left image and `depth` the right one; poses are those of the left camera.
   recording_index images;
   camera::stereo_rig<camera::any_camera> cameras;
   double fps = 30.0;
-  std::optional<camera::shutter> shutter{};  ///< of both cameras, if it is known
+  std::optional<camera::shutter> shutter{};  ///< of both cameras, if known
 };
 
 }  // namespace orbis::io::detail

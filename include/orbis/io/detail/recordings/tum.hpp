@@ -34,7 +34,7 @@ struct stamped_file {
   std::filesystem::path path;
 };
 
-/// What a list names, in the order of time and each time stamp once; notes say what was changed. Errors: no_data (it is
+/// The entries of a list in order of time, each time stamp once; notes report changes. Errors: no_data (the list is
 /// empty).
 template <class Entry>
 [[nodiscard]] result<std::vector<Entry>> in_order_of_time(const std::filesystem::path& list, std::vector<Entry> entries,
@@ -42,30 +42,30 @@ template <class Entry>
   const auto earlier = [](const Entry& a, const Entry& b) { return a.timestamp < b.timestamp; };
   if (!std::is_sorted(entries.begin(), entries.end(), earlier)) {
     std::stable_sort(entries.begin(), entries.end(), earlier);
-    notes.push_back(list.string() + ": not in the order of time, sorted");
+    notes.push_back(list.string() + ": not in order of time; sorted");
   }
   const auto repeated = std::unique(entries.begin(), entries.end(),
                                     [](const Entry& a, const Entry& b) { return a.timestamp == b.timestamp; });
   if (repeated != entries.end()) {
     notes.push_back(list.string() + ": " + std::to_string(entries.end() - repeated) +
-                    " lines with a repeated time stamp left out");
+                    " lines with a repeated time stamp skipped");
     entries.erase(repeated, entries.end());
   }
   if (entries.empty()) return fail(errc::no_data, list.string(), "the list names no image");
   return entries;
 }
 
-/// Notes lines of a list that are left out: the first ones one by one, the others by their number.
+/// Notes the skipped lines of a list: the first ones individually, the others by their number.
 class skipped_lines {
  public:
   skipped_lines(const std::filesystem::path& list, std::vector<std::string>& notes) : list_{list}, notes_{notes} {}
   void add(std::size_t line, const char* why) {
-    if (++count_ <= most_) notes_.push_back(at_line(list_, line) + ": left out, " + why);
+    if (++count_ <= most_) notes_.push_back(at_line(list_, line) + ": skipped, " + why);
   }
-  /// @pre called once, after the last line
+  /// Notes the number of the others. @pre called once, after the last line
   void finish() {
     if (count_ > most_)
-      notes_.push_back(list_.string() + ": " + std::to_string(count_ - most_) + " more lines left out");
+      notes_.push_back(list_.string() + ": " + std::to_string(count_ - most_) + " more lines skipped");
   }
 
  private:
@@ -75,9 +75,9 @@ class skipped_lines {
   std::size_t count_ = 0;
 };
 
-/// A list of `timestamp filename` lines: comments, blank lines and CRLF are fine, the order is
-/// made right, unreadable lines and repeated time stamps are left out and noted. File names are
-/// relative to the folder of `list`. Errors: no_data (no line is left).
+/// Parses a list of `timestamp filename` lines: comments, blank lines and CRLF are accepted, the entries are sorted,
+/// unreadable lines and repeated time stamps are skipped and noted. File names are relative to the folder of `list`.
+/// Errors: no_data (no line remains).
 [[nodiscard]] inline result<std::vector<stamped_file>> parse_image_list(std::string_view text,
                                                                         const std::filesystem::path& list,
                                                                         std::vector<std::string>& notes) {
@@ -105,9 +105,9 @@ class skipped_lines {
   return parse_image_list(*text, list, notes);
 }
 
-/// The text of `associations.txt`: four fields a line, a time stamp and a file for colour and for depth, in
-/// either order (the file whose path says "depth" is the depth image; colour first if neither or
-/// both do). Unreadable lines and repeated time stamps are left out and noted. Errors: as `parse_image_list`.
+/// Parses `associations.txt`: four fields per line, a time stamp and a file for colour and for depth, in either order
+/// (the file whose path contains "depth" is the depth image; colour first if neither or both do). Unreadable lines and
+/// repeated time stamps are skipped and noted. Errors: as `parse_image_list`.
 [[nodiscard]] inline result<std::vector<recording_entry>> parse_associations(std::string_view text,
                                                                              const std::filesystem::path& list,
                                                                              std::vector<std::string>& notes) {
@@ -144,8 +144,8 @@ class skipped_lines {
   return parse_associations(*text, list, notes);
 }
 
-/// Reads `groundtruth.txt` of a folder, if it is there, into an index whose frames are known, and gives these their
-/// poses (`attach_ground_truth`). Errors: unreadable, malformed (with its line).
+/// Reads `groundtruth.txt` of a folder, if it exists, into an index with known frames, and sets their poses
+/// (`attach_ground_truth`). Errors: unreadable, malformed (with its line).
 [[nodiscard]] inline result<void> read_ground_truth(const std::filesystem::path& folder, double max_time_difference,
                                                     recording_index& index) {
   const auto file = folder / "groundtruth.txt";
@@ -158,13 +158,13 @@ class skipped_lines {
   return {};
 }
 
-/// Whether `folder` looks like a TUM recording.
+/// Returns true if `folder` looks like a TUM recording.
 [[nodiscard]] inline bool is_tum(const std::filesystem::path& folder) {
   return present(folder / "rgb.txt") || present(folder / "depth.txt") || present(folder / "associations.txt");
 }
 
-/// The camera of a TUM recording with freiburg1, 2 or 3 in its path, or none. Of several such words the last one tells:
-/// the sequence may lie in another one's folder.
+/// The camera of a TUM recording with freiburg1, 2 or 3 in its path, or none. Of several such words the last one
+/// counts: the sequence may be in the folder of another one.
 [[nodiscard]] inline std::optional<camera::camera_settings> tum_camera(const std::filesystem::path& folder) {
   std::optional<camera::camera_settings> found;
   const std::string name = std::filesystem::absolute(folder).lexically_normal().string();
@@ -179,12 +179,11 @@ class skipped_lines {
   return found;
 }
 
-/// The index of a TUM recording. `associations.txt` decides where it is present; otherwise colour and
-/// depth images are paired by `associate` within `max_time_difference` seconds, and what finds no
-/// partner is noted. The ground truth is interpolated at the colour images' time stamps. The camera
-/// is known for folders with freiburg1, 2 or 3 in their name.
-/// Errors: not_found (a list, the first image), unreadable, no_data (empty lists, no pair),
-/// malformed (ground truth, with its line).
+/// The index of a TUM recording. `associations.txt` is used if it exists; otherwise colour and depth images are paired
+/// by `associate` within `max_time_difference` seconds, and images without a partner are noted. The ground truth is
+/// interpolated at the colour images' time stamps. The camera is known for folders with freiburg1, 2 or 3 in their
+/// name. Errors: not_found (a list, the first image), unreadable, no_data (empty lists, no pair), malformed (ground
+/// truth, with its line).
 [[nodiscard]] inline result<recording_index> index_tum(const std::filesystem::path& folder,
                                                        double max_time_difference = 0.020) {
   recording_index index;
@@ -212,10 +211,10 @@ class skipped_lines {
     if (const std::size_t lonely = color->size() - index.frames.size(); lonely != 0)
       index.notes.push_back(std::to_string(lonely) + " of " + std::to_string(color->size()) +
                             " colour images have no depth image within " + std::to_string(max_time_difference) +
-                            " s and are left out");
+                            " s and are skipped");
     if (const std::size_t lonely = depth->size() - index.frames.size(); lonely != 0)
       index.notes.push_back(std::to_string(lonely) + " of " + std::to_string(depth->size()) +
-                            " depth images are left out");
+                            " depth images are skipped");
   }
   if (const auto ok = check_first_frame(index, folder); !ok) return fail(ok.error());
 
@@ -225,8 +224,8 @@ class skipped_lines {
   return index;
 }
 
-/// Pairs left with right images within `max_time_difference` seconds and makes frames of them; what finds no partner is
-/// noted. Errors: no_data (no pair), not_found (the first images).
+/// Pairs left with right images within `max_time_difference` seconds and adds them as frames; images without a partner
+/// are noted. Errors: no_data (no pair), not_found (the first images).
 [[nodiscard]] inline result<void> pair_images(const std::vector<stamped_file>& left,
                                               const std::vector<stamped_file>& right,
                                               const std::filesystem::path& where, double max_time_difference,
@@ -244,7 +243,7 @@ class skipped_lines {
   for (const auto& [list, side] : {std::pair{&left, "left"}, std::pair{&right, "right"}})
     if (const std::size_t lonely = list->size() - to.frames.size(); lonely != 0)
       to.notes.push_back(std::to_string(lonely) + " of " + std::to_string(list->size()) + " " + side +
-                         " images have no partner and are left out");
+                         " images have no partner and are skipped");
   return check_first_frame(to, where);
 }
 

@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The arithmetic that synthetic pixels are made of: the same bits on every machine.
+/// The arithmetic of synthetic pixels: bit-identical on every machine.
 ///
-/// Only operations that IEEE 754 defines to the last bit (+ - * / sqrt, conversions) and integers
-/// are used; sine and cosine are those of core/rounded.hpp. A compiler may still fuse a product and a
-/// sum into one rounding where the target can (`-march=native`), so every header whose arithmetic
-/// reaches a pixel switches this off for its own functions, between ORBIS_BEGIN_UNFUSED and
-/// ORBIS_END_UNFUSED. Functions in such a region are no templates: those would be compiled elsewhere,
-/// under other options.
+/// It uses only operations that IEEE 754 defines exactly (+ - * / sqrt, conversions) and integers; sine and cosine are
+/// those of core/rounded.hpp. A compiler may still fuse a product and a sum into one rounding if the target supports it
+/// (`-march=native`), so every header whose arithmetic affects a pixel disables this for its own functions, between
+/// ORBIS_BEGIN_UNFUSED and ORBIS_END_UNFUSED. Functions in such a region are not templates: those would be compiled
+/// elsewhere, with other options.
 #pragma once
 
 #include <cmath>
@@ -21,7 +20,7 @@ ORBIS_BEGIN_UNFUSED
 
 namespace orbis::io::detail::synthetic {
 
-/// Three numbers, with arithmetic that is not Eigen's (whose kernels depend on the target).
+/// Three numbers, with arithmetic independent of Eigen (whose kernels depend on the target).
 struct triple {
   double x = 0.0, y = 0.0, z = 0.0;
 
@@ -39,7 +38,7 @@ struct triple {
 [[nodiscard]] inline triple to_triple(const vec3& v) noexcept { return {v.x(), v.y(), v.z()}; }
 [[nodiscard]] inline vec3 to_vec3(triple v) noexcept { return {v.x, v.y, v.z}; }
 
-/// A word of noise that depends on nothing but the three keys.
+/// A word of noise that depends only on the three keys.
 [[nodiscard]] inline std::uint64_t noise_word(std::uint64_t seed, std::uint64_t stream, std::uint64_t index) noexcept {
   return mix64(seed ^ mix64(index * 0x100000001b3ULL + stream));
 }
@@ -58,13 +57,13 @@ struct triple {
   return lo + (hi - lo) * bits.uniform();
 }
 
-/// The largest integer not above `v`, for |v| < 2^31.
+/// The largest integer <= `v`, for |v| < 2^31.
 [[nodiscard]] inline std::int64_t floor_of(double v) noexcept {
   const auto i = static_cast<std::int64_t>(v);
   return static_cast<double>(i) > v ? i - 1 : i;
 }
 
-/// Smooth noise of one dimension in [-1, 1], with about one swing per unit of `t`.
+/// Smooth one-dimensional noise in [-1, 1], with about one oscillation per unit of `t`.
 [[nodiscard]] inline double smooth_noise(std::uint64_t seed, std::uint64_t stream, double t) noexcept {
   const std::int64_t cell = floor_of(t);
   const double f = t - static_cast<double>(cell);

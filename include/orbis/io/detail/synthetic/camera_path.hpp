@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The way of a hand-held camera once round a room.
+/// Path of a hand-held camera once round a room.
 #pragma once
 
 #include <algorithm>
@@ -14,14 +14,14 @@ ORBIS_BEGIN_UNFUSED
 
 namespace orbis::io::detail::synthetic {
 
-/// A camera's place and the columns of its rotation: right, down and forward in the world.
+/// A camera's position and the columns of its rotation: right, down and forward in the world frame.
 struct camera_pose {
   triple position;
   triple right, down, forward;
   double qw = 1.0;  ///< the same rotation, as a unit quaternion
   triple q;
 
-  /// `T_world_camera`.
+  /// The pose `T_world_camera`.
   [[nodiscard]] se3 T_world_camera() const { return {so3{so3::quaternion(qw, q.x, q.y, q.z)}, to_vec3(position)}; }
 };
 
@@ -33,7 +33,7 @@ struct quaternion {
   }
 };
 
-/// The rotation of `pose` by its unit quaternion.
+/// Sets the rotation of `pose` from its unit quaternion.
 inline void set_rotation(camera_pose& pose, quaternion r) noexcept {
   const double w = r.w, x = r.v.x, y = r.v.y, z = r.v.z;
   pose.right = {1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)};
@@ -43,7 +43,8 @@ inline void set_rotation(camera_pose& pose, quaternion r) noexcept {
   pose.q = r.v;
 }
 
-/// Turns a camera: `yaw` from the world's x axis towards y, `pitch` upward, `roll` about the view; all in turns.
+/// Rotates a camera: `yaw` from the world's x axis towards y, `pitch` upward, `roll` about the optical axis; all in
+/// turns.
 inline void orient(camera_pose& pose, double yaw, double pitch, double roll) noexcept {
   const quaternion about_up{cos_turns(0.5 * yaw), {0.0, 0.0, sin_turns(0.5 * yaw)}};
   const quaternion about_side{cos_turns(0.5 * pitch), {0.0, -sin_turns(0.5 * pitch), 0.0}};
@@ -61,10 +62,10 @@ class camera_path {
     start_ = upper_fraction(noise_word(seed_, 99, 0));
   }
 
-  /// Seconds.
+  /// Duration in seconds.
   [[nodiscard]] double duration() const noexcept { return duration_; }
 
-  /// The pose `time` seconds after the beginning. World: z up, the floor at z = 0.
+  /// The pose `time` seconds after the start. World: z up, the floor at z = 0.
   [[nodiscard]] camera_pose at(double time) const noexcept {
     const double trip = (options_.sees_floor ? 2.0 : 1.0) * progress(time / duration_), turn = start_ + trip;
     const double inward = options_.sees_floor ? inwardness(trip - 1.0) : 0.0;
@@ -91,14 +92,13 @@ class camera_path {
   }
 
  private:
-  /// 0 looking outward, 1 looking inward, at the share `s` of the second round: changes smoothly in its first and last
-  /// quarter.
+  /// 0 looking outward, 1 looking inward, at the fraction `s` of the second round: changes smoothly in its first and
+  /// last quarter.
   [[nodiscard]] static double inwardness(double s) noexcept {
     const double t = std::clamp(4.0 * std::min(s, 1.0 - s), 0.0, 1.0);
     return t * t * (3.0 - 2.0 * t);
   }
-  /// The share of the round trip done at the share `s` of the time: speeds up, goes evenly, slows
-  /// down, rests.
+  /// Fraction of the round trip completed at the fraction `s` of the time: accelerates, moves uniformly, brakes, rests.
   [[nodiscard]] double progress(double s) const noexcept {
     const double t = std::clamp(s / (1.0 - options_.overlap), 0.0, 1.0);
     constexpr double ramp = 0.06;

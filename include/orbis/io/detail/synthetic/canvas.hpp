@@ -18,23 +18,23 @@ ORBIS_BEGIN_UNFUSED
 
 namespace orbis::io::detail::synthetic {
 
-/// A colour with channels from 0 to 1 or so.
+/// A colour with channels from 0 to about 1.
 struct tint {
   float r = 0.0F, g = 0.0F, b = 0.0F;
   [[nodiscard]] friend tint operator*(float s, tint c) noexcept { return {s * c.r, s * c.g, s * c.b}; }
 };
 
-/// One face while it is painted.
+/// One face being painted.
 class canvas {
  public:
-  /// Sizes in metres, `texel` metres each.
+  /// Sizes in metres; texels have an edge of `texel` metres.
   canvas(double width, double height, double texel)
       : texel_{texel},
         width_{texels(width, texel)},
         height_{texels(height, texel)},
         texels_(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_)) {}
 
-  /// How many texels cover a length, both in metres.
+  /// Number of texels that cover a length, both in metres.
   [[nodiscard]] static int texels(double length, double texel) noexcept {
     return std::max(1, static_cast<int>(length / texel + 0.999));
   }
@@ -45,7 +45,7 @@ class canvas {
     return texels_[static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(x)];
   }
 
-  /// The base, texel by texel.
+  /// Paints the base, texel by texel.
   void prime(material m, std::uint64_t seed) {
     random_bits bits{seed};
     const tint base = base_colour(m, bits);
@@ -57,7 +57,7 @@ class canvas {
       }
   }
 
-  /// `per_square_metre` patches, large ones first.
+  /// Paints `per_square_metre` patches, large ones first.
   void scatter(double per_square_metre, double contrast, std::uint64_t seed) {
     random_bits bits{seed};
     const double w = width_ * texel_, h = height_ * texel_;
@@ -96,7 +96,7 @@ class canvas {
   }
 
   [[nodiscard]] static tint patch_colour(double contrast, random_bits& bits) {
-    // Bright or dark, seldom in between; a third of them coloured.
+    // Bright or dark, rarely in between; a third of them coloured.
     const double level = bits.uniform() < 0.5 ? between(bits, 0.05, 0.40) : between(bits, 0.60, 1.0);
     const double mixed = 0.55 + contrast * (level - 0.55);
     const double colourful = bits.uniform() < 0.35 ? 0.45 : 0.08;
@@ -110,7 +110,7 @@ class canvas {
     return static_cast<float>(
         upper_fraction(noise_word(seed, static_cast<std::uint64_t>(i), static_cast<std::uint64_t>(j))));
   }
-  /// Smooth noise in [-1, 1] with one swing for each unit of `u` and `v`.
+  /// Smooth noise in [-1, 1] with one oscillation per unit of `u` and `v`.
   [[nodiscard]] static float value_noise(std::uint64_t seed, double u, double v) noexcept {
     const std::int64_t i = floor_of(u), j = floor_of(v);
     const auto f = static_cast<float>(u - static_cast<double>(i)), g = static_cast<float>(v - static_cast<double>(j));
@@ -165,7 +165,7 @@ class canvas {
     return {shade_grey(s)};
   }
 
-  /// One patch: a disc, or a convex polygon of three or four corners.
+  /// Paints one patch: a disc, or a convex polygon of three or four corners.
   void stamp(double u, double v, double r, tint colour, random_bits& bits) {
     const int x0 = std::max(0, static_cast<int>((u - r) / texel_)),
               x1 = std::min(width_ - 1, static_cast<int>((u + r) / texel_));

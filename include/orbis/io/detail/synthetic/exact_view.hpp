@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// What there is to see, before a sensor measures it.
+/// The exact image of a scene, before a sensor measures it.
 #pragma once
 
 #include <orbis/core/image.hpp>
 
 namespace orbis::io::detail::synthetic {
 
-/// The exact picture of a moment: for each pixel the depth (metres) and the cosine of the angle
-/// between ray and surface normal.
+/// The exact image at one moment: for each pixel the depth (metres) and the cosine of the angle between ray and surface
+/// normal.
 struct exact_view {
   image<rgb8> color;
   image<float> depth;

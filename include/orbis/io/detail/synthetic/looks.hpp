@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// What the faces of solids look like, and which lamps light them.
+/// Appearance of the faces of solids, and the lamps that light them.
 #pragma once
 
 #include <array>
@@ -17,19 +17,19 @@ ORBIS_BEGIN_UNFUSED
 
 namespace orbis::io::detail::synthetic {
 
-/// What one face of a solid is painted with.
+/// Appearance of one face of a solid.
 struct face_look {
   material surface = material::plain;  ///< the base
-  double patches = 0.0;                ///< painted on it, for each square metre
+  double patches = 0.0;                ///< number painted per square metre
   double contrast = 0.8;               ///< of the patches
-  std::uint64_t seed = 0;              ///< the same seed and size: the same picture
-  double period = 0.0;                 ///< metres; above 0 the picture repeats itself along both axes
-  double coarseness = 1.0;             ///< size of its texels, in those of the other faces
+  std::uint64_t seed = 0;              ///< the same seed and size give the same picture
+  double period = 0.0;                 ///< metres; if above 0, the picture repeats with this period along both axes
+  double coarseness = 1.0;             ///< size of its texels relative to those of the other faces
 };
-/// Of the six faces of a solid: 2 * axis, plus one for the positive side.
+/// Looks of the six faces of a solid: index 2 * axis, plus one for the positive side.
 using face_looks = std::array<face_look, 6>;
 
-/// How many patches a square metre of a material has: books and clutter are full of corners, a plain surface is not.
+/// Number of patches per square metre of a material: books and clutter have many corners, a plain surface has few.
 [[nodiscard]] inline double usual_patches(material m) noexcept {
   switch (m) {
     case material::plain: return 6.0;
@@ -44,14 +44,14 @@ using face_looks = std::array<face_look, 6>;
   return 0.0;
 }
 
-/// The look of face `face` of a solid made of `m`; no two faces and no two seeds look alike.
+/// The look of face `face` of a solid made of `m`; different faces and seeds look different.
 [[nodiscard]] inline face_look usual_look(material m, std::uint64_t seed, int face, double density = 1.0) noexcept {
   return {.surface = m,
           .patches = density * usual_patches(m),
           .contrast = m == material::clutter ? 1.0 : 0.8,
           .seed = noise_word(seed, 7, static_cast<std::uint64_t>(face))};
 }
-/// All six of them for a solid with its own material and seed.
+/// All six looks of a solid with its own material and seed.
 [[nodiscard]] inline face_looks usual_looks(const solid& s, double density = 1.0) noexcept {
   face_looks looks;
   for (int face = 0; face != 6; ++face)
@@ -59,14 +59,14 @@ using face_looks = std::array<face_look, 6>;
   return looks;
 }
 
-/// Solids with their looks, and the lamps among them: what textures are painted from.
+/// Solids with their looks, and the lamps among them: the input for painting textures.
 struct painted_solids {
   std::vector<solid> solids;
-  std::vector<face_looks> looks;  ///< one for each solid
-  std::vector<triple> lamps;      ///< metres, world; the brightest of them lights a place
+  std::vector<face_looks> looks;  ///< one per solid
+  std::vector<triple> lamps;      ///< metres, world; each place is lit by its brightest lamp
 };
 
-/// Walls, floor and ceiling of a furnished room.
+/// Looks of the walls, floor and ceiling of a furnished room.
 [[nodiscard]] inline face_looks looks_of_walls(const scene& room) noexcept {
   const solid& walls = room.solids().front();
   const synthetic_scene_options& o = room.options();
@@ -89,7 +89,7 @@ struct painted_solids {
   return looks;
 }
 
-/// A furnished room as it looks. The person is lit as at the beginning.
+/// A furnished room with its looks. The person is lit as at the start.
 [[nodiscard]] inline painted_solids painted(const scene& room) {
   painted_solids all{room.solids(), {}, {{0.0, 0.0, room.options().height - 0.5}}};
   for (const solid& s : all.solids)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A furnished room of known geometry, and somebody who walks in it: a body of capsules whose arms and legs swing.
+/// A furnished room of known geometry, and a walking person: a body of capsules with swinging arms and legs.
 #pragma once
 
 #include <algorithm>
@@ -25,13 +25,13 @@ namespace orbis::io::detail::synthetic {
 using body_parts = std::array<solid, 7>;
 
 /// A grown person, 1.75 m tall and 0.55 m wide, who stands on `foot` (metres, world) and looks along `(cos_yaw,
-/// sin_yaw)`. `step`: how many double steps were made, whose fraction says how arms and legs are. The textures depend
-/// on `seed` alone.
+/// sin_yaw)`. `step`: number of double steps made; its fraction determines the position of arms and legs. The textures
+/// depend only on `seed`.
 [[nodiscard]] inline body_parts walking_person(triple foot, double cos_yaw, double sin_yaw, double step,
                                                std::uint64_t seed) noexcept {
   body_parts parts;
   std::size_t i = 0;
-  // `from`: of the upper end of its axis, from the foot along the view, to the left, and up.
+  // `from`: the upper end of its axis relative to the foot: forward, to the left, and up.
   const auto add = [&](triple from, double radius, double height, double tilt, material surface) {
     solid& s = parts[i];
     s.kind = shape::capsule;
@@ -57,8 +57,8 @@ using body_parts = std::array<solid, 7>;
   return parts;
 }
 
-/// A room with its floor at z = 0 and its middle at the origin, furnished along its walls. The seed
-/// decides sizes, order and places of the furniture, and all textures.
+/// A room with its floor at z = 0 and its centre at the origin, furnished along its walls. The seed determines sizes,
+/// order and places of the furniture, and all textures.
 class scene {
  public:
   /// @pre sizes of 3 m x 3 m x 2 m at least, size_jitter in [0, 0.2]
@@ -77,9 +77,9 @@ class scene {
     }
   }
 
-  /// The surfaces: first the room itself, then all that stands in it.
+  /// The surfaces: first the room itself, then all objects in it.
   [[nodiscard]] const std::vector<solid>& solids() const noexcept { return solids_; }
-  /// The surfaces `time` seconds after the beginning: only those of the person are elsewhere.
+  /// The surfaces `time` seconds after the start: only those of the person move.
   [[nodiscard]] std::vector<solid> solids_at(double time) const {
     std::vector<solid> now = solids_;
     if (options_.person) {
@@ -88,20 +88,20 @@ class scene {
     }
     return now;
   }
-  /// How many of the solids never move: the first ones.
+  /// Number of static solids: the first ones.
   [[nodiscard]] std::size_t still() const noexcept { return still_; }
 
-  /// Metres along x, y and z.
+  /// Size in metres along x, y and z.
   [[nodiscard]] vec3 size() const { return {length_, width_, options_.height}; }
   [[nodiscard]] const synthetic_scene_options& options() const noexcept { return options_; }
-  /// Whether wall `face` (0: -x, 1: +x, 2: -y, 3: +y) is one of the poor ones.
+  /// Returns true if wall `face` (0: -x, 1: +x, 2: -y, 3: +y) has almost no texture.
   [[nodiscard]] bool is_poor_wall(int face) const noexcept {
     return face < 4 && (face - first_poor_wall_ + 4) % 4 < options_.poor_walls;
   }
 
-  /// The distance (metres, unsigned) of a point to the nearest surface a camera could see: the error
-  /// of a map point. Exact in front of the surfaces; behind them, where several solids overlap, the
-  /// distance to the hull of the one the point is deepest in. What moves does not count.
+  /// The distance (metres, unsigned) of a point to the nearest surface visible to a camera: the error of a map point.
+  /// Exact in front of the surfaces; behind them, where several solids overlap, the distance to the hull of the one the
+  /// point is deepest in. Ignores moving solids.
   [[nodiscard]] double distance(const vec3& p_world) const noexcept {
     const triple p = to_triple(p_world);
     double nearest = solids_.front().signed_distance(p);
@@ -109,8 +109,8 @@ class scene {
     return std::abs(nearest);
   }
 
-  /// Where the ray `origin + t direction` first meets a surface: `t`, empty if the ray starts outside
-  /// of the room, or the direction is zero or not finite. What moves does not count.
+  /// The parameter `t` at which the ray `origin + t direction` first meets a surface; empty if the ray starts outside
+  /// of the room, or the direction is zero or not finite. Ignores moving solids.
   [[nodiscard]] std::optional<double> cast(const vec3& origin, const vec3& direction) const noexcept {
     if (!all_finite(origin) || !all_finite(direction) || direction.isZero(0.0)) return std::nullopt;
     double t = std::numeric_limits<double>::infinity();
@@ -123,18 +123,18 @@ class scene {
   }
 
  private:
-  /// The person, on an ellipse between the camera's way and the furniture.
+  /// The person, on an ellipse between the camera's path and the furniture.
   [[nodiscard]] body_parts person_at(double time) const noexcept {
     const double a = 0.5 * length_ - 1.25, b = 0.5 * width_ - 1.15;
     constexpr double radians_per_turn = 6.283185307179586;
-    // Mean speed 1 m/s, and a double step of 1.3 m.
+    // Mean speed 1 m/s, with double steps of 1.3 m.
     const double turn = -time / (radians_per_turn * std::sqrt(0.5 * (a * a + b * b)));
     const double x = cos_turns(turn), y = sin_turns(turn);
     const double speed = std::sqrt(square(a * y) + square(b * x));
     return walking_person({a * x, b * y, 0.0}, a * y / speed, -b * x / speed, time / 1.3, person_seed_);
   }
 
-  /// A place at a wall: `along` it from its middle, `out` of it into the room.
+  /// A place at a wall: `along` it from its centre, `out` of it into the room.
   struct wall {
     int face;       // as in is_poor_wall
     double length;  // metres
@@ -160,7 +160,7 @@ class scene {
     }
   }
 
-  /// A box by its extent along the wall, out of it and up.
+  /// Adds a box by its extent along the wall, out of it and up.
   solid& block(const wall& w, std::array<double, 2> along, std::array<double, 2> out, std::array<double, 2> up,
                material surface) {
     const triple centre = place(w, 0.5 * (along[0] + along[1]), 0.5 * (out[0] + out[1]), 0.5 * (up[0] + up[1]));
@@ -174,14 +174,14 @@ class scene {
   solid& ball(const wall& w, double along, double out, double up, double radius, material surface) {
     return add(shape::sphere, place(w, along, out, up), {radius, radius, radius}, surface);
   }
-  /// Turns a box about the vertical by up to `turns`.
+  /// Rotates a box about the vertical by up to `turns`.
   void turn(solid& s, double turns) {
     const double by = between(bits_, -turns, turns);
     s.cos_yaw = cos_turns(by);
     s.sin_yaw = sin_turns(by);
   }
 
-  // The furniture; `a` is the middle of each piece along the wall.
+  // The furniture; `a` is the centre of each piece along the wall.
 
   void cupboard(const wall& w, double a) {
     block(w, {a - 0.5, a + 0.5}, {0.0, 0.5}, {0.0, 1.9}, material::wood);
@@ -264,7 +264,7 @@ class scene {
     double width;
   };
 
-  /// Four groups of furniture, one for each wall, in an order and with gaps that the seed decides.
+  /// Places four groups of furniture, one per wall, in an order and with gaps determined by the seed.
   void furnish() {
     std::array<std::vector<furniture>, 4> groups{{
         {{&scene::bed, 2.1}, {&scene::lamp, 0.4}, {&scene::drawers, 0.6}},
@@ -280,13 +280,13 @@ class scene {
       arrange(w, group);
       decorate(w);
     }
-    // A beam under the ceiling and a lamp beside it.
+    // A beam under the ceiling and a lamp next to it.
     add(shape::box, {0.22 * length_, 0.0, options_.height - 0.1}, {0.1, 0.5 * width_, 0.1}, material::wood);
     add(shape::sphere, {-0.1 * length_, 0.1, options_.height - 0.35}, {0.2, 0.2, 0.2}, material::fabric);
   }
 
   void arrange(const wall& w, const std::vector<furniture>& group) {
-    constexpr double corner = 0.7;  // leaves room for what stands at the neighbouring wall
+    constexpr double corner = 0.7;  // leaves room for furniture at the adjacent wall
     double taken = 0.0;
     for (const furniture& f : group) taken += f.width;
     double spare = std::max(0.0, w.length - 2.0 * corner - taken);
@@ -301,7 +301,7 @@ class scene {
     }
   }
 
-  /// Picture frames, slightly raised.
+  /// Adds picture frames, slightly raised.
   void decorate(const wall& w) {
     const int count = 2 + static_cast<int>(bits_.below(2));
     for (int i = 0; i != count; ++i) {
@@ -322,7 +322,7 @@ class scene {
   double length_ = 0.0, width_ = 0.0;
   int first_poor_wall_ = 0;
   std::vector<solid> solids_;
-  std::size_t still_ = 0;  // how many never move
+  std::size_t still_ = 0;  // number of static solids
   std::uint64_t person_seed_ = 0;
 };
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// What a structured-light RGB-D camera makes of the truth.
+/// Errors of a structured-light RGB-D camera, applied to exact images.
 #pragma once
 
 #include <algorithm>
@@ -20,10 +20,10 @@ ORBIS_BEGIN_UNFUSED
 
 namespace orbis::io::detail::synthetic {
 
-/// The published deviation (metres) of depth `z` (metres).
+/// The published standard deviation (metres) at depth `z` (metres).
 [[nodiscard]] inline double axial_deviation(double z) noexcept { return 0.0012 + 0.0019 * (z - 0.4) * (z - 0.4); }
 
-/// Applies the errors of one frame, row by row; rows do not depend on each other's results.
+/// Applies the errors of one frame, row by row; rows are independent of each other.
 class sensor {
  public:
   /// `focal`: of the registered image, pixels. `key`: different for each frame.
@@ -37,7 +37,7 @@ class sensor {
     }
   }
 
-  /// The measured depth of row `y`, in units of 1 / depth_scale metres, 0: none.
+  /// Measures the depth of row `y`, in units of 1 / depth_scale metres, 0: none.
   void measure_depth(const exact_view& exact, int y, std::span<std::uint16_t> out) const {
     const int width = exact.depth.width();
     const std::vector<bool> dark = options_.shadow ? shadow_of(exact.depth.row(y)) : std::vector<bool>{};
@@ -62,7 +62,7 @@ class sensor {
     }
   }
 
-  /// The colours of row `y` as the camera gives them.
+  /// Applies the noise to the colours of row `y`.
   void measure_colour(std::span<rgb8> row, int y) const noexcept {
     if (options_.colour_noise == 0.0) return;
     const auto sigma = static_cast<float>(options_.colour_noise * 0.015625476858987186);  // of the sum below
@@ -88,8 +88,8 @@ class sensor {
            chance * static_cast<double>(safe_cosine_ - lost_cosine_) > static_cast<double>(cosine - lost_cosine_);
   }
 
-  /// Pixels that the projector does not light: along the row, something to the right of them lies
-  /// further left as seen from the projector.
+  /// Marks pixels that the projector does not light: as seen from the projector, a pixel further to the right in the
+  /// row is further to the left.
   [[nodiscard]] std::vector<bool> shadow_of(std::span<const float> depth) const {
     std::vector<bool> dark(depth.size());
     const double shift = focal_ * options_.baseline;
@@ -102,8 +102,7 @@ class sensor {
     return dark;
   }
 
-  /// The depth a ray through (x, y) ends up with: near a depth edge perhaps a neighbour's, or one in
-  /// between.
+  /// Measured depth of the ray through (x, y): near a depth edge possibly a neighbour's, or a value in between.
   [[nodiscard]] double beside_edge(const exact_view& exact, int x, int y, std::uint64_t word) const noexcept {
     const image<float>& depth = exact.depth;
     const float* here = depth.data() + std::ptrdiff_t{y} * depth.width() + x;
@@ -117,7 +116,7 @@ class sensor {
     if (std::abs(z - other) <= 0.03F + 0.02F * std::min(z, other)) return static_cast<double>(z);  // no edge
     const std::uint64_t fresh = mix64(word ^ 0x6564676573ULL);
     if (upper_fraction(fresh) < options_.flying_pixels) {
-      // In between in disparity, as a correlation window that sees both surfaces would find.
+      // Between the two in disparity, like the result of a correlation window that covers both surfaces.
       const double f = lower_fraction(fresh);
       return 1.0 / ((1.0 - f) / static_cast<double>(z) + f / static_cast<double>(other));
     }
@@ -125,7 +124,7 @@ class sensor {
     return static_cast<double>(std::abs(sideways) > 0.5 ? other : z);
   }
 
-  /// Mean 0, deviation 1, close to normal out to three deviations: the sum of four uniforms.
+  /// Noise with mean 0 and deviation 1, close to normal up to three deviations: the sum of four uniforms.
   [[nodiscard]] static double normal_from(std::uint64_t word) noexcept {
     const std::uint64_t sum = (word & 0xffffU) + ((word >> 16U) & 0xffffU) + ((word >> 32U) & 0xffffU) + (word >> 48U);
     return (static_cast<double>(sum) - 131070.0) * 2.6428997918226276e-05;  // sqrt(3) / 65536

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A camera with its sensor, in front of painted solids: takes frames.
+/// A camera with its sensor that takes frames of painted solids.
 #pragma once
 
 #include <cassert>
@@ -25,7 +25,7 @@
 
 namespace orbis::io::detail::synthetic {
 
-/// What there is to see at a moment, and from where.
+/// The scene at one moment, and the camera's pose.
 struct moment {
   std::vector<solid> solids;
   camera_pose pose;
@@ -37,17 +37,17 @@ struct moment {
   return {width, height, focal, focal, 0.5 * (width - 1), 0.5 * (height - 1)};
 }
 
-/// Takes frames of what a function of time says is there to see. Thread-safe; copies share the textures.
+/// Takes frames of a scene given as a function of time. Thread-safe; copies share the textures.
 class simulator {
  public:
-  /// `textures` are those of the solids to come. @pre depth_scale > 0
+  /// `textures`: of the solids to render. @pre depth_scale > 0
   simulator(std::shared_ptr<const texture_set> textures, const camera::intrinsics& k, double depth_scale,
             const synthetic_sensor_options& sensor, std::uint64_t seed)
       : textures_{std::move(textures)}, k_{k}, depth_scale_{depth_scale}, sensor_{sensor}, seed_{seed} {
     assert(depth_scale > 0.0);
   }
 
-  /// Colour, depth (metres) and angles of a moment without any error of the sensor.
+  /// Colour, depth (metres) and angles of a moment without sensor errors.
   template <execution_policy Policy>
   [[nodiscard]] exact_view exact(const Policy& policy, const moment& m) const {
     const renderer picture{m.solids, *textures_, m.pose, k_};
@@ -58,8 +58,8 @@ class simulator {
     return out;
   }
 
-  /// The same with row `y` of the image `row_time(y)` seconds after `time`, where `at(time)` is the `moment` of any
-  /// time; without its colour image if `with_color` is false.
+  /// The same with row `y` of the image taken `row_time(y)` seconds after `time`, where `at(time)` returns the `moment`
+  /// of any time; without the colour image if `with_color` is false.
   template <execution_policy Policy, class At, class RowTime>
   [[nodiscard]] exact_view exact_rows(const Policy& policy, const At& at, double time, const RowTime& row_time,
                                       bool with_color = true) const {
@@ -73,7 +73,7 @@ class simulator {
     return out;
   }
 
-  /// What the sensor sees at `time`, where `at(time)` is the `moment` of any time. `key`: another one for each frame.
+  /// The measured frame at `time`, where `at(time)` returns the `moment` of any time. `key`: different for each frame.
   template <execution_policy Policy, class At>
   [[nodiscard]] camera::rgbd_frame frame(const Policy& policy, const At& at, double time, std::uint64_t key) const {
     exact_view seen = color_view(policy, at, time);
@@ -100,7 +100,7 @@ class simulator {
     return f;
   }
 
-  /// What two cameras of this kind see at `time`, the second one `baseline` metres to the right of the first. As above.
+  /// The images of two such cameras at `time`, the second one `baseline` metres to the right of the first. As above.
   template <execution_policy Policy, class At>
   [[nodiscard]] camera::stereo_frame stereo(const Policy& policy, const At& at, double time, std::uint64_t key,
                                             double baseline) const {
@@ -123,14 +123,14 @@ class simulator {
   }
 
  private:
-  /// What there is to see while the colour image is read out around `time`.
+  /// The exact view while the colour image is read out around `time`.
   template <execution_policy Policy, class At>
   [[nodiscard]] exact_view color_view(const Policy& policy, const At& at, double time) const {
     if (sensor_.shutter.color_read_out == 0.0) return exact(policy, at(time));
     return exact_rows(policy, at, time, [&](int y) { return sensor_.shutter.color_time(y, k_.height); });
   }
 
-  /// Averages pictures spread evenly over the exposure time, which is centred on `time`.
+  /// Averages images spread evenly over the exposure time, which is centred on `time`.
   template <execution_policy Policy, class At>
   void blur(const Policy& policy, const At& at, double time, image<rgb8>& color) const {
     const int count = sensor_.motion_blur;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The solids a synthetic room is made of, and where a ray meets them.
+/// The solids of a synthetic room, and their intersections with rays.
 #pragma once
 
 #include <algorithm>
@@ -14,26 +14,26 @@ ORBIS_BEGIN_UNFUSED
 
 namespace orbis::io::detail::synthetic {
 
-/// What a surface looks like.
+/// Appearance of a surface.
 enum class material : std::uint8_t { plain, wallpaper, brick, tile, wood, fabric, books, clutter };
 
 enum class shape : std::uint8_t {
   box,       ///< half sizes along its own axes
   sphere,    ///< half.x is the radius
   cylinder,  ///< upright; half.x is the radius, half.z half the height
-  capsule,   ///< a cylinder with half spheres for ends, which count in its half height half.z; may be tilted
+  capsule,   ///< a cylinder with hemispherical ends, which its half height half.z includes; may be tilted
   room       ///< a box seen from inside: everything outside of it is solid
 };
 
-/// A solid, possibly turned about the vertical, and before that about its own y axis, if it is a capsule. Each has six
-/// faces, two for each of its own axes (2 * axis, plus one for the positive side); round ones take the face of their
+/// A solid, optionally rotated about the vertical and, for a capsule, first tilted about its own y axis. Each has six
+/// faces, two for each of its own axes (2 * axis, plus one for the positive side); round solids use the face of the
 /// largest coordinate.
 struct solid {
   shape kind = shape::box;
   triple centre;  ///< metres, world
   triple half;    ///< half sizes, metres
   double cos_yaw = 1.0, sin_yaw = 0.0;
-  double cos_tilt = 1.0, sin_tilt = 0.0;  ///< of a capsule: its upper end is turned towards its own x axis
+  double cos_tilt = 1.0, sin_tilt = 0.0;  ///< of a capsule: its upper end is tilted towards its own x axis
   material surface = material::plain;
   std::uint64_t seed = 0;  ///< of its texture
 
@@ -47,7 +47,7 @@ struct solid {
     if (kind == shape::capsule) d = {cos_tilt * d.x + sin_tilt * d.z, d.y, cos_tilt * d.z - sin_tilt * d.x};
     return {cos_yaw * d.x - sin_yaw * d.y, sin_yaw * d.x + cos_yaw * d.y, d.z};
   }
-  /// Half sizes of the upright box of the world's axes around it.
+  /// Half sizes of the axis-aligned bounding box in the world frame.
   [[nodiscard]] triple bounds() const noexcept {
     if (kind == shape::sphere || kind == shape::cylinder)
       return {half.x, half.x, kind == shape::sphere ? half.x : half.z};
@@ -75,28 +75,28 @@ struct solid {
     return kind == shape::room ? -d : d;
   }
 
-  /// From the nearest point of a capsule's axis to `p`, in its own frame.
+  /// Vector from the nearest point of a capsule's axis to `p`, in its own frame.
   [[nodiscard]] triple from_axis(triple p) const noexcept {
     const double core = half.z - half.x;
     return {p.x, p.y, p.z - std::clamp(p.z, -core, core)};
   }
 
  private:
-  /// The distance to a box whose faces are `q` away.
+  /// The distance to a box, where `q` are the distances to its faces.
   [[nodiscard]] static double rounded_off(triple q) noexcept {
     const triple outside{std::max(q.x, 0.0), std::max(q.y, 0.0), std::max(q.z, 0.0)};
     return length(outside) + std::min(std::max({q.x, q.y, q.z}), 0.0);
   }
 };
 
-/// Where a ray first meets a solid.
+/// First intersection of a ray with a solid.
 struct hit {
   double t = std::numeric_limits<double>::infinity();  ///< in units of the ray's direction
   int axis = 0;                                        ///< boxes, rooms: of the face; cylinders: 2 a cap, 0 the side
 };
 
-/// The ray `origin + t direction` in the solid's own frame; hits beyond `t > 0` only. Seen from the
-/// inside only a room is met.
+/// The intersection of the ray `origin + t direction` in the solid's own frame, with t > 0 only. From the inside only a
+/// room is hit.
 [[nodiscard]] inline hit intersect(const solid& s, triple origin, triple direction) noexcept {
   const auto inverse = [](double d) { return 1.0 / (d == 0.0 ? 1e-30 : d); };
   hit h;
@@ -131,7 +131,7 @@ struct hit {
     return h;
   }
   if (s.kind == shape::capsule) {
-    // Of all points of the surface that the ray may enter by, the side's is valid between the half spheres.
+    // The hit on the side is valid between the hemispheres.
     const double core = s.half.z - s.half.x;
     const auto enters = [&](double a, double b, double c) {
       const double discriminant = b * b - a * c;
@@ -148,7 +148,7 @@ struct hit {
     for (const double end : {-core, core}) {
       const triple from{origin.x, origin.y, origin.z - end};
       const double to_end = enters(dot(direction, direction), dot(from, direction), dot(from, from) - radius2);
-      // A half sphere: its other half is inside of the capsule.
+      // A hemisphere: the other half of the sphere is inside of the capsule.
       if (to_end > 0.0 && to_end < h.t && (from.z + to_end * direction.z) * end >= 0.0) h.t = to_end;
     }
     return h;

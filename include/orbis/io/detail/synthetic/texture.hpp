@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The surfaces' looks: painted once, then sampled with the right amount of detail.
+/// Textures of the surfaces: painted once, then sampled at the appropriate level of detail.
 ///
-/// Every face is painted with a base (tiles, bricks, wood, ...) under many patches with hard edges
-/// whose sizes follow a power law, as in the "dead leaves" model of natural images: it has corners at
-/// every scale, and no two places look alike (A. B. Lee, D. Mumford, J. Huang, "Occlusion models for
-/// natural images", IJCV 2001). Sampling is trilinear in a pyramid (L. Williams, "Pyramidal
-/// parametrics", SIGGRAPH 1983), so that corners do not flicker as the camera moves.
+/// Every face is painted with a base (tiles, bricks, wood, ...) under many patches with hard edges whose sizes follow a
+/// power law, as in the "dead leaves" model of natural images: it has corners at every scale, and no two places look
+/// alike (A. B. Lee, D. Mumford, J. Huang, "Occlusion models for natural images", IJCV 2001). Sampling is trilinear in
+/// a pyramid (L. Williams, "Pyramidal parametrics", SIGGRAPH 1983), so that corners do not flicker when the camera
+/// moves.
 #pragma once
 
 #include <algorithm>
@@ -29,17 +29,17 @@ ORBIS_BEGIN_UNFUSED
 
 namespace orbis::io::detail::synthetic {
 
-/// All faces of some solids, painted and lit, in pyramids. A face is painted when it is seen first: no camera sees all
-/// of them. Thread-safe. Four bytes for each texel of the faces that were seen, and twelve more of the one that is
-/// painted.
+/// All faces of some solids, painted and lit, as pyramids. A face is painted when it is first sampled, because no
+/// camera sees all of them. Thread-safe. Four bytes for each texel of the faces sampled so far, and twelve more for the
+/// one being painted.
 class texture_set {
  public:
   /// `texel`: metres for each texel of the faces.
   texture_set(painted_solids place, double texel)
       : place_{std::move(place)}, texel_{texel}, faces_(6 * place_.solids.size()) {}
 
-  /// The colour (red in the lowest byte) at (u, v) metres from the corner of face `face` of solid
-  /// `of`, where a pixel covers `footprint` metres.
+  /// The colour (red in the lowest byte) at (u, v) metres from the corner of face `face` of solid `of`, for a pixel
+  /// that covers `footprint` metres.
   [[nodiscard]] std::uint32_t sample(std::size_t of, int face, double u, double v, double footprint) const {
     const pyramid& p = painted(6 * of + static_cast<std::size_t>(face));
     // The logarithm to base 2, linear between powers of two, in 1/256.
@@ -85,19 +85,19 @@ class texture_set {
     return f.picture;
   }
 
-  // Three channels side by side in one word, 16 bits apart.
+  // Spreads three channels into one word, 16 bits apart.
   [[nodiscard]] static std::uint64_t spread(const unsigned char* texel) noexcept {
     return texel[0] | std::uint64_t{texel[1]} << 16U | std::uint64_t{texel[2]} << 32U;
   }
   [[nodiscard]] static std::uint32_t pack(std::uint64_t s) noexcept {
     return static_cast<std::uint32_t>((s & 0xffU) | ((s >> 8U) & 0xff00U) | ((s >> 16U) & 0xff0000U));
   }
-  /// (a (256 - weight) + b weight) / 256, rounded, in each channel.
+  /// Blends each channel: (a (256 - weight) + b weight) / 256, rounded.
   [[nodiscard]] static std::uint64_t blend(std::uint64_t a, std::uint64_t b, std::uint64_t weight) noexcept {
     return ((a * (256 - weight) + b * weight + 0x0000008000800080ULL) >> 8U) & 0x000000ff00ff00ffULL;
   }
 
-  /// Between the four texel centres of a level around (u, v), in 1/256 texel of the finest level.
+  /// Interpolates between the four texel centres of a level around (u, v), in 1/256 texel of the finest level.
   [[nodiscard]] static std::uint64_t bilinear(const pyramid& p, int level, int u, int v) noexcept {
     const auto l = static_cast<std::size_t>(level);
     const int w = p.width[l], h = p.height[l];
@@ -112,7 +112,7 @@ class texture_set {
     return blend(top, bottom, g);
   }
 
-  /// The light that falls on a surface: some from everywhere, some from a lamp, some through a window.
+  /// Light on a surface: ambient, from a lamp, and through a window.
   [[nodiscard]] static float light(const painted_solids& place, triple p, triple normal) noexcept {
     double lamp = 0.0;
     for (const triple at : place.lamps) {
@@ -143,7 +143,7 @@ class texture_set {
     p.inverse_texel = 1.0 / texel;
     p.width[0] = repeats ? canvas::texels(across, texel) : c.width();
     p.height[0] = repeats ? canvas::texels(up, texel) : c.height();
-    p.texels.clear();  // where painting failed before
+    p.texels.clear();  // an earlier painting may have failed
     p.texels.reserve(channels * texels_of(p.width[0], p.height[0]));
     const bool round = s.kind == shape::sphere || s.kind == shape::cylinder || s.kind == shape::capsule;
     for (int y = 0; y != p.height[0]; ++y)
@@ -175,7 +175,7 @@ class texture_set {
       halve(p);
   }
 
-  /// How many texels a pyramid has.
+  /// Number of texels of a pyramid.
   [[nodiscard]] static std::size_t texels_of(int width, int height) noexcept {
     std::size_t all = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
     for (int level = 1; level != most_levels && (width > 1 || height > 1); ++level) {
@@ -186,7 +186,7 @@ class texture_set {
     return all;
   }
 
-  /// Appends the next level: means of two by two.
+  /// Appends the next level: averages of 2 x 2 texels.
   static void halve(pyramid& p) {
     const auto l = static_cast<std::size_t>(p.levels);
     const int w = p.width[l - 1], h = p.height[l - 1];

@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Depth images of 16 bits, compressed without loss.
+/// Lossless compression of 16-bit depth images.
 ///
-/// A. D. Wilson, "Fast lossless depth image compression", ISS 2017 (RVL): lengths of runs and, between them, folded
-/// differences, written in groups of some bits with one bit more that says whether the number goes on. There a run is
-/// one of pixels without depth, and a pixel is predicted to be as the one before. Here
+/// A. D. Wilson, "Fast lossless depth image compression", ISS 2017 (RVL): run lengths and, between the runs, folded
+/// differences, written in groups of bits, each with a bit that indicates whether the number continues. In RVL, runs
+/// consist of pixels without depth, and the prediction of a pixel is the previous one. Here
 ///
 /// - a pixel is coded by its *rank* among the distinct depths of the image. A depth camera that measures disparity has
-///   few of them, some hundreds, centimetres apart where they are far: ranks make equal steps of those of the sensor.
-/// - it is predicted from the three pixels above and before it, as in M. J. Weinberger, G. Seroussi, G. Sapiro, "The
+///   only some hundreds of them, centimetres apart at far range: ranks turn the sensor's steps into equal ones.
+/// - the prediction uses the three pixels above and before it, as in M. J. Weinberger, G. Seroussi, G. Sapiro, "The
 ///   LOCO-I lossless image compression algorithm", IEEE Transactions on Image Processing 9(8), 2000, section III.A.
-/// - a run is one of pixels, with depth or without (0), that are as predicted.
-/// - a group has one bit of a run, or two of a difference, as both are small.
+/// - a run consists of pixels, with depth or without (0), that equal their prediction.
+/// - a group has one bit of a run, or two of a difference, because both are small.
 #pragma once
 
 #include <algorithm>
@@ -29,23 +29,23 @@
 
 namespace orbis::mapping::detail {
 
-/// How the pixels of a compressed image are written: its first byte.
+/// Coding of the pixels of a compressed image: its first byte.
 enum class depth_coding : std::uint8_t {
-  plain,  ///< two bytes each, little-endian: what cannot be made smaller
-  runs    ///< the number of distinct depths, the steps between them, then runs and what stands between them
+  plain,  ///< two bytes each, little-endian: images that do not compress
+  runs    ///< the number of distinct depths, the steps between them, then alternating runs and differences
 };
 
-/// The rank that is expected of a pixel: its neighbours' ranks before, above, and before that. 0: no depth.
+/// The predicted rank of a pixel from the ranks of its neighbours to the west, north and north-west. 0: no depth.
 [[nodiscard]] inline std::int32_t expected_rank(std::int32_t west, std::int32_t north,
                                                 std::int32_t north_west) noexcept {
   if (west == 0 || north == 0 || north_west == 0) return west != 0 ? west : north;
-  // Values, not std::clamp's references, so that no branch is made of them: it would be a random one.
+  // Values instead of std::clamp's references, so that the compiler emits no branch: it would be unpredictable.
   const std::int32_t low = west < north ? west : north, high = west < north ? north : west;
   const std::int32_t plane = west + north - north_west, above = plane < low ? low : plane;
   return above < high ? above : high;
 }
 
-/// Signed numbers as unsigned ones: 0, -1, 1, -2, ...
+/// Maps signed numbers to unsigned ones: 0, -1, 1, -2, ...
 [[nodiscard]] inline std::uint32_t folded(std::int32_t value) noexcept {
   return static_cast<std::uint32_t>(value) << 1U ^ (value < 0 ? ~0U : 0U);
 }
@@ -53,7 +53,7 @@ enum class depth_coding : std::uint8_t {
   return value >> 1U ^ (0U - (value & 1U));
 }
 
-/// Writes numbers in groups of some bits, the lowest first, each with a bit before it that says whether another
+/// Writes numbers in groups of bits, the lowest first, each preceded by a bit that indicates whether another group
 /// follows.
 class group_writer {
  public:
@@ -68,9 +68,9 @@ class group_writer {
       if (used_ >= 32) put_word();
     } while (value != 0);
   }
-  /// Whether there was no room for what was put; then some of it is missing.
+  /// Returns true if the buffer was too small; the output is incomplete then.
   [[nodiscard]] bool is_full() const noexcept { return full_; }
-  /// Where the bytes end.
+  /// End of the written bytes.
   [[nodiscard]] std::byte* finish() noexcept {
     const std::ptrdiff_t bytes = (used_ + 7) / 8;
     bits_ <<= 32U - used_;
@@ -92,11 +92,11 @@ class group_writer {
   bool full_ = false;
 };
 
-/// Reads what a `group_writer` wrote.
+/// Reads numbers written by a `group_writer`.
 class group_reader {
  public:
   explicit group_reader(std::span<const std::byte> from) noexcept : from_{from} {}
-  /// The next number; behind the end come zeros.
+  /// The next number; zeros after the end.
   template <unsigned Bits>
   [[nodiscard]] std::uint32_t get() noexcept {
     std::uint32_t value = 0, group = 0;
@@ -111,7 +111,7 @@ class group_reader {
     } while (group >> Bits != 0 && shift != 32);
     return value;
   }
-  /// Whether the last number ended in the last byte.
+  /// Returns true if the last number ended in the last byte.
   [[nodiscard]] bool is_at_end() const noexcept { return (8 * at_ - left_ + 7) / 8 == from_.size(); }
 
  private:
@@ -134,10 +134,10 @@ class group_reader {
 
 inline constexpr unsigned run_bits = 1, step_bits = 2;
 
-/// Compresses depth images. Keeps its buffers, about 2 bytes a pixel and 130 kB, from one image to the next.
+/// Compresses depth images. Reuses its buffers, about 2 bytes per pixel and 130 kB.
 class depth_encoder {
  public:
-  /// The compressed image, until the next call; at most 1 byte longer than the pixels. Linear.
+  /// The compressed image, valid until the next call; at most 1 byte longer than the pixels. Linear.
   [[nodiscard]] std::span<const std::byte> encode(image_view<const std::uint16_t> depth) {
     const std::size_t plain =
         1 + 2 * static_cast<std::size_t>(depth.width()) * static_cast<std::size_t>(depth.height());
@@ -150,13 +150,13 @@ class depth_encoder {
     return out.first(plain);
   }
 
-  /// On the heap.
+  /// Bytes on the heap.
   [[nodiscard]] std::size_t bytes() const noexcept {
     return out_.capacity() + (rank_of_.capacity() + above_.capacity() + here_.capacity()) * sizeof(std::uint16_t);
   }
 
  private:
-  /// How many bytes it takes; 0: more than there are.
+  /// Number of bytes written; 0: `out` is too small.
   [[nodiscard]] std::size_t write_runs(image_view<const std::uint16_t> depth, std::span<std::byte> out) {
     out[0] = static_cast<std::byte>(depth_coding::runs);
     group_writer to{out.subspan(1)};
@@ -164,7 +164,7 @@ class depth_encoder {
     above_.assign(static_cast<std::size_t>(depth.width()), 0);
     here_ = above_;
     std::uint32_t run = 0;
-    std::int32_t last = 0;  // what was written last
+    std::int32_t last = 0;  // last value written
     for (int y = 0; y != depth.height() && !to.is_full(); ++y, above_.swap(here_)) {
       const std::uint16_t *const from = depth.row(y).data(), *const above = above_.data();
       std::uint16_t* const here = here_.data();
@@ -189,7 +189,7 @@ class depth_encoder {
     return to.is_full() ? 0 : static_cast<std::size_t>(end - out.data());
   }
 
-  /// Fills `rank_of_`, and writes what the decoder needs to know of it.
+  /// Fills `rank_of_`, and writes the list of depths for the decoder.
   void list_depths(image_view<const std::uint16_t> depth, group_writer& to) {
     constexpr std::size_t values = std::size_t{1} << 16U;
     rank_of_.assign(values, 0);
@@ -220,13 +220,13 @@ class depth_encoder {
   std::vector<std::uint16_t> above_, here_;  // ranks of two rows
 };
 
-/// Reads compressed depth images. Keeps its buffers: two bytes for each distinct depth, and 4 bytes a column.
+/// Decompresses depth images. Reuses its buffers: two bytes for each distinct depth, and 4 bytes per column.
 class depth_decoder {
  public:
-  /// Puts the image into `out`, which has its size. Errors: malformed, with nothing said of what `out` holds then; any
-  /// bytes are safe to give. Linear.
+  /// Decompresses the image into `out`, which has its size. Error: malformed; `out` is unspecified then. Safe for any
+  /// bytes. Linear.
   [[nodiscard]] result<void> decode(std::span<const std::byte> bytes, image_view<std::uint16_t> out) {
-    if (bytes.empty()) return damaged("it is empty");
+    if (bytes.empty()) return damaged("it has no bytes");
     const auto coding = static_cast<depth_coding>(bytes.front());
     bytes = bytes.subspan(1);
     if (coding == depth_coding::plain) return read_plain(bytes, out);
@@ -290,7 +290,7 @@ class depth_decoder {
         std::uint32_t rank = 0;
         if (expected == 0 || step != 0) {
           rank = last = (expected != 0 ? expected : last) + unfolded(step);
-          if (rank == 0 || rank >= depths_.size()) return damaged("a pixel's depth is not in the list of depths");
+          if (rank == 0 || rank >= depths_.size()) return damaged("a pixel refers to a depth that is not in the list");
         }
         here[x] = static_cast<std::uint16_t>(rank);
         west = static_cast<std::int32_t>(rank);
@@ -299,7 +299,7 @@ class depth_decoder {
       }
       for (int x = 0; x != out.width(); ++x) to[x] = depths_[here[x]];
     }
-    if (run != 0 || !from.is_at_end()) return damaged("its pixels do not end where they should");
+    if (run != 0 || !from.is_at_end()) return damaged("it has too few or too many bytes for its pixels");
     return {};
   }
 

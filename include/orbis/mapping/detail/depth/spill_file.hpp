@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A file for what does not fit into memory. It has no name once it is open, so nothing of it is left behind, whatever
-/// becomes of the program.
+/// A file for data beyond the memory budget. It is unlinked as soon as it is open, so nothing of it remains, however
+/// the program ends.
 #pragma once
 
 #include <algorithm>
@@ -28,10 +28,10 @@
 
 namespace orbis::mapping::detail {
 
-/// Ranges of a file that are not used any more, joined where they touch.
+/// Unused ranges of a file; adjacent ones are joined.
 class free_ranges {
  public:
-  /// The start of a range of `size` bytes, which is free no more: a hole where it fits, else the end of the file.
+  /// Allocates a range of `size` bytes and returns its start: a hole in which it fits, otherwise the end of the file.
   [[nodiscard]] std::uint64_t take(std::uint64_t size) {
     for (auto hole = holes_.begin(); hole != holes_.end(); ++hole) {
       if (hole->second < size) continue;
@@ -42,7 +42,7 @@ class free_ranges {
     }
     return std::exchange(end_, end_ + size);
   }
-  /// Gives a range back. @pre it was taken
+  /// Frees a range. @pre it was allocated by `take`
   void give(std::uint64_t start, std::uint64_t size) {
     if (size == 0) return;
     auto next = holes_.lower_bound(start);
@@ -61,7 +61,7 @@ class free_ranges {
     else
       holes_.emplace(start, size);
   }
-  /// All ranges in use lie before.
+  /// End of the last range in use.
   [[nodiscard]] std::uint64_t end() const noexcept { return end_; }
 
  private:
@@ -69,8 +69,8 @@ class free_ranges {
   std::uint64_t end_ = 0;
 };
 
-/// Records of bytes in a nameless file, each with a checksum that stays in memory. Records are read by any number of
-/// threads at once, as long as none is written.
+/// Records of bytes in a nameless file, each with a checksum in memory. Any number of threads may read concurrently
+/// while none writes.
 class spill_file {
  public:
   struct record {
@@ -78,7 +78,7 @@ class spill_file {
     std::uint32_t size = 0, checksum = 0;
   };
 
-  /// The file is made in the place and under the name `path`, once the first record is written.
+  /// Creates the file at `path` when the first record is written.
   explicit spill_file(std::filesystem::path path) : path_{std::move(path)} {}
   ~spill_file() { close(); }
   spill_file(spill_file&& other) noexcept
@@ -90,7 +90,7 @@ class spill_file {
     return *this;
   }
 
-  /// Errors: write_failed; then the file is as it was before. @pre bytes.size() < 2^32
+  /// Appends a record. Error: write_failed; the file is unchanged then. @pre bytes.size() < 2^32
   [[nodiscard]] result<record> write(std::span<const std::byte> bytes) {
 #ifdef ORBIS_HAS_POSIX_FILES
     if (file_ < 0)
@@ -111,11 +111,12 @@ class spill_file {
     return to;
 #else
     static_cast<void>(bytes);
-    return fail(errc::unsupported, path_.string(), "there are no spill files on this system");
+    return fail(errc::unsupported, path_.string(),
+                "spill files are not supported on this system; leave the path empty");
 #endif
   }
 
-  /// Errors: unreadable; malformed where the bytes are not those that were written.
+  /// Reads a record. Errors: unreadable; malformed if the bytes differ from those written.
   [[nodiscard]] result<std::vector<std::byte>> read(const record& from) const {
 #ifdef ORBIS_HAS_POSIX_FILES
     std::vector<std::byte> bytes(from.size);
@@ -125,24 +126,25 @@ class spill_file {
       if (n < 0 && errno == EINTR) continue;
       if (n < 0)
         return fail(errc::unreadable, path_.string(), "cannot be read: " + std::generic_category().message(errno));
-      if (n == 0) return fail(errc::malformed, path_.string(), "is shorter than what was written to it");
+      if (n == 0) return fail(errc::malformed, path_.string(), "is shorter than the data written to it");
       done += static_cast<std::size_t>(n);
     }
     if (crc32c(bytes) != from.checksum)
-      return fail(errc::malformed, path_.string(), "does not hold what was written to it: the checksum is wrong");
+      return fail(errc::malformed, path_.string(), "the checksum is wrong: the file is damaged");
     return bytes;
 #else
     static_cast<void>(from);
-    return fail(errc::unsupported, path_.string(), "there are no spill files on this system");
+    return fail(errc::unsupported, path_.string(),
+                "spill files are not supported on this system; leave the path empty");
 #endif
   }
 
-  /// Makes room for other records. @pre the record is in the file
+  /// Frees a record. @pre the record is in the file
   void erase(const record& r) {
     const std::uint64_t end = ranges_.end();
     ranges_.give(r.start, r.size);
 #ifdef ORBIS_HAS_POSIX_FILES
-    // Gives room back to the disk; where that does not work, later records still find it.
+    // Returns space to the disk; if that fails, later records reuse it.
     if (ranges_.end() < end) static_cast<void>(::ftruncate(file_, static_cast<::off_t>(ranges_.end())) == 0);
 #else
     static_cast<void>(end);
@@ -155,7 +157,7 @@ class spill_file {
     file_ = ::open(path_.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
     if (file_ < 0)
       return fail(errc::write_failed, path_.string(), "cannot be created: " + std::generic_category().message(errno));
-    ::unlink(path_.c_str());  // it lives until it is closed, and no longer
+    ::unlink(path_.c_str());  // the file exists until it is closed
     return {};
   }
   void close() noexcept {

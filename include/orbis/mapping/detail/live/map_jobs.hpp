@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// What waits for a live map's thread, in order.
+/// Queue of jobs for a live map's thread.
 #pragma once
 
 #include <algorithm>
@@ -35,17 +35,17 @@ struct map_job {
   [[nodiscard]] bool has_image() const noexcept { return kind <= between; }
 };
 
-/// A queue. Whoever bounds the images in it bounds the queue: between two of them, poses are kept once a keyframe, and
-/// so are removals.
+/// A queue. Bounding the number of images in it bounds the queue: between two images, at most one pose per keyframe is
+/// kept, and at most one removal.
 class map_jobs {
  public:
   [[nodiscard]] bool empty() const noexcept { return jobs_.empty(); }
   [[nodiscard]] std::size_t size() const noexcept { return jobs_.size(); }
-  /// How many jobs have an image.
+  /// Number of jobs with an image.
   [[nodiscard]] std::size_t images() const noexcept { return images_; }
 
-  /// Appends a job. The poses that wait as the last job, or as the last but removals, take in poses that come later,
-  /// and a removal that waits is not asked for again: in the end the map is the same. O(poses log poses).
+  /// Appends a job. Poses are merged into waiting poses at the end of the queue (only removals may come after those),
+  /// and a removal that is waiting is not added again: the resulting map is the same. O(poses log poses).
   void push(map_job j) {
     if (j.kind == map_job::positions || j.kind == map_job::removal)
       for (auto at = jobs_.rbegin(); at != jobs_.rend(); ++at) {
@@ -60,16 +60,16 @@ class map_jobs {
       }
     const bool has_image = j.has_image();
     jobs_.push_back(std::move(j));
-    images_ += has_image ? 1U : 0U;  // after what may throw
+    images_ += has_image ? 1U : 0U;  // after all operations that may throw
   }
-  /// @pre !empty()
+  /// Removes and returns the first job. @pre !empty()
   [[nodiscard]] map_job pop() {
     map_job first = std::move(jobs_.front());
     jobs_.pop_front();
     images_ -= first.has_image() ? 1U : 0U;
     return first;
   }
-  /// Takes out the oldest frame between keyframes, if there is one.
+  /// Removes and returns the oldest frame between keyframes, if there is one.
   [[nodiscard]] std::optional<map_job> pop_frame() {
     const auto at =
         std::find_if(jobs_.begin(), jobs_.end(), [](const map_job& j) { return j.kind == map_job::between; });
@@ -91,9 +91,9 @@ class map_jobs {
   }
 
  private:
-  /// `earlier` becomes what is the same as itself and then `later`.
+  /// Sets `earlier` to the combined effect of `earlier` followed by `later`.
   static void merge(map_job& earlier, map_job later) {
-    if (later.others == unlisted::hide) {  // of all keyframes: nothing is left of what was said before
+    if (later.others == unlisted::hide) {  // names all keyframes: replaces everything before
       earlier.poses = std::move(later.poses);
       earlier.others = unlisted::hide;
       return;
@@ -101,7 +101,7 @@ class map_jobs {
     auto& all = earlier.poses;
     all.insert(all.end(), std::make_move_iterator(later.poses.begin()), std::make_move_iterator(later.poses.end()));
     std::stable_sort(all.begin(), all.end(), [](const auto& a, const auto& b) { return a.frame < b.frame; });
-    // The last of those of one frame is the latest.
+    // The last pose of a frame is the latest.
     auto end = all.begin();
     for (auto p = all.begin(); p != all.end(); ++p)
       if (std::next(p) == all.end() || std::next(p)->frame != p->frame) *end++ = *p;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// How far a change of pose displaces what a camera sees.
+/// Displacement of the view of a camera by a change of its pose.
 #pragma once
 
 #include <algorithm>
@@ -21,10 +21,10 @@ namespace orbis::mapping::detail {
 /// A pyramid with eight sides around all rays of a camera, in the camera frame: its corners at z = 1.
 class view_frustum {
  public:
-  /// O(pixels).
+  /// Encloses the rays of all pixels. O(pixels).
   template <camera::camera_model Camera>
   explicit view_frustum(const Camera& camera) {
-    // Every pixel: at the border of a fisheye image there may be no ray.
+    // Every pixel: border pixels of a fisheye image may have no ray.
     for (int v = 0; v != camera.height(); ++v)
       for (int u = 0; u != camera.width(); ++u)
         if (const auto ray = camera.unproject(vec2{u, v})) include(ray->template head<2>());
@@ -44,7 +44,7 @@ class view_frustum {
     for (const vec3& c : corners_) {
       const vec3 far = reach * c;
       const double moved = norm(T_world_after * far - T_world_before * far);
-      if (!std::isfinite(moved)) return std::numeric_limits<double>::infinity();  // NaN would get lost in a maximum
+      if (!std::isfinite(moved)) return std::numeric_limits<double>::infinity();  // a maximum would drop NaN
       largest = std::max(largest, moved);
     }
     return largest;
@@ -58,24 +58,24 @@ class view_frustum {
         {{1, 0}, {half, half}, {0, 1}, {-half, half}, {-1, 0}, {-half, -half}, {0, -1}, {half, -half}}};
     return {all[side % sides][0], all[side % sides][1]};
   }
-  /// `ray`: x and y at z = 1.
+  /// Extends the pyramid to a ray: x and y at z = 1.
   void include(vec2 ray) {
     if (!all_finite(ray)) return;
-    // Depth along the axis says little of rays that are almost at right angles to it: what is farther off than 80
-    // degrees counts as if it were there.
+    // Depth along the axis says little about rays almost perpendicular to it: rays beyond 80 degrees count as if they
+    // were at 80 degrees.
     constexpr double widest = 5.67;
     const double off_axis = norm(ray);
     if (off_axis > widest) ray *= widest / off_axis;
     for (std::size_t i = 0; i != sides; ++i) reach_[i] = std::max(reach_[i], dot(direction(i), ray));
   }
-  /// A corner is where two neighbouring sides meet.
+  /// Computes the corners: intersections of two neighbouring sides.
   void close() {
     for (std::size_t i = 0; i != sides; ++i) {
       const vec2 a = direction(i), b = direction(i + 1);
       const double of_a = reach_[i], of_b = reach_[(i + 1) % sides];
       const double sine = a.x() * b.y() - a.y() * b.x();
       corners_[i] = {(of_a * b.y() - of_b * a.y()) / sine, (a.x() * of_b - b.x() * of_a) / sine, 1.0};
-      if (!all_finite(corners_[i])) corners_[i] = vec3(0.0, 0.0, 1.0);  // there is no ray
+      if (!all_finite(corners_[i])) corners_[i] = vec3(0.0, 0.0, 1.0);  // no ray was included
     }
   }
 
@@ -89,7 +89,7 @@ class view_frustum {
 
 /// The largest depth of an image, metres; 0 if no pixel is valid. O(pixels).
 [[nodiscard]] inline double largest_depth(const camera::depth_view<std::uint16_t>& depth) {
-  // Depth grows with what is stored: the largest stored value that is valid is found without a division for each pixel.
+  // Depth is monotonic in the stored value: finds the largest valid stored value without a division per pixel.
   const double most = static_cast<double>(depth.max_depth()) * depth.scale();
   std::uint16_t largest = 0;
   for (int y = 0; y != depth.height(); ++y)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A depth image in cells of 4x4 pixels: what it shows, and what its rays pass through.
+/// A depth image in cells of 4x4 pixels, with tests of the rays of one image against another.
 #pragma once
 
 #include <algorithm>
@@ -23,12 +23,12 @@
 
 namespace orbis::mapping::detail {
 
-/// The cells of a camera's images, and the rays through their middles.
+/// The cells of a camera's images, and the rays through their centres.
 struct cell_grid {
   static constexpr int edge = 4;  ///< of a cell, pixels
 
   int across = 0, down = 0;
-  std::vector<vec2f> rays;  ///< at z = 1; NaN where there is none
+  std::vector<vec2f> rays;  ///< at z = 1; NaN if the camera has none
 
   template <camera::camera_model Camera>
   explicit cell_grid(const Camera& camera)
@@ -43,24 +43,24 @@ struct cell_grid {
   [[nodiscard]] std::size_t size() const noexcept { return rays.size(); }
 };
 
-/// What a view says of a place: its rays pass through it, it shows it, or neither.
+/// Result of comparing a point with a view: rays of the view pass through it, the view shows it, or neither.
 enum class visibility : std::uint8_t { nothing, through, shown };
 
-/// Each cell's nearest depth, which stands for it; and around each corner of cells, the range of the depths in the four
-/// cells there: a window of 8x8 pixels, so that a point that is a pixel or two beside its true place finds the same.
+/// The nearest depth of each cell, which represents it; and around each corner of cells, the range of the depths in the
+/// four adjacent cells: a window of 8x8 pixels, so that a point projected a pixel or two off finds the same range.
 class depth_cells {
  public:
   [[nodiscard]] std::size_t size() const noexcept { return nearest_.size(); }
-  /// The depth of a cell's nearest pixel, metres; 0: it has none.
+  /// The depth of a cell's nearest pixel, metres; 0 if it has none.
   [[nodiscard]] float depth(std::size_t cell) const noexcept { return nearest_[cell]; }
 
-  /// O(pixels). @pre the image is of the grid's camera
+  /// Reads an image. O(pixels). @pre the image is of the grid's camera
   template <execution_policy Policy>
   void take(const Policy& policy, const camera::depth_view<std::uint16_t>& depth, const cell_grid& grid) {
     nearest_.resize(grid.size());
     farthest_.resize(grid.size());
     measured_.resize(grid.size());
-    // Depth grows with what is stored: cells are made of stored values.
+    // Depth is monotonic in the stored value: cells are computed from stored values.
     const double scale = depth.scale();
     const auto least =
         static_cast<std::uint16_t>(std::clamp(std::ceil(static_cast<double>(depth.min_depth()) * scale), 1.0, 65535.0));
@@ -111,9 +111,9 @@ class depth_cells {
     });
   }
 
-  /// `visit(cell, visibility)` for the cells of which `view` says something. `margin(z)`: what noise is good for at
-  /// that depth, metres; `slant`: so many times a window's range of depths is added for rays that pass through.
-  /// O(cells).
+  /// Calls `visit(cell, visibility)` for the cells that `view` shows or looks through. `margin(z)`: tolerance for noise
+  /// at that depth, metres; `slant`: for rays that pass through, a window's range of depths times this factor is added
+  /// to the margin. O(cells).
   template <execution_policy Policy, camera::camera_model Camera, class Margin, class Visit>
   void ask(const Policy& policy, const depth_cells& view, const cell_grid& grid, const Camera& camera,
            const se3& T_view_this, float slant, const Margin& margin, const Visit& visit) const {
@@ -138,11 +138,11 @@ class depth_cells {
 
  private:
   struct window {
-    float nearest = 0.0F, farthest = -1e9F;  // metres; without any depth nothing is in between
+    float nearest = 0.0F, farthest = -1e9F;  // metres; without any depth the range is empty
     bool covered = false;                    // most of its pixels have a depth
   };
 
-  /// The window around the point's pixel; null where it is not in the image.
+  /// The window around the point's pixel; null if it is not in the image.
   template <camera::camera_model Camera>
   [[nodiscard]] const window* window_at(const cell_grid& grid, const Camera& camera,
                                         const std::array<float, 3>& p) const {
@@ -160,7 +160,7 @@ class depth_cells {
       u = static_cast<float>(pixel->x());
       v = static_cast<float>(pixel->y());
     }
-    // Corner i lies half a pixel before the centre of pixel i * edge.
+    // Corner i is half a pixel before the centre of pixel i * edge.
     constexpr float per_pixel = 1.0F / cell_grid::edge, first = 0.5F + 0.5F / cell_grid::edge;
     const float x = rounded_product(u, per_pixel) + first, y = rounded_product(v, per_pixel) + first;
     if (!(x >= 0.0F && y >= 0.0F && x < static_cast<float>(grid.across + 1) && y < static_cast<float>(grid.down + 1)))
@@ -169,7 +169,7 @@ class depth_cells {
   }
 
   std::vector<float> nearest_, farthest_;
-  std::vector<std::uint8_t> measured_;  ///< how many of a cell's pixels have a depth
+  std::vector<std::uint8_t> measured_;  ///< number of pixels with depth per cell
   std::vector<window> windows_;
 };
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Which cells of the last keyframes' depth images show what has moved away, by the rays of the others.
+/// Detects cells of the last keyframes' depth images that show moved objects, by the rays of the other keyframes.
 #pragma once
 
 #include <algorithm>
@@ -25,14 +25,14 @@
 
 namespace orbis::mapping::detail {
 
-/// A cell that is taken out of a depth image.
+/// A cell that is removed from a depth image.
 struct removed_cell {
   std::uint32_t cell = 0;
   float depth = 0.0F;  ///< of its nearest pixel, metres
 };
 
-/// Sets the pixels of these cells to 0 in `pixels`, a copy of what `depth` stores, and those of the cells beside them
-/// that belong to the same surface. Returns how many. O(cells)
+/// Sets the pixels of these cells to 0 in `pixels`, a copy of the stored values of `depth`, and those pixels of
+/// adjacent cells that belong to the same surface. Returns the number of removed pixels. O(cells)
 template <camera::depth_source Depth>
 std::size_t remove_cells(const Depth& depth, const std::vector<removed_cell>& cells,
                          const moving_filter_options& options, image_view<mapping::depth_pixel<Depth>> pixels) {
@@ -45,7 +45,7 @@ std::size_t remove_cells(const Depth& depth, const std::vector<removed_cell>& ce
     const int x0 = (static_cast<int>(c.cell) % across - 1) * edge, y0 = (static_cast<int>(c.cell) / across - 1) * edge;
     for (int y = std::max(0, y0); y < std::min(depth.height(), y0 + 3 * edge); ++y)
       for (int x = std::max(0, x0); x < std::min(depth.width(), x0 + 3 * edge); ++x) {
-        // Where a surface turns away, its cell's other pixels lie well behind the nearest one.
+        // Where a surface is oblique, the other pixels of a cell are well behind the nearest one.
         const bool own = x >= x0 + edge && x < x0 + 2 * edge && y >= y0 + edge && y < y0 + 2 * edge;
         const float z = depth(x, y);
         if (!(z >= low && z <= (own ? own_high : high)) || pixels(x, y) == 0) continue;
@@ -56,7 +56,7 @@ std::size_t remove_cells(const Depth& depth, const std::vector<removed_cell>& ce
   return removed;
 }
 
-/// The last keyframes, and what their rays say about each other. See moving_filter.
+/// The last keyframes, and the evidence of their rays about each other. See moving_filter.
 template <camera::camera_model Camera>
 class moving_judge {
  public:
@@ -68,11 +68,11 @@ class moving_judge {
     double scale = 1.0;
     float min_depth = 0.0F, max_depth = 0.0F;
     depth_cells cells;
-    std::vector<std::uint8_t> through;  ///< how many other views' rays pass through each cell
-    std::vector<std::uint8_t> shown;    ///< how many others show it as well
-    std::vector<std::uint8_t> removed;  ///< 1: taken out, as far as `accept` was called
-    bool due = false;                   ///< the newest one has not been asked about it
-    bool unjudged = false;              ///< others have been asked about it since it was judged
+    std::vector<std::uint8_t> through;  ///< number of other views whose rays pass through each cell
+    std::vector<std::uint8_t> shown;    ///< number of other views that show the cell as well
+    std::vector<std::uint8_t> removed;  ///< 1: removed, as of the last call of `accept`
+    bool due = false;                   ///< the newest view has not been compared with it
+    bool unjudged = false;              ///< evidence has arrived since it was judged
 
     [[nodiscard]] depth_view depth() const { return depth_view{pixels.view(), scale, min_depth, max_depth}; }
     [[nodiscard]] std::vector<removed_cell> removed_cells() const {
@@ -90,9 +90,9 @@ class moving_judge {
            options.grow >= 0);
   }
 
-  /// Adds a keyframe in place of the oldest where there are enough, and asks the others about it: `pose_of(view)` gives
-  /// their poses, or none. The others are due then, see ask_newest. The same for every policy. O(pixels + cells x
-  /// keyframes). @pre a finite pose; depth has the camera's size; no other view is due
+  /// Adds a keyframe, in place of the oldest if the window is full, and compares the others with it: `pose_of(view)`
+  /// returns their poses, or none. The other views are due afterwards, see ask_newest. The same for every policy.
+  /// O(pixels + cells x keyframes). @pre a finite pose; depth has the camera's size; no other view is due
   template <execution_policy Policy, class PoseOf>
   view& add(const Policy& policy, std::uint64_t frame, const depth_view& depth, const se3& T_world_camera,
             const PoseOf& pose_of) {
@@ -116,7 +116,7 @@ class moving_judge {
     }
     return now;
   }
-  /// Asks the newest keyframe about another one, if that is due. O(cells).
+  /// Compares the newest keyframe with another view, if that is due. O(cells).
   template <execution_policy Policy, class PoseOf>
   void ask_newest(const Policy& policy, view& about, const PoseOf& pose_of) {
     if (!std::exchange(about.due, false)) return;
@@ -124,7 +124,8 @@ class moving_judge {
     const std::optional<se3> by = pose_of(newest), of = pose_of(std::as_const(about));
     if (by && of) ask(policy, about, newest, by->inverse() * *of);
   }
-  /// Judges a view by what is known of it now; returns how many cells differ from what was accepted last. O(cells).
+  /// Judges a view by the present evidence; returns the number of cells that differ from the last accepted verdict.
+  /// O(cells).
   [[nodiscard]] std::size_t judge(view& v) {
     v.unjudged = false;
     const int across = grid_.across, down = grid_.down;
@@ -137,7 +138,7 @@ class moving_judge {
       for (int x = 0; x != across; ++x) {
         const auto i = static_cast<std::size_t>(y * across + x);
         if (passed(i)) {
-          // One cell alone is noise, or the edge of something.
+          // A single cell is noise, or the edge of an object.
           int beside = 0;
           for (int dy = -1; dy <= 1; ++dy)
             for (int dx = -1; dx <= 1; ++dx)
@@ -152,9 +153,9 @@ class moving_judge {
     for (std::size_t i = 0; i != verdict_.size(); ++i) differ += verdict_[i] != v.removed[i] ? 1 : 0;
     return differ;
   }
-  /// Takes over the last judgement, which was of this view.
+  /// Accepts the last verdict, which is about this view.
   void accept(view& v) const { v.removed = verdict_; }
-  /// The view's depth image without what is taken out. Valid until the next call.
+  /// The view's depth image without the removed cells. Valid until the next call.
   [[nodiscard]] depth_view masked(const view& v) {
     copy_pixels<std::uint16_t>(v.pixels, masked_);
     remove_cells(v.depth(), v.removed_cells(), options_, masked_.view());
@@ -164,18 +165,18 @@ class moving_judge {
     const auto at = std::find_if(views_.begin(), views_.end(), [&](const view& v) { return v.frame == frame; });
     if (at == views_.end()) return;
     if (&*at == &views_.back())
-      for (view& v : views_) v.due = false;  // nobody is there to be asked
+      for (view& v : views_) v.due = false;  // no view is left to compare with
     spare_.push_back(std::move(*at));
     views_.erase(at);
   }
-  /// The last keyframes, the oldest first. If there are enough, that one goes when the next one is added.
+  /// The last keyframes, the oldest first. If the window is full, the oldest is replaced when the next one is added.
   [[nodiscard]] std::deque<view>& views() noexcept { return views_; }
   [[nodiscard]] const std::deque<view>& views() const noexcept { return views_; }
   [[nodiscard]] bool is_full() const noexcept { return views_.size() == options_.keyframes; }
   [[nodiscard]] const moving_filter_options& options() const noexcept { return options_; }
 
  private:
-  /// A view for a new keyframe, in the memory of the oldest where there are enough.
+  /// A view for a new keyframe, in the memory of the oldest if the window is full.
   [[nodiscard]] view& make_view() {
     view next;
     if (views_.size() == options_.keyframes) {
@@ -188,7 +189,7 @@ class moving_judge {
     views_.push_back(std::move(next));
     return views_.back();
   }
-  /// Counts what `by` says about the cells of `about`.
+  /// Counts the evidence of `by` about the cells of `about`.
   template <class Policy>
   void ask(const Policy& policy, view& about, const view& by, const se3& T_by_about) const {
     about.unjudged = true;
@@ -206,7 +207,7 @@ class moving_judge {
     else
       with_model(camera_);
   }
-  /// Takes out the cells beside those that are taken out, if they are of the same surface and nothing is known of them.
+  /// Removes the cells adjacent to removed ones, if they are of the same surface and the evidence does not keep them.
   void grow(const view& v) {
     const int across = grid_.across, down = grid_.down;
     grown_.clear();
@@ -230,7 +231,7 @@ class moving_judge {
   cell_grid grid_;
   std::deque<view> views_;
   std::vector<view> spare_;
-  std::vector<std::uint8_t> verdict_;  ///< of the last judgement
+  std::vector<std::uint8_t> verdict_;  ///< the last one computed
   std::vector<std::size_t> grown_;
   image<std::uint16_t> masked_;
 };

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// What has moved away in keyframes that are gone through once, in their order.
+/// Moved objects in keyframes that are traversed once, in order.
 #pragma once
 
 #include <cassert>
@@ -23,8 +23,8 @@
 
 namespace orbis::mapping::detail {
 
-/// A depth image as a moving_judge wants it: itself, or a copy in quarters of a millimetre, without what is farther
-/// away than 16 m. `copy` keeps the pixels.
+/// A depth image in the form that moving_judge reads: itself, or a copy in quarters of a millimetre, without depths
+/// beyond 16 m. `copy` stores the pixels.
 template <camera::depth_source Depth>
 [[nodiscard]] camera::depth_view<std::uint16_t> stored_depths(const Depth& depth, image<std::uint16_t>& copy) {
   if constexpr (std::same_as<Depth, camera::depth_view<std::uint16_t>>) {
@@ -42,22 +42,22 @@ template <camera::depth_source Depth>
   }
 }
 
-/// Keeps keyframes until those before and after them have said which of their cells their rays pass through, and gives
-/// them back in order: `options.keyframes` + 1 at most. Without options none is judged.
+/// Delays keyframes until those before and after have been compared with them, and returns them in order, together with
+/// the cells that show moved objects: at most `options.keyframes` + 1 are kept. Without options none is judged.
 template <camera::camera_model Camera, keyframe_like Keyframe>
 class moving_window {
  public:
   struct judged_keyframe {
-    std::size_t number = 0;  ///< in the order that they came in
+    std::size_t number = 0;  ///< position in the input
     Keyframe keyframe;
-    std::vector<removed_cell> removed{};  ///< the cells of what has moved away
+    std::vector<removed_cell> removed{};  ///< cells that show moved objects
   };
 
   moving_window(const Camera& camera, const std::optional<moving_filter_options>& options) {
     if (options) judge_.emplace(camera, *options);
   }
-  /// Adds the next keyframe, and keeps it. O(pixels + cells x options.keyframes).
-  /// @pre the image has the camera's size; the pose is finite; nothing is left to `pop`
+  /// Adds the next keyframe. O(pixels + cells x options.keyframes).
+  /// @pre the image has the camera's size; the pose is finite; `pop` has returned all finished keyframes
   template <execution_policy Policy>
   void push(const Policy& policy, Keyframe k) {
     const se3 T_world_camera = k.T_world_camera;
@@ -67,19 +67,19 @@ class moving_window {
       kept_.back().is_judged = true;
       return;
     }
-    if (judge_->is_full()) settle(judge_->views().front());
+    if (judge_->is_full()) record_verdict(judge_->views().front());
     const auto pose_of = [&](const auto& view) { return std::optional{at(view.frame).T_world_camera}; };
     const judged_keyframe& now = kept_.back().item;
     judge_->add(policy, now.number, stored_depths(now.keyframe.depth, copy_), T_world_camera, pose_of);
     for (auto& view : judge_->views()) judge_->ask_newest(policy, view, pose_of);
   }
-  /// No keyframe will come: all that are left are judged.
+  /// Ends the input: judges all remaining keyframes.
   void finish() {
     if (judge_)
       for (auto& view : judge_->views())
-        if (!at(view.frame).is_judged) settle(view);
+        if (!at(view.frame).is_judged) record_verdict(view);
   }
-  /// The next keyframe whose judgement stands, if there is one.
+  /// The next keyframe with a final verdict, if there is one.
   [[nodiscard]] std::optional<judged_keyframe> pop() {
     if (kept_.empty() || !kept_.front().is_judged) return std::nullopt;
     judged_keyframe out = std::move(kept_.front().item);
@@ -98,7 +98,7 @@ class moving_window {
     return kept_[static_cast<std::size_t>(number) - kept_.front().item.number];
   }
   template <class View>
-  void settle(View& view) {
+  void record_verdict(View& view) {
     static_cast<void>(judge_->judge(view));
     judge_->accept(view);
     entry& e = at(view.frame);

@@ -8,8 +8,8 @@
 
 namespace orbis::nav::detail {
 
-/// Values in blocks of 16: adding one moves no other, and finding one takes two loads, where a std::deque of large
-/// values computes. One empty block is kept, so that a value that comes and goes allocates nothing.
+/// Values in blocks of 16. Adding a value moves no other one. Access takes two loads; a std::deque of large values
+/// computes more. One empty block is kept, so that adding and removing a value repeatedly allocates nothing.
 template <class T>
 class block_vector {
  public:

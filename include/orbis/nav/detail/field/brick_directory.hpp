@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Which brick of 8x8x8 voxels has which number.
+/// Numbers of bricks of 8x8x8 voxels by their places.
 #pragma once
 
 #include <algorithm>
@@ -24,10 +24,10 @@ struct brick_place {
 /// Numbers of bricks by their places, in blocks of 8x8x8 bricks. Copies share the blocks until one of them changes.
 class brick_directory {
  public:
-  /// Instead of a number, where there is none: in one of the cubes (see add_cube), and outside of all.
+  /// Results of `find` for places without a number: `inner` in one of the cubes (see add_cube), `none` outside of all.
   static constexpr std::uint32_t none = hash_index::none, inner = none - 1;
 
-  /// `bricks`: how many the grid is wide. What lies outside is never found.
+  /// `bricks`: edge of the grid in bricks. Places outside of it are never found.
   explicit brick_directory(std::uint32_t bricks) noexcept : bricks_{bricks} {}
 
   [[nodiscard]] bool is_inside(const brick_place& p) const noexcept {
@@ -40,37 +40,37 @@ class brick_directory {
     const std::uint32_t b = blocks_.find(name(p));
     return b == none ? without_number(p) : numbers_[b][place(p)];
   }
-  /// What `find` says of places without a number in a cube of 2^level bricks, of which `p` is any.
-  /// @pre nothing has a number; level >= 3; in the grid
+  /// Sets the result of `find` to `inner` for places without a number in the cube of 2^level bricks that contains `p`.
+  /// @pre no brick has a number; level >= 3; in the grid
   void add_cube(const brick_place& p, int level) {
     cubes_.set(cube_name(p, level), 0);
     levels_ |= 1U << static_cast<unsigned>(level);
   }
-  /// Whether a node of 2^level bricks lies in one of the cubes. O(levels).
+  /// Returns true if a node of 2^level bricks lies in one of the cubes. O(levels).
   [[nodiscard]] bool is_in_cube(const brick_place& p, int level) const noexcept {
     for (unsigned levels = levels_ >> level << level; levels != 0; levels &= levels - 1)
       if (cubes_.find(cube_name(p, std::countr_zero(levels))) != none) return true;
     return false;
   }
   [[nodiscard]] bool has_cubes() const noexcept { return levels_ != 0; }
-  /// `inner` or `none`: of a place, if it had no number. O(levels of cubes).
+  /// `inner` or `none`: the result of `find` for a place if it had no number. O(levels of cubes).
   [[nodiscard]] std::uint32_t without_number(const brick_place& p) const noexcept {
     return has_cubes() && is_in_cube(p, 0) ? inner : none;
   }
-  /// Sets it. @pre is_inside(p)
+  /// Sets the number of the brick at `p`. @pre is_inside(p)
   void set(const brick_place& p, std::uint32_t number) {
     std::uint32_t b = blocks_.find(name(p));
     if (b == none) {
       b = static_cast<std::uint32_t>(numbers_.size());
       blocks_.set(name(p), b);
       block empty;
-      empty.fill(without_number(p));  // of all: no cube is smaller than a block
+      empty.fill(without_number(p));  // for the whole block: no cube is smaller than a block
       numbers_.push_back(empty);
       names_.push_back(name(p));
     }
     numbers_.writable(b)[place(p)] = number;
   }
-  /// Forgets the brick at `p`, and its block with the last one. @pre it has a number
+  /// Removes the brick at `p`, and its block if that becomes empty. @pre it has a number
   void erase(const brick_place& p) {
     const std::uint32_t b = blocks_.find(name(p));
     block& numbers = numbers_.writable(b);
@@ -91,7 +91,7 @@ class brick_directory {
            names_.capacity() * sizeof(std::uint64_t);
   }
 
-  /// Looks bricks up of which each lies near the one before. Valid until the directory changes.
+  /// Looks up bricks, each near the one before. Valid until the directory changes.
   class cursor {
    public:
     explicit cursor(const brick_directory& directory) noexcept : directory_{&directory} {}

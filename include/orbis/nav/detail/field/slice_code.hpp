@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The arithmetic of a distance field as functions, which slice_kernels.hpp has for each instruction set.
+/// Table of the distance field arithmetic; slice_kernels.hpp implements it for each instruction set.
 #pragma once
 
 #include <array>
@@ -9,24 +9,23 @@
 
 namespace orbis::nav::detail {
 
-/// The farthest that a field can reach, in voxels: its square still fits beside `far_away`.
+/// Maximum reach of a field, in voxels: its square is less than `far_away`.
 inline constexpr int max_reach = 181;
 /// The value of a voxel that is farther from all obstacles than the field reaches.
 inline constexpr std::uint16_t far_away = 0x7fff;
-/// Instead of a value, where a source has nothing to offer: with a square added it is neither equal to a value nor
-/// less.
+/// Value of a source that offers nothing: with a square added it is neither equal to nor less than any value.
 inline constexpr std::uint16_t no_offer = 0x8000;
 
 /// Row y * 8 + x.
 using slice = std::array<std::uint16_t, 64>;
 
-/// What a slice offers to slices beside it.
+/// Offer of a slice to neighbouring slices.
 struct slice_offer {
   alignas(64) slice value;
-  std::uint16_t least = no_offer;  ///< of the values
+  std::uint16_t least = no_offer;  ///< least of the values
 };
 
-/// See the kernels of these names.
+/// Pointers to the kernels of the same names.
 struct slice_code {
   void (*choose_offer)(const std::uint16_t* from, const std::uint16_t* other, slice_offer* offer);
   unsigned (*equal_slices)(const std::uint16_t* targets, const std::uint16_t* tops, const slice_offer* offer, int from,

@@ -2,8 +2,8 @@
 /// @file
 /// The arithmetic of a distance field, over slices of 8x8 voxels of one brick.
 ///
-/// Values are squared distances in voxels or `far_away`. A *source* offers target voxels its value plus the square of
-/// how far it is from them; a target's value is the least offer.
+/// Values are squared distances in voxels or `far_away`. A *source* offers a target voxel its own value plus the square
+/// of the distance between them; the value of a target is the least offer.
 #pragma once
 
 #include <array>
@@ -21,7 +21,7 @@ namespace orbis::nav::detail {
 template <class Target>
 using slice_lanes = simd::vec<std::uint16_t, 64, Target>;
 
-/// `offer` becomes `from` where that is less than `other`, and `no_offer` elsewhere.
+/// `offer` becomes `from` where `from` is less than `other`, and `no_offer` elsewhere.
 struct choose_offer_kernel {
   using signature = void(const std::uint16_t* from, const std::uint16_t* other, slice_offer* offer);
   template <class Target>
@@ -34,9 +34,9 @@ struct choose_offer_kernel {
   }
 };
 
-/// Of eight slices that follow each other (`targets`; `tops`: the largest value of each), those in which a value is
-/// what the source offers, as bits. `from`: how many slices the source is from the first one; slices [first, last]
-/// without those in `skip` are looked at.
+/// Finds those of eight consecutive slices (`targets`; `tops`: the largest value of each) in which a value equals the
+/// offer of the source; returns them as bits. `from`: distance of the source from the first slice, in slices. Examines
+/// slices [first, last] without those in `skip`.
 struct equal_slices_kernel {
   using signature = unsigned(const std::uint16_t* targets, const std::uint16_t* tops, const slice_offer* offer,
                              int from, int first, int last, unsigned skip);
@@ -55,7 +55,7 @@ struct equal_slices_kernel {
   }
 };
 
-/// Lowers the values of such slices to what the source offers where that is less and at most `bound`; keeps `tops`.
+/// Lowers the values of such slices to the offer of the source if that is less and at most `bound`; updates `tops`.
 struct lower_slices_kernel {
   using signature = void(std::uint16_t* targets, std::uint16_t* tops, const slice_offer* offer, int from, int first,
                          int last, unsigned skip, std::uint16_t bound);
@@ -75,7 +75,7 @@ struct lower_slices_kernel {
   }
 };
 
-/// Whether a value of the slice is what the source offers; `squares`: to be added to the offer.
+/// Returns true if a value of the slice equals the offer of the source; `squares` are added to the offer.
 struct equal_rows_kernel {
   using signature = bool(const std::uint16_t* target, const slice_offer* offer, const std::uint16_t* squares);
   template <class Target>
@@ -86,7 +86,7 @@ struct equal_rows_kernel {
   }
 };
 
-/// Lowers a copy of the slice; returns whether it is different from the slice.
+/// Lowers a copy of the slice; returns true if it differs from the slice.
 struct lower_rows_kernel {
   using signature = bool(const std::uint16_t* target, const slice_offer* offer, const std::uint16_t* squares,
                          std::uint16_t bound, std::uint16_t* lowered, std::uint16_t* top);
@@ -106,8 +106,8 @@ struct lower_rows_kernel {
   }
 };
 
-/// Adds the offers of the eight rows of a slice of distances along x (`rows`: 64 bytes, 255 where far) to `best`;
-/// `squares - 8 * i`: of the distances of row i to the rows of the target. Returns the largest value in `best`.
+/// Adds the offers of the eight rows of a slice of distances along x (`rows`: 64 bytes, 255 where far) to `best`.
+/// `squares - 8 * i`: squared distances of row i to the rows of the target. Returns the largest value in `best`.
 struct add_rows_kernel {
   using signature = std::uint16_t(std::uint16_t* best, const std::uint8_t* rows, const std::uint16_t* squares);
   template <class Target>
@@ -135,8 +135,8 @@ struct add_rows_kernel {
   }
 };
 
-/// Works a slice out: the least of `own` and of the slices before and behind it, `below[i]` and `above[i]` at distance
-/// i + 1, null where there is nothing. What is more than `bound` is `far_away`. Returns the largest value.
+/// Computes a slice: the least of `own` and of the offers of the slices before and after it, `below[i]` and `above[i]`
+/// at distance i + 1 (null: no slice). Values greater than `bound` become `far_away`. Returns the largest value.
 struct combine_slices_kernel {
   using signature = std::uint16_t(const std::uint16_t* own, const std::uint16_t* const* below,
                                   const std::uint16_t* const* above, int count, std::uint16_t bound,
@@ -164,7 +164,7 @@ template <class K>
   return simd::kernel<K, typename K::signature>();
 }
 
-/// The kernels for the processor that this runs on.
+/// The kernels for the processor of this machine.
 [[nodiscard]] inline slice_code best_slice_code() noexcept {
   return {best_code<choose_offer_kernel>(),  best_code<equal_slices_kernel>(), best_code<lower_slices_kernel>(),
           best_code<equal_rows_kernel>(),    best_code<lower_rows_kernel>(),   best_code<add_rows_kernel>(),

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A layer of a map by columns of voxels, as bits.
+/// A layer of a map as columns of voxels, in bits.
 #pragma once
 
 #include <algorithm>
@@ -23,10 +23,10 @@ namespace orbis::nav::detail {
 inline constexpr std::array<std::uint64_t, 4> octant_layers{0x000000000f0f0f0f, 0x00000000f0f0f0f0, 0x0f0f0f0f00000000,
                                                             0xf0f0f0f000000000};
 
-/// The voxels of a box of a map, column by column: which are known, and which of these are occupied.
+/// The voxels of a box of a map, column by column: the known ones, and the occupied ones among them.
 class voxel_columns {
  public:
-  /// Columns of nothing. @pre low and size are multiples of 4
+  /// Columns of unknown voxels. @pre low and size are multiples of 4
   voxel_columns(const octree::voxel_key& low, std::array<std::uint32_t, 3> size)
       : low_{low},
         size_{size},
@@ -40,7 +40,7 @@ class voxel_columns {
   [[nodiscard]] const octree::voxel_key& low() const noexcept { return low_; }
   [[nodiscard]] int width() const noexcept { return static_cast<int>(size_[0]); }
   [[nodiscard]] int height() const noexcept { return static_cast<int>(size_[1]); }
-  /// Voxels above each other.
+  /// Number of voxels in a column.
   [[nodiscard]] int levels() const noexcept { return static_cast<int>(size_[2]); }
 
   /// The lowest occupied voxel of a column from level `z` on; the largest int if there is none. @pre z >= 0
@@ -48,16 +48,17 @@ class voxel_columns {
     const int found = next(occupied_, 0, x, y, z);
     return found < levels() ? found : std::numeric_limits<int>::max();
   }
-  /// A voxel up to which, from level `z` on, all voxels are occupied. @pre that at `z` is; z >= 0
+  /// A level up to which all voxels from level `z` on are occupied: the end of the run or of its word.
+  /// @pre the voxel at `z` is occupied; z >= 0
   [[nodiscard]] int end_of_run(int x, int y, int z) const noexcept {
     return z + std::countr_one(occupied_[place(x, y) + static_cast<std::size_t>(z >> 6)] >> (z & 63)) - 1;
   }
-  /// The lowest voxel of which nothing is known; levels() if that lies beyond the box. @pre z >= 0
+  /// The lowest unknown voxel from level `z` on; levels() if it lies beyond the box. @pre z >= 0
   [[nodiscard]] int next_unknown(int x, int y, int z) const noexcept {
     return next(known_, ~std::uint64_t{0}, x, y, z);
   }
 
-  /// Sets what was not set before: all octants of a box of them. @pre it lies in this one
+  /// Sets all octants of a box of octants that were not set before. @pre the box lies in this one
   void set(const octree::key_box& octants, const octree::octant_states& s) noexcept {
     const std::uint64_t all = ~std::uint64_t{0};
     const bool is_uniform = s.known == all && (s.occupied == 0 || s.occupied == all);
@@ -93,7 +94,7 @@ class voxel_columns {
       }
     }
   }
-  /// The levels [from, to) of the column whose first word is `first`.
+  /// Fills the levels [from, to) of the column whose first word is `first`.
   void fill(std::size_t first, int from, int to, bool occupied) noexcept {
     for (int z = from; z < to; z = (z | 63) + 1) {
       const std::uint64_t rest = to - (z & ~63) < 64 ? (std::uint64_t{1} << (to & 63)) - 1 : ~std::uint64_t{0};
@@ -102,10 +103,10 @@ class voxel_columns {
       if (occupied) occupied_[first + static_cast<std::size_t>(z / 64)] |= bits;
     }
   }
-  /// An octant's voxels by columns of four, from the lowest; columns along x, then rows y = 0, 2, 1, 3. Of the bits of
-  /// a Morton code, x has 0 and 3, y 1 and 4, z 2 and 5: 0 is exchanged with 2, and 1 with 5.
+  /// The voxels of an octant as columns of four, lowest first; columns along x, then rows y = 0, 2, 1, 3. In a Morton
+  /// code, x has bits 0 and 3, y bits 1 and 4, z bits 2 and 5: exchanges bit 0 with 2, and 1 with 5.
   [[nodiscard]] static std::uint64_t by_column(std::uint64_t m) noexcept {
-    const auto exchange = [&](std::uint64_t bits, int distance) {  // these with those so far above
+    const auto exchange = [&](std::uint64_t bits, int distance) {  // exchanges `bits` with those `distance` higher
       const std::uint64_t differ = (m >> distance ^ m) & bits;
       m ^= differ ^ differ << distance;
     };
@@ -131,9 +132,8 @@ class voxel_columns {
   std::vector<std::uint64_t> known_, occupied_;  ///< words_ for each column, row by row
 };
 
-/// The columns of what is known in a box of voxels: as far as something in it is known, in octants, along all axes.
-/// Errors: no_data, invalid_argument (more than `most` words of 64 levels). O(octants and larger leaves in the box +
-/// words).
+/// The columns of a box of voxels, cropped along all axes to the octants with known voxels. Errors: no_data,
+/// invalid_argument (more than `most` words of 64 levels). O(octants and larger leaves in the box + words).
 template <planning_map Map>
 [[nodiscard]] result<voxel_columns> read_columns(const Map& map, const octree::key_box& wanted, std::uint64_t most) {
   const auto down = [](const octree::voxel_key& k) { return octree::node_key(k, 2); };

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Sums for a plane through the levels of columns around one.
+/// Sums for fitting a plane to the levels of the columns around one column.
 #pragma once
 
 #include <array>
@@ -17,28 +17,28 @@
 
 namespace orbis::nav::detail {
 
-/// Instead of the level of a column.
+/// Marks a column without a level.
 inline constexpr int no_level = std::numeric_limits<int>::min();
 
-/// Columns around one in the middle, which has coordinates (0, 0).
+/// Columns around a central one at coordinates (0, 0).
 struct level_window {
   const int* levels = nullptr;  ///< of the first column
   std::ptrdiff_t stride = 0;    ///< from row to row
   int x = 0, y = 0;             ///< coordinates of the first column, <= 0
   int width = 0, height = 0;
-  int level = 0;  ///< of the middle
-  /// A column counts if its level differs by at most `step` for each cell that it is away; all of `enough` and more
-  /// cells away do. `step` times `enough` is an int.
+  int level = 0;  ///< of the central column
+  /// A column counts if its level differs by at most `step` per cell of distance; all columns at `enough` or more cells
+  /// count. `step` times `enough` fits in an int.
   int step = 1, enough = 1;
 };
 
-/// Over the columns that count, with z the level above that of the middle.
+/// Sums over the columns that count; z is the level relative to the central one.
 struct plane_sums {
   double n = 0, x = 0, y = 0, z = 0, xx = 0, xy = 0, yy = 0, xz = 0, yz = 0;
   int lowest = 0, highest = 0;  ///< of z and 0
 };
 
-/// `T`: what sums are made in; exact if each is a T, or less than 2^53 if that is double.
+/// `T`: type of the sums; exact if each sum fits in a T (for double: is less than 2^53).
 template <class T>
 struct plane_sums_kernel {
   using signature = plane_sums(const level_window&);
@@ -56,8 +56,8 @@ struct plane_sums_kernel {
       const auto is_inside = integers::mask::first(count);
       const integers dx = integers(w.x + first) + integers::iota();
       const integers limit_x = min(simd::abs(dx), integers(w.enough)) * integers(w.step);
-      // Of the block's columns. Sums of sums count a row as often as rows follow it, itself included (t times, or
-      // t (t + 1) / 2): products would cost more.
+      // Over the columns of the block. Sums of sums weight a row by the number of rows from it to the end (t, or t (t +
+      // 1) / 2): products would cost more.
       V ones = T{0}, ones_t = T{0}, ones_tt = T{0}, rise = T{0}, rise_t = T{0};
       for (int row = 0; row != w.height; ++row) {
         const int dy = w.y + row;

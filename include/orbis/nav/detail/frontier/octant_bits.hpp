@@ -9,8 +9,8 @@
 namespace orbis::nav::detail {
 
 // Bit i is the voxel at place i of the Morton curve: along `axis` (0: x), the low bit of its coordinate is bit `axis`
-// of i, the high one bit `axis + 3`. So the next voxel is 1, 7 and 1 times 2^axis places further, and the last one 9
-// times that behind the first.
+// of i, the high bit is bit `axis + 3`. So successive voxels are 1, 7 and 1 times 2^axis places apart, and the last one
+// is 9 times 2^axis places after the first.
 
 /// The voxels whose coordinate along the axis has the low bit 0.
 inline constexpr std::array<std::uint64_t, 3> even_voxels{0x5555555555555555, 0x3333333333333333, 0x0f0f0f0f0f0f0f0f};
@@ -24,25 +24,25 @@ inline constexpr std::array<std::uint64_t, 3> lower_half{0x00ff00ff00ff00ff, 0x0
 [[nodiscard]] constexpr std::uint64_t highest_layer(unsigned axis) noexcept {
   return ~even_voxels[axis] & ~lower_half[axis];
 }
-/// Each voxel's upper neighbour along the axis, as far as it lies in the octant.
+/// Each voxel's upper neighbour along the axis, if it lies in the octant.
 [[nodiscard]] constexpr std::uint64_t moved_up(std::uint64_t m, unsigned axis) noexcept {
   return (m & even_voxels[axis]) << (1U << axis) | (m & ~even_voxels[axis] & lower_half[axis]) << (7U << axis);
 }
-/// Each voxel's lower neighbour.
+/// Each voxel's lower neighbour along the axis, if it lies in the octant.
 [[nodiscard]] constexpr std::uint64_t moved_down(std::uint64_t m, unsigned axis) noexcept {
   return (m & ~even_voxels[axis]) >> (1U << axis) | (m & even_voxels[axis] & ~lower_half[axis]) >> (7U << axis);
 }
-/// The upper neighbours that lie in the next octant.
+/// The upper neighbours in the next octant.
 [[nodiscard]] constexpr std::uint64_t spilled_up(std::uint64_t m, unsigned axis) noexcept {
   return (m & highest_layer(axis)) >> (9U << axis);
 }
-/// The lower neighbours that lie in the octant before.
+/// The lower neighbours in the previous octant.
 [[nodiscard]] constexpr std::uint64_t spilled_down(std::uint64_t m, unsigned axis) noexcept {
   return (m & lowest_layer(axis)) << (9U << axis);
 }
 
-/// The voxels and their 26 neighbours, as far as they lie in the octant at `offset` (-1, 0 or 1 along each axis, in
-/// octants) from theirs.
+/// The voxels and their 26 neighbours that lie in the octant at `offset` from the voxels' octant (-1, 0 or 1 along each
+/// axis, in octants).
 [[nodiscard]] constexpr std::uint64_t dilated(std::uint64_t m, const std::array<int, 3>& offset) noexcept {
   for (unsigned axis = 0; axis != 3; ++axis)
     m = offset[axis] > 0   ? spilled_up(m, axis)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Which cells hang together.
+/// Connectivity of free cells.
 #pragma once
 
 #include <algorithm>
@@ -20,25 +20,26 @@
 
 namespace orbis::nav::detail {
 
-/// Whether cells hang together with those that a robot starts from: by free cells of which each is one of the 26 (on a
-/// floor 8) neighbours of another one. No search over cells leads to what does not. What does is not always reached, as
-/// a step between two free cells may be blocked.
+/// Tests whether cells are connected to the cells from which a robot starts, by free cells that are 26-neighbours (on a
+/// floor 8-neighbours) of each other. No search over cells reaches unconnected cells. Connected cells are not always
+/// reachable, because a step between two free cells may be blocked.
 ///
-/// Two floods, from the start and from elsewhere, take turns, each towards the other one's place, until they meet or
-/// one has no more cells. So it costs little to find that either side is enclosed, however large the other one is.
+/// Two floods, from the start and from the other cell, alternate, each growing towards the other one's origin, until
+/// they meet or one runs out of cells. So finding that either side is enclosed is cheap, however large the other one
+/// is.
 template <class Space>
 class cell_floods {
  public:
   using key = octree::voxel_key;
 
-  /// `doors`: the cells that it starts from. `goal`: finite.
+  /// `doors`: the cells of the start. `goal`: finite.
   cell_floods(const Space& space, const vec3& start, const std::vector<key>& doors, const vec3& goal)
       : space_{space}, start_{start}, goal_{space.clamped(goal)} {
     for (const key& k : doors) begin(k, mark::near);
   }
 
-  /// Whether `k`, which is free, hangs together with the start; true also if that is not known after each flood has
-  /// looked at `max_cells`. What was found out before is not looked at again.
+  /// Returns true if the free cell `k` is connected to the start, or if that is undecided after each flood has examined
+  /// `max_cells` cells. Results of earlier calls are reused.
   [[nodiscard]] bool may_reach(const key& k, std::size_t max_cells) {
     far_.clear();
     seen_far_.clear();
@@ -47,23 +48,22 @@ class cell_floods {
       is_met = grow(far_, mark::far) || grow(near_, mark::near);
     if (is_met) {
       for (const entry& e : far_) push(e.cell, mark::near);
-      for (const key& seen : seen_far_) mark_of(seen) = mark::near, look_at(seen);
+      for (const key& seen : seen_far_) mark_of(seen) = mark::near, update_nearest(seen);
       return true;
     }
     if (far_.empty() || near_.empty()) return false;
     for (const key& seen : seen_far_) mark_of(seen) = mark::free;
     return true;
   }
-  /// Whether one of them does.
+  /// Returns true if `may_reach` is true for one of the cells.
   [[nodiscard]] bool may_reach_any(const std::vector<key>& cells, std::size_t max_cells) {
     return std::any_of(cells.begin(), cells.end(), [&](const key& k) { return may_reach(k, max_cells); });
   }
-  /// The cell nearest to the goal that hangs together with the start, as far as a flood of `max_cells` finds it;
-  /// nothing without doors. O(cells around the goal that are nearer, or that are enclosed with one of these), or
-  /// O(cells that hang together with the start).
+  /// The cell nearest to the goal that is connected to the start, as far as a flood of `max_cells` finds it; empty
+  /// without doors. O(cells that are nearer to the goal, or enclosed together with one of these), or O(cells connected
+  /// to the start).
   [[nodiscard]] std::optional<key> nearest(std::size_t max_cells) {
-    // Cells around the goal in the order of their distances, as long as they are fewer than what may have to be
-    // flooded.
+    // Visit cells around the goal in the order of their distances, as long as they are fewer than the cells of a flood.
     constexpr double most = std::size_t{1} << 20U;
     std::array<std::int64_t, 3> middle{};
     const vec3 from_first = (goal_ - space_.center(key{})) / space_.resolution();
@@ -120,19 +120,19 @@ class cell_floods {
     if (m == mark::none) m = space_.is_free(k) ? mark::free : mark::blocked;
     return m != mark::blocked;
   }
-  /// The same as `add`. @pre in the space and free
+  /// Like `add`. @pre in the space and free
   bool begin(const key& k, mark which) {
     if (mark_of(k) <= mark::free) mark_of(k) = mark::free;
     return add(k, which);
   }
-  /// Puts a cell into a flood, if it is in none. True if it is in the other one.
+  /// Adds a cell to a flood if it is in none. Returns true if it is in the other one.
   bool add(const key& k, mark which) {
     if (!space_.contains(k) || !is_free(k)) return false;
     mark& m = mark_of(k);
     if (m != mark::free) return m != which;
     m = which;
     if (which == mark::near)
-      look_at(k);
+      update_nearest(k);
     else
       seen_far_.push_back(k);
     push(k, which);
@@ -143,12 +143,12 @@ class cell_floods {
     flood.push_back({squared_norm(space_.center(k) - (which == mark::near ? goal_ : start_)), k});
     std::push_heap(flood.begin(), flood.end());
   }
-  /// A cell that hangs together with the start.
-  void look_at(const key& k) {
+  /// Updates the nearest cell with `k`, which is connected to the start.
+  void update_nearest(const key& k) {
     if (const double away = squared_norm(space_.center(k) - goal_); away < nearest_away_)
       nearest_away_ = away, nearest_ = k;
   }
-  /// One more cell's neighbours. True if that is where the floods meet. @pre not empty
+  /// Adds the neighbours of one more cell. Returns true if the floods meet there. @pre not empty
   bool grow(std::vector<entry>& flood, mark which) {
     std::pop_heap(flood.begin(), flood.end());
     const key k = flood.back().cell;
@@ -158,8 +158,7 @@ class cell_floods {
       is_met = add({k.x + d % 3 - 1, k.y + d / 3 % 3 - 1, k.z + d / 9 - 1}, which) || is_met;
     return is_met;
   }
-  /// Calls visit(k) for the cells of the space that are `r` away from `middle` along one axis, and no more along
-  /// others.
+  /// Calls visit(k) for the cells of the space at Chebyshev distance `r` from `middle`.
   template <class Visit>
   void for_each_in_shell(const std::array<std::int64_t, 3>& middle, std::int64_t r, Visit&& visit) const {
     const auto visit_if_inside = [&](std::int64_t x, std::int64_t y, std::int64_t z) {
@@ -179,13 +178,13 @@ class cell_floods {
 
   const Space& space_;
   vec3 start_, goal_;
-  std::vector<entry> near_{}, far_{};  ///< cells of each flood whose neighbours have not been looked at
-  std::vector<key> seen_far_{};        ///< all of the other flood
+  std::vector<entry> near_{}, far_{};  ///< cells of each flood whose neighbours have not been visited
+  std::vector<key> seen_far_{};        ///< all cells of the other flood
   std::vector<std::unique_ptr<brick>> bricks_{};
   hash_index index_{};
   std::uint64_t last_name_ = ~std::uint64_t{0};
   brick* last_brick_ = nullptr;
-  std::optional<key> nearest_{};  ///< to the goal, in the start's flood
+  std::optional<key> nearest_{};  ///< nearest to the goal, in the flood of the start
   double nearest_away_ = std::numeric_limits<double>::infinity();
 };
 

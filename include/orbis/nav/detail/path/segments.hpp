@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Straight ways: whether a robot can go them, and what they cost.
+/// Straight segments: whether a robot can move along them, and their costs.
 #pragma once
 
 #include <algorithm>
@@ -16,24 +16,25 @@
 
 namespace orbis::nav::detail {
 
-/// What a metre costs so far (metres) from obstacles, see planning_options.
+/// Cost of a metre at a clearance (metres) from obstacles, see planning_options.
 [[nodiscard]] inline double clearance_density(const planning_options& options, double clearance) noexcept {
   const double lacking = 1.0 - std::max(0.0, clearance) / options.preferred_clearance;
   return lacking > 0.0 ? 1.0 + options.clearance_weight * lacking * lacking : 1.0;
 }
 
-/// What `margin` says where a robot certainly does not fit.
+/// Value of `margin` where a robot certainly does not fit.
 inline constexpr double blocked = -std::numeric_limits<double>::infinity();
 
-/// Whether the straight way from `a` to `b` is free. `margin(p)`: how far the robot can go from `p` in any direction;
-/// `blocked`; or less than 0 if that is not certain. `is_blocked(p, q)`: whether it cannot go from `p` to `q`, exactly.
-/// Steps from clearance to clearance, after J. C. Hart, "Sphere tracing", The Visual Computer 12, 1996.
+/// Returns true if the segment from `a` to `b` is free. `margin(p)`: the distance that the robot can certainly move
+/// from `p` in any direction; `blocked`; or less than 0 if that is not certain. `is_blocked(p, q)`: exact test whether
+/// the robot cannot move from `p` to `q`. Steps from clearance to clearance, after J. C. Hart, "Sphere tracing", The
+/// Visual Computer 12, 1996.
 template <class Margin, class IsBlocked>
-[[nodiscard]] bool is_way_free(const vec3& a, const vec3& b, double cell, Margin&& margin, IsBlocked&& is_blocked) {
+[[nodiscard]] bool is_segment_free(const vec3& a, const vec3& b, double cell, Margin&& margin, IsBlocked&& is_blocked) {
   const double length = norm(b - a);
   const auto at = [&](double t) -> vec3 { return t >= length ? b : vec3{a + (b - a) * (t / length)}; };
   const double least_step = 0.2 * cell;  // several of them cost less than an exact test
-  // First what costs little: most ways that are not free are seen to be so by the margins alone.
+  // Cheap tests first: the margins alone reject most blocked segments.
   bool is_near = false;
   double t = 0.0;
   do {
@@ -56,9 +57,9 @@ template <class Margin, class IsBlocked>
   return true;
 }
 
-/// Whether the margins alone say that it is free, in steps of a tenth of a cell at least.
+/// Returns true if the margins alone prove the segment free, in steps of at least a tenth of a cell.
 template <class Margin>
-[[nodiscard]] bool is_way_surely_free(const vec3& a, const vec3& b, double cell, Margin&& margin) {
+[[nodiscard]] bool is_segment_certainly_free(const vec3& a, const vec3& b, double cell, Margin&& margin) {
   const double length = norm(b - a);
   double t = 0.0;
   do {
@@ -69,8 +70,8 @@ template <class Margin>
   return true;
 }
 
-/// What the straight way from `a` to `b` costs: the integral of the density, which is constant in each cell, exactly.
-/// O(cells on the way). @pre both lie in the space
+/// Cost of the segment from `a` to `b`: the exact integral of the density, which is constant in each cell. O(cells on
+/// the segment). @pre both lie in the space
 ///
 /// J. Amanatides, A. Woo, "A fast voxel traversal algorithm for ray tracing", Eurographics, 1987.
 template <class Space>
@@ -82,8 +83,8 @@ template <class Space>
   std::array<std::uint32_t, 3> at{key->x, key->y, key->z};
   const std::array<std::uint32_t, 3> last{end->x, end->y, end->z};
   std::array<std::uint32_t, 3> step{};
-  // Where faces are crossed, metres along the way. Rounding errors add up, so that it could leave the grid in the end:
-  // along an axis nothing is crossed any more when the last cell is reached.
+  // Positions along the segment at which faces are crossed, metres. Rounding errors accumulate and could lead out of
+  // the grid at the end: along an axis no face is crossed after the last cell is reached.
   std::array<double, 3> next{}, apart{};
   constexpr double never = std::numeric_limits<double>::infinity();
   for (int i = 0; i != 3; ++i) {
@@ -98,7 +99,7 @@ template <class Space>
   while (t < length) {
     const std::size_t i = next[0] < next[1] ? (next[0] < next[2] ? 0U : 2U) : (next[1] < next[2] ? 1U : 2U);
     const double to = std::min(std::max(next[i], t), length);
-    // Through an edge or a corner the way leads past the cells beside it, which do not count.
+    // Through an edge or a corner the segment passes the adjacent cells, which do not count.
     if (to - t > 1e-9 * space.resolution()) density = space.density({at[0], at[1], at[2]});
     sum += (to - t) * density;
     t = to;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Cheapest ways over the middles of cells.
+/// Cheapest paths over cell centres.
 #pragma once
 
 #include <algorithm>
@@ -23,33 +23,33 @@ namespace orbis::nav::detail {
 
 enum class search_end : std::uint8_t {
   found,
-  exhausted,  ///< all that can be reached has been looked at
+  exhausted,  ///< all reachable cells have been expanded
   stopped     ///< at the limit
 };
 
-/// The length of the shortest way in steps along axes and diagonals, where nothing is in between; `d`: from one end to
-/// the other, metres. A metric.
+/// Length of the shortest path in steps along axes and diagonals without obstacles; `d`: from one end to the other,
+/// metres. A metric.
 [[nodiscard]] inline double length_in_steps(const vec3& d) noexcept {
   std::array<double, 3> s{std::abs(d.x()), std::abs(d.y()), std::abs(d.z())};
   std::sort(s.begin(), s.end());
   return 1.73205080756887729 * s[0] + 1.41421356237309505 * (s[1] - s[0]) + (s[2] - s[1]);
 }
 
-/// The cheapest way from a place to another over the middles of cells, with steps to all 26 (on a floor 8) neighbours.
+/// Search for the cheapest path between two places over cell centres, with steps to all 26 (on a floor 8) neighbours.
 ///
 /// - On the grid: A*, P. Hart, N. Nilsson, B. Raphael, "A formal basis for the heuristic determination of minimum cost
-///   paths", IEEE Transactions on Systems Science and Cybernetics 4(2), 1968. No way on the grid is cheaper.
+///   paths", IEEE Transactions on Systems Science and Cybernetics 4(2), 1968. The result is optimal on the grid.
 /// - At any angle: lazy Theta*, A. Nash, S. Koenig, C. Tovey, "Lazy Theta*: any-angle path planning and path length
-///   analysis in 3D", AAAI 2010. A cell is offered the parent of the cell that leads to it, as if it saw it.
+///   analysis in 3D", AAAI 2010. A cell is offered its predecessor's parent, as if it were visible.
 ///
-/// In both, whether a step can be taken, and what a line costs, is asked when the cell is the next to be looked at and
-/// not for each of its neighbours: until then costs are bounds from below. A cell whose cost rises then waits again.
-/// (Lazy evaluation of edges, as in C. Dellin, S. Srinivasa, "A unifying formalism for shortest path problems with
-/// expensive edge evaluations via lazy best-first search over paths with edge selectors", ICAPS 2016.)
+/// Both test whether a step is possible, and compute the cost of a line, when the cell is expanded and not for each of
+/// its neighbours: before that, costs are lower bounds. A cell whose cost rises is put back into the queue. (Lazy
+/// evaluation of edges, as in C. Dellin, S. Srinivasa, "A unifying formalism for shortest path problems with expensive
+/// edge evaluations via lazy best-first search over paths with edge selectors", ICAPS 2016.)
 ///
-/// The heuristic is the length that is left where nothing is in between, in steps or straight: it is admissible, as no
-/// way costs less than its length, and consistent, as it is a metric. At any angle, where no optimum is proven anyway,
-/// it may count more than that (I. Pohl, "First results on the effect of error in heuristic search", Machine
+/// The heuristic is the remaining length without obstacles, in steps or straight. It is admissible, because no path
+/// costs less than its length, and consistent, because it is a metric. At any angle, where no optimum is proven anyway,
+/// it may have a weight greater than 1 (I. Pohl, "First results on the effect of error in heuristic search", Machine
 /// Intelligence 5, 1970).
 template <class Space>
 class voxel_search {
@@ -60,8 +60,8 @@ class voxel_search {
   explicit voxel_search(const Space& space, bool any_angle = false, double weight = 1.0)
       : space_{space}, any_angle_{any_angle}, is_uniform_{space.is_uniform()}, weight_{any_angle ? weight : 1.0} {}
 
-  /// The cells to whose middles there is a free straight way from `p`: its own, or else its neighbours.
-  /// @pre `p` lies in the space
+  /// The cells with a free straight segment from `p` to their centre: the cell of `p`, otherwise its neighbours. @pre
+  /// `p` lies in the space
   [[nodiscard]] std::vector<key> doors(const vec3& p) const {
     const key own = *space_.key(p);
     const auto is_door = [&](const key& k) { return space_.contains(k) && space_.is_free(p, space_.center(k)); };
@@ -73,12 +73,12 @@ class voxel_search {
     return found;
   }
 
-  /// Looks for the cheapest way from `start` to `goal` through one of the cells `exits` (see doors), until that many
-  /// cells have been looked at. Without any exits, it looks at all that can be reached. Once.
+  /// Searches the cheapest path from `start` to `goal` through one of the cells `exits` (see doors), expanding at most
+  /// `max_expanded` cells. Without exits, it expands all reachable cells. Call it once.
   [[nodiscard]] search_end run(const vec3& start, const vec3& goal, const std::vector<key>& exits,
                                std::size_t max_expanded) {
     places_ = {start, goal};
-    goal_ = space_.clamped(goal);  // outside, the nearest point of the grid stands for it
+    goal_ = space_.clamped(goal);  // a goal outside is replaced by the nearest point of the grid
     exits_ = exits;
     for (const key& exit : exits_) exit_costs_.push_back(cost_of(space_, space_.center(exit), goal));
     doors_ = doors(start);
@@ -88,16 +88,16 @@ class voxel_search {
       const std::uint32_t n = number_of(k);
       offer(n, from, cost_of(space_, start, space_.center(k)), trust::sure);
     }
-    return go_on(max_expanded);
+    return resume(max_expanded);
   }
-  /// Goes on after it was stopped, until that many cells have been looked at altogether.
-  [[nodiscard]] search_end go_on(std::size_t max_expanded) {
+  /// Resumes a stopped search, with a limit on the total number of expanded cells.
+  [[nodiscard]] search_end resume(std::size_t max_expanded) {
     while (!open_.empty()) {
       std::pop_heap(open_.begin(), open_.end());
       const entry e = open_.back();
       open_.pop_back();
-      if (at(e.number).is_closed || at(e.number).cost != e.cost) continue;  // it has been offered something else since
-      if (!is_settled(e.number)) continue;
+      if (at(e.number).is_closed || at(e.number).cost != e.cost) continue;  // it has received another offer since
+      if (!confirm_cost(e.number)) continue;
       if (e.number != to && expanded_ >= max_expanded) {
         open_.push_back(e);
         std::push_heap(open_.begin(), open_.end());
@@ -111,11 +111,11 @@ class voxel_search {
     return search_end::exhausted;
   }
   [[nodiscard]] std::size_t expanded() const noexcept { return expanded_; }
-  /// What the way that was found costs.
+  /// Cost of the path that was found.
   [[nodiscard]] double cost() const noexcept { return ends_[1].cost; }
-  /// From the start to the goal or, if it was not reached, to the middle of the cell nearest to it. No point follows an
-  /// equal one.
-  [[nodiscard]] std::vector<vec3> way() {
+  /// The path from the start to the goal or, if the goal was not reached, to the centre of the nearest reached cell.
+  /// Consecutive points differ.
+  [[nodiscard]] std::vector<vec3> path() {
     std::vector<vec3> points;
     const auto add = [&](const vec3& p) {
       if (points.empty() || p != points.back()) points.push_back(p);
@@ -132,19 +132,19 @@ class voxel_search {
   static constexpr std::uint32_t brick_bits = is_flat ? 6 : 9;  ///< cells of a brick: 8x8x8, or 8x8 on a floor
   static constexpr std::uint32_t from = ~std::uint32_t{1}, to = ~std::uint32_t{0};  ///< the numbers of both ends
 
-  /// What is known of a cell's cost.
+  /// Certainty of a cell's cost.
   enum class trust : std::uint8_t {
-    bound,  ///< it costs no less to come from the parent
-    exact,  ///< it costs that, if the way is free
-    sure    ///< the way is free
+    bound,  ///< a path from the parent costs no less
+    exact,  ///< the cost if the segment is free
+    sure    ///< the segment is free
   };
   struct node {
     double cost = infinity;
-    double density = 0.0;  ///< 0: not asked
+    double density = 0.0;  ///< 0: not computed
     std::uint32_t parent = from;
-    std::uint32_t tried = to;  ///< the last parent whose line was blocked or cost more than was hoped for
-    std::uint32_t barred = 0;  ///< directions of neighbours from which no step leads here; of the goal: exits
-    std::uint8_t free = 0;     ///< 0: not asked, 1: no, 2: yes
+    std::uint32_t tried = to;  ///< the last parent whose line was blocked or cost more than expected
+    std::uint32_t barred = 0;  ///< directions of neighbours without a step to this cell; of the goal: exits
+    std::uint8_t free = 0;     ///< 0: not tested, 1: no, 2: yes
     trust known = trust::bound;
     bool is_closed = false;
   };
@@ -204,7 +204,7 @@ class voxel_search {
     if (n.density == 0.0) n.density = space_.density(k);
     return n.density;
   }
-  /// From the middle of a cell to its neighbour's, half of it in each.
+  /// Cost of the step from the centre of a cell to its neighbour's, half of it in each.
   [[nodiscard]] double step_cost(node& a, const key& from_key, node& b, const key& to_key, unsigned direction) const {
     const double length = step_length(direction);
     return is_uniform_ ? length : length * (0.5 * (density(a, from_key) + density(b, to_key)));
@@ -212,7 +212,7 @@ class voxel_search {
 
   // -- costs
 
-  /// No way is cheaper to the goal or, on the grid, to an exit and from there to the goal.
+  /// Lower bound on the cost from a cell to the goal or, on the grid, to an exit and from there to the goal.
   [[nodiscard]] double ahead(std::uint32_t number) const {
     if (number == to) return 0.0;
     const vec3 p = position(number);
@@ -238,11 +238,11 @@ class voxel_search {
     if (const double away = squared_norm(space_.center(k) - goal_); away < nearest_away_)
       nearest_away_ = away, nearest_ = number;
     node& n = at(number);
-    // As if the parent saw them; it costs its length at least.
+    // As if they were visible from the parent; a line costs at least its length.
     const std::uint32_t above = any_angle_ ? n.parent : number;
     const double above_cost = at(above).cost;
     const vec3 above_position = position(above);
-    // A line costs its length at least and, in the half cells at its ends, what these cost.
+    // A line costs at least its length and, in the half cells at its ends, their densities.
     const auto half_cell = [&](node& end, const key& end_key) {
       return is_uniform_ ? 0.0 : 0.5 * space_.resolution() * (density(end, end_key) - 1.0);
     };
@@ -250,42 +250,41 @@ class voxel_search {
     const trust known = any_angle_ && !is_uniform_ ? trust::bound : trust::exact;
     for (std::size_t i = 0; i != exits_.size(); ++i)
       if (exits_[i] == k)
-        offer(to, above, any_angle_ ? above_cost + norm(places_[1] - above_position) : n.cost + exit_costs_[i],
-              known);
+        offer(to, above, any_angle_ ? above_cost + norm(places_[1] - above_position) : n.cost + exit_costs_[i], known);
     for_each_direction([&](unsigned direction) {
       const key beside = neighbor(k, direction);
       if (!space_.contains(beside)) return;
       const std::uint32_t other = number_of(beside);
       node& m = at(other);
       if (m.is_closed || m.free == 1) return;
-      if (any_angle_ && !is_uniform_ && m.tried == above) {  // its cost is known: what may be new is the step
+      if (any_angle_ && !is_uniform_ && m.tried == above) {  // its cost is known: only the step may be new
         if ((m.barred >> (26 - direction) & 1U) != 0) return;
         const double cost = n.cost + step_cost(n, k, m, beside, direction);
         if (cost < m.cost && is_free(m, beside)) offer(other, number, cost, trust::exact);
         return;
       }
-      const double cost = any_angle_
-                              ? line_begin + norm(space_.center(beside) - above_position) + half_cell(m, beside)
-                              : n.cost + step_cost(n, k, m, beside, direction);
+      const double cost = any_angle_ ? line_begin + norm(space_.center(beside) - above_position) + half_cell(m, beside)
+                                     : n.cost + step_cost(n, k, m, beside, direction);
       if (cost < m.cost && is_free(m, beside)) offer(other, above, cost, known);
     });
   }
 
-  /// Whether the cell's cost is what it says. If not, it waits again, with what is its cheapest way then.
-  [[nodiscard]] bool is_settled(std::uint32_t number) {
+  /// Returns true if the stored cost of the cell is correct. Otherwise puts it back into the queue with its cheapest
+  /// path.
+  [[nodiscard]] bool confirm_cost(std::uint32_t number) {
     node& n = at(number);
     if (n.known == trust::sure) return true;
     const std::uint32_t parent = n.parent;
-    // A line over several cells is worth little time; if it is free but barely so, steps lead there, and the shortening
-    // afterwards finds it.
+    // Testing a line over several cells is worth little time; if it is just free, steps lead there, and shortening
+    // finds the line afterwards.
     const unsigned direction = direction_between(parent, number);
     double cost = infinity;
-    const auto is_way_free = [&] {
+    const auto is_line_free = [&] {
       const vec3 a = position(parent), b = position(number);
       if (direction != none) return space_.is_free(a, b);
       return !(is_uniform_ && n.tried == parent) && space_.is_surely_free(a, b);
     };
-    if (is_way_free()) {
+    if (is_line_free()) {
       cost = n.known == trust::exact ? n.cost : at(parent).cost + cost_of(space_, position(parent), position(number));
       if (cost <= n.cost) {
         n.known = trust::sure;
@@ -300,7 +299,7 @@ class voxel_search {
     offer(number, parent, cost, trust::sure);
     return false;
   }
-  /// Which of its neighbours (of the goal: which exit) `parent` is; `none`, if it is none of them.
+  /// Index of the neighbour (of the goal: of the exit) that `parent` is; `none` if it is none of them.
   [[nodiscard]] unsigned direction_between(std::uint32_t parent, std::uint32_t number) const {
     if (parent == from) return none;
     const key p = key_of(parent);
@@ -313,7 +312,7 @@ class voxel_search {
     const std::uint32_t x = p.x - k.x + 1, y = p.y - k.y + 1, z = p.z - k.z + 1;
     return std::max({x, y, z}) <= 2 ? z * 9 + y * 3 + x : none;
   }
-  /// Offers a cell the cheapest of the steps that lead to it from what is closed.
+  /// Offers a cell the cheapest step from a closed cell.
   void offer_steps(std::uint32_t number) {
     node& n = at(number);
     std::uint32_t best = from;
