@@ -47,7 +47,7 @@ struct meaning {
   std::string text;
 };
 
-/// What is seen from above, metres.
+/// Extent of a view from above, metres.
 struct window {
   vec2 low, high;
 };
