@@ -3,6 +3,7 @@
 /// A type-erased depth image and camera, so that the marking of depth images is compiled once.
 #pragma once
 
+#include <concepts>
 #include <cstdint>
 #include <variant>
 
@@ -29,7 +30,8 @@ class depth_scan {
   template <camera::depth_source Depth, camera::camera_model Camera>
   depth_scan(const Depth& depth, const Camera& camera)
       : camera_{&camera}, fit_{[](const void* c, pixel_rays& rays) { rays.fit(*static_cast<const Camera*>(c)); }} {
-    if constexpr (requires { image_ = depth; })
+    if constexpr (std::same_as<Depth, camera::depth_view<std::uint16_t>> ||
+                  std::same_as<Depth, camera::depth_view<float>>)
       image_ = depth;
     else
       image_ = other_depth{&depth, static_cast<int>(depth.width()), static_cast<int>(depth.height()),
