@@ -97,6 +97,8 @@ template <class Slam>
     return poses.has_value();
   };
 }
+template <class Slam>
+void follow_keyframes(const Slam&&) = delete;
 
 struct live_map_counters {
   std::size_t keyframes = 0;          ///< inserted
