@@ -207,8 +207,8 @@ class dense_cloud {
   /// The whole depth image of keyframe `number` (every pixel, whatever the stride; the stored values, see `view_like`)
   /// with 0 in the pixels that the cloud leaves out: those with a depth out of range, flying pixels if they are
   /// removed, and pixels that belong to a point that is not in `kept`. A pixel between the strides belongs to the point
-  /// in its voxel, or otherwise to the point of its block of stride x stride pixels if their depths agree within 3 cm +
-  /// 2 %; a pixel that belongs to no point is left out. O(pixels). @pre as for `measurements`
+  /// in its voxel, or otherwise to the point of its block of stride x stride pixels if their depths agree within 3 cm
+  /// and 2 % per pixel between them; a pixel that belongs to no point is left out. O(pixels). @pre as for `measurements`
   template <execution_policy Policy, keyframe_like Keyframe>
   [[nodiscard]] auto masked_depth(const Policy& policy, const Keyframe& k, std::size_t number,
                                   const selection& kept = {}) const {
@@ -295,11 +295,13 @@ class dense_cloud {
   }
 
  private:
-  /// Returns true if the depth of a pixel agrees with that of the pixel of its block that is in the cloud.
+  /// Returns true if the depth of a pixel agrees with that of the pixel of its block that is in the cloud: within 3 cm
+  /// and 2 % for each pixel between them, so that slanted surfaces agree at any stride.
   template <class Depth>
   [[nodiscard]] bool is_like_its_block(const Depth& depth, int x, int y) const {
-    const float z = depth(x, y), of_block = depth(x - x % options_.stride, y - y % options_.stride);
-    return std::abs(z - of_block) <= 0.03F + 0.02F * std::min(z, of_block);
+    const int dx = x % options_.stride, dy = y % options_.stride;
+    const float z = depth(x, y), of_block = depth(x - dx, y - dy);
+    return std::abs(z - of_block) <= static_cast<float>(std::max(dx, dy)) * (0.03F + 0.02F * std::min(z, of_block));
   }
 
   struct frame {
