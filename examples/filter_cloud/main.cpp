@@ -32,7 +32,9 @@ int main(int argc, char** argv) try {
   cli.add_option("IN", input, "input .ply or .pcd file")->required();
   cli.add_option("OUT", output, "output .ply file")->required();
   const auto names = {"auto", "none", "statistical", "radius", "log-statistical", "range-statistical", "cluster"};
-  cli.add_option("--filter", filter, "filter; auto: by the cloud")->capture_default_str()->check(CLI::IsMember(names));
+  cli.add_option("--filter", filter, "outlier filter; auto: selected by analysing the cloud")
+      ->capture_default_str()
+      ->check(CLI::IsMember(names));
   cli.add_option("--neighbors", k, "number of neighbours (depends on the filter)")->check(CLI::Range(1, 100'000));
   cli.add_option("--sigma", sigma, "(range-)statistical: limit in standard deviations")->capture_default_str();
   cli.add_option("--voxel", voxel, "reduce to one point per voxel of this size in metres; 0: off")

@@ -394,7 +394,7 @@ std::variant<settings, exit_code> read_command_line(int argc, char** argv) {
   demo->add_option("--seed", s.seed, "of the room, the camera's path and the sensor's noise")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
-  demo->add_flag("--plain", s.plain, "one round only, without the person and the stray depths");
+  demo->add_flag("--plain", s.plain, "record one round, without the person and stray depths");
   demo->add_flag("--person", s.person, "with --plain: a person walks through the room");
   add_map_options(*demo, s);
   add_slam_options(*demo, s);

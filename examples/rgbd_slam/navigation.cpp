@@ -30,8 +30,7 @@ struct way {
   nav::found_path path;
 };
 
-/// Of the places where the camera was or looked along its axis, those where the robot fits. For a robot that drives,
-/// `view` drops them onto the floor.
+/// Positions on the camera's path and along its optical axis where the robot fits; on the floor for a driving robot.
 template <nav::planning_space View>
 std::vector<vec3> free_places(const View& view, const orbis::trajectory& cameras) {
   std::vector<vec3> places;

@@ -107,7 +107,7 @@ result<std::unique_ptr<file_recording>> read_video(const std::filesystem::path& 
   }
   cv::VideoCapture reader{path.string()};
   if (!reader.isOpened())
-    return fail(errc::unsupported, path.string(), "is no folder, no bag, and no video that OpenCV can read");
+    return fail(errc::unsupported, path.string(), "is not a folder, a bag, or a video that OpenCV can read");
   if (!camera)
     return fail(errc::invalid_argument, path.string(),
                 "unknown camera: put a camera.toml next to the video, or name a camera");

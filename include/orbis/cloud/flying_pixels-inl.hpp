@@ -33,7 +33,7 @@ struct flying_limits {
   float margin;
 };
 
-/// Difference of inverse depths that noise can explain.
+/// Largest difference of inverse depths that noise explains.
 ORBIS_ALWAYS_INLINE float flying_tolerance(float w, const flying_limits& limits) noexcept {
   const float quantised = limits.resolution * (w * w);
   return quantised < limits.noise ? limits.noise : quantised;

@@ -79,8 +79,8 @@ class fcl_shape {
 };
 
 #if FCL_HAVE_OCTOMAP
-/// The map for FCL's own functions: occupied where the sensor model says so, free elsewhere, including unknown space. A
-/// copy: O(voxels), and OctoMap's memory. Requires FCL built with OctoMap.
+/// Copies the map for FCL's own functions: occupied according to the sensor model, free elsewhere, including unknown
+/// space. O(voxels), as large as OctoMap's map. Requires FCL built with OctoMap.
 template <octree::octomap_model Model>
 [[nodiscard]] std::shared_ptr<fcl::OcTreed> to_fcl(const octree::occupancy_octree<Model>& map) {
   const std::shared_ptr<const octomap::OcTree> tree = to_octomap(map);

@@ -70,7 +70,8 @@ ORBIS_INLINE result<void> write_pcd(const std::filesystem::path& path, const poi
   for (const rgb8& c : cloud.colors) append_little_endian(columns, detail::packed_rgb(c));
   const std::string compressed = detail::lzf_compress(columns);
   if (std::max(columns.size(), compressed.size()) > UINT32_MAX)
-    return fail(errc::invalid_argument, path.string(), "too large for a PCD file");
+    return fail(errc::invalid_argument, path.string(),
+                "more than 4 GiB, the limit of compressed PCD files; write a PLY file");
   append_little_endian(bytes, static_cast<std::uint32_t>(compressed.size()));
   append_little_endian(bytes, static_cast<std::uint32_t>(columns.size()));
   bytes += compressed;

@@ -176,8 +176,8 @@ template <class Octree, execution_policy Policy, keyframe_range Keyframes, camer
   keyframe_points points;
   static_depth<depth_type> standing;
   cloud::view_samples samples;
-  std::vector<std::vector<removed_cell>>
-      moved;  // per keyframe that is not skipped; `place`: their positions in the range
+  // Per keyframe that is not skipped; `place`: their positions in the range.
+  std::vector<std::vector<removed_cell>> moved;
   std::vector<std::size_t> place;
   image<pixel> masked(camera.width(), camera.height());
   const auto mask = [&](const auto& depth) {

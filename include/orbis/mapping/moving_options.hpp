@@ -10,8 +10,8 @@
 namespace orbis::mapping {
 
 struct moving_filter_options {
-  std::size_t keyframes =
-      8;  ///< number of last keyframes that are compared with each other, > 0; older ones do not change
+  /// Number of latest keyframes that are compared with each other, > 0; older ones do not change.
+  std::size_t keyframes = 8;
   /// Two depths z are equal if they differ by less than margin + margin_growth z^2, which covers noise and small pose
   /// errors. Metres; 1 / metres.
   float margin = 0.03F;

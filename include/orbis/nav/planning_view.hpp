@@ -166,8 +166,8 @@ class planning_view {
                                                                           options_};
     return thicker.is_free(a, b);
   }
-  /// Returns true if the field alone proves a segment free: true only if `is_free(a, b)` is, and false also if that
-  /// would have to read the map. O(length / distance to the obstacles).
+  /// Returns true if the field alone proves a segment free. False does not mean blocked: the map may still decide
+  /// that it is free. O(length / distance to the obstacles).
   [[nodiscard]] bool is_surely_free(const vec3& a, const vec3& b) const {
     if (!is_in_region(a) || !is_in_region(b) || !is_short(a, b)) return false;
     squared_distance_view::reader reader{field_->voxels()};

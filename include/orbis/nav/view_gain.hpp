@@ -55,8 +55,8 @@ class view_gain {
     if (options.bounds) counted_ = octree::keys_between(grid_, options.bounds->min, options.bounds->max);
     counts_any_ = !options.bounds || counted_;
   }
-  view_gain(const Map&&, const Camera&,
-            const view_gain_options& = {}) = delete;  // a temporary would not outlive the gain
+  // A temporary would not outlive the gain.
+  view_gain(const Map&&, const Camera&, const view_gain_options& = {}) = delete;
 
   /// The number of unknown voxels seen from a pose; 0 from outside of the grid. O(voxels along the rays)
   [[nodiscard]] std::size_t operator()(const se3& T_world_camera) {

@@ -132,7 +132,7 @@ enum class pose_graph_status {
   nothing_to_do,    ///< no edge at a movable vertex
   bad_vertex,       ///< vertex `where` is not finite
   missing_vertex,   ///< edge `where` refers to a nonexistent vertex
-  self_edge,        ///< edge `where` connects a vertex with itself
+  self_edge,        ///< edge `where` connects a vertex to itself
   bad_measurement,  ///< edge `where`: the measurement is not finite
   bad_information,  ///< edge `where`: the information is not finite, not symmetric or not positive definite
   no_gauge,         ///< vertex `where` is in a connected component without a fixed vertex
@@ -156,7 +156,7 @@ enum class pose_graph_status {
     case pose_graph_status::nothing_to_do: return "nothing to do";
     case pose_graph_status::bad_vertex: return vertex("is not finite");
     case pose_graph_status::missing_vertex: return edge("refers to a nonexistent vertex");
-    case pose_graph_status::self_edge: return edge("connects a vertex with itself");
+    case pose_graph_status::self_edge: return edge("connects a vertex to itself");
     case pose_graph_status::bad_measurement: return edge("has a measurement that is not finite");
     case pose_graph_status::bad_information:
       return edge("has an information matrix that is not symmetric and positive definite");

@@ -77,7 +77,7 @@ template <std::size_t Bits>
   }
   tree.nodes.back() = {static_cast<std::uint32_t>(next), inner};
   if (next != tree.node_count) return "fewer children than nodes";
-  if (!child_counts.empty() && child_counts.back() == 0) return "the last of the inner nodes has no children";
+  if (!child_counts.empty() && child_counts.back() == 0) return "the last inner node has no children";
   if (tree.node_count - inner != (tree.word_count() == 0 ? 1 : tree.word_count()))
     return std::to_string(tree.node_count - inner) + " leaves, but " + std::to_string(tree.word_count()) + " words";
   for (const float weight : tree.weights)

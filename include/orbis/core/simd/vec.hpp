@@ -122,8 +122,8 @@ struct vec {
       out.v.low = half::load(p), out.v.high = half::load(p + N / 2);
     return out;
   }
-  /// Loads the first n <= N numbers at p, then zeros. Reads only these; through memory unless they are four- or
-  /// eight-byte numbers in one register of AVX2 or AVX-512.
+  /// Loads the first n <= N numbers at p, then zeros. Reads only these. Copies through memory unless the numbers
+  /// have four or eight bytes and fill one register of AVX2 or AVX-512.
   [[nodiscard]] static ORBIS_ALWAYS_INLINE vec load(const T* p, std::size_t n) noexcept {
 #if ORBIS_X86
     if constexpr (is_native && sizeof(T) >= 4 && sizeof(native) >= 32) {

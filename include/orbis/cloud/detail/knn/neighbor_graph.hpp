@@ -68,7 +68,7 @@ class neighbor_graph {
   [[nodiscard]] std::size_t size() const noexcept { return tree_.in_leaves + tree_.left_out.size(); }
   [[nodiscard]] std::size_t width() const noexcept { return width_; }
   [[nodiscard]] const leaf_hierarchy& tree() const noexcept { return tree_; }
-  /// Index in the cloud of the point at a place.
+  /// Index in the cloud of the point at `place`.
   [[nodiscard]] std::uint32_t index(std::size_t place) const noexcept {
     return is_in_leaf(place) ? tree_.members[place] : copy(place).index;
   }

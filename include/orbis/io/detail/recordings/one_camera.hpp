@@ -81,7 +81,7 @@ inline constexpr double mono_pose_distance = 0.020;
 
 // --- KITTI --------------------------------------------------------------------------------------
 
-/// The number of the camera whose images a KITTI sequence contains: left ones first, grey ones first.
+/// Number of the first camera of a KITTI sequence that has images: left before right, grey before colour.
 [[nodiscard]] inline std::optional<int> kitti_camera(const std::filesystem::path& folder) {
   for (const int i : {0, 2, 1, 3})
     if (present(folder / ("image_" + std::to_string(i)))) return i;

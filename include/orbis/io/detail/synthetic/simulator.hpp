@@ -47,7 +47,7 @@ class simulator {
     assert(depth_scale > 0.0);
   }
 
-  /// Colour, depth (metres) and angles of a moment without sensor errors.
+  /// Error-free colour, depth (metres) and angles at one moment.
   template <execution_policy Policy>
   [[nodiscard]] exact_view exact(const Policy& policy, const moment& m) const {
     const renderer picture{m.solids, *textures_, m.pose, k_};

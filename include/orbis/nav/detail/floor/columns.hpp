@@ -160,7 +160,7 @@ template <planning_map Map>
     map_access<Map>::for_each_octant(map, box, take);
   else
     map_access<Map>::for_each_octant(map, take);
-  if (parts.empty()) return fail(errc::no_data, "", "nothing is known at the floor's height");
+  if (parts.empty()) return fail(errc::no_data, "", "all space at the floor's height is unknown");
   const std::array<std::uint32_t, 3> size{around.high.x + 4 - around.low.x, around.high.y + 4 - around.low.y,
                                           around.high.z + 4 - around.low.z};
   if (std::uint64_t{size[0]} * size[1] > most || std::uint64_t{size[0]} * size[1] * ((size[2] + 63) / 64) > most)
