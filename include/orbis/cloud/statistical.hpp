@@ -118,8 +118,8 @@ struct range_statistical_result {
   double threshold = std::numeric_limits<double>::infinity();  ///< mu + alpha sigma; points above it are outliers
 };
 
-/// Classifies points by known mean distances and ranges: see `range_statistical_inliers`. `non_finite` decides on points without
-/// a mean distance (NaN); points without a range only are kept. O(n).
+/// Classifies points by known mean distances and ranges: see `range_statistical_inliers`. `non_finite` decides on
+/// points without a mean distance (NaN); points without a range only are kept. O(n).
 /// @pre ranges is as long as mean_distance; angle >= 0, noise >= 0 and not both zero; least_range > 0
 [[nodiscard]] range_statistical_result range_statistical_decision(std::span<const float> mean_distance,
                                                                   std::span<const float> ranges,

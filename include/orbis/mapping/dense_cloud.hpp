@@ -208,7 +208,8 @@ class dense_cloud {
   /// with 0 in the pixels that the cloud leaves out: those with a depth out of range, flying pixels if they are
   /// removed, and pixels that belong to a point that is not in `kept`. A pixel between the strides belongs to the point
   /// in its voxel, or otherwise to the point of its block of stride x stride pixels if their depths agree within 3 cm
-  /// and 2 % per pixel between them; a pixel that belongs to no point is left out. O(pixels). @pre as for `measurements`
+  /// and 2 % per pixel between them; a pixel that belongs to no point is left out. O(pixels).
+  /// @pre as for `measurements`
   template <execution_policy Policy, keyframe_like Keyframe>
   [[nodiscard]] auto masked_depth(const Policy& policy, const Keyframe& k, std::size_t number,
                                   const selection& kept = {}) const {
