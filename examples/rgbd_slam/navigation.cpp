@@ -105,9 +105,10 @@ orbis::result<navigation_results> navigate(const octree& map, const orbis::traje
     r.path_m = found->path.length;
     r.straight_m = (found->to - found->from).norm();
   };
-  if (floor && r.free_m2 > 0.0) {  // drive if there is a way on the floor, otherwise fly
+  if (floor && r.free_m2 > 0.0) {  // a path on the floor, if it is more than a few steps; otherwise a flight
     const nav::floor_view on_floor{*floor, s.robot_radius};
-    note(plan_through(on_floor, free_places(on_floor, cameras)), true);
+    const auto found = plan_through(on_floor, free_places(on_floor, cameras));
+    if (found && (found->to - found->from).norm() >= 5.0 * s.robot_radius) note(found, true);
   }
   if (r.path.empty()) {
     const nav::planning_view<octree> ball{map, field, s.robot_radius};

@@ -46,7 +46,7 @@ function(make_small_room file)
   file(WRITE ${file} "ply\nformat ascii 1.0\nelement vertex ${count}\nproperty float x\nproperty float y\nproperty float z\nend_header\n${points}")
 endfunction()
 
-set(room_run demo --frames 90 --stride 4 --width 320 --resolution 0.1 --threads 1 --out room)
+set(room_run demo --plain --frames 90 --stride 4 --width 320 --resolution 0.1 --threads 1 --out room)
 # The rest is unknown.
 make_plate(${WORK}/cloud.ply)
 app(0 map cloud.ply --out plate --resolution 0.1 --filter none)

@@ -134,7 +134,7 @@ TEST_CASE("The relative pose says why there is none") {
   CHECK(why(nonsense, {.max_iterations = 200, .min_inliers = 100}).message.find("no model has enough inliers") == 0);
   two_images bad = turned;
   for (auto& p : bad.first) p.x() = std::numeric_limits<double>::quiet_NaN();
-  CHECK(why(bad).message.find("of 200 matches 0 are finite") == 0);
+  CHECK(why(bad).message.find("only 0 of 200 matches are finite") == 0);
   two_images few = turned;
   few.first.resize(4);
   CHECK(why(few).code == errc::invalid_argument);
