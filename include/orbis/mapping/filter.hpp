@@ -161,7 +161,7 @@ template <execution_policy Policy, point_range Points>
       [&](const cloud::ray_evidence_options&) { return detail::all_indices(std::ranges::size(points)); });
   if (options.kind == filter_kind::ray_evidence) {
     out.report.mode.clear();
-    out.report.reason = "ray evidence requested, but there are no depth images: every point is kept";
+    out.report.reason = "requested ray evidence, but there are no depth images: every point is kept";
   }
   return out;
 }
