@@ -14,7 +14,8 @@ using namespace orbis;
 using namespace orbis::interop;
 
 static_assert(point_range<strided_points<float>> && point_range<const strided_points<double>&>);
-static_assert(std::ranges::view<strided_points<float>> && std::ranges::random_access_range<strided_points<float>>);
+static_assert(std::ranges::view<strided_points<float>> && std::ranges::borrowed_range<strided_points<float>>);
+static_assert(std::random_access_iterator<strided_points<float>::iterator>);
 
 namespace {
 
@@ -55,11 +56,10 @@ TEST_CASE("points in wider records, in planes of coordinates and in padded rows"
   CHECK(all[3] == point{13, 14, 15});
 }
 
-TEST_CASE("iterators go anywhere") {
+TEST_CASE("iterators go anywhere, and on without their view") {
   const std::vector<float> buffer = numbers(30);
-  const strided_points points{buffer.data(), 10};
-  const auto first = points.begin();
-  const auto last = points.end();
+  const auto first = strided_points{buffer.data(), 10}.begin();
+  const auto last = strided_points{buffer.data(), 10}.end();
   CHECK(last - first == 10);
   CHECK(*(first + 9) == point{27, 28, 29});
   CHECK(*(last - 1) == first[9]);
