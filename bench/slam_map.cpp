@@ -107,7 +107,7 @@ void add_row(const std::string& what, std::size_t length, Work&& work) {
         add_keyframe(grown, random);
         const auto newest = grown.keyframes().back().id;
         slam::detail::cull_landmarks(grown, newest, {});
-        slam::detail::cull_keyframes(grown, newest, 3.2, {});
+        slam::detail::cull_keyframes(grown, newest, 3.2, {}, [](slam::keyframe_id) { return false; });
       }
     });
     add_row("essential_graph", length, [](benchmark::State& state, const slam::map& m) {
