@@ -256,13 +256,12 @@ class dense_cloud {
     reader.read(
         policy, depth, rays_, points, T_world_camera, [&](std::size_t part, int x, int y, const vec3f& point, float) {
           std::optional<bool> is_kept = readers[part].find(point.cast<double>());
-          if (!is_kept && !is_like_its_block(depth, x, y)) is_kept = false;
-          if (!is_kept) {  // decided by the point of its block
+          if (!is_kept && is_like_its_block(depth, x, y)) {  // decided by the point of its block
             const auto block =
                 keyframe_points::point_at(depth, x - x % options_.stride, y - y % options_.stride, rays_, points, pose);
-            is_kept = block && readers[part].find(block->template cast<double>()).value_or(false);
+            if (block) is_kept = readers[part].find(block->template cast<double>());
           }
-          if (!*is_kept) out(x, y) = 0;
+          if (!is_kept.value_or(false)) out(x, y) = 0;
         });
   }
   /// The measurements of keyframe `number` in the world frame, at its latest pose, whose point of the cloud is in
