@@ -307,7 +307,8 @@ class renderer {
 
 frame_source make_synthetic(const settings& s) {
   constexpr std::size_t round = 360;  // one degree per frame
-  const std::size_t rounds = s.plain ? 1 : 2;
+  const orbis::io::synthetic_path_options path{.sees_floor = !s.plain};
+  const auto rounds = static_cast<std::size_t>(path.rounds());
   const std::size_t frames = s.frames == 0 ? rounds * round : std::min<std::size_t>(s.frames * s.stride, 1'000'000);
   const bool person = s.person || !s.plain;
   const auto width = static_cast<int>(s.width / 4 * 4);
@@ -317,7 +318,7 @@ frame_source make_synthetic(const settings& s) {
                                              .height = width / 4 * 3,
                                              .frames_around = static_cast<int>(std::max(frames / rounds, round)),
                                              .scene = {.person = person},
-                                             .path = {.sees_floor = !s.plain},
+                                             .path = path,
                                              .sensor = {.stray_depths = s.plain ? 0.0 : 0.001}};
   const auto recording = std::make_shared<const orbis::io::synthetic_recording>(options);  // of no frame: small
   const auto frames_of = std::make_shared<renderer>(options);

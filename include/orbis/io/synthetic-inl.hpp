@@ -22,7 +22,7 @@ namespace detail::synthetic {
 struct recorded_room {
   recorded_room(const synthetic_options& options, const camera::intrinsics& k)
       : path{options.path, options.seed,
-             (options.frames_around > 0 ? (options.path.sees_floor ? 2 : 1) * options.frames_around : options.frames) /
+             (options.frames_around > 0 ? options.path.rounds() * options.frames_around : options.frames) /
                  options.fps},
         surfaces{options.scene, options.seed},
         camera{std::make_shared<texture_set>(painted(surfaces), std::max(0.003, 2.0 / k.fx)),  // a pixel at 2 m

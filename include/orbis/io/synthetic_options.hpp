@@ -34,6 +34,9 @@ struct synthetic_path_options {
   bool sees_floor = false;    ///< adds a round that looks inward and down at the floor
   double wobble = 1.0;        ///< scales the slow sway in height, distance, yaw, pitch and roll
   double jitter = 1.0;        ///< scales the tremor of the hand (millimetres, tenths of degrees)
+
+  /// Number of rounds of the path.
+  [[nodiscard]] int rounds() const noexcept { return sees_floor ? 2 : 1; }
 };
 
 /// Errors of a Kinect- or Astra-like camera; 0 (or false) disables one.

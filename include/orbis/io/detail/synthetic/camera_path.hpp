@@ -67,7 +67,7 @@ class camera_path {
 
   /// The pose `time` seconds after the start. World: z up, the floor at z = 0.
   [[nodiscard]] camera_pose at(double time) const noexcept {
-    const double trip = (options_.sees_floor ? 2.0 : 1.0) * progress(time / duration_), turn = start_ + trip;
+    const double trip = options_.rounds() * progress(time / duration_), turn = start_ + trip;
     const double inward = options_.sees_floor ? inwardness(trip - 1.0) : 0.0;
     const auto sway = [&](double amplitude, int harmonic, double phase) {
       return options_.wobble * amplitude * sin_turns(static_cast<double>(harmonic) * turn + phase);
