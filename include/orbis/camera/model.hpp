@@ -10,6 +10,28 @@
 
 namespace orbis::camera {
 
+namespace detail {
+
+template <class C>
+concept has_image_size = requires(const C& camera) {
+  { camera.width() } -> std::convertible_to<int>;
+  { camera.height() } -> std::convertible_to<int>;
+};
+template <class C>
+concept projects = requires(const C& camera, const vec3& point) {
+  { camera.project(point) } -> std::same_as<std::optional<vec2>>;
+};
+template <class C>
+concept projects_with_jacobian = requires(const C& camera, const vec3& point, matrix<2, 3>& jacobian) {
+  { camera.project(point, jacobian) } -> std::same_as<std::optional<vec2>>;
+};
+template <class C>
+concept unprojects = requires(const C& camera, const vec2& pixel) {
+  { camera.unproject(pixel) } -> std::same_as<std::optional<vec3>>;
+};
+
+}  // namespace detail
+
 /// A central projection. Camera frame: x right, y down, z forward, metres. Pixels: centres at integers.
 ///
 /// - `project(p)`: the pixel of a point in the camera frame, empty if there is none (behind the camera, outside the
@@ -17,38 +39,17 @@ namespace orbis::camera {
 /// - `project(p, J)`: the pixel, and the derivative of the pixel by the point (2x3).
 /// - `unproject(pixel)`: the ray through a pixel, scaled to z = 1, empty if the inversion fails.
 template <class C>
-concept camera_model = requires(const C& camera, const vec3& point, const vec2& pixel, matrix<2, 3>& jacobian) {
-  { camera.width() } -> std::convertible_to<int>;
-  { camera.height() } -> std::convertible_to<int>;
-  { camera.project(point) } -> std::same_as<std::optional<vec2>>;
-  { camera.project(point, jacobian) } -> std::same_as<std::optional<vec2>>;
-  { camera.unproject(pixel) } -> std::same_as<std::optional<vec3>>;
-};
+concept camera_model =
+    detail::has_image_size<C> && detail::projects<C> && detail::projects_with_jacobian<C> && detail::unprojects<C>;
 
 /// Names `C` as `type`. If `C` lacks a member of `camera_model`, the first compiler error names that member.
 template <class C>
 struct checked_camera {
-  static_assert(
-      requires(const C& c) {
-        { c.width() } -> std::convertible_to<int>;
-        { c.height() } -> std::convertible_to<int>;
-      },
-      "a camera model needs width() and height(), pixels");
-  static_assert(
-      requires(const C& c, const vec3& p) {
-        { c.project(p) } -> std::same_as<std::optional<vec2>>;
-      },
-      "a camera model needs project(vec3), which returns std::optional<vec2>");
-  static_assert(
-      requires(const C& c, const vec3& p, matrix<2, 3>& j) {
-        { c.project(p, j) } -> std::same_as<std::optional<vec2>>;
-      },
-      "a camera model needs project(vec3, matrix<2, 3>& jacobian), which returns std::optional<vec2>");
-  static_assert(
-      requires(const C& c, const vec2& pixel) {
-        { c.unproject(pixel) } -> std::same_as<std::optional<vec3>>;
-      },
-      "a camera model needs unproject(vec2), which returns std::optional<vec3>");
+  static_assert(detail::has_image_size<C>, "a camera model needs width() and height(), pixels");
+  static_assert(detail::projects<C>, "a camera model needs project(vec3), which returns std::optional<vec2>");
+  static_assert(detail::projects_with_jacobian<C>,
+                "a camera model needs project(vec3, matrix<2, 3>& jacobian), which returns std::optional<vec2>");
+  static_assert(detail::unprojects<C>, "a camera model needs unproject(vec2), which returns std::optional<vec3>");
   using type = C;
 };
 
