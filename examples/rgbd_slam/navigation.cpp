@@ -3,9 +3,9 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cstdio>
 #include <functional>
 #include <optional>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -16,7 +16,9 @@
 #include <orbis/nav/path_search.hpp>
 #include <orbis/nav/planning_view.hpp>
 
+#include "formatted_text.hpp"
 #include "navigation_picture.hpp"
+#include "summary.hpp"
 
 namespace app {
 namespace {
@@ -116,18 +118,15 @@ orbis::result<navigation_results> navigate(const octree& map, const orbis::traje
   }
   r.planning_ms = std::chrono::duration<double, std::milli>(console::clock::now() - start).count();
 
-  char text[160];
-  if (r.path.empty())
-    std::snprintf(text, sizeof text, "no path: %s", r.path_status.c_str());
-  else
-    std::snprintf(text, sizeof text, "path of a %s of %g m: %.2f m, straight %.2f m",
-                  r.drives ? "driving robot with a radius" : "ball", s.robot_radius, r.path_m, r.straight_m);
+  const std::string outcome =
+      r.path.empty() ? "no path: " + r.path_status
+                     : text("path of a %s: %.2f m, straight %.2f m", robot_text(r).c_str(), r.path_m, r.straight_m);
   if (floor || !cameras.empty()) {
     const double height = !r.path.empty() && !r.drives ? r.path.front().z()
                           : floor                      ? floor->floor + 0.5 * s.robot_height
                                                        : 0.0;
     const auto drawn = write_navigation_picture({.title = "Floor and distances",
-                                                 .subtitle = text,
+                                                 .subtitle = outcome,
                                                  .map = map,
                                                  .field = &field,
                                                  .height = height,
@@ -138,7 +137,7 @@ orbis::result<navigation_results> navigate(const octree& map, const orbis::traje
                                                 folder / "navigation.png");
     if (!drawn) return orbis::fail(drawn.error());
   }
-  console.finish(text);
+  console.finish(outcome);
   return r;
 }
 

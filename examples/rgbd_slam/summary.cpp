@@ -230,11 +230,14 @@ std::string floor_text(const navigation_results& n) {
               n.robot_radius);
 }
 
+std::string robot_text(const navigation_results& n) {
+  return text("%s of %g m", n.drives ? "driving robot with a radius" : "ball", n.robot_radius);
+}
+
 std::string path_text(const navigation_results& n) {
   if (n.path.empty()) return n.path_status;
-  return text("%.2f m for a %s of %g m, straight %.2f m (%.2f times), found in %.1f ms", n.path_m,
-              n.drives ? "driving robot with a radius" : "ball", n.robot_radius, n.straight_m, n.path_m / n.straight_m,
-              n.planning_ms);
+  return text("%.2f m for a %s, straight %.2f m (%.2f times), found in %.1f ms", n.path_m, robot_text(n).c_str(),
+              n.straight_m, n.path_m / n.straight_m, n.planning_ms);
 }
 
 std::string navigation_lines(const navigation_results& n) {

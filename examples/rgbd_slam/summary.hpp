@@ -28,6 +28,8 @@ namespace app {
 /// The floor and the planned path.
 [[nodiscard]] std::string navigation_lines(const navigation_results& n);
 [[nodiscard]] std::string floor_text(const navigation_results& n);
+/// The robot that the path is for: "ball of 0.2 m".
+[[nodiscard]] std::string robot_text(const navigation_results& n);
 [[nodiscard]] std::string path_text(const navigation_results& n);
 [[nodiscard]] std::string accuracy_lines(const accuracy& a);
 
