@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Units of time stamps in files and file names, and frame numbers in place of times.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdio>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include <orbis/io/detail/text.hpp>
+
+namespace orbis::io::detail {
+
+/// A unit of time: its name and its length in seconds.
+struct time_unit {
+  std::string_view name;
+  double seconds = 1.0;
+  [[nodiscard]] friend bool operator==(const time_unit& a, const time_unit& b) noexcept {
+    return a.seconds == b.seconds;
+  }
+};
+
+/// The units of time stamps, from coarse to fine; each is a thousandth of the one before.
+inline constexpr time_unit time_units[] = {
+    {"seconds", 1.0}, {"milliseconds", 1e-3}, {"microseconds", 1e-6}, {"nanoseconds", 1e-9}};
+
+/// The unit of a time stamp by the digits before its decimal point: times since 1970 have 10 digits in seconds, 13 in
+/// milliseconds, 16 in microseconds and 19 in nanoseconds (from 2001 to 2286). Seconds for any other number.
+[[nodiscard]] constexpr time_unit unit_of(std::string_view stamp) noexcept {
+  const std::size_t digits = std::min(stamp.find_first_not_of("0123456789"), stamp.size());
+  if (digits != stamp.size() && stamp[digits] != '.') return time_units[0];  // a sign, or an exponent
+  switch (digits) {
+    case 13: return time_units[1];
+    case 16: return time_units[2];
+    case 19: return time_units[3];
+    default: return time_units[0];
+  }
+}
+
+/// Parses a time stamp in the unit of its digits (`unit_of`). Returns seconds; empty if it is not a finite number.
+[[nodiscard]] inline std::optional<double> parse_time_stamp(std::string_view stamp) noexcept {
+  double t = 0.0;
+  if (!parse_number(stamp, t) || !std::isfinite(t)) return std::nullopt;
+  return t * unit_of(stamp).seconds;
+}
+
+/// The median difference of consecutive times, which ascend. @pre times.size() >= 2
+[[nodiscard]] inline double median_interval(const std::vector<double>& times) {
+  std::vector<double> steps;
+  for (std::size_t i = 1; i < times.size(); ++i) steps.push_back(times[i] - times[i - 1]);
+  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
+  std::nth_element(steps.begin(), middle, steps.end());
+  return *middle;
+}
+
+/// Returns true if times, which ascend, are frame numbers: whole numbers, mostly less than ten apart, and far smaller
+/// than seconds since 1970.
+[[nodiscard]] inline bool are_frame_numbers(const std::vector<double>& times) {
+  constexpr double most_apart = 10.0, highest = 1e8;
+  return times.size() >= 2 && times.front() >= 0.0 && times.back() < highest &&
+         std::all_of(times.begin(), times.end(), [](double t) { return t == std::floor(t); }) &&
+         median_interval(times) < most_apart;
+}
+
+/// A warning if the median interval of times, which ascend, is more than 30 times longer or shorter than that of a
+/// camera with `fps` frames per second; empty otherwise. It names the unit that the times seem to have.
+[[nodiscard]] inline std::string describe_interval(const std::vector<double>& times, double fps) {
+  constexpr double tolerance = 30.0;
+  if (times.size() < 3) return {};
+  const double interval = median_interval(times), ratio = interval * fps;
+  if (!(ratio > tolerance || ratio < 1.0 / tolerance)) return {};
+  char text[160];
+  std::snprintf(text, sizeof text,
+                "the time between frames is %.3g s, that of a camera with %.3g frames per second %.3g s", interval, fps,
+                1.0 / fps);
+  const auto nearest = [&](const time_unit& unit) { return std::abs(std::log10(ratio * unit.seconds)); };
+  const auto* unit = std::min_element(std::begin(time_units), std::end(time_units),
+                                      [&](const auto& a, const auto& b) { return nearest(a) < nearest(b); });
+  return text + (ratio > tolerance
+                     ? "; the time stamps seem to be " + std::string{unit->name} + ": write them in seconds"
+                     : std::string{"; check the unit of the time stamps, and fps of the camera"});
+}
+
+}  // namespace orbis::io::detail
