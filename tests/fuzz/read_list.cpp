@@ -39,7 +39,9 @@ void check(std::string_view text, Parse&& parse) {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::string_view text{reinterpret_cast<const char*>(data), size};
-  check(text, [](auto&&... a) { return io::detail::parse_image_list(a...); });
+  check(text, [](std::string_view list, const auto& path, auto& notes) {
+    return io::detail::parse_image_list(list, path, "folder", notes);
+  });
   check(text, [](auto&&... a) { return io::detail::parse_associations(a...); });
   return 0;
 }

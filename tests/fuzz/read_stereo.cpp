@@ -55,7 +55,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if (const auto poses = checked(text, [&] { return io::detail::parse_asl_poses(text, where); }))
     for (const stamped_pose& p : *poses) fuzz::require(is_rotation(p.T_world_camera), "a pose is rigid");
   std::vector<std::string> notes;
-  if (const auto list = checked(text, [&] { return io::detail::parse_asl_list(text, where, "data", notes); }))
+  if (const auto list = checked(text, [&] { return io::detail::parse_image_list(text, where, "data", notes); }))
     fuzz::require(!list->empty(), "a list that is read names images");
   fuzz::require(notes.size() < 20, "many lines make few notes");
   return 0;

@@ -148,11 +148,14 @@ TEST_CASE("formats are told apart") {
   folder.write("tum/rgb.txt", "x");
   folder.write("icl/rgb/0.png", "x");
   folder.write("icl/depth/0.png", "x");
-  folder.write("icl/associations.txt", "x");
+  folder.write("icl/a.gt.freiburg", "x");
+  folder.write("folders/color/0.jpg", "x");
+  folder.write("folders/aligned_depth/0.png", "x");
   folder.write("scenes/frame-000000.color.png", "x");
   folder.write("other/readme.txt", "x");
   CHECK(io::detect_format(folder / "tum") == io::recording_format::tum);
   CHECK(io::detect_format(folder / "icl") == io::recording_format::icl_nuim);
+  CHECK(io::detect_format(folder / "folders") == io::recording_format::folders);
   CHECK(io::detect_format(folder / "scenes") == io::recording_format::seven_scenes);
   CHECK(io::detect_format(folder / "other") == io::recording_format::automatic);
   CHECK(io::open_recording(folder / "other").error().code == orbis::errc::unsupported);

@@ -7,8 +7,8 @@
 #include <utility>
 
 #include <orbis/core/inline.hpp>
-#include <orbis/io/camera_file.hpp>
 #include <orbis/io/detail/recordings/one_camera.hpp>
+#include <orbis/io/detail/recordings/recording_camera.hpp>
 #include <orbis/io/detail/recordings/recording_folder.hpp>
 #include <orbis/io/image.hpp>
 #include <orbis/io/mono_recording.hpp>
@@ -53,42 +53,35 @@ ORBIS_INLINE mono_format detect_mono_format(const std::filesystem::path& folder)
 ORBIS_INLINE result<mono_recording> open_mono_recording(const std::filesystem::path& folder,
                                                         const mono_recording_options& options) {
   if (const auto is_folder = detail::check_folder(folder); !is_folder) return fail(is_folder.error());
-  std::optional<camera::camera_settings> camera = options.camera;
-  std::optional<std::filesystem::path> camera_file;
-  if (const auto file = folder / "camera.toml"; !camera && detail::present(file)) {
-    auto read = read_camera(file);
-    if (!read) return fail(read.error());
-    camera = *std::move(read);
-    camera_file = file;
-  }
+  std::vector<std::filesystem::path> files;
+  auto camera = detail::given_camera(folder, options.camera, files);
+  if (!camera) return fail(camera.error());
+  const bool is_given = camera->has_value();
+  const double fps = is_given ? (*camera)->fps : camera::camera_settings{}.fps;
   const mono_format format = options.format == mono_format::automatic ? detect_mono_format(folder) : options.format;
   const auto read_index = [&]() -> result<detail::recording_index> {
     switch (format) {
-      case mono_format::tum: return detail::index_image_list(folder);
+      case mono_format::tum: return detail::index_image_list(folder, fps);
       case mono_format::kitti: return detail::index_kitti_camera(folder);
       case mono_format::asl: return detail::index_asl_camera(folder);
       case mono_format::rgbd: {
         recording_format with_depth = recording_format::automatic;
-        return detail::index_recording(folder, with_depth, recording_options{}.max_time_difference);
+        return detail::index_recording(folder, with_depth, recording_options{}.max_time_difference, fps);
       }
-      case mono_format::images: return detail::index_image_folder(folder, camera ? camera->fps : 30.0);
+      case mono_format::images: return detail::index_image_folder(folder, fps);
       case mono_format::automatic: break;
     }
     return fail(detail::unknown_recording(
         folder,
-        "no known recording of one camera: neither rgb.txt (TUM), nor image_0 or image_2 with calib.txt (KITTI), nor "
-        "mav0/cam0 (ASL, EuRoC), nor PNG or JPEG images in it or in rgb, color, images, left or data"));
+        "rgb.txt (TUM), image_0 or image_2 with calib.txt (KITTI), mav0/cam0 (ASL, EuRoC), PNG or JPEG images in it or "
+        "in rgb, color, images, left or data"));
   };
   auto index = read_index();
   if (!index) return fail(index.error());
-  if (camera_file) index->files.push_back(*camera_file);
-  if (!camera) camera = index->camera;
-  if (!options.camera && !camera_file && index->color)
-    camera->model = index->color->model;  // colour images are not resampled
-  if (!camera)
-    return fail(errc::invalid_argument, folder.string(),
-                "the camera is not known: put a camera.toml into the folder, or name a camera");
-  return mono_recording(*std::move(index), *std::move(camera), format);
+  index->files.insert(index->files.end(), files.begin(), files.end());
+  if (const auto known = detail::complete_camera(folder, *camera, *index); !known) return fail(known.error());
+  if (!is_given && index->color) (*camera)->model = index->color->model;  // colour images are not resampled
+  return mono_recording(*std::move(index), **std::move(camera), format);
 }
 
 }  // namespace orbis::io

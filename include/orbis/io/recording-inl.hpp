@@ -7,9 +7,10 @@
 
 #include <orbis/camera/pinhole.hpp>
 #include <orbis/core/inline.hpp>
-#include <orbis/io/camera_file.hpp>
 #include <orbis/io/detail/recordings/color_registration.hpp>
 #include <orbis/io/detail/recordings/icl_nuim.hpp>
+#include <orbis/io/detail/recordings/image_folders.hpp>
+#include <orbis/io/detail/recordings/recording_camera.hpp>
 #include <orbis/io/detail/recordings/recording_folder.hpp>
 #include <orbis/io/detail/recordings/scannet.hpp>
 #include <orbis/io/detail/recordings/seven_scenes.hpp>
@@ -83,55 +84,51 @@ ORBIS_INLINE recording_format detect_format(const std::filesystem::path& folder)
   if (detail::is_tum(folder)) return recording_format::tum;
   if (detail::is_seven_scenes(folder)) return recording_format::seven_scenes;
   if (detail::is_scannet(folder)) return recording_format::scannet;
+  if (detail::is_image_folders(folder)) return recording_format::folders;
   return recording_format::automatic;
 }
 
 namespace detail {
 
 ORBIS_INLINE result<recording_index> index_recording(const std::filesystem::path& folder, recording_format& format,
-                                                     double max_time_difference) {
+                                                     double max_time_difference, double fps) {
   if (format == recording_format::automatic) format = detect_format(folder);
   switch (format) {
-    case recording_format::tum: return index_tum(folder, max_time_difference);
+    case recording_format::tum: return index_tum(folder, max_time_difference, fps);
     case recording_format::seven_scenes: return index_seven_scenes(folder);
     case recording_format::icl_nuim: return index_icl_nuim(folder);
     case recording_format::scannet: return index_scannet(folder);
+    case recording_format::folders: return index_image_folders(folder, max_time_difference, fps);
     case recording_format::automatic: break;
   }
-  return fail(unknown_recording(
-      folder,
-      "no known recording: neither rgb.txt and depth.txt (TUM), nor frame-*.color.png (7-Scenes), nor "
-      "numbered images in rgb and depth (ICL-NUIM), nor color, depth and intrinsic_depth.txt (ScanNet)"));
+  return fail(unknown_recording(folder,
+                                "rgb.txt and depth.txt (TUM), images in rgb and depth (or color, image; aligned_depth, "
+                                "depth_registered), frame-*.color.png (7-Scenes), color, depth and intrinsic_depth.txt "
+                                "(ScanNet)"));
 }
 
 }  // namespace detail
 
 ORBIS_INLINE result<recording> open_recording(const std::filesystem::path& folder, const recording_options& options) {
   if (const auto is_folder = detail::check_folder(folder); !is_folder) return fail(is_folder.error());
+  std::vector<std::filesystem::path> files;
+  auto camera = detail::given_camera(folder, options.camera, files);
+  if (!camera) return fail(camera.error());
 
   recording_format format = options.format;
-  auto index = detail::index_recording(folder, format, options.max_time_difference);
+  auto index = detail::index_recording(folder, format, options.max_time_difference,
+                                       *camera ? (*camera)->fps : camera::camera_settings{}.fps);
   if (!index) return fail(index.error());
-
-  std::optional<camera::camera_settings> camera = options.camera;
-  if (const auto file = folder / "camera.toml"; !camera && detail::present(file)) {
-    auto read = read_camera(file);
-    if (!read) return fail(read.error());
-    camera = *std::move(read);
-    index->files.push_back(file);
-  }
-  if (!camera) camera = index->camera;
-  if (!camera)
-    return fail(errc::invalid_argument, folder.string(),
-                "the camera is not known: put a camera.toml into the folder, or name a camera");
+  index->files.insert(index->files.end(), files.begin(), files.end());
+  if (const auto known = detail::complete_camera(folder, *camera, *index); !known) return fail(known.error());
   if (index->color) {
     const auto size = [](const camera::intrinsics& k) {
       return std::to_string(k.width) + " x " + std::to_string(k.height);
     };
     index->notes.push_back("colour images of " + size(index->color->model.k()) +
-                           " pixels are resampled to the depth camera, " + size(camera->model.k()));
+                           " pixels are resampled to the depth camera, " + size((*camera)->model.k()));
   }
-  return recording(*std::move(index), *std::move(camera), format);
+  return recording(*std::move(index), **std::move(camera), format);
 }
 
 }  // namespace orbis::io

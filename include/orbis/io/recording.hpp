@@ -32,10 +32,12 @@ namespace detail {
 class color_registration;
 }
 
-/// The supported layouts. `automatic`: detected.
-enum class recording_format { automatic, tum, seven_scenes, icl_nuim, scannet };
+/// The supported layouts. `automatic`: detected. `folders`: colour images in `rgb`, `color`, `colour`, `image` or
+/// `images`, depth images in `depth`, `aligned_depth` or `depth_registered`, paired by the numbers or times in their
+/// names.
+enum class recording_format { automatic, tum, seven_scenes, icl_nuim, scannet, folders };
 
-/// The name of a format: "tum", "7scenes", "icl", "scannet", "auto".
+/// The name of a format: "tum", "7scenes", "icl", "scannet", "folders", "auto".
 [[nodiscard]] constexpr std::string_view to_string(recording_format format) noexcept {
   switch (format) {
     case recording_format::automatic: return "auto";
@@ -43,6 +45,7 @@ enum class recording_format { automatic, tum, seven_scenes, icl_nuim, scannet };
     case recording_format::seven_scenes: return "7scenes";
     case recording_format::icl_nuim: return "icl";
     case recording_format::scannet: return "scannet";
+    case recording_format::folders: return "folders";
   }
   return "unknown";
 }
@@ -136,17 +139,19 @@ class recording {
 
 namespace detail {
 
-/// The index of the recording in `folder`; replaces a `format` of `automatic` by the detected one. Errors: as
-/// `open_recording`.
+/// The index of the recording in `folder`; replaces a `format` of `automatic` by the detected one. `fps`: rate of
+/// images without times. Errors: as `open_recording`.
 [[nodiscard]] result<recording_index> index_recording(const std::filesystem::path& folder, recording_format& format,
-                                                      double max_time_difference);
+                                                      double max_time_difference, double fps);
 
 }  // namespace detail
 
 /// Opens the recording in `folder`: reads its lists, poses and camera, but not its images.
 ///
 /// The camera is, in this order: that of the options; that of `camera.toml` in the folder; that of the format's own
-/// files or the folder's name. Without any of these the function fails. Errors: not_found, unreadable, unsupported (no
+/// files; that of the data set, for ICL-NUIM (`*.gt.freiburg`) and the TUM benchmark (`rgbd_dataset_freiburg1` ... in
+/// the path), with a note. Without any of these the function fails. A time between frames that does not suit the
+/// camera's rate is noted. Errors: not_found, unreadable, unsupported (no
 /// known format), no_data (no frames), malformed (with file and line), invalid_argument (no camera known).
 [[nodiscard]] result<recording> open_recording(const std::filesystem::path& folder,
                                                const recording_options& options = {});

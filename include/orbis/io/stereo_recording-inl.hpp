@@ -8,9 +8,10 @@
 
 #include <orbis/core/file.hpp>
 #include <orbis/core/inline.hpp>
-#include <orbis/io/camera_file.hpp>
 #include <orbis/io/detail/recordings/asl.hpp>
+#include <orbis/io/detail/recordings/image_names.hpp>
 #include <orbis/io/detail/recordings/kitti.hpp>
+#include <orbis/io/detail/recordings/recording_camera.hpp>
 #include <orbis/io/detail/recordings/recording_folder.hpp>
 #include <orbis/io/detail/recordings/recording_index.hpp>
 #include <orbis/io/detail/recordings/seven_scenes.hpp>
@@ -34,38 +35,35 @@ namespace detail {
   return lists || (present(folder / "right") && !first_present(folder, {"left", "rgb"}).empty());
 }
 
-/// The numbered images in `folder`, at `fps` images per second. Errors: no_data.
-[[nodiscard]] inline result<std::vector<stamped_file>> numbered_images(const std::filesystem::path& folder, double fps,
-                                                                       std::vector<std::string>& notes) {
+/// The images in `folder`, by their names (`order_by_name`). Errors: no_data.
+[[nodiscard]] inline result<std::vector<stamped_file>> named_images(const std::filesystem::path& folder, double fps,
+                                                                    std::vector<std::string>& notes) {
+  const keyed_images images = order_by_name(images_in(folder));
+  if (images.paths.empty() || images.keys_are == image_keys::alphabet)
+    return fail(
+        errc::no_data, folder.string(),
+        "there are no images named by numbers (000000.png) or times in it; the folder " + describe_content(folder));
   std::vector<stamped_file> files;
-  for (const auto& path : list_folder(folder)) {
-    unsigned number = 0;
-    if (parse_number(path.stem().string(), number) && is_image_name(path)) files.push_back({number / fps, path});
-  }
-  if (files.empty()) return fail(errc::no_data, folder.string(), "there are no numbered images (000000.png) in it");
+  const auto times = images.times(fps);
+  for (std::size_t i = 0; i != times.size(); ++i) files.push_back({times[i], images.paths[i]});
   return in_order_of_time(folder, std::move(files), notes);
 }
 
-/// The index of such a folder. `camera` replaces `camera.toml`. Errors: not_found (a file), unreadable, no_data,
-/// malformed (with file and line), invalid_argument (no camera, or no baseline).
+/// The index of such a folder. The camera `given` replaces `camera.toml`. Errors: not_found (a file), unreadable,
+/// no_data, malformed (with file and line), invalid_argument (no camera, or no baseline).
 [[nodiscard]] inline result<stereo_index> index_image_pairs(const std::filesystem::path& folder,
                                                             double max_time_difference,
-                                                            std::optional<camera::camera_settings> camera) {
+                                                            const std::optional<camera::camera_settings>& given) {
   stereo_index index;
   recording_index& images = index.images;
-  const auto camera_file = folder / "camera.toml", right_file = folder / "camera_right.toml",
-             place_file = folder / "T_left_right.txt";
-  if (!camera && present(camera_file)) {
-    auto read = read_camera(camera_file);
-    if (!read) return fail(read.error());
-    camera = *std::move(read);
-    images.files.push_back(camera_file);
-  }
-  if (!camera)
+  const auto right_file = folder / "camera_right.toml", place_file = folder / "T_left_right.txt";
+  const auto camera = given_camera(folder, given, images.files);
+  if (!camera) return fail(camera.error());
+  if (!*camera)
     return fail(errc::invalid_argument, folder.string(),
                 "the camera is not known: put a camera.toml into the folder, or name a camera");
-  index.fps = camera->fps;
-  index.shutter = camera->shutter;
+  index.fps = (*camera)->fps;
+  index.shutter = (*camera)->shutter;
   if (present(right_file)) {
     const auto right = read_camera(right_file);
     if (!right) return fail(right.error());
@@ -73,14 +71,14 @@ namespace detail {
     if (!text) return fail(text.error());
     const auto T_left_right = parse_pose_matrix(*text, place_file);
     if (!T_left_right) return fail(T_left_right.error());
-    index.cameras = {camera->model, right->model, *T_left_right};
+    index.cameras = {(*camera)->model, right->model, *T_left_right};
     images.files.insert(images.files.end(), {right_file, place_file});
   } else {
-    if (!camera->baseline)
+    if (!(*camera)->baseline)
       return fail(errc::invalid_argument, folder.string(),
                   "the baseline is not known: add baseline to camera.toml, or add camera_right.toml and "
                   "T_left_right.txt");
-    index.cameras = {camera->model, camera->model, se3{so3{}, vec3{*camera->baseline, 0.0, 0.0}}};
+    index.cameras = {(*camera)->model, (*camera)->model, se3{so3{}, vec3{*(*camera)->baseline, 0.0, 0.0}}};
   }
 
   std::vector<stamped_file> lists[2];
@@ -88,7 +86,7 @@ namespace detail {
     const auto list = i == 0 ? first_present(folder, {"left.txt", "rgb.txt"}) : first_present(folder, {"right.txt"});
     const auto numbered = i == 0 ? first_present(folder, {"left", "rgb"}) : folder / "right";
     auto files =
-        list.empty() ? numbered_images(numbered, camera->fps, images.notes) : read_image_list(list, images.notes);
+        list.empty() ? named_images(numbered, (*camera)->fps, images.notes) : read_image_list(list, images.notes);
     if (!files) return fail(files.error());
     lists[i] = *std::move(files);
     if (!list.empty()) images.files.push_back(list);
@@ -165,10 +163,10 @@ ORBIS_INLINE result<stereo_recording> open_stereo_recording(const std::filesyste
       case stereo_format::pairs: return detail::index_image_pairs(folder, options.max_time_difference, options.camera);
       case stereo_format::automatic: break;
     }
-    return fail(detail::unknown_recording(
-        folder,
-        "no known stereo recording: neither image_0, image_1 and calib.txt (KITTI), nor mav0/cam0 and "
-        "mav0/cam1 (ASL, EuRoC), nor left.txt and right.txt or images in left and right"));
+    return fail(detail::unknown_recording(folder,
+                                          "image_0, image_1 and calib.txt (KITTI), mav0/cam0 and mav0/cam1 (ASL, "
+                                          "EuRoC), left.txt and right.txt or images "
+                                          "in left and right"));
   };
   auto index = read_index();
   if (!index) return fail(index.error());

@@ -31,10 +31,12 @@ inline constexpr time_unit time_units[] = {
     {"seconds", 1.0}, {"milliseconds", 1e-3}, {"microseconds", 1e-6}, {"nanoseconds", 1e-9}};
 
 /// The unit of a time stamp by the digits before its decimal point: times since 1970 have 10 digits in seconds, 13 in
-/// milliseconds, 16 in microseconds and 19 in nanoseconds (from 2001 to 2286). Seconds for any other number.
+/// milliseconds, 16 in microseconds and 19 in nanoseconds (from 2001 to 2286). Seconds for any other number, also one
+/// with leading zeros.
 [[nodiscard]] constexpr time_unit unit_of(std::string_view stamp) noexcept {
   const std::size_t digits = std::min(stamp.find_first_not_of("0123456789"), stamp.size());
-  if (digits != stamp.size() && stamp[digits] != '.') return time_units[0];  // a sign, or an exponent
+  if (stamp.starts_with('0') || (digits != stamp.size() && stamp[digits] != '.'))  // a sign, or an exponent
+    return time_units[0];
   switch (digits) {
     case 13: return time_units[1];
     case 16: return time_units[2];
@@ -48,6 +50,22 @@ inline constexpr time_unit time_units[] = {
   double t = 0.0;
   if (!parse_number(stamp, t) || !std::isfinite(t)) return std::nullopt;
   return t * unit_of(stamp).seconds;
+}
+
+/// A time in seconds for messages, with at most 6 decimals.
+[[nodiscard]] inline std::string describe(double seconds) {
+  char text[400];  // the largest double has 309 digits
+  const int length = std::snprintf(text, sizeof text, "%.6f", seconds);
+  std::string all(text, static_cast<std::size_t>(length));
+  all.erase(all.find_last_not_of('0') + 1);
+  if (all.ends_with('.')) all.pop_back();
+  return all;
+}
+
+/// The span of times for messages: "12.5 to 20". @pre !times.empty()
+[[nodiscard]] inline std::string describe_span(const std::vector<double>& times) {
+  const auto [first, last] = std::minmax_element(times.begin(), times.end());
+  return describe(*first) + " to " + describe(*last);
 }
 
 /// The median difference of consecutive times, which ascend. @pre times.size() >= 2
@@ -69,22 +87,24 @@ inline constexpr time_unit time_units[] = {
 }
 
 /// A warning if the median interval of times, which ascend, is more than 30 times longer or shorter than that of a
-/// camera with `fps` frames per second; empty otherwise. It names the unit that the times seem to have.
+/// camera with `fps` frames per second; empty otherwise. It states the factor that the unit of the times seems to have.
 [[nodiscard]] inline std::string describe_interval(const std::vector<double>& times, double fps) {
   constexpr double tolerance = 30.0;
   if (times.size() < 3) return {};
   const double interval = median_interval(times), ratio = interval * fps;
   if (!(ratio > tolerance || ratio < 1.0 / tolerance)) return {};
-  char text[160];
+  char text[240];
   std::snprintf(text, sizeof text,
                 "the time between frames is %.3g s, that of a camera with %.3g frames per second %.3g s", interval, fps,
                 1.0 / fps);
-  const auto nearest = [&](const time_unit& unit) { return std::abs(std::log10(ratio * unit.seconds)); };
-  const auto* unit = std::min_element(std::begin(time_units), std::end(time_units),
-                                      [&](const auto& a, const auto& b) { return nearest(a) < nearest(b); });
-  return text + (ratio > tolerance
-                     ? "; the time stamps seem to be " + std::string{unit->name} + ": write them in seconds"
-                     : std::string{"; check the unit of the time stamps, and fps of the camera"});
+  std::string warning = text;
+  if (ratio > tolerance) {
+    const double thousands = std::clamp(std::round(std::log10(ratio) / 3.0), 1.0, 6.0);
+    std::snprintf(text, sizeof text, "; the time stamps seem to be %.0f times too large: write them in seconds",
+                  std::pow(1000.0, thousands));
+    return warning + text;
+  }
+  return warning + "; check the unit of the time stamps, and fps of the camera";
 }
 
 }  // namespace orbis::io::detail

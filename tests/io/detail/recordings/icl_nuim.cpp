@@ -2,6 +2,7 @@
 #include <string>
 
 #include <orbis/io/detail/recordings/icl_nuim.hpp>
+#include <orbis/io/recording.hpp>
 
 #include "io/recordings.hpp"
 #include "support/catch.hpp"
@@ -51,16 +52,20 @@ TEST_CASE("an association list in the order of ICL-NUIM is understood") {
   CHECK(index.frames[2].depth.parent_path().filename() == "depth");
 }
 
-TEST_CASE("numbered images with an association list and the ground truth of TUM are a TUM recording") {
+TEST_CASE("only its trajectory file identifies an ICL-NUIM recording") {
   const temporary_folder folder;
-  write_images(folder, 0, 1);
-  folder.write("associations.txt", "0 rgb/0.png 0 depth/0.png\n0.1 rgb/1.png 0.1 depth/1.png\n");
-  CHECK(io::detail::is_icl_nuim(folder.path()));
-  folder.write("groundtruth.txt", "0 0 1 0 0 0 0 1\n");
+  write_images(folder, 0, 2);
   CHECK_FALSE(io::detail::is_icl_nuim(folder.path()));
-  CHECK(io::detail::is_tum(folder.path()));
+  CHECK_FALSE(io::open_recording(folder.path()));  // no camera is known
+  folder.write("associations.txt", "0 rgb/0.png 0 depth/0.png\n1 rgb/1.png 1 depth/1.png\n");
+  CHECK_FALSE(io::detail::is_icl_nuim(folder.path()));
+  CHECK_FALSE(io::open_recording(folder.path()));
   folder.write("livingRoom0.gt.freiburg", "0 0 1 0 0 0 0 1\n");
   CHECK(io::detail::is_icl_nuim(folder.path()));
+  const auto recording = io::open_recording(folder.path()).value();
+  CHECK(recording.format() == io::recording_format::icl_nuim);
+  CHECK_THAT(recording.notes().back(),
+             Catch::Matchers::Contains("the camera is icl") && Catch::Matchers::Contains("depth_scale 5000"));
 }
 
 TEST_CASE("mirroring turns left-handed poses into the ones our points need") {
@@ -79,7 +84,7 @@ TEST_CASE("what is missing in an ICL-NUIM recording is named") {
   CHECK_FALSE(io::detail::is_icl_nuim(folder.path()));
   CHECK(io::detail::index_icl_nuim(folder.path()).error().code == orbis::errc::not_found);
   folder.write("rgb/readme.txt", "x");
-  CHECK(io::detail::index_icl_nuim(folder.path()).error().code == orbis::errc::no_data);
+  CHECK(io::detail::index_icl_nuim(folder.path()).error().code == orbis::errc::not_found);
   write_images(folder, 1, 1);
   folder.write("a.gt.freiburg", "1 0 nan 0 0 0 0 1\n");
   CHECK(orbis::test::message_of(io::detail::index_icl_nuim(folder.path())) ==

@@ -10,6 +10,9 @@
 #include "support/data.hpp"
 
 namespace io = orbis::io;
+using Catch::Matchers::Contains;
+using Catch::Matchers::EndsWith;
+using Catch::Matchers::StartsWith;
 using orbis::test::message_of;
 using orbis::test::temporary_folder;
 
@@ -49,8 +52,8 @@ TEST_CASE("images are paired by time whatever the lists look like") {
   }
   CHECK(mentions(index, "rgb.txt: not in order of time"));
   CHECK(mentions(index, "depth.txt:2: skipped"));
-  CHECK(mentions(index, "1 of 4 colour images have no depth image"));
-  CHECK(mentions(index, "1 of 4 depth images are skipped"));
+  CHECK(mentions(index, "1 of 4 colour images have no counterpart"));
+  CHECK(mentions(index, "1 of 4 depth images have no counterpart"));
 }
 
 TEST_CASE("the time allowed between colour and depth can be chosen") {
@@ -96,7 +99,9 @@ TEST_CASE("an association list decides and may name depth first") {
 TEST_CASE("what is missing in a TUM recording is named") {
   const temporary_folder folder;
   folder.write("rgb.txt", "1.00 rgb/1.00.png\n");
-  CHECK(message_of(io::detail::index_tum(folder.path())) == (folder / "depth.txt").string() + ": no such file");
+  CHECK_THAT(message_of(io::detail::index_tum(folder.path())),
+             StartsWith((folder / "depth.txt").string() + ": no such file; a recording in the layout of TUM") &&
+                 EndsWith("the folder holds rgb.txt"));
   folder.write("depth.txt", "# nothing\n\n");
   CHECK(message_of(io::detail::index_tum(folder.path())) ==
         (folder / "depth.txt").string() + ": the list names no image");
@@ -139,18 +144,93 @@ TEST_CASE("a time stamp that an association list repeats gives one frame") {
   CHECK(notes.back().find("1 lines with a repeated time stamp skipped") != std::string::npos);
 }
 
+TEST_CASE("lists are read with any separator, quotes, a heading, a byte order mark and blanks in names") {
+  const std::string expected[] = {"rgb/1.png", "rgb/a 2.png"};
+  for (const char* const text : {"1.5 rgb/1.png\n2.5 rgb/a 2.png\n", "1.5,rgb/1.png\n2.5,rgb/a 2.png\n",
+                                 "1.5, rgb/1.png\r\n2.5, rgb/a 2.png\r\n", "1.5;rgb/1.png;\n2.5;rgb/a 2.png;\n",
+                                 "1.5\trgb/1.png\n2.5\trgb/a 2.png\n", "1.5 rgb\\1.png\n2.5 rgb\\a 2.png\n",
+                                 "\xEF\xBB\xBF# t f\n1.5 rgb/1.png\n2.5 rgb/a 2.png",
+                                 "timestamp,filename\n1.5,\"rgb/1.png\"\n2.5,\"rgb/a 2.png\"\n"}) {
+    INFO(text);
+    std::vector<std::string> notes;
+    const auto files = io::detail::parse_image_list(text, "x/rgb.txt", "x", notes).value();
+    REQUIRE(files.size() == 2);
+    CHECK(notes.empty());
+    for (std::size_t i : {0U, 1U}) {
+      CHECK(files[i].timestamp == 1.5 + static_cast<double>(i));
+      CHECK(files[i].path == std::filesystem::path{"x"} / expected[i]);
+    }
+  }
+  for (const char* const text :
+       {"1 rgb/a 1.png 1.01 depth/a 1.png\n", "1,rgb/a 1.png,1.01,depth/a 1.png\n",
+        "1.01; depth/a 1.png; 1; rgb/a 1.png\n", "\xEF\xBB\xBF\"t\" x\n1\trgb/a 1.png\t1.01\tdepth/a 1.png\r\n"}) {
+    INFO(text);
+    std::vector<std::string> notes;
+    const auto pairs = io::detail::parse_associations(text, "x/a.txt", notes).value();
+    REQUIRE(pairs.size() == 1);
+    CHECK(pairs[0].timestamp == 1.0);
+    CHECK(pairs[0].depth_timestamp == 1.01);
+    CHECK(pairs[0].color == "x/rgb/a 1.png");
+    CHECK(pairs[0].depth == "x/depth/a 1.png");
+  }
+}
+
+TEST_CASE("a list without entries quotes its first line") {
+  std::vector<std::string> notes;
+  for (const char* const text : {"a b\nc d\n", "x\n[1] rgb/1.png\n[2] rgb/2.png\n", "-\n"})
+    CHECK_THAT(message_of(io::detail::parse_image_list(text, "rgb.txt", "", notes)),
+               StartsWith("rgb.txt:") && Contains("the list names no image: \"") &&
+                   EndsWith("\" is not a time stamp and a file name"));
+  CHECK_THAT(message_of(io::detail::parse_associations("1 rgb/1.png depth/1.png\n", "a.txt", notes)),
+             Contains("a.txt:1: the list names no image: \"1 rgb/1.png depth/1.png\" is not two pairs"));
+}
+
+TEST_CASE("whole numbers in lists are frame numbers, other stamps have the unit of their digits") {
+  const temporary_folder folder;
+  write_images(folder);
+  folder.write("rgb.txt", "3 rgb/1.00.png\n4 rgb/1.03.png\n6 rgb/1.09.png\n");
+  folder.write("depth.txt", "3 depth/1.01.png\n4 depth/1.04.png\n6 depth/1.30.png\n");
+  folder.write("groundtruth.txt", "3 0 0 0 0 0 0 1\n4 1 0 0 0 0 0 1\n");
+  const auto index = io::detail::index_tum(folder.path(), 0.02, 10.0).value();
+  CHECK(index.frames[2].timestamp == 0.6);
+  CHECK(index.frames[1].T_world_camera.value().translation().x() == 1.0);
+  CHECK(index.ground_truth[1].timestamp == 0.4);
+  CHECK(mentions(index, "the time stamps are frame numbers; times are those of 10 frames per second"));
+  folder.write("depth.txt", "3.01 depth/1.01.png\n4.01 depth/1.04.png\n6.01 depth/1.30.png\n");  // seconds
+  CHECK(io::detail::index_tum(folder.path(), 0.02, 10.0).value().frames[2].timestamp == 6.0);
+  for (const char* const zeros : {"000", "000000", "000000000"}) {
+    const std::string z = zeros;
+    folder.write("rgb.txt", "1305031102" + z + " rgb/1.00.png\n1305031103" + z + " rgb/1.03.png\n");
+    folder.write("depth.txt", "1305031102" + z + ".5 depth/1.01.png\n1305031103" + z + " depth/1.04.png\n");
+    std::filesystem::remove(folder / "groundtruth.txt");
+    const auto in_seconds = io::detail::index_tum(folder.path()).value();
+    REQUIRE(in_seconds.frames.size() == 2);
+    CHECK(std::abs(in_seconds.frames[0].timestamp - 1305031102.0) < 1e-6);
+  }
+}
+
 TEST_CASE("the folder's name tells the camera of the benchmark's sequences") {
   const temporary_folder folder;
   for (const auto& [name, fx] :
        {std::pair{"rgbd_dataset_freiburg1_desk", 517.3}, std::pair{"rgbd_dataset_freiburg2_xyz", 520.9},
         std::pair{"rgbd_dataset_freiburg3_office", 535.4},
-        std::pair{"freiburg2 and freiburg3/rgbd_dataset_freiburg1_xyz", 517.3}}) {
+        std::pair{"rgbd_dataset_freiburg2_xyz/rgbd_dataset_freiburg1_xyz", 517.3},
+        std::pair{"rgbd_dataset_freiburg2_desk/part", 520.9}, std::pair{"freiburg3_desk", 535.4}}) {
     const std::filesystem::path sub = name;
     folder.write(sub / "rgb.txt", "1 a.png\n");
     folder.write(sub / "depth.txt", "1 b.png\n");
     folder.write(sub / "a.png", "x");
     folder.write(sub / "b.png", "x");
-    CHECK(io::detail::index_tum(folder / sub).value().camera.value().model.k().fx == fx);
+    const auto index = io::detail::index_tum(folder / sub).value();
+    CHECK(index.camera.value().model.k().fx == fx);
+    CHECK_THAT(index.camera_guess, Contains("by the name "));
+  }
+  for (const std::filesystem::path name : {"my_freiburg1_walk", "freiburg1/kitchen", "rgbd_dataset/x"}) {
+    folder.write(name / "rgb.txt", "1 a.png\n");
+    folder.write(name / "depth.txt", "1 b.png\n");
+    folder.write(name / "a.png", "x");
+    folder.write(name / "b.png", "x");
+    CHECK_FALSE(io::detail::index_tum(folder / name).value().camera);
   }
 }
 
@@ -183,9 +263,9 @@ TEST_CASE("a list of nothing but rubbish is said so in few words") {
   std::vector<std::string> notes;
   std::string text = "1 a.png 2 b.png\n";
   for (int i = 0; i != 5000; ++i) text += "x\n";
-  REQUIRE(io::detail::parse_image_list(text, "rgb.txt", notes).value().size() == 1);
+  REQUIRE(io::detail::parse_image_list(text, "rgb.txt", "", notes).value().size() == 1);
   REQUIRE(notes.size() == 11);
-  CHECK(notes.front() == "rgb.txt:2: skipped, not a time stamp and a file name");
+  CHECK(notes.front() == "rgb.txt:2: skipped, \"x\" is not a time stamp and a file name");
   CHECK(notes.back() == "rgb.txt: 4990 more lines skipped");
   notes.clear();
   REQUIRE(io::detail::parse_associations(text, "both.txt", notes).value().size() == 1);

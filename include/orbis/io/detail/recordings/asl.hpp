@@ -93,28 +93,6 @@ struct asl_camera {
   return camera;
 }
 
-/// Parses a camera's `data.csv`: `nanoseconds,file` per line; files are in `folder`. Unreadable lines are skipped and
-/// noted. Errors: no_data (no line remains).
-[[nodiscard]] inline result<std::vector<stamped_file>> parse_asl_list(std::string_view text,
-                                                                      const std::filesystem::path& list,
-                                                                      const std::filesystem::path& folder,
-                                                                      std::vector<std::string>& notes) {
-  std::vector<stamped_file> files;
-  skipped_lines skipped{list, notes};
-  for_each_line(text, [&](std::string_view line, std::size_t number) {
-    const std::size_t comma = std::min(line.find(','), line.size());
-    std::int64_t nanoseconds = 0;
-    const std::string_view name = trimmed(line.substr(std::min(comma + 1, line.size())));
-    if (!parse_number(trimmed(line.substr(0, comma)), nanoseconds) || name.empty())
-      skipped.add(number, "not a time and a file name");
-    else
-      files.push_back({1e-9 * static_cast<double>(nanoseconds), folder / std::filesystem::path{name}});
-    return true;
-  });
-  skipped.finish();
-  return in_order_of_time(list, std::move(files), notes);
-}
-
 /// Parses the `data.csv` of the ground truth: nanoseconds, position and quaternion (w first) of the body; further
 /// columns are ignored. Errors: malformed, with the line.
 [[nodiscard]] inline result<trajectory> parse_asl_poses(std::string_view text, const std::filesystem::path& where) {
@@ -145,7 +123,8 @@ struct asl_camera {
 /// The folder that contains `cam0` and `cam1`; empty if there is none.
 [[nodiscard]] inline std::filesystem::path asl_root(const std::filesystem::path& folder) {
   for (const auto& root : {folder / "mav0", folder})
-    if (present(root / "cam0" / "sensor.yaml") || present(root / "cam0" / "data.csv")) return root;
+    for (const char* const part : {"sensor.yaml", "data.csv", "data"})
+      if (present(root / "cam0" / part)) return root;
   return {};
 }
 
@@ -164,12 +143,18 @@ struct asl_images {
 /// Reads a camera's folder: its `sensor.yaml` and `data.csv`, which are added to the files of `to`. Errors: not_found
 /// (a file), unreadable, no_data, malformed (with file and line), unsupported.
 [[nodiscard]] inline result<asl_images> read_asl_images(const std::filesystem::path& where, recording_index& to) {
+  std::string missing;
+  for (const char* const name : {"sensor.yaml", "data.csv"})
+    if (!present(where / name)) missing += (missing.empty() ? "" : " and ") + std::string{name};
+  if (!missing.empty())
+    return fail(errc::not_found, where.string(),
+                "a camera in the ASL layout (EuRoC) needs " + missing + "; the folder " + describe_content(where));
   const auto settings = read_file(where / "sensor.yaml", plain_yaml::max_bytes), list = read_file(where / "data.csv");
   if (!settings) return fail(settings.error());
   if (!list) return fail(list.error());
   auto camera = parse_asl_camera(*settings, where / "sensor.yaml");
   if (!camera) return fail(camera.error());
-  auto files = parse_asl_list(*list, where / "data.csv", where / "data", to.notes);
+  auto files = parse_image_list(*list, where / "data.csv", where / "data", to.notes);
   if (!files) return fail(files.error());
   to.files.insert(to.files.end(), {where / "sensor.yaml", where / "data.csv"});
   return asl_images{*std::move(camera), *std::move(files)};

@@ -27,6 +27,7 @@
 #include <orbis/io/detail/recordings/seven_scenes.hpp>
 #include <orbis/io/detail/recordings/stereo_index.hpp>
 #include <orbis/io/detail/text.hpp>
+#include <orbis/io/detail/time_stamp.hpp>
 #include <orbis/io/image.hpp>
 
 namespace orbis::io::detail {
@@ -87,15 +88,16 @@ struct kitti_calibration {
   return k;
 }
 
-/// Parses `times.txt`: seconds, one per line. Errors: malformed, with the line (not a number, or not ascending).
+/// Parses `times.txt`: time stamps (`parse_time_stamp`), one per line. Errors: malformed, with the line (not a number,
+/// or not ascending).
 [[nodiscard]] inline result<std::vector<double>> parse_kitti_times(std::string_view text,
                                                                    const std::filesystem::path& where) {
   std::vector<double> times;
   std::size_t bad_line = 0;
   for_each_line(text, [&](std::string_view line, std::size_t number) {
-    const auto t = numbers_of<1>(line);
-    if (!t || (!times.empty() && !((*t)[0] > times.back()))) return bad_line = number, false;
-    times.push_back((*t)[0]);
+    const auto t = parse_time_stamp(line);
+    if (!t || (!times.empty() && !(*t > times.back()))) return bad_line = number, false;
+    times.push_back(*t);
     return true;
   });
   if (bad_line != 0)
@@ -152,15 +154,19 @@ inline void add_kitti_frame(std::size_t n, const std::vector<double>& times, con
   index.ground_truth.push_back({times[n], poses[n]});
 }
 
-/// Sorts the frames of a sequence by time; of frames with the same number keeps the first. `left_out`: images that are
-/// in no frame. Errors: no_data, and those of `check_first_frame`.
-[[nodiscard]] inline result<void> sort_kitti_frames(const std::filesystem::path& folder, std::size_t left_out,
+/// Sorts the frames of a sequence by time; of frames with the same number keeps the first. `images`: the cameras'
+/// folders. Errors: no_data, and those of `check_first_frame`.
+[[nodiscard]] inline result<void> sort_kitti_frames(const std::vector<std::filesystem::path>& images, std::size_t times,
                                                     recording_index& index) {
-  if (index.frames.empty() && left_out != 0)
+  const auto folder = images.front().parent_path();
+  if (index.frames.empty()) {
+    std::string content;
+    for (const auto& path : images) content += path.filename().string() + " " + describe_content(path) + ", ";
     return fail(errc::no_data, folder.string(),
-                "none of " + std::to_string(left_out) + " images makes a frame: " +
-                    "each needs a time in times.txt and, with two cameras, a partner of "
-                    "the same name");
+                "there is no frame: images are named 000000.png to the number of times in times.txt (" +
+                    std::to_string(times) + "), and two cameras have the same names; " +
+                    content.erase(content.size() - 2));
+  }
   const auto keep_first = [](auto& list) {
     const auto earlier = [](const auto& a, const auto& b) { return a.timestamp < b.timestamp; };
     const auto same = [](const auto& a, const auto& b) { return a.timestamp == b.timestamp; };
@@ -224,7 +230,7 @@ inline void add_kitti_frame(std::size_t n, const std::vector<double>& times, con
   }
   if (lonely != 0)
     images.notes.push_back(std::to_string(lonely) + " left images have no right image or no time and are skipped");
-  if (const auto ok = sort_kitti_frames(folder, lonely, images); !ok) return fail(ok.error());
+  if (const auto ok = sort_kitti_frames({left, right}, times->size(), images); !ok) return fail(ok.error());
   const auto first = read_color(images.frames.front().color);
   if (!first) return fail(first.error());
   const camera::pinhole camera{first->width(), first->height(), k->fx, k->fy, k->cx, k->cy};

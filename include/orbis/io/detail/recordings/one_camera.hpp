@@ -20,6 +20,7 @@
 #include <orbis/core/result.hpp>
 #include <orbis/core/se3.hpp>
 #include <orbis/io/detail/recordings/asl.hpp>
+#include <orbis/io/detail/recordings/image_names.hpp>
 #include <orbis/io/detail/recordings/kitti.hpp>
 #include <orbis/io/detail/recordings/recording_folder.hpp>
 #include <orbis/io/detail/recordings/recording_index.hpp>
@@ -39,9 +40,9 @@ inline constexpr double mono_pose_distance = 0.020;
   return first_present(folder, {"rgb.txt", "left.txt"});
 }
 
-/// The index of the images listed in `rgb.txt` or `left.txt`. Errors: not_found, unreadable, no_data, malformed (ground
-/// truth, with its line).
-[[nodiscard]] inline result<recording_index> index_image_list(const std::filesystem::path& folder) {
+/// The index of the images listed in `rgb.txt` or `left.txt`. `fps`: rate of images with numbers for times. Errors:
+/// not_found, unreadable, no_data, malformed (ground truth, with its line).
+[[nodiscard]] inline result<recording_index> index_image_list(const std::filesystem::path& folder, double fps) {
   recording_index index;
   auto list = image_list_of(folder);
   if (list.empty()) list = folder / "rgb.txt";  // to name it in the error
@@ -51,7 +52,8 @@ inline constexpr double mono_pose_distance = 0.020;
   for (const stamped_file& f : *files) index.frames.push_back({f.timestamp, f.path, {}, {}});
   if (const auto ok = check_first_frame(index, folder); !ok) return fail(ok.error());
   if (const auto truth = read_ground_truth(folder, mono_pose_distance, index); !truth) return fail(truth.error());
-  index.camera = tum_camera(folder);
+  convert_frame_numbers(index, fps);
+  guess_tum_camera(folder, index);
   return index;
 }
 
@@ -113,7 +115,8 @@ inline constexpr double mono_pose_distance = 0.020;
   for (se3& pose : *poses) pose = pose * kitti_place(p);
 
   std::size_t lonely = 0;
-  for (const auto& image : list_folder(folder / ("image_" + std::to_string(*camera)))) {
+  const auto images = folder / ("image_" + std::to_string(*camera));
+  for (const auto& image : list_folder(images)) {
     std::size_t n = 0;
     if (!is_image_name(image) || !parse_number(image.stem().string(), n)) continue;
     if (n < times->size())
@@ -122,7 +125,7 @@ inline constexpr double mono_pose_distance = 0.020;
       ++lonely;
   }
   if (lonely != 0) index.notes.push_back(std::to_string(lonely) + " images have no time and are skipped");
-  if (const auto ok = sort_kitti_frames(folder, lonely, index); !ok) return fail(ok.error());
+  if (const auto ok = sort_kitti_frames({images}, times->size(), index); !ok) return fail(ok.error());
   const auto first = read_color(index.frames.front().color);
   if (!first) return fail(first.error());
   index.camera = camera::camera_settings{
@@ -132,99 +135,34 @@ inline constexpr double mono_pose_distance = 0.020;
 
 // --- plain folders ------------------------------------------------------------------------------
 
-/// The images directly in `folder`, by name.
-[[nodiscard]] inline std::vector<std::filesystem::path> images_in(const std::filesystem::path& folder) {
-  auto paths = list_folder(folder);
-  std::erase_if(paths, [](const auto& path) { return !is_image_name(path); });
-  return paths;
-}
-
 /// The folder with the images of a plain folder: itself, or one of the usual names in it; empty if there are none.
 [[nodiscard]] inline std::filesystem::path image_folder_of(const std::filesystem::path& folder) {
   if (!images_in(folder).empty()) return folder;
-  for (const char* const name : {"rgb", "color", "images", "left", "data"})
+  for (const char* const name : {"rgb", "color", "colour", "image", "images", "left", "data"})
     if (!images_in(folder / name).empty()) return folder / name;
   return {};
 }
 
-/// Times derived from the names of images: `1305031102.1753.png` is a time in seconds, `1403636579763555584.png` one in
-/// nanoseconds (only times are that long), and `frame_000123.png` frame 123. If the names have no common form, the
-/// images keep their order, and `in_order` is true.
-struct times_of_names {
-  std::vector<double> times;  ///< seconds, per name
-  bool in_order = false;
-};
-[[nodiscard]] inline times_of_names times_from_names(const std::vector<std::filesystem::path>& names, double fps) {
-  constexpr std::size_t shortest_nanoseconds = 16;  // 1970 and 11 days
-  times_of_names found;
-  const auto all = [&](const auto& time_of) {
-    found.times.clear();
-    for (const auto& name : names) {
-      const std::optional<double> t = time_of(name.stem().string());
-      if (!t) return false;
-      found.times.push_back(*t);
-    }
-    return true;
-  };
-  const auto seconds = [](const std::string& stem) -> std::optional<double> {
-    double t = 0.0;
-    const bool is_time =
-        stem.find('.') != std::string::npos && stem.find_first_not_of("0123456789.") == std::string::npos;
-    return is_time && parse_number(stem, t) ? std::optional{t} : std::nullopt;
-  };
-  const auto nanoseconds = [](const std::string& stem) -> std::optional<double> {
-    std::int64_t t = 0;
-    if (stem.size() < shortest_nanoseconds || !parse_number(stem, t) || t < 0) return std::nullopt;
-    return 1e-9 * static_cast<double>(t);
-  };
-  std::optional<std::string> prefix;
-  const auto numbers = [&](const std::string& stem) -> std::optional<double> {
-    const std::string whole = stem.ends_with(".color") ? stem.substr(0, stem.size() - 6) : stem;
-    const std::size_t digits = whole.find_last_not_of("0123456789") + 1;
-    std::uint32_t number = 0;
-    if (!parse_number(std::string_view{whole}.substr(digits), number)) return std::nullopt;
-    if (!prefix) prefix = whole.substr(0, digits);
-    return *prefix == whole.substr(0, digits) ? std::optional{number / fps} : std::nullopt;
-  };
-  if (all(seconds) || all(nanoseconds) || all(numbers)) return found;
-  found.in_order = true;
-  found.times.clear();
-  for (std::size_t i = 0; i != names.size(); ++i) found.times.push_back(static_cast<double>(i) / fps);
-  return found;
-}
-
 /// The index of a plain folder of images, PNG or JPEG, in it or in `rgb`, `color`, `images`, `left` or `data`. Their
-/// order is determined by their names (`times_from_names`), and their times are those of `times.txt` (seconds, one per
-/// line), or of the names. `fps`: rate of numbered images. Errors: no_data, unreadable, malformed (with file and line).
+/// order is determined by their names (`order_by_name`), and their times are those of `times.txt` or
+/// `timestamps.txt` (one per line), or of the names. `fps`: rate of numbered images. Errors: no_data, unreadable,
+/// malformed (with file and line).
 [[nodiscard]] inline result<recording_index> index_image_folder(const std::filesystem::path& folder, double fps) {
   recording_index index;
   const auto where = image_folder_of(folder);
   if (where.empty())
     return fail(
         errc::no_data, folder.string(),
-        "there are no images in it, nor in rgb, color, images, left or data; the folder " + describe_content(folder));
-  const auto names = images_in(where);
-  const times_of_names found = times_from_names(names, fps);
+        "no PNG or JPEG images in it, nor in rgb, color, images, left or data; the folder " + describe_content(folder));
+  const keyed_images images = order_by_name(images_in(where));
+  const std::vector<double> times = images.times(fps);
   std::vector<stamped_file> files;
-  for (std::size_t i = 0; i != names.size(); ++i) files.push_back({found.times[i], names[i]});
-  // Numbers without leading zeros are not in alphabetical order.
-  std::stable_sort(files.begin(), files.end(), [](const auto& a, const auto& b) { return a.timestamp < b.timestamp; });
-  if (const auto file = folder / "times.txt"; present(file)) {
-    const auto text = read_file(file);
-    if (!text) return fail(text.error());
-    const auto times = parse_kitti_times(*text, file);
-    if (!times) return fail(times.error());
-    if (times->size() != names.size())
-      index.notes.push_back(file.string() + ": " + std::to_string(times->size()) + " times for " +
-                            std::to_string(names.size()) + " images");
-    files.resize(std::min(files.size(), times->size()));
-    for (std::size_t i = 0; i != files.size(); ++i) files[i].timestamp = (*times)[i];
-    index.files.push_back(file);
-  } else if (found.in_order) {
+  for (std::size_t i = 0; i != times.size(); ++i) files.push_back({times[i], images.paths[i]});
+  if (const auto read = read_image_times(folder, files, index); !read) return fail(read.error());
+  if (images.keys_are == image_keys::alphabet && first_present(folder, {"times.txt", "timestamps.txt"}).empty())
     index.notes.push_back(where.string() +
                           ": the names of the images are neither numbers nor times; they are read in "
                           "alphabetical order");
-  }
   auto ordered = in_order_of_time(where, std::move(files), index.notes);
   if (!ordered) return fail(ordered.error());
   for (const stamped_file& f : *ordered) index.frames.push_back({f.timestamp, f.path, {}, {}});

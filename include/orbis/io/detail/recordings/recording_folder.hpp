@@ -64,10 +64,17 @@ inline result<void> check_first_frame(const recording_index& index, const std::f
   return paths;
 }
 
-/// Returns true if the name of a file has the extension of a supported image format.
+[[nodiscard]] inline std::string lower_case(std::string text) {
+  for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return text;
+}
+
+/// Return true if the name of a file has the extension of a supported image format; of PNG.
+[[nodiscard]] inline bool is_png_name(const std::filesystem::path& path) {
+  return lower_case(path.extension().string()) == ".png";
+}
 [[nodiscard]] inline bool is_image_name(const std::filesystem::path& path) {
-  std::string ending = path.extension().string();
-  for (char& c : ending) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  const std::string ending = lower_case(path.extension().string());
   return ending == ".png" || ending == ".jpg" || ending == ".jpeg";
 }
 
@@ -106,6 +113,9 @@ inline result<void> check_first_frame(const recording_index& index, const std::f
                       (ending.empty() ? " files without an extension" : " " + ending + " files"));
   }
   if (items.empty()) return "is empty";
+  for (std::string& name : items)
+    std::replace_if(
+        name.begin(), name.end(), [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7F; }, '?');
   std::string text = "holds ";
   for (std::size_t i = 0; i != std::min(items.size(), most); ++i) text += (i == 0 ? "" : ", ") + items[i];
   if (items.size() > most) text += " and " + std::to_string(items.size() - most) + " more";
@@ -121,9 +131,10 @@ inline result<void> check_first_frame(const recording_index& index, const std::f
   return {};
 }
 
-/// Error for a folder that is not a recording, with the expected files and its actual content.
-[[nodiscard]] inline error unknown_recording(const std::filesystem::path& folder, const std::string& looked_for) {
-  return {errc::unsupported, folder.string(), looked_for + "; the folder " + describe_content(folder)};
+/// Error for a folder that is not a recording, with its actual content and the layouts that are known.
+[[nodiscard]] inline error unknown_recording(const std::filesystem::path& folder, const std::string& known) {
+  return {errc::unsupported, folder.string(),
+          "no known recording; the folder " + describe_content(folder) + ";\n  known are " + known};
 }
 
 }  // namespace orbis::io::detail

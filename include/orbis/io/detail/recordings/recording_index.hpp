@@ -33,7 +33,8 @@ struct recording_entry {
 struct recording_index {
   std::vector<recording_entry> frames;  ///< in order of time, never empty when returned
   trajectory ground_truth;
-  std::optional<camera::camera_settings> camera;  ///< if the format's own files contain it
+  std::optional<camera::camera_settings> camera;  ///< if the format's own files contain it, or it is guessed
+  std::string camera_guess;                       ///< name and origin of a guessed camera, else empty
   std::optional<color_camera> color;              ///< set if colour has to be resampled to the depth camera
   std::vector<std::string> notes;                 ///< warnings for the user
   std::vector<std::filesystem::path> files;       ///< files that were read for the index, without images

@@ -77,6 +77,10 @@ namespace orbis::io::detail {
   const auto earlier = [](const auto& a, const auto& b) { return a.timestamp < b.timestamp; };
   std::stable_sort(index.frames.begin(), index.frames.end(), earlier);
   std::stable_sort(index.ground_truth.begin(), index.ground_truth.end(), earlier);
+  if (index.frames.empty())
+    return fail(errc::no_data, folder.string(),
+                "no image color/N.jpg with a depth image depth/N.png: color " + describe_content(folder / "color") +
+                    ", depth " + describe_content(folder / "depth"));
   if (const auto ok = check_first_frame(index, folder); !ok) return fail(ok.error());
   if (without_depth != 0)
     index.notes.push_back(std::to_string(without_depth) + " colour images have no depth image and are skipped");

@@ -173,6 +173,10 @@ inline std::vector<std::filesystem::path> seven_scenes_sequences(const std::file
                    [](const recording_entry& a, const recording_entry& b) { return a.timestamp < b.timestamp; });
   std::stable_sort(index.ground_truth.begin(), index.ground_truth.end(),
                    [](const stamped_pose& a, const stamped_pose& b) { return a.timestamp < b.timestamp; });
+  if (index.frames.empty() && without_depth != 0)
+    return fail(errc::no_data, folder.string(),
+                std::to_string(without_depth) + " colour images have no frame-*.depth.png; the folder " +
+                    describe_content(folder));
   if (const auto ok = check_first_frame(index, folder); !ok) return fail(ok.error());
   if (without_depth != 0)
     index.notes.push_back(std::to_string(without_depth) + " colour images have no depth image and are skipped");

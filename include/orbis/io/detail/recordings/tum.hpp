@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstdio>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -24,6 +25,7 @@
 #include <orbis/io/detail/recordings/recording_folder.hpp>
 #include <orbis/io/detail/recordings/recording_index.hpp>
 #include <orbis/io/detail/text.hpp>
+#include <orbis/io/detail/time_stamp.hpp>
 #include <orbis/io/trajectory_file.hpp>
 
 namespace orbis::io::detail {
@@ -33,6 +35,12 @@ struct stamped_file {
   double timestamp = 0.0;
   std::filesystem::path path;
 };
+
+[[nodiscard]] inline std::vector<double> times_of(const std::vector<stamped_file>& files) {
+  std::vector<double> times;
+  for (const stamped_file& f : files) times.push_back(f.timestamp);
+  return times;
+}
 
 /// The entries of a list in order of time, each time stamp once; notes report changes. Errors: no_data (the list is
 /// empty).
@@ -55,46 +63,76 @@ template <class Entry>
   return entries;
 }
 
-/// Notes the skipped lines of a list: the first ones individually, the others by their number.
-class skipped_lines {
- public:
-  skipped_lines(const std::filesystem::path& list, std::vector<std::string>& notes) : list_{list}, notes_{notes} {}
-  void add(std::size_t line, const char* why) {
-    if (++count_ <= most_) notes_.push_back(at_line(list_, line) + ": skipped, " + why);
-  }
-  /// Notes the number of the others. @pre called once, after the last line
-  void finish() {
-    if (count_ > most_)
-      notes_.push_back(list_.string() + ": " + std::to_string(count_ - most_) + " more lines skipped");
-  }
-
- private:
-  static constexpr std::size_t most_ = 10;
-  const std::filesystem::path& list_;
-  std::vector<std::string>& notes_;
-  std::size_t count_ = 0;
-};
-
-/// Parses a list of `timestamp filename` lines: comments, blank lines and CRLF are accepted, the entries are sorted,
-/// unreadable lines and repeated time stamps are skipped and noted. File names are relative to the folder of `list`.
-/// Errors: no_data (no line remains).
-[[nodiscard]] inline result<std::vector<stamped_file>> parse_image_list(std::string_view text,
-                                                                        const std::filesystem::path& list,
-                                                                        std::vector<std::string>& notes) {
-  std::vector<stamped_file> files;
-  skipped_lines skipped{list, notes};
+/// Parses a list with one entry per line. `parse(line)` returns an entry, or none for a line that is not one; `form`
+/// describes an entry. Comments, blank lines, CRLF and a byte order mark are accepted, and a first line without an
+/// entry is a heading. The entries are sorted; other lines and repeated time stamps are skipped and noted. Errors:
+/// no_data (no entry; quotes the first line).
+template <class Entry, class Parse>
+[[nodiscard]] result<std::vector<Entry>> parse_list(std::string_view text, const std::filesystem::path& list,
+                                                    const std::string& form, Parse&& parse,
+                                                    std::vector<std::string>& notes) {
+  constexpr std::size_t most_noted = 10, most_quoted = 60;
+  const auto is_letter = [](char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'); };
+  std::vector<Entry> entries;
+  bool heading = false;
+  std::size_t skipped = 0, first_line = 0;
+  std::string first_skipped;
   for_each_line(text, [&](std::string_view line, std::size_t number) {
-    double t = 0.0;
-    const std::string_view stamp = next_field(line);
-    const std::string_view name = trimmed(line);
-    if (!parse_number(stamp, t) || !std::isfinite(t) || name.empty())
-      skipped.add(number, "not a time stamp and a file name");
-    else
-      files.push_back({t, list.parent_path() / std::filesystem::path{name}});
+    if (std::optional<Entry> entry = parse(line)) {
+      entries.push_back(*std::move(entry));
+      return true;
+    }
+    if (entries.empty() && skipped == 0 && !heading && is_letter(line.front())) return heading = true;
+    const std::string quoted = "\"" + std::string{line.substr(0, most_quoted)} +
+                               (line.size() > most_quoted ? "...\"" : "\"") + " is not " + form;
+    if (skipped++ == 0) first_skipped = quoted, first_line = number;
+    if (skipped <= most_noted) notes.push_back(at_line(list, number) + ": skipped, " + quoted);
     return true;
   });
-  skipped.finish();
-  return in_order_of_time(list, std::move(files), notes);
+  if (skipped > most_noted)
+    notes.push_back(list.string() + ": " + std::to_string(skipped - most_noted) + " more lines skipped");
+  if (entries.empty() && skipped != 0)
+    return fail(errc::no_data, at_line(list, first_line), "the list names no image: " + first_skipped);
+  return in_order_of_time(list, std::move(entries), notes);
+}
+
+[[nodiscard]] constexpr bool is_separator(char c) noexcept { return is_blank(c) || c == ',' || c == ';'; }
+
+/// Removes the first field, which ends at a blank, comma or semicolon, and the separators after it from the front of
+/// `line`; returns the field.
+[[nodiscard]] constexpr std::string_view next_separated(std::string_view& line) noexcept {
+  std::size_t end = 0;
+  while (end != line.size() && !is_separator(line[end])) ++end;
+  const std::string_view field = line.substr(0, end);
+  while (end != line.size() && is_separator(line[end])) ++end;
+  line.remove_prefix(end);
+  return field;
+}
+
+/// The file name of a list: without quotes, and without separators at its end; backslashes become slashes.
+[[nodiscard]] inline std::string listed_name(std::string_view name) {
+  while (!name.empty() && is_separator(name.back())) name.remove_suffix(1);
+  if (name.size() >= 2 && name.front() == '"' && name.back() == '"') name = name.substr(1, name.size() - 2);
+  std::string path{name};
+  std::replace(path.begin(), path.end(), '\\', '/');
+  return path;
+}
+
+/// Parses a list of lines with a time stamp (`parse_time_stamp`) and a file name, separated by blanks, a comma or a
+/// semicolon; see `parse_list`. File names are relative to `folder`. Errors: no_data.
+[[nodiscard]] inline result<std::vector<stamped_file>> parse_image_list(std::string_view text,
+                                                                        const std::filesystem::path& list,
+                                                                        const std::filesystem::path& folder,
+                                                                        std::vector<std::string>& notes) {
+  return parse_list<stamped_file>(
+      text, list, "a time stamp and a file name",
+      [&](std::string_view line) -> std::optional<stamped_file> {
+        const std::optional<double> t = parse_time_stamp(next_separated(line));
+        const std::string name = listed_name(line);
+        if (!t || name.empty()) return std::nullopt;
+        return stamped_file{*t, folder / name};
+      },
+      notes);
 }
 
 /// Reads a list; see `parse_image_list`. Errors: not_found, unreadable, no_data.
@@ -102,43 +140,53 @@ class skipped_lines {
                                                                        std::vector<std::string>& notes) {
   const auto text = read_file(list);
   if (!text) return fail(text.error());
-  return parse_image_list(*text, list, notes);
+  return parse_image_list(*text, list, list.parent_path(), notes);
 }
 
-/// Parses `associations.txt`: four fields per line, a time stamp and a file for colour and for depth, in either order
-/// (the file whose path contains "depth" is the depth image; colour first if neither or both do). Unreadable lines and
-/// repeated time stamps are skipped and noted. Errors: as `parse_image_list`.
-[[nodiscard]] inline result<std::vector<recording_entry>> parse_associations(std::string_view text,
-                                                                             const std::filesystem::path& list,
-                                                                             std::vector<std::string>& notes) {
-  std::vector<recording_entry> frames;
-  skipped_lines skipped{list, notes};
-  for_each_line(text, [&](std::string_view line, std::size_t number) {
-    double t1 = 0.0, t2 = 0.0;
-    const bool first_ok = parse_number(next_field(line), t1) && std::isfinite(t1);
-    std::string_view file1 = next_field(line);
-    const bool second_ok = parse_number(next_field(line), t2) && std::isfinite(t2);
-    std::string_view file2 = next_field(line);
-    if (!first_ok || !second_ok || file2.empty() || !trimmed(line).empty()) {
-      skipped.add(number, "not two pairs of time stamp and file name");
-      return true;
-    }
-    const auto says_depth = [](std::string_view name) { return name.find("depth") != std::string_view::npos; };
-    if (says_depth(file1) && !says_depth(file2)) {
-      std::swap(file1, file2);
-      std::swap(t1, t2);
-    }
-    const std::filesystem::path folder = list.parent_path();
-    frames.push_back({t1, folder / std::filesystem::path{file1}, folder / std::filesystem::path{file2}, {}});
-    return true;
-  });
-  skipped.finish();
-  return in_order_of_time(list, std::move(frames), notes);
+/// A line of `associations.txt`: a colour and a depth image with a time stamp each.
+struct associated_files {
+  double timestamp = 0.0, depth_timestamp = 0.0;
+  std::filesystem::path color, depth;
+};
+
+/// Parses a line with a time stamp and a file, twice, in either order (the file whose path contains "depth" is the
+/// depth image; colour first if neither or both do). Fields are separated by blanks, commas or semicolons; file names
+/// may contain blanks if only one field between them is a number.
+[[nodiscard]] inline std::optional<associated_files> parse_association(std::string_view line,
+                                                                       const std::filesystem::path& folder) {
+  const std::optional<double> t1 = parse_time_stamp(next_separated(line));
+  std::optional<double> t2;
+  std::string file1, file2;
+  for (std::string_view rest = line; !rest.empty();) {
+    const std::size_t at = line.size() - rest.size();
+    const std::optional<double> t = parse_time_stamp(next_separated(rest));
+    if (!t || at == 0 || rest.empty()) continue;
+    if (t2) return std::nullopt;  // two numbers between the names
+    t2 = t;
+    file1 = listed_name(line.substr(0, at));
+    file2 = listed_name(rest);
+  }
+  if (!t1 || !t2 || file1.empty() || file2.empty()) return std::nullopt;
+  const auto says_depth = [](const std::string& name) { return name.find("depth") != std::string::npos; };
+  const bool depth_first = says_depth(file1) && !says_depth(file2);
+  const auto first = folder / file1, second = folder / file2;
+  if (depth_first) return associated_files{*t2, *t1, second, first};
+  return associated_files{*t1, *t2, first, second};
+}
+
+/// Parses `associations.txt`; see `parse_association` and `parse_list`. File names are relative to the folder of
+/// `list`. Errors: no_data.
+[[nodiscard]] inline result<std::vector<associated_files>> parse_associations(std::string_view text,
+                                                                              const std::filesystem::path& list,
+                                                                              std::vector<std::string>& notes) {
+  return parse_list<associated_files>(
+      text, list, "two pairs of time stamp and file name",
+      [&](std::string_view line) { return parse_association(line, list.parent_path()); }, notes);
 }
 
 /// Reads `associations.txt`; see `parse_associations`. Errors: as `read_image_list`.
-[[nodiscard]] inline result<std::vector<recording_entry>> read_associations(const std::filesystem::path& list,
-                                                                            std::vector<std::string>& notes) {
+[[nodiscard]] inline result<std::vector<associated_files>> read_associations(const std::filesystem::path& list,
+                                                                             std::vector<std::string>& notes) {
   const auto text = read_file(list);
   if (!text) return fail(text.error());
   return parse_associations(*text, list, notes);
@@ -158,69 +206,103 @@ class skipped_lines {
   return {};
 }
 
-/// Returns true if `folder` looks like a TUM recording.
-[[nodiscard]] inline bool is_tum(const std::filesystem::path& folder) {
-  return present(folder / "rgb.txt") || present(folder / "depth.txt") || present(folder / "associations.txt");
+/// The list of pairs of colour and depth images in `folder`, under one of its usual names; empty if there is none.
+[[nodiscard]] inline std::filesystem::path association_list_of(const std::filesystem::path& folder) {
+  return first_present(folder, {"associations.txt", "association.txt", "associated.txt", "associate.txt", "assoc.txt"});
 }
 
-/// The camera of a TUM recording with freiburg1, 2 or 3 in its path, or none. Of several such words the last one
-/// counts: the sequence may be in the folder of another one.
-[[nodiscard]] inline std::optional<camera::camera_settings> tum_camera(const std::filesystem::path& folder) {
-  std::optional<camera::camera_settings> found;
-  const std::string name = std::filesystem::absolute(folder).lexically_normal().string();
-  std::size_t last = 0;
+/// Returns true if `folder` looks like a TUM recording.
+[[nodiscard]] inline bool is_tum(const std::filesystem::path& folder) {
+  return present(folder / "rgb.txt") || present(folder / "depth.txt") || !association_list_of(folder).empty();
+}
+
+/// Sets the camera of a sequence of the TUM benchmark, which `rgbd_dataset_freiburg1` (2, 3) in the path of `folder`
+/// identifies (the innermost such folder counts), or `freiburg1` at the beginning of the folder's own name.
+inline void guess_tum_camera(const std::filesystem::path& folder, recording_index& index) {
+  const auto full = std::filesystem::absolute(folder / "").lexically_normal().parent_path();
   for (const auto& [word, preset] :
        {std::pair{"freiburg1", "tum_fr1"}, std::pair{"freiburg2", "tum_fr2"}, std::pair{"freiburg3", "tum_fr3"}}) {
-    const std::size_t at = name.rfind(word);
-    if (at == std::string::npos || at < last) continue;
-    last = at;
-    if (auto camera = camera::preset(preset)) found = *std::move(camera);
+    std::filesystem::path named;
+    if (full.filename().string().starts_with(word)) named = full;
+    for (auto path = full; named.empty() && path.has_relative_path(); path = path.parent_path()) {
+      const std::string name = path.filename().string();
+      if (!name.starts_with("rgbd_dataset_freiburg")) continue;
+      if (!name.starts_with(std::string{"rgbd_dataset_"} + word)) break;
+      named = path;
+    }
+    if (named.empty()) continue;
+    if (auto camera = camera::preset(preset)) index.camera = *std::move(camera);
+    index.camera_guess = std::string{preset} + ", by the name " + named.filename().string();
   }
-  return found;
+}
+
+/// Converts the times of frames from frame numbers to seconds at `fps` frames per second, if they are such numbers, and
+/// those of a ground truth of whole numbers with them; notes it.
+inline void convert_frame_numbers(recording_index& index, double fps) {
+  std::vector<double> times;
+  for (const recording_entry& frame : index.frames) times.push_back(frame.timestamp);
+  if (!are_frame_numbers(times)) return;
+  for (recording_entry& frame : index.frames) frame.timestamp /= fps;
+  const bool truth_has_numbers = std::all_of(index.ground_truth.begin(), index.ground_truth.end(),
+                                             [](const auto& p) { return p.timestamp == std::floor(p.timestamp); });
+  if (truth_has_numbers)
+    for (stamped_pose& pose : index.ground_truth) pose.timestamp /= fps;
+  char text[100];
+  std::snprintf(text, sizeof text, "the time stamps are frame numbers; times are those of %.6g frames per second", fps);
+  index.notes.emplace_back(text);
 }
 
 /// The index of a TUM recording. `associations.txt` is used if it exists; otherwise colour and depth images are paired
 /// by `associate` within `max_time_difference` seconds, and images without a partner are noted. The ground truth is
-/// interpolated at the colour images' time stamps. The camera is known for folders with freiburg1, 2 or 3 in their
-/// name. Errors: not_found (a list, the first image), unreadable, no_data (empty lists, no pair), malformed (ground
-/// truth, with its line).
+/// interpolated at the colour images' time stamps. The camera is that of the benchmark's sequences
+/// (`guess_tum_camera`). If all time stamps are frame numbers, times are those at `fps` frames per second. Errors:
+/// not_found (a list, the first image), unreadable, no_data (empty lists, no pair), malformed (ground truth, with its
+/// line).
 [[nodiscard]] inline result<recording_index> index_tum(const std::filesystem::path& folder,
-                                                       double max_time_difference = 0.020) {
+                                                       double max_time_difference = 0.020, double fps = 30.0) {
   recording_index index;
-  if (const auto list = folder / "associations.txt"; present(list)) {
+  const auto is_whole = [](double t) { return t == std::floor(t); };
+  bool depth_is_whole = true;
+  if (const auto list = association_list_of(folder); !list.empty()) {
     auto frames = read_associations(list, index.notes);
     if (!frames) return fail(frames.error());
-    index.frames = *std::move(frames);
+    for (associated_files& f : *frames) {
+      depth_is_whole = depth_is_whole && is_whole(f.depth_timestamp);
+      index.frames.push_back({f.timestamp, std::move(f.color), std::move(f.depth), {}});
+    }
     index.files = {list};
   } else {
     index.files = {folder / "rgb.txt", folder / "depth.txt"};
+    for (const auto& file : index.files)
+      if (!present(file))
+        return fail(
+            errc::not_found, file.string(),
+            "no such file; a recording in the layout of TUM has rgb.txt and depth.txt, or associations.txt; the "
+            "folder " +
+                describe_content(folder));
     const auto color = read_image_list(folder / "rgb.txt", index.notes);
     if (!color) return fail(color.error());
     const auto depth = read_image_list(folder / "depth.txt", index.notes);
     if (!depth) return fail(depth.error());
-    const auto stamps = [](const std::vector<stamped_file>& files) {
-      std::vector<double> t;
-      for (const stamped_file& f : files) t.push_back(f.timestamp);
-      return t;
-    };
-    for (const auto& [c, d] : associate(stamps(*color), stamps(*depth), max_time_difference))
-      index.frames.push_back({(*color)[c].timestamp, (*color)[c].path, (*depth)[d].path, {}});
+    const auto times = times_of(*color), depth_times = times_of(*depth);
+    depth_is_whole = std::all_of(depth_times.begin(), depth_times.end(), is_whole);
+    for (const auto& [c, d] : associate(times, depth_times, max_time_difference))
+      index.frames.push_back({times[c], (*color)[c].path, (*depth)[d].path, {}});
     if (index.frames.empty())
       return fail(errc::no_data, folder.string(),
-                  "no colour image has a depth image within " + std::to_string(max_time_difference) + " s");
-    if (const std::size_t lonely = color->size() - index.frames.size(); lonely != 0)
-      index.notes.push_back(std::to_string(lonely) + " of " + std::to_string(color->size()) +
-                            " colour images have no depth image within " + std::to_string(max_time_difference) +
-                            " s and are skipped");
-    if (const std::size_t lonely = depth->size() - index.frames.size(); lonely != 0)
-      index.notes.push_back(std::to_string(lonely) + " of " + std::to_string(depth->size()) +
-                            " depth images are skipped");
+                  "no colour image has a depth image within " + describe(max_time_difference) +
+                      " s: rgb.txt has times " + describe_span(times) + ", depth.txt " + describe_span(depth_times));
+    for (const auto& [list, kind] : {std::pair{&*color, "colour"}, std::pair{&*depth, "depth"}})
+      if (const std::size_t lonely = list->size() - index.frames.size(); lonely != 0)
+        index.notes.push_back(std::to_string(lonely) + " of " + std::to_string(list->size()) + " " + kind +
+                              " images have no counterpart within " + describe(max_time_difference) +
+                              " s and are skipped");
   }
   if (const auto ok = check_first_frame(index, folder); !ok) return fail(ok.error());
 
   if (const auto truth = read_ground_truth(folder, max_time_difference, index); !truth) return fail(truth.error());
-
-  index.camera = tum_camera(folder);
+  if (depth_is_whole) convert_frame_numbers(index, fps);
+  guess_tum_camera(folder, index);
   return index;
 }
 
@@ -230,16 +312,14 @@ class skipped_lines {
                                               const std::vector<stamped_file>& right,
                                               const std::filesystem::path& where, double max_time_difference,
                                               recording_index& to) {
-  const auto stamps = [](const std::vector<stamped_file>& files) {
-    std::vector<double> t;
-    for (const stamped_file& f : files) t.push_back(f.timestamp);
-    return t;
-  };
-  for (const auto& [l, r] : associate(stamps(left), stamps(right), max_time_difference))
-    to.frames.push_back({left[l].timestamp, left[l].path, right[r].path, {}});
+  const auto left_times = times_of(left), right_times = times_of(right);
+  for (const auto& [l, r] : associate(left_times, right_times, max_time_difference))
+    to.frames.push_back({left_times[l], left[l].path, right[r].path, {}});
   if (to.frames.empty())
     return fail(errc::no_data, where.string(),
-                "no left image has a right image within " + std::to_string(max_time_difference) + " s");
+                "no left image has a right image within " + describe(max_time_difference) +
+                    " s: the left ones have times " + describe_span(left_times) + ", the right ones " +
+                    describe_span(right_times));
   for (const auto& [list, side] : {std::pair{&left, "left"}, std::pair{&right, "right"}})
     if (const std::size_t lonely = list->size() - to.frames.size(); lonely != 0)
       to.notes.push_back(std::to_string(lonely) + " of " + std::to_string(list->size()) + " " + side +

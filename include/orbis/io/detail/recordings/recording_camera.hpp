@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// The camera of a recording: given, in a file of the folder, or known by its format.
+#pragma once
+
+#include <cstdio>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <orbis/camera/settings.hpp>
+#include <orbis/core/result.hpp>
+#include <orbis/io/camera_file.hpp>
+#include <orbis/io/detail/recordings/recording_folder.hpp>
+#include <orbis/io/detail/recordings/recording_index.hpp>
+#include <orbis/io/detail/time_stamp.hpp>
+
+namespace orbis::io::detail {
+
+/// The camera `given` by the user, or else that of `camera.toml` in `folder`, which is added to `files`; none if
+/// neither exists. Errors: those of `read_camera`.
+[[nodiscard]] inline result<std::optional<camera::camera_settings>> given_camera(
+    const std::filesystem::path& folder, const std::optional<camera::camera_settings>& given,
+    std::vector<std::filesystem::path>& files) {
+  const auto file = folder / "camera.toml";
+  if (given || !present(file)) return given;
+  auto read = read_camera(file);
+  if (!read) return fail(read.error());
+  files.push_back(file);
+  return std::optional{*std::move(read)};
+}
+
+/// Sets `camera` to that of the index if it is empty, with a note if that one is a guess, and notes a time between
+/// frames that does not suit its rate. Errors: invalid_argument (no camera is known).
+[[nodiscard]] inline result<void> complete_camera(const std::filesystem::path& folder,
+                                                  std::optional<camera::camera_settings>& camera,
+                                                  recording_index& index) {
+  if (!camera && index.camera && !index.camera_guess.empty()) {
+    const camera::intrinsics& k = index.camera->model.k();
+    char text[200];
+    std::snprintf(text, sizeof text, "%d x %d, fx %.6g, fy %.6g, cx %.6g, cy %.6g, depth_scale %.6g", k.width, k.height,
+                  k.fx, k.fy, k.cx, k.cy, index.camera->depth_scale);
+    index.notes.push_back("the camera is " + index.camera_guess + ": " + text);
+  }
+  if (!camera) camera = index.camera;
+  if (!camera)
+    return fail(errc::invalid_argument, folder.string(),
+                "the camera is not known: put a camera.toml into the folder, or name a camera");
+  std::vector<double> times;
+  for (const recording_entry& frame : index.frames) times.push_back(frame.timestamp);
+  if (std::string warning = describe_interval(times, camera->fps); !warning.empty())
+    index.notes.push_back(std::move(warning));
+  return {};
+}
+
+}  // namespace orbis::io::detail
