@@ -159,7 +159,10 @@ void add_sensor_option(CLI::App& cmd, settings& s, const std::vector<std::string
 }
 
 void add_camera_option(CLI::App& cmd, settings& s) {
-  cmd.add_option("--camera", s.camera, "camera file (camera.toml) or preset: tum_fr1, tum_fr2, tum_fr3, icl, kinect")
+  cmd.add_option("--camera", s.camera,
+                 "camera file (camera.toml, or JSON or YAML of Open3D, ROS, RealSense, ORB-SLAM) or preset: tum_fr1, "
+                 "tum_fr2, tum_fr3, "
+                 "icl, kinect")
       ->check(CLI::Validator(
           [](std::string& name) -> std::string {
             if (is_file_name(name)) return {};
@@ -173,7 +176,7 @@ void add_camera_option(CLI::App& cmd, settings& s) {
 void add_recording_options(CLI::App& cmd, settings& s) {
   add_sensor_option(cmd, s, {"auto", "rgbd", "stereo", "mono"});
   cmd.add_option("--format", s.format, "layout of the recording")
-      ->check(CLI::IsMember({"auto", "tum", "7scenes", "icl", "scannet", "kitti", "asl", "pairs", "images"}))
+      ->check(CLI::IsMember({"auto", "tum", "7scenes", "icl", "scannet", "folders", "kitti", "asl", "pairs", "images"}))
       ->capture_default_str()
       ->type_name("F");
   cmd.add_option("--topics", s.topics, "image topics of a ROS bag: COLOUR,DEPTH or LEFT,RIGHT (chosen automatically)")
@@ -268,7 +271,7 @@ void add_calibration_options(CLI::App& cmd, settings& s) {
       ->required()
       ->type_name("");
   cmd.add_option("--format", s.format, "layout of the recording")
-      ->check(CLI::IsMember({"auto", "tum", "7scenes", "icl", "scannet"}))
+      ->check(CLI::IsMember({"auto", "tum", "7scenes", "icl", "scannet", "folders"}))
       ->capture_default_str()
       ->type_name("F");
   add_camera_option(cmd, s);
@@ -296,7 +299,7 @@ std::string build_features() {
 /// The error if recordings of the sensor do not exist in the requested layout; otherwise empty.
 std::string wrong_format(const settings& s) {
   using list = std::vector<std::string>;
-  const list formats = s.sensor == "rgbd"     ? list{"tum", "7scenes", "icl", "scannet"}
+  const list formats = s.sensor == "rgbd"     ? list{"tum", "7scenes", "icl", "scannet", "folders"}
                        : s.sensor == "stereo" ? list{"kitti", "asl", "pairs"}
                        : s.sensor == "mono"   ? list{"tum", "kitti", "asl", "images"}
                                               : list{s.format};

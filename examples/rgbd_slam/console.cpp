@@ -75,7 +75,13 @@ void console::warn(const std::string& message) {
 
 void console::error(const orbis::error& e) {
   clear_bar();
-  log_->error("rgbd_slam: {}", one_line(e.to_string()));
+  std::string text = one_line(e.where) + (e.where.empty() ? "" : ": ");
+  for (std::size_t begin = 0; begin <= e.message.size();) {  // a message may have several lines
+    const std::size_t end = std::min(e.message.find('\n', begin), e.message.size());
+    text += (begin == 0 ? "" : "\n") + one_line(e.message.substr(begin, end - begin));
+    begin = end + 1;
+  }
+  log_->error("rgbd_slam: {}", text);
 }
 
 bool console::print(const std::string& line) {

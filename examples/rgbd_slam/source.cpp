@@ -3,14 +3,14 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <fstream>
 #include <limits>
 #include <memory>
 #include <mutex>
 #include <utility>
 
-#include <orbis/camera/presets.hpp>
 #include <orbis/camera/stereo_frame.hpp>
-#include <orbis/io/camera_file.hpp>
+#include <orbis/io/image.hpp>
 #include <orbis/io/mono_recording.hpp>
 #include <orbis/io/recording.hpp>
 #include <orbis/io/stereo_recording.hpp>
@@ -20,6 +20,7 @@
 #include "../common/near_origin.hpp"
 #include "../common/voxel_estimate.hpp"
 #include "background.hpp"
+#include "camera_files.hpp"
 #include "inputs/file_recording.hpp"
 #include "inputs/live_source.hpp"
 #include "interrupts.hpp"
@@ -32,14 +33,61 @@ using orbis::fail;
 using orbis::result;
 using orbis::slam::sensor_kind;
 
-result<orbis::camera::camera_settings> named_camera(const std::string& name) {
-  return is_file_name(name) ? orbis::io::read_camera(name) : orbis::camera::preset(name);
-}
+constexpr const char* camera_request = "name a camera";
 
 /// Adds the name of the option to a reader's request for a camera.
 orbis::error with_option(orbis::error e) {
-  if (e.message.ends_with("name a camera")) e.message += " with --camera";
+  if (e.message.ends_with(camera_request))
+    e.message +=
+        " with --camera, which takes a file (camera.toml; JSON or YAML of Open3D, ROS, RealSense, ORB-SLAM) or "
+        "tum_fr1, tum_fr2, tum_fr3, icl, kinect";
+  if (e.code == orbis::errc::not_found && e.where.ends_with("depth.txt"))
+    e.message +=
+        ". --format folders pairs the images in rgb/ and depth/ by their names; --sensor mono does without depth";
   return e;
+}
+
+/// The camera of the option --camera; none without it.
+result<std::optional<orbis::camera::camera_settings>> camera_option(const settings& s) {
+  if (s.camera.empty()) return std::nullopt;
+  auto camera = named_camera(s.camera);
+  if (!camera) return fail(camera.error());
+  return std::optional{*std::move(camera)};
+}
+
+/// Opens a recording with `open(options)`. If it needs a camera and a file of another program in the folder has one,
+/// uses that, and adds a note.
+template <class Open, class Options>
+auto open_with_camera(const settings& s, Options options, Open&& open, std::optional<camera_file>& found)
+    -> decltype(open(options)) {
+  auto camera = camera_option(s);
+  if (!camera) return fail(camera.error());
+  options.camera = *camera;
+  auto opened = open(options);
+  if (opened || !opened.error().message.ends_with(camera_request)) return opened;
+  const auto path = find_camera_file(s.input);
+  if (path.empty()) return opened;
+  auto file = read_camera_file(path);
+  if (!file) return fail(file.error());
+  if (file->camera.model.width() == 0) {  // of the size of the first image
+    const auto images = orbis::io::open_mono_recording(s.input, {.camera = file->camera});
+    if (!images) return fail(images.error());
+    const auto first = orbis::io::read_color(images->path(0));
+    if (!first) return fail(first.error());
+    orbis::camera::intrinsics k = file->camera.model.k();
+    k.width = first->width();
+    k.height = first->height();
+    file->camera.model = orbis::camera::pinhole{k};
+  }
+  found = *std::move(file);
+  options.camera = found->camera;
+  return open(options);
+}
+
+void add_camera_file(const std::optional<camera_file>& file, frame_source& source) {
+  if (!file) return;
+  source.notes.push_back(file->describe());
+  source.files.push_back(file->path);
 }
 
 std::size_t limited(std::size_t available, const settings& s) {
@@ -102,11 +150,9 @@ result<frame_source> open_stereo_recording(const settings& s) {
                                                         : s.format == "asl"   ? stereo_format::asl
                                                         : s.format == "pairs" ? stereo_format::pairs
                                                                               : stereo_format::automatic};
-  if (!s.camera.empty()) {
-    auto camera = named_camera(s.camera);
-    if (!camera) return fail(camera.error());
-    options.camera = *std::move(camera);
-  }
+  const auto camera = camera_option(s);
+  if (!camera) return fail(camera.error());
+  options.camera = *camera;
   auto opened = orbis::io::open_stereo_recording(s.input, options);
   if (!opened) return fail(with_option(opened.error()));
   const auto recording = std::make_shared<const orbis::io::stereo_recording>(*std::move(opened));
@@ -128,28 +174,34 @@ result<frame_source> open_recording(const settings& s) {
                                                  : s.format == "7scenes" ? recording_format::seven_scenes
                                                  : s.format == "icl"     ? recording_format::icl_nuim
                                                  : s.format == "scannet" ? recording_format::scannet
+                                                 : s.format == "folders" ? recording_format::folders
                                                                          : recording_format::automatic};
-  if (!s.camera.empty()) {
-    auto camera = named_camera(s.camera);
-    if (!camera) return fail(camera.error());
-    options.camera = *std::move(camera);
-  }
-  auto opened = orbis::io::open_recording(s.input, options);
+  std::optional<camera_file> file;
+  auto opened = open_with_camera(
+      s, options, [&](const auto& with) { return orbis::io::open_recording(s.input, with); }, file);
   if (!opened) {
     orbis::error e = with_option(opened.error());
     if (e.code == orbis::errc::unsupported && s.sensor == "auto" && s.format == "auto") {
-      const auto add = [&](const orbis::error& other) {
-        if (other.message == e.message) return;  // the contents of the folder are listed once
-        e.message = e.message.substr(0, e.message.rfind("; the folder ")) + "; and " + other.message;
+      const auto add = [&](const char* sensor, const orbis::error& other) {
+        constexpr std::string_view before = "known are ";
+        if (const std::size_t at = other.message.find(before); at != std::string::npos)
+          e.message += sensor + other.message.substr(at + before.size());
       };
-      if (const auto stereo = orbis::io::open_stereo_recording(s.input); !stereo) add(stereo.error());
-      if (const auto mono = orbis::io::open_mono_recording(s.input); !mono) add(mono.error());
+      if (const auto stereo = orbis::io::open_stereo_recording(s.input); !stereo)
+        add(";\n  with two cameras ", stereo.error());
+      if (const auto mono = orbis::io::open_mono_recording(s.input); !mono) add("; with one ", mono.error());
     }
     return fail(std::move(e));
   }
 
   const auto recording = std::make_shared<const orbis::io::recording>(*std::move(opened));
   frame_source source = make_source(*recording, "recording", s);
+  if (recording->format() == recording_format::folders) {
+    const auto folder = [](const std::filesystem::path& image) { return image.parent_path().filename().string(); };
+    const auto& files = source.files;  // the images of the last frame are at the end
+    source.images_of = folder(files[files.size() - 2]) + "/ and " + folder(files.back()) + "/";
+  }
+  add_camera_file(file, source);
   subtract_origin(source);
   source.frame = [recording, origin = source.origin, stride = s.stride](std::size_t i) -> result<source_frame> {
     auto frame = moved(recording->frame(i * stride), origin);
@@ -160,6 +212,20 @@ result<frame_source> open_recording(const settings& s) {
   return source;
 }
 
+/// Notes folders whose names say that they hold depth images, which a recording of one camera does not use.
+void note_depth_folders(const std::filesystem::path& folder, std::vector<std::string>& notes) {
+  std::error_code failure;
+  for (std::filesystem::directory_iterator it{folder, failure}, end; !failure && it != end; it.increment(failure)) {
+    const std::string name = it->path().filename().string();
+    std::error_code ignored;
+    if (name.find("depth") != std::string::npos && it->is_directory(ignored))
+      notes.push_back(
+          "the folder " + name +
+          "/ is not used: the recording is taken for one of a camera without depth. Call it depth/, or list "
+          "its images in depth.txt, to use it");
+  }
+}
+
 result<frame_source> open_mono_recording(const settings& s) {
   using orbis::io::mono_format;
   orbis::io::mono_recording_options options{.format = s.format == "tum"      ? mono_format::tum
@@ -167,15 +233,20 @@ result<frame_source> open_mono_recording(const settings& s) {
                                                       : s.format == "asl"    ? mono_format::asl
                                                       : s.format == "images" ? mono_format::images
                                                                              : mono_format::automatic};
-  if (!s.camera.empty()) {
-    auto camera = named_camera(s.camera);
-    if (!camera) return fail(camera.error());
-    options.camera = *std::move(camera);
-  }
-  auto opened = orbis::io::open_mono_recording(s.input, options);
+  std::optional<camera_file> file;
+  auto opened = open_with_camera(
+      s, options, [&](const auto& with) { return orbis::io::open_mono_recording(s.input, with); }, file);
   if (!opened) return fail(with_option(opened.error()));
   const auto recording = std::make_shared<const orbis::io::mono_recording>(*std::move(opened));
   frame_source source = make_source(*recording, "monocular recording", s);
+  add_camera_file(file, source);
+  if (s.sensor == "auto") {
+    note_depth_folders(s.input, source.notes);
+    const auto above = std::filesystem::absolute(s.input / "").parent_path().parent_path();
+    if (orbis::io::detect_format(above) == orbis::io::recording_format::folders)
+      source.notes.push_back("images of one camera; the folder above, " + above.string() +
+                             ", is a recording with depth");
+  }
   source.sensor = sensor_kind::monocular;
   subtract_origin(source);
   source.color = [recording, stride = s.stride](std::size_t i) { return recording->color(i * stride); };
@@ -192,13 +263,28 @@ std::optional<sensor_kind> wanted_sensor(const settings& s) {
   return s.sensor == "stereo" ? sensor_kind::stereo : s.sensor == "mono" ? sensor_kind::monocular : sensor_kind::rgbd;
 }
 
+/// Returns true if a file begins with text: printable characters without a zero byte.
+bool is_text(const std::filesystem::path& path) {
+  std::ifstream in{path, std::ios::binary};
+  std::string begin(1024, '\0');
+  in.read(begin.data(), static_cast<std::streamsize>(begin.size()));
+  begin.resize(static_cast<std::size_t>(in.gcount()));
+  return !begin.empty() && std::none_of(begin.begin(), begin.end(), [](char c) {
+    return static_cast<unsigned char>(c) < 0x20 && c != '\n' && c != '\r' && c != '\t' && c != '\f';
+  });
+}
+
 result<frame_source> open_file(const settings& s) {
-  file_recording_options options{.sensor = wanted_sensor(s), .topics = s.topics};
-  if (!s.camera.empty()) {
-    auto camera = named_camera(s.camera);
-    if (!camera) return fail(camera.error());
-    options.camera = *std::move(camera);
-  }
+  if (const auto ending = s.input.extension(); ending == ".png" || ending == ".jpg" || ending == ".jpeg")
+    return fail(orbis::errc::unsupported, s.input.string(),
+                "is one image; name its folder, " + std::filesystem::absolute(s.input).parent_path().string());
+  if (is_text(s.input))
+    return fail(orbis::errc::unsupported, s.input.string(),
+                "is a text file, neither a bag nor a video; a recording with lists is opened by its folder, " +
+                    std::filesystem::absolute(s.input).parent_path().string());
+  const auto camera = camera_option(s);
+  if (!camera) return fail(camera.error());
+  const file_recording_options options{.sensor = wanted_sensor(s), .camera = *camera, .topics = s.topics};
   auto opened = s.input.extension() == ".bag" ? open_bag(s.input, options) : open_video(s.input, options);
   if (!opened) return fail(with_option(opened.error()));
   const std::shared_ptr<const file_recording> recording = *std::move(opened);
@@ -223,12 +309,12 @@ sensor_kind sensor_of(const settings& s) {
   if (s.format == "images") return sensor_kind::monocular;
   if (s.format == "kitti" || s.format == "asl" || s.format == "pairs") return sensor_kind::stereo;
   std::error_code ignored;
-  for (const char* const depth : {"depth.txt", "associations.txt", "depth"})
+  for (const char* const depth : {"depth.txt", "depth"})
     if (std::filesystem::exists(s.input / depth, ignored)) return sensor_kind::rgbd;
   using orbis::io::recording_format;
-  const auto with_depth = orbis::io::detect_format(s.input);  // TUM recordings with depth have one of the lists above
-  if (s.format != "auto" || (with_depth != recording_format::automatic && with_depth != recording_format::tum))
-    return sensor_kind::rgbd;
+  const auto with_depth = orbis::io::detect_format(s.input);
+  const bool only_colour = with_depth == recording_format::tum && std::filesystem::exists(s.input / "rgb.txt", ignored);
+  if (s.format != "auto" || (with_depth != recording_format::automatic && !only_colour)) return sensor_kind::rgbd;
   if (orbis::io::detect_stereo_format(s.input) != orbis::io::stereo_format::automatic) return sensor_kind::stereo;
   return orbis::io::detect_mono_format(s.input) != orbis::io::mono_format::automatic ? sensor_kind::monocular
                                                                                      : sensor_kind::rgbd;
@@ -238,11 +324,9 @@ sensor_kind sensor_of(const settings& s) {
 /// video cameras; other names are OpenNI2 devices.
 result<std::unique_ptr<camera_device>> open_device(const settings& s) {
   device_options options{.name = s.input.string(), .sensor = wanted_sensor(s)};
-  if (!s.camera.empty()) {
-    auto camera = named_camera(s.camera);
-    if (!camera) return fail(camera.error());
-    options.camera = *std::move(camera);
-  }
+  const auto camera = camera_option(s);
+  if (!camera) return fail(camera.error());
+  options.camera = *camera;
   std::error_code ignored;
   if (std::filesystem::is_directory(s.input, ignored)) {
     options.sensor = sensor_of(s);
@@ -379,6 +463,48 @@ result<void> check_resolution(frame_source& source, const settings& s) {
   return {};
 }
 
+/// Reads the first frame, so that images that do not suit the camera are an error before tracking starts, and adds a
+/// note if depths are so far from those of a room that the depth scale must be wrong.
+result<void> check_images(frame_source& source) {
+  if (source.frames == 0 || source.is_live || source.made) return {};
+  constexpr std::size_t samples = 4;
+  for (std::size_t sample = 0; sample != samples; ++sample) {
+    const std::size_t i = sample * source.frames / samples;
+    const auto frame = source.frame(i);
+    if (!frame && sample != 0) return {};  // tracking reports the error
+    if (!frame) {
+      orbis::error e = frame.error();
+      if (e.message.find("pixels, the camera") != std::string::npos)
+        e.message += "; use a camera of this size (--camera)";
+      return fail(std::move(e));
+    }
+    if (source.sensor != sensor_kind::rgbd) return {};
+    std::vector<std::uint16_t> depths;
+    for (const std::uint16_t d : frame->depth.pixels())
+      if (d != 0 && d != 65535) depths.push_back(d);
+    if (depths.size() < frame->depth.pixels().size() / 100) continue;  // looks at a later frame
+    const auto middle = depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2);
+    std::nth_element(depths.begin(), middle, depths.end());
+    constexpr double nearest = 0.2, farthest = 20.0;
+    const double metres = *middle / frame->depth_scale;
+    if (metres >= nearest && metres <= farthest) return {};
+    char text[300];
+    int length = std::snprintf(text, sizeof text, "the median depth of frame %zu is %.*f m (%d / depth_scale %.6g)", i,
+                               metres < 10.0 ? 2 : 0, metres, static_cast<int>(*middle), frame->depth_scale);
+    for (const double scale : {1000.0, 5000.0, 10000.0, 100.0})
+      if (*middle / scale >= nearest && *middle / scale <= farthest / 2.0) {
+        length += std::snprintf(text + length, sizeof text - static_cast<std::size_t>(length),
+                                "; with depth_scale %.6g it would be %.2f m", scale, *middle / scale);
+        break;
+      }
+    source.notes.push_back(text +
+                           std::string{". Check depth_scale of the camera: stored depth / depth_scale = metres"});
+    return {};
+  }
+  if (source.sensor == sensor_kind::rgbd) source.notes.emplace_back("depth images have hardly any depth");
+  return {};
+}
+
 std::string describe(const frame_source& source) {
   return source.title + ": " + (source.is_live ? "live camera" : std::to_string(source.frames) + " frames") + ", " +
          std::to_string(source.camera.model.width()) + " x " + std::to_string(source.camera.model.height()) +
@@ -413,6 +539,7 @@ result<frame_source> open_source(const settings& s, console& console) {
   };
   auto source = s.what == command::demo ? result<frame_source>{make_synthetic(s)} : open();
   if (!source) return source;
+  if (auto fits = check_images(*source); !fits) return fail(fits.error());
   if (source->is_stereo()) {
     // Up to this depth, a quarter of a pixel of disparity corresponds to about 1 % of the depth.
     constexpr double baselines = 20.0;

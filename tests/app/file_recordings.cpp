@@ -102,7 +102,8 @@ TEST_CASE("what is no video or has no camera is refused in words") {
   const temporary_folder folder;
   CHECK_THAT(message_of(app::open_video(folder.path() / "none.avi", {})), Contains("no such file"));
   folder.write("notes.txt", "hello");
-  CHECK_THAT(message_of(app::open_video(folder.path() / "notes.txt", {.camera = settings})), Contains("not a folder, a bag, or a video that"));
+  CHECK_THAT(message_of(app::open_video(folder.path() / "notes.txt", {.camera = settings})),
+             Contains("not a folder, a bag, or a video that"));
   const auto path = write_video(folder, 2, 32);
   CHECK_THAT(message_of(app::open_video(path, {})), Contains("put a camera.toml next to the video"));
   CHECK_THAT(message_of(app::open_video(path, {.sensor = sensor_kind::rgbd})), Contains("no depth"));

@@ -21,9 +21,12 @@ check(page MATCHES "depth / 500 = metres" AND page MATCHES "measurements up to 1
 
 # A folder that is neither: both kinds are named.
 file(MAKE_DIRECTORY ${WORK}/nothing)
-app_fails(2 "rgb.txt and depth.txt.*and no known stereo recording: neither image_0" run nothing --out out)
-app_fails(2 "nothing: no known stereo recording" run nothing --sensor stereo --out out)
-app_fails(2 "nothing: no known recording: neither rgb.txt" run nothing --sensor rgbd --out out)
+foreach(kind "stereo;image_0, image_1" "rgbd;rgb.txt and depth.txt")
+  list(GET kind 0 sensor)
+  list(GET kind 1 layout)
+  app(2 run nothing --sensor ${sensor} --out out)
+  check(err MATCHES "nothing: no known recording. the folder [^\n]*\n  known are ${layout}")
+endforeach()
 
 # Two lists of images are stereo where there is no depth.
 if(EXISTS ${DATA}/kitti_stereo_a)

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Cameras in files: camera.toml, and the files of other programs.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include <orbis/camera/settings.hpp>
+#include <orbis/core/result.hpp>
+
+namespace app {
+
+/// A camera in a file of another program. Images of any size fit a camera whose width is 0: the file does not state it.
+struct camera_file {
+  orbis::camera::camera_settings camera;
+  std::filesystem::path path;
+  bool has_depth_scale = false;  ///< otherwise `depth_scale` is assumed
+  /// Describes the camera for a note.
+  [[nodiscard]] std::string describe() const;
+};
+
+/// Reads a JSON or YAML file: Open3D (`intrinsic_matrix`), librealsense (`fx`, `ppx`, `coeffs`),
+/// `sensor_msgs/CameraInfo` as text, ROS calibrations (`camera_matrix`), ORB-SLAM settings (`Camera.fx`,
+/// `DepthMapFactor`); or a text file with a 3x3 matrix or `fx fy cx cy`. A depth scale below 1 is the length of a step
+/// in metres. Errors: not_found, unreadable, malformed, unsupported (a distortion model).
+[[nodiscard]] orbis::result<camera_file> read_camera_file(const std::filesystem::path& path);
+
+/// The camera of the option --camera: `camera.toml`, a file as above, or a preset. Errors: as above.
+[[nodiscard]] orbis::result<orbis::camera::camera_settings> named_camera(const std::string& name);
+
+/// The file of another program with the camera of the recording in `folder`, under one of its usual names; empty if
+/// there is none.
+[[nodiscard]] std::filesystem::path find_camera_file(const std::filesystem::path& folder);
+
+}  // namespace app
