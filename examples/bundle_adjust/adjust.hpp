@@ -14,6 +14,8 @@
 #include <orbis/optimize/bundle_adjustment-inl.hpp>
 #include <orbis/optimize/reprojection_with_intrinsics.hpp>
 
+#include "../common/report_error.hpp"
+
 namespace optimize = orbis::optimize;
 
 struct settings {
@@ -24,10 +26,7 @@ struct settings {
   bool json = false;
 };
 
-inline int report_error(int code, const std::string& why) {
-  std::fprintf(stderr, "bundle_adjust: %s\n", why.c_str());
-  return code;
-}
+inline int report_error(int code, const std::string& why) { return examples::report_error("bundle_adjust", code, why); }
 
 /// The problem of a file, as input of the solver.
 struct bundle {
@@ -107,6 +106,8 @@ int adjust(const settings& s, orbis::io::bal_problem& problem, Loss loss) {
                      {.max_iterations = s.max_iterations, .relative_tolerance = s.tolerance}, {}, print);
   if (in_line) std::printf("\n");
   if (is_failure(summary.status)) return report_error(2, s.input + ": " + to_string(summary));
+  if (!std::isfinite(summary.initial_cost) || !std::isfinite(summary.final_cost))
+    return report_error(2, s.input + ": the cost is not finite: the numbers are too large");
   if (!s.output.empty()) {
     b.write_to(problem);
     if (const auto done = write_bal(s.output, problem); !done) return report_error(2, done.error().to_string());

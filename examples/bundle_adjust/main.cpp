@@ -2,17 +2,15 @@
 //
 // bundle_adjust FILE.txt: adjusts cameras and points of a "Bundle Adjustment in the Large" file and prints a table of
 // iterations, or JSON (--json).
-#include <exception>
 #include <filesystem>
 #include <string>
 
 #include <CLI/CLI.hpp>
 
-#include "../common/memory.hpp"
+#include "../common/program.hpp"
 #include "adjust.hpp"
 
-int main(int argc, char** argv) try {
-  examples::limit_memory();
+int run(int argc, char** argv) {
   settings s;
   CLI::App cli{"Adjust cameras and points of a Bundle Adjustment in the Large file", "bundle_adjust"};
   cli.add_option("FILE", s.input, "input problem, uncompressed")->required();
@@ -33,14 +31,12 @@ int main(int argc, char** argv) try {
   cli.add_option("--max-iterations", s.max_iterations)->check(CLI::NonNegativeNumber)->capture_default_str();
   cli.add_option("--threads", s.threads, "number of threads; 0: all cores")->capture_default_str();
   cli.add_flag("--json", s.json, "print the summary as JSON");
-  try {
-    cli.parse(argc, argv);
-  } catch (const CLI::ParseError& e) {
-    return e.get_exit_code() == 0 ? cli.exit(e) : report_error(1, e.what() + std::string{" (--help shows the usage)"});
-  }
+  if (const auto code = examples::parse(cli, argc, argv)) return *code;
   auto problem = orbis::io::read_bal(std::filesystem::path{s.input});
   if (!problem) return report_error(2, problem.error().to_string());
   return s.loss == "cauchy" || s.loss == "tukey" ? adjust_redescending(s, *problem) : adjust_convex(s, *problem);
-} catch (const std::exception& e) {  // out of memory or threads
-  return report_error(2, examples::describe_exception(e));
+}
+
+int main(int argc, char** argv) {
+  return examples::run_program("bundle_adjust", [&] { return run(argc, argv); });
 }

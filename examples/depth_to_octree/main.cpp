@@ -2,7 +2,6 @@
 //
 // depth_to_octree DEPTH.png MAP.bt: converts a depth image with a camera pose to an occupancy octree for octovis.
 #include <cstdio>
-#include <exception>
 #include <string>
 #include <vector>
 
@@ -13,13 +12,11 @@
 #include <orbis/octree.hpp>
 
 #include "../common/memory.hpp"
+#include "../common/program.hpp"
 #include "../common/same_file.hpp"
 #include "../common/voxel_estimate.hpp"
 
-int report_error(int code, const std::string& why) {
-  std::fprintf(stderr, "depth_to_octree: %s\n", why.c_str());
-  return code;
-}
+int report_error(int code, const std::string& why) { return examples::report_error("depth_to_octree", code, why); }
 
 orbis::result<orbis::camera::camera_settings> camera_named(const std::string& s, int width, int height) {
   if (s.find(',') == s.npos) return orbis::camera::preset(s) ? orbis::camera::preset(s) : orbis::io::read_camera(s);
@@ -30,7 +27,7 @@ orbis::result<orbis::camera::camera_settings> camera_named(const std::string& s,
   return orbis::camera::camera_settings{.model = orbis::camera::pinhole{k}};
 }
 
-int main(int argc, char** argv) try {
+int run(int argc, char** argv) {
   std::string input, output, camera_name = "525,525,319.5,239.5";
   std::vector<double> p{0, 0, 0, 0, 0, 0, 1};
   double resolution = 0.05, scale = 0.0;  // scale 0: that of the camera
@@ -41,11 +38,7 @@ int main(int argc, char** argv) try {
   cli.add_option("--camera", camera_name, "camera.toml, preset (tum_fr1 ...), or fx,fy,cx,cy")->capture_default_str();
   cli.add_option("--scale", scale, "depth units per metre (that of the camera file, or 1000)");
   cli.add_option("--resolution", resolution, "voxel size in metres")->capture_default_str();
-  try {
-    cli.parse(argc, argv);
-  } catch (const CLI::ParseError& e) {
-    return e.get_exit_code() == 0 ? cli.exit(e) : report_error(1, e.what() + std::string{" (--help shows the usage)"});
-  }
+  if (const auto code = examples::parse(cli, argc, argv)) return *code;
   const orbis::so3::quaternion q{p.data() + 3};  // x y z w
   if (!(q.norm() > 1e-6 && orbis::vec3{p.data()}.norm() + q.norm() < 1e6))
     return report_error(1, "--pose: is not a valid pose");
@@ -53,7 +46,6 @@ int main(int argc, char** argv) try {
   if (!(scale == 0.0 || (scale >= 1e-3 && scale <= 1e9))) return report_error(1, "--scale: must be in 0.001 ... 1e9");
   for (const std::string& read : {input, camera_name})
     if (examples::is_same_file(output, read)) return report_error(1, examples::overwrite_message(output, read));
-  examples::limit_memory();
   const auto depth = orbis::io::read_depth(input);
   if (!depth) return report_error(2, depth.error().to_string());
   const auto camera = camera_named(camera_name, depth->width(), depth->height());
@@ -72,6 +64,9 @@ int main(int argc, char** argv) try {
   const auto scan = map.integrate(metres, camera->model, orbis::se3{orbis::so3{q}, orbis::vec3{p.data()}});
   if (scan.used == 0) return report_error(2, input + ": no depth within the bounds of the map");
   if (const auto done = write_bt(map, output); !done) return report_error(2, done.error().to_string());
-} catch (const std::exception& e) {  // out of memory or threads
-  return report_error(2, examples::describe_exception(e));
+  return 0;
+}
+
+int main(int argc, char** argv) {
+  return examples::run_program("depth_to_octree", [&] { return run(argc, argv); });
 }

@@ -8,7 +8,6 @@
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
-#include <exception>
 #include <limits>
 #include <string>
 #include <vector>
@@ -20,17 +19,14 @@
 #include <orbis/nav.hpp>
 #include <orbis/octree.hpp>
 
-#include "../common/memory.hpp"
+#include "../common/program.hpp"
 
 using orbis::se3;
 using orbis::vec3;
 
 using map_type = orbis::octree::occupancy_octree<>;
 
-int report_error(int code, const std::string& why) {
-  std::fprintf(stderr, "explore: %s\n", why.c_str());
-  return code;
-}
+int report_error(int code, const std::string& why) { return examples::report_error("explore", code, why); }
 
 /// A furnished room, divided by two walls with a door each. z is up, the floor is at z = 0, the centre at the origin.
 class building {
@@ -210,8 +206,7 @@ double coverage(const explorer& robot, const vec3& start, std::size_t& air) {
   return static_cast<double>(known) / static_cast<double>(std::max<std::size_t>(1, air));
 }
 
-int main(int argc, char** argv) try {
-  examples::limit_memory();
+int run(int argc, char** argv) {
   std::string output;
   double resolution = 0.05, radius = 0.2, range = 4.0;
   int budget = 600, width = 160;
@@ -232,11 +227,7 @@ int main(int argc, char** argv) try {
       ->capture_default_str();
   cli.add_option("--views", budget, "maximum number of views")->check(CLI::Range(16, 100000))->capture_default_str();
   cli.add_option("--seed", seed, "seed of the building")->capture_default_str();
-  try {
-    cli.parse(argc, argv);
-  } catch (const CLI::ParseError& e) {
-    return e.get_exit_code() == 0 ? cli.exit(e) : report_error(1, e.what() + std::string{" (--help shows the usage)"});
-  }
+  if (const auto code = examples::parse(cli, argc, argv)) return *code;
 
   const building world{seed};
   const vec3 start{-4.0, 0.0, 1.3};
@@ -280,6 +271,9 @@ int main(int argc, char** argv) try {
               robot.travelled, 100.0 * share, static_cast<double>(air) * std::pow(resolution, 3),
               robot.frontiers.size(), why.c_str());
   if (const auto written = write_bt(robot.map, output); !written) return report_error(2, written.error().to_string());
-} catch (const std::exception& e) {  // out of memory or threads
-  return report_error(2, examples::describe_exception(e));
+  return 0;
+}
+
+int main(int argc, char** argv) {
+  return examples::run_program("explore", [&] { return run(argc, argv); });
 }

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // pose_graph FILE.g2o: optimises the poses of a g2o file and prints a table of iterations, or JSON (--json).
+#include <cmath>
 #include <cstdio>
-#include <exception>
 #include <string>
 #include <vector>
 
@@ -11,7 +11,7 @@
 #include <orbis/io/g2o.hpp>
 #include <orbis/optimize/pose_graph-inl.hpp>
 
-#include "../common/memory.hpp"
+#include "../common/program.hpp"
 #include "chordal.hpp"
 
 namespace optimize = orbis::optimize;
@@ -24,10 +24,7 @@ struct settings {
   bool chordal = false, json = false;
 };
 
-int report_error(int code, const std::string& why) {
-  std::fprintf(stderr, "pose_graph: %s\n", why.c_str());
-  return code;
-}
+int report_error(int code, const std::string& why) { return examples::report_error("pose_graph", code, why); }
 
 void print_json(const settings& s, const orbis::io::g2o_graph& graph, const optimize::pose_graph_summary& r) {
   const auto& t = r.seconds;
@@ -73,6 +70,8 @@ int run(const settings& s, orbis::io::g2o_graph& graph, Loss loss) {
                      if (!s.json) std::printf("%9d %20.10g %15d\n", now.iterations, now.final_cost, now.factorizations);
                    });
   if (is_failure(summary.status)) return report_error(2, s.input + ": " + to_string(summary));
+  if (!std::isfinite(summary.initial_cost) || !std::isfinite(summary.final_cost))
+    return report_error(2, s.input + ": the cost is not finite: the numbers are too large");
   if (!s.output.empty())
     if (const auto done = write_g2o(s.output, graph); !done) return report_error(2, done.error().to_string());
   if (s.json)
@@ -83,8 +82,7 @@ int run(const settings& s, orbis::io::g2o_graph& graph, Loss loss) {
   return 0;
 }
 
-int main(int argc, char** argv) try {
-  examples::limit_memory();
+int run_command(int argc, char** argv) {
   settings s;
   CLI::App cli{"Optimise the poses of a g2o file (VERTEX_SE3:QUAT, EDGE_SE3:QUAT, FIX)", "pose_graph"};
   cli.add_option("FILE", s.input, "input graph")->required();
@@ -100,11 +98,7 @@ int main(int argc, char** argv) try {
   cli.add_option("--threads", s.threads, "number of threads; 0: all cores")->capture_default_str();
   cli.add_flag("--chordal", s.chordal, "initialise from the edges instead of the file's poses");
   cli.add_flag("--json", s.json, "print the summary as JSON");
-  try {
-    cli.parse(argc, argv);
-  } catch (const CLI::ParseError& e) {
-    return e.get_exit_code() == 0 ? cli.exit(e) : report_error(1, e.what() + std::string{" (--help shows the usage)"});
-  }
+  if (const auto code = examples::parse(cli, argc, argv)) return *code;
   auto graph = orbis::io::read_g2o(s.input);
   if (!graph) return report_error(2, graph.error().to_string());
   if (s.chordal) {
@@ -117,6 +111,8 @@ int main(int argc, char** argv) try {
   if (s.loss == "cauchy") return run(s, *graph, optimize::cauchy{s.width});
   if (s.loss == "tukey") return run(s, *graph, optimize::tukey{s.width});
   return run(s, *graph, optimize::trivial{});
-} catch (const std::exception& e) {  // out of memory or threads
-  return report_error(2, examples::describe_exception(e));
+}
+
+int main(int argc, char** argv) {
+  return examples::run_program("pose_graph", [&] { return run_command(argc, argv); });
 }

@@ -17,6 +17,7 @@
 #include <orbis/camera/presets.hpp>
 #include <orbis/io/toml.hpp>
 
+#include "../common/report_error.hpp"
 #include "filters.hpp"
 #include "inputs/camera_device.hpp"
 #include "profiles.hpp"
@@ -25,10 +26,8 @@
 namespace app {
 namespace {
 
-exit_code report_error(std::string message, exit_code code) {
-  for (char& c : message)
-    if (c == '\n' || c == '\r') c = ' ';
-  std::fprintf(stderr, "rgbd_slam: %s\n", message.c_str());
+exit_code report_error(const std::string& message, exit_code code) {
+  examples::report_error("rgbd_slam", code, message);
   return code;
 }
 

@@ -7,16 +7,10 @@
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
+#include "../common/report_error.hpp"
+
 namespace app {
-namespace {
-
-std::string one_line(std::string text) {
-  for (char& c : text)
-    if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) c = ' ';
-  return text;
-}
-
-}  // namespace
+using examples::one_line;
 
 console::console(bool quiet) : quiet_{quiet}, terminal_{::isatty(STDERR_FILENO) == 1} {
   auto sink = std::make_shared<spdlog::sinks::stderr_color_sink_mt>();

@@ -7,6 +7,7 @@
 #endif
 
 #include "../common/memory.hpp"
+#include "../common/program.hpp"
 #include "command_line.hpp"
 #include "commands.hpp"
 #include "interrupts.hpp"
@@ -20,13 +21,11 @@ void set_up_memory() {
   mallopt(M_MMAP_THRESHOLD, 1 << 20);
   mallopt(M_ARENA_MAX, 2);
 #endif
-  examples::limit_memory();
 }
 
 }  // namespace
 
-int main(int argc, char** argv) {
-  set_up_memory();
+int run(int argc, char** argv) {
   const auto parsed = app::read_command_line(argc, argv);
   if (const auto* code = std::get_if<app::exit_code>(&parsed)) return *code;
   app::interrupts::start();
@@ -46,4 +45,9 @@ int main(int argc, char** argv) {
     console.error({orbis::errc::unreadable, {}, examples::describe_exception(e)});
   }
   return app::bad_input;
+}
+
+int main(int argc, char** argv) {
+  set_up_memory();
+  return examples::run_program("rgbd_slam", [&] { return run(argc, argv); });
 }

@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <cstdint>
 #include <cstdio>
-#include <exception>
 #include <iterator>
 #include <ostream>
 #include <span>
@@ -21,7 +20,7 @@
 #include <orbis/core/file.hpp>
 #include <orbis/places.hpp>
 
-#include "../common/memory.hpp"
+#include "../common/program.hpp"
 #include "../common/same_file.hpp"
 #include "load_vocabulary.hpp"
 #include "recall.hpp"
@@ -37,10 +36,7 @@ struct settings {
   places::training_options training{};
 };
 
-int report_error(int code, const std::string& why) {
-  std::fprintf(stderr, "train_vocabulary: %s\n", why.c_str());
-  return code;
-}
+int report_error(int code, const std::string& why) { return examples::report_error("train_vocabulary", code, why); }
 
 int write(const settings& s, const places::vocabulary& words) {
   const std::string bytes = places::vocabulary_bytes(words);
@@ -112,8 +108,7 @@ int judge(const settings& s) {
   return 0;
 }
 
-int main(int argc, char** argv) try {
-  examples::limit_memory();
+int run(int argc, char** argv) {
   settings s;
   CLI::App cli{"Train, convert and measure vocabularies of visual words", "train_vocabulary"};
   cli.require_subcommand(1);
@@ -141,13 +136,11 @@ int main(int argc, char** argv) try {
     command->add_option("--stride", s.stride, "use every N-th frame of a recording")
         ->capture_default_str()
         ->check(CLI::Range(1, 10'000));
-  try {
-    cli.parse(argc, argv);
-  } catch (const CLI::ParseError& e) {
-    return e.get_exit_code() == 0 ? cli.exit(e) : report_error(1, e.what() + std::string{" (--help shows the usage)"});
-  }
+  if (const auto code = examples::parse(cli, argc, argv)) return *code;
   if (train_command->parsed()) return train(s);
   return convert_command->parsed() ? convert(s) : judge(s);
-} catch (const std::exception& e) {  // out of memory or threads
-  return report_error(2, examples::describe_exception(e));
+}
+
+int main(int argc, char** argv) {
+  return examples::run_program("train_vocabulary", [&] { return run(argc, argv); });
 }

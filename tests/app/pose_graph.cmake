@@ -86,6 +86,17 @@ foreach(loss IN ITEMS huber cauchy tukey)
   check(type STREQUAL "NULL")
 endforeach()
 
+# A cost beyond the numbers of the machine is an error, not JSON with "inf"; so is output that cannot be written.
+file(WRITE ${WORK}/large.g2o "VERTEX_SE3:QUAT 0 0 0 0 0 0 0 1\nVERTEX_SE3:QUAT 1 1e200 0 0 0 0 0 1\n"
+     "EDGE_SE3:QUAT 0 1 1 0 0 0 0 0 1 ${information}\n")
+app(2 large.g2o --json)
+check(NOT out AND err MATCHES "large.g2o: the cost is not finite")
+if(EXISTS /dev/full)
+  execute_process(COMMAND bash -c "\"${APP}\" square.g2o --json >/dev/full" WORKING_DIRECTORY ${WORK} RESULT_VARIABLE result
+                  ERROR_VARIABLE err)
+  check(result EQUAL 2 AND err MATCHES "pose_graph: standard output: cannot be written")
+endif()
+
 # Short of memory: one line, too.
 set(chain "VERTEX_SE3:QUAT 0 0 0 0 0 0 0 1\nFIX 0\n")
 foreach(i RANGE 1 3000)

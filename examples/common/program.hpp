@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// Start and end of a program: exit codes, errors in one line, and no exception or signal that ends it without them.
+#pragma once
+
+#include <csignal>
+#include <cstdio>
+#include <exception>
+#include <optional>
+#include <string>
+
+#include <CLI/CLI.hpp>
+
+#include "memory.hpp"
+#include "report_error.hpp"
+
+namespace examples {
+
+/// Parses the command line. Returns the exit code if the program ends with it: --help, or wrong usage (1).
+[[nodiscard]] inline std::optional<int> parse(CLI::App& cli, int argc, char** argv) {
+  try {
+    cli.parse(argc, argv);
+    return std::nullopt;
+  } catch (const CLI::ParseError& e) {
+    if (e.get_exit_code() == 0) return cli.exit(e);
+    return report_error(cli.get_name().c_str(), 1, e.what() + std::string{" (--help shows the usage)"});
+  }
+}
+
+/// Runs `body`, which returns the exit code of the program. The code is 2 if the body throws (memory, threads), or if
+/// standard output cannot be written. A closed pipe does not end the program; memory is limited to what is free.
+template <class Body>
+[[nodiscard]] int run_program(const char* program, Body&& body) {
+#ifdef SIGPIPE
+  std::signal(SIGPIPE, SIG_IGN);
+#endif
+  int code = 2;
+  try {
+    limit_memory();
+    code = body();
+  } catch (const std::exception& e) {
+    return report_error(program, 2, describe_exception(e));
+  }
+  const bool is_written = std::fflush(stdout) == 0 && std::ferror(stdout) == 0;
+  return code == 0 && !is_written ? report_error(program, 2, "standard output: cannot be written") : code;
+}
+
+}  // namespace examples

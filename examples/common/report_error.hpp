@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// Errors of the programs, in one line.
+#pragma once
+
+#include <cstddef>
+#include <cstdio>
+#include <string>
+#include <string_view>
+
+namespace examples {
+
+/// The text in one line: without control characters, and with words of more than 200 characters cut, as input files and
+/// arguments may contain both.
+[[nodiscard]] inline std::string one_line(std::string_view text) {
+  constexpr std::size_t longest = 200;
+  std::string all;
+  std::size_t length = 0;
+  for (const char c : text) {
+    const bool is_control = static_cast<unsigned char>(c) < 0x20 || c == 0x7f;
+    length = is_control || c == ' ' ? 0 : length + 1;
+    if (length <= longest)
+      all += is_control ? ' ' : c;
+    else if (length == longest + 1)
+      all += "...";
+  }
+  return all;
+}
+
+/// Prints "PROGRAM: why" on standard error. Returns `code`.
+inline int report_error(const char* program, int code, std::string_view why) {
+  std::fprintf(stderr, "%s: %s\n", program, one_line(why).c_str());
+  return code;
+}
+
+}  // namespace examples
