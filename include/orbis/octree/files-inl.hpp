@@ -122,16 +122,14 @@ template <class Model, class Reader>
 }
 template <class Writer, class Map>
 [[nodiscard]] result<void> write_octomap(const Map& map, std::string_view magic, const std::filesystem::path& path) {
-  return write_file_atomically(path, [&](std::ostream& out) -> result<void> {
-    if (map.tree_depth() != default_tree_depth)
-      return fail(errc::unsupported, path.string(),
-                  "the tree has " + std::to_string(map.tree_depth()) + " levels, but OctoMap's files need 16");
+  if (map.tree_depth() != default_tree_depth)
+    return fail(errc::unsupported, path.string(),
+                "the tree has " + std::to_string(map.tree_depth()) + " levels, but OctoMap's files need 16");
+  return write_file_atomically(path, [&](std::ostream& out) {
     const octomap_nodes nodes = Writer{map.store(), map.tree_depth()}.write();
     const std::string header = octomap_header(magic, nodes.nodes, map.resolution());
     out.write(header.data(), static_cast<std::streamsize>(header.size()));
-    if (!out.write(nodes.bytes.view().data(), static_cast<std::streamsize>(nodes.bytes.size())))
-      return fail(errc::write_failed, path.string(), "cannot be written");
-    return {};
+    out.write(nodes.bytes.view().data(), static_cast<std::streamsize>(nodes.bytes.size()));
   });
 }
 
