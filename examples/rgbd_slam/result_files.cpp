@@ -133,6 +133,12 @@ std::optional<orbis::error> find_overwritten(const std::vector<fs::path>& target
   return std::nullopt;
 }
 
+void finish_earlier_run(const settings& s) {
+  staged_folder::finish(s.out);
+  for (const fs::path& file : {s.save_map, s.floor_map})
+    if (!file.empty()) staged_folder::finish(folder_of(file));
+}
+
 std::optional<orbis::error> find_overwritten(const settings& s, const std::vector<fs::path>& inputs) {
   std::vector<fs::path> targets;
   for (const std::string& name : result_names(s)) targets.push_back(s.out / name);

@@ -31,6 +31,10 @@ inline constexpr std::size_t most_maps = 9;
 /// The files that the command may write to the output folder.
 [[nodiscard]] file_names result_names(const settings& s);
 
+/// Moves the files of an earlier run into place whose end interrupted that, in all folders that the command writes to.
+/// Call before anything there is read.
+void finish_earlier_run(const settings& s);
+
 /// All files that the run reads; `source_files`: those of the recording.
 [[nodiscard]] std::vector<std::filesystem::path> inputs_of(const settings& s,
                                                            std::vector<std::filesystem::path> source_files);

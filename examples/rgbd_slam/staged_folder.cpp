@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <memory>
+#include <ostream>
 #include <string_view>
 #include <system_error>
 #include <utility>
@@ -16,6 +17,8 @@
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
+
+#include <orbis/core/file.hpp>
 
 namespace app {
 
@@ -33,7 +36,7 @@ descriptor::~descriptor() {
 
 namespace {
 
-constexpr std::string_view prefix = ".rgbd_slam-", ready = ".ready", backup = "old";
+constexpr std::string_view prefix = ".rgbd_slam-", ready = ".ready", backup = "old", list = ".names";
 
 auto failure(const fs::path& path, const std::string& what) {
   return orbis::fail(orbis::errc::write_failed, path.string(), what);
@@ -120,8 +123,19 @@ std::vector<move> moves_to(const fs::path& folder, const fs::path& from, const s
   return moves;
 }
 
+/// The names of the files that a hidden folder moves into place, each with a zero byte after it.
+std::vector<std::string> listed_in(const fs::path& hidden) {
+  std::string text = orbis::read_file(hidden / list).value_or(std::string{});
+  std::vector<std::string> names;
+  for (std::size_t end = 0; (end = text.find('\0')) != std::string::npos; text.erase(0, end + 1)) {
+    const fs::path name = text.substr(0, end);
+    if (!name.empty() && name == name.filename()) names.push_back(name.string());
+  }
+  return names;
+}
+
 /// Finishes or removes the hidden folders of ended processes in `folder`. @pre it is locked
-void clear_leftovers(const fs::path& folder, const std::vector<std::string>& names) {
+void clear_leftovers(const fs::path& folder) {
   std::vector<fs::path> found;
   std::error_code ec;
   for (fs::directory_iterator it{folder, ec}, end; !ec && it != end; it.increment(ec))
@@ -130,12 +144,19 @@ void clear_leftovers(const fs::path& folder, const std::vector<std::string>& nam
   for (const fs::path& left : found) {
     const descriptor lock = open_folder(left);
     if (lock.get() < 0 || ::flock(lock.get(), LOCK_EX | LOCK_NB) != 0) continue;  // of a running process
-    if (left.filename().string().ends_with(ready) && rename_all(moves_to(folder, left, names)) != 0) continue;
+    if (left.filename().string().ends_with(ready) && rename_all(moves_to(folder, left, listed_in(left))) != 0) continue;
     fs::remove_all(left, ec);
   }
 }
 
 }  // namespace
+
+void staged_folder::finish(const fs::path& folder) {
+  const descriptor opened = open_folder(folder);
+  if (opened.get() < 0) return;
+  const folder_lock lock{opened.get()};
+  clear_leftovers(folder);
+}
 
 result<staged_folder> staged_folder::open(const fs::path& folder, std::vector<std::string> names,
                                           hidden_folders& hidden) {
@@ -152,7 +173,7 @@ result<staged_folder> staged_folder::open(const fs::path& folder, std::vector<st
       return failure(folder / name, "is not a regular file and is not replaced");
 
   const folder_lock lock{made.folder_lock_.get()};
-  clear_leftovers(made.folder_, made.names_);
+  clear_leftovers(made.folder_);
   std::string name = (made.folder_ / (std::string{prefix} + "XXXXXX")).string();
   const std::lock_guard registers{hidden.mutex};
   hidden.paths.emplace_back();
@@ -196,6 +217,11 @@ result<void> staged_folder::put_in_place(std::span<staged_folder* const> folders
     for (const std::string& name : f->made())
       if (!may_be_replaced(f->folder_ / name))
         return failure(f->folder_ / name, "is not a regular file and is not replaced");
+    std::string names;
+    for (const std::string& name : f->names_) (names += name) += '\0';
+    if (auto listed = orbis::write_file_atomically(f->staging_ / list, [&](std::ostream& out) { out << names; });
+        !listed)
+      return listed;
     const fs::path marked = f->staging_.string() + std::string{ready};
     fs::create_directory(f->staging_ / backup, ec);
     ::fsync(f->staging_lock_.get());

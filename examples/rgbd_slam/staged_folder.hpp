@@ -6,9 +6,9 @@
 /// into place together:
 ///   1. all data is synced to the disk, and the suffix `.ready` is added to the name of the hidden folder;
 ///   2. a child process in a separate session renames the files, and finishes even if this program is killed;
-///   3. if the machine stops in between, the next run finds the `.ready` folder and finishes.
-/// Only files with the given names are moved. No other file in the folder is changed, and only hidden folders of ended
-/// processes are deleted. Processes that write into the same folder wait for each other by `flock`.
+///   3. if the machine stops in between, the next program that writes into the folder finishes first (`finish`).
+/// Only files with the given names are moved; the hidden folder lists them, so that any program can finish. No other file in the folder is changed, and only hidden folders of ended processes are
+/// deleted. Processes that write into the same folder wait for each other by `flock`.
 #pragma once
 
 #include <filesystem>
@@ -43,8 +43,12 @@ struct hidden_folders {
 
 class staged_folder {
  public:
-  /// Creates `folder` if it does not exist, and the hidden folder in it, and adds that to `hidden`. Finishes or removes
-  /// hidden folders of ended processes. `names`: the files that may be moved into place. Errors: write_failed.
+  /// Finishes what ended processes have begun to move into place in `folder`, and removes their other hidden folders.
+  /// Call before anything in the folder is read. No effect if the folder does not exist.
+  static void finish(const std::filesystem::path& folder);
+
+  /// Creates `folder` if it does not exist, and the hidden folder in it, and adds that to `hidden`. Calls `finish`.
+  /// `names`: the files that may be moved into place. Errors: write_failed.
   [[nodiscard]] static orbis::result<staged_folder> open(const std::filesystem::path& folder,
                                                          std::vector<std::string> names, hidden_folders& hidden);
   staged_folder(staged_folder&&) = default;

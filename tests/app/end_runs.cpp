@@ -252,6 +252,9 @@ int main(int argc, char** argv) {
     else
       std::ofstream{out / ".rgbd_slam-000000.ready" / name, std::ios::binary} << bytes;
   std::ofstream{out / ".rgbd_slam-000000.ready" / "other"} << "is none of ours";
+  std::ofstream list{out / ".rgbd_slam-000000.ready" / ".names", std::ios::binary};
+  for (const auto& [name, bytes] : after) list << name << '\0';
+  list.close();
   std::ofstream{work / "none.ply"} << "no cloud";
   check(run{map_of("none.ply")}.wait() == 2, "a damaged cloud");
   check(is_new(content_of(out), before, &after, "a machine that stopped"),

@@ -1,0 +1,38 @@
+# SPDX-License-Identifier: BSD-3-Clause
+#
+# A run and its child process are killed while files are moved into place: the next command finishes first, so that
+# results are never refused or of two runs.
+include(${CMAKE_CURRENT_LIST_DIR}/support.cmake)
+make_recording(${WORK}/room 4 160)
+set(quick --quiet --resolution 0.2 --filter none)
+file(WRITE ${WORK}/cloud.ply "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\nproperty float z\n"
+     "end_header\n0 0 1\n0.1 0 1\n")
+function(run_killed moved)  # arguments of the run
+  execute_process(COMMAND ${CMAKE_COMMAND} -E env LD_PRELOAD=${KILLED} ASAN_OPTIONS=verify_asan_link_order=0
+                          ORBIS_TEST_RENAMES=${moved} ${APP} ${ARGN} WORKING_DIRECTORY ${WORK} RESULT_VARIABLE result
+                          OUTPUT_QUIET ERROR_QUIET)
+  check(NOT result EQUAL 0)
+  file(GLOB ready ${WORK}/out/.rgbd_slam-*.ready)
+  check(ready)
+endfunction()
+function(must_be_of run)  # the trajectory's files in out are those of this run
+  foreach(name trajectory.txt keyframes.txt camera_used.toml)
+    must_equal(out/${name} ${run}/${name})
+  endforeach()
+  file(GLOB ready ${WORK}/out/.rgbd_slam-*)
+  check(NOT ready)
+endfunction()
+
+app(0 run room --out all ${quick} --deterministic)
+app(0 run room --frames 3 --out three ${quick} --deterministic)
+foreach(moved 0 1 4 9)
+  # Without earlier results: not refused.
+  file(REMOVE_RECURSE ${WORK}/out)
+  run_killed(${moved} run room --out out ${quick} --deterministic)
+  app(0 map cloud.ply --out out ${quick})
+  must_be_of(all)
+  # Over earlier results, by a command that makes other files.
+  run_killed(${moved} run room --frames 3 --out out ${quick} --deterministic)
+  app(0 map cloud.ply --out out ${quick})
+  must_be_of(three)
+endforeach()
