@@ -15,6 +15,7 @@
 /// | `image.hpp` | colour and depth images in any supported format |
 /// | `png.hpp`, `jpeg.hpp` | reading and writing images of one format |
 /// | `cloud_file.hpp` | point clouds in any supported format |
+/// | `cloud_fields.hpp` | a cloud with all numbers of its file: intensity, normals, time |
 /// | `ply.hpp`, `pcd.hpp` | reading and writing point clouds of one format |
 /// | `bal_problem.hpp`, `bal.hpp` | bundle adjustment problems ("bundle adjustment in the large") and their files |
 /// | `g2o_graph.hpp`, `g2o.hpp` | pose graphs and their files |
@@ -23,6 +24,7 @@
 #include <orbis/io/bal.hpp>
 #include <orbis/io/bal_problem.hpp>
 #include <orbis/io/camera_file.hpp>
+#include <orbis/io/cloud_fields.hpp>
 #include <orbis/io/cloud_file.hpp>
 #include <orbis/io/g2o.hpp>
 #include <orbis/io/g2o_graph.hpp>

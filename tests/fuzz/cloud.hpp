@@ -7,11 +7,15 @@
 #include <cstddef>
 #include <iterator>
 #include <optional>
+#include <set>
+#include <string>
 #include <string_view>
 
 #include <orbis/core/point_cloud.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/core/types.hpp>
+#include <orbis/io/cloud_fields.hpp>
+#include <orbis/io/detail/files/scalar_type.hpp>
 
 #include "fuzz/target.hpp"
 
@@ -33,6 +37,18 @@ auto check_cloud_reader(std::string_view bytes, std::size_t memory_per_byte, Rea
 
 inline void check_cloud(const point_cloud& cloud) {
   require(cloud.colors.empty() || cloud.colors.size() == cloud.points.size(), "a colour for each point, or none");
+}
+
+/// `read` is `cloud` with fields that have all of their numbers and names of their own.
+inline void check_fields(const io::cloud_with_fields& read, const point_cloud& cloud) {
+  require(read.cloud.colors == cloud.colors && read.cloud.size() == cloud.size(), "fields do not change the cloud");
+  std::set<std::string> names;
+  for (const io::cloud_field& field : read.fields) {
+    require(field.bytes.size() == cloud.size() * field.count * io::detail::size_of(field.type),
+            "numbers of all points");
+    require(!field.name.empty() && names.insert(field.name).second, "fields have different names");
+  }
+  for (const std::string& note : read.notes) require(!note.empty(), "a note has words");
 }
 
 /// Where a cloud may be read from: nearby, in a map's coordinates, and out of all bounds.

@@ -576,6 +576,10 @@ def clouds():
     write("read_ply", "declares_more", ply("binary_little_endian", "element vertex 5000000000", *xyz) + bytes(12))
     write("read_ply", "twice", ply("ascii", "element vertex 1", *xyz, *xyz) + b"1 2 3 4 5 6\n")
     write("read_ply", "many_properties", ply("ascii", "element vertex 1", *xyz, *["property char c"] * 300))
+    write("read_ply", "fields", ply("binary_big_endian", "element vertex 2", "property uchar diffuse_red", *xyz,
+                                    "property float diffuse_blue", "property ushort diffuse_green",
+                                    "property list uchar char w", "property int ring")
+          + struct.pack(">B4fHB1bi", 9, 1, 2, 3, 200, 999, 1, 5, -7) * 2)
     write("read_ply", "no_z", ply("ascii", "element vertex 1", *xyz[:2]) + b"1 2\n")
     write("read_ply", "header_only", b"ply\nformat ascii 1.0\n")
 
@@ -594,6 +598,9 @@ def clouds():
     write("read_pcd", "text", pcd(*colored, 2, 1, "ascii", b"1 2 3 255\nnan -1e9 0 4294967295\n"))
     write("read_pcd", "text_float_color", pcd("x y z rgb", "4 4 4 4", "F F F F", "1 1 1 1", 1, 1, "ascii",
                                               b"1 2 3 1e-39\n"))
+    write("read_pcd", "fields", pcd("_ x y rgba z label n", "1 4 4 4 4 1 8", "U F F U F U F", "3 1 1 1 1 1 2", 2, 1, "ascii",
+                                    b"0 0 0 1 2 4278190335 3 -1 1e300 nan\n0 0 0 4 5 255 6 300 0 1\n")
+          .replace(b"VIEWPOINT 0", b"VIEWPOINT 1e-3"))
     write("read_pcd", "binary", pcd(*xyz, 2, 2, "binary", raw))
     write("read_pcd", "compressed", pcd(*xyz, 2, 2, "binary_compressed", squeezed(lzf(raw), 48)))
     zeros = b"\0\0" + b"\xe0\xff\0" * 8 + b"\xe0\xfe\0"  # 2376 of them

@@ -17,6 +17,11 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
                                              [](std::string_view bytes) { return io::parse_pcd(bytes, "fuzz.pcd"); });
   if (!read) return 0;
   fuzz::check_cloud(*read);
+  const auto all =
+      fuzz::check_cloud_reader({reinterpret_cast<const char*>(data), size}, 900,
+                               [](std::string_view bytes) { return io::parse_pcd_with_fields(bytes, "fuzz.pcd"); });
+  fuzz::require(all.has_value(), "a cloud with fields is read where a cloud is");
+  fuzz::check_fields(*all, *read);
   const vec3 origin = fuzz::some_origin(size);
   const auto moved = io::parse_pcd({reinterpret_cast<const char*>(data), size}, "fuzz.pcd", origin);
   fuzz::require(moved.has_value(), "an origin does not make a file unreadable");

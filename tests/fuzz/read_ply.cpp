@@ -16,6 +16,11 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
                                               [](std::string_view bytes) { return io::parse_ply(bytes, "fuzz.ply"); });
   if (!cloud) return 0;
   fuzz::check_cloud(*cloud);
+  const auto all =
+      fuzz::check_cloud_reader({reinterpret_cast<const char*>(data), size}, 128,
+                               [](std::string_view bytes) { return io::parse_ply_with_fields(bytes, "fuzz.ply"); });
+  fuzz::require(all.has_value(), "a cloud with fields is read where a cloud is");
+  fuzz::check_fields(*all, *cloud);
   const vec3 origin = fuzz::some_origin(size);
   const auto moved = io::parse_ply({reinterpret_cast<const char*>(data), size}, "fuzz.ply", origin);
   fuzz::require(moved.has_value(), "an origin does not make a file unreadable");

@@ -3,11 +3,14 @@
 /// Point clouds from files in any supported format.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
+#include <span>
 
 #include <orbis/core/point_cloud.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/core/types.hpp>
+#include <orbis/io/cloud_fields.hpp>
 
 namespace orbis::io {
 
@@ -15,6 +18,17 @@ namespace orbis::io {
 /// from the coordinates before they are converted to float: for clouds far from their coordinate origin. Errors:
 /// not_found, unreadable, malformed, unsupported (neither of the two).
 [[nodiscard]] result<point_cloud> read_cloud(const std::filesystem::path& path, const vec3& origin = zeros<vec3>());
+
+/// Reads a cloud like `read_cloud`, with all other numbers that the file has for each point. Errors: those of
+/// `read_cloud`.
+[[nodiscard]] result<cloud_with_fields> read_cloud_with_fields(const std::filesystem::path& path,
+                                                               const vec3& origin = zeros<vec3>());
+
+/// Writes points of a cloud by index, with all of their fields: to a PCD file if the extension is `.pcd`, otherwise to
+/// a PLY file. `origin` is added to the coordinates, metres. @pre indices are of the cloud. Errors: write_failed,
+/// invalid_argument.
+result<void> write_cloud(const std::filesystem::path& path, const cloud_with_fields& cloud,
+                         std::span<const std::uint32_t> indices, const vec3& origin = zeros<vec3>());
 
 }  // namespace orbis::io
 

@@ -3,24 +3,33 @@
 /// Point clouds in PCD files (version 0.7: ascii, binary, binary_compressed).
 ///
 /// Source: the Point Cloud Library's documentation of the file format. Points that are not finite are kept: in an
-/// organised cloud the index of a point determines its pixel. The viewpoint is not applied.
+/// organised cloud the index of a point determines its pixel. The viewpoint is not applied: it may be the place of the
+/// sensor, with points in the world, or the transform from the points to the world.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
+#include <span>
 #include <string>
 #include <string_view>
 
 #include <orbis/core/point_cloud.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/core/types.hpp>
+#include <orbis/io/cloud_fields.hpp>
 
 namespace orbis::io {
 
-/// Parses a PCD file in memory: `x y z` of any type, and `rgb` or `rgba` (packed, float or integer) if present. Ignores
-/// all other fields. `origin` is subtracted from the coordinates before they are converted to float. Errors: malformed
+/// Parses a PCD file in memory: `x y z` of any type and, if present, colours like those of `parse_ply`. Ignores all
+/// other fields. `origin` is subtracted from the coordinates before they are converted to float. Errors: malformed
 /// (damaged, truncated), unsupported (no x, y and z).
 [[nodiscard]] result<point_cloud> parse_pcd(std::string_view bytes, const std::string& where = {},
                                             const vec3& origin = zeros<vec3>());
+
+/// Parses a PCD file like `parse_pcd`, with all other fields and the viewpoint. Notes report a viewpoint other than the
+/// identity, what is left out, and colours whose range is not that of their type. Errors: those of `parse_pcd`.
+[[nodiscard]] result<cloud_with_fields> parse_pcd_with_fields(std::string_view bytes, const std::string& where = {},
+                                                              const vec3& origin = zeros<vec3>());
 
 /// Reads a PCD file; see `parse_pcd`. Errors: not_found, unreadable, malformed, unsupported.
 [[nodiscard]] result<point_cloud> read_pcd(const std::filesystem::path& path);
@@ -28,6 +37,11 @@ namespace orbis::io {
 /// Writes a cloud as a PCD file (binary_compressed) atomically: `x y z`, and `rgb` (packed into a float, as in PCL) if
 /// there are colours. Errors: write_failed, invalid_argument (more than 4 GiB).
 result<void> write_pcd(const std::filesystem::path& path, const point_cloud& cloud);
+
+/// Writes points of a cloud by index with all of their fields and the viewpoint. `origin` is added to the coordinates,
+/// metres; if it is not zero, they are written as double. @pre indices are of the cloud
+result<void> write_pcd(const std::filesystem::path& path, const cloud_with_fields& cloud,
+                       std::span<const std::uint32_t> indices, const vec3& origin = zeros<vec3>());
 
 }  // namespace orbis::io
 

@@ -5,13 +5,14 @@
 
 #include <algorithm>
 #include <charconv>
-#include <cmath>
 #include <ostream>
-#include <vector>
+#include <string_view>
+#include <type_traits>
 
 #include <orbis/core/bytes.hpp>
 #include <orbis/core/file.hpp>
 #include <orbis/core/inline.hpp>
+#include <orbis/io/detail/files/cloud_columns.hpp>
 #include <orbis/io/detail/files/ply_format.hpp>
 #include <orbis/io/detail/files/scalar_type.hpp>
 #include <orbis/io/ply.hpp>
@@ -19,60 +20,18 @@
 namespace orbis::io {
 
 ORBIS_INLINE result<point_cloud> parse_ply(std::string_view bytes, const std::string& where, const vec3& origin) {
-  using namespace detail;
-  const auto header = take_ply_header(bytes, where);
-  if (!header) return fail(header.error());
-  ply_body body{bytes, header->format};
-  const auto ends_early = [&] { return fail(errc::malformed, where, "the data end early or are damaged"); };
+  auto columns = detail::read_ply_columns(bytes, where, false);
+  if (!columns) return fail(columns.error());
+  auto read = detail::to_cloud(*std::move(columns), where, origin);
+  if (!read) return fail(read.error());
+  return std::move(read->cloud);
+}
 
-  for (const ply_element& element : header->elements) {
-    std::size_t least = 0;
-    for (const ply_property& p : element.properties) least += body.least_size(p);
-    if (least == 0) continue;  // takes no space in the file
-    if (element.count > body.bytes_left() / least + 1) return ends_early();
-    if (element.name != "vertex") {
-      for (std::uint64_t i = 0; i != element.count; ++i)
-        for (const ply_property& p : element.properties)
-          if (!body.skip(p)) return ends_early();
-      continue;
-    }
-
-    constexpr std::string_view names[6] = {"x", "y", "z", "red", "green", "blue"};
-    std::vector<int> role(element.properties.size(), -1);
-    std::array<detail::scalar_type, 6> type{};
-    unsigned found = 0;
-    for (std::size_t k = 0; k != role.size(); ++k)
-      for (std::size_t r = 0; r != 6; ++r)
-        if (element.properties[k].name == names[r] && !element.properties[k].count && (found >> r & 1U) == 0) {
-          role[k] = static_cast<int>(r);
-          type[r] = element.properties[k].type;
-          found |= 1U << r;
-        }
-    if ((found & 7U) != 7U) return fail(errc::unsupported, where, "the vertices have no x, y and z");
-    const bool colored = found == 63U;
-    const auto channel = [](double v, detail::scalar_type t) {
-      if (t == detail::scalar_type::float32 || t == detail::scalar_type::float64) v *= 255.0;
-      if (t == detail::scalar_type::uint16) v /= 257.0;
-      return static_cast<std::uint8_t>(v >= 0.0 ? std::min(255.0, std::round(v)) : 0.0);
-    };
-
-    point_cloud cloud;
-    cloud.points.reserve(static_cast<std::size_t>(element.count));
-    if (colored) cloud.colors.reserve(static_cast<std::size_t>(element.count));
-    for (std::uint64_t i = 0; i != element.count; ++i) {
-      double v[6] = {};
-      for (std::size_t k = 0; k != role.size(); ++k) {
-        const bool ok = role[k] < 0 ? body.skip(element.properties[k])
-                                    : body.next(element.properties[k].type, v[static_cast<std::size_t>(role[k])]);
-        if (!ok) return ends_early();
-      }
-      cloud.points.emplace_back(static_cast<float>(v[0] - origin.x()), static_cast<float>(v[1] - origin.y()),
-                                static_cast<float>(v[2] - origin.z()));
-      if (colored) cloud.colors.push_back({channel(v[3], type[3]), channel(v[4], type[4]), channel(v[5], type[5])});
-    }
-    return cloud;
-  }
-  return fail(errc::unsupported, where, "there are no vertices");
+ORBIS_INLINE result<cloud_with_fields> parse_ply_with_fields(std::string_view bytes, const std::string& where,
+                                                             const vec3& origin) {
+  auto columns = detail::read_ply_columns(bytes, where, true);
+  if (!columns) return fail(columns.error());
+  return detail::to_cloud(*std::move(columns), where, origin);
 }
 
 ORBIS_INLINE result<point_cloud> read_ply(const std::filesystem::path& path) {
@@ -89,10 +48,15 @@ ORBIS_INLINE result<void> write_ply_vertices(const std::filesystem::path& path, 
   const bool far = !options.origin.isZero();
   const std::string axis = far ? "\nproperty double " : "\nproperty float ";
   return write_file_atomically(path, [&](std::ostream& out) {
-    std::string bytes =
-        std::string{"ply\nformat "} + (binary ? "binary_little_endian" : "ascii") + " 1.0\nelement vertex " +
-        std::to_string(vertices.count) + axis + "x" + axis + "y" + axis + "z\n" +
-        (vertices.colored ? "property uchar red\nproperty uchar green\nproperty uchar blue\n" : "") + "end_header\n";
+    std::string bytes = std::string{"ply\nformat "} + (binary ? "binary_little_endian" : "ascii") +
+                        " 1.0\nelement vertex " + std::to_string(vertices.count) + axis + "x" + axis + "y" + axis +
+                        "z\n" +
+                        (vertices.colored ? "property uchar red\nproperty uchar green\nproperty uchar blue\n" : "");
+    for (const cloud_field& field : vertices.fields)
+      for (std::size_t e = 0; e != field.count; ++e)
+        bytes += "property " + std::string{ply_name(field.type)} + ' ' + field.name +
+                 (field.count == 1 ? "" : '_' + std::to_string(e)) + '\n';
+    bytes += "end_header\n";
     const auto flush = [&] {
       out.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
       bytes.clear();
@@ -103,28 +67,34 @@ ORBIS_INLINE result<void> write_ply_vertices(const std::filesystem::path& path, 
     for (std::size_t begin = 0; begin < vertices.count; begin += some.size()) {
       const std::span chunk{some.data(), std::min(some.size(), vertices.count - begin)};
       vertices.read(vertices.of, begin, chunk);
-      for (const auto& [xyz, c] : chunk) {
-        const auto for_each_coordinate = [&, &xyz = xyz](const auto& f) {
-          for (std::size_t a = 0; a != 3; ++a)
-            if (far)
-              f(double{xyz[a]} + options.origin[static_cast<int>(a)]);
-            else
-              f(xyz[a]);
+      for (std::size_t i = 0; i != chunk.size(); ++i) {
+        const auto& [xyz, c] = chunk[i];
+        const auto put = [&](auto v) {
+          char text[64];
+          if (binary)
+            append_little_endian(bytes, v);
+          else
+            bytes.append(text, std::to_chars(text, text + sizeof text, v).ptr) += ' ';
         };
-        if (binary) {
-          for_each_coordinate([&](auto v) { append_little_endian(bytes, v); });
-          if (vertices.colored)
-            for (const std::uint8_t v : {c.r, c.g, c.b}) append_little_endian(bytes, v);
-        } else {
-          char buffer[64];
-          for_each_coordinate([&](auto v) {
-            bytes.append(buffer, std::to_chars(buffer, buffer + sizeof buffer, v).ptr);
-            bytes += ' ';
-          });
-          if (vertices.colored)
-            for (const unsigned v : {c.r, c.g, c.b}) bytes += std::to_string(v) + ' ';
-          bytes.back() = '\n';
-        }
+        for (std::size_t a = 0; a != 3; ++a)
+          if (far)
+            put(double{xyz[a]} + options.origin[static_cast<int>(a)]);
+          else
+            put(xyz[a]);
+        if (vertices.colored)
+          for (const std::uint8_t v : {c.r, c.g, c.b}) put(v);
+        for (const cloud_field& field : vertices.fields)
+          for (std::size_t e = 0; e != field.count; ++e)
+            with_type(field.type, [&](auto zero) {
+              using number = decltype(zero);
+              const auto v = load_number<number>(field.bytes.data() +
+                                                 (vertices.rows[begin + i] * field.count + e) * sizeof(number));
+              if constexpr (std::is_integral_v<number> && sizeof(number) == 8)
+                put(static_cast<double>(v));
+              else
+                put(v);
+            });
+        if (!binary) bytes.back() = '\n';
         if (bytes.size() >= block) flush();
       }
     }
@@ -139,19 +109,34 @@ ORBIS_INLINE result<void> write_ply(const std::filesystem::path& path, const poi
   return write_ply(path, cloud.points, std::span<const rgb8>{cloud.colors}, options);
 }
 
-ORBIS_INLINE result<void> write_ply(const std::filesystem::path& path, const point_cloud& cloud,
-                                    std::span<const std::uint32_t> indices, const ply_options& options) {
-  const auto read = [&](std::size_t begin, std::span<detail::ply_vertex> out) {
+namespace detail {
+
+inline result<void> write_indexed_ply(const std::filesystem::path& path, const point_cloud& cloud,
+                                      std::span<const cloud_field> fields, std::span<const std::uint32_t> indices,
+                                      const ply_options& options) {
+  const auto read = [&](std::size_t begin, std::span<ply_vertex> out) {
     for (std::size_t i = 0; i != out.size(); ++i) {
       const std::uint32_t at = indices[begin + i];
       out[i].xyz = coordinates<float>(cloud.points[at]);
       if (cloud.has_colors()) out[i].color = cloud.colors[at];
     }
   };
-  const auto call = [](const void* of, std::size_t begin, std::span<detail::ply_vertex> out) {
+  const auto call = [](const void* of, std::size_t begin, std::span<ply_vertex> out) {
     (*static_cast<const decltype(read)*>(of))(begin, out);
   };
-  return detail::write_ply_vertices(path, {&read, call, indices.size(), cloud.has_colors()}, options);
+  return write_ply_vertices(path, {&read, call, indices.size(), cloud.has_colors(), fields, indices}, options);
+}
+
+}  // namespace detail
+
+ORBIS_INLINE result<void> write_ply(const std::filesystem::path& path, const point_cloud& cloud,
+                                    std::span<const std::uint32_t> indices, const ply_options& options) {
+  return detail::write_indexed_ply(path, cloud, {}, indices, options);
+}
+
+ORBIS_INLINE result<void> write_ply(const std::filesystem::path& path, const cloud_with_fields& cloud,
+                                    std::span<const std::uint32_t> indices, const ply_options& options) {
+  return detail::write_indexed_ply(path, cloud.cloud, cloud.fields, indices, options);
 }
 
 }  // namespace orbis::io

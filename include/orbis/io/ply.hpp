@@ -20,6 +20,7 @@
 #include <orbis/core/point_cloud.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/core/types.hpp>
+#include <orbis/io/cloud_fields.hpp>
 
 namespace orbis::io {
 
@@ -32,12 +33,19 @@ struct ply_options {
   vec3 origin = zeros<vec3>();
 };
 
-/// Parses the vertices of a PLY file in memory: `x y z` of any type and, if present, `red green blue` (8-bit unchanged,
-/// 16-bit scaled, floating point from 0 to 1). Ignores everything else. `origin` is subtracted from the coordinates
-/// before they are converted to float, whose resolution is half a metre at 5000 km. Errors: malformed (damaged,
-/// truncated), unsupported (no vertices with x, y and z).
+/// Parses the vertices of a PLY file in memory: `x y z` of any type and, if present, colours: `red green blue`,
+/// `r g b`, `diffuse_red diffuse_green diffuse_blue`, or packed `rgb` or `rgba`. Bytes are unchanged. Floating-point
+/// channels are from 0 to 1 if none is greater, otherwise from 0 to 255; wider integers are from 0 to 255 if none is
+/// greater, otherwise from 0 to 65535. Ignores everything else. `origin` is subtracted from the coordinates before they
+/// are converted to float, whose resolution is half a metre at 5000 km. Errors: malformed (damaged, truncated),
+/// unsupported (no vertices with x, y and z).
 [[nodiscard]] result<point_cloud> parse_ply(std::string_view bytes, const std::string& where = {},
                                             const vec3& origin = zeros<vec3>());
+
+/// Parses a PLY file like `parse_ply`, and all other properties of the vertices except lists. Notes report what is left
+/// out, and colours whose range is not that of their type. Errors: those of `parse_ply`.
+[[nodiscard]] result<cloud_with_fields> parse_ply_with_fields(std::string_view bytes, const std::string& where = {},
+                                                              const vec3& origin = zeros<vec3>());
 
 /// Reads a PLY file; see `parse_ply`. Errors: not_found, unreadable, malformed, unsupported.
 [[nodiscard]] result<point_cloud> read_ply(const std::filesystem::path& path);
@@ -55,6 +63,8 @@ struct ply_vertices {
   void (*read)(const void* of, std::size_t begin, std::span<ply_vertex> out) = nullptr;
   std::size_t count = 0;
   bool colored = false;
+  std::span<const cloud_field> fields{};
+  std::span<const std::uint32_t> rows{};  ///< of the fields, one per vertex
 };
 
 /// Writes vertices in blocks.
@@ -87,6 +97,11 @@ result<void> write_ply(const std::filesystem::path& path, const point_cloud& clo
 /// Writes the points of a cloud that a filter kept, without copying them to another cloud. @pre indices are of the
 /// cloud
 result<void> write_ply(const std::filesystem::path& path, const point_cloud& cloud,
+                       std::span<const std::uint32_t> indices, const ply_options& options = {});
+
+/// Writes points of a cloud by index with all of their fields: a field of several numbers `f` as properties `f_0`,
+/// `f_1`, ..., integers of 64 bits as double. @pre indices are of the cloud
+result<void> write_ply(const std::filesystem::path& path, const cloud_with_fields& cloud,
                        std::span<const std::uint32_t> indices, const ply_options& options = {});
 
 }  // namespace orbis::io

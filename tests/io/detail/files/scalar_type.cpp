@@ -6,6 +6,7 @@
 #include "support/catch.hpp"
 
 using namespace orbis::io::detail;
+using orbis::io::scalar_type;
 
 TEST_CASE("numbers of the types that files name are read in both byte orders") {
   const char bytes[] = {'\xFC', 0, 0, 0};

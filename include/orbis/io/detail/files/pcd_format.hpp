@@ -3,20 +3,23 @@
 /// The header of a PCD file, and its points as text or binary numbers.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <bit>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include <orbis/core/bytes.hpp>
-#include <orbis/core/image.hpp>
-#include <orbis/core/point_cloud.hpp>
 #include <orbis/core/result.hpp>
-#include <orbis/core/types.hpp>
+#include <orbis/io/cloud_fields.hpp>
+#include <orbis/io/detail/files/cloud_columns.hpp>
+#include <orbis/io/detail/files/lzf.hpp>
 #include <orbis/io/detail/files/scalar_type.hpp>
 #include <orbis/io/detail/text.hpp>
 
@@ -48,13 +51,31 @@ struct pcd_header {
   std::size_t tokens = 0;      ///< numbers per point
   std::size_t lines = 0;       ///< number of lines of the header
   pcd_data data = pcd_data::ascii;
-
-  [[nodiscard]] const pcd_field* find(std::string_view name) const {
-    for (const pcd_field& f : fields)
-      if (f.name == name) return &f;
-    return nullptr;
-  }
+  std::array<double, 7> viewpoint{0, 0, 0, 1, 0, 0, 0};
+  std::string note;  ///< on the viewpoint
 };
+
+/// Parses seven numbers, and describes a viewpoint other than the identity in `header.note`. Rotations of zero length
+/// are taken as none.
+inline void parse_viewpoint(std::string_view line, pcd_header& header) {
+  const std::string text{trimmed(line)};
+  std::array<double, 7> read{};
+  for (double& v : read)
+    if (!parse_number(next_field(line), v) || !std::isfinite(v)) {
+      header.note = "VIEWPOINT " + text.substr(0, 100) + " is not seven numbers: left out";
+      return;
+    }
+  const auto is_zero = [&](std::size_t from, std::size_t to) {
+    return std::all_of(read.begin() + static_cast<std::ptrdiff_t>(from), read.begin() + static_cast<std::ptrdiff_t>(to),
+                       [](double v) { return v == 0.0; });
+  };
+  if (is_zero(0, 3) && is_zero(4, 7)) return;
+  header.viewpoint = read;
+  header.note =
+      "VIEWPOINT " + text.substr(0, 200) +
+      " is not applied: the points are taken as they are. This is right if it is the place of the sensor and the "
+      "points are in the world; if it is the transform from the points to the world, apply it first";
+}
 
 /// Parses the header and removes it from the front of `bytes`.
 inline result<pcd_header> take_pcd_header(std::string_view& bytes, const std::string& where) {
@@ -105,7 +126,9 @@ inline result<pcd_header> take_pcd_header(std::string_view& bytes, const std::st
       else
         return bad("an unknown kind of DATA");
       has_data = true;
-    } else if (key != "VERSION" && key != "VIEWPOINT") {
+    } else if (key == "VIEWPOINT") {
+      parse_viewpoint(line, header);
+    } else if (key != "VERSION") {
       return header.fields.empty() ? result<pcd_header>(fail(errc::malformed, where, "is not a PCD file"))
                                    : result<pcd_header>(bad("an unknown line"));
     }
@@ -129,78 +152,100 @@ inline result<pcd_header> take_pcd_header(std::string_view& bytes, const std::st
   return header;
 }
 
-/// The fields of a header that a cloud is read from.
-struct pcd_columns {
-  std::array<const pcd_field*, 3> xyz{};
-  const pcd_field* color = nullptr;
-};
-
-inline rgb8 unpacked_rgb(std::uint32_t packed) {
-  return {static_cast<std::uint8_t>(packed >> 16), static_cast<std::uint8_t>(packed >> 8),
-          static_cast<std::uint8_t>(packed)};
-}
-inline std::uint32_t packed_rgb(const rgb8& c) {
-  return static_cast<std::uint32_t>(c.r) << 16 | static_cast<std::uint32_t>(c.g) << 8 | c.b;
+/// The columns of the points: all, or those of points and colours. `column_of[k]`: index of the column of field k.
+inline cloud_columns make_columns(const pcd_header& header, bool all,
+                                  std::vector<std::optional<std::size_t>>& column_of) {
+  cloud_columns read{.columns = {},
+                     .size = static_cast<std::size_t>(header.points),
+                     .viewpoint = header.viewpoint,
+                     .left_out = {},
+                     .notes = {}};
+  if (!header.note.empty()) read.notes.push_back(header.note);
+  column_of.resize(header.fields.size());
+  for (std::size_t k = 0; k != column_of.size(); ++k) {
+    const pcd_field& f = header.fields[k];
+    if (f.count == 0 || f.name == "_" || !(all || is_point_or_color(f.name))) continue;
+    column_of[k] = read.columns.size();
+    read.columns.push_back(make_column(f.name, *f.scalar(), f.count, read.size, header.data == pcd_data::ascii));
+  }
+  return read;
 }
 
 /// Reads points from lines of text. Errors: malformed, with the line.
-inline result<point_cloud> read_pcd_text(std::string_view body, const pcd_header& header, const pcd_columns& columns,
-                                         const vec3& origin, const std::string& where) {
+inline result<cloud_columns> read_pcd_text(std::string_view body, const pcd_header& header, bool all,
+                                           const std::string& where) {
   if (header.points > (body.size() + 1) / (2 * header.tokens))  // one digit per number, plus separators
     return fail(errc::malformed, where,
                 "the data end early: they are too short for " + std::to_string(header.points) + " points");
-  point_cloud cloud;
-  cloud.points.reserve(static_cast<std::size_t>(header.points));
+  std::vector<std::optional<std::size_t>> column_of;
+  cloud_columns read = make_columns(header, all, column_of);
   std::vector<std::string_view> tokens(header.points == 0 ? 0 : header.tokens);
-  std::size_t bad_line = 0;
+  std::size_t bad_line = 0, points = 0;
   for_each_line(body, [&](std::string_view line, std::size_t number) {
-    if (cloud.size() == header.points) return false;
+    if (points == read.size) return false;
     bad_line = header.lines + number;
     for (std::string_view& token : tokens) token = next_field(line);
-    float xyz[3] = {};
-    for (std::size_t k = 0; k != 3; ++k) {
-      double value = 0.0;
-      if (!parse_number(tokens[columns.xyz[k]->first_token], value)) return false;
-      xyz[k] = static_cast<float>(value - origin[static_cast<int>(k)]);
-    }
     if (tokens.back().empty() || !trimmed(line).empty()) return false;
-    if (columns.color != nullptr) {
-      double value = 0.0;
-      if (!parse_number(tokens[columns.color->first_token], value)) return false;
-      const bool as_float = columns.color->type == 'F';
-      if (!as_float && !(value >= -2147483648.0 && value <= 4294967295.0)) return false;
-      cloud.colors.push_back(unpacked_rgb(as_float ? std::bit_cast<std::uint32_t>(static_cast<float>(value))
-                                                   : static_cast<std::uint32_t>(static_cast<std::int64_t>(value))));
-    }
-    cloud.points.emplace_back(xyz[0], xyz[1], xyz[2]);
+    for (std::size_t k = 0; k != column_of.size(); ++k)
+      for (std::size_t e = 0; column_of[k] && e != header.fields[k].count; ++e) {
+        const pcd_field& f = header.fields[k];
+        cloud_field& column = read.columns[*column_of[k]];
+        if (store_number(column, points * f.count + e, tokens[f.first_token + e])) continue;
+        if (is_point_or_color(f.name)) return false;
+        read.left_out.push_back(f.name + " (no number in line " + std::to_string(bad_line) + ")");
+        column.count = 0;
+        column_of[k].reset();
+      }
+    ++points;
     bad_line = 0;
     return true;
   });
   if (bad_line != 0)
     return fail(errc::malformed, where + ":" + std::to_string(bad_line),
                 "the line does not match the fields of the header");
-  if (cloud.size() != header.points) return fail(errc::malformed, where, "the data end early");
-  return cloud;
+  if (points != read.size) return fail(errc::malformed, where, "the data end early");
+  return read;
 }
 
 /// Reads points from binary data. `at(field, i)`: address of the field of point i.
 template <class At>
-point_cloud read_pcd_binary(const pcd_header& header, const pcd_columns& columns, const vec3& origin, At&& at) {
-  const auto n = static_cast<std::size_t>(header.points);
-  point_cloud cloud;
-  cloud.points.reserve(n);
-  if (columns.color != nullptr) cloud.colors.reserve(n);
-  const scalar_type types[3] = {*columns.xyz[0]->scalar(), *columns.xyz[1]->scalar(), *columns.xyz[2]->scalar()};
-  for (std::size_t i = 0; i != n; ++i) {
-    float xyz[3];
-    for (std::size_t k = 0; k != 3; ++k)
-      xyz[k] = static_cast<float>(load_as_double(at(*columns.xyz[k], i), types[k], std::endian::little) -
-                                  origin[static_cast<int>(k)]);
-    cloud.points.emplace_back(xyz[0], xyz[1], xyz[2]);
-    if (columns.color != nullptr)
-      cloud.colors.push_back(unpacked_rgb(load_number<std::uint32_t>(at(*columns.color, i), std::endian::little)));
+cloud_columns read_pcd_binary(const pcd_header& header, bool all, At&& at) {
+  std::vector<std::optional<std::size_t>> column_of;
+  cloud_columns read = make_columns(header, all, column_of);
+  for (std::size_t k = 0; k != column_of.size(); ++k) {
+    if (!column_of[k]) continue;
+    const pcd_field& f = header.fields[k];
+    char* const to = read.columns[*column_of[k]].bytes.data();
+    for (std::size_t i = 0; i != read.size; ++i) std::memcpy(to + i * f.size * f.count, at(f, i), f.size * f.count);
   }
-  return cloud;
+  return read;
+}
+
+/// Reads the points of a PCD file: all columns, or those of points and colours. Errors: malformed.
+inline result<cloud_columns> read_pcd_columns(std::string_view bytes, const std::string& where, bool all) {
+  const auto header = take_pcd_header(bytes, where);
+  if (!header) return fail(header.error());
+  if (header->point_size == 0) return fail(errc::unsupported, where, "the points have no x, y and z");
+  const auto ends_early = [&] { return fail(errc::malformed, where, "the data end early or are damaged"); };
+  if (header->data == pcd_data::ascii) return read_pcd_text(bytes, *header, all, where);
+  if (header->data == pcd_data::binary) {
+    if (header->points > bytes.size() / header->point_size) return ends_early();
+    return read_pcd_binary(*header, all, [&](const pcd_field& f, std::size_t i) {
+      return bytes.data() + i * header->point_size + f.offset;
+    });
+  }
+  // Compressed: all x, then all y, ...
+  if (bytes.size() < 8) return ends_early();
+  const auto compressed_size = load_number<std::uint32_t>(bytes.data());
+  const auto size = load_number<std::uint32_t>(bytes.data() + 4);
+  bytes.remove_prefix(8);
+  if (compressed_size > bytes.size() || size % header->point_size != 0 || size / header->point_size != header->points)
+    return ends_early();
+  const auto data = lzf_decompress(bytes.substr(0, compressed_size), size);
+  if (!data) return ends_early();
+  return read_pcd_binary(*header, all, [&](const pcd_field& f, std::size_t i) {
+    return data->data() + f.offset * header->points + i * f.size * f.count;
+  });
 }
 
 }  // namespace orbis::io::detail

@@ -3,9 +3,11 @@
 /// The header of a PLY file, and a reader of the numbers of its body.
 #pragma once
 
+#include <algorithm>
 #include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -13,6 +15,8 @@
 #include <vector>
 
 #include <orbis/core/result.hpp>
+#include <orbis/io/cloud_fields.hpp>
+#include <orbis/io/detail/files/cloud_columns.hpp>
 #include <orbis/io/detail/files/scalar_type.hpp>
 #include <orbis/io/detail/text.hpp>
 
@@ -44,6 +48,13 @@ inline std::optional<scalar_type> ply_type(std::string_view name) {
   for (const auto& [known, type] : names)
     if (known == name) return type;
   return std::nullopt;
+}
+
+/// The name of a type in a PLY file, which has no integers of 64 bits: these are written as double.
+constexpr std::string_view ply_name(scalar_type type) {
+  constexpr std::string_view names[] = {"char", "uchar",  "short",  "ushort", "int",
+                                        "uint", "double", "double", "float",  "double"};
+  return names[static_cast<std::size_t>(type)];
 }
 
 /// Parses the header and removes it from the front of `bytes`.
@@ -111,6 +122,19 @@ class ply_body {
     left_.remove_prefix(size);
     return true;
   }
+  /// Reads a number into the column. Returns false like `next`.
+  bool store(cloud_field& column, std::size_t index) {
+    if (format_ == ply_format::ascii) return store_number(column, index, next_field(left_));
+    const std::size_t size = size_of(column.type);
+    if (left_.size() < size) return false;
+    char* const to = column.bytes.data() + index * size;
+    if (format_ == ply_format::big)
+      std::reverse_copy(left_.data(), left_.data() + size, to);
+    else
+      std::memcpy(to, left_.data(), size);
+    left_.remove_prefix(size);
+    return true;
+  }
   bool skip(const ply_property& property) {
     double value = 0.0, count = 1.0;
     if (property.count && (!next(*property.count, count) || !(count >= 0.0))) return false;
@@ -129,5 +153,45 @@ class ply_body {
   std::string_view left_;
   ply_format format_;
 };
+
+/// Reads the vertices of a PLY file: all columns, or those of points and colours. Errors: malformed, unsupported.
+inline result<cloud_columns> read_ply_columns(std::string_view bytes, const std::string& where, bool all) {
+  const auto header = take_ply_header(bytes, where);
+  if (!header) return fail(header.error());
+  const bool text = header->format == ply_format::ascii;
+  ply_body body{bytes, header->format};
+  const auto ends_early = [&] { return fail(errc::malformed, where, "the data end early or are damaged"); };
+  std::optional<cloud_columns> read;
+  std::vector<std::string> others;
+  for (const ply_element& element : header->elements) {
+    if (read || element.name != "vertex") {
+      if (element.count != 0 && !element.properties.empty())
+        others.push_back(std::to_string(element.count) + " of element " + element.name);
+      if (read) continue;
+    }
+    std::size_t least = 0;
+    for (const ply_property& p : element.properties) least += body.least_size(p);
+    if (least == 0) continue;  // takes no space in the file
+    if (element.count > body.bytes_left() / least + 1) return ends_early();
+    const auto points = static_cast<std::size_t>(element.count);
+    if (element.name == "vertex") read.emplace().size = points;
+    constexpr std::size_t skipped = std::size_t(-1);
+    std::vector<std::size_t> column(element.properties.size(), skipped);
+    for (std::size_t k = 0; read && k != column.size(); ++k) {
+      const ply_property& p = element.properties[k];
+      if (p.count && all) others.push_back("list " + p.name);
+      if (p.count || !(all || is_point_or_color(p.name))) continue;
+      column[k] = read->columns.size();
+      read->columns.push_back(make_column(p.name, p.type, 1, points, text));
+    }
+    for (std::size_t i = 0; i != points; ++i)
+      for (std::size_t k = 0; k != column.size(); ++k)
+        if (!(column[k] == skipped ? body.skip(element.properties[k]) : body.store(read->columns[column[k]], i)))
+          return ends_early();
+  }
+  if (!read) return fail(errc::unsupported, where, "there are no vertices");
+  read->left_out = std::move(others);
+  return *std::move(read);
+}
 
 }  // namespace orbis::io::detail

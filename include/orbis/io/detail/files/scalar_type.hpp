@@ -1,51 +1,55 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The number types of binary cloud files.
+/// The number types of cloud files: sizes, and numbers from bytes.
 #pragma once
 
 #include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 
 #include <orbis/core/bytes.hpp>
+#include <orbis/io/cloud_fields.hpp>
 
 namespace orbis::io::detail {
 
-/// The number types that a cloud file may store.
-enum class scalar_type { int8, uint8, int16, uint16, int32, uint32, int64, uint64, float32, float64 };
+/// Returns `f(T{})` for the C++ type of `type`.
+template <class F>
+constexpr decltype(auto) with_type(scalar_type type, F&& f) {
+  switch (type) {
+    case scalar_type::int8: return f(std::int8_t{});
+    case scalar_type::uint8: return f(std::uint8_t{});
+    case scalar_type::int16: return f(std::int16_t{});
+    case scalar_type::uint16: return f(std::uint16_t{});
+    case scalar_type::int32: return f(std::int32_t{});
+    case scalar_type::uint32: return f(std::uint32_t{});
+    case scalar_type::int64: return f(std::int64_t{});
+    case scalar_type::uint64: return f(std::uint64_t{});
+    case scalar_type::float32: return f(float{});
+    case scalar_type::float64: break;
+  }
+  return f(double{});
+}
 
 /// Size of a number, bytes.
 [[nodiscard]] constexpr std::size_t size_of(scalar_type type) noexcept {
-  switch (type) {
-    case scalar_type::int8:
-    case scalar_type::uint8: return 1;
-    case scalar_type::int16:
-    case scalar_type::uint16: return 2;
-    case scalar_type::int32:
-    case scalar_type::uint32:
-    case scalar_type::float32: return 4;
-    case scalar_type::int64:
-    case scalar_type::uint64:
-    case scalar_type::float64: return 8;
-  }
-  return 0;
+  return with_type(type, [](auto zero) { return sizeof zero; });
+}
+
+[[nodiscard]] constexpr bool is_floating(scalar_type type) noexcept {
+  return type == scalar_type::float32 || type == scalar_type::float64;
 }
 
 /// The number of type `type` stored at `from`.
 [[nodiscard]] inline double load_as_double(const char* from, scalar_type type, std::endian order) noexcept {
-  switch (type) {
-    case scalar_type::int8: return load_number<std::int8_t>(from, order);
-    case scalar_type::uint8: return load_number<std::uint8_t>(from, order);
-    case scalar_type::int16: return load_number<std::int16_t>(from, order);
-    case scalar_type::uint16: return load_number<std::uint16_t>(from, order);
-    case scalar_type::int32: return load_number<std::int32_t>(from, order);
-    case scalar_type::uint32: return load_number<std::uint32_t>(from, order);
-    case scalar_type::int64: return static_cast<double>(load_number<std::int64_t>(from, order));
-    case scalar_type::uint64: return static_cast<double>(load_number<std::uint64_t>(from, order));
-    case scalar_type::float32: return static_cast<double>(load_number<float>(from, order));
-    case scalar_type::float64: return load_number<double>(from, order);
-  }
-  return 0.0;
+  return with_type(type, [&](auto zero) { return static_cast<double>(load_number<decltype(zero)>(from, order)); });
+}
+
+/// Stores a number at `to`.
+template <class T>
+void store_little_endian(char* to, T value) noexcept {
+  const T stored = load_number<T>(reinterpret_cast<const char*>(&value), std::endian::little);
+  std::memcpy(to, &stored, sizeof stored);
 }
 
 }  // namespace orbis::io::detail

@@ -1,0 +1,223 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// The numbers of a cloud file by name, and their interpretation as points and colours, the same for every format.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <optional>
+#include <set>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include <orbis/core/bytes.hpp>
+#include <orbis/core/image.hpp>
+#include <orbis/core/point_cloud.hpp>
+#include <orbis/core/result.hpp>
+#include <orbis/core/types.hpp>
+#include <orbis/io/cloud_fields.hpp>
+#include <orbis/io/detail/files/scalar_type.hpp>
+#include <orbis/io/detail/text.hpp>
+
+namespace orbis::io::detail {
+
+/// The points of a file, before their interpretation.
+struct cloud_columns {
+  std::vector<cloud_field> columns;  ///< in the order of the file; names may repeat
+  std::size_t size = 0;              ///< number of points
+  std::array<double, 7> viewpoint{0, 0, 0, 1, 0, 0, 0};
+  std::vector<std::string> left_out;  ///< other parts of the file
+  std::vector<std::string> notes;
+};
+
+constexpr std::string_view coordinate_names[] = {"x", "y", "z"};
+constexpr std::array<std::string_view, 3> color_names[] = {
+    {"red", "green", "blue"}, {"r", "g", "b"}, {"diffuse_red", "diffuse_green", "diffuse_blue"}};
+constexpr std::string_view packed_color_names[] = {"rgb", "rgba"};
+
+[[nodiscard]] inline bool is_coordinate(std::string_view name) {
+  return std::ranges::find(coordinate_names, name) != std::end(coordinate_names);
+}
+
+/// Returns true if points or colours may be read from columns of this name.
+[[nodiscard]] inline bool is_point_or_color(std::string_view name) {
+  return is_coordinate(name) || std::ranges::find(packed_color_names, name) != std::end(packed_color_names) ||
+         std::ranges::any_of(color_names,
+                             [&](const auto& names) { return std::ranges::find(names, name) != names.end(); });
+}
+
+/// A column of `points` zeros. In text, coordinates are stored as double whatever the header declares.
+[[nodiscard]] inline cloud_field make_column(std::string name, scalar_type type, std::size_t count, std::size_t points,
+                                             bool text) {
+  if (text && is_coordinate(name)) type = scalar_type::float64;
+  return {std::move(name), type, count, std::string(points * count * size_of(type), '\0')};
+}
+
+/// Stores the number `token` as the `index`-th of the column. If the column's type cannot represent it, the column
+/// becomes float64. Returns false if it is no number.
+[[nodiscard]] inline bool store_number(cloud_field& column, std::size_t index, std::string_view token) {
+  const auto store = [&](auto value) {
+    if (!parse_number(token, value)) return false;
+    store_little_endian(column.bytes.data() + index * sizeof value, value);
+    return true;
+  };
+  if (with_type(column.type, store)) return true;
+  double value = 0.0;
+  if (column.type == scalar_type::float64 || !parse_number(token, value)) return false;
+  const std::size_t size = size_of(column.type), n = column.bytes.size() / size;
+  std::string wide(n * sizeof value, '\0');
+  for (std::size_t i = 0; i != index; ++i)
+    store_little_endian(wide.data() + i * sizeof value,
+                        load_as_double(column.bytes.data() + i * size, column.type, std::endian::little));
+  column.bytes = std::move(wide);
+  column.type = scalar_type::float64;
+  return store(value);
+}
+
+[[nodiscard]] inline double number_at(const cloud_field& column, std::size_t index) {
+  return load_as_double(column.bytes.data() + index * size_of(column.type), column.type, std::endian::little);
+}
+
+inline rgb8 unpacked_rgb(std::uint32_t packed) {
+  return {static_cast<std::uint8_t>(packed >> 16), static_cast<std::uint8_t>(packed >> 8),
+          static_cast<std::uint8_t>(packed)};
+}
+inline std::uint32_t packed_rgb(const rgb8& c) {
+  return static_cast<std::uint32_t>(c.r) << 16 | static_cast<std::uint32_t>(c.g) << 8 | c.b;
+}
+
+/// Colours from three columns. The unit of a channel follows from the largest number of all channels of its kind
+/// (8-bit, wider integer, floating point): PLY does not define it. Rounding may lift floating-point numbers above 1.
+inline std::vector<rgb8> channel_colors(const std::array<const cloud_field*, 3>& channels, std::size_t size,
+                                        std::vector<std::string>& notes) {
+  const auto is_byte = [](scalar_type type) { return size_of(type) == 1; };
+  double most_integer = 0.0, most_floating = 0.0;
+  for (const cloud_field* c : channels)
+    if (double& most = is_floating(c->type) ? most_floating : most_integer; !is_byte(c->type))
+      for (std::size_t i = 0; i != size; ++i)
+        if (const double v = number_at(*c, i); std::isfinite(v)) most = std::max(most, v);
+  const auto range_of = [](double most) { return most <= 255.0 ? 255.0 : 65535.0; };
+  std::vector<rgb8> colors(size);
+  constexpr std::uint8_t rgb8::*channel_of[] = {&rgb8::r, &rgb8::g, &rgb8::b};
+  std::string last_note;
+  for (std::size_t k = 0; k != 3; ++k) {
+    const cloud_field& c = *channels[k];
+    const double most = is_floating(c.type) ? most_floating : most_integer;
+    const double range = is_byte(c.type) ? 255.0 : is_floating(c.type) && most <= 1.001 ? 1.0 : range_of(most);
+    for (std::size_t i = 0; i != size; ++i) {
+      double v = number_at(c, i);
+      if (c.type == scalar_type::int8 && v < 0.0) v += 256.0;  // bytes declared as signed
+      v = std::round(v * 255.0 / range);
+      colors[i].*channel_of[k] = static_cast<std::uint8_t>(v >= 0.0 ? std::min(255.0, v) : 0.0);
+    }
+    const bool usual = is_byte(c.type) || (is_floating(c.type) && range == 1.0) ||
+                       (c.type == scalar_type::uint16 && range == 65535.0) || most == 0.0;
+    if (usual) continue;
+    std::string note = std::string{"colours are "} + (is_floating(c.type) ? "floating-point numbers" : "integers") +
+                       " up to " + std::to_string(std::llround(std::min(most, 1e15))) + ": taken as 0 ... " +
+                       std::to_string(static_cast<int>(range));
+    if (note != last_note) notes.push_back(last_note = std::move(note));
+  }
+  return colors;
+}
+
+/// Colours packed as 0xAARRGGBB into integers or the bits of floats; nothing if the column holds other numbers. `alpha`
+/// receives the most significant bytes.
+inline std::optional<std::vector<rgb8>> packed_colors(const cloud_field& column, std::size_t size, std::string& alpha) {
+  std::vector<rgb8> colors(size);
+  alpha.resize(size);
+  for (std::size_t i = 0; i != size; ++i) {
+    std::uint32_t packed = 0;
+    if (column.type == scalar_type::float32) {
+      packed = load_number<std::uint32_t>(column.bytes.data() + 4 * i);
+    } else {
+      const double v = number_at(column, i);
+      if (!(v >= -2147483648.0 && v <= 4294967295.0) || v != std::floor(v)) return std::nullopt;
+      packed = static_cast<std::uint32_t>(static_cast<std::int64_t>(v));
+    }
+    colors[i] = unpacked_rgb(packed);
+    alpha[i] = static_cast<char>(packed >> 24);
+  }
+  return colors;
+}
+
+/// Interprets columns as points, colours and other fields. `origin` is subtracted from the coordinates before they are
+/// converted to float. Errors: unsupported (no x, y and z).
+inline result<cloud_with_fields> to_cloud(cloud_columns&& read, const std::string& where, const vec3& origin) {
+  cloud_with_fields out;
+  out.viewpoint = read.viewpoint;
+  out.notes = std::move(read.notes);
+  const std::size_t n = read.size;
+  std::vector<bool> used(read.columns.size(), false);
+  const auto find = [&](std::string_view name) -> const cloud_field* {
+    const auto at = std::ranges::find(read.columns, name, &cloud_field::name);
+    return at == read.columns.end() || at->count != 1 ? nullptr : &*at;
+  };
+  const auto use = [&](const cloud_field* column) {
+    used[static_cast<std::size_t>(column - read.columns.data())] = true;
+  };
+
+  const cloud_field* xyz[3] = {find("x"), find("y"), find("z")};
+  for (const cloud_field* c : xyz) {
+    if (c == nullptr) return fail(errc::unsupported, where, "the points have no x, y and z");
+    use(c);
+  }
+  out.cloud.points.resize(n);
+  for (int axis = 0; axis != 3; ++axis)
+    for (std::size_t i = 0; i != n; ++i)
+      out.cloud.points[i][axis] = static_cast<float>(number_at(*xyz[axis], i) - origin[axis]);
+
+  bool colored = false;
+  std::string obstacle;
+  for (std::size_t set = 0; set != std::size(color_names) && !colored; ++set) {
+    const auto& names = color_names[set];
+    const std::array channels{find(names[0]), find(names[1]), find(names[2])};
+    const auto missing = std::ranges::find(channels, nullptr);
+    colored = missing == channels.end();
+    if (colored) {
+      out.cloud.colors = channel_colors(channels, n, out.notes);
+      for (const cloud_field* c : channels) use(c);
+    } else if (std::ranges::count(channels, nullptr) == 1) {
+      obstacle = std::string{names[static_cast<std::size_t>(missing - channels.begin())]} + " is missing";
+    }
+  }
+  std::string alpha;
+  for (std::size_t k = 0; k != std::size(packed_color_names) && !colored; ++k) {
+    const cloud_field* column = find(packed_color_names[k]);
+    if (column == nullptr || size_of(column->type) < 4) continue;
+    auto colors = packed_colors(*column, n, alpha);
+    colored = colors.has_value();
+    if (!colored) obstacle = column->name + " holds no packed colours";
+    if (!colored) continue;
+    out.cloud.colors = *std::move(colors);
+    use(column);
+    const bool constant = std::ranges::all_of(alpha, [&](char a) { return a == 0; }) ||
+                          std::ranges::all_of(alpha, [&](char a) { return a == '\xFF'; });
+    if (!constant && find("alpha") == nullptr) out.fields.push_back({"alpha", scalar_type::uint8, 1, std::move(alpha)});
+  }
+
+  if (!colored && !obstacle.empty()) out.notes.push_back("no colours: " + obstacle);
+
+  std::set<std::string> taken{"x", "y", "z"};  // names in the files that are written
+  if (colored) taken.insert({"red", "green", "blue", "rgb"});
+  if (!out.fields.empty()) taken.insert("alpha");
+  for (std::size_t k = 0; k != used.size(); ++k) {
+    cloud_field& field = read.columns[k];
+    if (used[k] || field.name.empty() || field.name == "_" || field.count == 0) continue;  // "_": padding
+    if (taken.insert(field.name).second)
+      out.fields.push_back(std::move(field));
+    else
+      read.left_out.push_back("another " + field.name);
+  }
+  if (!read.left_out.empty()) out.notes.push_back("left out: " + joined(read.left_out));
+  return out;
+}
+
+}  // namespace orbis::io::detail
