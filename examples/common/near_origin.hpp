@@ -11,9 +11,9 @@
 #include <vector>
 
 #include <orbis/core/point.hpp>
-#include <orbis/core/point_cloud.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/core/types.hpp>
+#include <orbis/io/cloud_fields.hpp>
 #include <orbis/io/cloud_file.hpp>
 
 namespace examples {
@@ -42,20 +42,20 @@ namespace examples {
 }
 
 struct cloud_near_origin {
-  orbis::point_cloud cloud;  ///< relative to `origin`
-  orbis::vec3 origin;        ///< in the coordinates of the file; zero if these are small
+  orbis::io::cloud_with_fields read;  ///< coordinates relative to `origin`
+  orbis::vec3 origin;                 ///< in the coordinates of the file; zero if these are small
 };
 
 /// Reads a cloud, relative to its median if that is far from the origin. Errors: those of `io::read_cloud`.
 [[nodiscard]] inline orbis::result<cloud_near_origin> read_near_origin(const std::filesystem::path& path) {
-  auto cloud = orbis::io::read_cloud(path);
-  if (!cloud) return orbis::fail(cloud.error());
-  const orbis::vec3 origin = nearby_origin(middle_of(cloud->points));
+  auto read = orbis::io::read_cloud_with_fields(path);
+  if (!read) return orbis::fail(read.error());
+  const orbis::vec3 origin = nearby_origin(middle_of(read->cloud.points));
   if (!origin.isZero()) {
-    cloud = orbis::io::read_cloud(path, origin);
-    if (!cloud) return orbis::fail(cloud.error());
+    read = orbis::io::read_cloud_with_fields(path, origin);
+    if (!read) return orbis::fail(read.error());
   }
-  return cloud_near_origin{*std::move(cloud), origin};
+  return cloud_near_origin{*std::move(read), origin};
 }
 
 }  // namespace examples

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// filter_cloud IN.{ply,pcd} OUT.ply: removes outliers from a cloud, with a filter chosen automatically or by the user.
+// filter_cloud IN.{ply,pcd} OUT.{ply,pcd}: removes outliers from a cloud, with a filter chosen automatically or by the
+// user.
 #include <cstdio>
 #include <exception>
+#include <filesystem>
 #include <optional>
 #include <string>
 #include <vector>
@@ -30,7 +32,7 @@ int main(int argc, char** argv) try {
   std::vector<double> xyz;
   CLI::App cli{"Remove outliers from a cloud; print the chosen filter and the reason", "filter_cloud"};
   cli.add_option("IN", input, "input .ply or .pcd file")->required();
-  cli.add_option("OUT", output, "output .ply file")->required();
+  cli.add_option("OUT", output, "output .ply or .pcd file")->required();
   const auto names = {"auto", "none", "statistical", "radius", "log-statistical", "range-statistical", "cluster"};
   cli.add_option("--filter", filter, "outlier filter; auto: selected by analysing the cloud")
       ->capture_default_str()
@@ -51,11 +53,26 @@ int main(int argc, char** argv) try {
   if (eye ? !eye->allFinite() : filter == "range-statistical")
     return report_error(1, "--origin: needs a finite position");
   if (examples::is_same_file(output, input)) return report_error(1, examples::overwrite_message(output, input));
-  const auto read = examples::read_near_origin(input);  // written in the original coordinates
-  if (!read) return report_error(2, read.error().to_string());
-  if (eye) *eye -= read->origin;
-  const auto cloud = voxel > 0 ? voxel_grid(read->cloud, {.size = voxel}) : read->cloud;
-  const auto& p = cloud.points;
+  auto found = examples::read_near_origin(input);  // written in the original coordinates
+  if (!found) return report_error(2, found.error().to_string());
+  auto& [read, origin] = *found;
+  const auto in_file = read.cloud.size();
+  if (eye) *eye -= origin;
+  if (voxel > 0) {
+    if (!read.fields.empty()) read.notes.push_back("left out, because of --voxel: " + orbis::io::names_of(read.fields));
+    read.fields.clear();
+    read.cloud = voxel_grid(read.cloud, {.size = voxel});
+  }
+  if (std::filesystem::path{output}.extension() != ".pcd") {
+    if (read.viewpoint != orbis::io::cloud_with_fields{}.viewpoint)
+      read.notes.emplace_back("VIEWPOINT is left out, because PLY files have none: write a .pcd file to keep it");
+    for (const auto& field : read.fields)
+      if (field.type == orbis::io::scalar_type::int64 || field.type == orbis::io::scalar_type::uint64)
+        read.notes.push_back(field.name +
+                             ": 64-bit integers become double, which is exact up to 2^53; a .pcd file keeps them");
+  }
+  for (const auto& note : read.notes) report_error(0, "warning: " + input + ": " + note);
+  const auto& p = read.cloud.points;
   const auto finite = pass_through_inliers(p);
   if (finite.empty()) return report_error(2, input + ": has no finite points");
   automatic_result best;
@@ -67,9 +84,8 @@ int main(int argc, char** argv) try {
                     : filter == "cluster"           ? cluster_inliers(par, p, {k.value_or(12)})
                                           : (best = filter_automatically(par, p, {k.value_or(8), eye})).inliers;
   const auto why = filter == "auto" ? to_string(best.choice.chain) + ": " + best.choice.reason : filter;
-  const orbis::io::ply_options options{.origin = read->origin};
-  if (auto ok = orbis::io::write_ply(output, cloud, kept, options); !ok) return report_error(2, ok.error().to_string());
-  std::printf("%zu points, %zu to filter, %zu kept; %s\n", read->cloud.size(), finite.size(), kept.size(), why.c_str());
+  if (auto ok = orbis::io::write_cloud(output, read, kept, origin); !ok) return report_error(2, ok.error().to_string());
+  std::printf("%zu points, %zu to filter, %zu kept; %s\n", in_file, finite.size(), kept.size(), why.c_str());
 } catch (const std::exception& e) {  // out of memory or threads
   return report_error(2, examples::describe_exception(e));
 }

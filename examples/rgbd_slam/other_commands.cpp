@@ -9,6 +9,7 @@
 #include <orbis/cloud/extract.hpp>
 #include <orbis/core/point.hpp>
 #include <orbis/core/trajectory.hpp>
+#include <orbis/io/cloud_fields.hpp>
 #include <orbis/io/trajectory_file.hpp>
 
 #include "../common/memory.hpp"
@@ -125,10 +126,12 @@ orbis::result<mapped> map_cloud_file(const settings& s, const std::filesystem::p
     return orbis::fail(orbis::errc::invalid_argument, s.input.string(),
                        "the filter ray-evidence needs a recording: a cloud has no depth images");
   console.stage("reading");
-  auto read = examples::read_near_origin(s.input);
-  if (!read) return orbis::fail(read.error());
-  const orbis::vec3 origin = read->origin;
-  orbis::point_cloud& cloud = read->cloud;
+  auto found = examples::read_near_origin(s.input);
+  if (!found) return orbis::fail(found.error());
+  auto& [read, origin] = *found;
+  if (!read.fields.empty()) read.notes.push_back("not used: " + orbis::io::names_of(read.fields));
+  read.fields.clear();
+  orbis::point_cloud& cloud = read.cloud;
   const std::size_t in_file = cloud.size();
   keep_finite(cloud);
   if (cloud.empty()) return orbis::fail(orbis::errc::no_data, s.input.string(), "the cloud has no finite points");
@@ -139,6 +142,7 @@ orbis::result<mapped> map_cloud_file(const settings& s, const std::filesystem::p
   results r = begin_results(s, name, nullptr, folder);
   r.setup.emplace_back("points", count_text(cloud.size()) + left_out);
   r.truth_note = "A cloud, without SLAM.";
+  for (const std::string& note : read.notes) console.warn(r.warnings.emplace_back(s.input.string() + ": " + note));
   settings moved = s;
   r.origin = origin;
   if (!origin.isZero()) console.warn(r.warnings.emplace_back(origin_note(origin)));

@@ -23,6 +23,13 @@ app_fails(2 "--resolution: voxels of 1 mm: the space between origin and points h
           map many.ply --out no --resolution 0.001 --filter none --origin 0,0,0)
 app(0 map many.ply --out fine --resolution 0.001 --filter none)
 
+# A map has no place for other numbers and for the viewpoint of a cloud: both are mentioned.
+file(WRITE ${WORK}/fields.pcd "FIELDS x y z normal_x intensity\nSIZE 4 4 4 4 4\nTYPE F F F F F\nWIDTH 2\nHEIGHT 1\n"
+     "VIEWPOINT 0 -1 0 0.7071068 0.7071068 0 0\nPOINTS 2\nDATA ascii\n0 0 0 1 10\n1 0 0 1 20\n")
+app(0 map fields.pcd --out fields --resolution 0.1 --filter none)
+check(err MATCHES "warning: fields.pcd: VIEWPOINT 0 -1 0 0.7071068 0.7071068 0 0 is not applied")
+check(err MATCHES "warning: fields.pcd: not used: normal_x, intensity\n")
+
 app(0 map out/cloud_filtered.ply --out again --resolution 0.1 --filter statistical --neighbors 8 --sigma 3)
 summary(mode ${WORK}/again filter mode)
 check(mode STREQUAL "statistical")
