@@ -11,7 +11,8 @@
 /// | `synthetic_options.hpp` | its room, its camera's path and its sensor's errors |
 /// | `camera_file.hpp` | `camera.toml`: model, size, intrinsics, distortion, depth scale |
 /// | `toml.hpp` | settings in TOML from untrusted bytes; not included here, because it includes toml++ |
-/// | `trajectory_file.hpp` | trajectories in TUM format |
+/// | `trajectory_file.hpp` | trajectories in TUM format, and readers of those of EuRoC and KITTI |
+/// | `trajectory_reading.hpp` | a trajectory from a file, with notes about lost poses, repeated times and units |
 /// | `image.hpp` | colour and depth images in any supported format |
 /// | `png.hpp`, `jpeg.hpp` | reading and writing images of one format |
 /// | `cloud_file.hpp` | point clouds in any supported format |
@@ -39,3 +40,4 @@
 #include <orbis/io/synthetic.hpp>
 #include <orbis/io/synthetic_options.hpp>
 #include <orbis/io/trajectory_file.hpp>
+#include <orbis/io/trajectory_reading.hpp>

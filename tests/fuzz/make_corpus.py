@@ -647,6 +647,11 @@ def texts():
     write("read_trajectory", "not_finite", b"1 0 nan 0 0 0 0 1\n")
     write("read_trajectory", "nine_numbers", b"1 0 0 0 0 0 0 1 1\n")
     write("read_trajectory", "mark", b"\xef\xbb\xbf1 0 0 0 0 0 0 1\r\n+2 0 0 0 0 0 0 1")
+    write("read_trajectory", "euroc", b"#timestamp [ns], p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_w [], q_RS_x [], "
+          b"q_RS_y [], q_RS_z []\n1403715529000000000,1,2,3,1,0,0,0,7\n1403715529050000000,1,nan,3,1,0,0,0,7\n")
+    write("read_trajectory", "kitti", b"1 0 0 1 0 1 0 2 0 0 1 3\n" + b"inf " * 12 + b"\n1 0 0 4 0 1 0 5 0 0 1 6\n")
+    write("read_trajectory", "two_runs", b"".join(b"%d 0 0 %d 0 0 0 1\n" % (i, j) for j in (1, 2) for i in range(40)))
+    write("read_trajectory", "repeated", b"1403715529000;1;2;3;0;0;0;1\n" * 2 + b"1403715529000;1;2;4;0;0;0;1\n" * 9)
     write("read_trajectory", "matrix", b"1 0 0 1\n0 0.001 -1 2\n0 1 0 3\n0 0 0 1\n")
     write("read_trajectory", "mirror", b"1 0 0 1\n0 1 0 2\n0 0 -1 3\n0 0 0 1\n")
     sensor = (b"# General.\nsensor_type: camera\nT_BS:\n  cols: 4\n  rows: 4\n"

@@ -51,9 +51,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if (const auto times = checked(text, [&] { return io::detail::parse_kitti_times(text, where); }))
     for (std::size_t i = 1; i < times->size(); ++i) fuzz::require((*times)[i] > (*times)[i - 1], "times ascend");
   if (const auto poses = checked(text, [&] { return io::detail::parse_kitti_poses(text, where); }))
-    for (const se3& pose : *poses) fuzz::require(is_rotation(pose), "a pose is rigid");
+    for (const std::optional<se3>& pose : *poses) fuzz::require(!pose || is_rotation(*pose), "a pose is rigid");
   if (const auto poses = checked(text, [&] { return io::detail::parse_asl_poses(text, where); }))
-    for (const stamped_pose& p : *poses) fuzz::require(is_rotation(p.T_world_camera), "a pose is rigid");
+    for (const stamped_pose& p : poses->poses) fuzz::require(is_rotation(p.T_world_camera), "a pose is rigid");
   std::vector<std::string> notes;
   if (const auto list = checked(text, [&] { return io::detail::parse_image_list(text, where, "data", notes); }))
     fuzz::require(!list->empty(), "a list that is read names images");

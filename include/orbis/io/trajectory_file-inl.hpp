@@ -4,15 +4,19 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <charconv>
-#include <cmath>
-#include <cstddef>
+#include <optional>
 #include <ostream>
-#include <string>
+#include <tuple>
+#include <utility>
+#include <vector>
 
 #include <orbis/core/file.hpp>
 #include <orbis/core/inline.hpp>
+#include <orbis/io/detail/files/pose_text.hpp>
 #include <orbis/io/detail/text.hpp>
+#include <orbis/io/detail/time_stamp.hpp>
 #include <orbis/io/trajectory_file.hpp>
 
 namespace orbis::io {
@@ -22,23 +26,14 @@ ORBIS_INLINE result<trajectory> parse_trajectory(std::string_view text, const st
   std::string problem;
   std::size_t problem_line = 0;
   detail::for_each_line(text, [&](std::string_view line, std::size_t number) {
-    const auto reject = [&](std::string why) {
-      problem = std::move(why);
-      problem_line = number;
-      return false;
-    };
-    double v[8];
-    for (double& value : v) {
-      const std::string_view field = detail::next_field(line);
-      if (field.empty()) return reject("a pose has 8 numbers: timestamp tx ty tz qx qy qz qw");
-      if (!detail::parse_number(field, value))
-        return reject("\"" + std::string{field.substr(0, 40)} + "\" is not a number");
-      if (!std::isfinite(value)) return reject("a pose with NaN or infinity");
-    }
-    if (!detail::trimmed(line).empty()) return reject("a pose has 8 numbers: timestamp tx ty tz qx qy qz qw");
-    const so3::quaternion q(v[7], v[4], v[5], v[6]);
-    if (!(q.norm() > 1e-6) || !std::isfinite(q.norm())) return reject("the quaternion is zero or too large");
-    poses.push_back({v[0], se3(so3(q), vec3(v[1], v[2], v[3]))});
+    std::array<double, 8> v{};
+    bool lost = false;
+    problem = detail::parse_pose_numbers(line, ' ', false, v, lost);
+    const auto pose = problem.empty() && !lost ? detail::pose_of(v, false) : std::nullopt;
+    if (problem.empty() && !pose)
+      problem = lost ? "a pose with NaN or infinity" : "the quaternion is zero or too large";
+    if (!pose) return problem_line = number, false;
+    poses.push_back({v[0], *pose});
     return true;
   });
   if (problem_line != 0) return fail(errc::malformed, detail::at_line(where, problem_line), std::move(problem));
@@ -51,6 +46,77 @@ ORBIS_INLINE result<trajectory> read_trajectory(const std::filesystem::path& pat
   const auto text = read_file(path);
   if (!text) return fail(text.error());
   return parse_trajectory(*text, path);
+}
+
+ORBIS_INLINE result<trajectory_reading> parse_trajectory_file(std::string_view text,
+                                                              const std::filesystem::path& where) {
+  auto lines = detail::parse_pose_lines(text, where);
+  if (!lines) return fail(lines.error());
+  const auto unit = lines->unit;
+  auto read = detail::order_poses(*std::move(lines), where);
+  if (!read) return read;
+  const auto note = [&](const std::string& text) {
+    read->notes.insert(read->notes.begin(), where.string() + ": " + text);
+  };
+  if (read->layout != trajectory_layout::kitti && !(unit == detail::time_units[0]))
+    note("the time stamps are in " + std::string{unit.name});
+  if (read->layout == trajectory_layout::euroc) note("read in EuRoC's layout, the quaternion with w first");
+  if (read->layout == trajectory_layout::kitti) note("read in KITTI's layout, a pose matrix per line");
+  return read;
+}
+
+ORBIS_INLINE result<trajectory_reading> read_trajectory_file(const std::filesystem::path& path) {
+  const auto text = read_file(path);
+  if (!text) return fail(text.error());
+  return parse_trajectory_file(*text, path);
+}
+
+ORBIS_INLINE result<void> set_times(trajectory_reading& read, const std::filesystem::path& times) {
+  const auto text = read_file(times);
+  if (!text) return fail(text.error());
+  std::vector<double> all;
+  std::size_t bad_line = 0;
+  detail::for_each_line(*text, [&](std::string_view line, std::size_t number) {
+    const auto t = detail::parse_time_stamp(line);
+    if (!t || (!all.empty() && !(*t > all.back()))) return bad_line = number, false;
+    all.push_back(*t);
+    return true;
+  });
+  if (bad_line != 0)
+    return fail(errc::malformed, detail::at_line(times, bad_line),
+                "a line must have one time, later than the previous one");
+  if (all.size() != read.poses.size() + read.lost)
+    return fail(errc::malformed, times.string(),
+                std::to_string(all.size()) + " times for " + std::to_string(read.poses.size() + read.lost) + " poses");
+  for (stamped_pose& p : read.poses) p.timestamp = all[static_cast<std::size_t>(p.timestamp)];
+  return {};
+}
+
+ORBIS_INLINE std::string describe_spans(const trajectory& a, const trajectory& b) {
+  const auto span = [](const trajectory& poses) {
+    return poses.empty()
+               ? std::string{"no time"}
+               : detail::describe(poses.front().timestamp) + " to " + detail::describe(poses.back().timestamp) + " s";
+  };
+  const std::string units = describe_units(a, b);
+  return span(a) + " and " + span(b) + (units.empty() ? "" : "; " + units);
+}
+
+ORBIS_INLINE std::string describe_units(const trajectory& a, const trajectory& b) {
+  constexpr double likely = 0.1;
+  if (a.empty() || b.empty()) return {};
+  // Intersection over union of the spans, with the times of `x` in another unit.
+  const auto agreement = [](const trajectory& x, double unit, const trajectory& y) {
+    const double x0 = x.front().timestamp * unit, x1 = x.back().timestamp * unit;
+    const double y0 = y.front().timestamp, y1 = y.back().timestamp;
+    return (std::min(x1, y1) - std::max(x0, y0)) / (std::max(x1, y1) - std::min(x0, y0));
+  };
+  if (agreement(a, 1.0, b) > likely) return {};
+  for (const auto& unit : detail::time_units)
+    for (const auto& [x, y, which] : {std::tuple{&a, &b, "first"}, std::tuple{&b, &a, "second"}})
+      if (unit.seconds != 1.0 && agreement(*x, unit.seconds, *y) > likely)
+        return "those of the " + std::string{which} + " seem to be " + std::string{unit.name};
+  return {};
 }
 
 ORBIS_INLINE result<void> write_trajectory(const std::filesystem::path& path, const trajectory& poses) {

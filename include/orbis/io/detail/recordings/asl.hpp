@@ -25,12 +25,14 @@
 #include <orbis/core/se3.hpp>
 #include <orbis/core/trajectory.hpp>
 #include <orbis/io/detail/files/plain_yaml.hpp>
+#include <orbis/io/detail/files/pose_matrix.hpp>
+#include <orbis/io/detail/files/pose_text.hpp>
 #include <orbis/io/detail/recordings/recording_folder.hpp>
 #include <orbis/io/detail/recordings/recording_index.hpp>
-#include <orbis/io/detail/recordings/seven_scenes.hpp>
 #include <orbis/io/detail/recordings/stereo_index.hpp>
 #include <orbis/io/detail/recordings/tum.hpp>
 #include <orbis/io/detail/text.hpp>
+#include <orbis/io/trajectory_reading.hpp>
 
 namespace orbis::io::detail {
 
@@ -94,30 +96,13 @@ struct asl_camera {
 }
 
 /// Parses the `data.csv` of the ground truth: nanoseconds, position and quaternion (w first) of the body; further
-/// columns are ignored. Errors: malformed, with the line.
-[[nodiscard]] inline result<trajectory> parse_asl_poses(std::string_view text, const std::filesystem::path& where) {
-  trajectory poses;
-  std::size_t bad_line = 0;
-  for_each_line(text, [&](std::string_view line, std::size_t number) {
-    std::int64_t nanoseconds = 0;
-    double v[7];
-    const auto next = [&] {
-      const std::size_t comma = std::min(line.find(','), line.size());
-      const std::string_view field = trimmed(line.substr(0, comma));
-      line.remove_prefix(std::min(comma + 1, line.size()));
-      return field;
-    };
-    bool good = parse_number(next(), nanoseconds);
-    for (double& value : v) good = good && parse_number(next(), value) && std::isfinite(value);
-    const so3::quaternion q = good ? so3::quaternion(v[3], v[4], v[5], v[6]) : so3::quaternion(0.0, 0.0, 0.0, 0.0);
-    if (!(q.norm() > 1e-6) || !std::isfinite(q.norm())) return bad_line = number, false;
-    poses.push_back({1e-9 * static_cast<double>(nanoseconds), se3{so3{q}, vec3{v[0], v[1], v[2]}}});
-    return true;
-  });
-  if (bad_line != 0)
-    return fail(errc::malformed, at_line(where, bad_line), "a pose has a time, a position and a quaternion");
-  std::stable_sort(poses.begin(), poses.end(), [](const auto& a, const auto& b) { return a.timestamp < b.timestamp; });
-  return poses;
+/// columns are ignored. Lost poses and repeated times are handled, and noted, as in `parse_trajectory_file`. Errors:
+/// malformed, with the line; degenerate.
+[[nodiscard]] inline result<trajectory_reading> parse_asl_poses(std::string_view text,
+                                                                const std::filesystem::path& where) {
+  auto lines = parse_pose_lines(text, where, {.quaternion = 4, .w_first = true, .nanoseconds = true});
+  if (!lines) return fail(lines.error());
+  return order_poses(*std::move(lines), where);
 }
 
 /// The folder that contains `cam0` and `cam1`; empty if there is none.
@@ -169,9 +154,7 @@ struct asl_images {
     if (!present(file)) continue;
     const auto text = read_file(file);
     if (!text) return fail(text.error());
-    auto truth = parse_asl_poses(*text, file);
-    if (!truth) return fail(truth.error());
-    index.ground_truth = *std::move(truth);
+    if (auto taken = take_ground_truth(parse_asl_poses(*text, file), index); !taken) return fail(taken.error());
     for (stamped_pose& p : index.ground_truth) p.T_world_camera = p.T_world_camera * T_body_camera;
     index.files.push_back(file);
     attach_ground_truth(index, 0.02);

@@ -22,9 +22,9 @@
 #include <orbis/core/file.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/core/se3.hpp>
+#include <orbis/io/detail/files/pose_matrix.hpp>
 #include <orbis/io/detail/recordings/recording_folder.hpp>
 #include <orbis/io/detail/recordings/recording_index.hpp>
-#include <orbis/io/detail/recordings/seven_scenes.hpp>
 #include <orbis/io/detail/recordings/stereo_index.hpp>
 #include <orbis/io/detail/text.hpp>
 #include <orbis/io/detail/time_stamp.hpp>
@@ -105,13 +105,17 @@ struct kitti_calibration {
   return times;
 }
 
-/// Parses a file of poses: the first three rows of `T_world_camera`, 12 numbers per line. Errors: malformed, with the
-/// line (not 12 numbers, not a rigid transform).
-[[nodiscard]] inline result<std::vector<se3>> parse_kitti_poses(std::string_view text,
-                                                                const std::filesystem::path& where) {
-  std::vector<se3> poses;
+/// Parses a file of poses: the first three rows of `T_world_camera`, 12 numbers per line; a pose with NaN or infinity
+/// is none. Errors: malformed, with the line (not 12 numbers, not a rigid transform).
+[[nodiscard]] inline result<std::vector<std::optional<se3>>> parse_kitti_poses(std::string_view text,
+                                                                               const std::filesystem::path& where) {
+  std::vector<std::optional<se3>> poses;
   std::optional<error> problem;
   for_each_line(text, [&](std::string_view line, std::size_t number) {
+    if (is_lost_pose(line)) {
+      poses.emplace_back();
+      return true;
+    }
     auto pose = parse_pose_matrix(std::string{line} + " 0 0 0 1", where);
     if (pose)
       poses.push_back(*pose);
@@ -123,11 +127,13 @@ struct kitti_calibration {
   return poses;
 }
 
-/// The poses of camera 0 of a sequence: `poses.txt` in its folder, or the benchmark's file in `../../poses`; empty if
-/// there are none. Adds the file to those of `index`, and a note if their number differs from `times`. Errors:
-/// unreadable, malformed (with the line).
-[[nodiscard]] inline result<std::vector<se3>> read_kitti_poses(const std::filesystem::path& folder, std::size_t times,
-                                                               recording_index& index) {
+/// The poses of a camera of a sequence that is at `T_first_camera` in the frame of camera 0: `poses.txt` in its folder,
+/// or the benchmark's file in `../../poses`; empty if there are none. Adds the file to those of `index`, and notes if
+/// their number differs from `times`, and about lost poses. Errors: unreadable, malformed (with the line).
+[[nodiscard]] inline result<std::vector<std::optional<se3>>> read_kitti_poses(const std::filesystem::path& folder,
+                                                                              const se3& T_first_camera,
+                                                                              std::size_t times,
+                                                                              recording_index& index) {
   const auto name = std::filesystem::absolute(folder / "").lexically_normal().parent_path().filename().string();
   for (const auto& file : {folder / "poses.txt", folder / ".." / ".." / "poses" / (name + ".txt")}) {
     if (!present(file)) continue;
@@ -139,19 +145,26 @@ struct kitti_calibration {
     if (poses->size() != times)
       index.notes.push_back(file.string() + ": " + std::to_string(poses->size()) + " poses for " +
                             std::to_string(times) + " times");
+    std::size_t lost = 0;
+    for (std::optional<se3>& pose : *poses)
+      if (pose)
+        pose = *pose * T_first_camera;
+      else
+        ++lost;
+    if (lost != 0) index.notes.push_back(lost_frames_note(lost, poses->size()));
     return poses;
   }
-  return std::vector<se3>{};
+  return std::vector<std::optional<se3>>{};
 }
 
 /// Adds frame number `n` with its time and, if there is one, its pose.
-inline void add_kitti_frame(std::size_t n, const std::vector<double>& times, const std::vector<se3>& poses,
-                            const std::filesystem::path& color, const std::filesystem::path& depth,
-                            recording_index& index) {
+inline void add_kitti_frame(std::size_t n, const std::vector<double>& times,
+                            const std::vector<std::optional<se3>>& poses, const std::filesystem::path& color,
+                            const std::filesystem::path& depth, recording_index& index) {
   index.frames.push_back({times[n], color, depth, {}});
-  if (n >= poses.size()) return;
+  if (n >= poses.size() || !poses[n]) return;
   index.frames.back().T_world_camera = poses[n];
-  index.ground_truth.push_back({times[n], poses[n]});
+  index.ground_truth.push_back({times[n], *poses[n]});
 }
 
 /// Sorts the frames of a sequence by time; of frames with the same number keeps the first. `images`: the cameras'
@@ -214,9 +227,8 @@ inline void add_kitti_frame(std::size_t n, const std::vector<double>& times, con
   const auto times = parse_kitti_times(*times_text, images.files[1]);
   if (!times) return fail(times.error());
 
-  auto poses = read_kitti_poses(folder, times->size(), images);
+  const auto poses = read_kitti_poses(folder, k->T_first_left, times->size(), images);
   if (!poses) return fail(poses.error());
-  for (se3& pose : *poses) pose = pose * k->T_first_left;
 
   std::size_t lonely = 0;
   for (const auto& image : list_folder(left)) {

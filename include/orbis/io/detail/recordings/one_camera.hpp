@@ -110,9 +110,8 @@ inline constexpr double mono_pose_distance = 0.020;
   const auto& p = *projection;
   const auto times = parse_kitti_times(*times_text, index.files[1]);
   if (!times) return fail(times.error());
-  auto poses = read_kitti_poses(folder, times->size(), index);
+  const auto poses = read_kitti_poses(folder, kitti_place(p), times->size(), index);
   if (!poses) return fail(poses.error());
-  for (se3& pose : *poses) pose = pose * kitti_place(p);
 
   std::size_t lonely = 0;
   const auto images = folder / ("image_" + std::to_string(*camera));

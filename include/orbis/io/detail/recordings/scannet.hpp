@@ -20,6 +20,7 @@
 #include <orbis/core/file.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/core/se3.hpp>
+#include <orbis/io/detail/files/pose_matrix.hpp>
 #include <orbis/io/detail/recordings/color_registration.hpp>
 #include <orbis/io/detail/recordings/recording_folder.hpp>
 #include <orbis/io/detail/recordings/recording_index.hpp>
@@ -63,7 +64,7 @@ namespace orbis::io::detail {
       const auto text = read_file(file);
       if (!text) return fail(text.error());
       index.files.push_back(file);
-      if (text->find("inf") != std::string::npos || text->find("nan") != std::string::npos) {
+      if (is_lost_pose(*text)) {
         ++without_pose;
       } else {
         const auto pose = parse_pose_matrix(*text, file);
@@ -84,9 +85,7 @@ namespace orbis::io::detail {
   if (const auto ok = check_first_frame(index, folder); !ok) return fail(ok.error());
   if (without_depth != 0)
     index.notes.push_back(std::to_string(without_depth) + " colour images have no depth image and are skipped");
-  if (without_pose != 0)
-    index.notes.push_back(std::to_string(without_pose) + " of " + std::to_string(index.frames.size()) +
-                          " frames have no pose: the camera was lost there");
+  if (without_pose != 0) index.notes.push_back(lost_frames_note(without_pose, index.frames.size()));
 
   const auto first_color = read_color(index.frames.front().color);
   if (!first_color) return fail(first_color.error());

@@ -19,57 +19,15 @@
 
 #include <orbis/camera/settings.hpp>
 #include <orbis/core/file.hpp>
-#include <orbis/core/jacobi.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/core/se3.hpp>
+#include <orbis/io/detail/files/pose_matrix.hpp>
 #include <orbis/io/detail/recordings/recording_folder.hpp>
 #include <orbis/io/detail/recordings/recording_index.hpp>
 #include <orbis/io/detail/text.hpp>
 #include <orbis/io/image.hpp>
 
 namespace orbis::io::detail {
-
-/// Parses the pose `T_world_camera` from a text with a 4x4 matrix. Its rotation may deviate by a few parts in a
-/// thousand, as in 7-Scenes: the result has the nearest rotation. Errors: malformed, with the line (not 16 numbers, NaN
-/// or infinity, a matrix that deviates from a rigid transform by more than 5 %).
-[[nodiscard]] inline result<se3> parse_pose_matrix(std::string_view text, const std::filesystem::path& path) {
-  double m[16];
-  std::size_t count = 0, last_line = 0;
-  std::string problem;
-  for_each_line(text, [&](std::string_view line, std::size_t number) {
-    last_line = number;
-    for (std::string_view field = next_field(line); !field.empty(); field = next_field(line)) {
-      if (count == 16)
-        problem = "more than 16 numbers in a pose";
-      else if (!parse_number(field, m[count]))
-        problem = "\"" + std::string{field.substr(0, 40)} + "\" is not a number";
-      else if (!std::isfinite(m[count++]))
-        problem = "a pose with NaN or infinity";
-      if (!problem.empty()) return false;
-    }
-    return true;
-  });
-  if (!problem.empty()) return fail(errc::malformed, at_line(path, last_line), problem);
-  if (count != 16) return fail(errc::malformed, path.string(), "a pose is a 4x4 matrix, 16 numbers");
-
-  mat3 r;
-  for (int y = 0; y != 3; ++y)
-    for (int x = 0; x != 3; ++x) r(y, x) = m[static_cast<std::size_t>(4 * y + x)];
-  const bool last_row =
-      std::abs(m[12]) < 1e-3 && std::abs(m[13]) < 1e-3 && std::abs(m[14]) < 1e-3 && std::abs(m[15] - 1.0) < 1e-3;
-  if (!last_row || determinant(r) < 0.0 || largest_magnitude(mat3(transposed(r) * r - identity<mat3>())) > 0.05)
-    return fail(errc::malformed, path.string(), "the matrix is not a rigid transform");
-  const auto rotation = nearest_rotation(r);
-  if (!rotation) return fail(errc::malformed, path.string(), rotation.error().message);
-  return se3(*rotation, vec3(m[3], m[7], m[11]));
-}
-
-/// Reads a pose; see `parse_pose_matrix`. Errors: not_found, unreadable, malformed.
-[[nodiscard]] inline result<se3> read_pose_matrix(const std::filesystem::path& path) {
-  const auto text = read_file(path);
-  if (!text) return fail(text.error());
-  return parse_pose_matrix(*text, path);
-}
 
 /// Parses a 3x3 camera matrix, or the upper left part of a 4x4 one. Errors: malformed.
 [[nodiscard]] inline result<mat3> parse_camera_matrix(std::string_view text, const std::filesystem::path& path) {
@@ -150,7 +108,7 @@ inline std::vector<std::filesystem::path> seven_scenes_sequences(const std::file
   }
 
   recording_index index;
-  std::size_t without_depth = 0;
+  std::size_t without_depth = 0, lost = 0;
   for (const auto& color : list_folder(folder)) {
     std::string stem;
     unsigned number = 0;
@@ -161,11 +119,17 @@ inline std::vector<std::filesystem::path> seven_scenes_sequences(const std::file
       continue;
     }
     if (const auto file = folder / (stem + ".pose.txt"); present(file)) {
-      const auto pose = read_pose_matrix(file);
-      if (!pose) return fail(pose.error());
-      frame.T_world_camera = *pose;
+      const auto text = read_file(file);
+      if (!text) return fail(text.error());
       index.files.push_back(file);
-      index.ground_truth.push_back({frame.timestamp, *pose});
+      if (is_lost_pose(*text)) {
+        ++lost;
+      } else {
+        const auto pose = parse_pose_matrix(*text, file);
+        if (!pose) return fail(pose.error());
+        frame.T_world_camera = *pose;
+        index.ground_truth.push_back({frame.timestamp, *pose});
+      }
     }
     index.frames.push_back(std::move(frame));
   }
@@ -180,6 +144,7 @@ inline std::vector<std::filesystem::path> seven_scenes_sequences(const std::file
   if (const auto ok = check_first_frame(index, folder); !ok) return fail(ok.error());
   if (without_depth != 0)
     index.notes.push_back(std::to_string(without_depth) + " colour images have no depth image and are skipped");
+  if (lost != 0) index.notes.push_back(lost_frames_note(lost, index.frames.size()));
   index.notes.push_back("colour and depth are not registered in this format: colours are slightly misaligned");
 
   std::filesystem::path intrinsics = folder / "camera-intrinsics.txt";

@@ -192,15 +192,29 @@ struct associated_files {
   return parse_associations(*text, list, notes);
 }
 
+/// Makes a trajectory and its notes those of an index. A ground truth whose times are unusable (degenerate) is left out
+/// with a note. Errors: all others of `read`.
+[[nodiscard]] inline result<void> take_ground_truth(result<trajectory_reading> read, recording_index& index) {
+  if (!read && read.error().code == errc::degenerate) {
+    index.notes.push_back(read.error().to_string() + "; the ground truth is not used");
+    return {};
+  }
+  if (!read) return fail(read.error());
+  index.notes.insert(index.notes.end(), read->notes.begin(), read->notes.end());
+  index.ground_truth = std::move(read->poses);
+  return {};
+}
+
 /// Reads `groundtruth.txt` of a folder, if it exists, into an index with known frames, and sets their poses
-/// (`attach_ground_truth`). Errors: unreadable, malformed (with its line).
+/// (`attach_ground_truth`). Errors: unreadable, malformed (with its line), unsupported.
 [[nodiscard]] inline result<void> read_ground_truth(const std::filesystem::path& folder, double max_time_difference,
                                                     recording_index& index) {
   const auto file = folder / "groundtruth.txt";
   if (!present(file)) return {};
-  auto truth = read_trajectory(file);
-  if (!truth) return fail(truth.error());
-  index.ground_truth = *std::move(truth);
+  auto truth = read_trajectory_file(file);
+  if (truth && truth->layout == trajectory_layout::kitti)
+    return fail(errc::malformed, file.string(), "the poses have no times; a line is timestamp tx ty tz qx qy qz qw");
+  if (auto taken = take_ground_truth(std::move(truth), index); !taken) return fail(taken.error());
   index.files.push_back(file);
   attach_ground_truth(index, max_time_difference);
   return {};

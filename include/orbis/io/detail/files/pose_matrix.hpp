@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Poses as text with a 4x4 matrix, and poses of frames at which the camera was lost.
+#pragma once
+
+#include <cmath>
+#include <cstddef>
+#include <filesystem>
+#include <string>
+#include <string_view>
+
+#include <orbis/core/file.hpp>
+#include <orbis/core/jacobi.hpp>
+#include <orbis/core/result.hpp>
+#include <orbis/core/se3.hpp>
+#include <orbis/io/detail/text.hpp>
+
+namespace orbis::io::detail {
+
+/// Parses the pose `T_world_camera` from a text with a 4x4 matrix. Its rotation may deviate by a few parts in a
+/// thousand, as in 7-Scenes: the result has the nearest rotation. Errors: malformed, with the line (not 16 numbers, NaN
+/// or infinity, a matrix that deviates from a rigid transform by more than 5 %).
+[[nodiscard]] inline result<se3> parse_pose_matrix(std::string_view text, const std::filesystem::path& path) {
+  double m[16];
+  std::size_t count = 0, last_line = 0;
+  std::string problem;
+  for_each_line(text, [&](std::string_view line, std::size_t number) {
+    last_line = number;
+    for (std::string_view field = next_field(line); !field.empty(); field = next_field(line)) {
+      if (count == 16)
+        problem = "more than 16 numbers in a pose";
+      else if (!parse_number(field, m[count]))
+        problem = "\"" + std::string{field.substr(0, 40)} + "\" is not a number";
+      else if (!std::isfinite(m[count++]))
+        problem = "a pose with NaN or infinity";
+      if (!problem.empty()) return false;
+    }
+    return true;
+  });
+  if (!problem.empty()) return fail(errc::malformed, at_line(path, last_line), problem);
+  if (count != 16) return fail(errc::malformed, path.string(), "a pose is a 4x4 matrix, 16 numbers");
+
+  mat3 r;
+  for (int y = 0; y != 3; ++y)
+    for (int x = 0; x != 3; ++x) r(y, x) = m[static_cast<std::size_t>(4 * y + x)];
+  const bool last_row =
+      std::abs(m[12]) < 1e-3 && std::abs(m[13]) < 1e-3 && std::abs(m[14]) < 1e-3 && std::abs(m[15] - 1.0) < 1e-3;
+  if (!last_row || determinant(r) < 0.0 || largest_magnitude(mat3(transposed(r) * r - identity<mat3>())) > 0.05)
+    return fail(errc::malformed, path.string(), "the matrix is not a rigid transform");
+  const auto rotation = nearest_rotation(r);
+  if (!rotation) return fail(errc::malformed, path.string(), rotation.error().message);
+  return se3(*rotation, vec3(m[3], m[7], m[11]));
+}
+
+/// Reads a pose; see `parse_pose_matrix`. Errors: not_found, unreadable, malformed.
+[[nodiscard]] inline result<se3> read_pose_matrix(const std::filesystem::path& path) {
+  const auto text = read_file(path);
+  if (!text) return fail(text.error());
+  return parse_pose_matrix(*text, path);
+}
+
+/// Returns true if a number of the text is NaN or infinite: data sets mark the poses of lost frames in this way.
+[[nodiscard]] inline bool is_lost_pose(std::string_view text) {
+  bool lost = false;
+  for_each_line(text, [&](std::string_view line, std::size_t) {
+    double value = 0.0;
+    for (std::string_view field = next_field(line); !lost && !field.empty(); field = next_field(line))
+      lost = parse_number(field, value) && !std::isfinite(value);
+    return !lost;
+  });
+  return lost;
+}
+
+/// A warning about frames without a pose.
+[[nodiscard]] inline std::string lost_frames_note(std::size_t lost, std::size_t frames) {
+  return std::to_string(lost) + " of " + std::to_string(frames) + " frames have no pose: the camera was lost there";
+}
+
+}  // namespace orbis::io::detail

@@ -1,0 +1,298 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Trajectories as text: the lines of the TUM, EuRoC and KITTI layouts, lost poses, repeated time stamps, and several
+/// runs in one file.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cmath>
+#include <cstddef>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include <orbis/core/result.hpp>
+#include <orbis/core/se3.hpp>
+#include <orbis/core/trajectory.hpp>
+#include <orbis/io/detail/files/pose_matrix.hpp>
+#include <orbis/io/detail/text.hpp>
+#include <orbis/io/detail/time_stamp.hpp>
+#include <orbis/io/trajectory_reading.hpp>
+
+namespace orbis::io::detail {
+
+/// The poses of a file, line by line.
+struct pose_lines {
+  struct entry {
+    stamped_pose pose;
+    std::size_t line = 0;
+  };
+  std::vector<entry> entries;  ///< in the order of the file
+  trajectory_layout layout = trajectory_layout::tum;
+  time_unit unit = time_units[0];  ///< of the first time stamp; `entries` have seconds
+  std::size_t lost = 0;            ///< lines with NaN or infinity
+  std::size_t first_lost_line = 0;
+};
+
+/// Removes the next field from the front of a line: up to a comma, or else a semicolon, if the line contains one,
+/// otherwise up to blanks. A separator at the end of the line starts no field.
+[[nodiscard]] inline std::string_view next_value(std::string_view& line, char separator) {
+  if (separator == ' ') return next_field(line);
+  const std::size_t end = std::min(line.find(separator), line.size());
+  const std::string_view field = trimmed(line.substr(0, end));
+  line.remove_prefix(std::min(end + 1, line.size()));
+  return field;
+}
+[[nodiscard]] inline char separator_of(std::string_view line) {
+  return line.find(',') != line.npos ? ',' : line.find(';') != line.npos ? ';' : ' ';
+}
+
+/// The columns that a header line names.
+struct pose_header {
+  std::optional<std::size_t> quaternion;  ///< first of four columns q..., none if there are not four
+  bool w_first = false;
+  bool is_usual = true;  ///< the quaternion is after the position and in the order x, y, z, w or w, x, y, z
+  bool nanoseconds = false;
+};
+
+/// Parses a header such as `#timestamp [ns], p_RS_R_x [m], ..., q_RS_w [], ...`; units in brackets name no column.
+[[nodiscard]] inline pose_header parse_pose_header(std::string_view line) {
+  pose_header header;
+  while (!line.empty() && (line.front() == '#' || is_blank(line.front()))) line.remove_prefix(1);
+  const char separator = separator_of(line);
+  std::string last_letters;  // of columns q...
+  for (std::size_t column = 0; !line.empty();) {
+    std::string_view name = next_value(line, separator);
+    if (column == 0 && (name.find("[ns]") != name.npos || name.ends_with("_ns"))) header.nanoseconds = true;
+    if (column == 1 && name == "[ns]") header.nanoseconds = true;
+    if (name.starts_with('[')) continue;
+    name = next_field(name);
+    const bool is_q = name.size() > 1 && (name.front() == 'q' || name.front() == 'Q');
+    const char last = name.empty() ? ' ' : static_cast<char>(std::tolower(static_cast<unsigned char>(name.back())));
+    if (is_q && std::string_view{"wxyz"}.find(last) != std::string_view::npos) {
+      if (last_letters.empty()) header.quaternion = column;
+      last_letters.push_back(last);
+    }
+    ++column;
+  }
+  if (last_letters.size() != 4) header.quaternion.reset();
+  header.w_first = header.quaternion && last_letters[0] == 'w';
+  // Comments may have words before the names.
+  if (header.quaternion)
+    header.is_usual = *header.quaternion >= 4 && (last_letters == "wxyz" || last_letters == "xyzw");
+  return header;
+}
+
+/// A pose as numbers: time, position, quaternion in the order of the file. Returns an explanation if it is none; `lost`
+/// is set for NaN and infinity.
+[[nodiscard]] inline std::string parse_pose_numbers(std::string_view line, char separator, bool more_columns,
+                                                    std::array<double, 8>& v, bool& lost) {
+  const char* const eight = more_columns ? "a pose has a time, a position and a quaternion"
+                                         : "a pose has 8 numbers: timestamp tx ty tz qx qy qz qw";
+  lost = false;
+  for (double& value : v) {
+    const std::string_view field = next_value(line, separator);
+    if (field.empty()) return eight;
+    if (!parse_number(field, value)) return "\"" + std::string{field.substr(0, 40)} + "\" is not a number";
+    lost = lost || !std::isfinite(value);
+  }
+  return more_columns || trimmed(line).empty() ? std::string{} : eight;
+}
+
+/// A pose of numbers; none if the quaternion is zero or too large.
+[[nodiscard]] inline std::optional<se3> pose_of(const std::array<double, 8>& v, bool w_first) {
+  const so3::quaternion q = w_first ? so3::quaternion(v[4], v[5], v[6], v[7]) : so3::quaternion(v[7], v[4], v[5], v[6]);
+  if (!(q.norm() > 1e-6) || !std::isfinite(q.norm())) return std::nullopt;
+  return se3(so3(q), vec3(v[1], v[2], v[3]));
+}
+
+/// Returns true if a field of the line is a number.
+[[nodiscard]] inline bool has_number(std::string_view line) {
+  const char separator = separator_of(line);
+  for (double value = 0.0; !line.empty();)
+    if (parse_number(next_value(line, separator), value)) return true;
+  return false;
+}
+
+/// Parses the lines of a trajectory in the layout of its header and first pose: a header or commas with nanoseconds are
+/// EuRoC's, 12 numbers per line KITTI's, everything else TUM's. `assumed`: the header of a file without one. Errors:
+/// malformed, with the line; unsupported (a header that names the columns in another order).
+inline result<pose_lines> parse_pose_lines(std::string_view text, const std::filesystem::path& where,
+                                           pose_header assumed = {}) {
+  pose_lines read;
+  pose_header header = assumed;
+  const auto start = [&](std::string_view line) {
+    const char separator = separator_of(line);
+    std::size_t fields = 0;
+    for (std::string_view rest = line; fields != 13 && !next_value(rest, separator).empty();) ++fields;
+    read.unit = header.nanoseconds ? time_units[3] : unit_of(next_value(line, separator));
+    header.w_first = header.quaternion ? header.w_first : separator == ',' && read.unit == time_units[3];
+    read.layout = header.w_first                                           ? trajectory_layout::euroc
+                  : fields == 12 && separator == ' ' && !header.quaternion ? trajectory_layout::kitti
+                                                                           : trajectory_layout::tum;
+  };
+  const auto parse_line = [&](std::string_view line, std::size_t number) -> std::string {
+    bool lost = false;
+    std::optional<se3> pose;
+    double seconds = static_cast<double>(read.entries.size() + read.lost);
+    if (read.layout == trajectory_layout::kitti) {
+      lost = is_lost_pose(line);
+      auto matrix = lost ? result<se3>{se3{}} : parse_pose_matrix(std::string{line} + " 0 0 0 1", where);
+      if (!matrix) return matrix.error().message;
+      pose = *matrix;
+    } else {
+      const char separator = separator_of(line);
+      std::array<double, 8> v{};
+      if (auto why = parse_pose_numbers(line, separator, header.w_first, v, lost); !why.empty()) return why;
+      if (!lost) pose = pose_of(v, header.w_first);
+      if (!lost && !pose)
+        return header.w_first ? "a pose has a quaternion, w first, which is neither zero nor too large"
+                              : "the quaternion is zero or too large";
+      seconds = v[0] * (header.nanoseconds ? time_units[3] : unit_of(next_value(line, separator))).seconds;
+    }
+    if (!lost)
+      read.entries.push_back({{seconds, *pose}, number});
+    else if (read.lost++ == 0)
+      read.first_lost_line = number;
+    return {};
+  };
+
+  if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
+  bool in_header = true;  // up to the first pose, which one line without numbers may precede
+  bool named = false;
+  for (std::size_t number = 1; !text.empty(); ++number) {
+    const std::string_view line = trimmed(next_line(text));
+    const bool comment = line.starts_with('#');
+    if (line.empty() || (comment && !in_header)) continue;
+    if (comment || (in_header && !named && !has_number(line))) {
+      named = named || !comment;
+      const auto found = parse_pose_header(line);
+      header.nanoseconds = header.nanoseconds || found.nanoseconds;
+      if (!found.quaternion) continue;
+      if (!found.is_usual)
+        return fail(errc::unsupported, at_line(where, number),
+                    "the columns are not time, position and quaternion (x y z w, or w x y z), in this order");
+      header.quaternion = found.quaternion;
+      header.w_first = found.w_first;
+      continue;
+    }
+    if (in_header) start(line);
+    in_header = false;
+    if (auto why = parse_line(line, number); !why.empty())
+      return fail(errc::malformed, at_line(where, number), std::move(why));
+  }
+  return read;
+}
+
+/// Lines at which time runs backwards by so much that another run begins there, as indices of entries; empty if the
+/// lines are merely out of order.
+[[nodiscard]] inline std::vector<std::size_t> starts_of_runs(const std::vector<pose_lines::entry>& entries) {
+  constexpr std::size_t shortest = 3, most = 20;
+  constexpr double jump = 10.0;  // median intervals
+  std::vector<double> steps;
+  for (std::size_t i = 1; i < entries.size(); ++i)
+    steps.push_back(std::abs(entries[i].pose.timestamp - entries[i - 1].pose.timestamp));
+  if (steps.empty()) return {};
+  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
+  std::nth_element(steps.begin(), middle, steps.end());
+  std::vector<std::size_t> starts;
+  std::size_t last = 0;
+  for (std::size_t i = 1; i <= entries.size(); ++i) {
+    const bool ends = i == entries.size();
+    if (!ends && !(entries[i].pose.timestamp < entries[i - 1].pose.timestamp)) continue;
+    if (i - last < shortest || starts.size() == most) return {};
+    if (ends) break;
+    if (entries[i - 1].pose.timestamp - entries[i].pose.timestamp < jump * *middle) return {};
+    starts.push_back(last = i);
+  }
+  return starts;
+}
+
+/// Returns true if poses are equal to the last bit.
+[[nodiscard]] inline bool same_pose(const se3& a, const se3& b) {
+  return a.translation() == b.translation() &&
+         a.rotation().unit_quaternion().coeffs() == b.rotation().unit_quaternion().coeffs();
+}
+
+/// Keeps the first of consecutive entries with equal times.
+struct repeated_times {
+  std::size_t same = 0;       ///< removed entries with the pose of the kept one
+  std::size_t different = 0;  ///< removed entries with another pose
+};
+inline repeated_times keep_first(std::vector<pose_lines::entry>& entries) {
+  repeated_times removed;
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i != entries.size(); ++i) {
+    const bool repeated = kept != 0 && entries[i].pose.timestamp == entries[kept - 1].pose.timestamp;
+    if (!repeated)
+      entries[kept++] = entries[i];
+    else
+      ++(same_pose(entries[i].pose.T_world_camera, entries[kept - 1].pose.T_world_camera) ? removed.same
+                                                                                          : removed.different);
+  }
+  entries.resize(kept);
+  return removed;
+}
+
+/// The poses in order of time, each time once: the first line counts. If a later run contradicts the first one, or
+/// overlaps with it in time, only the first one is kept. Errors: degenerate (most poses have the time of another one
+/// and differ from it).
+[[nodiscard]] inline result<trajectory_reading> order_poses(pose_lines&& lines, const std::filesystem::path& where) {
+  trajectory_reading read{.poses = {}, .layout = lines.layout, .lost = lines.lost, .notes = {}};
+  const auto note = [&](const std::string& text) { read.notes.push_back(where.string() + ": " + text); };
+  if (lines.lost != 0)
+    note(std::to_string(lines.lost) + " poses with NaN or infinity are left out: the camera was lost there");
+
+  std::vector<pose_lines::entry>& entries = lines.entries;
+  const std::size_t all = entries.size();
+  const auto earlier = [](const auto& a, const auto& b) { return a.pose.timestamp < b.pose.timestamp; };
+  const bool sorted = std::is_sorted(entries.begin(), entries.end(), earlier);
+  const auto runs = sorted ? std::vector<std::size_t>{} : starts_of_runs(entries);
+  std::vector<pose_lines::entry> first;
+  std::string backwards = "not in order of time; sorted";
+  if (!runs.empty()) {
+    first.assign(entries.begin(), entries.begin() + static_cast<std::ptrdiff_t>(runs[0]));
+    backwards =
+        "time runs backwards at line " + std::to_string(entries[runs[0]].line) +
+        (runs.size() == 1 ? "; two runs in one file?" : "; " + std::to_string(runs.size() + 1) + " runs in one file?");
+  }
+  std::stable_sort(entries.begin(), entries.end(), earlier);
+  std::size_t during_first = 0;  // poses of later runs
+  if (!runs.empty())
+    during_first = static_cast<std::size_t>(std::upper_bound(entries.begin(), entries.end(), first.back(), earlier) -
+                                            std::lower_bound(entries.begin(), entries.end(), first.front(), earlier)) -
+                   first.size();
+  repeated_times repeated = keep_first(entries);
+  if (2 * repeated.different > all) {
+    const bool whole = entries.size() > 1 && std::all_of(entries.begin(), entries.end(), [](const auto& e) {
+                         return e.pose.timestamp == std::floor(e.pose.timestamp);
+                       });
+    return fail(errc::degenerate, where.string(),
+                std::to_string(repeated.different) + " of " + std::to_string(all) +
+                    " poses have the time stamp of another pose: " +
+                    (!runs.empty() ? backwards
+                     : whole       ? "the time stamps are in whole seconds; write them with more digits"
+                                   : "the time stamps are written with too few digits"));
+  }
+  if (during_first != 0 && (repeated.different != 0 || repeated.same == 0)) {
+    note(backwards + " The " + std::to_string(all - first.size()) + " poses from there on are left out");
+    entries = std::move(first);
+    repeated = keep_first(entries);
+  } else if (!sorted) {
+    note(backwards);
+  }
+  if (repeated.same != 0) note(std::to_string(repeated.same) + " repeated lines are left out");
+  if (repeated.different != 0)
+    note(std::to_string(repeated.different) +
+         " poses with the time stamp of another pose are left out; two runs in one file?");
+  read.poses.reserve(entries.size());
+  for (const pose_lines::entry& e : entries) read.poses.push_back(e.pose);
+  return read;
+}
+
+}  // namespace orbis::io::detail
