@@ -17,6 +17,7 @@
 #include <orbis/core/result.hpp>
 #include <orbis/core/trajectory.hpp>
 #include <orbis/eval/alignment.hpp>
+#include <orbis/eval/orientations.hpp>
 #include <orbis/eval/statistics.hpp>
 
 namespace orbis::eval {
@@ -34,7 +35,8 @@ struct relative_pose_error {
 
 /// Compares the motions of `estimate` and `reference` over a delta of frames or seconds. With a delta of seconds,
 /// excludes motions whose duration differs from it by more than a quarter (across a gap). Errors: no_data (no motion to
-/// compare), invalid_argument (a delta of 0 or less). O(n log n).
+/// compare), invalid_argument (a delta of 0 or less), degenerate (the reference has positions only, see
+/// `lacks_orientations`: motions are relative to orientations). O(n log n).
 /// @pre both are sorted by time
 [[nodiscard]] inline result<relative_pose_error> rpe(const trajectory& estimate, const trajectory& reference,
                                                      const rpe_options& options = {}) {
@@ -42,6 +44,9 @@ struct relative_pose_error {
   if (options.delta_seconds ? !(*options.delta_seconds > 0.0) : options.delta_frames == 0)
     return fail(errc::invalid_argument, where, "the delta must be above zero");
   const auto pairs = pair_poses(estimate, reference, options.max_time_difference);
+  if (lacks_orientations(pairs))
+    return fail(errc::degenerate, where,
+                "the reference has no orientations: they are all equal, while the estimate turns");
 
   const auto end_of_motion = [&](std::size_t i) -> std::optional<std::size_t> {
     if (!options.delta_seconds)

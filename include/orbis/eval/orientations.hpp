@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Detection of references that have positions only: GPS and laser trackers give no orientations, and their files have
+/// the same quaternion in every line.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <numbers>
+#include <vector>
+
+#include <orbis/core/se3.hpp>
+#include <orbis/core/trajectory.hpp>
+#include <orbis/eval/alignment.hpp>
+
+namespace orbis::eval {
+
+/// Minimum number of poses for which equal orientations mean that there are none.
+inline constexpr std::size_t min_poses_without_orientation = 5;
+/// Maximum angle between equal orientations, radians.
+inline constexpr double equal_orientations = 1e-9;
+
+/// Returns true if the references of all pairs have the same orientation (at least `min_poses_without_orientation`),
+/// while the estimates turn by more than a degree: the reference has positions only. A camera on rails does not turn.
+/// O(n).
+[[nodiscard]] inline bool lacks_orientations(const std::vector<pose_pair>& pairs) {
+  constexpr double degree = std::numbers::pi / 180.0;
+  if (pairs.size() < min_poses_without_orientation) return false;
+  double reference = 0.0, estimate = 0.0;  // greatest angles from the first pose
+  for (const pose_pair& p : pairs) {
+    const pose_pair& first = pairs.front();
+    reference = std::max(reference, (first.reference.rotation().inverse() * p.reference.rotation()).angle());
+    estimate = std::max(estimate, (first.estimate.rotation().inverse() * p.estimate.rotation()).angle());
+  }
+  return reference <= equal_orientations && estimate > degree;
+}
+
+/// Returns true if all poses (at least `min_poses_without_orientation`) have the identity as orientation, but different
+/// positions. Use `lacks_orientations` if there is an estimate to compare with. O(n).
+[[nodiscard]] inline bool has_positions_only(const trajectory& reference) {
+  constexpr double least_motion = 1e-3;  // metres
+  if (reference.size() < min_poses_without_orientation) return false;
+  double motion = 0.0;
+  for (const stamped_pose& p : reference) {
+    if (p.T_world_camera.rotation().angle() > equal_orientations) return false;
+    motion = std::max(motion, norm(p.T_world_camera.translation() - reference.front().T_world_camera.translation()));
+  }
+  return motion > least_motion;
+}
+
+}  // namespace orbis::eval
