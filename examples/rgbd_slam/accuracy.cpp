@@ -3,6 +3,7 @@
 
 #include <orbis/eval/ate.hpp>
 #include <orbis/eval/cloud_error.hpp>
+#include <orbis/eval/orientations.hpp>
 #include <orbis/eval/rpe.hpp>
 
 #include "summary.hpp"
@@ -25,9 +26,13 @@ orbis::result<accuracy> compare(const orbis::trajectory& estimate, const orbis::
   if (const auto rpe = orbis::eval::rpe(in_metres, truth)) {
     a.rpe_trans_rmse_m = rpe->translation.rmse;
     a.rpe_rot_rmse_deg = rpe->rotation.rmse;
+  } else {
+    a.no_rpe = rpe.error().message;
   }
   const auto pairs = orbis::eval::pair_poses(in_metres, truth, orbis::eval::alignment_options{}.max_time_difference);
-  if (const auto by_pose = orbis::eval::align_poses(pairs)) a.T_truth_map = by_pose->T_reference_estimate;
+  const auto by_pose = orbis::eval::align_poses(pairs);
+  const bool has_orientations = by_pose && !orbis::eval::lacks_orientations(pairs);
+  a.T_truth_map = has_orientations ? by_pose->T_reference_estimate : a.T_truth_estimate;
   const orbis::se3 T_estimate_truth = a.T_truth_estimate.inverse();
   for (const auto& pair : pairs) {
     const orbis::vec3 p = pair.estimate.translation();
@@ -68,6 +73,7 @@ void compare_with_truth(results& r, const frame_source& source, console& console
     if (error) r.map->error_m = *error;
     r.truth_note += " The map error is that of the filtered cloud, aligned by the poses.";
   }
+  if (!compared->no_rpe.empty()) console.warn(r.warnings.emplace_back("no RPE: " + compared->no_rpe));
   r.against_truth = *std::move(compared);
   console.finish("ATE and RPE" + std::string{r.map && r.map->error_m ? ", map error" : ""});
 }

@@ -416,7 +416,8 @@ std::variant<settings, exit_code> read_command_line(int argc, char** argv) {
   add_viewer_options(*live, s);
   live->footer(build_features());
 
-  CLI::App* eval = cli.add_subcommand("eval", "compare a trajectory with ground truth (TUM format): ATE and RPE");
+  CLI::App* eval =
+      cli.add_subcommand("eval", "compare a trajectory with ground truth (TUM, EuRoC or KITTI format): ATE and RPE");
   eval->add_option("TRAJECTORY", s.input, "estimated trajectory")->required()->type_name("");
   eval->add_option("GROUNDTRUTH", s.reference, "reference trajectory")->required()->type_name("");
   eval->add_flag("--json", s.json, "print JSON");

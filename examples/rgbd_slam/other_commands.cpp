@@ -1,8 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 #include <cstddef>
+#include <filesystem>
 #include <numbers>
 #include <optional>
+#include <string>
+#include <system_error>
+#include <utility>
 #include <vector>
 
 #include <orbis/camera/shutter.hpp>
@@ -44,6 +48,10 @@ orbis::vec6 twist_at(const orbis::trajectory& truth, double time) {
 orbis::result<posed_frames> frames_with_poses(const frame_source& source, const settings& s,
                                               const std::filesystem::path& spill_file,
                                               std::optional<world_results>& world, console& console) {
+  if (source.truth_has_positions_only)
+    return orbis::fail(orbis::errc::unsupported, s.input.string(),
+                       "the ground truth has positions only (all orientations are 0 0 0 1), which cannot place depth "
+                       "images; use run");
   console.stage("reading");
   const auto shutter = source.camera.shutter.value_or(orbis::camera::shutter{});
   posed_frames posed{source, s, spill_file, shutter};
@@ -154,17 +162,61 @@ orbis::result<mapped> map_cloud_file(const settings& s, const std::filesystem::p
   return mapped{std::move(r), map_cloud(std::move(cloud), moved, console), {}};
 }
 
+/// Sets the times of poses in KITTI's layout: those of `times.txt`, or the numbers of the lines if neither file has
+/// times.
+orbis::result<void> complete_times(const settings& s, orbis::io::trajectory_reading& estimate,
+                                   orbis::io::trajectory_reading& truth, std::vector<std::string>& warnings) {
+  const auto has_times = [](const auto& read) { return read.layout != orbis::io::trajectory_layout::kitti; };
+  const auto lines = [](const auto& read) { return read.poses.size() + read.lost; };
+  if (!has_times(estimate) && !has_times(truth)) {
+    warnings.push_back("poses are compared line by line");
+    if (lines(estimate) != lines(truth))
+      warnings.push_back(s.input.string() + " has " + std::to_string(lines(estimate)) + " poses, " +
+                         s.reference.string() + " " + std::to_string(lines(truth)));
+    return {};
+  }
+  for (const auto& [read, path] : {std::pair{&estimate, &s.input}, std::pair{&truth, &s.reference}}) {
+    if (has_times(*read)) continue;
+    std::error_code ignored;
+    auto times = path->parent_path() / "times.txt";
+    if (const auto benchmark = path->parent_path() / ".." / "sequences" / path->stem() / "times.txt";
+        !std::filesystem::exists(times, ignored) && std::filesystem::exists(benchmark, ignored))
+      times = benchmark;
+    if (!std::filesystem::exists(times, ignored))
+      return orbis::fail(
+          orbis::errc::no_data, path->string(),
+          "the poses have no times (KITTI's layout); put times.txt, one time per line, next to the file");
+    if (auto set = orbis::io::set_times(*read, times); !set) return set;
+    warnings.push_back(path->string() + ": the times are those of " + times.lexically_normal().string());
+  }
+  return {};
+}
+
 }  // namespace
 
 exit_code evaluate(const settings& s, console& console) {
   const auto give_up = [&](const orbis::error& e) { return console.error(e), bad_input; };
-  const auto estimate = orbis::io::read_trajectory(s.input);
+  auto estimate = orbis::io::read_trajectory_file(s.input);
   if (!estimate) return give_up(estimate.error());
-  const auto truth = orbis::io::read_trajectory(s.reference);
+  auto truth = orbis::io::read_trajectory_file(s.reference);
   if (!truth) return give_up(truth.error());
-  const auto compared = compare(*estimate, *truth, s.with_scale);
-  if (!compared) return give_up({compared.error().code, s.input.string(), compared.error().message});
-  std::string text = s.json ? accuracy_json(*compared) : accuracy_lines(*compared) + "\n";
+  std::vector<std::string> warnings = std::move(estimate->notes);
+  warnings.insert(warnings.end(), truth->notes.begin(), truth->notes.end());
+  if (auto timed = complete_times(s, *estimate, *truth, warnings); !timed) return give_up(timed.error());
+  const auto compared = compare(estimate->poses, truth->poses, s.with_scale);
+  if (compared && s.json && !compared->no_rpe.empty()) warnings.push_back("no RPE: " + compared->no_rpe);
+  const std::string units = orbis::io::describe_units(estimate->poses, truth->poses);
+  if (compared && !units.empty())
+    warnings.push_back("only " + std::to_string(compared->poses.size()) +
+                       " poses have a reference pose: of the times, " + units);
+  for (const std::string& warning : warnings) console.warn(warning);
+  if (!compared) {
+    orbis::error e{compared.error().code, s.input.string(), compared.error().message};
+    if (e.code == orbis::errc::no_data)
+      e.message += "; the times are " + orbis::io::describe_spans(estimate->poses, truth->poses);
+    return give_up(e);
+  }
+  std::string text = s.json ? accuracy_json(*compared, warnings) : accuracy_lines(*compared) + "\n";
   text.pop_back();
   if (!console.print(text)) return give_up({orbis::errc::write_failed, "standard output", "cannot be written"});
   return done;

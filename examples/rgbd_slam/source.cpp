@@ -10,6 +10,7 @@
 #include <utility>
 
 #include <orbis/camera/stereo_frame.hpp>
+#include <orbis/eval/orientations.hpp>
 #include <orbis/io/image.hpp>
 #include <orbis/io/mono_recording.hpp>
 #include <orbis/io/recording.hpp>
@@ -111,9 +112,16 @@ source_frame with_right(orbis::camera::stereo_frame pair) {
   return f;
 }
 
-/// Subtracts an origin from all positions, so that results are near zero; adds a note if it is not zero.
+/// Subtracts an origin from all positions, so that results are near zero; adds a note if it is not zero. Results are
+/// not in the frame of a ground truth that has positions only.
 void subtract_origin(frame_source& source) {
   if (source.ground_truth.empty()) return;
+  source.truth_has_positions_only = orbis::eval::has_positions_only(source.ground_truth);
+  if (source.truth_has_positions_only) {
+    source.notes.push_back(
+        "the ground truth has positions only (all orientations are 0 0 0 1): the world frame is not its frame");
+    return;
+  }
   const orbis::vec3 origin = examples::nearby_origin(source.ground_truth.front().T_world_camera.translation());
   source.origin = origin;
   for (orbis::stamped_pose& p : source.ground_truth)

@@ -54,6 +54,8 @@ struct frame_source {
   std::function<void()> rest;
   orbis::vec3 origin = orbis::vec3::Zero();  ///< subtracted from all positions, metres
   orbis::trajectory ground_truth;            ///< empty if unknown
+  /// The ground truth has no orientations: it defines no world frame, and cannot place depth images.
+  bool truth_has_positions_only = false;
   std::vector<std::filesystem::path> files;  ///< input files
   std::vector<std::string> notes;            ///< warnings
   /// Distance (metres) of a point in the ground truth's world from the true surface; empty if unknown.

@@ -156,15 +156,16 @@ std::string summary_json(const results& r) {
   return j.dump(2, ' ', false, json::error_handler_t::replace) + "\n";
 }
 
-std::string accuracy_json(const accuracy& a) {
+std::string accuracy_json(const accuracy& a, const std::vector<std::string>& warnings) {
   const json j = {{"pairs", a.poses.size()},
                   {"ate_rmse_m", a.ate_rmse_m},
                   {"ate_mean_m", a.ate_mean_m},
                   {"ate_median_m", a.ate_median_m},
                   {"ate_max_m", a.ate_max_m},
                   {"rpe_trans_rmse_m", or_null(a.rpe_trans_rmse_m)},
-                  {"rpe_rot_rmse_deg", or_null(a.rpe_rot_rmse_deg)}};
-  return j.dump(2) + "\n";
+                  {"rpe_rot_rmse_deg", or_null(a.rpe_rot_rmse_deg)},
+                  {"warnings", warnings}};
+  return j.dump(2, ' ', false, json::error_handler_t::replace) + "\n";
 }
 
 orbis::result<void> write_summary(const results& r) {
@@ -250,6 +251,7 @@ std::string accuracy_lines(const accuracy& a) {
   if (a.rpe_trans_rmse_m && a.rpe_rot_rmse_deg)
     lines +=
         text("\n  RPE  RMSE %.4f m, %.3f deg, between consecutive poses", *a.rpe_trans_rmse_m, *a.rpe_rot_rmse_deg);
+  if (!a.no_rpe.empty()) lines += "\n  RPE  none: " + a.no_rpe;
   if (a.scale != 1.0) lines += text("\n       after scaling by %.4g", a.scale);
   return lines;
 }

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include <orbis/core/result.hpp>
 
@@ -13,8 +14,8 @@ namespace app {
 
 /// The summary as JSON text; missing values are null.
 [[nodiscard]] std::string summary_json(const results& r);
-/// Only the comparison with ground truth, for `eval --json`.
-[[nodiscard]] std::string accuracy_json(const accuracy& a);
+/// Only the comparison with ground truth, and warnings, for `eval --json`.
+[[nodiscard]] std::string accuracy_json(const accuracy& a, const std::vector<std::string>& warnings);
 [[nodiscard]] orbis::result<void> write_summary(const results& r);
 
 /// The sizes of the point cloud and the octree, before and after the filter.

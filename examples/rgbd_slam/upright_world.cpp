@@ -17,7 +17,7 @@ using orbis::vec3;
 using orbis::mapping::upright_source;
 
 upright_worlds::upright_worlds(const frame_source& source, const settings& s)
-    : rays_{source.camera.model}, gravity_{s.gravity} {}
+    : rays_{source.camera.model}, gravity_{s.gravity}, follows_truth_{!source.truth_has_positions_only} {}
 
 se3 upright_worlds::start_world(const orbis::camera::rgbd_frame& frame, bool is_first) {
   orbis::mapping::upright_options options;
@@ -29,7 +29,7 @@ se3 upright_worlds::start_world(const orbis::camera::rgbd_frame& frame, bool is_
       options);
   world_results& how = begun_[frame.timestamp];
   how = {std::string{to_string(view.source)}, view.confidence};
-  if (!frame.T_world_camera) return {view.R_world_camera, vec3::Zero()};
+  if (!frame.T_world_camera || !follows_truth_) return {view.R_world_camera, vec3::Zero()};
 
   // If the z axis of the ground truth is up within the accuracy of the estimate, the ground truth is taken as exact.
   const double reach = (view.source == upright_source::assumed ? 45.0 : 10.0) * std::numbers::pi / 180.0;

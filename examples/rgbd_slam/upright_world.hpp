@@ -22,8 +22,8 @@ class upright_worlds {
   upright_worlds(const frame_source& source, const settings& s);
 
   /// The pose of the camera at `frame` in the world that starts with it. With ground truth, this is the world of the
-  /// ground truth, rotated if its z axis is not up; without, the camera is at the origin and looks along x. The gravity
-  /// of the settings applies to the very first frame only (`is_first`).
+  /// ground truth, rotated if its z axis is not up; without (or with positions only), the camera is at the origin and
+  /// looks along x. The gravity of the settings applies to the very first frame only (`is_first`).
   [[nodiscard]] orbis::se3 start_world(const orbis::camera::rgbd_frame& frame, bool is_first);
   /// The source of the vertical in the world that starts at this time; empty if there is none.
   [[nodiscard]] std::optional<world_results> world_starting_at(double timestamp) const;
@@ -31,6 +31,7 @@ class upright_worlds {
  private:
   orbis::camera::ray_table rays_;
   std::optional<orbis::vec3> gravity_;
+  bool follows_truth_;
   std::map<double, world_results> begun_;  // by time
 };
 

@@ -52,6 +52,27 @@ summary(free ${WORK}/out octree free)
 check(free GREATER 100)
 check(NOT EXISTS ${WORK}/out/trajectory.txt)
 
+# A ground truth of a receiver that has positions only, in the coordinates of a map of the earth: poses without
+# orientation place no depth image, and results of SLAM are not in its frame.
+make_recording(${WORK}/positions 20 160)
+file(STRINGS ${WORK}/positions/groundtruth.txt lines)
+set(positions "")
+foreach(line ${lines})
+  if(line MATCHES "^([-0-9.e+]+) ([-0-9]*)([-0-9.e+]*) ([^ ]+) ([^ ]+) ")
+    string(APPEND positions "${CMAKE_MATCH_1} 455000${CMAKE_MATCH_3} ${CMAKE_MATCH_4} ${CMAKE_MATCH_5} 0 0 0 1\n")
+  endif()
+endforeach()
+file(WRITE ${WORK}/positions/groundtruth.txt "${positions}")
+app(2 map positions --out no)
+check(err MATCHES "rgbd_slam: positions: the ground truth has positions only [^\n]* cannot place depth images")
+check(NOT EXISTS ${WORK}/no/map.bt)
+app(0 run positions --out out --deterministic)
+check(err MATCHES "the ground truth has positions only" AND NOT err MATCHES "results are relative to")
+summary(origin ${WORK}/out world origin_m 0)
+check(origin EQUAL 0)
+summary(up ${WORK}/out world up_from)
+check(NOT up STREQUAL "ground truth")
+
 # A rolling shutter that the camera file knows of: the walls become less thick than without it.
 foreach(read_out 0 40)
   make_recording(${WORK}/read_${read_out} 30 160 ${read_out})
