@@ -136,6 +136,20 @@ TEST_CASE("layouts, separators, headers and units of trajectories are recognised
   }
 }
 
+TEST_CASE("the unit of a file is that of its first time, and of whole numbers that of its header") {
+  const auto times = [](const std::string& text) {
+    std::vector<double> all;
+    for (const stamped_pose& p : io::parse_trajectory_file(text).value().poses) all.push_back(p.timestamp);
+    return all;
+  };
+  const std::string pose = " 1 2 3 0 0 0 1\n", csv = ",1,2,3,1,0,0,0\n";
+  CHECK(times("999999999999" + pose + "1000000000001" + pose) == std::vector<double>{999999999999.0, 1000000000001.0});
+  CHECK(times("nan" + pose + "1403715529000" + pose) == std::vector<double>{1403715529.0});
+  CHECK(times("#t [ns],x,y,z,qw,qx,qy,qz\n500000000" + csv + "1500000000" + csv) == std::vector<double>{0.5, 1.5});
+  CHECK(times("#t [ns],x,y,z,qw,qx,qy,qz\n1403715529.5" + csv) == std::vector<double>{1403715529.5});
+  CHECK(times("1.5" + pose + "1e1" + pose) == std::vector<double>{1.5, 10.0});
+}
+
 TEST_CASE("headers that name another order, and lines that are no poses, are errors") {
   const auto message = [](const std::string& text) {
     const auto read = io::parse_trajectory_file(text, "f.txt");

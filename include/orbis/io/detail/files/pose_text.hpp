@@ -34,7 +34,7 @@ struct pose_lines {
   };
   std::vector<entry> entries;  ///< in the order of the file
   trajectory_layout layout = trajectory_layout::tum;
-  time_unit unit = time_units[0];  ///< of the first time stamp; `entries` have seconds
+  time_unit unit = time_units[0];  ///< of the time stamps, by the first one; `entries` have seconds
   std::size_t lost = 0;            ///< lines with NaN or infinity
   std::size_t first_lost_line = 0;
 };
@@ -130,8 +130,8 @@ inline result<pose_lines> parse_pose_lines(std::string_view text, const std::fil
     const char separator = separator_of(line);
     std::size_t fields = 0;
     for (std::string_view rest = line; fields != 13 && !next_value(rest, separator).empty();) ++fields;
-    read.unit = header.nanoseconds ? time_units[3] : unit_of(next_value(line, separator));
-    header.w_first = header.quaternion ? header.w_first : separator == ',' && read.unit == time_units[3];
+    const bool nanoseconds = unit_of(next_value(line, separator)) == time_units[3];
+    header.w_first = header.quaternion ? header.w_first : separator == ',' && nanoseconds;
     read.layout = header.w_first                                           ? trajectory_layout::euroc
                   : fields == 12 && separator == ' ' && !header.quaternion ? trajectory_layout::kitti
                                                                            : trajectory_layout::tum;
@@ -153,7 +153,10 @@ inline result<pose_lines> parse_pose_lines(std::string_view text, const std::fil
       if (!lost && !pose)
         return header.w_first ? "a pose has a quaternion, w first, which is neither zero nor too large"
                               : "the quaternion is zero or too large";
-      seconds = v[0] * (header.nanoseconds ? time_units[3] : unit_of(next_value(line, separator))).seconds;
+      const std::string_view stamp = next_value(line, separator);
+      const bool is_whole = stamp.find('.') == stamp.npos;
+      if (read.entries.empty()) read.unit = header.nanoseconds && is_whole ? time_units[3] : unit_of(stamp);
+      seconds = v[0] * read.unit.seconds;
     }
     if (!lost)
       read.entries.push_back({{seconds, *pose}, number});
