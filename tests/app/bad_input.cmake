@@ -101,8 +101,11 @@ file(REMOVE ${images})
 app_fails(2 "no_images/rgb" run no_images --out out)
 
 recording(bad_pose)
-file(APPEND ${WORK}/bad_pose/groundtruth.txt "9 nan 0 0 0 0 0 1\n")
-app_fails(2 "groundtruth.txt:[0-9]+: .*NaN" run bad_pose --out out)
+file(APPEND ${WORK}/bad_pose/groundtruth.txt "9 nan 0 0 0 0 0 1\n")  # a lost pose
+app(0 map bad_pose --out lost --resolution 0.2)
+check(err MATCHES "warning: [^\n]*groundtruth.txt: 1 poses with NaN or infinity are left out")
+file(APPEND ${WORK}/bad_pose/groundtruth.txt "10 zero 0 0 0 0 0 1\n")
+app_fails(2 "groundtruth.txt:[0-9]+: .*zero" run bad_pose --out out)
 
 # A truth so far away that the steps of a plot's axis are lost in rounding: the pictures come to an end.
 recording(far_truth)
