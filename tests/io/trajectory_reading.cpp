@@ -291,6 +291,31 @@ TEST_CASE("trajectories of random forms are read with all of their poses") {
   }
 }
 
+TEST_CASE("of random runs in one file the first one is kept, and random times with too few digits are refused") {
+  for (std::uint64_t seed = 0; seed != 60; ++seed) {
+    orbis::random_bits random{seed};
+    const double interval = random.uniform(0.01, 0.1);
+    const trajectory first = some_path(30 + random.below(100), seed + 1, interval);
+    trajectory second = some_path(30 + random.below(100), seed + 1000, random.uniform(0.01, 0.1));
+    const double shift = random.below(2) == 0 ? 0.0 : random.uniform(-5.0, 0.5) * interval;
+    for (stamped_pose& p : second) p.timestamp += shift;
+    INFO("seed " << seed << ", shift " << shift);
+    const auto two = io::parse_trajectory_file(text_of(first) + text_of(second)).value();
+    CHECK(same_poses(two.poses, first));
+    CHECK(has_note(two, "time runs backwards at line " + std::to_string(first.size() + 1) + "; two runs in one file?"));
+    CHECK(has_note(two, std::to_string(second.size()) + " poses from there on are left out"));
+
+    // Times rounded to steps that hold at least three poses.
+    const double step = std::pow(10.0, std::ceil(std::log10(3.5 * interval)));
+    trajectory coarse = first;
+    for (stamped_pose& p : coarse) p.timestamp = step * std::floor(p.timestamp / step);
+    const auto refused = io::parse_trajectory_file(text_of(coarse));
+    REQUIRE_FALSE(refused);
+    CHECK(refused.error().code == orbis::errc::degenerate);
+    CHECK(refused.error().message.find(step < 0.9 ? "too few digits" : "digits") != std::string::npos);
+  }
+}
+
 TEST_CASE("poses without times get those of a file") {
   const orbis::test::temporary_folder folder;
   const trajectory poses = some_path(4, 1);
