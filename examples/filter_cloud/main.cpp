@@ -3,7 +3,6 @@
 // filter_cloud IN.{ply,pcd} OUT.{ply,pcd}: removes outliers from a cloud, with a filter chosen automatically or by the
 // user.
 #include <cstdio>
-#include <exception>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -14,16 +13,13 @@
 #include <orbis/cloud.hpp>
 #include <orbis/io.hpp>
 
-#include "../common/memory.hpp"
 #include "../common/near_origin.hpp"
+#include "../common/program.hpp"
 #include "../common/same_file.hpp"
 
-int report_error(int code, const std::string& why) {
-  return std::fprintf(stderr, "filter_cloud: %s\n", why.c_str()), code;
-}
+int report_error(int code, const std::string& why) { return examples::report_error("filter_cloud", code, why); }
 
-int main(int argc, char** argv) try {
-  examples::limit_memory();
+int run(int argc, char** argv) {
   using namespace orbis::cloud;
   using orbis::par;
   std::string input, output, filter = "auto";
@@ -42,11 +38,7 @@ int main(int argc, char** argv) try {
   cli.add_option("--voxel", voxel, "reduce to one point per voxel of this size in metres; 0: off")
       ->capture_default_str();
   cli.add_option("--origin", xyz, "x,y,z of the sensor in metres")->delimiter(',')->expected(3);
-  try {
-    cli.parse(argc, argv);
-  } catch (const CLI::ParseError& e) {
-    return e.get_exit_code() == 0 ? cli.exit(e) : report_error(1, e.what() + std::string{" (--help shows the usage)"});
-  }
+  if (const auto code = examples::parse(cli, argc, argv)) return *code;
   if (!(sigma >= 0 && sigma < 1e6)) return report_error(1, "--sigma: must be in 0 ... 1000000");
   if (voxel != 0 && !(voxel >= 1e-6 && voxel < 1e6)) return report_error(1, "--voxel: must be 0 or in 1e-6 ... 1e6");
   auto eye = xyz.empty() ? std::nullopt : std::optional{orbis::vec3{xyz.data()}};
@@ -86,6 +78,9 @@ int main(int argc, char** argv) try {
   const auto why = filter == "auto" ? to_string(best.choice.chain) + ": " + best.choice.reason : filter;
   if (auto ok = orbis::io::write_cloud(output, read, kept, origin); !ok) return report_error(2, ok.error().to_string());
   std::printf("%zu points, %zu to filter, %zu kept; %s\n", in_file, finite.size(), kept.size(), why.c_str());
-} catch (const std::exception& e) {  // out of memory or threads
-  return report_error(2, examples::describe_exception(e));
+  return 0;
+}
+
+int main(int argc, char** argv) {
+  return examples::run_program("filter_cloud", [&] { return run(argc, argv); });
 }

@@ -86,7 +86,9 @@ TEST_CASE("what is missing in an ICL-NUIM recording is named") {
   folder.write("rgb/readme.txt", "x");
   CHECK(io::detail::index_icl_nuim(folder.path()).error().code == orbis::errc::not_found);
   write_images(folder, 1, 1);
-  folder.write("a.gt.freiburg", "1 0 nan 0 0 0 0 1\n");
+  folder.write("a.gt.freiburg", "1 0 nan 0 0 0 0 1\n2 0 0 0 0 0 0 1\n");
+  CHECK(io::detail::index_icl_nuim(folder.path()).value().ground_truth.size() == 1);  // a lost pose
+  folder.write("a.gt.freiburg", "1 0 x 0 0 0 0 1\n");
   CHECK(orbis::test::message_of(io::detail::index_icl_nuim(folder.path())) ==
-        (folder / "a.gt.freiburg").string() + ":1: a pose with NaN or infinity");
+        (folder / "a.gt.freiburg").string() + ":1: \"x\" is not a number");
 }

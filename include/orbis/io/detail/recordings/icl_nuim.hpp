@@ -53,9 +53,7 @@ inline se3 mirrored_y(const se3& pose) {
   if (!read) return read;
   recording_index index = *std::move(read);
   if (const auto file = icl_ground_truth(folder); !file.empty()) {
-    auto truth = read_trajectory(file);
-    if (!truth) return fail(truth.error());
-    index.ground_truth = *std::move(truth);
+    if (auto taken = take_ground_truth(read_trajectory_file(file), index); !taken) return fail(taken.error());
     index.files.push_back(file);
     for (stamped_pose& pose : index.ground_truth)
       pose = {pose.timestamp / frames_per_second, mirrored_y(pose.T_world_camera)};
