@@ -28,7 +28,7 @@ struct unproject_options {
   float max_depth = std::numeric_limits<float>::max();  ///< metres along the optical axis
 };
 
-/// Points and the pixels that they were observed in.
+/// Points, and the pixels that observed them.
 struct unprojected_points {
   std::vector<vec3f> points;          ///< metres
   std::vector<std::uint32_t> pixels;  ///< `y * width + x`, ascending; one per point

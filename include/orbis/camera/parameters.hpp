@@ -25,7 +25,7 @@ namespace orbis::camera {
 /// - `with(camera, p)`: a camera of the same image size with the parameters `p`, empty if they are invalid (a focal
 /// length that is not positive, a NaN);
 /// - `project(camera, point, by_point, by_parameters)`: as `camera.project(point, by_point)`, and the derivative of the
-/// pixel by the parameters (2 x count). Both are unchanged if the result is empty.
+///   pixel with respect to the parameters (2 x count). Both are unchanged if the result is empty.
 template <class Camera>
 struct parameters_of {};
 
@@ -50,7 +50,8 @@ namespace detail {
   return k;
 }
 
-/// The derivative of a pixel by fx, fy, cx, cy, column by column, for (x, y) on the plane z = 1 after distortion.
+/// The derivative of a pixel with respect to fx, fy, cx, cy, column by column, for (x, y) on the plane z = 1 after
+/// distortion.
 inline void by_camera_matrix(double x, double y, double* j) {
   j[0] = x, j[1] = 0.0;
   j[2] = 0.0, j[3] = y;

@@ -33,7 +33,8 @@ class pinhole {
     if (!std::isfinite(pixel.x()) || !std::isfinite(pixel.y())) return std::nullopt;
     return pixel;
   }
-  /// The pixel of the point, and the derivative of the pixel by the point. Without a pixel `jacobian` is unchanged.
+  /// The pixel of the point, and its derivative with respect to the point. If there is no pixel, `jacobian` is
+  /// unchanged.
   [[nodiscard]] std::optional<vec2> project(const vec3& p, matrix<2, 3>& jacobian) const {
     const auto pixel = project(p);
     if (pixel) {

@@ -31,8 +31,8 @@ concept double_lanes = requires(const L& x, const double* p) {
 template <double_lanes L>
 using mask_of = decltype(std::declval<L>() < std::declval<L>());
 
-/// The pixels of eight points in the camera frame, and their derivatives by the point, `j[row][column]`, in pixels per
-/// metre. Unspecified in lanes that are not `valid`.
+/// The pixels of eight points in the camera frame, and their derivatives with respect to the point, `j[row][column]`,
+/// in pixels per metre. Unspecified in lanes that are not `valid`.
 template <double_lanes L>
 struct lane_projection {
   L u, v;

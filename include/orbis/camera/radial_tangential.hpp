@@ -54,7 +54,8 @@ class radial_tangential {
     if (!(p.z() > 0.0)) return std::nullopt;
     return pixel_of({p.x() / p.z(), p.y() / p.z()});
   }
-  /// The pixel of the point, and the derivative of the pixel by the point. Without a pixel `jacobian` is unchanged.
+  /// The pixel of the point, and its derivative with respect to the point. If there is no pixel, `jacobian` is
+  /// unchanged.
   [[nodiscard]] std::optional<vec2> project(const vec3& p, matrix<2, 3>& jacobian) const {
     const auto pixel = project(p);
     if (pixel) {
@@ -139,7 +140,7 @@ class radial_tangential {
     return j;
   }
 
-  /// The ray of `target` without tangential distortion, or one on the rim of the domain.
+  /// The ray of `target` without tangential distortion, or one on the boundary of the domain.
   [[nodiscard]] vec2 radial_start(const vec2& target) const {
     const double distorted = std::sqrt(target.x() * target.x() + target.y() * target.y());
     if (distorted == 0.0) return target;

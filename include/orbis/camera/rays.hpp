@@ -12,8 +12,8 @@
 
 namespace orbis::camera {
 
-/// For every pixel of a camera the point where its ray meets the plane z = 1, so that un-projecting a depth costs three
-/// multiplications. 8 bytes per pixel.
+/// Stores for every pixel of a camera the point where its ray meets the plane z = 1, so that un-projecting a depth
+/// costs three multiplications. 8 bytes per pixel.
 class ray_table {
  public:
   ray_table() = default;

@@ -44,7 +44,7 @@ struct shutter {
 
 /// Maps a point from the camera frame at time `t` to the camera frame at time 0, if the camera moves by a constant
 /// twist: `exp(t * twist) p` to second order; the remainder is below a thousandth of a pixel for the angles of one
-/// read-out (some hundredths of a radian). `twist`: of the camera in its own frame, per second, translation first. The
+/// read-out (a few hundredths of a radian). `twist`: of the camera in its own frame, per second, translation first. The
 /// point is `p / inverse_scale`, and so is the result: with a ray for `p` and its inverse depth, this covers points at
 /// any distance.
 [[nodiscard]] inline vec3 moved_by(const vec6& twist, double t, const vec3& p, double inverse_scale = 1.0) {

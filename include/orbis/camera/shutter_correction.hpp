@@ -83,9 +83,9 @@ class shutter_correction {
 
   /// Computes the depth image of a global shutter at the frame's time. `out` is 0 where nothing was measured, or where
   /// the measured point is not visible. `T` is the stored type of `depth` if it is a `depth_view` (`out` then has its
-  /// scale), otherwise `float` (metres). Without a motion, or if all its rows are of the frame's time, `out` has the
-  /// same values. Errors: `invalid_argument` for a twist that is not finite, or turns the camera by more than 0.3
-  /// radians from the frame's time to that of a row; `out` is then unchanged. O(pixels).
+  /// scale), otherwise `float` (metres). Without a motion, or if all its rows are read at the frame's time, `out` has
+  /// the same values. Errors: `invalid_argument` for a twist that is not finite, or turns the camera by more than 0.3
+  /// radians between the frame's time and that of a row; `out` is then unchanged. O(pixels).
   /// @pre the images have the size of the camera and do not overlap
   template <depth_source Depth, class T>
   requires std::same_as<T, typename detail::stored_depth<Depth>::type>
@@ -123,9 +123,9 @@ class shutter_correction {
   }
 
   /// Computes the colour image that belongs to a corrected depth image: each pixel gets the colour read at the position
-  /// where its point was observed; a pixel without depth that of a point at a large distance; positions outside the
-  /// image are black. Without a motion, or if all rows are of the frame's time, a copy. Errors and preconditions as
-  /// above. O(pixels).
+  /// where its point was observed; a pixel without depth is treated as a point at a large distance; positions outside
+  /// the image are black. Without a motion, or if all rows are read at the frame's time, this is a copy. Errors and
+  /// preconditions as above. O(pixels).
   template <depth_source Depth>
   [[nodiscard]] result<void> color(const shutter& s, const vec6& twist, const Depth& corrected,
                                    image_view<const rgb8> color, image_view<rgb8> out) {

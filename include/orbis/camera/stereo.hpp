@@ -45,7 +45,7 @@ struct rectify_options {
   int width = 0;                   ///< of the rectified images, pixels; 0: width of the left camera
   int height = 0;                  ///< likewise
   std::optional<double> focal{};   ///< of the rectified camera, pixels; default: see `rectify`
-  double max_magnification = 1.5;  ///< upper limit of the default focal length / that at the image centres
+  double max_magnification = 1.5;  ///< maximum ratio of the default focal length to that at the image centres
 };
 
 /// Maps the images of a stereo rig to those of two identical pinhole cameras at the same positions with parallel

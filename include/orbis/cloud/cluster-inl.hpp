@@ -76,8 +76,8 @@ struct nearest_place {
   [[nodiscard]] bool found() const noexcept { return place != std::numeric_limits<std::uint32_t>::max(); }
 };
 
-/// Finds the point nearest to `q` among those for whose place `counts(place)` is true. Ties are resolved by the lowest
-/// index, except at `q` itself. `found()` is false if there is no such point. @pre q is finite
+/// Finds the point nearest to `q` among those for which `counts(place)` is true. Ties are resolved by the lowest index,
+/// except at `q` itself. `found()` is false if there is no such point. @pre q is finite
 template <class Counts>
 [[nodiscard]] nearest_place find_nearest(const leaf_hierarchy& tree, const knn_kernels& kernels,
                                          const std::array<float, 3>& q, const Counts& counts) {
@@ -208,7 +208,7 @@ template <execution_policy Policy>
 }
 
 /// Numbers components by their first points. `vertex(i)`: vertex of point `i` of the cloud, negative if it has none.
-/// `stays(i)`: true if such a point is an inlier nevertheless.
+/// `stays(i)`: true if a point without a vertex is nevertheless an inlier.
 template <class Vertex, class Stays>
 [[nodiscard]] cluster_result numbered(linked_components found, std::size_t count, const Vertex& vertex,
                                       const Stays& stays) {

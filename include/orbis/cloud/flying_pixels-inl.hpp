@@ -90,7 +90,7 @@ struct flag_between {
   }
 };
 
-/// Number of the eight pixels around that have the depth of the one at `center`.
+/// Number of the eight neighbours of the pixel at `center` that have the same depth as it.
 [[nodiscard]] inline int flying_support(const float* center, std::ptrdiff_t stride, float tolerance) noexcept {
   int count = -1;  // the pixel itself
   for (std::ptrdiff_t y = -1; y <= 1; ++y) {

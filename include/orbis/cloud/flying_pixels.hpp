@@ -37,8 +37,8 @@ struct flying_pixel_options {
   double resolution = 0.001;  ///< smallest depth difference that counts, metres
   double sigmas = 4.0;        ///< minimum distance from a surface, in multiples of the noise or the resolution
   double jump = 3.0;          ///< minimum size of an edge, in multiples of that distance
-  double margin = 0.05;       ///< minimum distance from a surface, as a part of the jump
-  int support = 4;            ///< number of the eight pixels around with the same depth that keeps a pixel
+  double margin = 0.05;       ///< minimum distance from a surface, as a fraction of the jump
+  int support = 4;            ///< a pixel is kept if this many of its eight neighbours have its depth
 };
 
 /// Counts of the examined and the removed pixels.

@@ -44,7 +44,7 @@ struct ray_evidence_options {
   int window = 1;                ///< radius in pixels of the window of depths around a pixel; >= 0
   float margin = 0.02F;          ///< allowance for noise and small pose errors, metres:
   float margin_growth = 0.005F;  ///< margin + margin_growth z^2 at depth z; 1 / metres
-  float slant = 1.0F;      ///< part of the window's depth range that is added to the margin for rays that pass through
+  float slant = 1.0F;      ///< fraction of the window's depth range added to the margin for rays that pass through
   float min_depth = 0.0F;  ///< a view does not judge points at or below this depth, metres
   float max_depth = std::numeric_limits<float>::max();  ///< nor those beyond this
   bool resolve_ghosts = true;  ///< read the views a second time to find parts that most others contradict

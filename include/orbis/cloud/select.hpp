@@ -4,7 +4,7 @@
 ///
 /// 1. *Views*, if available, take precedence: points that their rays pass through are removed, as are points
 ///    measured only by a stray pixel or by a view that contradicts all others.
-/// 2. *Density*: the logarithm of a point's mean distance to a few neighbours, less a reference. The reference is one
+/// 2. *Density*: the logarithm of a point's mean distance to a few neighbours, minus a reference. The reference is one
 ///    value for all points, a line over the logarithm of the range (a depth camera's points thin out with range), or,
 ///    for clouds of uneven density, the value of the surroundings. Outliers appear as a second population of points
 ///    that lie on no surface; the threshold is placed in the valley before it. Without such a population, only points
@@ -42,7 +42,7 @@ struct automatic_result {
 
 namespace detail {
 
-/// Type-erased callback that judges points by views. Returns false if cancelled.
+/// Type-erased callback that evaluates points against views. Returns false if cancelled.
 struct view_judge {
   const void* context = nullptr;
   /// Clears `left` for the points that the views exclude, and adds a step and its reason; null without views.
@@ -73,9 +73,9 @@ struct known_ranges {
 
 }  // namespace detail
 
-/// Judges the cloud by its points and by the depth images from which it was made, or that saw the same place. Returns
-/// the points that the chosen filters keep. The images detect false points in front of their measurements, such as
-/// moving objects or the effect of wrong poses, which do not show in the density.
+/// Selects filters from the points and from the depth images that the cloud was made from, or that show the same place.
+/// Returns the points that the chosen filters keep. The images detect false points in front of their measurements, such
+/// as moving objects or the effect of wrong poses, which do not show in the density.
 ///
 /// Deterministic and the same for every policy. `on_progress` counts the views; if it cancels, the chain is empty, the
 /// reason is "cancelled", and all points stay. O(n log n + views (pixels + n)).
@@ -86,7 +86,8 @@ template <execution_policy Policy, point_range Points, posed_depth_range Views, 
                                                     const Camera& camera, const select_options& options = {},
                                                     progress on_progress = {});
 
-/// Judges the cloud by its points alone. A cloud that is empty or too small to judge gets an empty chain. O(n log n).
+/// Selects filters from the points alone. A cloud that is empty or too small to analyse gets an empty chain. O(n log
+/// n).
 /// @pre neighbors > 0; ranges is empty or as long as points
 template <execution_policy Policy, point_range Points>
 [[nodiscard]] automatic_result filter_automatically(const Policy& policy, const Points& points,
@@ -97,7 +98,7 @@ template <execution_policy Policy, point_range Points>
                                    detail::known_ranges{threads, points, options}.all, options, {});
 }
 
-/// Judges the cloud and selects filters: `filter_automatically` without the inliers.
+/// Selects filters: `filter_automatically` without the inliers.
 template <execution_policy Policy, point_range Points>
 [[nodiscard]] filter_choice select_filter(const Policy& policy, const Points& points,
                                           const select_options& options = {}) {

@@ -65,8 +65,8 @@ struct brick_place {
 
 }  // namespace detail
 
-/// Measurements grouped into runs that lie in one brick each, as input of `voxel_sums`; a part of a larger set. Its
-/// memory is reused.
+/// Measurements grouped into runs, each within one brick, as input of `voxel_sums`; a part of a larger set. Its memory
+/// is reused.
 class voxel_measurements {
  public:
   /// @pre size > 0, metres

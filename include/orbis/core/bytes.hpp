@@ -108,7 +108,7 @@ inline std::uint32_t crc32c_sse42(const std::byte* at, std::size_t size, std::ui
 
 namespace detail {
 
-/// The 85 characters from '#' on, except the two that are special in a literal.
+/// The 85 characters starting at '#', except the two that are special in a literal.
 [[nodiscard]] constexpr char base85_character(std::uint32_t digit) noexcept {
   const char c = static_cast<char>('#' + digit);
   return c == '\\' ? 'x' : c == '?' ? 'y' : c;

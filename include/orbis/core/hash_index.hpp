@@ -154,7 +154,8 @@ class number_index {
     const slot* const s = table_.find(Hash{}(key), matches(key, key_of));
     return s == nullptr ? none : s->number;
   }
-  /// The position of `key`; stores `number` if it has none yet. Then key_of(number) must return `key` from now on.
+  /// The position of `key`; stores `number` if it has none yet. In that case key_of(number) must return `key` from then
+  /// on.
   template <class KeyOf>
   std::uint32_t find_or_insert(const Key& key, std::uint32_t number, const KeyOf& key_of) {
     slot& s = table_.find_or_insert(Hash{}(key), matches(key, key_of), hash_of(key_of));

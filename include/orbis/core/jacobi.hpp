@@ -176,7 +176,7 @@ template <int N>
   return out;
 }
 
-/// The rotation matrix closest to `m` (least sum of squared differences). Errors: degenerate if `m` contains a
+/// The rotation matrix closest to `m` (smallest sum of squared differences). Errors: degenerate if `m` contains a
 /// reflection (determinant below 0), is singular to rounding, or is not finite.
 ///
 /// Source: S. Umeyama, "Least-squares estimation of transformation parameters between two point

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Persistent threads for a parallel_policy: starting a thread takes as long as many a small loop.
+/// Persistent threads for a parallel_policy: starting a thread takes about as long as a small loop.
 #pragma once
 
 #include <algorithm>
@@ -20,7 +20,7 @@ namespace orbis {
 ///   orbis::thread_pool pool{4};
 ///   cloud::statistical_filter(orbis::par.on(pool), points);
 /// @endcode
-/// Any number of threads may use it. Threads poll for work for some microseconds before they sleep. After a fork, the
+/// Any number of threads may use it. Threads poll for work for a few microseconds before they sleep. After a fork, the
 /// child process has none of the threads: it may use a pool made before, on the caller's thread alone, but must not
 /// destroy it.
 class thread_pool {
@@ -73,7 +73,7 @@ class thread_pool {
   // Bits of the state: the number of helpers inside the job, open for more helpers, stopped, the number of the job.
   static constexpr std::uint64_t inside = 0xffff, open = std::uint64_t{1} << 16U, stopped = std::uint64_t{1} << 17U,
                                  one_job = std::uint64_t{1} << 18U;
-  static constexpr int patience = 2000;  ///< number of polls of the state, some 20 us
+  static constexpr int patience = 2000;  ///< number of polls of the state, about 20 us
 
   void wait_for_work() {
     std::uint64_t done = 0;  // the last job that this thread has seen

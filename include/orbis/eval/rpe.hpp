@@ -24,7 +24,7 @@ namespace orbis::eval {
 
 struct rpe_options {
   std::size_t delta_frames = 1;           ///< motion from one paired pose to the n-th pose after it ...
-  std::optional<double> delta_seconds{};  ///< ... or, if set, to the pose nearest to this time later
+  std::optional<double> delta_seconds{};  ///< ... or, if set, to the pose nearest to this many seconds later
   double max_time_difference = 0.02;      ///< between paired poses, seconds
 };
 

@@ -35,8 +35,7 @@ class basic_point_view {
  public:
   using scalar = S;
   basic_point_view() = default;
-  /// Views points in memory. `axis`: coordinates of the first point; those of each next point follow after `stride`
-  /// bytes.
+  /// Views points in memory. `axis`: coordinates of the first point; consecutive points are `stride` bytes apart.
   basic_point_view(const std::array<const S*, 3>& axis, std::size_t stride, std::size_t count) noexcept
       : stride_{stride}, count_{count} {
     for (std::size_t a = 0; a != 3; ++a) axis_[a] = reinterpret_cast<const unsigned char*>(axis[a]);

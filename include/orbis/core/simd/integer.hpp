@@ -110,7 +110,7 @@ concept small_unsigned = std::same_as<T, std::uint8_t> || std::same_as<T, std::u
 
 }  // namespace detail
 
-/// Saturated sum: a + b, at most the largest number.
+/// Saturating addition: a + b, clamped to the maximum of the type.
 template <detail::small_unsigned T, std::size_t N, target Target>
 [[nodiscard]] ORBIS_ALWAYS_INLINE vec<T, N, Target> add_saturated(const vec<T, N, Target>& a,
                                                                   const vec<T, N, Target>& b) noexcept {
@@ -118,7 +118,7 @@ template <detail::small_unsigned T, std::size_t N, target Target>
       a, b, [](auto& out, const auto& x, const auto& y) ORBIS_INLINE_LAMBDA { detail::add_small(out, x, y); },
       [](const auto& x, const auto& y) ORBIS_INLINE_LAMBDA { return x + min(y, ~x); });
 }
-/// Saturated difference: a - b, at least zero.
+/// Saturating subtraction: a - b, clamped to zero.
 template <detail::small_unsigned T, std::size_t N, target Target>
 [[nodiscard]] ORBIS_ALWAYS_INLINE vec<T, N, Target> subtract_saturated(const vec<T, N, Target>& a,
                                                                        const vec<T, N, Target>& b) noexcept {
@@ -180,8 +180,8 @@ template <std::size_t N, target Target>
   }
 }
 
-/// Packs each 16 bytes: the eight lanes of a, then the eight of b, clamped to bytes in [0, 255]. One instruction.
-/// Inverse of zip_low_in_blocks and zip_high_in_blocks. Vectors of at least 16 bytes.
+/// Packs each block of 16 bytes: the eight lanes of a, then those of b, each clamped to a byte in [0, 255]. One
+/// instruction. Inverse of zip_low_in_blocks and zip_high_in_blocks. Vectors of at least 16 bytes.
 template <std::size_t N, target Target>
 [[nodiscard]] ORBIS_ALWAYS_INLINE vec<std::uint8_t, 2 * N, Target> narrow_in_blocks(
     const vec<std::int16_t, N, Target>& a, const vec<std::int16_t, N, Target>& b) noexcept {

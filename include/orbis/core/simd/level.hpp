@@ -63,7 +63,7 @@ namespace detail {
 inline std::atomic<int> chosen_level{-1};
 }  // namespace detail
 
-/// The level that kernels run at: the best one of the processor, unless a test limits it. Costs one load.
+/// The level that kernels run at: the best one that the processor supports, unless a test limits it. Costs one load.
 [[nodiscard]] inline level best_level() noexcept {
   const int chosen = detail::chosen_level.load(std::memory_order_relaxed);
   if (chosen >= 0) return static_cast<level>(chosen);

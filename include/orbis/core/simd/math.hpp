@@ -13,7 +13,7 @@
 
 namespace orbis::simd {
 
-/// Absolute value; the least signed integer is returned unchanged.
+/// Absolute value; the smallest value of a signed integer type is returned unchanged.
 template <class T, std::size_t N, target Target>
 [[nodiscard]] ORBIS_ALWAYS_INLINE vec<T, N, Target> abs(const vec<T, N, Target>& a) noexcept {
   using V = vec<T, N, Target>;
@@ -59,7 +59,7 @@ template <class T, std::size_t N, target Target>
     return out;
   }
 }
-/// Floor: the largest integer that is not larger. Lane by lane on SSE2.
+/// Floor: the largest integer that does not exceed the value. Lane by lane on SSE2.
 template <class T, std::size_t N, target Target>
 [[nodiscard]] ORBIS_ALWAYS_INLINE vec<T, N, Target> floor(const vec<T, N, Target>& a) noexcept {
   using V = vec<T, N, Target>;
@@ -118,7 +118,7 @@ template <std::size_t N, target Target>
   y = y * (1.5 - half * y * y);
   return y * (1.5 - half * y * y);
 }
-/// sqrt(x) for the same x to about two units in the last place, and 0 for 0.
+/// sqrt(x) to about two units in the last place, for the same range of x as above; 0 for 0.
 template <std::size_t N, target Target>
 [[nodiscard]] ORBIS_ALWAYS_INLINE vec<double, N, Target> square_root(const vec<double, N, Target>& x) noexcept {
   return select(x == 0.0, x, x * reciprocal_root(x));

@@ -126,7 +126,7 @@ struct warp_row_kernel {
 
 /// One of the two functions above for all pixels of an image. Both are smooth over a few pixels and over inverse depth:
 /// they are computed at nodes, for three inverse depths, and interpolated linearly between the nodes and by a parabola
-/// in inverse depth. The error is some thousandths of a pixel for the motions of a read-out, and no pixel needs a
+/// in inverse depth. The error is a few thousandths of a pixel for the motions of a read-out, and no pixel needs a
 /// projection. Very near points, and those next to a node without a pixel, are computed individually.
 template <camera_model Camera>
 class row_warp {

@@ -64,7 +64,7 @@ struct nearby_leaves {
   line_vector<float> boxes;  ///< layout of `box_axes`
   line_vector<std::uint32_t> leaves;
   std::size_t count = 0;
-  /// Returns true if a further row of children fits.
+  /// Returns true if another row of children fits.
   [[nodiscard]] bool has_room() const noexcept { return count + 2 * leaf_width <= stride; }
   /// Returns sixteen boxes. @pre first is a multiple of sixteen
   [[nodiscard]] box_axes row(std::size_t first) const noexcept { return {boxes.data() + first, stride}; }
@@ -319,7 +319,7 @@ struct sum_nearest {
     }
     return simd::greatest(select(even + odd > numbers(-static_cast<std::int32_t>(rank)), v, lanes(0.0F)));
   }
-  /// Returns the `rank`-th smallest of thirty-two values, of which those from `count` on are infinite.
+  /// Returns the `rank`-th smallest of thirty-two values; the values at index `count` and above are infinite.
   template <simd::target Target>
   static ORBIS_ALWAYS_INLINE float ranked_of_two(const float* values, std::size_t count, std::size_t rank) noexcept {
     using lanes = simd::vec<float, leaf_width, Target>;

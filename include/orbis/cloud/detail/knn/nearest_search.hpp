@@ -291,7 +291,7 @@ class nearest_search {
     return true;
   }
 
-  /// Makes `near_rows_` hold all rows of leaves within squared distance `bound` of a row. Returns false if there are
+  /// Fills `near_rows_` with all rows of leaves within squared distance `bound` of a row. Returns false if there are
   /// too many.
   [[nodiscard]] bool ensure_near_rows(std::size_t row, float bound) {
     if (row == near_rows_of_ && bound <= near_rows_reach_) return true;

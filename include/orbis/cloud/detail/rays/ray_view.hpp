@@ -33,7 +33,7 @@ struct ray_view {
   float max_depth = 0;
   float margin = 0;  ///< margin + margin_growth z^2, metres
   float margin_growth = 0;
-  float slant = 0;  ///< part of a window's depth range that is added to the margin of rays that pass through
+  float slant = 0;  ///< fraction of a window's depth range added to the margin of rays that pass through
   const float* nearest = nullptr;
   const float* farthest = nullptr;
   const float* middle = nullptr;

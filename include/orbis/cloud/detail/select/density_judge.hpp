@@ -56,8 +56,8 @@ struct threshold_options {
 };
 
 /// Finds the threshold of a density test. Sparse points on surfaces are not outliers, whatever their number: regions
-/// seen from afar or at a grazing angle. So the histogram contains only the other points, and the threshold is beyond
-/// the spacing from which on more than 40 % of the sparser points lie on surfaces.
+/// seen from afar or at a grazing angle. The histogram therefore contains only the other points, and the threshold
+/// exceeds the spacing above which more than 40 % of the sparser points lie on surfaces.
 template <execution_policy Policy>
 [[nodiscard]] density_evidence find_threshold(const Policy& policy, surroundings& around, const reference& r,
                                               const threshold_options& manner) {
@@ -128,8 +128,8 @@ template <execution_policy Policy>
   return out;
 }
 
-/// Judges the remaining points of a cloud by the points alone; adds the resulting steps and their reasons. The tests
-/// store their removals in `around`.
+/// Evaluates the remaining points of a cloud without views; adds the resulting steps and their reasons. The tests store
+/// their removals in `around`.
 template <execution_policy Policy>
 void judge_points(const Policy& policy, surroundings& around, const select_options& options, filter_choice& choice,
                   std::vector<std::string>& reasons) {

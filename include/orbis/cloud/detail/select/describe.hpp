@@ -15,7 +15,7 @@ namespace orbis::cloud::detail {
   std::snprintf(text, sizeof text, "%.3g", value);
   return text;
 }
-/// Concatenates parts of a sentence. Sums of strings take long to compile.
+/// Concatenates parts of a sentence. Chained string additions are slow to compile.
 [[nodiscard]] inline std::string joined(std::initializer_list<std::string_view> parts) {
   std::string out;
   for (const std::string_view part : parts) out += part;

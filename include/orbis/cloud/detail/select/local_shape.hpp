@@ -59,7 +59,7 @@ struct smallest_of_columns {
 
 /// Computes for each place the usual value in its surroundings: the 35 % quantile over its 12 nearest neighbours,
 /// repeated in rounds to reach beyond the neighbours. Non-finite values (NaN) and those of points without neighbours
-/// stay and do not count. O(n rounds), the same for every policy.
+/// are unchanged and ignored. O(n rounds), the same for every policy.
 /// @pre values has an entry for each place
 template <execution_policy Policy>
 [[nodiscard]] std::vector<float> smoothed_over_neighbors(const Policy& policy, const neighbor_graph& graph,

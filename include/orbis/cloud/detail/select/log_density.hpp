@@ -137,7 +137,7 @@ struct valley {
   double position = 0;  ///< distance above the median
   double ratio = 0;     ///< height of the later peak over that of the valley
 };
-/// Finds the place in [lowest, 3.2] of the smoothed histogram of `values - median` with the largest ratio of the
+/// Finds the position in [lowest, 3.2] of the smoothed histogram of `values - median` with the largest ratio of the
 /// highest later peak to its own height. O(n).
 [[nodiscard]] inline valley deepest_valley(std::span<const float> values, double median, double lowest) {
   constexpr double first = 0.3;

@@ -62,7 +62,7 @@ ray_removals apply_rays(const Policy& policy, const point_view& points, const ra
   return cancelled ? ray_removals{} : remove_by_rays(counter.scores(), step, left);
 }
 
-/// Tests if a cloud was made from some views: nearly every point of a sample is in one of them.
+/// Tests whether a cloud was made from given views: nearly every point of a sample is in one of them.
 template <camera::camera_model Camera>
 class source_view_test {
  public:
@@ -96,8 +96,8 @@ class source_view_test {
   ray_evidence_counter<Camera> counter_;
 };
 
-/// Judges a cloud by its views, clears `left` for the points they exclude, and adds the step and its reason. Returns
-/// false if cancelled.
+/// Evaluates a cloud against its views, clears `left` for the points that they exclude, and adds the step and its
+/// reason. Returns false if cancelled.
 template <execution_policy Policy, posed_depth_range Views, camera::camera_model Camera>
 [[nodiscard]] bool judge_views(const Policy& policy, const point_view& points, const Views& views, const Camera& camera,
                                const select_options& options, std::span<char> left, filter_choice& choice,

@@ -303,9 +303,9 @@ class voxel_parts {
   entry* entries_ = nullptr;
 };
 
-/// Estimates the number of occupied voxels from a sample of the points, rather too high than too low, and at most the
-/// number of points. With f1 sampled voxels found once and f2 found twice, at least f1^2 / (2 f2) voxels were not
-/// found, and about twice that number if the numbers of points per voxel vary. @pre the cloud is not empty
+/// Estimates the number of occupied voxels from a sample of the points, erring on the high side, but at most the number
+/// of points. With f1 sampled voxels found once and f2 found twice, at least f1^2 / (2 f2) voxels were not found, and
+/// about twice that number if the numbers of points per voxel vary. @pre the cloud is not empty
 ///
 /// Source: A. Chao, "Nonparametric estimation of the number of classes in a population", Scandinavian Journal of
 /// Statistics 11, 1984.

@@ -151,7 +151,7 @@ class voxel_brick {
       count += static_cast<std::size_t>(std::popcount(mask[w]));
     }
   }
-  /// Makes room for further cells, in place, from the end.
+  /// Makes room for additional cells in place, working backwards from the end.
   void widen(const cell_mask& mask) {
     const cell_mask old = mask_;
     std::size_t from = sums_.size();
