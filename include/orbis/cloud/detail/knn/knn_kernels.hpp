@@ -215,7 +215,7 @@ struct near_in_leaves {
   }
 };
 
-/// As `near_in_leaves`; also writes the corresponding places in `leaf_hierarchy::members`.
+/// Like `near_in_leaves`; also writes the corresponding places in `leaf_hierarchy::members`.
 struct places_in_leaves {
   template <simd::vector V>
   static ORBIS_ALWAYS_INLINE std::size_t collect(const point_row* leaves, const std::uint32_t* chosen,

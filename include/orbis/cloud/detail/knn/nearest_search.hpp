@@ -125,7 +125,7 @@ class nearest_search {
       for (std::size_t i = first; i != last; ++i) largest_[i] = f(i, found_of(i), bounds_[i]);
     });
   }
-  /// As `visit_leaf`, but sums up the nearest distances itself and calls `f(i, found, sum)`. `sum` is meaningless if
+  /// Like `visit_leaf`, but sums up the nearest distances itself and calls `f(i, found, sum)`. `sum` is meaningless if
   /// fewer than `wanted` were found.
   template <class F>
   void visit_sums(std::size_t l, F&& f) {

@@ -31,8 +31,8 @@ namespace orbis::cloud::detail {
 /// while values are added.
 class sparse_values {
  public:
-  /// Adds `value(i)` for each i < count without a value for which `wanted(i)` is true. Both are called from several
-  /// threads. O(count), the same for every policy. @pre count is the same in all calls
+  /// Adds `value(i)` for each i < count that has no value yet and for which `wanted(i)` is true. Both functions are
+  /// called from several threads. O(count), the same for every policy. @pre count is the same in all calls
   template <execution_policy Policy, class Wanted, class Value>
   void add(const Policy& policy, std::size_t count, const Wanted& wanted, const Value& value) {
     const sparse_values before = *this;
