@@ -6,7 +6,6 @@
 /// provides the rest, one function each. Every function that needs an instruction set carries its target attribute and
 /// takes registers by reference: a kernel template, which has no attribute, can then name it, and it is inlined once
 /// the template is inlined into a function that has the attribute.
-/// inside the function that has one.
 #pragma once
 
 #include <cstddef>
