@@ -23,7 +23,7 @@ struct epipolar_line {
 };
 
 /// Epipolar geometry of the keypoints of two images:
-/// - `line(i, k)`: the line in the train image that belongs to query `i` with keypoint `k`, or none;
+/// - `line(i, k)`: the line in the train image of query `i` with keypoint `k`, or none;
 /// - `point(i, k)`: position of train `i` with keypoint `k`, pixels; NaN if it has none;
 /// - `epipole()`: intersection of all lines of the train image, or none.
 /// Lines and points are in one plane, which need not be the image itself.

@@ -80,8 +80,8 @@ struct region {
   friend constexpr bool operator==(const region&, const region&) = default;
 };
 
-/// Brightness differences: a detector returns the corners of at least `strong`, and in neighbourhoods without any,
-/// those of at least `weak`. 0 <= weak <= strong <= 254.
+/// Brightness thresholds: a detector returns the corners with a difference of at least `strong` and, in neighbourhoods
+/// without any, those with at least `weak`. 0 <= weak <= strong <= 254.
 struct corner_thresholds {
   int strong = 20;
   int weak = 7;

@@ -16,9 +16,9 @@ namespace orbis::features {
 /// @pre both images have the same size
 void luma(image_view<const rgb8> from, image_view<std::uint8_t> to);
 
-/// Converts a 16-bit image (infrared, thermal, raw) to 8 bits: values up to `low` become 0, values from `high` on
-/// become 255, those between are scaled linearly and rounded. Use the same `low` and `high` for a whole recording;
-/// otherwise the brightness flickers. O(pixels).
+/// Converts a 16-bit image (infrared, thermal, raw) to 8 bits: values up to `low` become 0, values of at least `high`
+/// become 255, and those in between are scaled linearly and rounded. Use the same `low` and `high` for a whole
+/// recording; otherwise the brightness flickers. O(pixels).
 /// @pre low < high; both images have the same size
 inline void narrow(image_view<const std::uint16_t> from, image_view<std::uint8_t> to, std::uint16_t low,
                    std::uint16_t high) {

@@ -95,7 +95,7 @@ struct workspace_of_part<Part> {
 template <class Part>
 using workspace_of = typename detail::workspace_of_part<Part>::type;
 
-/// The first part of a matcher. It returns the candidates in ascending order of their query, at most one per query, by
+/// The first part of a matcher: it returns the candidates in ascending order of their query, at most one per query, by
 /// `search(candidates, workspace, queries, trains, needs, where...)`.
 template <class S>
 concept match_source = requires {
@@ -111,11 +111,11 @@ concept searches = match_source<S> &&
   source.search(candidates, memory, view, view, needs, where...);
 };
 
-/// A stage that judges each candidate individually: any callable `bool(const candidate&)`.
+/// A stage that tests each candidate individually: any callable `bool(const candidate&)`.
 template <class S>
 concept match_predicate = std::predicate<const S&, const candidate&>;
 
-/// A stage that judges the candidates together, with the keypoints (empty if the caller passed none): any callable
+/// A stage that tests the candidates together, with the keypoints (empty if the caller passed none): any callable
 /// `void(std::vector<candidate>&, std::span<const keypoint>, std::span<const keypoint>, workspace_of<S>&)` that erases
 /// rejected candidates and keeps the order.
 template <class S>

@@ -8,9 +8,9 @@
 /// @endcode
 ///
 /// A chain begins with one source (`brute_force`, `windowed`, `projected`, `epipolar`); a stage is anything that
-/// satisfies `match_stage`, for example a lambda `bool(const candidate&)`. Stages judge candidates in order; each sees
-/// the nearest neighbour, the second distance and the reverse neighbour that the source found among *all* descriptors,
-/// not among those left by earlier stages.
+/// satisfies `match_stage`, for example a lambda `bool(const candidate&)`. Stages test candidates in order; each
+/// receives the nearest neighbour, the second distance and the reverse neighbour that the source found among *all*
+/// descriptors, not among those left by earlier stages.
 ///
 /// A matcher that is called every frame can keep its memory in a workspace:
 ///
@@ -49,7 +49,7 @@ class match_chain {
 
   /// Returns the matches in ascending order of their query, at most one per query. `where`: additional arguments of the
   /// source, e.g. the windows of `windowed`.
-  /// @pre queries and trains come with keypoints if a stage needs them
+  /// @pre queries and trains have keypoints if a stage needs them
   template <describable Queries, describable Trains, class... Where>
   requires std::same_as<descriptor_of<Queries>, descriptor_of<Trains>> &&
       searches<Source, descriptor_of<Queries>, Where...>

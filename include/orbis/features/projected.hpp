@@ -26,7 +26,7 @@ struct projection {
   float distance = 1.0F;      ///< from the camera, metres
   float cosine = 1.0F;        ///< of the angle between the line of sight and the earlier viewing direction
   float min_distance = 0.0F;  ///< minimum distance at which the descriptor is detectable, metres
-  float max_distance = std::numeric_limits<float>::infinity();  ///< appears at the finest level from there on, metres
+  float max_distance = std::numeric_limits<float>::infinity();  ///< appears at the finest level from there, metres
 };
 
 /// Search radius around a projection, and pyramid levels to search.
@@ -35,7 +35,7 @@ struct projection_rule {
   float slanted = 1.6F;           ///< factor of the radius if the viewing direction differs from the earlier one
   float frontal_cosine = 0.998F;  ///< the viewing direction differs if its cosine is below this
   float min_cosine = 0.5F;        ///< below it, the point is not searched; -1: always searched
-  float range_tolerance = 0.2F;   ///< fraction by which the distance may leave the point's range
+  float range_tolerance = 0.2F;   ///< fraction by which the distance may exceed the point's range at either end
   int levels = 8;                 ///< of the extractor's pyramid
   float scale_factor = 1.2F;      ///< between them
   int finer = 1, coarser = 1;     ///< levels to search around the predicted one

@@ -59,8 +59,9 @@ struct unique {
 };
 
 /// Keeps the candidates whose change of orientation is among the most frequent: between two images with a relative
-/// rotation, the keypoints of true matches rotate alike. The angle differences fill `bins` equal bins around the
-/// circle; the `peaks` fullest bins are kept (the lowest on ties), except those below `weakest` times the fullest.
+/// rotation, the keypoints of true matches rotate by the same angle. The angle differences fill `bins` equal bins
+/// around the circle; the `peaks` fullest bins are kept (the lowest on ties), except those below `weakest` times the
+/// fullest.
 struct rotation_consistency {
   static constexpr search_needs needs{.keypoints = true};
   int bins = 30;

@@ -48,9 +48,9 @@ struct sliding_square {
   pixel_rows strip;   ///< likewise `side` + `shifts` - 1
 };
 
-/// Sets `sums[k]` to four times the sum of absolute differences between the square and the strip from column `k` on,
-/// each minus its mean (to a quarter of a grey value), for k < `shifts`. Writes a multiple of 16 sums; those from
-/// `shifts` on are unspecified. @pre 1 <= side <= max_side, 1 <= shifts <= max_shifts
+/// Sets `sums[k]` to four times the sum of absolute differences between the square and the strip starting at column
+/// `k`, each minus its mean (to a quarter of a grey value), for k < `shifts`. Writes a multiple of 16 sums; those at
+/// index `shifts` and above are unspecified. @pre 1 <= side <= max_side, 1 <= shifts <= max_shifts
 void slide_differences(const sliding_square& s, int shifts, std::int32_t* sums);
 
 }  // namespace detail

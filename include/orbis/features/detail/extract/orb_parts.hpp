@@ -15,11 +15,10 @@
 namespace orbis::features::detail {
 
 /// Detects FAST-9/16 corners: nine contiguous pixels of the circle of radius 3 are all brighter or all darker than the
-/// centre by more than a threshold. The response is the largest threshold at which the pixel still is a corner; only
+/// centre by more than a threshold. The response is the largest threshold at which the pixel is still a corner; only
 /// pixels with a larger response than their eight neighbours count. The threshold adapts to the texture: a cell of the
 /// area with a corner of at least `strong` keeps only such corners; the others keep all down to `weak`. A response does
 /// not depend on the threshold, so one pass finds both.
-/// pass finds both.
 ///
 /// The defaults differ from other implementations in three points. Slight smoothing, and keeping a corner whose
 /// neighbour has an equal response, improve repeatability (by several per cent, most under noise and shifts). A
@@ -28,7 +27,7 @@ namespace orbis::features::detail {
 struct fast9 {
   int cell = 35;       ///< side, pixels; about the extent of a descriptor
   bool smooth = true;  ///< convolve the image with the binomial (1, 2, 1) / 4 in x and y first
-  bool ties = true;    ///< of equal neighbours the last by row, then column, is a corner; false: none of them
+  bool ties = true;    ///< of equal neighbours, the last one (by row, then column) is a corner; false: none is
 
   bool subpixel = true;  ///< compute `dx` and `dy`
 
@@ -55,10 +54,10 @@ struct fast9 {
 };
 static_assert(corner_detector<fast9>);
 
-/// Selects corners that cover the image first. The image is divided into square cells, whose number is a share of the
-/// wanted corners, and every cell contributes its strongest corner of all levels. The rest are the strongest corners of
-/// their levels, at any position, because strong corners are more repeatable. A cell contributes one corner in total,
-/// not one per level, which leaves room for these. O(n), and sorting of the chosen corners.
+/// Selects corners that cover the image first. The image is divided into square cells, whose number is a fraction of
+/// the requested corners, and every cell contributes its strongest corner of all levels. The rest are the strongest
+/// corners of their levels, at any position, because strong corners are more repeatable. A cell contributes one corner
+/// in total, not one per level, which leaves room for these. O(n), and sorting of the chosen corners.
 struct cover_first {
   double share = 0.25;  ///< of the wanted corners, for covering; 0: most repeatable, 1: best distributed
 
@@ -88,7 +87,7 @@ inline constexpr int disc_radius = 15;
 struct intensity_centroid {
   static constexpr int radius = disc_radius;
 
-  /// @pre at least `radius` pixels from the image's edge, on the right one more
+  /// @pre at least `radius` pixels from the image's edge, and one more on the right
   [[nodiscard]] orientation operator()(image_view<const std::uint8_t> image, int x, int y) const;
 };
 static_assert(orientation_estimator<intensity_centroid>);

@@ -28,7 +28,7 @@ struct resize_tap {
   std::uint16_t weight = 0;
 };
 
-/// Pixels are areas with centres at integers: result pixel i is at (i + 1/2) from / to - 1/2.
+/// Pixels are areas with centres at integers: result pixel i is at (i + 1/2) * from / to - 1/2.
 [[nodiscard]] inline resize_tap tap_at(int i, int from, int to) {
   const double at = (i + 0.5) * (static_cast<double>(from) / to) - 0.5;
   const double whole = std::floor(at);

@@ -159,7 +159,7 @@ ORBIS_ALWAYS_INLINE void half_add(V& sum, V& a) noexcept {
   sum = sum ^ a;
   a = carry;
 }
-/// One bit of a comparison, from the lowest bit up: below becomes x < y, given the result for the lower bits.
+/// One bit of a comparison, starting at the lowest bit: below becomes x < y, given the result for the lower bits.
 template <class V>
 ORBIS_ALWAYS_INLINE void compare_bit(V& below, const V& x, const V& y) noexcept {
   if constexpr (has_ternary_logic<V>) {
