@@ -35,8 +35,8 @@ struct bal_problem {
   std::vector<bal_observation> observations;   ///< in the file's order
 };
 
-/// Projection of a point by a camera of the format; empty in the plane of the camera's centre, and for values that are
-/// not finite. Points behind the camera have a pixel too, as in the residuals of the paper.
+/// Projection of a point by a camera of the format; empty for a point in the plane of the camera's centre, and for
+/// values that are not finite. Points behind the camera have a pixel too, as in the residuals of the paper.
 [[nodiscard]] inline std::optional<vec2> project_bal(std::span<const double, 9> camera, const vec3& point) {
   const vec3 p = so3::exp(vec3(camera[0], camera[1], camera[2])) * point + vec3(camera[3], camera[4], camera[5]);
   const vec2 d = head<2>(p) / p.z();

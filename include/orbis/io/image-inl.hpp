@@ -12,7 +12,7 @@
 namespace orbis::io {
 
 namespace detail {
-/// Maximum size of an image file: more than one of `max_image_pixels` has, compressed or not.
+/// Maximum size of an image file: larger than any image of `max_image_pixels`, compressed or not.
 inline constexpr std::uintmax_t max_image_bytes = std::uintmax_t{1} << 30;
 }  // namespace detail
 

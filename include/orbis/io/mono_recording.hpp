@@ -73,7 +73,7 @@ class mono_recording {
   /// All files of the recording: lists, poses, camera, and all images.
   [[nodiscard]] std::vector<std::filesystem::path> files() const;
 
-  /// Reads frame `i`. Errors: not_found, unreadable, malformed (damaged, or of another size than the camera's),
+  /// Reads frame `i`. Errors: not_found, unreadable, malformed (damaged, or its size differs from the camera's),
   /// unsupported. @pre i < size()
   [[nodiscard]] result<camera::mono_frame> frame(std::size_t i) const;
   /// Reads only the image of frame `i`. Errors as above. @pre i < size()
@@ -89,7 +89,7 @@ class mono_recording {
 [[nodiscard]] mono_format detect_mono_format(const std::filesystem::path& folder);
 
 /// Opens the recording in `folder` as that of one camera: reads its lists, poses and camera, but not its images (for
-/// KITTI one, for its size). Ignores depth and the images of further cameras.
+/// KITTI one, for its size). Ignores depth and the images of other cameras.
 ///
 /// The camera is, in this order: that of the options; that of `camera.toml` in the folder; that of the format's own
 /// files or the folder's name. Without any of these the function fails.

@@ -57,7 +57,7 @@ struct ply_vertex {
   rgb8 color{};
 };
 
-/// Points of any type as vertices: `read(of, begin, out)` returns those from `begin` on.
+/// Points of any type as vertices: `read(of, begin, out)` returns those starting at `begin`.
 struct ply_vertices {
   const void* of = nullptr;
   void (*read)(const void* of, std::size_t begin, std::span<ply_vertex> out) = nullptr;

@@ -76,13 +76,13 @@ class recording {
   [[nodiscard]] std::vector<std::filesystem::path> files() const;
 
   /// Reads frame `i`. Colour and depth have the camera's size. Errors: not_found, unreadable,
-  /// malformed (damaged, or of another size than the camera's), unsupported. @pre i < size()
+  /// malformed (damaged, or its size differs from the camera's), unsupported. @pre i < size()
   [[nodiscard]] result<camera::rgbd_frame> frame(std::size_t i) const;
   /// Reads only the colour image of frame `i`. Errors as above. @pre i < size()
   [[nodiscard]] result<image<rgb8>> color(std::size_t i) const;
 
   /// Single pass over the frames; reads each one when it is reached. Ends at the first frame that cannot be read; the
-  /// recording's `status` has the reason then. A reference to a frame is valid until the iterator advances.
+  /// recording's `status` then contains the reason. A reference to a frame is valid until the iterator advances.
   class iterator {
    public:
     using iterator_category = std::input_iterator_tag;
@@ -112,7 +112,7 @@ class recording {
     std::shared_ptr<const camera::rgbd_frame> frame_;  // shared, so that an iterator can be copied
   };
 
-  /// Starts again, and clears `status`. The recording must outlive the iterator and stay in place.
+  /// Restarts the iteration and clears `status`. The recording must outlive the iterator and stay in place.
   [[nodiscard]] iterator begin() {
     status_ = {};
     return iterator(*this);
@@ -150,7 +150,7 @@ namespace detail {
 ///
 /// The camera is, in this order: that of the options; that of `camera.toml` in the folder; that of the format's own
 /// files; that of the data set, for ICL-NUIM (`*.gt.freiburg`) and the TUM benchmark (`rgbd_dataset_freiburg1` ... in
-/// the path), with a note. Without any of these the function fails. A time between frames that does not suit the
+/// the path), with a note. Without any of these the function fails. A time between frames that does not match the
 /// camera's rate is noted. Errors: not_found, unreadable, unsupported (no
 /// known format), no_data (no frames), malformed (with file and line), invalid_argument (no camera known).
 [[nodiscard]] result<recording> open_recording(const std::filesystem::path& folder,

@@ -78,7 +78,7 @@ class stereo_recording {
   /// All files of the recording: lists, poses, cameras, and all images.
   [[nodiscard]] std::vector<std::filesystem::path> files() const;
 
-  /// Reads frame `i`. Errors: not_found, unreadable, malformed (damaged, or of another size than its camera's),
+  /// Reads frame `i`. Errors: not_found, unreadable, malformed (damaged, or its size differs from its camera's),
   /// unsupported. @pre i < size()
   [[nodiscard]] result<camera::stereo_frame> frame(std::size_t i) const;
   /// Reads only the left image of frame `i`. Errors as above. @pre i < size()
@@ -97,7 +97,7 @@ class stereo_recording {
 
 /// Opens the stereo recording in `folder`: reads its lists, poses and cameras, and rectifies the cameras; reads only
 /// the first left image, for its size. Errors: not_found, unreadable, unsupported (no known format, or a camera of an
-/// unknown model), no_data (no pairs), malformed (with file and line; an image of another size than its camera's),
+/// unknown model), no_data (no pairs), malformed (with file and line; an image whose size differs from its camera's),
 /// invalid_argument (no camera known, a camera option for a format with its own cameras, or cameras that cannot be
 /// rectified).
 [[nodiscard]] result<stereo_recording> open_stereo_recording(const std::filesystem::path& folder,

@@ -48,12 +48,12 @@ template <execution_policy Policy>
 
 }  // namespace detail::synthetic
 
-/// A recording of a hand-held camera moving once round a furnished room, with exact ground truth. Frames are
+/// A recording of a hand-held camera moving once around a furnished room, with exact ground truth. Frames are
 /// independent: they may be requested in any order and from several threads, and are byte for byte equal on every
 /// machine (except the pose, whose last bit may differ).
 ///
 /// The floor of the room is at z = 0 with the origin at its centre. The surfaces' textures are painted when they are
-/// first seen, which takes a few tenths of a second for the first frames at 640x480, and some 50 MB in the end; copies
+/// first seen, which takes a few tenths of a second for the first frames at 640x480, and eventually about 50 MB; copies
 /// share them.
 class synthetic_recording {
  public:
@@ -68,12 +68,12 @@ class synthetic_recording {
   [[nodiscard]] double timestamp(std::size_t i) const noexcept { return static_cast<double>(i) / options_.fps; }
   [[nodiscard]] const synthetic_options& options() const noexcept { return options_; }
   /// The distance (metres, unsigned) of a point of the world to the nearest surface visible to a camera: the error of a
-  /// map point. Exact in front of the surfaces; behind them, where solids overlap, the distance to the hull of the one
-  /// that the point is deepest in. Ignores moving solids. O(solids of the room)
+  /// map point. Exact in front of the surfaces; behind them, where solids overlap, it is the distance to the hull of
+  /// the solid that contains the point most deeply. Ignores moving solids. O(solids of the room)
   [[nodiscard]] double surface_distance(const vec3& p_world) const noexcept;
   /// The room's solids, for tests of this component (io/detail/synthetic/scene.hpp).
   [[nodiscard]] const detail::synthetic::scene& scene() const noexcept;
-  /// A pinhole camera of 525 pixels focal length at 640 pixels width.
+  /// A pinhole camera with a focal length of 525 pixels at a width of 640 pixels.
   [[nodiscard]] camera::camera_settings camera() const {
     return {.model = camera::pinhole{k_},
             .depth_scale = options_.depth_scale,
@@ -81,7 +81,7 @@ class synthetic_recording {
             .baseline = options_.sensor.baseline,
             .shutter = options_.sensor.shutter};
   }
-  /// The camera of `stereo_frame`: as `camera()`, with the baseline.
+  /// The camera of `stereo_frame`: like `camera()`, with the baseline.
   [[nodiscard]] camera::camera_settings stereo_camera() const {
     camera::camera_settings both = camera();
     both.baseline = options_.sensor.stereo_baseline;
@@ -117,7 +117,7 @@ class synthetic_recording {
   }
 
   /// Exact depth image of a camera of any model at any pose in the room: depths in metres along its axis; 0 where a
-  /// pixel has no ray, and everywhere if the camera is outside of the room. Ignores moving solids.
+  /// pixel has no ray, and everywhere if the camera is outside the room. Ignores moving solids.
   template <execution_policy Policy, camera::camera_model Camera>
   [[nodiscard]] image<float> exact_depth(const Policy& policy, const Camera& camera, const se3& T_world_camera) const {
     image<float> depth(camera.width(), camera.height());
@@ -138,7 +138,7 @@ class synthetic_recording {
   [[nodiscard]] result<camera::rgbd_frame> render_on(const parallel_policy& policy, std::size_t i) const;
   [[nodiscard]] result<camera::stereo_frame> render_stereo_on(const parallel_policy& policy, std::size_t i) const;
   [[nodiscard]] result<detail::synthetic::exact_view> exact_on(const parallel_policy& policy, std::size_t i) const;
-  /// Distance from a point along a ray to the nearest surface, in lengths of the ray; 0 if there is none.
+  /// Distance from a point along a ray to the nearest surface, in multiples of the ray's length; 0 if there is none.
   [[nodiscard]] double depth_along(const vec3& origin, const vec3& ray) const;
 
   synthetic_options options_;

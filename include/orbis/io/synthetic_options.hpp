@@ -18,13 +18,13 @@ struct synthetic_scene_options {
   bool furniture = true;         ///< false: bare walls
   int poor_walls = 1;            ///< number of the four walls that have almost no texture, 0..4
   double texture_density = 1.0;  ///< scales the number of patches painted on every surface; 0: none
-  bool person = false;           ///< adds a person who walks round the room, against the camera's direction, at 1 m/s
+  bool person = false;           ///< adds a person who walks around the room, against the camera's direction, at 1 m/s
   double wall_period = 0.0;      ///< metres; if above 0 all walls show one picture that repeats at this distance
 };
 
 /// The motion of the camera. The path starts at rest, makes one round (360 degrees of yaw) on an ellipse about the
-/// room's centre while looking outward, and rests at its first view again for the last `overlap` of the time, so that a
-/// loop can close. With `sees_floor` it makes a second round on a larger ellipse, looking inward and down.
+/// room's centre while looking outward, and rests at its first view again for the last fraction `overlap` of the time,
+/// so that a loop can close. With `sees_floor` it makes a second round on a larger ellipse, looking inward and down.
 struct synthetic_path_options {
   double semi_axis_x = 0.80;  ///< of the ellipse, metres
   double semi_axis_y = 0.60;  ///< metres
@@ -55,8 +55,8 @@ struct synthetic_sensor_options {
   double disparity_step = 0.125;  ///< resolution of the disparity, pixels of the infrared camera
   double infrared_focal = 580.0;  ///< of the infrared camera, pixels: disparity = focal * baseline / depth
   double baseline = 0.075;        ///< from projector to camera, metres
-  double grazing_angle = 1.45;    ///< radians from the normal: surfaces seen flatter are lost; dropping out
-                                  ///< begins 0.15 radians before
+  double grazing_angle = 1.45;    ///< maximum angle of incidence, radians; pixels begin to drop out
+                                  ///< 0.15 radians below it
   bool shadow = true;             ///< no depth where the projector (on the right) does not reach
   double dropouts = 0.002;        ///< fraction of pixels lost anywhere
   double stray_depths = 0.0;      ///< fraction of pixels with a random depth in front of the surface: dust, rain, spray

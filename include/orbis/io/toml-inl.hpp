@@ -14,7 +14,7 @@ namespace orbis::io {
 
 namespace detail {
 
-/// Returns true if each line that begins like the head of a table has a key in it: toml++ 3.3 assumes that.
+/// Returns true if each line that begins like a table header contains a key, as toml++ 3.3 assumes.
 [[nodiscard]] inline bool has_keys_in_heads(std::string_view text) noexcept {
   const auto skip_blanks = [](std::string_view& line) {
     line.remove_prefix(std::min(line.find_first_not_of(" \t"), line.size()));
@@ -38,8 +38,8 @@ namespace detail {
   return true;
 }
 
-/// Returns true if all characters outside of strings and comments are ASCII, as TOML requires: toml++ 3.3 tests some
-/// other characters for being blanks, and handles them incorrectly.
+/// Returns true if all characters outside strings and comments are ASCII, as TOML requires: toml++ 3.3 mishandles some
+/// other characters when it tests for blanks.
 [[nodiscard]] inline bool is_ascii_outside_strings(std::string_view text) noexcept {
   if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
   for (std::size_t i = 0; i < text.size();) {

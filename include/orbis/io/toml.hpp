@@ -19,7 +19,7 @@ namespace orbis::io {
 inline constexpr std::size_t max_toml_bytes = 16384;
 
 /// Parses `text` as a table. `where` names the source in errors. Errors: malformed, with the line if known (not TOML;
-/// more than `max_toml_bytes`; a list of lists over several lines, whose lines could be heads of tables).
+/// more than `max_toml_bytes`; a list of lists over several lines, whose lines could be table headers).
 [[nodiscard]] result<toml::table> parse_toml(std::string_view text, const std::filesystem::path& where = {});
 
 /// Reads a settings file; see `parse_toml`. Errors: not_found, unreadable, malformed.

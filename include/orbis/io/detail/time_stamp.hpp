@@ -31,8 +31,8 @@ inline constexpr time_unit time_units[] = {
     {"seconds", 1.0}, {"milliseconds", 1e-3}, {"microseconds", 1e-6}, {"nanoseconds", 1e-9}};
 
 /// The unit of a time stamp by the digits before its decimal point: times since 1970 have 10 digits in seconds, 13 in
-/// milliseconds, 16 in microseconds and 19 in nanoseconds (from 2001 to 2286). Seconds for any other number, also one
-/// with leading zeros.
+/// milliseconds, 16 in microseconds and 19 in nanoseconds (from 2001 to 2286). Seconds for any other number of digits,
+/// and for leading zeros.
 [[nodiscard]] constexpr time_unit unit_of(std::string_view stamp) noexcept {
   const std::size_t digits = std::min(stamp.find_first_not_of("0123456789"), stamp.size());
   if (stamp.starts_with('0') || (digits != stamp.size() && stamp[digits] != '.'))  // a sign, or an exponent

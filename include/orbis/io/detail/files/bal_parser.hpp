@@ -22,7 +22,7 @@
 
 namespace orbis::io::detail {
 
-/// Reads the file number by number, with the line for errors.
+/// Reads the file number by number, and counts lines for errors.
 class bal_parser {
  public:
   bal_parser(std::string_view text, const std::filesystem::path& where)

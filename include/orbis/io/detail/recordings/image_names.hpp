@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Images in a folder, and their times or frame numbers by their names.
+/// Images in a folder, and their times or frame numbers from their names.
 #pragma once
 
 #include <algorithm>
@@ -34,7 +34,7 @@ namespace orbis::io::detail {
 /// The meaning of the names of images.
 enum class image_keys { times, numbers, alphabet };
 
-/// Images with a key each, ascending: seconds, frame numbers, or their index in alphabetical order.
+/// Images, each with a key, in ascending order: seconds, frame numbers, or their index in alphabetical order.
 struct keyed_images {
   image_keys keys_are = image_keys::alphabet;
   std::vector<double> keys;

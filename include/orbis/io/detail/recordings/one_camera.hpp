@@ -40,8 +40,8 @@ inline constexpr double mono_pose_distance = 0.020;
   return first_present(folder, {"rgb.txt", "left.txt"});
 }
 
-/// The index of the images listed in `rgb.txt` or `left.txt`. `fps`: rate of images with numbers for times. Errors:
-/// not_found, unreadable, no_data, malformed (ground truth, with its line).
+/// The index of the images listed in `rgb.txt` or `left.txt`. `fps`: rate of images that have numbers instead of times.
+/// Errors: not_found, unreadable, no_data, malformed (ground truth, with its line).
 [[nodiscard]] inline result<recording_index> index_image_list(const std::filesystem::path& folder, double fps) {
   recording_index index;
   auto list = image_list_of(folder);
@@ -134,7 +134,8 @@ inline constexpr double mono_pose_distance = 0.020;
 
 // --- plain folders ------------------------------------------------------------------------------
 
-/// The folder with the images of a plain folder: itself, or one of the usual names in it; empty if there are none.
+/// The folder that contains the images: `folder` itself, or a subfolder with one of the usual names; empty if there are
+/// none.
 [[nodiscard]] inline std::filesystem::path image_folder_of(const std::filesystem::path& folder) {
   if (!images_in(folder).empty()) return folder;
   for (const char* const name : {"rgb", "color", "colour", "image", "images", "left", "data"})

@@ -32,7 +32,7 @@ namespace orbis::io::detail {
 }
 
 /// Sets `camera` to that of the index if it is empty, with a note if that one is a guess, and notes a time between
-/// frames that does not suit its rate. Errors: invalid_argument (no camera is known).
+/// frames that does not match its rate. Errors: invalid_argument (no camera is known).
 [[nodiscard]] inline result<void> complete_camera(const std::filesystem::path& folder,
                                                   std::optional<camera::camera_settings>& camera,
                                                   recording_index& index) {

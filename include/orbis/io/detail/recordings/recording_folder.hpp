@@ -42,8 +42,8 @@ inline void attach_ground_truth(recording_index& index, double max_distance) {
                           " frames are outside the ground truth");
 }
 
-/// Fails if a frame list is empty or its first images do not exist: the whole list is wrong then. Later images are
-/// checked when they are read. Errors: no_data, not_found.
+/// Fails if a frame list is empty or its first images do not exist, because the whole list is then wrong. Later images
+/// are checked when they are read. Errors: no_data, not_found.
 inline result<void> check_first_frame(const recording_index& index, const std::filesystem::path& where) {
   if (index.frames.empty()) return fail(errc::no_data, where.string(), "the recording has no frames");
   for (const std::filesystem::path& path : {index.frames.front().color, index.frames.front().depth}) {

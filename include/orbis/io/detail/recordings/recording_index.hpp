@@ -31,7 +31,7 @@ struct recording_entry {
 
 /// A recording without its pixels.
 struct recording_index {
-  std::vector<recording_entry> frames;  ///< in order of time, never empty when returned
+  std::vector<recording_entry> frames;  ///< in chronological order, never empty when returned
   trajectory ground_truth;
   std::optional<camera::camera_settings> camera;  ///< if the format's own files contain it, or it is guessed
   std::string camera_guess;                       ///< name and origin of a guessed camera, else empty

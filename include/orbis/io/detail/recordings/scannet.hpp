@@ -30,7 +30,7 @@
 
 namespace orbis::io::detail {
 
-/// The file of a ScanNet scene for `what` ("intrinsic_depth"); empty if there is none.
+/// The path of the calibration file `what` (such as "intrinsic_depth") of a ScanNet scene; empty if there is none.
 [[nodiscard]] inline std::filesystem::path scannet_file(const std::filesystem::path& folder, const std::string& what) {
   std::string plural = what;  // spelling of the data set's smaller edition
   plural.insert(plural.find('_'), "s");

@@ -60,7 +60,7 @@ namespace orbis::io::detail {
 
 inline constexpr std::string_view seven_scenes_color[] = {".color.png", ".color.jpg"};
 
-/// Returns true if `name` is that of a colour image; sets its stem and number then.
+/// Returns true if `name` is that of a colour image; if so, sets its stem and number.
 inline bool seven_scenes_frame(const std::string& name, std::string& stem, unsigned& number) {
   if (!name.starts_with("frame-")) return false;
   for (const std::string_view ending : seven_scenes_color) {

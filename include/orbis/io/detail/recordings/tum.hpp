@@ -42,8 +42,8 @@ struct stamped_file {
   return times;
 }
 
-/// The entries of a list in order of time, each time stamp once; notes report changes. Errors: no_data (the list is
-/// empty).
+/// The entries of a list in chronological order, each time stamp once; notes report changes. Errors: no_data (the list
+/// is empty).
 template <class Entry>
 [[nodiscard]] result<std::vector<Entry>> in_order_of_time(const std::filesystem::path& list, std::vector<Entry> entries,
                                                           std::vector<std::string>& notes) {
@@ -231,7 +231,7 @@ struct associated_files {
 }
 
 /// Sets the camera of a sequence of the TUM benchmark, which `rgbd_dataset_freiburg1` (2, 3) in the path of `folder`
-/// identifies (the innermost such folder counts), or `freiburg1` at the beginning of the folder's own name.
+/// identifies (the innermost such folder is used), or `freiburg1` at the beginning of the folder's own name.
 inline void guess_tum_camera(const std::filesystem::path& folder, recording_index& index) {
   const auto full = std::filesystem::absolute(folder / "").lexically_normal().parent_path();
   for (const auto& [word, preset] :
@@ -250,8 +250,8 @@ inline void guess_tum_camera(const std::filesystem::path& folder, recording_inde
   }
 }
 
-/// Converts the times of frames from frame numbers to seconds at `fps` frames per second, if they are such numbers, and
-/// those of a ground truth of whole numbers with them; notes it.
+/// Converts the times of frames from frame numbers to seconds at `fps` frames per second, if they are frame numbers,
+/// together with whole-numbered times of the ground truth; adds a note.
 inline void convert_frame_numbers(recording_index& index, double fps) {
   std::vector<double> times;
   for (const recording_entry& frame : index.frames) times.push_back(frame.timestamp);

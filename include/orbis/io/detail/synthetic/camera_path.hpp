@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Path of a hand-held camera once round a room.
+/// Path of a hand-held camera once around a room.
 #pragma once
 
 #include <algorithm>

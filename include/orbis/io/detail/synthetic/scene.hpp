@@ -79,7 +79,7 @@ class scene {
 
   /// The surfaces: first the room itself, then all objects in it.
   [[nodiscard]] const std::vector<solid>& solids() const noexcept { return solids_; }
-  /// The surfaces `time` seconds after the start: only those of the person move.
+  /// The surfaces `time` seconds after the start; only the person's surfaces move.
   [[nodiscard]] std::vector<solid> solids_at(double time) const {
     std::vector<solid> now = solids_;
     if (options_.person) {
@@ -100,8 +100,8 @@ class scene {
   }
 
   /// The distance (metres, unsigned) of a point to the nearest surface visible to a camera: the error of a map point.
-  /// Exact in front of the surfaces; behind them, where several solids overlap, the distance to the hull of the one the
-  /// point is deepest in. Ignores moving solids.
+  /// Exact in front of the surfaces; behind them, where several solids overlap, it is the distance to the hull of the
+  /// solid that contains the point most deeply. Ignores moving solids.
   [[nodiscard]] double distance(const vec3& p_world) const noexcept {
     const triple p = to_triple(p_world);
     double nearest = solids_.front().signed_distance(p);
@@ -110,7 +110,7 @@ class scene {
   }
 
   /// The parameter `t` at which the ray `origin + t direction` first meets a surface; empty if the ray starts outside
-  /// of the room, or the direction is zero or not finite. Ignores moving solids.
+  /// the room, or the direction is zero or not finite. Ignores moving solids.
   [[nodiscard]] std::optional<double> cast(const vec3& origin, const vec3& direction) const noexcept {
     if (!all_finite(origin) || !all_finite(direction) || direction.isZero(0.0)) return std::nullopt;
     double t = std::numeric_limits<double>::infinity();
@@ -134,7 +134,7 @@ class scene {
     return walking_person({a * x, b * y, 0.0}, a * y / speed, -b * x / speed, time / 1.3, person_seed_);
   }
 
-  /// A place at a wall: `along` it from its centre, `out` of it into the room.
+  /// A position next to a wall: `along` the wall from its centre, `out` from it into the room.
   struct wall {
     int face;       // as in is_poor_wall
     double length;  // metres
@@ -160,7 +160,7 @@ class scene {
     }
   }
 
-  /// Adds a box by its extent along the wall, out of it and up.
+  /// Adds a box given by its extents along the wall, away from it, and upwards.
   solid& block(const wall& w, std::array<double, 2> along, std::array<double, 2> out, std::array<double, 2> up,
                material surface) {
     const triple centre = place(w, 0.5 * (along[0] + along[1]), 0.5 * (out[0] + out[1]), 0.5 * (up[0] + up[1]));

@@ -124,7 +124,8 @@ class sensor {
     return static_cast<double>(std::abs(sideways) > 0.5 ? other : z);
   }
 
-  /// Noise with mean 0 and deviation 1, close to normal up to three deviations: the sum of four uniforms.
+  /// Approximately Gaussian noise with mean 0 and standard deviation 1, accurate up to three sigma: the sum of four
+  /// uniform numbers.
   [[nodiscard]] static double normal_from(std::uint64_t word) noexcept {
     const std::uint64_t sum = (word & 0xffffU) + ((word >> 16U) & 0xffffU) + ((word >> 32U) & 0xffffU) + (word >> 48U);
     return (static_cast<double>(sum) - 131070.0) * 2.6428997918226276e-05;  // sqrt(3) / 65536

@@ -31,7 +31,7 @@ struct moment {
   camera_pose pose;
 };
 
-/// Intrinsics of a pinhole camera of 525 pixels focal length at 640 pixels width.
+/// Intrinsics of a pinhole camera with a focal length of 525 pixels at a width of 640 pixels.
 [[nodiscard]] inline camera::intrinsics usual_intrinsics(int width, int height) noexcept {
   const double focal = 525.0 * width / 640.0;
   return {width, height, focal, focal, 0.5 * (width - 1), 0.5 * (height - 1)};

@@ -22,7 +22,7 @@ enum class shape : std::uint8_t {
   sphere,    ///< half.x is the radius
   cylinder,  ///< upright; half.x is the radius, half.z half the height
   capsule,   ///< a cylinder with hemispherical ends, which its half height half.z includes; may be tilted
-  room       ///< a box seen from inside: everything outside of it is solid
+  room       ///< a box seen from inside: everything outside it is solid
 };
 
 /// A solid, optionally rotated about the vertical and, for a capsule, first tilted about its own y axis. Each has six
@@ -60,7 +60,7 @@ struct solid {
     return {c * half.x + s * half.y, s * half.x + c * half.y, half.z};
   }
 
-  /// The distance (metres) of a point to the surface, negative inside of the solid.
+  /// The distance (metres) of a point to the surface, negative inside the solid.
   [[nodiscard]] double signed_distance(triple p_world) const noexcept {
     const triple p = to_local(p_world);
     switch (kind) {
@@ -95,8 +95,8 @@ struct hit {
   int axis = 0;                                        ///< boxes, rooms: of the face; cylinders: 2 a cap, 0 the side
 };
 
-/// The intersection of the ray `origin + t direction` in the solid's own frame, with t > 0 only. From the inside only a
-/// room is hit.
+/// The intersection of the ray `origin + t direction` in the solid's own frame, with t > 0 only. From the inside, only
+/// a room can be hit.
 [[nodiscard]] inline hit intersect(const solid& s, triple origin, triple direction) noexcept {
   const auto inverse = [](double d) { return 1.0 / (d == 0.0 ? 1e-30 : d); };
   hit h;

@@ -4,8 +4,8 @@
 ///
 /// Every face is painted with a base (tiles, bricks, wood, ...) under many patches with hard edges whose sizes follow a
 /// power law, as in the "dead leaves" model of natural images: it has corners at every scale, and no two places look
-/// alike (A. B. Lee, D. Mumford, J. Huang, "Occlusion models for natural images", IJCV 2001). Sampling is trilinear in
-/// a pyramid (L. Williams, "Pyramidal parametrics", SIGGRAPH 1983), so that corners do not flicker when the camera
+/// the same (A. B. Lee, D. Mumford, J. Huang, "Occlusion models for natural images", IJCV 2001). Sampling is trilinear
+/// in a pyramid (L. Williams, "Pyramidal parametrics", SIGGRAPH 1983), so that corners do not flicker when the camera
 /// moves.
 #pragma once
 
