@@ -62,7 +62,7 @@ concept depth_map = std::constructible_from<M, double> && std::movable<M> &&
 /// Pixels removed from the depth images because they show moved objects.
 struct moving_count {
   std::size_t keyframes = 0;  ///< that lost pixels
-  std::size_t pixels = 0;     ///< of the whole images, whatever the stride
+  std::size_t pixels = 0;     ///< of the whole images, regardless of the stride
 };
 
 /// The map and a report of how it was built.
@@ -121,9 +121,9 @@ class static_depth {
 };
 
 /// The steps of `build_map`. `into.wants(k, whole)` returns true if it lacks this keyframe's depth image; `whole` is
-/// false if moved objects were removed from the image. `into.scan(k, depth)` takes one depth image before the filter of
-/// the cloud; `into.unfiltered()` returns the map of these. `into.filtered(cloud, kept, depths, ms, progress)` returns
-/// the map after that filter: `depths(use)` calls `use(k, depth)` with the remaining pixels of each depth image.
+/// false if moved objects were removed from the image. `into.scan(k, depth)` takes one depth image before the cloud is
+/// filtered; `into.unfiltered()` returns the map of these. `into.filtered(cloud, kept, depths, ms, progress)` returns
+/// the map after filtering: `depths(use)` calls `use(k, depth)` with the remaining pixels of each depth image.
 template <class Octree, execution_policy Policy, keyframe_range Keyframes, camera::camera_model Camera, class Into>
 [[nodiscard]] result<built_map<Octree>> build_map_into(const Policy& policy, const Keyframes& keyframes,
                                                        const Camera& camera, const map_options& options,
@@ -369,7 +369,7 @@ struct live_octree {
     if (auto done = live.finish(policy); !done) return fail(std::move(done.error()));
     return live.snapshot();
   }
-  /// If the images cannot be written to their file, they stay in memory: nothing is lost.
+  /// If the images cannot be written to their file, they stay in memory, so that nothing is lost.
   template <class Done>
   static result<void> ignore_write_failure(Done done) {
     if (done || done.error().code == errc::write_failed) return {};
@@ -386,8 +386,8 @@ struct live_octree {
 /// through. The octrees are bit for bit those that a `live_map` builds from the same depth images and poses.
 ///
 /// The range is traversed twice and, depending on the filter, up to three times more. At most
-/// `options.moving->keyframes` + 1 of its values are kept at a time if that is set, otherwise one. So values must be
-/// copyable or returned again by the range, and valid as long as they are kept.
+/// `options.moving->keyframes` + 1 of its values are kept at a time if that is set, otherwise one. Values must
+/// therefore be copyable, or be returned again by the range, and remain valid while they are kept.
 ///
 /// Keyframes whose pose is not finite are skipped and counted. Errors: `no_data` if there is no keyframe;
 /// `invalid_argument` if an image's size is not the camera's, or an option is out of range; `cancelled`. The same
@@ -402,7 +402,7 @@ requires depth_map<Octree, Camera>
   return detail::build_map_into<Octree>(policy, keyframes, camera, options, on_progress, into);
 }
 
-/// As above, with a live map that grew while these keyframes were made: moves its keyframes to their present poses,
+/// As above, with a live map that grew while these keyframes were made: moves its keyframes to their current poses,
 /// adds missing ones, hides others, and then applies the result of the filter. The octrees are bit for bit those of the
 /// function above. Keyframes have a member `frame`, their index in the live map, and are in ascending order of it. The
 /// times in the result are those of passing images to the map, without replaying; after the filter, their mean.

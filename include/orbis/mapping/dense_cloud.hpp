@@ -38,18 +38,18 @@ struct dense_options {
   std::optional<cloud::flying_pixel_options> flying_pixels{};
 };
 
-/// Options of the pixels that become points of the cloud.
+/// Selection of the pixels that become points of the cloud.
 [[nodiscard]] inline keyframe_point_options point_options(const dense_options& options) {
   return {options.stride, options.min_depth, options.max_depth, options.flying_pixels};
 }
 
-/// A cloud that grows by keyframes, and follows changes of their poses.
+/// A cloud that grows with each keyframe and follows changes of the keyframes' poses.
 ///
 /// With a voxel size, memory is proportional to the observed surface (about 50 bytes for each voxel, and 20 for each
-/// measurement of the largest keyframe), without one to the number of measurements. In both cases the cloud depends
-/// only on the keyframes and their latest poses: after corrections without a tolerance it is, byte for byte, the cloud
-/// built with the corrected poses from the start. With a voxel size it does not depend on the order of the keyframes
-/// either.
+/// measurement of the largest keyframe); without one, it is proportional to the number of measurements. In both cases
+/// the cloud depends only on the keyframes and their latest poses: after corrections without a tolerance it is, byte
+/// for byte, the cloud built with the corrected poses from the start. With a voxel size it does not depend on the order
+/// of the keyframes either.
 class dense_cloud {
  public:
   /// @pre options.stride > 0, options.voxel_size >= 0
@@ -83,7 +83,7 @@ class dense_cloud {
     colored_ -= f.colored ? 1 : 0;
     f = {};
   }
-  /// Moves keyframe `number` to the present pose of `k`. O(pixels).
+  /// Moves keyframe `number` to the current pose of `k`. O(pixels).
   /// @pre it was added with the same images and has not been removed; the pose is finite; not after `finish`
   template <execution_policy Policy, keyframe_like Keyframe>
   void move(const Policy& policy, const Keyframe& k, std::size_t number) {
@@ -91,9 +91,9 @@ class dense_cloud {
     put(policy, k, number);
   }
   /// Moves all keyframes whose pose has changed since they were last placed: in any bit or, with a `tolerance` (metres,
-  /// >= 0), by so much that a point of their view, which ends at `max_depth`, moves by more than the tolerance (in any
+  /// >= 0), far enough that a point of their view, which ends at `max_depth`, moves by more than the tolerance (in any
   /// bit if `max_depth` is not finite). Returns their number. `keyframes`: all that were added, in that order; removed
-  /// ones are skipped. O(keyframes + pixels of those that moved), with a tolerance O(pixels of one image) more. @pre
+  /// ones are skipped. O(keyframes + pixels of those that moved), plus O(pixels of one image) with a tolerance. @pre
   /// the number of keyframes is the number of those added; the poses are finite; not after `finish`
   template <execution_policy Policy, keyframe_range Keyframes>
   std::size_t reassemble(const Policy& policy, const Keyframes& keyframes, double tolerance = 0.0) {
@@ -122,7 +122,7 @@ class dense_cloud {
   }
   /// Number of points.
   [[nodiscard]] std::size_t size() const noexcept { return merging() ? voxels_.size() : size_; }
-  /// The present cloud in the world frame: voxel by voxel in the order of `cloud::voxel_sums`, or keyframe by keyframe.
+  /// The current cloud in the world frame: voxel by voxel in the order of `cloud::voxel_sums`, or keyframe by keyframe.
   /// O(size()), and O(bricks log bricks) with a voxel size. @pre not after `finish`
   template <execution_policy Policy = sequential_policy>
   [[nodiscard]] point_cloud cloud(const Policy& policy = {}) const {
@@ -147,7 +147,7 @@ class dense_cloud {
     for (const frame& f : frames_) out.insert(out.end(), f.ranges.begin(), f.ranges.end());
     return out;
   }
-  /// Ends the changes: call it after the last use of `cloud` and `ranges`; no keyframe may be added, removed or moved
+  /// Ends all changes. Call it after the last use of `cloud` and `ranges`; no keyframe may be added, removed or moved
   /// afterwards. Frees the memory for these. With a voxel size a few bytes for each voxel remain, for `select`,
   /// `masked_depth` and `measurements`; without one nothing is freed. O(bricks).
   void finish() {
@@ -204,11 +204,11 @@ class dense_cloud {
     }
     return out;
   }
-  /// The whole depth image of keyframe `number` (every pixel, whatever the stride; the stored values, see `view_like`)
-  /// with 0 in the pixels that the cloud leaves out: those with a depth out of range, flying pixels if they are
-  /// removed, and pixels that belong to a point that is not in `kept`. A pixel between the strides belongs to the point
-  /// in its voxel, or otherwise to the point of its block of stride x stride pixels if their depths agree within 3 cm
-  /// and 2 % per pixel between them; a pixel that belongs to no point is left out. O(pixels).
+  /// The whole depth image of keyframe `number` (every pixel, regardless of the stride; the stored values, see
+  /// `view_like`) with 0 in the pixels that the cloud leaves out: those with a depth out of range, flying pixels if
+  /// they are removed, and pixels that belong to a point that is not in `kept`. A pixel between the strides belongs to
+  /// the point in its voxel, or otherwise to the point of its block of stride x stride pixels if their depths agree
+  /// within 3 cm and 2 % per pixel between them; a pixel that belongs to no point is left out. O(pixels).
   /// @pre as for `measurements`
   template <execution_policy Policy, keyframe_like Keyframe>
   [[nodiscard]] auto masked_depth(const Policy& policy, const Keyframe& k, std::size_t number,

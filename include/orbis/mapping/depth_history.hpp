@@ -13,8 +13,8 @@ namespace orbis::mapping {
 
 /// Stores depth images by the index of their frame, and returns them exactly.
 ///
-/// `put(frame, pixels)` stores a copy, and replaces an image of the same frame. After an error the image is stored
-/// nevertheless, or `get` fails for it from then on.
+/// `put(frame, pixels)` stores a copy, and replaces an image of the same frame. After an error, either the image is
+/// nevertheless stored, or `get` fails for it afterwards.
 ///
 /// `get(frame, out)` copies the image to `out`, whose size changes to the image's. If it is const, several threads may
 /// call it concurrently.

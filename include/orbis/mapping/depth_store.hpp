@@ -31,8 +31,8 @@ namespace orbis::mapping {
 struct depth_store_options {
   /// Memory budget of the compressed images, bytes. The least recently used ones are spilled first.
   std::size_t memory_budget = std::size_t{64} << 20U;
-  /// Path of a file that does not exist yet, in an existing folder. It is created when it is first needed, and unlinked
-  /// at once: it vanishes with the store, or with the process. Empty: everything stays in memory.
+  /// Path of a file that does not exist yet, in an existing folder. It is created when it is first needed and unlinked
+  /// immediately, so that it is deleted with the store or when the process ends. Empty: everything stays in memory.
   std::filesystem::path spill_file{};
 };
 
@@ -40,8 +40,8 @@ struct depth_store_options {
 ///
 /// An image takes .05 to .2 of its 16 bits per pixel, from real and simulated sensors, because a depth camera that
 /// measures disparity has few distinct depths (`detail/depth/depth_codec.hpp`). An image of pure noise is not
-/// compressed. Pixels are numbers: scale and meaning are the caller's. Depth in `float` metres is not supported; its
-/// lowest bits are noise, which does not compress.
+/// compressed. Pixels are plain numbers; the caller defines their scale and meaning. Depth in `float` metres is not
+/// supported; its lowest bits are noise, which does not compress.
 ///
 /// Any number of threads may call const members, including `get`, while none calls another one. Movable.
 class depth_store {
@@ -53,8 +53,8 @@ class depth_store {
 
   /// Stores `depth` under the number `frame`, and replaces an image with that number. Error: write_failed if an image
   /// could not be written to the spill file: the disk is full, the folder does not exist, or the file exists already.
-  /// Nothing is lost then: this image and the others stay in memory, beyond the budget, and the next call tries again.
-  /// Linear in the pixels, about 2 ms for 640 x 480.
+  /// In that case nothing is lost: this image and the others stay in memory, beyond the budget, and the next call tries
+  /// again. Linear in the pixels, about 2 ms for 640 x 480.
   result<void> put(std::uint64_t frame, image_view<const std::uint16_t> depth) {
     return put(frame, depth, encoder_.encode(depth));
   }
@@ -82,7 +82,7 @@ class depth_store {
   }
 
   /// Copies the image of `frame` to `out`, whose size changes to the image's. A spilled image stays in the file.
-  /// Errors: not_found; unreadable or malformed if the spill file fails or is damaged (`out` is empty then). Linear in
+  /// Errors: not_found; unreadable or malformed if the spill file fails or is damaged (`out` is then empty). Linear in
   /// the pixels, about 1 ms for 640 x 480.
   result<void> get(std::uint64_t frame, image<std::uint16_t>& out) const {
     const auto at = entries_.find(frame);

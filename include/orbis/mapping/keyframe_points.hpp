@@ -22,7 +22,7 @@
 
 namespace orbis::mapping {
 
-/// Options of the pixels that become points.
+/// Selection of the pixels that become points.
 struct keyframe_point_options {
   int stride = 1;          ///< every stride-th pixel of every stride-th row; > 0
   float min_depth = 0.0F;  ///< metres along the optical axis
@@ -56,7 +56,7 @@ class keyframe_points {
     read_all(policy, depth, rays, options, T_world_camera, f);
     return {};
   }
-  /// A copy of the depth image (see `view_like`) with 0 in every pixel that would not become a point, whatever the
+  /// A copy of the depth image (see `view_like`) with 0 in every pixel that would not become a point, regardless of the
   /// stride: the result of `dense_cloud::masked_depth` before a filter of the cloud. O(pixels). @pre as for `read`
   template <execution_policy Policy, camera::depth_source Depth>
   [[nodiscard]] image<depth_pixel<Depth>> masked(const Policy& policy, const Depth& depth,
@@ -89,7 +89,7 @@ class keyframe_points {
     return {};
   }
   /// The point of one pixel in the world frame, with the same bits as `read`; empty if it has none.
-  /// @pre the pixel lies in the image; depth and rays have the same size
+  /// @pre the pixel is inside the image; depth and rays have the same size
   template <camera::depth_source Depth>
   [[nodiscard]] static std::optional<vec3f> point_at(const Depth& depth, int x, int y, const camera::ray_table& rays,
                                                      const keyframe_point_options& options,

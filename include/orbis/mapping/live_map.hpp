@@ -48,10 +48,11 @@ struct live_map_options {
   double resolution = 0.05;                   ///< the edge of a voxel, metres; > 0
   octree::integration_options integration{};  ///< of every depth image
   /// Tolerance in voxels: a keyframe is moved in the map when its pose moves a point of its view by more than this. 0:
-  /// when any bit of the pose changes, so that the map is that of the present poses whenever nothing is pending. >= 0
+  /// when any bit of the pose changes, so that the map corresponds to the current poses whenever nothing is pending. >=
+  /// 0
   double tolerance = 0.25;
-  /// Number of keyframes that are moved before the map is updated: a larger number is less work, a smaller one is
-  /// sooner. > 0
+  /// Number of keyframes that are moved before the map is updated: a larger number means less work, a smaller one
+  /// earlier updates. > 0
   std::size_t keyframes_per_replay = 16;
   /// Maximum number of frames between keyframes in the map; older ones are dropped. 0: keyframes only.
   std::size_t max_frames = 0;
@@ -77,7 +78,7 @@ enum class completeness { complete, filtered };
 
 /// Limits of one call of live_map::correct.
 struct correction_limits {
-  /// Time limit; a keyframe or a few dozen bricks that were begun are finished.
+  /// Time limit; a keyframe, or a few dozen bricks, in progress are finished first.
   std::chrono::nanoseconds time = std::chrono::nanoseconds::max();
   std::optional<vec3> robot{};  ///< position in the world frame; keyframes near it are moved first
 };
@@ -94,7 +95,7 @@ struct correction_progress {
 ///
 /// When nothing is pending, the map is bit for bit the one that `integrate` builds from the depth images in the order
 /// of their frames, each from the pose that it was marked with (`used_pose`): with tolerance 0 and after `finish` from
-/// the present poses, otherwise from poses within the tolerance. It depends neither on policies nor on time limits.
+/// the current poses, otherwise from poses within the tolerance. It depends neither on policies nor on time limits.
 ///
 /// For one thread at a time; live_map_thread.hpp has a map with its own thread. With orbis::compiled, an octree of
 /// another model than log_odds<> needs octree/scan_history-inl.hpp as well.
@@ -118,8 +119,8 @@ class live_map {
 
   /// Adds a keyframe, or replaces the depth image and pose of an existing one. `frame`: the index of its frame, which
   /// orders keyframes; `depth`: as integrated into the map, without the pixels that a filter removed; `T_world_camera`:
-  /// if it is not finite, the keyframe waits outside of the map for a pose. The newest keyframe is in the map at once.
-  /// `what` is only stored, see is_filtered. Error: that of `Depths::put`; the keyframe is in the map nevertheless.
+  /// if it is not finite, the keyframe waits outside the map for a pose. The newest keyframe is in the map at once.
+  /// `what` is only stored, see is_filtered. Error: that of `Depths::put`; the keyframe is nevertheless in the map.
   /// O(marking, see octree::scan_marker) and Depths::put. @pre depth has the camera's size
   template <execution_policy Policy>
   result<octree::integration_summary> add_keyframe(const Policy& policy, std::uint64_t frame, const depth_view& depth,
@@ -163,7 +164,7 @@ class live_map {
   /// The map follows with `correct`. Stops when `on_progress`, which counts the keyframes, returns false. Errors:
   /// not_found, before anything is changed; that of `Depths::get`, whose keyframe is removed while the rest of its
   /// group is unchanged; that of `Depths::put`, after all keyframes are processed; cancelled. For each keyframe
-  /// O(pixels), Depths::get and put, and marking. @pre no frame is named twice
+  /// O(pixels), Depths::get and put, and marking. @pre no frame is listed twice
   template <execution_policy Policy, class RemovePixels>
   result<void> edit_depths(const Policy& policy, std::span<const std::uint64_t> frames,
                            const RemovePixels& remove_pixels, progress on_progress = {}) {
@@ -203,7 +204,7 @@ class live_map {
     return kept;
   }
   /// Adds a frame between keyframes whose pose was measured relative to `keyframe`: it is marked from there, at the
-  /// keyframe's pose in the map. It makes the map denser in time, and is not kept for corrections: it is removed from
+  /// keyframe's pose in the map. It makes the map denser in time but is not kept for corrections: it is removed from
   /// the map when there are more than `max_frames`, when its keyframe moves, is hidden or removed, and with `finish`.
   /// Accepts any depth source. Returns false if `max_frames` is 0, the keyframe is not in the map, the pose is not
   /// finite, or the frame is a keyframe. O(marking). @pre depth has the camera's size
@@ -233,7 +234,7 @@ class live_map {
 
   // -- corrections
 
-  /// Sets the present poses of keyframes, in any order; the map follows with `correct`. Frames that are not keyframes
+  /// Sets the current poses of keyframes, in any order; the map follows with `correct`. Frames that are not keyframes
   /// of the map are skipped; a pose that is not finite hides its keyframe. Returns the number of keyframes that wait to
   /// be moved. O(poses x log keyframes), about 0.1 us each.
   template <std::ranges::input_range Poses>
@@ -251,10 +252,10 @@ class live_map {
         if (k.listed != round_) want(k, std::nullopt);
     return waiting_;
   }
-  /// Moves keyframes whose poses are out of tolerance to their present poses, first those whose view moved most and
-  /// that are close to the robot, and updates the map, until the time is over. Every call makes progress if anything is
-  /// pending. Error: that of `Depths::get`. The keyframe whose image is lost is removed; the next call continues with
-  /// the others. O(keyframes) and, for each keyframe that is moved, marking and replaying; nothing if nothing is
+  /// Moves keyframes whose poses are out of tolerance to their current poses, starting with those whose view moved most
+  /// and that are close to the robot, and updates the map, until the time limit. Every call makes progress if anything
+  /// is pending. Error: that of `Depths::get`. The keyframe whose image is lost is removed; the next call continues
+  /// with the others. O(keyframes) and, for each keyframe that is moved, marking and replaying; O(1) if nothing is
   /// pending.
   template <execution_policy Policy>
   result<correction_progress> correct(const Policy& policy, const correction_limits& limits = {}) {
@@ -291,7 +292,7 @@ class live_map {
     return progress;
   }
   /// Moves every keyframe whose pose differs in any bit, drops the frames between keyframes, and updates the map: it
-  /// then equals the map rebuilt from the present keyframes and poses. Returns the work done. Errors: those of
+  /// then equals the map rebuilt from the current keyframes and poses. Returns the work done. Errors: those of
   /// `correct`.
   template <execution_policy Policy>
   result<correction_progress> finish(const Policy& policy) {
@@ -312,7 +313,7 @@ class live_map {
 
   // -- queries
 
-  /// The present map; readable at any time.
+  /// The current map; readable at any time.
   [[nodiscard]] const Octree& map() const noexcept { return history_.map(); }
   /// A copy for readers on other threads; it shares memory with the map and clones on change. O(pages of 4 KB).
   [[nodiscard]] Octree snapshot() const { return history_.map(); }
@@ -337,7 +338,7 @@ class live_map {
     const entry* const k = find(frame);
     return k == nullptr ? std::nullopt : k->wanted;
   }
-  /// Returns true if a keyframe's depth image is without pixels removed by a filter: it was set by `set_depth`, or
+  /// Returns true if a keyframe's depth image lacks the pixels that a filter removed: it was set by `set_depth`, or
   /// declared so in `add_keyframe`. O(log keyframes).
   [[nodiscard]] bool is_filtered(std::uint64_t frame) const noexcept {
     const entry* const k = find(frame);
@@ -367,7 +368,7 @@ class live_map {
     double reach = 0.0;  ///< largest depth used, metres
     bool waiting = false;
     bool filtered = false;
-    std::uint64_t listed = 0;  ///< the last call of set_poses that named it
+    std::uint64_t listed = 0;  ///< the last call of set_poses that listed it
   };
   static constexpr bool packs = std::is_same_v<Depths, depth_store>;
   struct no_packer {};

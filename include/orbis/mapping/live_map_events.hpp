@@ -35,7 +35,7 @@ enum class depth_use : std::uint8_t {
 struct insertion_event {
   std::uint64_t frame = 0;
   bool is_keyframe = false;
-  double milliseconds = 0.0;        ///< wall time of the work: `prepare`, judging, marking, storing the depth image
+  double milliseconds = 0.0;        ///< wall time: `prepare`, moved objects, marking, storing the depth image
   double delay_milliseconds = 0.0;  ///< from the call that added it until it is visible to readers
   std::size_t waiting = 0;          ///< keyframes and frames still waiting
 };
@@ -49,7 +49,7 @@ struct refusal_event {
   std::uint64_t frame = 0;
   std::uint64_t keyframe = 0;
 };
-/// No keyframe or brick waits for a correction any more.
+/// All corrections of keyframes and bricks are complete.
 struct live_correction_event {
   std::size_t keyframes = 0;  ///< moved
   std::size_t bricks = 0;     ///< updated
@@ -58,7 +58,7 @@ struct live_correction_event {
 
 /// Poses of the keyframes from the SLAM system.
 struct keyframe_poses {
-  std::vector<keyframe_position> poses{};  ///< the present ones; other keyframes are hidden
+  std::vector<keyframe_position> poses{};  ///< the current ones; other keyframes are hidden
   std::vector<std::uint64_t> removed{};    ///< frames of keyframes that will never get a pose again
 };
 
@@ -68,9 +68,9 @@ struct keyframe_poses {
 template <class Octree>
 struct live_map_listeners {
   std::function<void()> started{};  ///< called first, on the map's thread: to name it, or to lower its priority
-  /// Fills in the present poses and returns true, or returns false if the poses have not changed since the last call;
-  /// with `always`, fills them in in any case. Hidden keyframes keep their depth images, which costs memory, because
-  /// they may return with their map of the atlas. List culled keyframes in `removed` to drop them from the map.
+  /// Fills in the current poses and returns true, or returns false if the poses have not changed since the last call;
+  /// with `always`, always fills them in. Hidden keyframes keep their depth images, which costs memory, because they
+  /// may return with their map of the atlas. List culled keyframes in `removed` to drop them from the map.
   std::function<bool(keyframe_poses& now, bool always)> poll_poses{};
   /// May change a depth image before it is inserted: a filter sets the pixels that it removes to 0. Called on the map's
   /// thread, so that no other thread waits for it.

@@ -100,14 +100,14 @@ class live_map_thread {
   bool add_keyframe(std::uint64_t frame, const depth_view& depth, const se3& T_world_camera) {
     return add_scan({.kind = job::keyframe, .frame = frame, .T = T_world_camera}, depth);
   }
-  /// Adds a frame between keyframes, see live_map::add_frame, as above. Never waits. Returns false if it was dropped;
-  /// `refused` reports frames that the map rejects. O(pixels). @pre depth has the camera's size
+  /// Adds a frame between keyframes, see live_map::add_frame; otherwise as above. Never waits. Returns false if it was
+  /// dropped; `refused` reports frames that the map rejects. O(pixels). @pre depth has the camera's size
   bool add_frame(std::uint64_t frame, const depth_view& depth, std::uint64_t keyframe, const se3& T_keyframe_camera) {
     return add_scan({.kind = job::between, .frame = frame, .keyframe_of = keyframe, .T = T_keyframe_camera}, depth);
   }
   /// Removes a keyframe, see live_map::remove.
   void remove(std::uint64_t frame) { push({.kind = job::removal, .frame = frame}); }
-  /// Sets the present poses, see live_map::set_poses.
+  /// Sets the current poses, see live_map::set_poses.
   void set_poses(std::vector<keyframe_position> poses, unlisted others = unlisted::keep) {
     push({.kind = job::positions, .poses = std::move(poses), .others = others});
   }
@@ -134,8 +134,8 @@ class live_map_thread {
     return counters_;
   }
   /// The reason why the thread ended by itself, if it did: an exception of a listener or of `Depths`, or out of memory.
-  /// It was also reported to `failed`. Waiting requests are dropped then, waiting calls return, no input is accepted
-  /// any more, and the snapshots do not change. Code: errc::exception.
+  /// It was also reported to `failed`. Waiting requests are then dropped, waiting calls return, no further input is
+  /// accepted, and the snapshots no longer change. Code: errc::exception.
   [[nodiscard]] std::optional<error> failure() const {
     const std::lock_guard lock{mutex_};
     return failure_;
@@ -149,7 +149,7 @@ class live_map_thread {
     if (listeners_.poll_poses) push({.kind = job::poll});  // poses may have moved since the last poll
     wait_until_idle();
   }
-  /// Updates the map to all present keyframes and poses, see live_map::finish, and waits for it, as above.
+  /// Updates the map to all current keyframes and poses (see live_map::finish), and waits for completion as above.
   void finish() {
     push({.kind = job::finish});
     wait_until_idle();
@@ -222,7 +222,7 @@ class live_map_thread {
     if (dropped && listeners_.overflowed) listeners_.overflowed({dropped->frame, use_of(*dropped)});
     return added;
   }
-  /// A copy, in reused memory if available.
+  /// A copy, in recycled memory if available.
   [[nodiscard]] image<std::uint16_t> copy_of(image_view<const std::uint16_t> pixels) {
     image<std::uint16_t> copy;
     {
@@ -357,7 +357,7 @@ class live_map_thread {
     }
     if (inserted) tell_insertion(j, waiting, milliseconds_since(start));
   }
-  /// Polls the present poses and passes them to the map. Returns the reply: empty if the poses have not changed.
+  /// Polls the current poses and passes them to the map. Returns the reply: empty if the poses have not changed.
   const keyframe_poses& poll(bool always = false) {
     polled_.poses.clear();
     polled_.removed.clear();
@@ -373,7 +373,7 @@ class live_map_thread {
     map_.set_poses(polled_.poses, unlisted::hide);
     return polled_;
   }
-  /// Number of the last keyframes that wait for a judgement by the newest.
+  /// Number of recent keyframes that have not yet been compared with the newest one.
   [[nodiscard]] std::size_t due() const noexcept { return moving_ ? moving_->due() : 0; }
   void revise(std::chrono::nanoseconds time) {
     const auto start = clock::now();

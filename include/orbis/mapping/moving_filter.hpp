@@ -34,10 +34,11 @@ namespace orbis::mapping {
 
 /// Compares the last keyframes of a live map with each other, and applies the result to the map: a later keyframe whose
 /// rays pass through a surface of an earlier one removes it, and one that shows it again restores it. A keyframe is
-/// inserted first, and the others are judged by it afterwards, one at a time, so that no insertion waits for that. The
-/// result is a depth image with fewer pixels (`live_map::set_depth`), so that the map remains that of these images and
-/// the keyframes' poses. Keyframes are compared at the latest poses given to the map (`live_map::wanted_pose`), because
-/// those are of one moment; in the map, a keyframe that waits for a correction is still at an earlier one.
+/// inserted first; the others are compared with it afterwards, one at a time, so that no insertion waits for the
+/// comparison. The result is a depth image with fewer pixels (`live_map::set_depth`), so that the map remains that of
+/// these images and the keyframes' poses. Keyframes are compared at the latest poses given to the map
+/// (`live_map::wanted_pose`), because those are of one moment; in the map, a keyframe that waits for a correction is
+/// still at an earlier one.
 ///
 /// Stores the last keyframes' depth images: 3.5 bytes per pixel for each. Memory is reused from keyframe to keyframe.
 template <camera::camera_model Camera>
@@ -49,10 +50,10 @@ class moving_filter {
   explicit moving_filter(Camera camera, const moving_filter_options& options = {})
       : judge_{std::move(camera), options} {}
 
-  /// live_map::add_keyframe without the pixels that rays of the last keyframes pass through. The last keyframes are due
-  /// for a judgement afterwards, see revise. A keyframe with a pose that is not finite is added to the map unchanged.
-  /// The same for every policy. Errors: those of live_map::add_keyframe and set_depth. O(pixels + cells x keyframes),
-  /// and marking. @pre as for live_map::add_keyframe; `map` is always the same
+  /// live_map::add_keyframe without the pixels that rays of the last keyframes pass through. Afterwards the last
+  /// keyframes are due for re-evaluation, see revise. A keyframe with a pose that is not finite is added to the map
+  /// unchanged. The same for every policy. Errors: those of live_map::add_keyframe and set_depth. O(pixels + cells x
+  /// keyframes), and marking. @pre as for live_map::add_keyframe; `map` is always the same
   template <execution_policy Policy, octree::replayable_octree Octree, depth_history Depths>
   result<octree::integration_summary> add_keyframe(const Policy& policy, live_map<Octree, Camera, Depths>& map,
                                                    std::uint64_t frame, const depth_view& depth,
@@ -75,14 +76,14 @@ class moving_filter {
     if (added && !settled) return fail(std::move(settled.error()));
     return added;
   }
-  /// Number of the last keyframes that have not been judged by all others of the window. O(keyframes).
+  /// Number of the last keyframes that have not been compared with all others in the window. O(keyframes).
   [[nodiscard]] std::size_t due() const noexcept {
     return static_cast<std::size_t>(std::ranges::count_if(judge_.views(), [](const auto& v) { return is_due(v); }));
   }
-  /// Judges one of the last keyframes that are due, and updates its image in the map (live_map::set_depth) if the
+  /// Re-evaluates one of the last keyframes that are due, and updates its image in the map (live_map::set_depth) if the
   /// verdict has changed; the map follows with `correct`. Call it until nothing is due, or the next keyframe is more
-  /// urgent: the remaining ones are judged with that one. Errors: those of live_map::set_depth; the keyframe is judged
-  /// nevertheless. O(cells), and marking if the image changes.
+  /// urgent: the remaining ones are evaluated together with that one. Errors: those of live_map::set_depth; the
+  /// keyframe is evaluated nevertheless. O(cells), and marking if the image changes.
   template <execution_policy Policy, octree::replayable_octree Octree, depth_history Depths>
   result<void> revise(const Policy& policy, live_map<Octree, Camera, Depths>& map) {
     for (auto& v : judge_.views()) {
@@ -113,7 +114,7 @@ class moving_filter {
     return [&map](const view& v) { return map.wanted_pose(v.frame); };
   }
   [[nodiscard]] bool leaves_next(const view& v) const { return judge_.is_full() && &v == &judge_.views().front(); }
-  /// Judges a keyframe of the map, and updates its image there if enough of it differs.
+  /// Evaluates a keyframe of the map, and updates its image there if enough of it differs.
   template <class Policy, class Map>
   result<void> change(const Policy& policy, Map& map, view& v) {
     const std::size_t differ = judge_.judge(v);

@@ -10,7 +10,7 @@
 namespace orbis::mapping {
 
 struct moving_filter_options {
-  /// Number of latest keyframes that are compared with each other, > 0; older ones do not change.
+  /// Number of most recent keyframes that are compared with each other, > 0; older ones do not change.
   std::size_t keyframes = 8;
   /// Two depths z are equal if they differ by less than margin + margin_growth z^2, which covers noise and small pose
   /// errors. Metres; 1 / metres.
@@ -21,8 +21,8 @@ struct moving_filter_options {
   float slant = 1.0F;
   int min_through = 1;  ///< a cell is removed if the rays of at least this number of keyframes pass through it, > 0,
   double ratio = 1.0;   ///< and of more than this factor times the number of keyframes that show it
-  /// Distance in cells up to which neighbours of a removed cell are removed too, if they are of the same surface and
-  /// the keyframes that show them do not outnumber those that look through them. >= 0
+  /// Distance in cells up to which neighbours of a removed cell are removed too, if they belong to the same surface and
+  /// the keyframes that show them do not outnumber those whose rays pass through them. >= 0
   int grow = 4;
   /// Share of a keyframe's cells whose verdict has to change before the keyframe is marked again in the map; ignored
   /// when the keyframe leaves the window.

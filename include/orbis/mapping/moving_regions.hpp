@@ -47,11 +47,12 @@ struct moving_region_options {
 
 /// Grows marked pixels along the surfaces of a depth image, moving and static ones at the same time: a cell moves if
 /// its nearest mark moves. Surfaces end at depth discontinuities. A keyframe without moving objects can be integrated
-/// into a map: tracking detects moving objects in front of the camera at once (`slam::tracked_feature::moving`), also a
-/// person walking along with the camera, whom no later ray passes through; `moving_filter` detects moved objects that
-/// tracking has missed.
+/// into a map. Tracking detects moving objects in front of the camera immediately (`slam::tracked_feature::moving`),
+/// including a person walking along with the camera, whom no later ray passes through; `moving_filter` detects moved
+/// objects that tracking has missed.
 ///
-/// Works on cells of 4x4 pixels. Reuses its memory: allocates nothing after some images. For one thread at a time.
+/// Works on cells of 4x4 pixels. Reuses its memory: allocates nothing after the first few images. For one thread at a
+/// time.
 template <camera::camera_model Camera>
 class moving_regions {
  public:

@@ -36,7 +36,7 @@ struct found_up {
   double along = 0.0;   ///< weight of the normals along it
 };
 
-/// Weight of a normal at an angle of sine `off`; 1 at 0, 0 from `reach` on. (Tukey's biweight.)
+/// Weight of a normal at an angle of sine `off`; 1 at 0, and 0 at `reach` and above (Tukey's biweight).
 [[nodiscard]] inline double fit_of(double off, double reach) noexcept {
   const double t = off / reach;
   const double u = 1.0 - t * t;
@@ -63,7 +63,7 @@ struct up_ballot {
 };
 
 /// The direction within `max_tilt` radians of -y that most normals are along or perpendicular to; empty if no normal
-/// is, or if rotating the direction fits equally well. O(normals), for some thousand directions.
+/// is, or if rotating the direction fits equally well. O(normals), for a few thousand directions.
 [[nodiscard]] inline std::optional<found_up> vote_for_up(std::span<const vec3> normals, double max_tilt) {
   constexpr double degree = std::numbers::pi / 180.0;
   const double wide = std::sin(10.0 * degree);
@@ -221,9 +221,9 @@ struct upright_view {
 
 /// The upright world of a depth image: from gravity if it is given, otherwise from planes.
 ///
-/// Planes are fitted to the blocks of a grid of some hundreds, in inverse depth, where a plane is linear and the noise
-/// of a disparity sensor is uniform. Each block votes for the directions along its normal (a floor, a table, a ceiling)
-/// and perpendicular to it (a wall); directions beyond `max_tilt` are excluded, and those far from the camera's -y axis
+/// Planes are fitted to a few hundred blocks of a grid, in inverse depth, where a plane is linear and the noise of a
+/// disparity sensor is uniform. Each block votes for the directions along its normal (a floor, a table, a ceiling) and
+/// perpendicular to it (a wall); directions beyond `max_tilt` are excluded, and those far from the camera's -y axis
 /// have less weight. The best direction is refined by least squares over the blocks that agree: the eigenvector of the
 /// smallest eigenvalue of `sum(wall normals n n^T) - sum(floor normals n n^T)`. If the image does not determine a
 /// direction (nothing flat, one wall only), the camera is assumed to be level, and `source` is `assumed`.

@@ -7,7 +7,7 @@
 /// consist of pixels without depth, and the prediction of a pixel is the previous one. Here
 ///
 /// - a pixel is coded by its *rank* among the distinct depths of the image. A depth camera that measures disparity has
-///   only some hundreds of them, centimetres apart at far range: ranks turn the sensor's steps into equal ones.
+///   only a few hundred of them, centimetres apart at far range: ranks turn the sensor's steps into equal ones.
 /// - the prediction uses the three pixels above and before it, as in M. J. Weinberger, G. Seroussi, G. Sapiro, "The
 ///   LOCO-I lossless image compression algorithm", IEEE Transactions on Image Processing 9(8), 2000, section III.A.
 /// - a run consists of pixels, with depth or without (0), that equal their prediction.
@@ -68,7 +68,7 @@ class group_writer {
       if (used_ >= 32) put_word();
     } while (value != 0);
   }
-  /// Returns true if the buffer was too small; the output is incomplete then.
+  /// Returns true if the buffer was too small; in that case the output is incomplete.
   [[nodiscard]] bool is_full() const noexcept { return full_; }
   /// End of the written bytes.
   [[nodiscard]] std::byte* finish() noexcept {
@@ -223,7 +223,7 @@ class depth_encoder {
 /// Decompresses depth images. Reuses its buffers: two bytes for each distinct depth, and 4 bytes per column.
 class depth_decoder {
  public:
-  /// Decompresses the image into `out`, which has its size. Error: malformed; `out` is unspecified then. Safe for any
+  /// Decompresses the image into `out`, which has its size. Error: malformed; `out` is then unspecified. Safe for any
   /// bytes. Linear.
   [[nodiscard]] result<void> decode(std::span<const std::byte> bytes, image_view<std::uint16_t> out) {
     if (bytes.empty()) return damaged("it has no bytes");

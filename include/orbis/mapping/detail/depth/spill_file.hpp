@@ -90,7 +90,7 @@ class spill_file {
     return *this;
   }
 
-  /// Appends a record. Error: write_failed; the file is unchanged then. @pre bytes.size() < 2^32
+  /// Appends a record. Error: write_failed; the file is then unchanged. @pre bytes.size() < 2^32
   [[nodiscard]] result<record> write(std::span<const std::byte> bytes) {
 #ifdef ORBIS_HAS_POSIX_FILES
     if (file_ < 0)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Displacement of the view of a camera by a change of its pose.
+/// Displacement of a camera's view caused by a change of its pose.
 #pragma once
 
 #include <algorithm>

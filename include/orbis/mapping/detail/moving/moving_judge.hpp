@@ -71,7 +71,7 @@ class moving_judge {
     std::vector<std::uint8_t> through;  ///< number of other views whose rays pass through each cell
     std::vector<std::uint8_t> shown;    ///< number of other views that show the cell as well
     std::vector<std::uint8_t> removed;  ///< 1: removed, as of the last call of `accept`
-    bool due = false;                   ///< the newest view has not been compared with it
+    bool due = false;                   ///< it has not been compared with the newest view
     bool unjudged = false;              ///< evidence has arrived since it was judged
 
     [[nodiscard]] depth_view depth() const { return depth_view{pixels.view(), scale, min_depth, max_depth}; }
@@ -124,7 +124,7 @@ class moving_judge {
     const std::optional<se3> by = pose_of(newest), of = pose_of(std::as_const(about));
     if (by && of) ask(policy, about, newest, by->inverse() * *of);
   }
-  /// Judges a view by the present evidence; returns the number of cells that differ from the last accepted verdict.
+  /// Evaluates a view by the current evidence; returns the number of cells that differ from the last accepted verdict.
   /// O(cells).
   [[nodiscard]] std::size_t judge(view& v) {
     v.unjudged = false;

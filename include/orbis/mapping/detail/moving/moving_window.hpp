@@ -43,7 +43,7 @@ template <camera::depth_source Depth>
 }
 
 /// Delays keyframes until those before and after have been compared with them, and returns them in order, together with
-/// the cells that show moved objects: at most `options.keyframes` + 1 are kept. Without options none is judged.
+/// the cells that show moved objects: at most `options.keyframes` + 1 are kept. Without options, none is evaluated.
 template <camera::camera_model Camera, keyframe_like Keyframe>
 class moving_window {
  public:
@@ -73,7 +73,7 @@ class moving_window {
     judge_->add(policy, now.number, stored_depths(now.keyframe.depth, copy_), T_world_camera, pose_of);
     for (auto& view : judge_->views()) judge_->ask_newest(policy, view, pose_of);
   }
-  /// Ends the input: judges all remaining keyframes.
+  /// Ends the input: evaluates all remaining keyframes.
   void finish() {
     if (judge_)
       for (auto& view : judge_->views())
