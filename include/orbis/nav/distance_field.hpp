@@ -38,11 +38,11 @@ struct distance_field_options {
   double reach = 1.0;  ///< maximum distance; larger ones are reported as `reach`, metres; 1 to 181 voxels
   /// State that an unknown voxel counts as: occupied or free.
   octree::occupancy unknown = octree::occupancy::occupied;
-  /// Exchanges obstacles and free space: the field is then the depth inside of obstacles, 0 outside of them. See
+  /// Exchanges obstacles and free space: the field is then the depth inside obstacles, and 0 outside them. See
   /// signed_distance.
   bool inside = false;
   /// Maximum number of bricks of 8x8x8 voxels (2.9 kB each) for leaves of the map that are larger than a brick: a file
-  /// of a few bytes can be a leaf as large as the grid. Leaves beyond the limit are left out, see `is_complete`.
+  /// of a few bytes can describe a leaf as large as the grid. Leaves beyond the limit are left out, see `is_complete`.
   std::size_t max_bricks = std::size_t{1} << 19U;
 };
 
@@ -53,7 +53,7 @@ struct distance_with_gradient {
 };
 
 /// Distances in metres. The distance of a voxel is the one between its centre and the centre of the nearest obstacle
-/// voxel: 0 in obstacles, and at most `reach()`. Space outside of the grid counts as unknown.
+/// voxel: 0 in obstacles, and at most `reach()`. Space outside the grid counts as unknown.
 template <class Voxels>
 class metric_distances {
  public:
@@ -67,7 +67,7 @@ class metric_distances {
   /// Interpolates linearly along each axis between the centres of the eight voxels around `p` (metres). The distance is
   /// continuous, and the gradient is its derivative. Beyond the centres of the outermost voxels of the grid: if the
   /// outside is an obstacle it counts as one; otherwise the outermost values extend to the edge of the grid, and the
-  /// distance outside of it is `reach()`. O(1), about 50 ns.
+  /// distance outside the grid is `reach()`. O(1), about 50 ns.
   template <point_like P>
   [[nodiscard]] distance_with_gradient distance_and_gradient(const P& p) const noexcept {
     const auto c = coordinates<double>(p);
@@ -105,7 +105,7 @@ class metric_distances {
     const double along_y = mix(x10 - x00, x11 - x01, w);
     return {mix(y0, y1, w), vec3{along_x, along_y, y1 - y0} / cell};
   }
-  /// Radius (metres) around `p` in which there is certainly no point of an obstacle's cube; 0 in obstacles. O(1).
+  /// Radius (metres) around `p` that is certain to contain no point of an obstacle's cube; 0 in obstacles. O(1).
   template <point_like P>
   [[nodiscard]] double clearance(const P& p) const noexcept {
     const auto k = grid_.key(p);
@@ -119,7 +119,7 @@ class metric_distances {
   [[nodiscard]] const octree::voxel_grid& grid() const noexcept { return grid_; }
   /// The largest distance, metres.
   [[nodiscard]] double reach() const noexcept { return reach_; }
-  /// Distance in metres of a squared distance in voxels.
+  /// Converts a squared distance in voxels to a distance in metres.
   [[nodiscard]] double metres(std::uint16_t squared) const noexcept {
     return squared == squared_distance_view::far
                ? reach_
@@ -158,8 +158,8 @@ template <class Outside, class Inside, point_like P>
   return {to.distance - out.distance, to.gradient - out.gradient};
 }
 
-/// The distance field of a map. It is bit for bit equal to one rebuilt from the present map, whatever the order of
-/// changes, including obstacles that appear and vanish. It needs no bounds. The algorithm is described in
+/// The distance field of a map. It is bit for bit equal to one rebuilt from the current map, regardless of the order of
+/// changes, including obstacles that appear and disappear. It needs no bounds. The algorithm is described in
 /// squared_distances.hpp.
 ///
 /// For one thread at a time. Readers on other threads use a `view()`, made on the thread that updates the field.
@@ -182,10 +182,10 @@ class distance_field : public metric_distances<squared_distances> {
   /// Follows the map by its change log (`map.changes()`) if it has one that covers all changes since the last update.
   /// Otherwise it compares everything: after changes that the log does not record (see
   /// occupancy_octree::track_changes), and each time if changes are not tracked. Costs as much as
-  /// squared_distances::update; comparing everything takes O(bricks of the field + octants of the map) more. Of a leaf
-  /// with an edge of 256 voxels or more, only the part within reach of its faces costs time and memory; if such a leaf
-  /// appeared or vanished since everything was last compared, the field is rebuilt. @pre the same map every time, of
-  /// the same grid
+  /// squared_distances::update, plus O(bricks of the field + octants of the map) to compare everything. Of a leaf with
+  /// an edge of 256 voxels or more, only the part within reach of its faces costs time and memory; if such a leaf has
+  /// appeared or disappeared since everything was last compared, the field is rebuilt. @pre the same map every time,
+  /// with the same grid
   template <planning_map Map>
   void update(const Map& map) {
     assert(map_access<Map>::grid(map) == grid_);
@@ -200,7 +200,7 @@ class distance_field : public metric_distances<squared_distances> {
   ///     field.update(snapshot.map, log, snapshot.revision);
   ///   };
   /// @endcode
-  /// @pre revision <= log.revision(); copies of the same map every time, of the same grid
+  /// @pre revision <= log.revision(); copies of the same map every time, with the same grid
   template <planning_map Map>
   void update(const Map& copy, const octree::change_log& log, std::uint64_t revision) {
     assert(map_access<Map>::grid(copy) == grid_);
@@ -228,8 +228,8 @@ class distance_field : public metric_distances<squared_distances> {
   /// to, 4 kB at a time. On the updating thread query the field itself.
   [[nodiscard]] distance_view view() const { return {grid_, voxels_.view(), reach_}; }
   /// False if leaves of the map were left out because of `max_bricks`: they count as unknown, at least where the field
-  /// stores nothing. If unknown space counts as an obstacle, distances are then at most too short; if it counts as
-  /// free, obstacles are missing. With the option `inside` it is the opposite.
+  /// stores nothing. In that case, if unknown space counts as an obstacle, distances may be too short; if it counts as
+  /// free, obstacles are missing. With the option `inside` the reverse holds.
   [[nodiscard]] bool is_complete() const noexcept { return is_complete_; }
   [[nodiscard]] const distance_field_options& options() const noexcept { return options_; }
   /// Bytes on the heap.
@@ -260,8 +260,8 @@ class distance_field : public metric_distances<squared_distances> {
     }
     apply();
   }
-  /// Lists the octants that may differ in the map, and begins an empty field with the cubes. Returns false if the cubes
-  /// that it began with are no longer those of the map.
+  /// Lists the octants that may differ in the map; initialises an empty field with the cubes. Returns false if those
+  /// initial cubes no longer match the map.
   template <planning_map Map>
   bool find_differences(const Map& map) {
     octants_.clear();
@@ -332,7 +332,7 @@ class distance_field : public metric_distances<squared_distances> {
   std::vector<octant_obstacles> octants_;
   struct {
     std::uint64_t bricks = 0, volume = 0;
-  } cubes_;  ///< totals of the cubes that the field began with
+  } cubes_;  ///< totals of the cubes that the field was initialised with
   bool is_complete_ = true;
 };
 

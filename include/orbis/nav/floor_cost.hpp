@@ -21,7 +21,7 @@ inline constexpr std::uint8_t no_information = 255;
 struct inflation_options {
   double radius = 0.2;             ///< of the robot, metres ("inscribed radius")
   double inflation_radius = 0.55;  ///< metres; obstacles farther away cost nothing
-  double cost_scaling = 3.0;       ///< rate at which the cost falls, per metre
+  double cost_scaling = 3.0;       ///< rate at which the cost decreases, per metre
 };
 
 /// The squared distance of each cell to the nearest occupied one, between their centres, in cells; a large number if no

@@ -15,7 +15,7 @@ namespace orbis::nav {
 /// all three states back ("trinary"): `free_thresh` is 0.196, because with 0.25, Nav2's default, unknown cells are read
 /// as free. Each file is replaced atomically, the image first. Errors: write_failed, invalid_argument (no file name, or
 /// one that ends in .pgm or contains a quotation mark, a backslash or a control character; an empty map, or one whose
-/// origin or resolution is not finite; nothing is written then).
+/// origin or resolution is not finite; in these cases nothing is written).
 [[nodiscard]] result<void> save_floor_map(const std::filesystem::path& path, const floor_map& map);
 
 }  // namespace orbis::nav

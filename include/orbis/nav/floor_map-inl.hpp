@@ -22,7 +22,7 @@ namespace orbis::nav {
 
 namespace detail {
 
-/// Maximum number of octants on top of large leaves that find_floor examines: one second's work.
+/// Maximum number of octants on top of large leaves that find_floor examines; they take about a second.
 inline constexpr std::uint64_t most_octants_on_leaves = std::uint64_t{1} << 24U;
 
 }  // namespace detail
@@ -63,7 +63,7 @@ std::optional<double> find_floor(const Map& map) {
 namespace detail {
 
 /// Replaces each value by the extreme of the values at most `radius` away along both axes: combines ranges of doubling
-/// lengths, and finally two of these that overlap. `nothing` counts as no value. O(values x log radius).
+/// lengths, and finally two of these that overlap. The value `nothing` means "no value". O(values x log radius).
 template <class Extreme>
 void spread_extremes(image<int>& values, int radius, int nothing, const Extreme& extreme) {
   std::vector<int> line;
@@ -148,7 +148,8 @@ class floor_search {
       return floor_state::occupied;
     return in_doubt();
   }
-  /// Sets the radius of is_steep, in cells. Call it before judging and after driving.
+  /// Sets the radius of is_steep, in cells. Call it after the reachable surfaces are known and before cells are
+  /// evaluated.
   void set_radius(int radius) {
     radius_ = std::min(radius, std::max(levels_.width(), levels_.height()));
     // Sums of integers are faster, if they fit.
@@ -165,8 +166,8 @@ class floor_search {
     spread_extremes(high_, radius_, none, [](int a, int b) { return std::max(a, b); });
   }
 
-  /// For each column the level of the nearest column that has one, by steps to the four neighbours; of several the
-  /// lowest. `otherwise` if there is none.
+  /// For each column, the level of the nearest column that has one, counting steps to the four neighbours; the lowest
+  /// on ties. `otherwise` if there is none.
   [[nodiscard]] image<int> spread_levels(int otherwise) const {
     image<int> spread = levels_;
     std::vector<std::array<int, 2>> border, next;

@@ -38,7 +38,7 @@ struct ground_robot {
 /// State of a cell of the floor.
 enum class floor_state : std::uint8_t {
   unknown,
-  free,     ///< the robot's centre may be over it, judging by this cell alone
+  free,     ///< the robot's centre may be over it, considering this cell alone
   occupied  ///< an obstacle, a drop, a hole, too high a step, too steep a floor, or too little height
 };
 
@@ -51,7 +51,7 @@ struct floor_map_options {
   std::optional<octree::bounding_box> region{};  ///< part of the map to use (x and y), metres; empty: all
 };
 
-/// The floor by square cells, one for each column of voxels. Cell (0, 0) has the least x and y.
+/// The floor by square cells, one for each column of voxels. Cell (0, 0) has the smallest x and y.
 struct floor_map {
   double resolution = 0.0;      ///< the edge of a cell, metres
   vec2 origin = zeros<vec2>();  ///< the low corner of cell (0, 0), metres
@@ -79,8 +79,8 @@ struct floor_map {
 
 /// Height (metres) of the floor: the top of the lowest large horizontal layer, that is, one with at least half as much
 /// surface with free space right above it as the largest has. Two layers of voxels count as one, because a floor may
-/// lie between them. The observed floor lies in these voxels: up to one lower. Empty if there is no such surface.
-/// O(octants + tops of larger leaves in octants; at most 2^24 of these count).
+/// lie between them: the observed floor is within these voxels, up to one voxel lower. Empty if there is no such
+/// surface. O(octants + tops of larger leaves in octants; at most 2^24 of the latter).
 template <planning_map Map>
 [[nodiscard]] std::optional<double> find_floor(const Map& map);
 
@@ -92,12 +92,12 @@ template <planning_map Map>
 /// lowest counts. Such a cell is free, with these exceptions. It is occupied
 /// - if a neighbour is lower by more than a step: a drop,
 /// - if the floor within the robot's radius (a square) rises by more than a step, and the plane through it is steeper
-///   than `max_slope`. Cells that differ by more than a step for each cell that they are away do not count in this.
+///   than `max_slope`. Cells that differ by more than a step per cell of distance are ignored here.
 /// and it has the state `options.unknown` if the robot's height above it is not fully known. A cell that the robot does
-/// not reach is judged from the nearest one that it reaches: occupied if something is in the robot's way there, or if
-/// there is nothing to drive on (a hole: all voxels within a step below are known to be free); otherwise it has the
-/// state `options.unknown`. If that is `occupied`, the robot does not drive on surfaces whose height above is not fully
-/// known.
+/// not reach is classified relative to the nearest one that it reaches: occupied if an obstacle is in the robot's way,
+/// or if there is nothing to drive on (a hole: all voxels within a step below are known to be free); otherwise it has
+/// the state `options.unknown`. If that is `occupied`, the robot does not drive on surfaces whose height above is not
+/// fully known.
 ///
 /// After: A. Hornung et al., "OctoMap", Autonomous Robots 34, 2013 (projection of a height band); P. Fankhauser et al.,
 /// "Probabilistic terrain mapping for mobile robots with uncertain localization", RA-L 3, 2018 (steps and slopes).

@@ -26,26 +26,26 @@
 
 namespace orbis::nav {
 
-/// Tests whether a disc is free on a floor, at rest or moving along a segment: whether it has no point in common with
-/// the square of an occupied cell. The answers are exact. Space outside of the map counts as unknown cells.
+/// Tests whether a disc, at rest or moving along a segment, is free on a floor, i.e. has no point in common with the
+/// square of an occupied cell. The results are exact. Space outside of the map counts as unknown cells.
 ///
-/// A `planning_space` that ignores z: the distance of two places is the horizontal one, and a path is reported at the
-/// height of the floor in the cells of its points. It refers to the floor map, which must not change while the view is
-/// used. Safe for concurrent queries.
+/// A `planning_space` that ignores z: the distance between two positions is the horizontal one, and a path is reported
+/// at the height of the floor in the cells of its points. It refers to the floor map, which must not change while the
+/// view is used. Safe for concurrent queries.
 class floor_view {
  public:
   static constexpr int dimensions = 2;
 
   /// `radius`: of the robot, metres. `unknown`: state that unknown cells count as. O(cells).
-  /// @pre radius > 0; less than 2^21 cells along x and y; the options'
+  /// @pre radius > 0; fewer than 2^21 cells along x and y; the options'
   floor_view(const floor_map& map, double radius, const planning_options& options = {},
              octree::occupancy unknown = octree::occupancy::occupied)
       : map_{&map}, radius_{radius}, options_{options} {
     look_at_obstacles(unknown, [&](int x, int y) { return map.states(x, y); });
   }
-  /// For the centre of a robot on a cost map (see inflate), which accounts for its radius: cells with at least
-  /// `inscribed` are obstacles, and a metre costs 1 + clearance_weight cost / 252 in the others; preferred_clearance is
-  /// ignored.
+  /// For the centre of a robot on a cost map (see inflate), which accounts for its radius: cells with a cost of at
+  /// least `inscribed` are obstacles; in the others a metre costs 1 + clearance_weight cost / 252; preferred_clearance
+  /// is ignored.
   /// @pre as above; costs are those of `map`, and outlive the view
   floor_view(const floor_map& map, const image<std::uint8_t>& costs, const planning_options& options = {},
              octree::occupancy unknown = octree::occupancy::occupied)
@@ -126,7 +126,7 @@ class floor_view {
   }
   /// `p` with z = 0.
   [[nodiscard]] vec3 placed(const vec3& p) const noexcept { return {p.x(), p.y(), 0.0}; }
-  /// `p` at the height of the floor in its cell or, where the robot does not go, at the height of the floor as a whole.
+  /// `p` at the height of the floor in its cell or, where the robot cannot go, at the overall floor height.
   [[nodiscard]] vec3 on_ground(const vec3& p) const {
     const auto cell = map_->cell(p);
     const double height = cell && !map_->heights.empty() ? map_->heights((*cell)[0], (*cell)[1]) : map_->floor;

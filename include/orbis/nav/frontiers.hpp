@@ -54,8 +54,8 @@ struct frontier_cluster {
 
 struct frontier_options {
   /// Maximum number of octants to examine on the faces of leaves of the map that are larger than 8x8x8 voxels: a file
-  /// of a few bytes can be a leaf as large as the grid, whose faces have 1.6e9. Octants beyond the limit are left out,
-  /// see `is_complete`.
+  /// of a few bytes can describe a leaf as large as the grid, whose faces have 1.6e9 octants. Octants beyond the limit
+  /// are left out, see `is_complete`.
   std::size_t max_octants = std::size_t{1} << 24U;
 };
 
@@ -64,11 +64,11 @@ struct cluster_options {
 };
 
 /// The frontier of a map: the free voxels with an unknown voxel among their six face neighbours. Space outside of the
-/// grid does not count as unknown, because it cannot be observed. The frontier depends only on the present map, not on
+/// grid does not count as unknown, because it cannot be observed. The frontier depends only on the current map, not on
 /// the order of changes.
 ///
-/// Octants are bit masks, so that a few shifts and ands give the frontier of 64 voxels. Only nonempty masks are stored,
-/// 48 to 64 bytes for each. For one thread at a time.
+/// Octants are bit masks, so that a few bit operations compute the frontier of 64 voxels. Only nonempty masks are
+/// stored, 48 to 64 bytes for each. For one thread at a time.
 class frontiers {
  public:
   /// The frontier of an empty map.
@@ -85,14 +85,14 @@ class frontiers {
 
   /// Follows the map by its change log, as distance_field::update does. O(octants that changed) on average; if the log
   /// does not reach back far enough, O(octants of the map + octants on the faces of its larger leaves). @pre the same
-  /// map every time, of the same grid
+  /// map every time, with the same grid
   template <planning_map Map>
   void update(const Map& map) {
     assert(map_access<Map>::grid(map) == grid_);
     follower_.follow(map, changed_in(map), [&] { rebuild(map); });
   }
   /// Follows a copy of the map, as distance_field::update does.
-  /// @pre revision <= log.revision(); copies of the same map every time, of the same grid
+  /// @pre revision <= log.revision(); copies of the same map every time, with the same grid
   template <planning_map Map>
   void update(const Map& copy, const octree::change_log& log, std::uint64_t revision) {
     assert(map_access<Map>::grid(copy) == grid_);
@@ -129,8 +129,8 @@ class frontiers {
     for (const std::uint32_t i : order) out.push_back({octree::morton_key(found_[i].name << 6U), found_[i].mask});
     return out;
   }
-  /// The connected components of the frontier: the largest cluster first, of equal ones that with the lowest voxel
-  /// along the Morton curve. O(n log n)
+  /// The connected components of the frontier: the largest cluster first; among equal ones, the one with the lowest
+  /// voxel along the Morton curve. O(n log n)
   [[nodiscard]] std::vector<frontier_cluster> clusters(const cluster_options& options = {}) const;
 
   [[nodiscard]] const octree::voxel_grid& grid() const noexcept { return grid_; }
@@ -145,7 +145,8 @@ class frontiers {
     std::uint64_t mask;
   };
 
-  /// Cache of octants of a map by their Morton codes, addressed by the low bits: one octant for each place in a cube.
+  /// Direct-mapped cache of a map's octants, addressed by the low bits of the Morton code: one entry for each position
+  /// in a cube.
   template <class Octants>
   class octant_cache {
    public:
@@ -173,7 +174,7 @@ class frontiers {
     if (here != 0) visit(others | ((here - one) & along), std::false_type{});
     if (here != (last_ & along)) visit(others | (((here | ~along) + one) & along), std::true_type{});
   }
-  /// The frontier in an octant. `octants`: reads the map.
+  /// The frontier in an octant. `octants`: reader of the map.
   template <class Octants>
   [[nodiscard]] std::uint64_t frontier_in(Octants& octants, std::uint64_t name) const {
     const octree::octant_states here = octants(name);

@@ -14,10 +14,10 @@
 
 namespace orbis::nav {
 
-/// Access of planning to a map. Specialise it for a user-defined type with `grid`, `octants` and `for_each_octant` of
-/// the specialisation for octrees below; the map is read in place and not copied. The other functions are optional:
-/// `state` and `overlaps` are then implemented with `octants`, and octants in a box are selected from all octants,
-/// which is slower.
+/// Access of planning to a map. To support a user-defined type, specialise it with `grid`, `octants` and
+/// `for_each_octant` as in the specialisation for octrees below; the map is read in place and not copied. The other
+/// functions are optional: `state` and `overlaps` are then implemented with `octants`, and octants in a box are
+/// selected from all octants, which is slower.
 template <class Map>
 struct map_access;
 
@@ -30,7 +30,7 @@ struct map_access<Map> {
   /// not change.
   [[nodiscard]] static octree::octant_reader<Map> octants(const Map& map) { return octree::octant_reader<Map>{map}; }
   /// Calls `visit(lowest voxel, level, states)` for every octant (level 2) with known voxels; larger cubes whose
-  /// octants all have the same states may be visited as one. Each voxel once, in any order.
+  /// octants all have the same states may be visited as one. Visits each voxel once, in any order.
   template <class Visit>
   static void for_each_octant(const Map& map, Visit&& visit) {
     octree::for_each_octant(map, visit);

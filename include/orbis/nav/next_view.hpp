@@ -37,9 +37,9 @@
 
 namespace orbis::nav {
 
-/// Places of a frontier to look at: splits large clusters by the cubes of a lattice; the mean of each cube's voxels is
-/// a place (metres). Larger clusters come first. `spacing`: edge of the cubes, metres, rounded to a power of two of
-/// voxels, at least 4.
+/// Returns the places of a frontier to look at (metres): large clusters are split by the cubes of a lattice, and the
+/// mean of each cube's voxels is a place. Larger clusters come first. `spacing`: edge of the cubes, metres, rounded to
+/// a power of two of voxels, at least 4.
 [[nodiscard]] inline std::vector<vec3> places_of(std::span<const frontier_cluster> clusters,
                                                  const octree::voxel_grid& grid, double spacing = 0.8) {
   const double levels = std::round(std::log2(std::max(4.0, spacing / grid.resolution())));
@@ -79,10 +79,10 @@ struct next_view_options {
 
 enum class next_view_status : std::uint8_t {
   found,
-  /// None of the candidates where the robot is free sees enough. Candidates are random: another seed may find a view if
-  /// little is left to see or the robot barely fits.
+  /// No candidate at which the robot is free sees enough. Candidates are random: if little is left to see or the robot
+  /// barely fits, another seed may find a view.
   nothing_to_see,
-  start_outside,  ///< the robot is outside of the grid or the region, or its position is not finite
+  start_outside,  ///< the robot is outside the grid or the region, or its position is not finite
   start_blocked,  ///< it touches an obstacle
   unreachable,    ///< no path leads to any of the candidates
   gave_up         ///< no path was found after path.max_expanded cells; one may exist
@@ -100,11 +100,11 @@ enum class next_view_status : std::uint8_t {
   return "unknown";
 }
 
-/// A view and the path to it; or only the reason why there is none.
+/// A view and the path to it, or the reason why there is none.
 struct next_view {
   next_view_status status = next_view_status::nothing_to_see;
   se3 T_world_camera{};        ///< the camera's axes: x to the right, y down, z forward; x is level
-  vec3 place = zeros<vec3>();  ///< that the camera looks at, metres
+  vec3 place = zeros<vec3>();  ///< point that the camera looks at, metres
   double gain = 0.0;           ///< unknown space that the camera would see, cubic metres
   double utility = 0.0;        ///< gain * exp(-lambda * length of the path); 0 if that is too small for a double
   found_path path{};
@@ -118,18 +118,18 @@ struct next_view {
 }
 
 /// The best random view of the places, among those with a gain greater than 0 and at least `min_gain` where the robot
-/// (whose camera is at its reference point) is free and that it can reach. The best has the greatest utility, gain *
-/// exp(-lambda * length of the path): H. H. Gonzalez-Banos, J.-C. Latombe, "Navigation strategies for exploring indoor
-/// environments", International Journal of Robotics Research 21, 2002. A path is searched only while a straight one
-/// could still be the best, and only if the straight segment is free or free cells connect both ends. The world has z
-/// up.
+/// (whose camera is at its reference point) is free and that it can reach. The best view has the greatest utility, gain
+/// * exp(-lambda * length of the path): H. H. Gonzalez-Banos, J.-C. Latombe, "Navigation strategies for exploring
+/// indoor environments", International Journal of Robotics Research 21, 2002. A path is searched only while a straight
+/// one could still be the best, and only if the straight segment is free or free cells connect both ends. The world has
+/// z up.
 ///
-/// All failed searches together expand less than 2 `path.max_expanded` cells, whatever the number of candidates: each
-/// one at most half of the remaining number. So if more cells than that are reachable, for example because unknown
+/// All failed searches together expand fewer than 2 `path.max_expanded` cells, regardless of the number of candidates:
+/// each one at most half of the remaining number. If more cells than that are reachable, for example because unknown
 /// space is free and no region is given, some searches may give up; the result is then the best of the views to which a
 /// path was found, if there is one.
 ///
-/// The same arguments give the same view. Typically a millisecond per candidate, plus the cost of find_path.
+/// Deterministic. Typically takes a millisecond per candidate, plus the cost of find_path.
 /// @pre 0 < min_distance <= max_distance; 0 <= max_elevation < pi / 2; lambda >= 0
 template <planning_map Map, robot_shape Shape, camera::camera_model Camera>
 [[nodiscard]] next_view next_best_view(const planning_view<Map, Shape>& view, std::span<const vec3> places,

@@ -29,7 +29,7 @@ namespace orbis::nav {
 
 enum class path_status : std::uint8_t {
   found,
-  start_outside,  ///< the start is outside of the grid or the region, or not finite
+  start_outside,  ///< the start is outside the grid or the region, or not finite
   start_blocked,  ///< the robot touches an obstacle at the start
   goal_outside,
   goal_blocked,
@@ -52,9 +52,9 @@ enum class path_status : std::uint8_t {
 
 /// Method of the path search.
 enum class path_method : std::uint8_t {
-  /// Lazy Theta*: straight over many cells where nothing is in between; shorter, but not proven optimal. If costs other
-  /// than the length count (see planning_options), it adds up costs along each segment, and takes several times as long
-  /// as `grid` for a path that is hardly better.
+  /// Lazy Theta*: straight across many cells where no obstacle is in between; shorter paths, but not guaranteed
+  /// optimal. If costs other than length apply (see planning_options), it adds up costs along each segment, and takes
+  /// several times as long as `grid` for a marginally better path.
   any_angle,
   grid  ///< A*: optimal among paths in steps from cell to neighbouring cell
 };
@@ -79,7 +79,7 @@ struct found_path {
   std::vector<vec3> points{};
   double length = 0.0;       ///< of the points, metres
   double cost = 0.0;         ///< see planning_options; equals the length in a uniform space. Excludes heights of floors
-  std::size_t expanded = 0;  ///< number of expanded cells; 0 if the straight segment was taken at once
+  std::size_t expanded = 0;  ///< number of expanded cells; 0 if the straight segment was taken immediately
 };
 
 /// The length of a polyline, in the unit of its points.
@@ -165,7 +165,7 @@ void shorten_path(const Space& space, std::vector<vec3>& points, std::size_t max
 
 namespace detail {
 
-/// Returns true if the cost of the free segment equals its length: no path is cheaper then.
+/// Returns true if the cost of the free segment equals its length, so that no path is cheaper.
 template <planning_space Space>
 [[nodiscard]] bool costs_its_length(const Space& space, const vec3& a, const vec3& b) {
   return space.is_uniform() || cost_of(space, a, b) <= norm(b - a) * (1.0 + 1e-9);
@@ -216,7 +216,7 @@ template <planning_space Space>
 /// for the robot only off the grid is not found.
 ///
 /// O(n log n) for n expanded cells, 16 kB for each 8x8x8 voxels (2 kB for each 8x8 cells of a floor) visited, and
-/// `max_checks` segments to check in shortening. An unreachable goal costs little if it, or the start, is in a small
+/// `max_checks` segment checks for shortening. An unreachable goal costs little if it, or the start, is in a small
 /// enclosure, or if it is in an obstacle. Otherwise, for example if unknown space is free and no region is given, the
 /// search expands `max_expanded` cells.
 /// @pre options.heuristic_weight is finite and >= 1

@@ -16,15 +16,15 @@ namespace orbis::nav {
 ///
 ///     (1 + clearance_weight (1 - d / preferred_clearance)^2) u,    d < preferred_clearance
 ///
-/// with d the distance of the robot's hull to the nearest obstacle when the robot is at the centre of the cell (metres,
-/// accurate to about a cell), the parenthesis 1 for greater d, and u = `unknown_cost` in unknown cells, otherwise 1. No
-/// path costs less than its length.
+/// where d is the distance of the robot's hull to the nearest obstacle when the robot is at the centre of the cell
+/// (metres, accurate to about a cell); the factor in parentheses is 1 for greater d, and u is `unknown_cost` in unknown
+/// cells and 1 elsewhere. No path costs less than its length.
 struct planning_options {
-  /// Box that the robot's reference point stays in, metres; empty: anywhere on the grid.
+  /// Box in which the robot's reference point must stay, metres; empty: anywhere on the grid.
   std::optional<octree::bounding_box> region{};
-  double clearance_weight = 0.0;     ///< >= 0; 0: only the length counts
-  double preferred_clearance = 0.3;  ///< metres; > 0. The reach of the field should exceed the robot by this distance
-  /// Cost of a metre through unknown space if that counts as free; >= 1.
+  double clearance_weight = 0.0;     ///< >= 0; 0: length only
+  double preferred_clearance = 0.3;  ///< metres; > 0. The reach of the field should exceed the robot's radius by this
+  /// Cost of a metre through unknown space, if unknown space counts as free; >= 1.
   double unknown_cost = 1.0;
 };
 
@@ -33,7 +33,7 @@ struct planning_options {
 ///
 /// - `dimensions`: 2 or 3, the axes along which cells have neighbours;
 /// - `resolution()`: the edge of a cell, metres;
-/// - `key(p)`: the cell of a position; empty outside of the grid and of the region, and if not finite;
+/// - `key(p)`: the cell of a position; empty outside the grid and of the region, and if not finite;
 /// - `contains(k)`: whether a cell is in the grid, and its centre in the region;
 /// - `center(k)`: the centre of a cell;
 /// - `clamped(p)`: the point of the grid nearest to the finite position `p` (the target of a search for a goal
@@ -41,7 +41,7 @@ struct planning_options {
 /// - `is_free(k)`, `is_free(p)`, `is_free(a, b)`: whether the robot fits at the centre of a cell, at a position, and
 ///   everywhere on the straight segment between two positions. If both ends are equal, the last one equals
 ///   `is_free(p)`;
-/// - `is_surely_free(a, b)`: a cheap test for the same that may be false although the segment is free;
+/// - `is_surely_free(a, b)`: a cheap, conservative version of the same test; it may return false for a free segment;
 /// - `density(k)`: the cost of a metre in a cell, at least 1; `is_uniform()`: whether it is 1 everywhere;
 /// - `placed(p)`: the position as used in the search: on a floor with z = 0;
 /// - `on_ground(p)`: the position as reported: on a floor at its height.

@@ -109,11 +109,11 @@ template <planning_map Map, octree::overlap_shape Shape>
 
 }  // namespace detail
 
-/// Tests whether a robot is free, at rest or moving along a segment. The answer is that of `octree::overlaps` for the
-/// robot's shape or the volume that it sweeps (for a ball: a capsule), with unknown space treated as in the field. It
-/// is neither sampled nor taken from voxel centres; the two differ at most by rounding, where the robot just touches a
-/// voxel. The field alone decides if obstacles are far away, or so near that the robot certainly touches one; only in
-/// the narrow band between these the map is read.
+/// Tests whether a robot is free, at rest or moving along a segment. The result equals that of `octree::overlaps` for
+/// the robot's shape or the volume that it sweeps (for a ball: a capsule), with unknown space treated as in the field.
+/// Nothing is sampled or approximated by voxel centres; the two results differ at most by rounding where the robot just
+/// touches a voxel. The field alone decides if obstacles are far away, or so near that the robot certainly touches one;
+/// the map is read only in the narrow band in between.
 ///
 /// A `planning_space`. It refers to the map and the field; neither may change while it is used. Safe for concurrent
 /// queries.
@@ -123,8 +123,9 @@ class planning_view {
   static constexpr int dimensions = 3;
 
   /// The reach of the field should be at least two voxels more than the robot's radius, and the field complete
-  /// (`is_complete`). Otherwise queries only take longer: an incomplete field is used only for distances in costs. @pre
-  /// those of the shape and of the options; the field is that of the map, up to date, and of obstacles (not `inside`)
+  /// (`is_complete`). Otherwise queries merely take longer: an incomplete field is used only for distances in costs.
+  /// @pre the preconditions of the shape and the options; the field belongs to the map, is up to date, and contains
+  /// distances to obstacles (not `inside`)
   planning_view(const Map& map, const distance_field& field, const Shape& shape, const planning_options& options = {})
       : map_{&map}, field_{&field}, shape_{shape}, cover_{cover_of(shape)}, options_{options} {
     assert(cover_.inner > 0.0 && map_access<Map>::grid(map) == field.grid() && !field.options().inside);
@@ -145,10 +146,10 @@ class planning_view {
   = delete;
 
   /// Returns true if the robot with its reference point at `p` (metres) touches no obstacle. False if `p` is not
-  /// finite, or outside of the region. O(1) away from obstacles; near them as expensive as `overlaps`.
+  /// finite, or outside the region. O(1) away from obstacles; near them as expensive as `overlaps`.
   [[nodiscard]] bool is_free(const vec3& p) const { return is_free(p, p); }
   /// Returns true if the robot touches no obstacle on the straight segment from `a` to `b` (metres). False if an end is
-  /// outside of the region, or the segment longer than four edges of the map's grid. O(length / distance to the
+  /// outside the region, or the segment longer than four edges of the map's grid. O(length / distance to the
   /// obstacles), plus the cost of `overlaps` for each 4 voxels near them.
   [[nodiscard]] bool is_free(const vec3& a, const vec3& b) const {
     const double cell = resolution();
@@ -199,7 +200,7 @@ class planning_view {
     return options_.clearance_weight == 0.0 && options_.unknown_cost == 1.0;
   }
 
-  /// The voxel of `p` (metres); empty outside of the grid and of the region, and if not finite. O(1).
+  /// The voxel of `p` (metres); empty outside the grid and of the region, and if not finite. O(1).
   [[nodiscard]] std::optional<octree::voxel_key> key(const vec3& p) const {
     return is_in_region(p) ? grid().key(p) : std::nullopt;
   }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Paths in a changing map: tests whether a change blocks the path, and replans only then.
+/// Paths in a changing map: tests whether a change blocks the path, and replans only if it does.
 ///
 /// @code
 ///   orbis::nav::replanner planner{goal};
@@ -47,10 +47,10 @@ concept follows_changes = requires(const Space& space) {
 };
 }  // namespace detail
 
-/// Monitors whether a path stays free while the map changes. It uses the map's change log: it tests exactly those
-/// segments again along which the robot sweeps over a changed octant (4x4x4 voxels). It tests all segments if the log
-/// does not reach back far enough, on floors, and on maps without a log. It does not notice shorter paths that open
-/// when obstacles vanish.
+/// Monitors whether a path stays free while the map changes. It uses the map's change log: it retests exactly those
+/// segments along which the robot sweeps over a changed octant (4x4x4 voxels). It tests all segments if the log does
+/// not reach back far enough, on floors, and on maps without a log. It does not notice shorter paths that open up when
+/// obstacles disappear.
 class path_monitor {
  public:
   /// A monitor without a path.
@@ -63,8 +63,8 @@ class path_monitor {
 
   /// The first segment (from points()[i] to points()[i + 1]) that is no longer free since the path was given or last
   /// checked. A blocked segment is tested again each time. O(changed octants x segments), few operations for each, plus
-  /// the cost of `is_free` for the segments that are tested. @pre the same map every time (of floors: one of the same
-  /// world), and a view of its present state
+  /// the cost of `is_free` for the segments that are tested. @pre the same map every time (for floors: a map of the
+  /// same world), and a view of its current state
   template <planning_space Space>
   [[nodiscard]] std::optional<std::size_t> first_blocked(const Space& space) {
     const std::size_t segments = points_.empty() ? 0 : points_.size() - 1;
@@ -128,7 +128,7 @@ class path_monitor {
 
   std::vector<vec3> points_;
   detail::map_follower follower_;
-  std::vector<bool> is_suspect_;  ///< segments that changes touch and that are not known to be free
+  std::vector<bool> is_suspect_;  ///< segments touched by changes and not known to be free
   std::vector<octree::bounding_box> sweeps_;
   std::size_t tested_ = 0;
 };
@@ -142,7 +142,7 @@ class replanner {
   explicit replanner(const vec3& goal, const path_options& options = {}) : goal_{goal}, options_{options} {}
 
   /// The path from `position` (metres) to the goal, as found by find_path: the previous one without the part already
-  /// passed, or a new one; on a floor at its present height. Valid until the next call. @pre those of
+  /// passed, or a new one; on a floor at its current height. Valid until the next call. @pre those of
   /// path_monitor::first_blocked
   template <planning_space Space>
   const found_path& update(const Space& space, const vec3& position) {

@@ -80,9 +80,9 @@ struct swept_shape {
   return {a, b, s};
 }
 
-/// Balls on the vertical line through the reference point that bound a shape from outside and inside: `count` balls
-/// from `low` above the reference point on, `spacing` apart (metres). Balls of radius `outer` cover the shape, and
-/// those of radius `inner` are in it.
+/// Balls on the vertical line through the reference point that bound a shape from outside and inside: `count` balls,
+/// the first `low` above the reference point, `spacing` apart (metres). Balls of radius `outer` cover the shape, and
+/// balls of radius `inner` are inside it.
 struct ball_cover {
   double low = 0.0, spacing = 0.0;
   int count = 1;

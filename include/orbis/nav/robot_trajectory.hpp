@@ -116,7 +116,7 @@ class robot_trajectory {
 
 namespace detail {
 
-/// Returns true if a robot is free along a Bezier curve. The curve is in the convex hull of its control points. So its
+/// Returns true if a robot is free along a Bezier curve. The curve is in the convex hull of its control points, so its
 /// distance from the segment between its ends is at most that of the farthest control point. Tests a robot inflated by
 /// that distance along the segment, and if that is not free, each half of the curve recursively. Nothing is sampled.
 template <inflatable_space Space>
@@ -146,8 +146,8 @@ template <inflatable_space Space>
 /// A trajectory along a polyline, from rest to rest, within the limits. Corners are rounded (see path_piece) as far as
 /// the robot fits: each rounded corner is certified as a whole by the exact test of the volume that an inflated robot
 /// (of a user-defined shape: the balls that cover it) sweeps along pieces of the curve's convex hull. If none of
-/// several sizes fits, the robot stops at the corner. So the robot is free all the time. Speed and acceleration are
-/// within the limits everywhere, not only at samples.
+/// several sizes fits, the robot stops at the corner. The robot is therefore free at all times. Speed and acceleration
+/// are within the limits everywhere, not only at samples.
 ///
 /// On a floor (`floor_view`) the points keep their heights. Between them height is linear, so that the robot's true
 /// height may differ: `view.on_ground(position)` returns it. The limits hold for the polyline's motion.

@@ -11,10 +11,10 @@
 ///     plane(x, y, z) = min over j of along(x, j, z)^2 + (y - j)^2
 ///     space(x, y, z) = min over k of plane(x, y, k) + (z - k)^2
 ///
-/// A change propagates through the stages and ends where a value is unchanged. In each stage, sources that rose mark
-/// those slices of 8x8 voxels as stale in which a value equals the source's previous offer: it may have been the least,
-/// and the slice is computed again, once. Sources that fell lower their targets. So the values do not depend on the
-/// order of changes.
+/// A change propagates through the stages and ends where a value is unchanged. In each stage, sources that increased
+/// mark as stale those slices of 8x8 voxels in which a value equals the source's previous offer: it may have been the
+/// minimum, and the slice is recomputed once. Sources that decreased lower their targets. The values therefore do not
+/// depend on the order of changes.
 #pragma once
 
 #include <algorithm>
@@ -68,12 +68,12 @@ class squared_distance_view {
   }
   /// Maximum distance, in voxels.
   [[nodiscard]] int reach() const noexcept { return reach_; }
-  /// The value outside of the grid, and in all bricks that are not stored, except those in a cube (see
+  /// The value outside the grid, and in all bricks that are not stored, except those in a cube (see
   /// squared_distances::begin).
   [[nodiscard]] std::uint16_t elsewhere() const noexcept { return elsewhere_; }
   /// Calls `visit(lowest voxel, values)` for every stored brick: 8x8x8 squared distances, x fastest. Bricks that are
-  /// not stored have the value `elsewhere()`, or in cubes that the field began with the opposite: 0 or `far`. In no
-  /// particular order.
+  /// not stored have the value `elsewhere()`, or, in cubes that the field was initialised with, the opposite: 0 or
+  /// `far`. The order is unspecified.
   template <class Visit>
   void for_each_brick(Visit&& visit) const {
     for (std::size_t i = 0; i != values_.size(); ++i) {
@@ -85,7 +85,7 @@ class squared_distance_view {
   }
   [[nodiscard]] std::size_t brick_count() const noexcept { return values_.size(); }
 
-  /// Reads squared distances of voxels, each near the one before. The view must outlive the reader and not change.
+  /// Reads squared distances of voxels, each near the previous one. The view must outlive the reader and not change.
   class reader {
    public:
     explicit reader(const squared_distance_view& view) noexcept : view_{&view}, cursor_{view.directory_} {}
@@ -118,7 +118,7 @@ class squared_distance_view {
     return {static_cast<std::int32_t>(k.x >> 3U), static_cast<std::int32_t>(k.y >> 3U),
             static_cast<std::int32_t>(k.z >> 3U)};
   }
-  /// Returns true if a result of the directory is the number of a brick.
+  /// Returns true if the result of a directory look-up is a brick number.
   [[nodiscard]] static bool is_brick(std::uint32_t found) noexcept { return found < detail::brick_directory::inner; }
   /// The value of all voxels of a brick that is not stored, where `found` is the result of the directory: 0 or `far`.
   [[nodiscard]] std::uint16_t value_without_brick(std::uint32_t found) const noexcept {
@@ -137,33 +137,33 @@ class squared_distance_view {
 
 /// Distances that follow their obstacles: after any sequence of updates the values are bit for bit those of a field
 /// rebuilt from the same obstacles. It needs no bounds. Memory is proportional to the space near obstacles or, if space
-/// without information is an obstacle (`elsewhere_is_obstacle`), to the free space: about 2.9 kB for each 8x8x8 voxels
-/// of which one is within reach, released when none is any more.
+/// without information is an obstacle (`elsewhere_is_obstacle`), to the free space: about 2.9 kB for each block of
+/// 8x8x8 voxels with a voxel within reach, released when none is left.
 ///
 /// For one thread at a time. Readers on other threads use copies of `view()`.
 class squared_distances : public squared_distance_view {
  public:
   /// `reach`: maximum distance, in voxels. `cells`: of the grid, along an axis. `elsewhere_is_obstacle`: true if voxels
-  /// that were never set, and all space outside of the grid, are obstacles. @pre 1 <= reach <= 181; cells is a multiple
-  /// of 8
+  /// that were never set, and all space outside the grid, are obstacles. @pre 1 <= reach <= 181; cells is a multiple of
+  /// 8
   squared_distances(int reach, std::uint32_t cells, bool elsewhere_is_obstacle);
 
-  /// Sets these cubes to the opposite of the space elsewhere: full of obstacles, or free. Only bricks within reach of
-  /// their faces are stored: outside of full cubes, inside of free ones (see bricks_of). @pre before the first update;
-  /// disjoint cubes of level 6 or more, in the grid
+  /// Sets these cubes to the opposite of all other space: full of obstacles, or free. Only bricks within reach of their
+  /// faces are stored: outside full cubes, inside free ones (see bricks_of). @pre before the first update; disjoint
+  /// cubes of level 6 or more, in the grid
   void begin(std::span<const voxel_cube> cubes);
   /// Maximum number of bricks that one cube alone adds to the field. O(1).
   [[nodiscard]] std::uint64_t bricks_of(const voxel_cube& cube) const noexcept;
-  /// Returns true if a node (level 2 or more) is in one of the cubes that the field began with. O(levels).
+  /// Returns true if a node (level 2 or more) is in one of the cubes that the field was initialised with. O(levels).
   [[nodiscard]] bool is_in_cube(const voxel_cube& node) const noexcept {
     return directory_.has_cubes() && directory_.is_in_cube(place_of(node.low), std::max(node.level - 3, 0));
   }
   [[nodiscard]] bool has_cubes() const noexcept { return directory_.has_cubes(); }
 
-  /// Sets the obstacles in these octants; all other voxels keep their state. Each octant is named once.
+  /// Sets the obstacles in these octants; all other voxels keep their state. Each octant is listed once.
   ///
-  /// O(changes x reach^3) in the worst case: a single obstacle in free space is the nearest one of all voxels within
-  /// reach, and all these are written, 64 at a time; when it vanishes, their slices of 64 are computed again in
+  /// O(changes x reach^3) in the worst case: a single obstacle in free space is the nearest one for all voxels within
+  /// reach, and all of these are written, 64 at a time; when it disappears, their slices of 64 are recomputed in
   /// O(reach) each. Typically obstacles are surfaces: most changes end after a few voxels, where another obstacle is
   /// nearer, and voxels that several neighbours change are computed once. Memory that a large update needs in addition
   /// to the field (up to its size) is released at its end; small ones allocate nothing except new bricks.
@@ -198,7 +198,7 @@ class squared_distances : public squared_distance_view {
     std::array<std::uint16_t, 8> plane_top;  ///< the largest value of each slice
     std::array<std::uint16_t, 8> space_top;
     std::uint32_t kept = none;     ///< number of the copy of `plane` from before the update
-    std::uint8_t stale_plane = 0;  ///< slices to compute again
+    std::uint8_t stale_plane = 0;  ///< slices to recompute
     std::uint8_t stale_space = 0;
   };
   /// `plane` as it was before an update.
@@ -219,15 +219,15 @@ class squared_distances : public squared_distance_view {
   void remove(std::uint32_t brick);
   [[nodiscard]] std::size_t buffer_bytes() const noexcept;
   void release_buffers();
-  /// For a brick that is not stored: true if it is full of obstacles, and a row of it as bits.
+  /// For a brick that is not stored: returns true if it is full of obstacles; returns one of its rows as bits.
   [[nodiscard]] bool is_full(std::uint32_t found) const noexcept { return value_without_brick(found) == 0; }
   [[nodiscard]] std::uint8_t row_bits(std::uint32_t found) const noexcept { return is_full(found) ? 0xff : 0; }
   [[nodiscard]] std::uint16_t bound() const noexcept { return static_cast<std::uint16_t>(reach_ * reach_); }
-  /// The squares of the distances of eight rows, the first `distance` rows away, eight times each.
+  /// The squares of the distances of eight rows, the first one `distance` rows away, each repeated eight times.
   [[nodiscard]] const std::uint16_t* squares(int distance) const noexcept {
     return squares_.data() + 8 * (distance + squares_pad_);
   }
-  /// Maximum distance at which an offer of `least` matters, in voxels; < 0 if nowhere.
+  /// Maximum distance at which an offer of `least` matters, in voxels; negative if it matters nowhere.
   [[nodiscard]] int range_of(std::uint16_t least) const noexcept;
 
   /// Clears the change lists of the previous update; propagates those of this one through all stages.

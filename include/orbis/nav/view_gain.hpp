@@ -28,15 +28,15 @@ struct view_gain_options {
   double max_range = 4.0;  ///< range of the camera, metres along the ray
   int pixel_step = 8;      ///< spacing of the rays in columns and rows of the image
   /// Box in which unknown space counts; empty: everywhere. If a map ends in unknown space on all sides, a box around
-  /// the space to explore keeps rays that slip through a gap from counting the world outside.
+  /// the space to explore prevents rays that pass through a gap from counting space outside it.
   std::optional<octree::bounding_box> bounds{};
 };
 
 /// Counts the unknown voxels that a camera would see: its rays pass through free and unknown space up to the first
-/// occupied voxel. Each voxel counts once, however many rays pass it. This is an upper bound on what a view can make
-/// known, because unknown space may hide the space behind it: H. H. Gonzalez-Banos, J.-C. Latombe, "Navigation
-/// strategies for exploring indoor environments", International Journal of Robotics Research 21, 2002. Rays that are
-/// more than a voxel apart miss some.
+/// occupied voxel. Each voxel counts once, regardless of how many rays cross it. This is an upper bound on the space
+/// that a view can reveal, because unknown space may hide the space behind it: H. H. Gonzalez-Banos, J.-C. Latombe,
+/// "Navigation strategies for exploring indoor environments", International Journal of Robotics Research 21, 2002. Rays
+/// that are more than a voxel apart miss some.
 ///
 /// It caches the parts of the map that it reads, so that poses near each other are fast. The map must outlive it and
 /// not change. For one thread at a time.
@@ -58,7 +58,7 @@ class view_gain {
   // A temporary would not outlive the gain.
   view_gain(const Map&&, const Camera&, const view_gain_options& = {}) = delete;
 
-  /// The number of unknown voxels seen from a pose; 0 from outside of the grid. O(voxels along the rays)
+  /// The number of unknown voxels seen from a pose; 0 from outside the grid. O(voxels along the rays)
   [[nodiscard]] std::size_t operator()(const se3& T_world_camera) {
     const vec3 origin = T_world_camera.translation();
     const std::optional<octree::voxel_key> start = all_finite(origin) ? grid_.key(origin) : std::nullopt;
@@ -70,7 +70,7 @@ class view_gain {
   }
 
  private:
-  /// States of an octant of 4x4x4 voxels, and those of its voxels that the view of this number has counted.
+  /// States of an octant of 4x4x4 voxels, and the voxels in it that the view with this number has counted.
   struct octant {
     octree::octant_states states;
     std::uint64_t counted = 0;

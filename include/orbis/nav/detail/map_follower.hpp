@@ -49,7 +49,7 @@ class map_follower {
       some(log, since);
     seen_ = revision;
   }
-  /// Marks the present revision of `map` as read.
+  /// Marks the current revision of `map` as read.
   template <class Map>
   void mark_read(const Map& map) {
     seen_.reset();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Numbers of bricks of 8x8x8 voxels by their places.
+/// Index from positions to the numbers of bricks of 8x8x8 voxels.
 #pragma once
 
 #include <algorithm>
@@ -21,13 +21,14 @@ struct brick_place {
   friend bool operator==(const brick_place&, const brick_place&) = default;
 };
 
-/// Numbers of bricks by their places, in blocks of 8x8x8 bricks. Copies share the blocks until one of them changes.
+/// Numbers of bricks by position, stored in blocks of 8x8x8 bricks. Copies share the blocks until one of them changes.
 class brick_directory {
  public:
-  /// Results of `find` for places without a number: `inner` in one of the cubes (see add_cube), `none` outside of all.
+  /// Results of `find` for places without a number: `inner` in one of the cubes (see add_cube), `none` outside all of
+  /// them.
   static constexpr std::uint32_t none = hash_index::none, inner = none - 1;
 
-  /// `bricks`: edge of the grid in bricks. Places outside of it are never found.
+  /// `bricks`: edge of the grid in bricks. Places outside it are never found.
   explicit brick_directory(std::uint32_t bricks) noexcept : bricks_{bricks} {}
 
   [[nodiscard]] bool is_inside(const brick_place& p) const noexcept {
@@ -91,7 +92,7 @@ class brick_directory {
            names_.capacity() * sizeof(std::uint64_t);
   }
 
-  /// Looks up bricks, each near the one before. Valid until the directory changes.
+  /// Looks up bricks, each near the previous one. Valid until the directory changes.
   class cursor {
    public:
     explicit cursor(const brick_directory& directory) noexcept : directory_{&directory} {}

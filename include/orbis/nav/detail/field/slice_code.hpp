@@ -22,7 +22,7 @@ using slice = std::array<std::uint16_t, 64>;
 /// Offer of a slice to neighbouring slices.
 struct slice_offer {
   alignas(64) slice value;
-  std::uint16_t least = no_offer;  ///< least of the values
+  std::uint16_t least = no_offer;  ///< smallest of the values
 };
 
 /// Pointers to the kernels of the same names.

@@ -3,7 +3,7 @@
 /// The arithmetic of a distance field, over slices of 8x8 voxels of one brick.
 ///
 /// Values are squared distances in voxels or `far_away`. A *source* offers a target voxel its own value plus the square
-/// of the distance between them; the value of a target is the least offer.
+/// of the distance between them; the value of a target is the smallest offer.
 #pragma once
 
 #include <array>
@@ -135,7 +135,7 @@ struct add_rows_kernel {
   }
 };
 
-/// Computes a slice: the least of `own` and of the offers of the slices before and after it, `below[i]` and `above[i]`
+/// Computes a slice: the minimum of `own` and the offers of the slices before and after it, `below[i]` and `above[i]`
 /// at distance i + 1 (null: no slice). Values greater than `bound` become `far_away`. Returns the largest value.
 struct combine_slices_kernel {
   using signature = std::uint16_t(const std::uint16_t* own, const std::uint16_t* const* below,
@@ -164,7 +164,7 @@ template <class K>
   return simd::kernel<K, typename K::signature>();
 }
 
-/// The kernels for the processor of this machine.
+/// The kernels for this machine's processor.
 [[nodiscard]] inline slice_code best_slice_code() noexcept {
   return {best_code<choose_offer_kernel>(),  best_code<equal_slices_kernel>(), best_code<lower_slices_kernel>(),
           best_code<equal_rows_kernel>(),    best_code<lower_rows_kernel>(),   best_code<add_rows_kernel>(),

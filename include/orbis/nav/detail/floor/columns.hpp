@@ -43,17 +43,17 @@ class voxel_columns {
   /// Number of voxels in a column.
   [[nodiscard]] int levels() const noexcept { return static_cast<int>(size_[2]); }
 
-  /// The lowest occupied voxel of a column from level `z` on; the largest int if there is none. @pre z >= 0
+  /// The lowest occupied voxel of a column at level `z` or above; the largest int if there is none. @pre z >= 0
   [[nodiscard]] int next_occupied(int x, int y, int z) const noexcept {
     const int found = next(occupied_, 0, x, y, z);
     return found < levels() ? found : std::numeric_limits<int>::max();
   }
-  /// A level up to which all voxels from level `z` on are occupied: the end of the run or of its word.
+  /// A level up to which all voxels from `z` upwards are occupied: the end of the run or of its word.
   /// @pre the voxel at `z` is occupied; z >= 0
   [[nodiscard]] int end_of_run(int x, int y, int z) const noexcept {
     return z + std::countr_one(occupied_[place(x, y) + static_cast<std::size_t>(z >> 6)] >> (z & 63)) - 1;
   }
-  /// The lowest unknown voxel from level `z` on; levels() if it lies beyond the box. @pre z >= 0
+  /// The lowest unknown voxel at level `z` or above; levels() if it is beyond the box. @pre z >= 0
   [[nodiscard]] int next_unknown(int x, int y, int z) const noexcept {
     return next(known_, ~std::uint64_t{0}, x, y, z);
   }

@@ -25,8 +25,8 @@ namespace orbis::nav::detail {
 /// reachable, because a step between two free cells may be blocked.
 ///
 /// Two floods, from the start and from the other cell, alternate, each growing towards the other one's origin, until
-/// they meet or one runs out of cells. So finding that either side is enclosed is cheap, however large the other one
-/// is.
+/// they meet or one runs out of cells. Detecting that either side is enclosed is therefore cheap, regardless of the
+/// size of the other.
 template <class Space>
 class cell_floods {
  public:
@@ -59,9 +59,9 @@ class cell_floods {
   [[nodiscard]] bool may_reach_any(const std::vector<key>& cells, std::size_t max_cells) {
     return std::any_of(cells.begin(), cells.end(), [&](const key& k) { return may_reach(k, max_cells); });
   }
-  /// The cell nearest to the goal that is connected to the start, as far as a flood of `max_cells` finds it; empty
-  /// without doors. O(cells that are nearer to the goal, or enclosed together with one of these), or O(cells connected
-  /// to the start).
+  /// The cell nearest to the goal that is connected to the start, among the `max_cells` cells that a flood examines;
+  /// empty without doors. O(cells that are nearer to the goal, or enclosed together with one of these), or O(cells
+  /// connected to the start).
   [[nodiscard]] std::optional<key> nearest(std::size_t max_cells) {
     // Visit cells around the goal in the order of their distances, as long as they are fewer than the cells of a flood.
     constexpr double most = std::size_t{1} << 20U;

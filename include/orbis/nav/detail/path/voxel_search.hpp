@@ -40,7 +40,7 @@ enum class search_end : std::uint8_t {
 /// - On the grid: A*, P. Hart, N. Nilsson, B. Raphael, "A formal basis for the heuristic determination of minimum cost
 ///   paths", IEEE Transactions on Systems Science and Cybernetics 4(2), 1968. The result is optimal on the grid.
 /// - At any angle: lazy Theta*, A. Nash, S. Koenig, C. Tovey, "Lazy Theta*: any-angle path planning and path length
-///   analysis in 3D", AAAI 2010. A cell is offered its predecessor's parent, as if it were visible.
+///   analysis in 3D", AAAI 2010. A cell is first assigned its predecessor's parent, as if it were visible.
 ///
 /// Both test whether a step is possible, and compute the cost of a line, when the cell is expanded and not for each of
 /// its neighbours: before that, costs are lower bounds. A cell whose cost rises is put back into the queue. (Lazy
@@ -73,8 +73,8 @@ class voxel_search {
     return found;
   }
 
-  /// Searches the cheapest path from `start` to `goal` through one of the cells `exits` (see doors), expanding at most
-  /// `max_expanded` cells. Without exits, it expands all reachable cells. Call it once.
+  /// Searches for the cheapest path from `start` to `goal` through one of the cells `exits` (see doors), expanding at
+  /// most `max_expanded` cells. Without exits, it expands all reachable cells. Call it once.
   [[nodiscard]] search_end run(const vec3& start, const vec3& goal, const std::vector<key>& exits,
                                std::size_t max_expanded) {
     places_ = {start, goal};
@@ -299,7 +299,7 @@ class voxel_search {
     offer(number, parent, cost, trust::sure);
     return false;
   }
-  /// Index of the neighbour (of the goal: of the exit) that `parent` is; `none` if it is none of them.
+  /// Index of `parent` among the neighbours (for the goal: among the exits); `none` if it is not one of them.
   [[nodiscard]] unsigned direction_between(std::uint32_t parent, std::uint32_t number) const {
     if (parent == from) return none;
     const key p = key_of(parent);
