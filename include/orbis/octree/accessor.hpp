@@ -60,7 +60,7 @@ class store_reader {
   }
 
   const brick_store<T>* store_;
-  voxel_key at_{~0U, ~0U, ~0U};  ///< the last voxel read; initially far from all
+  voxel_key at_{~0U, ~0U, ~0U};  ///< the last voxel read; initially far from all others
   std::uint32_t cells_ = 0;      ///< edge of the node around it that `octant_` represents
   const chunk* chunk_ = nullptr;
   const brick<T>* brick_ = nullptr;
@@ -79,7 +79,7 @@ concept octree_map = sensor_model<typename M::model> && requires(const M& map) {
   { map.grid() } -> std::same_as<const voxel_grid&>;
 };
 
-/// Probability of a stored value; empty if there is none.
+/// Converts a stored value to a probability; empty for an empty value.
 template <sensor_model Model>
 [[nodiscard]] std::optional<double> probability_at(std::optional<typename Model::value_type> v) noexcept {
   return v ? std::optional{probability_of(*v)} : std::nullopt;

@@ -91,8 +91,8 @@ class change_log {
   /// Oldest revision for which queries are exact; for older ones the masks may contain additional voxels but miss none.
   [[nodiscard]] std::uint64_t exact_since() const noexcept { return exact_since_; }
 
-  /// Sets the number of entries (octants and revisions) from which on the oldest are merged. The current revision is
-  /// never merged, whatever its size.
+  /// Sets the number of entries (octants and revisions) above which the oldest are merged. The current revision is
+  /// never merged, regardless of its size.
   void set_capacity(std::size_t entries) {
     capacity_ = entries;
     limit_ = 2 * entries;

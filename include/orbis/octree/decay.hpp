@@ -26,7 +26,7 @@ template <sensor_model M>
 }
 
 /// Exponential decay: log-odds halve in every `half_life`. Two applications equal one for the sum of the times, up to
-/// rounding. Free never becomes occupied, nor vice versa.
+/// rounding. Free voxels never become occupied, or vice versa.
 /// @pre half_life > 0, elapsed >= 0
 template <sensor_model M = log_odds<>>
 struct exponential_decay {

@@ -19,7 +19,7 @@ namespace orbis::octree {
 /// Tree depth of OctoMap and the default of orbis, and the maximum depth.
 ///
 /// The *level* of a node counts from the bottom: 0 is a voxel; in general it is `tree depth - depth`. Stored data
-/// refers to levels only and thus does not depend on the extent of the grid.
+/// refers only to levels and thus does not depend on the extent of the grid.
 inline constexpr int default_tree_depth = 16;
 inline constexpr int max_tree_depth = 21;
 

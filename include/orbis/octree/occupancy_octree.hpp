@@ -142,7 +142,7 @@ class occupancy_octree {
     note_node(key, tree_depth() - depth);
   }
 
-  /// Makes all voxels unknown and frees the memory. The grid stays.
+  /// Makes all voxels unknown and frees the memory. Keeps the grid.
   void clear() {
     store_.clear();
     scratch_ = {};

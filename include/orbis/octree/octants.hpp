@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// States of a map's voxels by octants of 4x4x4 voxels, as bit masks: for data derived from a whole map, or from the
-/// octants in its change log.
+/// Access to the states of a map's voxels as bit masks of octants (4x4x4 voxels), for deriving data from a whole map or
+/// from the octants in its change log.
 #pragma once
 
 #include <concepts>
@@ -37,8 +37,8 @@ template <sensor_model Model>
 
 }  // namespace detail
 
-/// Reads octants of a map near each other, for example those of a change log. The map must outlive the reader and must
-/// not change; use one per thread.
+/// Reads octants of a map that are near each other, for example those of a change log. The map must outlive the reader
+/// and must not change; use one per thread.
 template <octree_map Map>
 class octant_reader {
  public:

@@ -227,8 +227,8 @@ class overlap_search {
 }  // namespace detail
 
 /// Returns true if the shape has a point in common with an occupied voxel, or with unknown space if that counts as
-/// occupied. The cubes of voxels include their faces, so that touching is overlapping. Skips nodes without occupied
-/// voxels. @pre finite coordinates
+/// occupied. The cubes of voxels include their faces, so that touching counts as overlapping. Skips nodes without
+/// occupied voxels. @pre finite coordinates
 template <octree_map Map, overlap_shape Shape>
 [[nodiscard]] bool overlaps(const Map& map, const Shape& shape, const overlap_options& options = {}) {
   assert(all_finite(bounds_of(shape).min) && all_finite(bounds_of(shape).max));

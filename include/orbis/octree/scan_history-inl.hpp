@@ -25,8 +25,8 @@ template <class T>
   return different;
 }
 
-/// Replays the stale octants of a brick from empty with every scan of `b.uses` in turn; `voxels_of(scan)` returns the
-/// scan's voxels. Reads the store only. O(scans that use the brick).
+/// Replays the stale octants of a brick from an empty state with every scan of `b.uses` in turn; `voxels_of(scan)`
+/// returns the scan's voxels. Only reads the store. O(scans that use the brick).
 /// @pre no leaf of the store is larger than a brick
 template <sensor_model Model, class VoxelsOf>
 void replay_brick(const brick_store<typename Model::value_type>& store, const used_brick& b, const VoxelsOf& voxels_of,

@@ -5,8 +5,8 @@
 ///
 /// Log-odds are clamped, so the order of scans matters, and a scan cannot be subtracted, because clamping loses
 /// information. Instead, the history keeps the voxels that each scan observed free and occupied, and replays the
-/// octants of 4x4x4 voxels whose observations changed: from empty, with all scans in order. Replaying is cheap, because
-/// no ray is traversed again.
+/// octants of 4x4x4 voxels whose observations changed, starting from an empty state with all scans in order. Replaying
+/// is cheap, because no ray is traversed again.
 #pragma once
 
 #include <chrono>
@@ -109,7 +109,7 @@ class scan_history {
     set(frame, marked_);
     return summary;
   }
-  /// Sets the scan of `frame` to voxels that were marked before, on another thread for example. O(bricks observed
+  /// Sets the scan of `frame` to voxels that were marked earlier, for example on another thread. O(bricks observed
   /// before and now x log(scans that use a brick)).
   /// @pre `voxels` were marked for this grid
   void set(std::uint64_t frame, const scan_voxels& voxels);

@@ -48,7 +48,7 @@ class scan_voxels {
     std::array<std::uint64_t, 8> occupied{};
   };
 
-  /// Bricks, ordered by name, each once.
+  /// The bricks in ascending order of name, without duplicates.
   [[nodiscard]] std::span<const part> parts() const noexcept { return parts_; }
   [[nodiscard]] std::span<const std::uint64_t> words() const noexcept { return words_; }
   [[nodiscard]] bool empty() const noexcept { return parts_.empty(); }

@@ -53,7 +53,7 @@ enum class occupancy { unknown, free, occupied };
   const double odds = probability / (1.0 - probability);
   return static_cast<float>(std::is_constant_evaluated() ? detail::constexpr_log(odds) : std::log(odds));
 }
-/// Probability of log-odds.
+/// Probability for the given log-odds.
 [[nodiscard]] inline double probability_of(double log_odds) noexcept { return 1.0 - 1.0 / (1.0 + std::exp(log_odds)); }
 
 // -- requirements of a sensor model, as separate concepts for specific compiler messages
@@ -84,7 +84,7 @@ concept sensor_model = has_constants_of_its_value_type<M> && hit_raises_and_miss
 template <class M>
 concept octomap_model = sensor_model<M> && std::same_as<typename M::value_type, float>;
 
-/// OctoMap's default model: P(hit) = 0.7, P(miss) = 0.4, beliefs clamped to [0.1192, 0.971], occupied from 0.5 on.
+/// OctoMap's default model: P(hit) = 0.7, P(miss) = 0.4, beliefs clamped to [0.1192, 0.971], occupied at 0.5 and above.
 /// Derive from it, or write a custom model, to change constants:
 ///
 /// @code

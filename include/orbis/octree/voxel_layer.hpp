@@ -27,7 +27,7 @@ template <class T>
 concept voxel_payload = std::copyable<T> && std::default_initializable<T> && std::is_trivially_copyable_v<T>;
 
 /// Running mean of observed colours; 8 bytes. Exact for the first 257 observations; afterwards the past has a weight of
-/// at least 128 observations, so that the mean follows about the last two hundred.
+/// at least 128 observations, so that the mean covers roughly the last two hundred.
 class rgb_mean {
  public:
   void update(const rgb8& color) noexcept {
@@ -58,9 +58,9 @@ class rgb_mean {
   std::uint16_t count_ = 0;
 };
 
-/// Values in octants of 4x4x4 voxels. Takes the memory of 64 values per octant with any value. A copy shares all data
-/// with the original until one of them changes. A reference to a value is valid until the value is erased or the layer
-/// is copied or destroyed.
+/// Values in octants of 4x4x4 voxels. Uses the memory of 64 values for each octant with at least one value. A copy
+/// shares all data with the original until one of them changes. A reference to a value is valid until the value is
+/// erased or the layer is copied or destroyed.
 ///
 /// @code
 ///   orbis::octree::voxel_layer<orbis::octree::rgb_mean> colors;

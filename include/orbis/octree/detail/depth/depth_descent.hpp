@@ -193,7 +193,7 @@ struct depth_descent {
   }
 };
 
-/// Marks the free voxels below the nodes of a frame in `masks`; each thread of the policy has its own worker. See
+/// Marks the free voxels below the nodes of a frame in `masks`, with one worker per thread of the policy. See
 /// depth_descent.
 template <execution_policy Policy, class Rays, class Saturated>
 void descend_nodes(const Policy& policy, const view_frame& frame, const depth_sensor& sensor, const Rays& rays,

@@ -19,7 +19,7 @@
 namespace orbis::octree::detail {
 
 /// The view of a depth image: one ray per pixel. Fill `ends` and, for cameras other than pinholes, `map`; then call
-/// set_scene. See view_frame for the further steps.
+/// set_scene. See view_frame for the remaining steps.
 struct depth_frame : view_frame {
   using sample_kernel = unsigned(const depth_scene&, const endpoint_image&, const child_offsets&, const float3&,
                                  const children&, unsigned);

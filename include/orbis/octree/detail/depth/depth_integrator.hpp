@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Finds the voxels that a depth image observes free and occupied. They are found voxel by voxel, by projection,
+/// Finds the voxels that a depth image observes free and occupied. The voxels are found one by one by projection
 /// instead of ray by ray, and are exactly those that the traversal of every ray finds.
 #pragma once
 
@@ -65,7 +65,7 @@ class depth_integrator {
     }
     return {.used = ends.used, .truncated = ends.truncated, .rejected = ends.rejected};
   }
-  /// Finds only the occupied voxels, as `mark` does.
+  /// Like `mark`, but finds only the occupied voxels.
   template <execution_policy Policy>
   integration_summary mark_ends(const Policy& policy, const voxel_grid& grid, const depth_scan& scan,
                                 const se3& T_world_camera, const integration_options& options, scan_masks& masks) {

@@ -76,8 +76,8 @@ struct overlap_kernel {
   }
 };
 
-/// Level k, from 1 on, has cells of 2^k x 2^k pixels; its entry (i, j) covers the cells i, i + 1 of the rows j, j + 1.
-/// A box that touches at most four cells in a row is covered by the entries of its first and its last but one cell.
+/// Level k >= 1 has cells of 2^k x 2^k pixels; its entry (i, j) covers the cells i, i + 1 of the rows j, j + 1. A box
+/// that touches at most four cells in a row is covered by the entries of its first and its second-to-last cell.
 ///
 /// There are three kinds of entries with different definitions of the nearest end. Kind 0: the nearest pixel, 0 if any
 /// has no end. Kind 1: the pixels with an end of every aligned tile of 2x2, 0 if none has one. Kind 2: the same with
@@ -174,7 +174,7 @@ class depth_pyramid {
     std::copy_n(at(h - 1), w + 1, at(h));
     for (int j = 0; j != h; ++j) overlap_(at(j), at(j + 1), w, out + static_cast<std::ptrdiff_t>(j) * w);
   }
-  /// Computes the entries of all levels from `level` on, from the cells of `level`; overwrites `cells`.
+  /// Computes the entries of `level` and all higher levels from the cells of `level`; overwrites `cells`.
   void raise(std::size_t kind, int level, std::vector<std::uint32_t>& cells) {
     for (;; ++level) {
       const std::uint32_t* const out = entries(kind, level);

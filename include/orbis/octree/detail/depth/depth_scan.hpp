@@ -43,7 +43,7 @@ class depth_scan {
   decltype(auto) visit(F&& f) const {
     return std::visit(f, image_);
   }
-  /// Depth in metres, or 0 without a measurement.
+  /// Depth in metres, or 0 if there is no measurement.
   [[nodiscard]] float depth(int u, int v) const {
     return visit([&](const auto& image) { return image(u, v); });
   }

@@ -66,7 +66,7 @@ class endpoint_image {
   }
   /// Depths of all rows of that image, `stride()` values per row.
   [[nodiscard]] std::span<float> ends() noexcept { return std::span{z_}.first(z_.size() - pixel_rays::padding); }
-  /// Reduces the image to the part from pixel `first` of `ends()` on, which is the image of `camera`.
+  /// Reduces the image to the part that starts at pixel `first` of `ends()`, which is the image of `camera`.
   /// @pre there are no ends elsewhere; at least 16 columns remain on the right
   void crop(const camera::pinhole& camera, std::uint32_t first) {
     rays_.fit(camera);

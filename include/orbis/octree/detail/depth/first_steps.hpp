@@ -87,7 +87,7 @@ class first_step_order {
   scan_origin source_;
 };
 
-/// Finds which of the 26 neighbours of the sensor's voxel rays pass through.
+/// Finds those of the 26 neighbours of the sensor's voxel that rays pass through.
 class first_voxels {
  public:
   explicit first_voxels(const depth_sensor& sensor) noexcept : sensor_{sensor} {}

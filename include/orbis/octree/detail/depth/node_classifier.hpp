@@ -23,7 +23,7 @@ namespace orbis::octree::detail {
 ///
 /// The relevant rays are those from the centre to the world points, rounded to float; the tests use the rays of the
 /// pixels, and nodes with rounded centres. With u = 2^-24 and c a node's centre:
-/// - the sum that makes a world point p has an error of at most 10 u |p - t|_1 + u |t|_1, and relative to the node the
+/// - the sum that yields a world point p has an error of at most 10 u |p - t|_1 + u |t|_1, and relative to the node the
 ///   first part shrinks with the distance;
 /// - rotating c with the rotation rounded to float has an error of 7 u |c|_1, in addition to the 2 u |c|_1 of c itself,
 ///   and each step down the octree adds u |c|_1: less than 25 u |c|_1 from a root of 16 levels;
@@ -94,7 +94,7 @@ struct child_offsets {
   }
 };
 
-/// Classification of the eight children of a node.
+/// Classification of a node's eight children.
 struct children {
   alignas(32) std::array<float, 8> x, y, z;                ///< centres in the camera frame
   alignas(32) std::array<std::int32_t, 8> u0, u1, v0, v1;  ///< pixels whose rays may touch them

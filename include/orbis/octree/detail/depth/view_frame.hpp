@@ -48,8 +48,8 @@ struct view_frame {
   std::vector<child_offsets> offsets;  ///< per level, offsets of a node's children at that level
   std::vector<node> nodes;             ///< nodes at list_level that rays may touch
 
-  /// Computes the view's parameters of the tests; the caller sets those of the rays. `ray_error`: maximum deviation of
-  /// rays from their assumed directions, at z = 1.
+  /// Computes those parameters of the tests that depend on the view; the caller sets those that depend on the rays.
+  /// `ray_error`: maximum deviation of rays from their assumed directions, at z = 1.
   void set_view(const depth_sensor& sensor, const view_extent& e, float ray_error = 0.0F) {
     depth_scene& s = scene;
     const auto& rows = sensor.pose.rows;
@@ -144,8 +144,8 @@ struct view_frame {
     return std::pair{voxel_key{range[0][0], range[1][0], range[2][0]},
                      voxel_key{range[0][1], range[1][1], range[2][1]}};
   }
-  /// Returns true if the camera's centre is so close to a face of its voxel that rounding decides for many rays on
-  /// which side they leave.
+  /// Returns true if the camera's centre is so close to a face of its voxel that for many rays rounding decides through
+  /// which side they leave it.
   [[nodiscard]] bool is_on_face(const depth_sensor& sensor) const {
     const double close = 64.0 * static_cast<double>(scene.margin(scene.voxel));
     const voxel_key& k = *sensor.key;

@@ -184,7 +184,7 @@ struct test_pixels_kernel {
 inline constexpr std::array<std::array<float, 2>, 5> sample_places{{{0, 0}, {-1, -1}, {1, -1}, {-1, 1}, {1, 1}}};
 inline constexpr float sample_spread = 0.3F;
 
-/// For each child the deepest of a few pixels close to its centre. z < 0: not wanted
+/// For each child, the deepest of a few pixels close to its centre. z < 0: not requested
 template <class Floats, class Integers>
 struct sampled_pixels {
   Floats z{-1.0F};

@@ -15,7 +15,7 @@
 
 namespace orbis::octree::detail {
 
-/// Moves bit 2 i of 16 to bit i; ignores the others.
+/// Moves bit 2 i of a 16-bit word to bit i; ignores the other bits.
 [[nodiscard]] constexpr unsigned gather_bits(unsigned v) noexcept {
   v &= 0x5555U;
   v = (v | v >> 1U) & 0x3333U;

@@ -37,7 +37,7 @@ struct used_brick {
   std::vector<brick_use> uses;
 };
 
-/// All bricks observed by scans, and a queue of those with stale octants. A brick without scans is removed once it is
+/// All bricks observed by scans, and a queue of those with stale octants. A brick without scans is removed when it is
 /// no longer stale; its memory is reused.
 class brick_uses {
  public:
@@ -98,7 +98,7 @@ class brick_uses {
   hash_index index_;
   std::vector<used_brick> bricks_;
   std::vector<std::uint32_t> free_;   ///< unused numbers
-  std::vector<std::uint32_t> queue_;  ///< numbers of stale bricks, from done_ on
+  std::vector<std::uint32_t> queue_;  ///< numbers of stale bricks, starting at done_
   std::size_t done_ = 0;
 };
 

@@ -71,7 +71,7 @@ struct window_tables {
   }
 };
 
-/// Places the first `count` rays of a batch: writes them to `out` in window coordinates, numbered from `first` on.
+/// Places the first `count` rays of a batch: writes them to `out` in window coordinates, numbered starting at `first`.
 /// `out` needs room for a multiple of 16.
 struct place_rays_kernel {
   template <simd::target Target>
@@ -151,9 +151,9 @@ class binned_rays {
     }
     place_ = simd::kernel<place_rays_kernel, place_kernel>();
   }
-  /// Adds the rays of a batch of `count` points, from the scan's `first` on. The rays that must be walked instead
-  /// remain in `rays`. Can be called by several workers at once. @pre no other worker adds the points from `first` on
-  /// to the next multiple of 256
+  /// Adds the rays of a batch of `count` points, the first of which is point `first` of the scan. The rays that must be
+  /// walked instead remain in `rays`. Can be called by several workers at once. @pre no other worker adds points
+  /// between `first` and the next multiple of 256
   void add(std::size_t worker, ray_batch& rays, std::size_t first, std::size_t count) {
     ray_places places;
     const binned_ray* const placed = rays_.data() + first;
@@ -209,7 +209,7 @@ class binned_rays {
   }
 
   [[nodiscard]] std::size_t size() const noexcept { return begin_[cells_]; }
-  /// Maximum depth of the rays' ends.
+  /// Maximum depth of the ray endpoints.
   [[nodiscard]] float max_z() const noexcept { return max_z_; }
   [[nodiscard]] window_rays window(const direction_window& w) const noexcept {
     return {z_.data() + w.begin, deepest_.data() + w.begin, begin_.data() + w.begin, w.stride, rays_.data(),
@@ -226,8 +226,8 @@ class binned_rays {
 
  private:
   struct worker_bins {
-    /// Per cell one packed number: the number of rays (8 bits), the index of the deepest one (24), and its depth (32).
-    /// The larger number is the deeper ray. All zero between scans.
+    /// One packed number per cell: the number of rays (8 bits), the index of the deepest one (24), and its depth (32).
+    /// Larger numbers are deeper rays. All are zero between scans.
     std::vector<std::uint64_t> bins;
     std::vector<std::uint32_t> first;  ///< position of this worker's first ray in each cell
     float max_z = 0.0F;

@@ -19,7 +19,7 @@
 
 namespace orbis::octree::detail {
 
-/// As sample_children_kernel, with a cell's deepest ray as its representative.
+/// Like sample_children_kernel, with a cell's deepest ray as its representative.
 struct sample_cells_kernel {
   template <simd::target Target>
   static ORBIS_ALWAYS_INLINE unsigned run(const depth_scene& s, const window_rays& w, const child_offsets& o,
@@ -37,7 +37,7 @@ struct sample_cells_kernel {
   }
 };
 
-/// As test_pixels_kernel, for the rays of a box of cells. Appends numbers of rays to `unsure`.
+/// Like test_pixels_kernel, for the rays of a box of cells. Appends numbers of rays to `unsure`.
 struct test_cells_kernel {
   template <simd::target Target>
   static ORBIS_ALWAYS_INLINE bool run(const depth_scene& s, const window_rays& w, const voxel_test& t,

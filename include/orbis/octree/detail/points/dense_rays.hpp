@@ -83,8 +83,8 @@ struct cell_rays {
 /// Collects the rays of a scan and marks their voxels. Reuses its memory between scans.
 class dense_rays {
  public:
-  /// Decides from a sample of the scan's points if the rays are dense enough for this method, and prepares it if so.
-  /// O(1). `limit`: maximum length of rays, metres
+  /// Decides from a sample of the scan's points whether the rays are dense enough for this method, and prepares it if
+  /// so. O(1). `limit`: maximum length of rays, metres
   template <class Point>
   [[nodiscard]] bool plan(const voxel_grid& grid, const float3& origin, std::size_t count, Point&& point,
                           double limit) {

@@ -50,7 +50,7 @@ struct ray_batch {
       cut[w] &= left[w];
     }
   }
-  /// Returns eight bits from bit i on. @pre i is a multiple of eight
+  /// Returns eight bits, starting at bit i. @pre i is a multiple of eight
   [[nodiscard]] static std::uint32_t eight(const bits& b, std::size_t i) noexcept {
     return static_cast<std::uint32_t>(b[i >> 6U] >> (i & 63U)) & 0xffU;
   }
@@ -61,7 +61,7 @@ struct ray_batch {
   }
 };
 
-/// One vector of rays of a batch from ray `i` on. @pre i is a multiple of the vector size
+/// One vector of consecutive rays of a batch, starting at ray `i`. @pre i is a multiple of the vector size
 template <simd::target Target>
 struct ray_lanes {
   using floats = simd::native_vec<float, Target>;

@@ -99,8 +99,8 @@ using place_in_pixels = void(const pixel_placement&, const ray_batch&, std::size
 /// Collects the rays of a scan and marks their voxels. Reuses its memory between scans.
 class organised_rays {
  public:
-  /// Decides if the scan's points are the pixels of a depth image that is dense enough for this method, and prepares it
-  /// if so. O(1). `limit`: maximum length of rays, metres
+  /// Decides whether the scan's points are the pixels of a depth image that is dense enough for this method, and
+  /// prepares it if so. O(1). `limit`: maximum length of rays, metres
   template <class Point>
   [[nodiscard]] bool plan(const voxel_grid& grid, const float3& origin, std::size_t count, Point&& point,
                           double limit) {
@@ -139,8 +139,8 @@ class organised_rays {
     numbers_.resize(frame_.ends.ends().size());
     place_ = simd::kernel<place_in_pixels_kernel, place_in_pixels>();
   }
-  /// Adds the rays of a batch of `count` points, from the scan's `first` on. The rays that must be walked instead
-  /// remain in `rays`. Can be called by several workers at once.
+  /// Adds the rays of a batch of `count` points, the first of which is point `first` of the scan. The rays that must be
+  /// walked instead remain in `rays`. Can be called by several workers at once.
   void add(std::size_t worker, ray_batch& rays, std::size_t first, std::size_t count) {
     pixel_places places;
     place_(placement_, rays, count, places);
@@ -199,8 +199,8 @@ class organised_rays {
   /// The smaller focal length determines the largest distance between rays.
   [[nodiscard]] double focal() const { return std::min(fit_.camera().k().fx, fit_.camera().k().fy); }
   /// Error of rays beyond the allowance of depth_scene. That allowance includes 10 u |c|_1 for the rounding of points,
-  /// not to be counted twice, and 19 u |c|_1 in reserve. A ray may deviate along x and along y, so by sqrt(2) times the
-  /// error in total; the float coordinates have errors of about 7 u, plus the rounding of cx and cy.
+  /// which must not be counted twice, and 19 u |c|_1 in reserve. A ray may deviate along x and along y, so by sqrt(2)
+  /// times the error in total; the float coordinates have errors of about 7 u, plus the rounding of cx and cy.
   [[nodiscard]] float ray_error() const {
     constexpr double u = 0x1p-24;
     const auto& k = fit_.camera().k();
@@ -220,7 +220,7 @@ class organised_rays {
     frame_.ends.crop(camera::pinhole{k}, first);
     return first;
   }
-  /// Stores the depth and the number of each pixel's first ray; further rays go to `second_`. One thread per band of
+  /// Stores the depth and the number of each pixel's first ray; additional rays go to `second_`. One thread per band of
   /// rows.
   template <class Policy>
   void fill_image(const Policy& policy) {
@@ -271,7 +271,7 @@ class organised_rays {
   std::vector<float> z_;                            ///< depth of its end
   std::vector<pixel_places::bounds> within_;        ///< bounds of each worker's rays
   std::vector<std::uint32_t> numbers_;              ///< number of each pixel's ray, if it has one
-  std::vector<std::vector<std::uint32_t>> second_;  ///< per band of rows: further rays of pixels that have one
+  std::vector<std::vector<std::uint32_t>> second_;  ///< per band of rows: additional rays of occupied pixels
   std::vector<descent_worker> workers_;
 };
 

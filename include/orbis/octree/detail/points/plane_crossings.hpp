@@ -192,8 +192,8 @@ struct mark_crossings_kernel {
 using crossings_kernel = void(const plane_stack&, queued_rays&, std::size_t, std::size_t, std::vector<std::uint32_t>&);
 
 /// Marks the rays [begin, end) in a stack of planes. If the arithmetic cannot decide a cell or an order with certainty,
-/// the ray is appended to `doubtful` and removed (planes = -1); its existing marks are correct.
-/// @pre the cells of the rays lie in the stack
+/// the ray is appended to `doubtful` and removed (planes = -1); its existing marks are correct. @pre the cells of the
+/// rays are in the stack
 [[nodiscard]] inline crossings_kernel* mark_crossings() noexcept {
   return simd::kernel<mark_crossings_kernel, crossings_kernel>();
 }

@@ -42,7 +42,7 @@ struct load_triples_kernel {
   }
 
  private:
-  /// Every third of 3 N numbers, from number K on.
+  /// Every third of 3 N numbers, starting with number K.
   template <std::size_t K, class V, std::size_t... I>
   static ORBIS_ALWAYS_INLINE V coordinate(const V& a, const V& b, const V& c, std::index_sequence<I...>) noexcept {
     constexpr std::size_t n = sizeof...(I);

@@ -115,7 +115,7 @@ class ray_rasterizer {
     fallback_.clear();
   }
 
-  /// Queues a prepared ray; marks voxels that no plane marks immediately.
+  /// Queues a prepared ray; immediately marks the voxels that no plane marks.
   void take(std::size_t lane, const float3& end, bool cut, scan_masks& masks) {
     const ray_setup& r = setup_;
     const std::int32_t kind = r.kind[lane], planes = r.planes[lane];

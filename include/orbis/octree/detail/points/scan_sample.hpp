@@ -13,7 +13,7 @@
 
 namespace orbis::octree::detail {
 
-/// Returns a random place in the k-th of `stretches` equal parts of [0, last]. Randomness avoids aliasing between
+/// Returns a random position in the k-th of `stretches` equal parts of [0, last]. Randomness avoids aliasing between
 /// regular steps and the rows of a scan.
 [[nodiscard]] inline std::size_t place_in_stretch(std::size_t k, std::size_t stretches, std::size_t last,
                                                   random_bits& random) {

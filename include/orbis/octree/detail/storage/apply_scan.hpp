@@ -76,7 +76,7 @@ void find_saturated(const brick_store<typename Model::value_type>& store, std::u
   for (std::uint32_t i = 0; i != 8; ++i) saturated[i] |= store.voxels_where(*b, i, is_saturated_free<Model>);
 }
 
-/// Voxels of an octant that changed, and those that had a miss without being saturated.
+/// Voxels of an octant that changed, and those that received a miss without being saturated.
 struct octant_change {
   std::uint64_t changed = 0, missed = 0;
 };

@@ -73,7 +73,7 @@ inline constexpr auto octant_offsets = [] {
 }
 
 /// Calls `on_leaf(key, level, value)` for leaves of at least an octant, and `on_octant(key, brick, i)` for the other
-/// octants, which returns the number of inner nodes from there on. Returns the number of inner nodes.
+/// octants, which returns the number of inner nodes in that octant. Returns the number of inner nodes.
 template <class T, class OnLeaf, class OnOctant>
 std::size_t walk_octants(const std::vector<tree_part<T>>& parts, int root_level, OnLeaf&& on_leaf,
                          OnOctant&& on_octant) {

@@ -116,7 +116,7 @@ struct plain_octant {
   }
 };
 
-/// Records of octants, identified by numbers: 3 bits for the pool, 29 for the place in it. Pool p < 6 holds octants
+/// Records of octants, identified by numbers: 3 bits for the pool, 29 for the position in it. Pool p < 6 holds octants
 /// with up to 2^p values, pool `plain` those with more. Copies share pages until one of them is modified.
 template <class T>
 class octant_pools {

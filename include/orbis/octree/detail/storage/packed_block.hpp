@@ -32,7 +32,7 @@ inline constexpr unsigned max_palette = 1U << max_palette_bits;
 /// Distinct values of a block: `plane[j]` holds bit j of every voxel's index into `value`.
 template <class T>
 struct palette {
-  unsigned count = 0;  ///< more than max_palette: too many
+  unsigned count = 0;  ///< greater than max_palette if there are too many
   std::array<std::uint64_t, max_palette_bits> plane{};
   std::array<T, max_palette> value{};
 

@@ -86,7 +86,7 @@ class upper_walk {
   upper_walk(const std::vector<tree_part<T>>& parts, Visitor& visitor)
       : next_{parts.data()}, end_{parts.data() + parts.size()}, visitor_{visitor} {}
 
-  /// Walks a node. @pre the remaining parts begin with some inside one node at `level`, which are visited
+  /// Walks a node. @pre the remaining parts begin with those inside one node at `level`, which are visited
   auto walk(int level) {
     if (next_->level == level) return visitor_.content(*next_++);
     const auto shift = 3 * static_cast<unsigned>(level - 1 - brick_level);
