@@ -47,7 +47,7 @@ template <point_range Points>
 
 /// Returns an error unless lists of these lengths can be aligned.
 [[nodiscard]] result<void> check_pairs(std::size_t from, std::size_t to, std::span<const double> weights);
-/// The transform from the moments of n pairs. Empty: they do not determine a rotation.
+/// The transform from the moments of n pairs. Empty if they do not determine a rotation.
 [[nodiscard]] std::optional<sim3> align_by_moments(const pair_moments& moments, std::size_t n, bool with_scale);
 /// The error for a failed alignment; `not_finite`: index of the first pair that is not finite, or n.
 [[nodiscard]] error alignment_error(std::size_t not_finite, std::size_t n);
@@ -79,7 +79,7 @@ template <class Transform>
 
 /// Absolute orientation: the `T_to_from` that minimises the sum of `|T_to_from * from[i] - to[i]|^2`, in closed form.
 /// Not robust; see `estimate_alignment` for pairs that may be wrong. O(n). Errors: `invalid_argument` for lists of
-/// different length; `no_data` below three pairs; `degenerate` for collinear, coincident or non-finite points.
+/// different length; `no_data` for fewer than three pairs; `degenerate` for collinear, coincident or non-finite points.
 template <point_range From, point_range To>
 [[nodiscard]] result<se3> absolute_orientation(const From& from, const To& to) {
   const auto s = detail::align(from, to, false);
@@ -118,11 +118,11 @@ struct alignment_estimate {
   std::size_t iterations = 0;
 };
 
-/// Estimates the transform `T_to_from` (`se3` or `sim3`) that brings most of `from[i]` close to `to[i]`: three pairs in
-/// RANSAC, each new best transform refined on its inliers. Non-finite pairs, and those with a zero or non-finite
+/// Estimates the transform `T_to_from` (`se3` or `sim3`) that maps most points `from[i]` close to `to[i]`: three pairs
+/// in RANSAC, each new best transform refined on its inliers. Non-finite pairs, and those with a zero or non-finite
 /// deviation, are outliers. Deterministic for a given `options.seed`. Errors: `invalid_argument` for lists of different
-/// length or options out of range; `no_data` below three pairs; `degenerate` if all points are collinear or coincide,
-/// or no transform has `min_inliers` inliers. The message gives the reason.
+/// length or options out of range; `no_data` for fewer than three pairs; `degenerate` if all points are collinear or
+/// coincide, or no transform has `min_inliers` inliers. The message gives the reason.
 template <class Transform = se3, point_range From, point_range To>
 requires(std::same_as<Transform, se3> || std::same_as<Transform, sim3>)
     [[nodiscard]] result<alignment_estimate<Transform>> estimate_alignment(const From& from, const To& to,

@@ -58,8 +58,8 @@ class bundle_adjuster {
                            Damping damping = detail::default_bundle_damping<Damping>(),
                            const reduced_solver_options& reduced = {});
 
-  /// The chi-squared error of an observation: `information` times the squared norm of its residual; infinite without a
-  /// projection.
+  /// The chi-squared error of an observation: `information` times the squared norm of its residual; infinite if there
+  /// is no projection.
   [[nodiscard]] double chi2(const camera_state& camera, const vec3& point, const observation& o) const;
 
   /// Computes the chi-squared errors of all observations: `out[k]` of `observations[k]`.

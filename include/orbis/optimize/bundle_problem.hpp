@@ -61,8 +61,8 @@ concept observation_of_a_point = std::copyable<O> && requires(const O& o) {
 /// - `r.is_usable(o)` is false for an observation that must be excluded, for example a non-finite one;
 /// - `r.residual(view, point, o)` is a vector of `R::dimension` numbers, not yet whitened, or empty if the point has no
 /// projection. `point` is in the world frame;
-/// - `r.linearize(view, point, o, by_camera, by_point)` returns the same vector and writes its derivatives by a step of
-/// the camera and by the point.
+/// - `r.linearize(view, point, o, by_camera, by_point)` returns the same vector and writes its derivatives with respect
+///   to a step of the camera and to the point.
 template <class R>
 concept bundle_residual = std::copyable<R> && camera_manifold<typename R::camera_manifold> &&
     observation_of_a_point<typename R::observation> &&
@@ -78,8 +78,8 @@ concept bundle_residual = std::copyable<R> && camera_manifold<typename R::camera
 
 /// A residual that depends on the point only through its coordinates q in the camera frame. Its camera is a pose with
 /// steps `T_world_camera * exp(d)`, followed by `R::intrinsic_dimension` more parameters. All derivatives are then
-/// products of the derivative by q with R_camera_world and with (-I, hat(q)), which halves the solver's arithmetic. The
-/// view has the members `rotation` (R_camera_world) and `translation`.
+/// products of the derivative with respect to q with R_camera_world and with (-I, hat(q)), which halves the solver's
+/// arithmetic. The view has the members `rotation` (R_camera_world) and `translation`.
 template <class R>
 concept camera_frame_residual =
     bundle_residual<R> && R::camera_manifold::dimension ==
@@ -92,8 +92,8 @@ concept camera_frame_residual =
   { r.linearize_in_camera(view, q, o, by_q, by_intrinsics) } -> std::same_as<std::optional<matrix<R::dimension>>>;
 };
 
-/// Options of bundle adjustment. The damping of the steps holds directions that neither the observations nor the fixed
-/// poses and points determine (the gauge: position and rotation of the whole and, without depth, its scale).
+/// Options of bundle adjustment. Damping of the steps fixes the directions that neither the observations nor the fixed
+/// poses and points determine (the gauge: overall position and rotation and, without depth, scale).
 struct bundle_options {
   int max_iterations = 10;
   double relative_tolerance = 1e-6;              ///< stop when a step lowers the cost by less than this fraction
@@ -108,7 +108,7 @@ enum class bundle_status {
   iteration_limit,
   cancelled,
   no_progress,       ///< no step lowers the cost, although the model predicts a decrease
-  nothing_to_do,     ///< no usable observation, or nothing movable
+  nothing_to_do,     ///< no usable observation, or every pose and point is fixed
   missing_pose,      ///< observation `where` refers to a nonexistent pose
   missing_point,     ///< observation `where` refers to a nonexistent point
   bad_pose,          ///< pose `where` has observations and is not finite
@@ -161,7 +161,7 @@ struct bundle_summary {
   bundle_times seconds;
 };
 
-/// The status as text; for a failure with the index of the observation or pose.
+/// The status as text; for a failure, includes the index of the observation or pose.
 [[nodiscard]] inline std::string to_string(const bundle_summary& s) {
   std::string text{to_string(s.status)};
   if (is_failure(s.status)) {

@@ -31,7 +31,7 @@ struct pnp_options {
 
 struct pose_estimate {
   se3 T_world_camera;
-  std::vector<std::uint32_t> inliers;  ///< exactly the matches within the threshold at the pose, ascending
+  std::vector<std::uint32_t> inliers;  ///< exactly the matches within the threshold for this pose, ascending
   double rmse = 0.0;                   ///< of the inliers' reprojection errors, pixels
   std::size_t iterations = 0;
 };
@@ -46,9 +46,9 @@ struct pnp_workspace {
 /// Estimates the pose from which most of `points_world[i]` (metres) project to `pixels[i]`: P3P in RANSAC with a
 /// sequential test of the models; each new best pose is refined on its inliers. Non-finite matches, and pixels that the
 /// camera cannot unproject, are outliers. Deterministic for a given `options.seed`. O(matches) for each sample that is
-/// scored completely. Errors: `invalid_argument` for spans of different length or options out of range; `no_data` below
-/// three matches; `degenerate` if fewer than three are usable, all points are collinear or coincide, or no pose has
-/// `min_inliers` inliers. The message gives the reason. The library orbis::compiled contains it for `pinhole`,
+/// scored completely. Errors: `invalid_argument` for spans of different length or options out of range; `no_data` for
+/// fewer than three matches; `degenerate` if fewer than three are usable, all points are collinear or coincide, or no
+/// pose has `min_inliers` inliers. The message gives the reason. The library orbis::compiled contains it for `pinhole`,
 /// `radial_tangential` and `any_camera`; for others include pnp-inl.hpp.
 template <camera::camera_model Camera>
 [[nodiscard]] result<pose_estimate> estimate_pose(std::span<const vec3> points_world, std::span<const vec2> pixels,

@@ -38,8 +38,8 @@ struct point_to_plane {
     if (!std::isfinite(r[0])) return std::nullopt;
     return r;
   }
-  /// The residual and its derivative by a step `T_world_camera * exp(d)`; the derivative is unchanged if the residual
-  /// is empty.
+  /// The residual and its derivative with respect to a step `T_world_camera * exp(d)`; the derivative is unchanged if
+  /// the residual is empty.
   [[nodiscard]] std::optional<matrix<1>> linearize(const se3& T_world_camera, matrix<1, 6>& jacobian) const {
     const auto r = residual(T_world_camera);
     if (!r) return r;
@@ -64,7 +64,7 @@ struct plane_observation {
   double information = 1.0;           ///< 1 / sigma^2 along the normal, 1 / m^2
 };
 
-/// The point-to-plane residual for bundle adjustment: estimates a point of the plane; the normal is fixed. Only the
+/// The point-to-plane residual for bundle adjustment: estimates a point on the plane; the normal is fixed. Only the
 /// position of that point along the normal is determined. Satisfies `bundle_residual`.
 struct point_to_plane_adjustment {
   using camera_state = se3;

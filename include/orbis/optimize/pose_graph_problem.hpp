@@ -36,8 +36,8 @@ concept relative_measurement = requires(const E& e) {
 };
 
 /// A residual of an edge: a vector computed from `D = T_a_b^-1 * (T_world_a^-1 * T_world_b)`, where `T_a_b` is measured
-/// and D is the identity for a perfect fit. `linearize` returns it and writes its derivatives by a step of each pose,
-/// on the right: `T * exp(d)`.
+/// and D is the identity for a perfect fit. `linearize` returns it and writes its derivatives with respect to a step of
+/// each pose, on the right: `T * exp(d)`.
 template <class F, class T>
 concept between_factor = std::copyable<F> &&
     requires(const F& f, const T& pose, matrix<F::dimension, T::dof>& jacobian) {
@@ -116,11 +116,11 @@ struct quaternion_between {
 static_assert(between_factor<quaternion_between, se3> && between_factor<logarithm_between<se3>, se3> &&
               between_factor<logarithm_between<sim3>, sim3> && between_factor<logarithm_between<so3>, so3>);
 
-/// Vertices to hold fixed, so that the others are determined: relative poses do not determine the position of the graph
+/// Vertices to hold fixed so that the others are determined: relative poses do not determine the position of the graph
 /// in the world.
 enum class pose_graph_gauge {
-  automatic,            ///< the fixed vertices; in a connected graph without any, its first vertex
-  first_of_each_piece,  ///< the fixed vertices; in each connected component without any, its first vertex
+  automatic,            ///< the fixed vertices; if a connected graph has none, its first vertex
+  first_of_each_piece,  ///< the fixed vertices; in each component without one, its first vertex
   as_given              ///< only the fixed vertices
 };
 

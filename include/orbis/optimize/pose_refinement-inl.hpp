@@ -83,7 +83,7 @@ class pose_pieces {
 struct pose_normal_equations {
   mat6 h;  ///< the lower triangle
   vec6 g;
-  double cost;  ///< half the robust sum
+  double cost;  ///< half the robust cost
 };
 
 /// One refinement, for one camera model.

@@ -3,8 +3,8 @@
 /// Pose-only refinement: the camera pose that minimises the reprojection errors of known points.
 ///
 /// Levenberg-Marquardt on SE(3) in rounds. After each round every observation is classified as an inlier or an outlier
-/// by its chi-squared error at the current pose; the last round is without the robust loss. Eight observations are
-/// processed at once. Needs about 80 kB of stack and never allocates.
+/// by its chi-squared error at the current pose; the last round omits the robust loss. Eight observations are processed
+/// at once. Needs about 80 kB of stack and never allocates.
 ///
 /// Source of the rounds: R. Mur-Artal, J. D. Tardos, "ORB-SLAM2", T-RO 33 (2017).
 #pragma once
@@ -25,7 +25,7 @@ namespace orbis::optimize {
 enum class refinement_status {
   converged,             ///< the last round ended because no step improved the pose
   iteration_limit,       ///< the last round reached its maximum number of iterations
-  too_few_observations,  ///< fewer than three usable observations, from the start or after the gates
+  too_few_observations,  ///< fewer than three usable observations, initially or after gating
   degenerate,            ///< the observations do not determine the pose (for example collinear points)
   invalid_start          ///< the initial pose is not finite
 };

@@ -57,9 +57,9 @@ struct one_or_none {
 /// The number of data scored at a time.
 inline constexpr std::size_t consensus_block = 32;
 
-/// An estimator with batched errors: `squared_errors(model, first, out)` writes those of `consensus_block` data from
-/// `first` on, a multiple of it; the values for data beyond the last are ignored. They rank the models; `squared_error`
-/// decides about inliers.
+/// An estimator with batched errors: `squared_errors(model, first, out)` writes the errors of `consensus_block` data
+/// starting at `first`, which is a multiple of it; the values for data beyond the last are ignored. These errors rank
+/// the models; `squared_error` determines the inliers.
 template <class E>
 concept block_estimator = model_estimator<E> && requires(const E& estimator, const typename E::model& model,
                                                          std::size_t first, std::span<float, consensus_block> out) {
@@ -114,7 +114,7 @@ template <std::size_t N>
   return sample;
 }
 
-/// The number of samples after which one of them is without outliers, with probability `confidence`; `recognised` is
+/// The number of samples after which at least one is free of outliers with probability `confidence`; `recognised` is
 /// the probability that such a sample is accepted by the sequential test.
 [[nodiscard]] inline double wanted_iterations(double confidence, double inlier_ratio, std::size_t sample_size,
                                               double recognised) {
@@ -363,8 +363,8 @@ template <class E>
 
 /// Estimates the model that agrees with most of the data. The same data, options and seed give the same result. O(data)
 /// for each model that is scored completely. Errors: `invalid_argument` for options out of range; `no_data` for fewer
-/// data than a sample; `degenerate` if no sample gives a model, or no model has `min_inliers` inliers and at least as
-/// many as a sample.
+/// data than a sample; `degenerate` if no sample gives a model, or no model has at least `min_inliers` inliers and at
+/// least the size of a sample.
 template <model_estimator E>
 [[nodiscard]] result<ransac_estimate<typename E::model>> ransac(const E& estimator, const ransac_options& options,
                                                                 ransac_workspace& workspace) {

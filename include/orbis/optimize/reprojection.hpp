@@ -59,7 +59,8 @@ struct reprojection {
     return difference(*pixel, point_camera.z(), o);
   }
 
-  /// The residual and its derivative `j` by the point in the camera frame; the third row is 0 without depth.
+  /// The residual and its derivative `j` with respect to the point in the camera frame; the third row is 0 without
+  /// depth.
   [[nodiscard]] std::optional<vec3> residual(const vec3& point_camera, const pose_observation& o, mat3& j) const {
     matrix<2, 3> projection;
     const auto pixel = camera.project(point_camera, projection);

@@ -20,7 +20,7 @@
 
 namespace orbis::optimize {
 
-/// A pose and the camera of its image.
+/// The pose and the camera model of an image.
 template <camera::parametric_camera Camera>
 struct posed_camera {
   se3 T_world_camera;

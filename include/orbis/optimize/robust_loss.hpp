@@ -70,7 +70,7 @@ struct tukey {
 static_assert(robust_loss<trivial> && robust_loss<huber> && robust_loss<cauchy> && robust_loss<tukey>);
 
 /// The 95 % quantile of the chi-squared distribution: 95 % of the correct whitened residuals with `dimension` entries
-/// have a squared norm below it. For a reprojection error `dimension` is 2, with depth 3. @pre 1 <= dimension <= 3
+/// have a squared norm below it. `dimension` is 2 for a reprojection error, 3 with depth. @pre 1 <= dimension <= 3
 [[nodiscard]] constexpr double chi_squared_gate(int dimension) noexcept {
   constexpr double quantiles[] = {3.841, 5.991, 7.815};
   return quantiles[dimension - 1];

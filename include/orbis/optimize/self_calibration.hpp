@@ -34,7 +34,7 @@ struct self_calibrated {
   /// Covariance of the parameters, in the order of `camera::parameters_of`; 0 for those that were not estimated.
   parameter_matrix covariance = zeros<parameter_matrix>();
   std::size_t observations = 0;  ///< number of observations used
-  std::size_t outliers = 0;      ///< of these, excluded in the end
+  std::size_t outliers = 0;      ///< number of these that were finally excluded
   double initial_rms = 0.0;      ///< of the inliers, in standard deviations, before ...
   double final_rms = 0.0;        ///< ... and after
   int iterations = 0;
@@ -57,7 +57,7 @@ struct self_calibrated {
 /// from the points' own contributions to the gradient ("sandwich" of the normal equations).
 ///
 /// One step costs O(observations + sum over the points of the squared number of images that observe them), plus
-/// O(images^3): use at most some hundred images.
+/// O(images^3): use at most a few hundred images.
 ///
 /// Sources: B. Triggs, P. McLauchlan, R. Hartley, A. Fitzgibbon, "Bundle adjustment - a modern synthesis", Vision
 /// Algorithms 2000; K.-Y. Liang, S. L. Zeger, "Longitudinal data analysis using generalized linear models", Biometrika

@@ -59,7 +59,7 @@ struct any_stepped_problem {
 };
 }  // namespace detail
 
-/// A step strategy for any `stepped_problem`. `state` is kept between the steps of one solution.
+/// A step strategy for any `stepped_problem`. `state` persists between the steps of one solution.
 template <class D>
 concept damping_policy = std::copyable<D> && std::default_initializable<typename D::state> &&
     requires(const D& d, typename D::state& s, detail::any_stepped_problem& problem, step_workspace& w) {

@@ -19,8 +19,8 @@ ORBIS_INLINE mat3 essential_of(const se3& T_second_first) {
   return hat<double>(T_second_first.translation()) * T_second_first.rotation_matrix();
 }
 
-/// Corrects two rays at z = 1 by the least sum of squares so that they intersect. Two steps, which suffice for
-/// convergence.
+/// Corrects two rays at z = 1 so that they intersect, with the smallest sum of squared corrections. Takes two steps,
+/// which suffice for convergence.
 ORBIS_INLINE void intersect_rays(const mat3& essential, vec3& first, vec3& second) {
   // `second` is x and `first` is x' in the paper.
   const mat2 e = block<2, 2>(essential, 0, 0);

@@ -69,11 +69,11 @@ template <class S>
 
 }  // namespace detail
 
-/// The point whose projections to z = 1 have the least sum of squared distances from the two rays. Constant time.
+/// The point whose projections to z = 1 have the smallest sum of squared distances from the two rays. Constant time.
 [[nodiscard]] triangulation triangulate(const se3& T_world_first, const vec3& first_ray, const se3& T_world_second,
                                         const vec3& second_ray, const triangulation_options& options = {});
 
-/// The point whose projections to z = 1 have the least sum of squared distances from all rays: starts at the point
+/// The point whose projections to z = 1 have the smallest sum of squared distances from all rays: starts at the point
 /// nearest to the rays and refines it by Levenberg-Marquardt. O(views) per step, a few steps. `poses` are the cameras'
 /// `T_world_camera`. @pre poses.size() == rays.size()
 template <std::ranges::contiguous_range Poses, std::ranges::contiguous_range Rays>

@@ -57,8 +57,8 @@ template <class Match>
 /// Estimates the essential matrix, and the relative pose, that agrees with most matches: five points in RANSAC, each
 /// new best matrix refined on its inliers. `first_pixels[i]` matches `second_pixels[i]`. Matches that are not finite or
 /// cannot be unprojected are outliers. Deterministic for a given `options.seed`. Errors: `invalid_argument` for spans
-/// of different length or options out of range; `no_data` below five matches; `degenerate` if fewer than five are
-/// usable, no matrix has `min_inliers` inliers, or a rotation alone explains nearly all inliers, so that the
+/// of different length or options out of range; `no_data` for fewer than five matches; `degenerate` if fewer than five
+/// are usable, no matrix has `min_inliers` inliers, or a rotation alone explains nearly all inliers, so that the
 /// translation is not determined. The message gives the reason.
 template <camera::camera_model Camera>
 [[nodiscard]] result<relative_pose_estimate> estimate_essential(std::span<const vec2> first_pixels,
@@ -108,16 +108,16 @@ struct plane_motion {
 /// Estimates the homography that agrees with most matches: four points in RANSAC, each new best one refined on its
 /// inliers (least squares of the transfer errors in both images). `first[i]` matches `second[i]`, in undistorted
 /// pixels. Matches that are not finite are outliers. Deterministic for a given `options.seed`. Errors:
-/// `invalid_argument` for spans of different length or options out of range; `no_data` below four matches; `degenerate`
-/// if fewer than four are finite, all points of an image are collinear, or no homography has `min_inliers` inliers. The
-/// message gives the reason.
+/// `invalid_argument` for spans of different length or options out of range; `no_data` for fewer than four matches;
+/// `degenerate` if fewer than four are finite, all points of an image are collinear, or no homography has `min_inliers`
+/// inliers. The message gives the reason.
 template <std::same_as<homography_options> Options = homography_options>
 [[nodiscard]] result<homography_estimate> estimate_homography(std::span<const vec2> first, std::span<const vec2> second,
                                                               const Options& options = {});
 
 /// The motions that a homography between rays at z = 1 may represent, independent of its scale and sign: two, or one if
-/// there is no translation. (Two more would have the plane behind the first camera.) `ray` is any matched ray of the
-/// first camera, in front of it. Errors: `degenerate` if the homography is singular or not finite.
+/// there is no translation. (Two further solutions have the plane behind the first camera.) `ray` is any matched ray of
+/// the first camera, in front of it. Errors: `degenerate` if the homography is singular or not finite.
 [[nodiscard]] result<std::vector<plane_motion>> decompose_homography(const mat3& homography,
                                                                      const vec3& ray = vec3(0.0, 0.0, 1.0));
 

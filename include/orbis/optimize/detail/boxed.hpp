@@ -8,7 +8,7 @@
 
 namespace orbis::optimize::detail {
 
-/// A `T`, copied with its owner. Empty after a move; then only assignment is allowed.
+/// A `T`, copied with its owner. Empty after a move; only assignment is allowed in that state.
 template <class T>
 class boxed {
  public:

@@ -25,8 +25,8 @@
 
 namespace orbis::optimize::detail {
 
-/// The cost of an observation that loses its projection by a step: that of an error of a thousand sigmas, so that a
-/// step never gains by losing observations.
+/// The cost of an observation that loses its projection in a step: that of an error of a thousand sigmas, so that
+/// losing observations never makes a step cheaper.
 inline constexpr double out_of_sight = 0.5e6;
 
 /// Camera-point blocks of eight observations in memory, row by row in vectors of eight. With camera-frame residuals,
@@ -124,9 +124,9 @@ template <bool Derive, class R, int Columns>
   }
 }
 
-/// Computes the residuals `r` of eight observations, and with `Derive` their derivatives by `q` (the point in the
-/// camera frame, or for general residuals in the world) and by the other parameters. Returns the mask of those with a
-/// projection.
+/// Computes the residuals `r` of eight observations, and with `Derive` their derivatives with respect to `q` (the point
+/// in the camera frame, or for general residuals in the world) and to the other parameters. Returns the mask of those
+/// with a projection.
 template <bool Derive, class R, int Columns, class L>
 ORBIS_ALWAYS_INLINE typename L::mask_type residuals_of_tile(const camera_work<R>& work, std::size_t first, const L* q,
                                                             L* r, L (*by_q)[3],

@@ -16,8 +16,8 @@ using portable_lanes = simd::vec<double, 8, simd::portable>;
 
 /// A `camera_frame_residual` that evaluates eight observations by one camera at once. `measure(o, to)` writes the
 /// required values of an observation to `to[8 * i]`, i < `R::measured`. `lanes_in_camera<Derive>(view, measurements, q,
-/// r, by_q, by_intrinsics)` is `linearize_in_camera` on all eight (without `Derive`: `residual_in_camera`) and returns
-/// the mask of those with a projection.
+/// r, by_q, by_intrinsics)` does the same as `linearize_in_camera` for all eight (without `Derive`: as
+/// `residual_in_camera`) and returns the mask of those with a projection.
 template <class R>
 concept lane_residual = camera_frame_residual<R> &&
     requires(const R& r, const typename R::observation& o, const typename R::view& view, double* to,

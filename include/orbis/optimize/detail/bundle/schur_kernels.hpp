@@ -56,8 +56,8 @@ struct elimination {
   double* scratch = nullptr;  ///< three vectors per observation of the chunk by a movable camera
 };
 
-/// Computes L^-1 and L^-1 g of up to eight points from `p` on, before `end`. Returns the first of them whose block is
-/// not positive definite, or `end`.
+/// Computes L^-1 and L^-1 g of up to eight points starting at `p`, before `end`. Returns the first of them whose block
+/// is not positive definite, or `end`.
 template <simd::target Target>
 ORBIS_ALWAYS_INLINE std::size_t invert_factors(const elimination& work, std::size_t p, std::size_t end) {
   using L = simd::vec<double, 8, Target>;

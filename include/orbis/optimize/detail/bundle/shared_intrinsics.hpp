@@ -88,7 +88,7 @@ class shared_intrinsics {
     std::copy(now_.points.begin(), now_.points.end(), points.begin());
   }
 
-  /// Iterates until the cost stops decreasing; counts the steps. Returns false if `go_on()` did.
+  /// Iterates until the cost stops decreasing; counts the steps. Returns false if `go_on()` returned false.
   template <class GoOn>
   [[nodiscard]] bool descend(int limit, double relative_tolerance, int& steps, const GoOn& go_on) {
     set_noise();
@@ -250,7 +250,7 @@ class shared_intrinsics {
       }
     }
   }
-  /// Connected components by shared points: for each image the first one of its component.
+  /// Connected components of images that share points: for each image, the first image of its component.
   [[nodiscard]] std::vector<std::uint32_t> parts() const {
     std::vector<std::uint32_t> first(now_.poses.size());
     for (std::uint32_t i = 0; i != first.size(); ++i) first[i] = i;
@@ -509,7 +509,7 @@ class shared_intrinsics {
   double noise_ = 1.0;  ///< standard deviation of the whitened residuals
   huber loss_{2.447};   ///< the chi-squared gate of two coordinates, times the noise
   estimate now_;
-  basis_type basis_ = zeros<basis_type>();        ///< derivatives of the parameters by the unknowns, a column each
+  basis_type basis_ = zeros<basis_type>();        ///< derivatives of the parameters, one column per unknown
   int count_ = 0;                                 ///< of the unknowns of the camera
   std::vector<bundle_observation> observations_;  ///< by point
   std::vector<std::size_t> begins_;               ///< start of each point's observations, followed by the end

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Derivatives of a `camera_frame_residual` by the camera and by the point in the world.
+/// Derivatives of a `camera_frame_residual` with respect to the camera and to the point in the world.
 #pragma once
 
 #include <optional>

@@ -28,7 +28,7 @@ namespace orbis::optimize::detail {
 }
 
 /// The unit vector at a distance of `d` radians from the unit vector `p` along a great circle. `d` is in
-/// `tangent_basis(p)`, which is the derivative by `d` at 0.
+/// `tangent_basis(p)`, which is the derivative with respect to `d` at 0.
 [[nodiscard]] inline vec3 step_on_sphere(const vec3& p, const vec2& d) {
   const double angle = std::sqrt(d.x() * d.x() + d.y() * d.y());
   const double factor = angle < 1e-8 ? 1.0 : std::sin(angle) / angle, along = std::cos(angle);
@@ -42,7 +42,7 @@ namespace orbis::optimize::detail {
   return {q[0] / length, q[1] / length, q[2] / length};
 }
 
-/// Converts gradients by the point at z = 1 to gradients by the pixel.
+/// Converts gradients with respect to the point at z = 1 to gradients with respect to the pixel.
 struct pixel_gradient {
   double xx, yx, yy;
   explicit pixel_gradient(const metric_ray& r) : xx{1.0 / r.xx}, yx{-r.xy / (r.xx * r.yy)}, yy{1.0 / r.yy} {}

@@ -55,8 +55,8 @@ struct homography_equations {
   matrix<8> g = zeros<matrix<8>>();
   double cost = 0.0;
 
-  /// Adds the error `r` of a point whose derivative by the point before its projection is `by_point`; that point
-  /// changes by `by_d * D * moved`.
+  /// Adds the error `r` of a point whose derivative with respect to the point before its projection is `by_point`; that
+  /// point changes by `by_d * D * moved`.
   void add(const vec2& r, const matrix<2, 3>& by_point, const mat3& by_d, const vec3& moved) {
     const matrix<2, 3> a = by_point * by_d;
     matrix<2, 8> j;
@@ -79,7 +79,7 @@ struct homography_equations {
   }
 };
 
-/// The derivative of `xy`, the projection of a point to z = 1, by the point.
+/// The derivative of `xy`, the projection of a point to z = 1, with respect to the point.
 [[nodiscard]] inline matrix<2, 3> derivative_of_projection(const vec2& xy, double inverse_z) {
   matrix<2, 3> projection;
   projection << inverse_z, 0.0, -xy.x() * inverse_z, 0.0, inverse_z, -xy.y() * inverse_z;

@@ -256,7 +256,7 @@ class pnp_estimator {
   match_kernels kernels_{};
 };
 
-/// The reason if the points determine no pose; otherwise empty.
+/// The reason why the points determine no pose; empty if they determine one.
 [[nodiscard]] inline std::string pnp_degeneracy(const pnp_matches& matches) {
   mat3 covariance = zeros<mat3>();
   for (const vec3& p : matches.points) covariance += p * transposed(p);

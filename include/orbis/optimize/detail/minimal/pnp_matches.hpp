@@ -2,10 +2,10 @@
 /// @file
 /// Matches between known points and pixels, converted for PnP.
 ///
-/// A pixel is stored as the point (x, y) of its ray at z = 1, and the derivative of the pixel by that point, made upper
-/// triangular by a rotation. The error in pixels is this matrix times the difference at z = 1: exact without
-/// distortion, and correct to first order with it, which suffices to rank poses. The loops over the matches thus do not
-/// depend on the camera's type.
+/// A pixel is stored as the point (x, y) of its ray at z = 1, and the derivative of the pixel with respect to that
+/// point, made upper triangular by a rotation. The error in pixels is this matrix times the difference at z = 1: exact
+/// without distortion, and correct to first order with it, which suffices to rank poses. The loops over the matches
+/// thus do not depend on the camera's type.
 #pragma once
 
 #include <cmath>

@@ -32,8 +32,8 @@ namespace orbis::optimize::detail {
 }
 
 /// Computes the roots of a polynomial within [-1, 1], ascending; returns their number. Between two roots of its
-/// derivative a polynomial has at most one root. A root of even multiplicity is reported once, and possibly also a near
-/// root.
+/// derivative a polynomial has at most one root. A root of even multiplicity is reported once, and a nearby root may be
+/// reported as well.
 template <std::size_t Degree>
 std::size_t roots_in_unit_interval(const std::array<double, Degree + 1>& c, std::array<double, Degree>& roots) {
   // The coefficients of all derivatives, starting with the linear one, each divided by a factorial.
@@ -81,7 +81,7 @@ std::size_t roots_in_unit_interval(const std::array<double, Degree + 1>& c, std:
 }
 
 /// Computes all real roots of a polynomial; returns their number. `c[i]` is the coefficient of x^i. A root of even
-/// multiplicity is reported once, and possibly also a near root. None if a coefficient is not finite.
+/// multiplicity is reported once, and a nearby root may be reported as well. None if a coefficient is not finite.
 template <std::size_t Degree>
 std::size_t real_roots(const std::array<double, Degree + 1>& c, std::array<double, Degree>& roots) {
   double largest = 0.0;

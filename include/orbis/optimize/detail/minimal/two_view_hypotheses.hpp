@@ -142,8 +142,8 @@ inline constexpr double least_disparity = 4.0;
   return sum;
 }
 
-/// The scores of a homography and of an essential matrix: over both images, the gate of a point minus the squared
-/// distance, for distances within the model's own gate.
+/// The scores of a homography and of an essential matrix: the sum over both images of the gate of a point minus the
+/// squared distance, for distances within the model's own gate.
 /// Source: R. Mur-Artal, J. M. M. Montiel, J. D. Tardos, "ORB-SLAM", T-RO 31 (2015), equations 1 and 2.
 struct model_scores {
   double homography = 0.0, essential = 0.0;

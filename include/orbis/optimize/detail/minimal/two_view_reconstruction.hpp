@@ -50,8 +50,8 @@ class two_view_search {
       all_.push_back({m, support_of(matches_, m)});
     }
   }
-  /// Returns true if one motion of a plane explains the plane's matches clearly better than `best`; `best` then mixes
-  /// the plane with another moving object.
+  /// Returns true if one motion of a plane explains the plane's matches clearly better than `best`, i.e. if `best`
+  /// mixes the plane with another moving object.
   [[nodiscard]] static bool contradicts(const std::vector<Match>& plane, const std::vector<epipolar_motion>& motions,
                                         const epipolar_motion& best) {
     constexpr std::array scales{3.0, 2.0, 2.0, 2.0, 2.0, 2.0};
@@ -66,7 +66,8 @@ class two_view_search {
       return refined && score(refined->e) > enough;
     });
   }
-  /// Searches for further motions: from directions of translation over the whole sphere, each with the best rotation.
+  /// Searches for additional motions, starting from directions of translation over the whole sphere, each with the best
+  /// rotation.
   void add_sampled_motions(const so3& turn) {
     constexpr std::array scales{20.0, 20.0, 10.0, 10.0, 5.0, 5.0};
     constexpr std::size_t few = 150;
@@ -150,9 +151,9 @@ struct two_view_inliers {
   }
 
  private:
-  /// Two estimates, of which the larger counts: from the noise of matches with independent errors, and from the change
-  /// of the motion when the matches of a part of the image are left out (delete-a-group jackknife), which covers
-  /// correlated errors: of neighbours, moving objects, the rows of a rolling shutter.
+  /// Uses the larger of two estimates: one from the noise of matches with independent errors, and one from the change
+  /// of the motion when the matches of a part of the image are left out (delete-a-group jackknife). The latter covers
+  /// correlated errors: those of neighbours, of moving objects, and of the rows of a rolling shutter.
   void estimate_deviations(const epipolar_motion& motion) {
     constexpr std::size_t side = 3, parts = side * side;
     std::vector<const Match*> order = all;

@@ -37,7 +37,7 @@ struct pose_sums {
   std::array<double, 9> corner{};
   std::array<double, 6> rotation{};
   std::array<double, 6> gradient{};
-  double cost = 0.0;  ///< half the robust sum
+  double cost = 0.0;  ///< half the robust cost
 };
 
 /// The constants of one pass over the observations.
@@ -79,7 +79,7 @@ ORBIS_ALWAYS_INLINE void see(const pose_lanes& in, std::size_t i, const L& infor
 }
 
 /// Computes the equations of the first `count` observations, a multiple of eight. A point without a projection costs as
-/// much as one at the gate, so that a step cannot gain by losing points.
+/// much as one at the gate, so that losing points never makes a step cheaper.
 template <simd::target Target, class Camera>
 ORBIS_ALWAYS_INLINE void sum_pose(const pose_lanes& in, std::size_t count, const Camera& camera, const pose_at& at,
                                   const huber& loss, pose_sums& out) {

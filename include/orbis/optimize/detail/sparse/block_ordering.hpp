@@ -176,7 +176,7 @@ class quotient_graph {
     for (const std::uint32_t i : clique_) clique_weight_ += weight_[i];
   }
 
-  /// Computes the weight of each element that touches the clique outside of the clique.
+  /// Computes, for each element that touches the clique, its weight outside the clique.
   void measure_elements() {
     touched_.clear();
     for (const std::uint32_t i : clique_)

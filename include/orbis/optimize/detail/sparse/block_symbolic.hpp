@@ -36,7 +36,7 @@ struct supernode_update {
 
 /// The structure of a factor `L` with `P A P^T = L L^T`.
 struct block_symbolic {
-  std::vector<std::uint32_t> order;     ///< `order[k]`: the block of A that is the k-th of the factor
+  std::vector<std::uint32_t> order;     ///< `order[k]`: the block of A that becomes the k-th of the factor
   std::vector<std::uint32_t> position;  ///< inverse of `order`
   std::vector<supernode> supernodes;    ///< in the order of elimination
   std::vector<std::uint32_t> rows;

@@ -58,8 +58,8 @@ class block_conjugate_gradients {
   }
   [[nodiscard]] std::uint32_t failed_block() const { return failed_block_; }
 
-  /// Replaces the right-hand side by an approximate solution. If the matrix turns out not to be positive definite, that
-  /// is the last iterate before.
+  /// Replaces the right-hand side by an approximate solution. If the matrix turns out not to be positive definite, the
+  /// result is the iterate before that was detected.
   void solve(std::span<double> x) {
     assert(x.size() == B * size_);
     residual_.assign(x.begin(), x.end());
