@@ -25,7 +25,7 @@ struct word_value {
   friend bool operator==(const word_value&, const word_value&) = default;
 };
 
-/// The words that occur, ascending, each once.
+/// The words that occur, in ascending order without duplicates.
 struct bag_of_words {
   std::vector<word_value> words;
 
@@ -66,7 +66,7 @@ inline void normalize(bag_of_words& bag) noexcept {
   return std::clamp(sum, 0.0, 1.0);
 }
 
-/// Number of words that two bags share. O(words).
+/// Number of words that two bags have in common. O(words).
 [[nodiscard]] inline std::size_t shared_words(const bag_of_words& a, const bag_of_words& b) noexcept {
   std::size_t shared = 0;
   for (std::size_t i = 0, j = 0; i != a.size() && j != b.size();) {

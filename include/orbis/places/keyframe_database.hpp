@@ -30,7 +30,7 @@ concept keyframe_id = std::totally_ordered<Id> && std::copyable<Id> && std::defa
 
 /// Acceptance criteria of a query.
 struct query_options {
-  double shared_words = 0.8;  ///< minimum number of shared words / that of the keyframe that shares most; exclusive
+  double shared_words = 0.8;  ///< minimum shared words, relative to the keyframe with the most; exclusive
   double min_score = 0.0;     ///< minimum score
   double group_score = 0.75;  ///< minimum sum of a group's scores, relative to the best group; exclusive
 };
@@ -144,8 +144,8 @@ class basic_keyframe_database {
   /// surroundings of the image itself, for loop closure). Computes the scores of those that share enough words; each
   /// score that is high enough forms a group: the keyframe and those of its neighbours (`neighbors(id)`, a range of
   /// ids: the keyframes that observe most of the same landmarks) that were also scored. A group represents a place;
-  /// from each group with a sufficient sum of scores, its best keyframe becomes a candidate, once. Neighbours that are
-  /// not in the database are ignored.
+  /// from each group with a sufficient sum of scores, its best keyframe becomes a candidate (at most once). Neighbours
+  /// that are not in the database are ignored.
   ///
   /// O(keyframes + keyframes that share a word, word by word + candidates x words); in steady state only the callables
   /// allocate memory.

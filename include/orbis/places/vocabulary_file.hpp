@@ -7,8 +7,8 @@
 ///     0   "orbisvoc"
 ///     8   version (u32), 1
 ///     12  CRC-32C of all that follows (u32)
-///     16  bits of a descriptor, weighting (0 tf-idf, 1 tf, 2 idf, 3 binary), nodes with the root, nodes up to the last
-///         that has children, words (u32 each)
+///     16  bits of a descriptor, weighting (0 tf-idf, 1 tf, 2 idf, 3 binary), nodes with the root, number of nodes up
+///     to the last one that has children, words (u32 each)
 ///     36  zeros up to byte 64
 ///     64  the descriptors of the nodes, level by level, the children of a node side by side, without the root
 ///         the weights of the words (f32), which are the leaves in that order

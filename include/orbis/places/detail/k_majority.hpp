@@ -28,7 +28,7 @@ namespace orbis::places::detail {
 inline constexpr std::array<std::uint64_t, 256> spread_bits = make_spread_bits();
 
 /// Counts for each bit the descriptors that have it set: bit by bit, with eight counters per word that are flushed
-/// before one of them can overflow.
+/// before any of them can overflow.
 template <std::size_t Bits>
 class bit_votes {
  public:
