@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Several maps: a new one begins after tracking is lost for long; maps are merged when a place is recognised.
+/// Several maps: a new one begins when tracking has been lost for a long time; maps are merged when a place is
+/// recognised.
 ///
 /// Source of the idea: R. Elvira, J. D. Tardos, J. M. M. Montiel, "ORBSLAM-Atlas: a robust and accurate multi-map
 /// system", IROS 2019.
@@ -44,7 +45,7 @@ class basic_atlas {
   [[nodiscard]] const std::map<map_id, map_type>& maps() const noexcept { return maps_; }
   [[nodiscard]] std::size_t size() const noexcept { return maps_.size(); }
 
-  /// Returns true if the keyframe exists, by its present id.
+  /// Returns true if the keyframe exists, by its current id.
   [[nodiscard]] bool has(map_keyframe k) const { return contains(k.map) && at(k.map).has_keyframe(k.keyframe); }
   /// @pre has(k)
   [[nodiscard]] const basic_keyframe<D>& at(map_keyframe k) const { return at(k.map).at(k.keyframe); }
@@ -55,7 +56,7 @@ class basic_atlas {
     maps_.try_emplace(active_, levels_, scale_factor_, min_shared_);
     return active_;
   }
-  /// Adds a map, which becomes the active one. Returns its id. @pre it has the same pyramid as the others
+  /// Adds a map, which becomes the active one. Returns its id. @pre it has the same pyramid as the other maps
   map_id create(map_type m) {
     assert(m.content().levels == levels_ && m.content().scale_factor == scale_factor_);
     active_ = next_++;
@@ -84,14 +85,14 @@ class basic_atlas {
     if (active_ == from) active_ = into;
     return offsets;
   }
-  /// Returns the present id of a keyframe, after mergers of its map. The keyframe may have been erased since (see
+  /// Returns the current id of a keyframe, after mergers of its map. The keyframe may have been erased since (see
   /// `basic_map::replacement_of`). The id of a removed map does not change. O(mergers).
   [[nodiscard]] map_keyframe current(map_keyframe k) const {
     for (auto to = merged_.find(k.map); to != merged_.end(); to = merged_.find(k.map))
       k = {to->second.into, k.keyframe + to->second.offsets.keyframes};
     return k;
   }
-  /// Returns the present id of a landmark of a map, after mergers of the map. @pre l != no_id
+  /// Returns the current id of a landmark, after mergers of its map. @pre l != no_id
   [[nodiscard]] landmark_id current(map_id map, landmark_id l) const {
     for (auto to = merged_.find(map); to != merged_.end(); to = merged_.find(map)) {
       map = to->second.into;

@@ -70,8 +70,8 @@ template <camera::parametric_camera Camera>
   return {all & ~(focal_lengths | central), central, focal_lengths};
 }
 
-/// The parameters that are estimated if all are determined. If the distortion is a fraction, numerator and denominator
-/// are determined only together; so are, nearly, more than two powers of the radius.
+/// The parameters that are estimated if all are determined. If the distortion is a fraction, its numerator and
+/// denominator are determined only jointly; the same is nearly true for more than two powers of the radius.
 template <camera::parametric_camera Camera>
 [[nodiscard]] std::uint32_t usual_parameters(const Camera&) {
   return (1U << camera::parameters_of<Camera>::count) - 1U;

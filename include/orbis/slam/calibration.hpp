@@ -32,8 +32,9 @@ struct calibration_options {
   /// depth camera's own distortion) and would be attributed to the lens; a small weight suffices to fix the scale of
   /// the world.
   double depth_weight = 0.0025;
-  bool keeps_aspect = true;  ///< keeps the given ratio of the focal lengths, as of square pixels
-  /// Maximum number of consecutive keyframes, taken where most was observed; the cost is cubic in their number.
+  bool keeps_aspect = true;  ///< keeps the given ratio of the focal lengths, for example square pixels
+  /// Maximum number of consecutive keyframes, taken where there are most observations; the cost is cubic in their
+  /// number.
   std::size_t max_keyframes = 300;
 };
 
@@ -48,7 +49,7 @@ struct calibrated_parameter {
 
 /// Result of a calibration, independent of the camera model.
 struct calibration_summary {
-  /// The parameters of the model; of `radial_tangential` k3 if it is not 0, k4 to k6 never.
+  /// The parameters of the model; for `radial_tangential`, k3 only if it is not 0, and never k4 to k6.
   std::vector<calibrated_parameter> parameters;
   std::size_t keyframes = 0, landmarks = 0;  ///< number of those used
   std::size_t observations = 0, outliers = 0;

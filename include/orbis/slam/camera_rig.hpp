@@ -19,7 +19,7 @@ template <camera::camera_model Camera>
 struct camera_rig {
   optimize::reprojection<Camera> model;  ///< the camera, and `bf`, which weights depth (see `options::bf`)
   pyramid_scales scales{};               ///< of the extractor's image pyramid
-  double min_depth = 0.1;                ///< metres; depth outside of min_depth ... max_depth is not used
+  double min_depth = 0.1;                ///< metres; depth outside min_depth ... max_depth is not used
   double max_depth = 10.0;               ///< metres
   bool scale_is_known = true;            ///< false if no depth is measured: lengths are in an arbitrary unit per map
 

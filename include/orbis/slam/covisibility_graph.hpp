@@ -77,7 +77,7 @@ class covisibility_graph {
     if (gone.empty()) return;
     for (const covisible& other : gone.mapped().pairs) decrease(other.keyframe, k, other.shared);
   }
-  /// Adds another graph, whose ids grow by `offset`. @pre this graph has no ids from `offset` on
+  /// Adds another graph, whose ids grow by `offset`. @pre all ids of this graph are less than `offset`
   void append(covisibility_graph&& other, std::uint32_t offset) {
     for (auto& [id, n] : other.nodes_) {
       assert(!nodes_.contains(id + offset));

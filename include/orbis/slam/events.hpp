@@ -44,13 +44,13 @@ enum class correction_kind : std::uint8_t {
 struct correction_event {
   correction_kind kind{};
   map_id map = 0;  ///< the corrected map
-  /// Of a loop or merger: the two keyframes of the same place (`from` by its new id). With threads either may have been
-  /// erased since (`basic_atlas::current` gives its replacement).
+  /// For a loop or merger: the two keyframes of the same place (`from` by its new id). With threads, either may since
+  /// have been erased (`basic_atlas::current` gives its replacement).
   map_keyframe from{}, to{};
-  map_id merged = 0;          ///< of a merger: the map that became a part of `map`
-  id_offsets offsets{};       ///< of a merger: the amounts by which the ids of `merged` grew
-  sim3 T_corrected_before{};  ///< the correction at keyframe `from`, in the world of the map; with depth, of scale 1
-  /// Of a merger: the change of the world of `map`, if `merged` is the older map, whose world is kept.
+  map_id merged = 0;          ///< for a merger: the map that became a part of `map`
+  id_offsets offsets{};       ///< for a merger: the amounts by which the ids of `merged` grew
+  sim3 T_corrected_before{};  ///< the correction at keyframe `from`, in the map's world; scale 1 with depth
+  /// For a merger: the change of the world of `map`, if `merged` is the older map, whose world is kept.
   sim3 T_map_before{};
   double milliseconds = 0.0;         ///< wall time
   double locked_milliseconds = 0.0;  ///< the longest single time that tracking and queries had to wait

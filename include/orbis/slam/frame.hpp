@@ -53,8 +53,8 @@ struct basic_frame {
   orbis::features::keypoint_grid grid;        ///< of the keypoints
   sensor_kind sensor = sensor_kind::unknown;  ///< custom sensors may leave it `unknown`
   bool scale_is_known = true;                 ///< false if no lengths are measured; set by the system
-  /// Few or no landmarks constrain the pose; depth does. Adjustments, which only use landmarks, keep the pose fixed.
-  /// Not stored in map files.
+  /// True if the pose is constrained by depth, with few or no landmarks. Adjustments, which use only landmarks, keep
+  /// the pose fixed. Not stored in map files.
   bool held_by_depth = false;
   /// The keypoints as read with a rolling shutter; the other members are for the frame's time. Empty with a global
   /// shutter.
@@ -66,7 +66,7 @@ struct basic_frame {
   [[nodiscard]] bool has_depth(std::size_t i) const noexcept { return depth[i] > 0.0F; }
   /// The point that keypoint `i` observes by its depth, in the camera frame, metres. @pre has_depth(i)
   [[nodiscard]] vec3 point_camera(std::size_t i) const { return static_cast<double>(depth[i]) * rays[i]; }
-  /// As `point_camera`, in the world frame. @pre has_depth(i)
+  /// Like `point_camera`, in the world frame. @pre has_depth(i)
   [[nodiscard]] vec3 point_world(std::size_t i) const { return T_world_camera * point_camera(i); }
   [[nodiscard]] vec2 pixel(std::size_t i) const { return {features.keypoints[i].x, features.keypoints[i].y}; }
 };

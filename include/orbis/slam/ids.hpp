@@ -68,7 +68,7 @@ struct id_offsets {
   std::uint32_t landmarks = 0;
 };
 
-/// A pair of keyframes, one of each map, that observe the same place; it attaches one map to the other.
+/// A pair of keyframes, one from each map, that observe the same place; it attaches one map to the other.
 struct map_link {
   keyframe_id into;  ///< of the map that is kept
   keyframe_id from;  ///< of the map that is merged into it, by its id there

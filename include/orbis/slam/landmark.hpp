@@ -34,7 +34,7 @@ struct basic_landmark {
   keyframe_id created;                    ///< the keyframe that created it
   std::uint32_t visible = 0;              ///< number of frames in which it was expected
   std::uint32_t found = 0;                ///< number of frames in which it was found
-  bool has_current_descriptor = false;    ///< true if `descriptor` was chosen from the present observations
+  bool has_current_descriptor = false;    ///< true if `descriptor` was chosen from the current observations
 
   /// Returns the observation by a keyframe, or null. O(log observations).
   [[nodiscard]] const observation* seen_by(keyframe_id k) const noexcept {

@@ -65,7 +65,7 @@ class basic_map {
   /// The landmarks by ascending id: a range like `keyframes()`.
   [[nodiscard]] const auto& landmarks() const noexcept { return content_.landmarks; }
   [[nodiscard]] std::size_t landmark_count() const noexcept { return content_.landmarks.size(); }
-  /// The id of the next keyframe: greater than all present and erased ids.
+  /// The id of the next keyframe: greater than all existing and erased ids.
   [[nodiscard]] keyframe_id keyframe_end() const noexcept { return content_.keyframes.end_id(); }
   /// The id of the next landmark.
   [[nodiscard]] landmark_id landmark_end() const noexcept { return content_.landmarks.end_id(); }
@@ -78,7 +78,8 @@ class basic_map {
   [[nodiscard]] std::uint32_t keyframe_ids_left() const noexcept {
     return decltype(content_.keyframes)::most_ids - keyframe_end().value();
   }
-  /// Returns the first landmark from `id` on; `landmark_end()` if there is none. O(erased ids in between).
+  /// Returns the first landmark with an id of at least `id`; `landmark_end()` if there is none. O(erased ids in
+  /// between).
   [[nodiscard]] landmark_id next_landmark(landmark_id id) const noexcept { return content_.landmarks.next_id(id); }
   [[nodiscard]] bool has_keyframe(keyframe_id id) const noexcept { return content_.keyframes.contains(id); }
   [[nodiscard]] bool has_landmark(landmark_id id) const noexcept { return content_.landmarks.contains(id); }
@@ -87,12 +88,12 @@ class basic_map {
   /// @pre has_landmark(id)
   [[nodiscard]] const landmark_type& landmark_at(landmark_id id) const { return content_.landmarks[id]; }
 
-  /// Returns the present landmark for `id`: itself if it exists, otherwise the one it was fused into; `no_id` if it was
+  /// Returns the current landmark for `id`: itself if it exists, otherwise the one it was fused into; `no_id` if it was
   /// removed, or erased so long ago that 2^18 landmarks or more have been added since.
   [[nodiscard]] landmark_id replacement_of(landmark_id id) const noexcept {
     return content_.landmarks.replacement_of(id);
   }
-  /// Returns the present keyframe for `id`: itself if it exists, otherwise its nearest existing ancestor in the
+  /// Returns the current keyframe for `id`: itself if it exists, otherwise its nearest existing ancestor in the
   /// spanning tree; `no_id` if no keyframe is left, or it was forgotten and the map comes from a file.
   [[nodiscard]] keyframe_id replacement_of(keyframe_id id) const noexcept {
     return content_.keyframes.replacement_of(id);
@@ -100,9 +101,9 @@ class basic_map {
   /// Number of changes of poses and of additions and erasures of keyframes: if it is unchanged, so are the keyframes
   /// and their poses.
   [[nodiscard]] std::uint64_t pose_changes() const noexcept { return pose_changes_; }
-  /// Returns true if the pose of a keyframe, present or erased, is known (`forget_erased`).
+  /// Returns true if the pose of a keyframe, existing or erased, is known (`forget_erased`).
   [[nodiscard]] bool remembers(keyframe_id id) const { return has_keyframe(id) || content_.erased.contains(id); }
-  /// Returns the first id from `id` on that the map remembers; `keyframe_end()` if there is none.
+  /// Returns the first id >= `id` that the map remembers; `keyframe_end()` if there is none.
   [[nodiscard]] keyframe_id next_remembered(keyframe_id id) const;
   /// Returns `T_world_camera` of a keyframe. An erased keyframe moves with its replacement. @pre remembers(id)
   [[nodiscard]] se3 pose_of(keyframe_id id) const;

@@ -44,7 +44,7 @@ namespace orbis::slam {
 /// Returns the bytes of a map's file. O(map).
 [[nodiscard]] std::string map_bytes(const map& m);
 
-/// Parses the map in `bytes`; `where` names their origin in errors. The map is consistent for any input. Errors:
+/// Parses the map in `bytes`; `where` names the source in errors. The map is consistent for any input. Errors:
 /// `malformed` (with the section and the problem), `unsupported` (another version).
 [[nodiscard]] result<map> parse_map(std::span<const std::byte> bytes, const std::string& where = "bytes");
 

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Measurement of a frame's features: the ray of each and, if available, the depth corresponding to a right coordinate.
+/// Measures the features of a frame: their rays and, if available, their depths and the corresponding right
+/// coordinates.
 ///
 /// Tracking and adjustments compare right coordinates (`optimize::reprojection`): those of a second camera, or of a
-/// virtual one that models the depth sensor. A sensor of another kind is a function that makes such a frame, for
-/// `system::track_measured`.
+/// virtual one that models the depth sensor. To support another kind of sensor, pass a function that makes such a frame
+/// to `system::track_measured`.
 #pragma once
 
 #include <algorithm>
@@ -39,7 +40,7 @@ namespace orbis::slam {
 
 /// Motion of the camera while a frame is taken.
 struct frame_motion {
-  camera::shutter shutter{};   ///< its depth image delay is that of this frame
+  camera::shutter shutter{};   ///< its depth image delay is the one of this frame
   vec6 twist = zeros<vec6>();  ///< motion of the camera in its own frame, per second, translation first
 };
 
@@ -70,8 +71,8 @@ template <camera::camera_model Camera, feature_descriptor D>
 
 }  // namespace detail
 
-/// Returns the number of points with which a frame can begin a map: of its features with depth, if lengths are measured
-/// (`options::scale_is_measured`), otherwise of all its features; 0 if there are fewer than
+/// Returns the number of points with which a frame can begin a map: the number of its features with depth if lengths
+/// are measured (`options::scale_is_measured`), otherwise of all its features; 0 if there are fewer than
 /// `settings.min_start_points`.
 template <feature_descriptor D>
 [[nodiscard]] std::size_t start_points(const basic_frame<D>& f, const options& settings) {

@@ -24,7 +24,7 @@ struct keyframe_options {
   /// Metres (without depth, median depths of the view) since the last keyframe that count as motion ...
   double moved = 0.06;
   double turned = 0.06;              ///< ... or radians
-  double inlier_ratio = 0.75;        ///< a keyframe is made below this share of the reference keyframe's landmarks
+  double inlier_ratio = 0.75;        ///< a keyframe is made below this fraction of the reference keyframe's landmarks
   double inlier_ratio_start = 0.4;   ///< `inlier_ratio` while the map has one keyframe
   std::size_t min_inliers = 15;      ///< no keyframe is made with this number of inliers or fewer
   std::size_t close_tracked = 100;   ///< a keyframe is made with fewer tracked close points than this ...
@@ -58,7 +58,7 @@ struct depth_term_options {
   bool enabled = true;           ///< adds the depth term to the keypoints in every pose refinement
   bool recovers = true;          ///< localises the camera by depth where keypoints fail
   std::size_t points = 400;      ///< maximum number of points of a frame
-  double effective_points = 40;  ///< maximum number they count as: errors of neighbouring depths are correlated
+  double effective_points = 40;  ///< maximum effective number of these: neighbouring depth errors are correlated
   std::size_t surfaces = 16;     ///< maximum number of keyframe surfaces kept; about 130 kB each
   double weakest = 0.002;  ///< mean square of the surfaces' normals in a direction below which it is unconstrained
   double min_share = 0.7;  ///< minimum share of consistent points among those on known surfaces ...
@@ -176,7 +176,7 @@ struct moving_options {
   double share = 0.15;            ///< ... if more than this share of the matches disagrees with one pose
   double seasoned = 1.0;          ///< age at which a landmark is fully trusted to be static, seconds
   double reach = 0.2;  ///< radius around moving features in which features of unknown motion are excluded, metres
-  double hold = 3.0;   ///< seconds for which moved features remain excluded while they are still
+  double hold = 3.0;   ///< seconds for which moved features stay excluded after coming to rest
 };
 
 /// Threads of the system.
@@ -184,7 +184,7 @@ struct thread_options {
   /// Off: `track` does everything, and the same frames give the same bytes. On: mapping, loop closing and global
   /// adjustment have one thread each, and `track` returns as soon as the pose is known.
   bool enabled = false;
-  /// Maximum number of keyframes waiting for mapping; at the limit, no further keyframe is made ...
+  /// Maximum number of keyframes waiting for mapping; at the limit, no more keyframes are made ...
   std::size_t max_waiting = 3;
   /// ... or `track` waits: for recordings, which must not outrun mapping. If off, an adjustment also ends early when a
   /// keyframe waits.
@@ -192,8 +192,8 @@ struct thread_options {
 };
 
 /// `options::bf` of a depth camera that triangulates: focal length (pixels) and distance between projector and camera
-/// (metres). Its disparity is accurate to about a tenth of a pixel, that of a stereo pair's features to one pixel.
-/// Source: K. Khoshelham, S. O. Elberink, "Accuracy and resolution of Kinect depth data", Sensors 2012.
+/// (metres). Its disparity is accurate to about a tenth of a pixel, compared with one pixel for features of a stereo
+/// pair. Source: K. Khoshelham, S. O. Elberink, "Accuracy and resolution of Kinect depth data", Sensors 2012.
 [[nodiscard]] constexpr double depth_camera_bf(double focal_length, double baseline) noexcept {
   return 10.0 * focal_length * baseline;
 }
@@ -207,9 +207,9 @@ struct options {
   /// deviation of a depth z is `z^2 / bf` metres (times the scale of the keypoint's level). 400 is close to the noise
   /// of a Kinect; see `depth_camera_bf`.
   double bf = 400.0;
-  double min_depth = 0.1;               ///< metres; depth outside of min_depth ... max_depth is not used
+  double min_depth = 0.1;               ///< metres; depth outside min_depth ... max_depth is not used
   double max_depth = 10.0;              ///< metres
-  double close_depth = 3.2;             ///< metres; nearer points become landmarks at once
+  double close_depth = 3.2;             ///< metres; nearer points become landmarks immediately
   std::size_t min_new_landmarks = 100;  ///< minimum number of new landmarks of a keyframe, even if they are not close
   std::size_t min_start_points = 100;   ///< minimum number of keypoints (with depth, if it is measured) to begin a map
   std::size_t min_inliers = 20;         ///< minimum number of inliers of a tracked frame
@@ -243,8 +243,7 @@ struct options {
   bool localization_only = false;     ///< makes no keyframes and keeps the map unchanged: for a loaded map
   std::optional<se3> initial_pose{};  ///< `T_world_camera` of the first frame of a map; default: the identity
   /// Function that returns the initial pose and replaces `initial_pose`: the tracking thread calls it when a map begins
-  /// with a frame (without depth, with the second of two frames; the pose is that of the second). It must not call the
-  /// system.
+  /// with a frame (without depth: with the second of two frames, whose pose it returns). It must not call the system.
   std::function<se3()> find_initial_pose{};
   std::uint64_t seed = 1;  ///< seed of RANSAC
 };
@@ -263,9 +262,9 @@ struct options {
 }
 
 /// Returns the settings of a camera without depth, based on `settings`. `keyframes.moved` and
-/// `triangulation.min_baseline` are then shares of the median depth of the landmarks in view. More keyframes are made,
-/// for the triangulation of landmarks, and landmarks need three of them. The figures follow R. Mur-Artal, J. M. M.
-/// Montiel, J. D. Tardos, "ORB-SLAM", T-RO 31 (2015), where it gives them.
+/// `triangulation.min_baseline` are then fractions of the median depth of the landmarks in view. More keyframes are
+/// made, for the triangulation of landmarks, and landmarks need three keyframes. The values follow R. Mur-Artal, J. M.
+/// M. Montiel, J. D. Tardos, "ORB-SLAM", T-RO 31 (2015), where that paper specifies them.
 [[nodiscard]] inline options monocular_options(options settings = {}) {
   settings.scale_is_measured = false;
   settings.keyframes.moved = 0.03;

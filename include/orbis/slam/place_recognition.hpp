@@ -23,9 +23,8 @@ namespace orbis::slam {
 /// - `describe(features)`: returns the signature of an image. Callable at any time, from any thread.
 /// - `add`, `erase`, `rename`: change the keyframes in the database; return false if that is not possible.
 /// - `similar(signature, count, exclude, neighbors)`: returns at most `count` keyframes, the most similar first,
-/// without those for which `exclude(id)` is true. `neighbors(id)` gives keyframes that observe the same place; one of
-/// them is enough.
-/// The same changes give the same answers.
+/// without those for which `exclude(id)` is true. `neighbors(id)` returns keyframes that observe the same place; the
+/// result needs only one of these. The same sequence of changes gives the same results.
 template <class P, class D>
 concept place_recognizer = std::movable<P> &&
     requires(P& places, const P& known, const features::basic_features<D>& seen,

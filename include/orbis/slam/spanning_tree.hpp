@@ -64,8 +64,8 @@ class spanning_tree {
     insert(nodes_[b.value()].loops, a);
   }
 
-  /// Erases a keyframe. Each of its children gets a new parent: the old parent or another child, whichever it shares
-  /// most landmarks with (`shared(a, b)`); the old parent if it shares none. If the root is erased, its oldest child
+  /// Erases a keyframe. Each of its children gets a new parent: the old parent or another child, whichever shares most
+  /// landmarks with it (`shared(a, b)`); the old parent if it shares none. If the root is erased, its oldest child
   /// becomes the root. Loop edges pass to the returned keyframe: the parent, or the new root, or `no_id` if none is
   /// left. O(children^2). @pre contains(k)
   template <std::invocable<keyframe_id, keyframe_id> Shared>
@@ -91,7 +91,7 @@ class spanning_tree {
   }
 
   /// Adds another tree, whose ids grow by `offset`. Its keyframe `by` becomes its root and a child of `at`.
-  /// @pre this tree has no ids from `offset` on; `at` and `by` exist, unless either tree is empty
+  /// @pre all ids of this tree are less than `offset`; `at` and `by` exist, unless either tree is empty
   void append(spanning_tree&& other, std::uint32_t offset, keyframe_id at, keyframe_id by) {
     const bool was_empty = size() == 0;
     if (other.size() != 0 && !was_empty) other.set_root(by);

@@ -112,8 +112,9 @@ class system {
   track_result track(double timestamp, image_view<const rgb8> color);
   track_result track(double timestamp, image_view<const std::uint8_t> grey) requires grey_extractor<Extractor>;
   /// As above, for a sensor of another kind: `measure(rig, extract)` makes the frame, like the functions of
-  /// `measure.hpp`, with the depth of each feature, or 0. There is no depth image then (`options::depth_term`), and
-  /// depth is assumed to be measured at the frame's time. With orbis::compiled, include `<orbis/slam/system-inl.hpp>`.
+  /// `measure.hpp`, with the depth of each feature, or 0. In this case there is no depth image (`options::depth_term`),
+  /// and depth is assumed to be measured at the frame's time. With orbis::compiled, include
+  /// `<orbis/slam/system-inl.hpp>`.
   template <class Measure>
   requires std::is_invocable_r_v < basic_frame<descriptor_of_t<Extractor>>,
   const Measure&, const camera_rig<Camera>&,
@@ -121,14 +122,14 @@ class system {
 
   /// The state after the last frame.
   [[nodiscard]] track_state state() const;
-  /// Enables or disables changes to the map, from the next frame on; if `on`, the map is kept unchanged.
+  /// Enables or disables changes to the map, starting with the next frame; if `on`, the map is kept unchanged.
   void set_localization_only(bool on) noexcept { localization_only_ = on; }
 
   /// Returns the features of the last frame and its pose relative to a keyframe; empty if it was not tracked. For the
   /// tracking thread only; takes no lock, so it does not wait for the back end. O(features).
   [[nodiscard]] std::optional<tracked_frame> last_frame() const;
 
-  /// Sets `T_world_camera` of the first frame of every map that begins from the next frame on
+  /// Sets `T_world_camera` of the first frame of every map that begins with the next frame or later
   /// (`options::initial_pose`). For the tracking thread only: if frames carry the gravity direction, a new map begins
   /// upright.
   void set_initial_pose(const se3& T_world_camera) {
@@ -149,7 +150,7 @@ class system {
   [[nodiscard]] orbis::trajectory trajectory(map_id map) const;
   /// Returns timestamp, pose and frame index of each keyframe of the active map.
   [[nodiscard]] std::vector<keyframe_pose> keyframes() const;
-  /// As above, but empty if the poses are those of revision `seen`. Sets `seen` to the present revision. Suitable for
+  /// As above, but empty if the poses are those of revision `seen`. Sets `seen` to the current revision. Suitable for
   /// polling by code that builds on the keyframes' poses: local adjustment moves keyframes without an event. O(1) if
   /// nothing has changed.
   [[nodiscard]] std::optional<std::vector<keyframe_pose>> keyframes_since(pose_revision& seen) const;
@@ -181,9 +182,9 @@ class system {
   [[nodiscard]] result<void> save_map(const std::filesystem::path& path)
       const requires std::same_as<descriptor_of_t<Extractor>, features::binary_descriptor<256>>;
   /// Reads a map from a file and makes it the active one; the camera is relocalised in it. The previous map is kept,
-  /// and merged into the loaded one when that is recognised; without keyframes it is removed. For ORB descriptors.
-  /// Errors: those of `read_map`; `unsupported` for a map with another image pyramid, or a map without metric scale if
-  /// the sensor measures lengths, and vice versa; `no_data` for one without keyframes.
+  /// and merged into the loaded one when that one is recognised; if it has no keyframes, it is removed. For ORB
+  /// descriptors. Errors: those of `read_map`; `unsupported` for a map with another image pyramid, or a map without
+  /// metric scale if the sensor measures lengths, and vice versa; `no_data` for one without keyframes.
   [[nodiscard]] result<void> load_map(const std::filesystem::path& path) requires
       std::same_as<descriptor_of_t<Extractor>, features::binary_descriptor<256>>;
 

@@ -64,7 +64,7 @@ struct tracked_feature {
 
 /// Tracking details of a frame, for display or logging.
 struct tracked_frame {
-  /// The keyframe that the frame's pose follows. `atlas::current` gives its present id; with
+  /// The keyframe that the frame's pose follows. `atlas::current` returns its current id; with
   /// `options::trajectory_frames` it may be forgotten later (`basic_map::remembers`).
   map_keyframe reference;
   se3 T_reference_camera;  ///< translation divided by `basic_map::scale_of` the reference, which is 1 with depth

@@ -117,9 +117,9 @@ struct depth_equations {
   double deviation = 0.0;  ///< root mean square of the residuals, standard deviations
 };
 
-/// Returns the equations of planes. `points`: maximum number of points the term counts as; more are down-weighted.
-/// `weakest`: mean square of the normals in a direction below which it counts as free; rotations are scaled to metres
-/// by the mean depth of the points. O(planes).
+/// Returns the equations of planes. `points`: maximum number of independent points; larger numbers are down-weighted to
+/// this. `weakest`: minimum mean square of the normals in a direction; below it, the direction counts as free;
+/// rotations are scaled to metres by the mean depth of the points. O(planes).
 [[nodiscard]] inline depth_equations equations_of(std::span<const plane_observation_of_row> planes,
                                                   const moving_pose& at, double points, double weakest) {
   depth_equations e;
@@ -175,7 +175,7 @@ struct depth_equations {
   return e;
 }
 
-/// Returns the motion of the camera frame to the least cost in the determined directions; zero in all others.
+/// Returns the motion of the camera frame that minimises the cost in the determined directions; zero in all others.
 [[nodiscard]] inline vec6 step_of(const depth_equations& e) {
   const symmetric_eigen<6> h = eigen_of_symmetric<6>(block<6, 6>(e.term.h, 0, 0));
   vec6 step = zeros<vec6>();

@@ -96,13 +96,13 @@ class surface_memory {
 struct depth_alignment {
   moving_pose at;
   int determined = 0;   ///< number of directions of the pose that the surfaces determine, of six
-  double least = 0.0;   ///< their strength in the worst of these: `depth_equations::least`
+  double least = 0.0;   ///< strength of the weakest of these: `depth_equations::least`
   association seen;     ///< at the aligned pose
   bool is_only = true;  ///< no other pose fits nearly as well
 };
 
 /// Returns start poses for depth alignment: the predicted pose, the last pose, and the last pose turned left and right,
-/// up and down, by the angle of a hand-held camera in the time. `interval`: seconds since `last`.
+/// up and down, by the angle that a hand-held camera may turn in that time. `interval`: seconds since `last`.
 [[nodiscard]] inline std::array<moving_pose, 8> search_starts(const se3& last, const se3& predicted, double interval) {
   const double angle = std::clamp(interval, 0.05, 0.25);  // about a radian per second
   std::array<moving_pose, 8> starts;
@@ -153,7 +153,7 @@ class depth_tracker {
   /// Returns the last result of `find_surfaces`.
   [[nodiscard]] bool has_surfaces() const noexcept { return !placed_.empty(); }
 
-  /// Returns the cost of a pose close to the true one by the surfaces; empty if they do not constrain it.
+  /// Returns the cost of a pose close to the true one with respect to the surfaces; empty if they do not constrain it.
   /// @pre find_surfaces
   [[nodiscard]] std::optional<pose_quadratic> term_at(const moving_pose& at, const camera::shutter& shutter) {
     const association seen = associate<Camera>(samples_, 1, placed_, at, shutter, rig_, close, planes_);
@@ -205,7 +205,7 @@ class depth_tracker {
            static_cast<double>(found.seen.visible) >= visible * static_cast<double>(samples_.size());
   }
 
-  /// Keeps the surface of the present frame at `T_anchor_camera` relative to keyframe `anchor`.
+  /// Stores the surface of the current frame at `T_anchor_camera` relative to keyframe `anchor`.
   void keep(map_keyframe anchor, const se3& T_anchor_camera, const vec6& twist, const camera::shutter& shutter) {
     if (now_.empty()) return;
     if (!shutter.is_global()) move_to_frame_time(twist, shutter);
@@ -263,7 +263,7 @@ class depth_tracker {
   surface_builder<Camera> builder_;
   surface_sampler sampler_;
   surface_memory memory_;
-  surface now_;  ///< of the present frame
+  surface now_;  ///< of the current frame
   std::vector<surface_sample> samples_;
   std::vector<placed_surface> placed_;
   std::vector<plane_observation_of_row> planes_;

@@ -39,7 +39,7 @@ struct surface {
   std::vector<surface_cell> cells;
 
   [[nodiscard]] bool empty() const noexcept { return cells.empty(); }
-  /// Returns the cell that contains a pixel; null outside of the grid.
+  /// Returns the cell that contains a pixel; null outside the grid.
   [[nodiscard]] const surface_cell* at(const vec2& pixel) const noexcept {
     const double u = (pixel.x() + 0.5) / step, v = (pixel.y() + 0.5) / step;
     if (!(u >= 0.0 && v >= 0.0 && u < columns && v < rows)) return nullptr;
@@ -55,7 +55,7 @@ struct surface {
 template <camera::camera_model Camera>
 class surface_builder {
  public:
-  /// Builds the surface of a depth image. `noise`: the standard deviation of an inverse depth, 1/m. Depths outside of
+  /// Builds the surface of a depth image. `noise`: the standard deviation of an inverse depth, 1/m. Depths outside
   /// `min_depth ... max_depth` (metres) are not used. O(pixels). @pre the image has the size of the camera, and the
   /// camera is the same in all calls
   template <camera::depth_source Depth>

@@ -47,18 +47,18 @@ inline constexpr double least_trust = 0.02;
   return outliers >= o.min_features && static_cast<double>(outliers) > o.share * static_cast<double>(matches);
 }
 
-/// Searches for a second rigid motion among matches of which one pose leaves many out, and decides which of the two is
-/// that of the camera: the one with the greater sum of trust times spread. Matches that have long been part of the map
-/// are trusted; an object that drags the pose along has appeared recently, or is small compared with the room behind
-/// it. The candidate poses include the one from the trusted matches alone, starting from the prediction. The second
-/// motion is found by RANSAC among the outliers of the first, as in P. H. S. Torr, "Geometric motion segmentation and
-/// model selection", Phil. Trans. R. Soc. A 356 (1998).
+/// Searches for a second rigid motion among matches many of which disagree with one pose, and decides which of the two
+/// motions is the camera's: the one with the greater sum of trust times spread. Matches that have long been part of the
+/// map are trusted; an object that biases the pose has appeared recently, or is small compared with the room behind it.
+/// The candidate poses include the one from the trusted matches alone, starting from the prediction. The second motion
+/// is found by RANSAC among the outliers of the first, as in P. H. S. Torr, "Geometric motion segmentation and model
+/// selection", Phil. Trans. R. Soc. A 356 (1998).
 template <camera::camera_model Camera>
 class motion_splitter {
  public:
   /// `trust`: of each match, 0 ... 1. `predicted`: the expected pose of the camera; `fitted`: the pose from all
-  /// matches, with which these `outliers` disagree. Empty if there is no second motion, and no better pose. O(matches),
-  /// some tenths of a millisecond. @pre one entry of `trust` and `outliers` for each observation
+  /// matches, with which these `outliers` disagree. Empty if there is neither a second motion nor a better pose.
+  /// O(matches), a few tenths of a millisecond. @pre one entry of `trust` and `outliers` for each observation
   [[nodiscard]] static std::optional<motion_split> split(std::span<const optimize::pose_observation> observations,
                                                          std::span<const double> trust,
                                                          const optimize::reprojection<Camera>& model,
@@ -94,8 +94,8 @@ class motion_splitter {
     return out;
   }
 
-  /// Returns true if the untrusted matches agree with the pose of all, but not with that of the trusted ones: an object
-  /// moves so slowly that it biases the pose. O(matches), some ten microseconds.
+  /// Returns true if the untrusted matches agree with the pose from all matches but not with the pose from the trusted
+  /// ones: a slowly moving object biases the pose. O(matches), about ten microseconds.
   [[nodiscard]] static bool is_biased_by_motion(std::span<const optimize::pose_observation> observations,
                                                 std::span<const double> trust,
                                                 const optimize::reprojection<Camera>& model, const se3& fitted,
@@ -206,7 +206,7 @@ class motion_splitter {
   }
 
   /// Marks the outliers that agree with one other motion, clearly disagree with that of the camera, and are surrounded
-  /// by outliers: a moving object is one body, whereas the outliers of a blurred image are everywhere.
+  /// by outliers: a moving object is one body, whereas the outliers in a blurred image are spread everywhere.
   [[nodiscard]] bool mark_moving(motion_split& s) {
     const std::optional<se3> other = second_motion(s.outliers);
     if (!other) return false;

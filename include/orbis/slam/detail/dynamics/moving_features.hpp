@@ -53,12 +53,12 @@ void remove_features(basic_frame<D>& f, std::span<const std::uint8_t> leave_out)
 }
 
 /// The features of the last frame on moving objects. Call for each frame: `find`, then `judge` on matches of static
-/// features, `spread` when the pose is known, and `take_out` at the end. While nothing moves, each of these returns at
-/// once and changes nothing.
+/// features, `spread` when the pose is known, and `take_out` at the end. While nothing moves, each of these returns
+/// immediately and changes nothing.
 ///
-/// When a second motion is found, its features are excluded from then on. A feature is matched by its appearance near
-/// the position predicted by its image motion, and its world position is compared with an earlier one. Features of
-/// unknown motion around them are excluded as well. An object that stops remains excluded for a while
+/// When a second motion is found, its features are excluded from that frame onwards. A feature is matched by its
+/// appearance near the position predicted by its image motion, and its world position is compared with an earlier one.
+/// Features of unknown motion around them are excluded as well. An object that stops remains excluded for a while
 /// (`moving_options::hold`), in case it moves again.
 template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers>
 class moving_features {
@@ -121,7 +121,7 @@ class moving_features {
   }
 
   /// Searches for a second motion after the pose of a frame was refined on matches of `list`, if many of them disagree.
-  /// If one is found, sets pose and landmarks of the frame again. Returns the number of matches that agree.
+  /// If one is found, replaces the pose and landmarks of the frame. Returns the number of matches that agree.
   std::size_t judge(basic_frame<D>& f, const basic_map<D>& m, const search_list<D>& list,
                     std::span<const features::match> matches, std::size_t inliers, const se3& predicted) {
     if (!is_enabled() || inliers == 0) return inliers;
@@ -137,7 +137,7 @@ class moving_features {
   /// Sets the pose of the last frame.
   void set_last(const se3& T_world_camera) { T_world_last_ = T_world_camera; }
 
-  /// Returns true if a landmark must be excluded from the search in the present frame: new landmarks may move.
+  /// Returns true if a landmark must be excluded from the search in the current frame: new landmarks may move.
   [[nodiscard]] bool is_excluded(const basic_map<D>& m, landmark_id id, double now) const {
     return trusts_old_only_ && trust_of(m, id, now) < enough_trust;
   }
@@ -227,7 +227,7 @@ class moving_features {
   static constexpr double anchor_time = 0.25;  ///< seconds
 
   struct track {
-    std::size_t feature = 0;  ///< of the present frame
+    std::size_t feature = 0;  ///< of the current frame
     features::keypoint at;
     D descriptor{};
     float flow_x = 0.0F, flow_y = 0.0F;  ///< pixels since the previous frame
@@ -292,7 +292,7 @@ class moving_features {
     return squared_norm(*expected - f.pixel(t.feature)) * information > 2.0 * error_limit(false);
   }
 
-  /// Returns the trust in a landmark to be static, by its age.
+  /// Returns the confidence that a landmark is static, based on its age.
   [[nodiscard]] double trust_of(const basic_map<D>& m, landmark_id id, double now) const {
     if (id == no_id) return 0.0;
     const keyframe_id by = m.landmark_at(id).created;
@@ -302,10 +302,10 @@ class moving_features {
 
   const camera_rig<Camera>& rig_;
   const options& options_;
-  std::vector<track> tracks_, next_;       ///< of the last frame, of the present one
-  std::vector<std::uint8_t> is_left_out_;  ///< by feature of the present frame; empty: none is excluded
+  std::vector<track> tracks_, next_;       ///< of the last frame, of the current one
+  std::vector<std::uint8_t> is_left_out_;  ///< by feature of the current frame; empty: none is excluded
   std::vector<std::uint8_t> agrees_;       ///< by feature: 1 if it agrees with the pose of the static scene
-  bool trusts_old_only_ = false;           ///< in the present frame
+  bool trusts_old_only_ = false;           ///< in the current frame
   double moved_ = 0.0;                     ///< time of the last motion, seconds
   se3 T_world_last_;
 };

@@ -36,7 +36,7 @@ struct report {
   std::size_t observations = 0;  ///< number of observations used
   std::size_t outliers = 0;      ///< observations that disagreed and were erased
   int iterations = 0;
-  double initial_cost = 0.0;  ///< half the robust sum of squared errors
+  double initial_cost = 0.0;  ///< half the robust cost (sum of robustified squared errors)
   double final_cost = 0.0;    ///< the same at the end, without outliers
 };
 
@@ -137,8 +137,8 @@ report apply_poses(basic_map<D>& m, const snapshot& s, const bundle_solution& so
           solved.iterations,  solved.initial_cost, solved.final_cost};
 }
 
-/// Erases the outliers among the `count` observations from `first` on, and the landmarks whose position is no longer
-/// determined, so that a caller that shares the map can do it in parts. Returns the number of erased outliers.
+/// Erases the outliers among the `count` observations starting at `first`, and the landmarks whose position is no
+/// longer determined, so that a caller that shares the map can do it in parts. Returns the number of erased outliers.
 /// O(count).
 /// @pre solved.usable
 template <feature_descriptor D>

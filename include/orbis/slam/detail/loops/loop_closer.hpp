@@ -34,7 +34,7 @@ class loop_closer {
  public:
   explicit loop_closer(shared_state<Camera, D, Places>& shared) : shared_{shared} {}
 
-  /// Searches for places that the keyframe observes again. Returns true if a map was corrected: then it should be
+  /// Searches for places that the keyframe observes again. Returns true if a map was corrected and should therefore be
   /// adjusted globally.
   bool close(map_keyframe k) {
     if (!shared_.settings.places.enabled) return false;
@@ -86,7 +86,7 @@ class loop_closer {
     report({.kind = correction_kind::global_adjustment, .map = id}, timing);
   }
 
-  /// Stops interruptible work soon. May be called from any thread.
+  /// Requests that interruptible work stop soon. May be called from any thread.
   void stop() noexcept { stopped_ = true; }
 
  private:
@@ -118,8 +118,8 @@ class loop_closer {
     return std::forward<F>(f)();
   }
 
-  /// Returns the keyframes with similar appearance; updates `k` to its present id. In its own map only keyframes that
-  /// share no landmark with it and are some keyframes older.
+  /// Returns the keyframes with similar appearance; updates `k` to its current id. Within its own map, only keyframes
+  /// that share no landmark with it and are at least a few keyframes older.
   std::vector<map_keyframe> candidates_of(map_keyframe& k) {
     typename Places::signature bow_vector;
     {

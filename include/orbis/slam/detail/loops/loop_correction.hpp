@@ -48,7 +48,7 @@ enum class edge_kind { tree, loop, covisibility };
 /// An edge of a pose graph.
 struct essential_edge {
   std::uint32_t from = no_id;  ///< a keyframe's id; for `optimize_poses` an index
-  std::uint32_t to = no_id;    ///< as `from`
+  std::uint32_t to = no_id;    ///< like `from`
   edge_kind kind = edge_kind::tree;
   std::uint32_t shared = 0;  ///< number of landmarks that both observe
   sim3 measurement;          ///< `T_from_to`; lengths at `from` are its scale times those at `to`
@@ -57,7 +57,7 @@ struct essential_edge {
 
 /// Returns the edges of the spanning tree, the loop edges, and the pairs that share at least `threshold` landmarks;
 /// each pair of keyframes once, by ascending `from`. Edges of the tree lead from child to parent, the others from the
-/// newer keyframe to the older one. The measurements are the present relative poses. O(keyframes and pairs that share
+/// newer keyframe to the older one. The measurements are the current relative poses. O(keyframes and pairs that share
 /// landmarks).
 template <feature_descriptor D>
 [[nodiscard]] std::vector<essential_edge> essential_graph(const basic_map<D>& m, std::uint32_t threshold = 100) {
@@ -107,7 +107,7 @@ template <class T>
 }
 
 /// Moves poses to agree with the edges, whose ends are indices of the poses; those with a nonzero entry in `is_fixed`
-/// are held. `scale_is_known`: all scales are and remain 1; otherwise scales are adjusted as well. Returns the number
+/// are held. `scale_is_known`: all scales are 1 and stay 1; otherwise scales are adjusted as well. Returns the number
 /// of iterations; empty, with unusable poses, if it fails or `callback` cancels it.
 template <class S = double>
 [[nodiscard]] std::optional<int> optimize_poses(std::type_identity_t<std::span<basic_sim3<S>>> poses,
@@ -204,7 +204,7 @@ template <feature_descriptor D, camera::camera_model Camera>
 }
 
 /// Writes the poses of a solution into the map of the snapshot. The map is not corrected if no keyframe replaces an end
-/// of the loop. If the report says that the map was corrected, the caller then calls `loop_fusion::fuse` and
+/// of the loop. If the report indicates that the map was corrected, the caller then calls `loop_fusion::fuse` and
 /// `update_landmarks`.
 template <feature_descriptor D>
 report apply_poses(basic_map<D>& m, const snapshot<D>& s, const solution& solved) {

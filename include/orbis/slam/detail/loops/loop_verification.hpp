@@ -45,7 +45,7 @@
 
 namespace orbis::slam::detail {
 
-/// A pair of keypoint `feature` of the keyframe and the `landmark` it observes, one of the candidate's map.
+/// Keypoint `feature` of the keyframe, and the `landmark` of the candidate's map that it observes.
 struct loop_pair {
   std::uint32_t feature = 0;
   landmark_id landmark;
@@ -70,7 +70,7 @@ struct loop_match {
 
 enum class loop_verdict {
   accepted,
-  connected,      ///< both observe the same landmarks already
+  connected,      ///< both already observe the same landmarks
   few_matches,    ///< too few features match
   not_aligned,    ///< no rigid motion explains enough of the matches
   few_inliers,    ///< the keyframe observes too few of the landmarks around the candidate
@@ -101,7 +101,7 @@ struct loop_check {
 
 namespace loop_verification {
 
-/// A keyframe, and its features with known points.
+/// A keyframe and its features with known 3D points.
 template <feature_descriptor D>
 struct view {
   basic_frame<D> image;
@@ -129,8 +129,8 @@ struct snapshot {
   double path_length = 0.0;  ///< along the keyframes between the two, metres
 };
 
-/// Returns the standard deviation of a landmark's depth in keyframe `k` if no depth is measured, in the map's unit: by
-/// a pixel's error of its rays and the largest angle between them. Infinite with one observation.
+/// Returns the standard deviation of a landmark's depth in keyframe `k` if no depth is measured, in the map's unit:
+/// from a one-pixel error of its rays and the largest angle between them. Infinite with one observation.
 template <feature_descriptor D, camera::camera_model Camera>
 [[nodiscard]] double deviation_by_parallax(const basic_map<D>& m, const basic_keyframe<D>& k, std::uint32_t feature,
                                            const camera_rig<Camera>& rig) {
@@ -181,7 +181,7 @@ template <feature_descriptor D>
   return length;
 }
 
-/// Copies the data for the verification. O(features of some keyframes, and keyframes between the two).
+/// Copies the data for the verification. O(features of a few keyframes + keyframes between the two).
 /// @pre the keyframes exist and differ
 template <feature_descriptor D, camera::camera_model Camera>
 [[nodiscard]] snapshot<D> take(const basic_map<D>& current, keyframe_id k, const basic_map<D>& candidate_map,
@@ -297,7 +297,7 @@ class checker {
     found.scale = T.scale();
     return true;
   }
-  /// Finds the landmarks around the candidate that a frame observes, and its pose by them, starting from
+  /// Finds the landmarks around the candidate that a frame observes, and estimates its pose from them, starting from
   /// `T_world_camera`.
   [[nodiscard]] optimize::pose_refinement localize(const basic_frame<D>& f, const se3& T_world_camera, double radius,
                                                    std::vector<loop_pair>* observed) const {

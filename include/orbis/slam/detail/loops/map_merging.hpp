@@ -55,8 +55,8 @@ template <feature_descriptor D>
 }
 
 /// Moves `from` by the match, merges it into `into`, and adds a loop edge at the match. If `from` was active, `into`
-/// becomes active. Changes nothing if a map or keyframe no longer exists. O(`from`). If the report says that the maps
-/// were merged, the caller then calls `loop_fusion::fuse`.
+/// becomes active. Changes nothing if a map or keyframe no longer exists. O(`from`). If the report indicates that the
+/// maps were merged, the caller then calls `loop_fusion::fuse`.
 template <feature_descriptor D>
 report join(basic_atlas<D>& maps, const snapshot<D>& s) {
   report done;

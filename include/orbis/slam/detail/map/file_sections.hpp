@@ -70,7 +70,7 @@ class section_finder {
  public:
   section_finder(std::string_view file, std::size_t begin) : file_{file}, at_{begin} {}
 
-  /// Returns the content of the next section if it is `name` and complete.
+  /// Returns the content of the next section if its name is `name` and it is complete.
   [[nodiscard]] std::optional<section_reader> find(std::string_view name) {
     const auto wrong = [&](const std::string& what) {
       problem_ = "section \"" + std::string(name) + "\" " + what;

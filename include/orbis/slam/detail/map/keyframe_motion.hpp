@@ -29,7 +29,7 @@ void move_all(basic_map<D>& m, const keyframe_motions& T_new_old) {
   for (const auto& k : m.keyframes()) m.move_keyframe(k.id, T_new_old.at(k.id.value()));
 }
 
-/// Calls `map.update_landmark` for `count` landmarks from the id `first` on, or for all that are left. Returns the id
+/// Calls `map.update_landmark` for `count` landmarks starting at id `first`, or for all that are left. Returns the id
 /// after them, at most `landmark_end()`, from which a caller that shares the map can continue later. Until then,
 /// landmarks are searched for by their old normals and distances.
 template <feature_descriptor D>

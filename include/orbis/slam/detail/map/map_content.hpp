@@ -27,9 +27,9 @@ struct erased_keyframe {
   std::uint64_t number = 0;  ///< ordinal of the erasure
 };
 
-/// Number of further ids after which an erased landmark may be forgotten. Users of a replacement hold a frame, or the
-/// data of a loop match, of the last seconds; a camera at 30 Hz makes this number of landmarks in about a hundred
-/// seconds.
+/// Number of subsequently assigned ids after which an erased landmark may be forgotten. Users of a replacement hold a
+/// frame, or the data of a loop match, of the last seconds; a camera at 30 Hz makes this number of landmarks in about a
+/// hundred seconds.
 inline constexpr std::uint32_t remembered_landmarks = 1U << 18U;
 
 template <feature_descriptor D>
@@ -44,7 +44,7 @@ struct map_content {
   spanning_tree tree;
   std::map<keyframe_id, erased_keyframe> erased;  ///< erased keyframes that are not forgotten
   std::uint64_t erasures = 0;  ///< number of erasures so far, greater than the number of any erased keyframe
-  std::size_t forgotten = 0;   ///< number of keyframe ids that are neither present nor in `erased`
+  std::size_t forgotten = 0;   ///< number of keyframe ids that neither exist nor are in `erased`
 };
 
 /// Limit of landmark ids in a file. A map with more is written without erased ones, so that it can grow after it is

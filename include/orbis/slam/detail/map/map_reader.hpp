@@ -28,7 +28,7 @@ inline constexpr double farthest = 1e12;
 inline constexpr double farthest_aside = 1e30;
 inline constexpr std::size_t bytes_of_keypoint = 76, bytes_of_observation = 8;
 
-/// Reads a pose bit by bit as written; empty if the numbers are not a valid pose.
+/// Reads a pose exactly as written; empty if the numbers are not a valid pose.
 [[nodiscard]] inline std::optional<se3> take_pose(section_reader& from) {
   std::array<double, 7> v{};
   for (double& x : v) x = from.take<double>();

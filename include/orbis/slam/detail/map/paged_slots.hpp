@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Slots of objects by id, for ids of which most are eventually erased.
+/// Slots of objects by id, for ids most of which are eventually erased.
 #pragma once
 
 #include <cassert>
@@ -19,7 +19,7 @@ namespace orbis::slam::detail {
 ///
 /// Numbers are in pages of 256. A page whose ids are all erased is freed when `remembered` more ids have been assigned
 /// since; its ids are then `gone` and take 16 bytes per thousand. A page with one id that is not erased takes 1 kB. A
-/// robot that runs indefinitely therefore needs memory for the present objects, and almost none for erased ones.
+/// robot that runs indefinitely therefore needs memory for the existing objects, and almost none for erased ones.
 class paged_slots {
  public:
   static constexpr std::uint32_t erased = 0x80000000U;
@@ -70,15 +70,15 @@ class paged_slots {
     if (i / page_size != size_ / page_size) end_page(i);
   }
 
-  /// Returns the first id from `i` on that is not erased; `size()` if there is none. O(erased ids in between); a page
-  /// whose ids are all erased takes one step, as do 65536 ids that were `gone` from the start.
+  /// Returns the first id >= `i` that is not erased; `size()` if there is none. O(erased ids in between); a page whose
+  /// ids are all erased takes one step, as do 65536 ids that were `gone` from the start.
   [[nodiscard]] std::uint32_t next_contained(std::uint32_t i) const noexcept {
     return next(
         i, [this](std::uint32_t page) { return contained_[page] != 0; },
         [](std::uint32_t slot) { return (slot & erased) == 0; });
   }
-  /// Returns the first id from `i` on that is not `gone`; `size()` if there is none. O(ids in between); a freed page
-  /// takes one step, as do 65536 ids that were `gone` from the start.
+  /// Returns the first id >= `i` that is not `gone`; `size()` if there is none. O(ids in between); a freed page takes
+  /// one step, as do 65536 ids that were `gone` from the start.
   [[nodiscard]] std::uint32_t next_known(std::uint32_t i) const noexcept {
     return next(
         i, [](std::uint32_t) { return true; }, [](std::uint32_t slot) { return slot != gone; });
@@ -98,7 +98,7 @@ class paged_slots {
   }
 
   /// Begins or ends the import of ids of another source, which were erased at other times. During the import no page is
-  /// freed; at its end, the imported erased ids count as erased then.
+  /// freed; the imported erased ids count as erased at its end.
   void adopt(bool on) noexcept {
     if (!on)
       for (; adopted_from_ < retired_.size(); ++adopted_from_) retired_[adopted_from_].since = size_;

@@ -19,7 +19,7 @@ namespace orbis::slam::detail {
 
 /// Objects with the ids 0, 1, 2 ... in the order in which they were added. No id is reused, but the memory of erased
 /// objects is. An erased id remembers its replacement, if any, at least until `remembered` more ids have been assigned
-/// (`no_id`: for ever). References stay valid until their object is erased. All operations take O(1) unless stated
+/// (`no_id`: indefinitely). References stay valid until their object is erased. All operations take O(1) unless stated
 /// otherwise.
 template <std::default_initializable T, class Id, std::uint32_t remembered = no_id>
 class slot_map {
@@ -82,10 +82,10 @@ class slot_map {
   [[nodiscard]] bool empty() const noexcept { return size() == 0; }
   /// The id of the next object.
   [[nodiscard]] Id end_id() const noexcept { return slots_.size(); }
-  /// Returns the first id from `i` on that has an object; `end_id()` if there is none. O(erased ids in between), in
-  /// steps of 256 where all are erased.
+  /// Returns the first id >= `i` that has an object; `end_id()` if there is none. O(erased ids in between), in steps of
+  /// 256 where all are erased.
   [[nodiscard]] Id next_id(Id i) const noexcept { return slots_.next_contained(i.value()); }
-  /// Returns the first id from `i` on that has an object or a replacement; `end_id()` if there is none. Cost as for
+  /// Returns the first id >= `i` that has an object or a replacement; `end_id()` if there is none. Cost as for
   /// `next_id`.
   [[nodiscard]] Id next_known_id(Id i) const noexcept { return slots_.next_known(i.value()); }
 

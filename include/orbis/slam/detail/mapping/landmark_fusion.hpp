@@ -32,9 +32,9 @@ struct fusion_counts {
 };
 
 /// Searches for landmarks in a keyframe that does not observe them. A found keypoint that observes another landmark
-/// fuses both: the one with fewer observations into the other, the younger one if equal. A keypoint that observes none
-/// gets an observation. The descriptors must match, and the position must agree with the keypoint (95 %). Changed
-/// landmarks are updated.
+/// fuses both: the one with fewer observations into the other, or the younger into the older if they have the same
+/// number. A keypoint that observes none gets an observation. The descriptors must match, and the position must agree
+/// with the keypoint (95 %). Changed landmarks are updated.
 template <feature_descriptor D, camera::camera_model Camera>
 fusion_counts fuse_into(basic_map<D>& m, keyframe_id id, std::span<const landmark_id> landmarks,
                         const camera_rig<Camera>& rig, const fusion_options& o = {}) {

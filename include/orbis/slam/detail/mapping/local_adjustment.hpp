@@ -6,7 +6,7 @@
 ///
 /// @code
 ///   snapshot s = take(map, newest, rig, options);                       // reads the map
-///   const bundle_solution solved = solver.solve(s, schedule_of(options), go_on);  // takes long
+///   const bundle_solution solved = solver.solve(s, schedule_of(options), go_on);  // takes a long time
 ///   apply(map, s, solved);                                              // changes the map
 /// @endcode
 ///
@@ -54,7 +54,7 @@ struct snapshot : bundle_snapshot {
 
 /// Copies keyframe `newest`, the keyframes that share most with it, and their landmarks. Other keyframes that observe
 /// these landmarks are included but held fixed, as are the root of the map and keyframes localised by depth. Empty if
-/// there is nothing to adjust. `memory`: a former snapshot, whose memory is reused. O(observations of the landmarks).
+/// there is nothing to adjust. `memory`: a previous snapshot, whose memory is reused. O(observations of the landmarks).
 /// @pre m.has_keyframe(newest)
 template <feature_descriptor D, camera::camera_model Camera>
 [[nodiscard]] snapshot take(const basic_map<D>& m, keyframe_id newest, const camera_rig<Camera>& rig,

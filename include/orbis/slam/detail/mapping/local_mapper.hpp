@@ -33,7 +33,7 @@ template <feature_descriptor D>
   return sum;
 }
 
-/// Returns true if a landmark is unreliable at the time of keyframe `newest`: seldom found where it is expected, or
+/// Returns true if a landmark is unreliable at the time of keyframe `newest`: rarely found where it is expected, or
 /// hardly observed by the keyframes after the one that created it. Always false for landmarks of the newest keyframe.
 /// Source: R. Mur-Artal, J. M. M. Montiel, J. D. Tardos, "ORB-SLAM", T-RO 31 (2015), section VI.B.
 template <feature_descriptor D>
@@ -113,7 +113,7 @@ class local_mapper {
  public:
   explicit local_mapper(shared_state<Camera, D, Places>& shared) : shared_{shared}, solver_{shared.rig.model} {}
 
-  /// Adds the keyframe to the places, and improves the map around it. Does nothing if it no longer exists. Calls
+  /// Adds the keyframe to place recognition, and improves the map around it. Does nothing if it no longer exists. Calls
   /// `stop_requested()` before each step of the adjustment: true ends it early.
   void process(map_keyframe k, const std::function<bool()>& stop_requested) {
     std::vector<keyframe_event> culled;
@@ -133,7 +133,7 @@ class local_mapper {
   }
 
  private:
-  /// Updates `k` to its present id and adds it to the places. Returns false if it no longer exists.
+  /// Updates `k` to its current id and adds it to place recognition. Returns false if it no longer exists.
   bool prepare(map_keyframe& k) {
     const auto* frame = shared_.locked([&]() -> const basic_keyframe<D>* {
       k = shared_.atlas.current(k);

@@ -34,7 +34,7 @@ struct bundle_snapshot {
   std::vector<vec3> points;                                ///< by landmark: in the world, metres
   std::vector<optimize::bundle_observation> observations;  ///< `pose` and `point` index the arrays above
   std::vector<observation> sources;                        ///< by observation: the keyframe and keypoint
-  keyframe_id end_keyframe = 0;                            ///< ids from here on were added to the map later
+  keyframe_id end_keyframe = 0;                            ///< this id and greater ones were added to the map later
   landmark_id end_landmark = 0;
 
   /// Returns true if there is nothing to adjust.
@@ -98,7 +98,7 @@ struct bundle_solution {
   bool usable = false;                 ///< true if poses and points are valid, and better than before
   bool complete = false;               ///< false if it was stopped, or failed
   int iterations = 0;
-  double initial_cost = 0.0;  ///< half the robust sum of squared errors
+  double initial_cost = 0.0;  ///< half the robust cost (sum of robustified squared errors)
   double final_cost = 0.0;    ///< the same at the end, without outliers
 };
 
@@ -117,7 +117,7 @@ class bundle_solver {
       : adjuster_{model, loss} {}
 
   /// Calls `go_on(iteration, iterations)` before each step; if it returns false, the adjustment stops. No observation
-  /// is marked as an outlier before the first half is complete. `memory`: a former solution, whose memory is reused.
+  /// is marked as an outlier before the first half is complete. `memory`: a previous solution, whose memory is reused.
   [[nodiscard]] bundle_solution solve(const bundle_snapshot& s, const bundle_schedule& schedule,
                                       const progress& go_on = {}, bundle_solution memory = {}) {
     bundle_solution result = std::move(memory);
@@ -161,7 +161,7 @@ class bundle_solver {
   }
 
  private:
-  /// Marks the observations that disagree with the present poses and points.
+  /// Marks the observations that disagree with the current poses and points.
   void find_outliers(const bundle_snapshot& s, bundle_solution& to) {
     squared_.resize(s.observations.size());
     adjuster_.chi2(to.poses, to.points, s.observations, squared_);

@@ -31,18 +31,18 @@ struct moving_pose {
   vec6 twist = zeros<vec6>();  ///< motion of the camera in its own frame, per second, translation first
 };
 
-/// The prior of the twist, before the frame is used: the mean motion since a former pose, extrapolated by a part of its
-/// change, within the acceleration of a hand; without a former pose, the motion of a hand.
+/// The prior of the twist, before the frame is used: the mean motion since a previous pose, extrapolated by part of its
+/// change, within the acceleration of a hand; without a previous pose, the motion of a hand.
 struct twist_prior {
-  std::optional<se3> T_world_before;   ///< the former pose ...
+  std::optional<se3> T_world_before;   ///< the previous pose ...
   double interval = 0.0;               ///< ... and the seconds since
   double trend = 0.0;                  ///< part of the change from `twist_before` to the mean motion that is added
-  vec6 twist_before = zeros<vec6>();   ///< at the former pose
+  vec6 twist_before = zeros<vec6>();   ///< at the previous pose
   double translation_deviation = 0.5;  ///< metres per second
   double rotation_deviation = 1.0;     ///< radians per second
 
-  /// Returns the prior `interval` seconds after a former frame. With a constant acceleration a trend of 1 is exact, but
-  /// errors of the twist would alternate for ever; half of it damps them. @pre interval > 0
+  /// Returns the prior `interval` seconds after a previous frame. With constant acceleration a trend of 1 is exact, but
+  /// errors of the twist would alternate indefinitely; a trend of one half damps them. @pre interval > 0
   [[nodiscard]] static twist_prior after(const moving_pose& before, double interval, bool twist_is_known) {
     constexpr double acceleration = 6.0;  // metres, or radians, per second squared
     const twist_prior unknown;
@@ -107,9 +107,9 @@ void find_observations(const basic_frame<D>& f, const basic_map<D>& m, const cam
 /// Width of Huber's loss of these residuals, standard deviations: as in the refinement of the pose alone.
 inline constexpr double row_loss_width = 2.447;
 
-/// Returns the residual of an observation, and its derivative by a motion of the camera frame (`exp(step) *
-/// T_camera_world`) at the time of its row; the derivative by the twist is `-o.time` times this. Empty if the point has
-/// no projection.
+/// Returns the residual of an observation, and its derivative with respect to a motion of the camera frame (`exp(step)
+/// * T_camera_world`) at the time of its row; the derivative with respect to the twist is `-o.time` times this. Empty
+/// if the point has no projection.
 template <camera::camera_model Camera>
 [[nodiscard]] std::optional<vec3> row_residual(const optimize::reprojection<Camera>& model, const se3& T_camera_world,
                                                const vec6& twist, const row_observation& o, matrix<3, 6>& j) {
@@ -122,7 +122,7 @@ template <camera::camera_model Camera>
 }
 
 /// A cost of pose and twist, to second order around `at`, from measurements other than keypoints. The steps are a
-/// motion of the camera frame (`exp(step) * T_camera_world`), then that of the twist.
+/// motion of the camera frame (`exp(step) * T_camera_world`), then a change of the twist.
 struct pose_quadratic {
   moving_pose at;
   matrix<12, 12> h = zeros<matrix<12, 12>>();
@@ -139,7 +139,7 @@ struct pose_quadratic {
 
 /// Inputs of the refinement of a pose other than the keypoints.
 struct refinement_terms {
-  const pose_quadratic* other = nullptr;  ///< a further cost, or null
+  const pose_quadratic* other = nullptr;  ///< an additional cost, or null
   bool moves = true;                      ///< true if the camera moves during read-out; otherwise the twist is fixed
 };
 
@@ -147,10 +147,10 @@ struct refinement_terms {
 struct moving_pose_equations {
   matrix<12, 12> h;
   matrix<12, 1> g;
-  double cost = 0.0;  ///< half the robust sum
+  double cost = 0.0;  ///< half the robust cost
 };
 
-/// Sets the equations for a pose and its twist (h, g of `to`) from those given by powers of the rows' times.
+/// Sets the equations for a pose and its twist (h, g of `to`) from equations in powers of the rows' times.
 template <class Equations>
 void set_parts(Equations& to, const std::array<mat6, 3>& h, const std::array<vec6, 2>& g) {
   set_block(to.h, 0, 0, h[0]);
@@ -160,7 +160,7 @@ void set_parts(Equations& to, const std::array<mat6, 3>& h, const std::array<vec
   to.g = stacked(g[0], g[1]);
 }
 
-/// Adds the other constraints on pose and twist to the equations of the keypoints, which are given by powers of the
+/// Adds the other constraints on pose and twist to the equations of the keypoints, which are given in powers of the
 /// rows' times.
 inline void add_terms(moving_pose_equations& e, const std::array<mat6, 3>& h, const std::array<vec6, 2>& g,
                       const se3& T_camera_world, const vec6& twist, const twist_prior& prior,
@@ -191,7 +191,8 @@ inline void add_terms(moving_pose_equations& e, const std::array<mat6, 3>& h, co
   }
 }
 
-/// Returns the Gauss-Newton step: the motion of the camera frame, then that of the twist, which is zero unless `moves`.
+/// Returns the Gauss-Newton step: the motion of the camera frame, then the change of the twist, which is zero unless
+/// `moves`.
 [[nodiscard]] inline matrix<12, 1> newton_step(const moving_pose_equations& e, bool moves) {
   if (moves) return solve_semidefinite(e.h, matrix<12>(-e.g)).value_or(zeros<matrix<12>>());
   const auto pose = solve_semidefinite(block<6, 6>(e.h, 0, 0), vec6(-head<6>(e.g)));
@@ -224,7 +225,7 @@ template <camera::camera_model Camera>
   return e;
 }
 
-/// Returns the squares of the deviations, times the square of `factor`, on the diagonal.
+/// Returns the diagonal matrix of the squared deviations times the square of `factor`.
 [[nodiscard]] inline mat6 variances_of(const twist_prior& prior, double factor) {
   const double t = factor * prior.translation_deviation, r = factor * prior.rotation_deviation;
   return diagonal_matrix(stacked(filled<vec3>(t * t), filled<vec3>(r * r)));
@@ -235,9 +236,9 @@ template <camera::camera_model Camera>
 /// A twist follows from the poses around it, and the pose of the frame from depth that was moved by the twist. If depth
 /// comes after the frame, an error of the pose feeds back with the opposite sign and decays; if it comes before, a
 /// direction that pixels hardly determine would oscillate from frame to frame with growing amplitude. Such a depth
-/// image therefore follows the refined twist only as far as pixels alone determine it, and the former twist otherwise,
-/// by the gain of R. E. Kalman, "A new approach to linear filtering and prediction problems", J. Basic Engineering 82
-/// (1960).
+/// image therefore follows the refined twist only as far as pixels alone determine it, and the previous twist
+/// otherwise, with the gain of R. E. Kalman, "A new approach to linear filtering and prediction problems", J. Basic
+/// Engineering 82 (1960).
 class early_depth_twist {
  public:
   /// Computes the gain from the pixels of a frame's observations. Call before `between`. O(observations).
@@ -261,17 +262,17 @@ class early_depth_twist {
     determine(h, prior);
   }
 
-  /// Returns a twist between that of the former frame and that of this one.
+  /// Returns a twist between that of the previous frame and that of this one.
   [[nodiscard]] vec6 between(const twist_prior& prior, const vec6& refined) const {
     if (!prior.T_world_before || !all_finite(gain_)) return refined;
     return prior.twist_before + gain_ * (refined - prior.twist_before);
   }
 
-  /// Makes the present frame the former one.
+  /// Makes the current frame the previous one.
   void advance() { former_covariance_ = pose_covariance_; }
 
  private:
-  /// Computes the gain from the information of the pixels, by powers of the rows' times.
+  /// Computes the gain from the information of the pixels, given in powers of the rows' times.
   void determine(const std::array<mat6, 3>& h, const twist_prior& prior) {
     pose_covariance_ = inverse(h[0]);
     if (!prior.T_world_before) return;

@@ -3,7 +3,7 @@
 /// Motion of rolling-shutter keypoints to their positions at the time of the frame.
 ///
 /// The camera moves by a constant body twist while an image is read out. A keypoint of a row that is read `t` seconds
-/// after the frame's time observes, in the camera frame of that moment, the point `p`; in the camera frame of the
+/// after the frame's time observes, a point at `p` in the camera frame of that moment; in the camera frame of the
 /// frame's time it is at `exp(t * twist) p`. Projected there, with its depth, it is a measurement of a global shutter,
 /// and later steps need no knowledge of rows.
 ///
@@ -35,9 +35,9 @@ void keep_as_read(basic_frame<D>& f) {
 }
 
 /// Moves the keypoints from their read positions to those at the frame's time; sets their rays and depths, the grid and
-/// `f.twist`. `depth_of(i)`: the depth of the point observed by a keypoint without measured depth, if known; 0: it is
-/// far, and only the rotation is applied. A keypoint that leaves the image keeps its read position. Does nothing
-/// without stored keypoints (`keep_as_read`). O(features).
+/// `f.twist`. `depth_of(i)`: the depth of the point observed by a keypoint without measured depth, if known; 0: the
+/// point is distant, and only the rotation is applied. A keypoint that leaves the image keeps its read position. Does
+/// nothing without stored keypoints (`keep_as_read`). O(features).
 template <feature_descriptor D, camera::camera_model Camera, class DepthOf>
 void move_to_frame_time(basic_frame<D>& f, const camera_rig<Camera>& rig, const camera::shutter& shutter,
                         const vec6& twist, DepthOf&& depth_of) {
@@ -65,7 +65,7 @@ void move_to_frame_time(basic_frame<D>& f, const camera_rig<Camera>& rig, const 
   f.grid.assign(f.features.keypoints);
 }
 
-/// As above; all keypoints without measured depth count as far.
+/// As above; all keypoints without measured depth are treated as distant.
 template <feature_descriptor D, camera::camera_model Camera>
 void move_to_frame_time(basic_frame<D>& f, const camera_rig<Camera>& rig, const camera::shutter& shutter,
                         const vec6& twist) {

@@ -4,9 +4,9 @@
 ///
 /// A point observed by a keyframe and a frame is projected from one into the other; its error depends on read-out and
 /// delay in a known way, because the motion of the camera is known from the poses around each. For each pair the
-/// relative pose is eliminated (it would explain a part); two linear equations remain, which are summed over all pairs.
-/// Their deviation is estimated from the variation of the keyframes' sums, because the errors of the pairs of one
-/// keyframe are not independent.
+/// relative pose is eliminated (it would explain part of the error); two linear equations remain, which are summed over
+/// all pairs. Their deviation is estimated from the variation of the keyframes' sums, because the errors of the pairs
+/// of one keyframe are not independent.
 ///
 /// Sources: read-out from motion: P.-E. Forssen, E. Ringaby, "Rectifying rolling shutter video from hand-held devices",
 /// CVPR 2010; deviations from sums over clusters: K.-Y. Liang, S. L. Zeger, "Longitudinal data analysis using
@@ -39,8 +39,8 @@ namespace orbis::slam::detail {
 struct depth_change {
   static constexpr double step = 0.008;  ///< seconds: short enough that few edges are in between
   float later = 0.0F, earlier = 0.0F;
-  /// Returns this if depth changes evenly there, as on a surface; otherwise zero: an edge between the readings would be
-  /// mistaken for a motion.
+  /// Returns this slope if depth changes evenly there, as on a surface; otherwise zero: an edge between the readings
+  /// would be mistaken for a motion.
   [[nodiscard]] depth_change if_even(float depth) const noexcept {
     constexpr float limit = 0.02F;  // 1 / metres: some deviations of a depth camera's noise
     return std::abs(later + earlier) <= limit * depth * depth ? *this : depth_change{};
@@ -178,7 +178,7 @@ class shutter_estimator {
   /// Forgets all equations, after a change of the shutter with which they were made.
   void clear() { blocks_.clear(); }
 
-  /// Returns the present estimate. The threshold for keeping an assumed value is lower than for adopting a new one.
+  /// Returns the current estimate. The threshold for keeping an assumed value is lower than for adopting a new one.
   /// O(keyframes).
   [[nodiscard]] shutter_estimate estimate(const camera::shutter& assumed = {}) const {
     constexpr std::size_t enough = 8;

@@ -30,7 +30,7 @@ class shutter_observer {
  public:
   [[nodiscard]] shutter_estimate estimate() const { return estimate_; }
 
-  /// Reads the depth of the keypoints of the present frame as if its image had been taken at other times.
+  /// Reads the depth of the keypoints of the current frame as if its image had been taken at other times.
   /// `read_depth(frame, motion)` sets that of `as_read`; `assumed`: the motion of the frame.
   template <feature_descriptor D, class ReadDepth>
   void set_depths(const basic_frame<D>& f, const frame_motion& assumed, ReadDepth&& read_depth) {
@@ -51,8 +51,8 @@ class shutter_observer {
     }
   }
 
-  /// Adds a tracked frame that follows `last` (as it was tracked, with its present pose). `keyframe`: the one made from
-  /// the frame. Returns the shutter to assume from the next frame on, if it changes.
+  /// Adds a tracked frame that follows `last` (as it was tracked, with its current pose). `keyframe`: the one made from
+  /// the frame. Returns the shutter to assume for subsequent frames, if it changes.
   template <feature_descriptor D, camera::camera_model Camera>
   [[nodiscard]] std::optional<camera::shutter> add(const basic_frame<D>& last, const basic_frame<D>& f,
                                                    const std::optional<map_keyframe>& keyframe, const basic_map<D>& m,
@@ -111,7 +111,7 @@ class shutter_observer {
   }
 
   /// Revises the estimate each time the observation time has grown by half, and discards the measurements made with the
-  /// former shutter: the equations are linear only around the assumed values, and the gates of tracking have favoured
+  /// previous shutter: the equations are linear only around the assumed values, and the gates of tracking have favoured
   /// them. Slopes of depth are noisy, and their squares too large, so a step towards the delay is about half as long as
   /// it should be: several steps are needed.
   [[nodiscard]] std::optional<camera::shutter> decide(const camera::shutter& assumed) {
@@ -133,8 +133,8 @@ class shutter_observer {
     return next;
   }
 
-  /// Returns a new estimate, unless it is from too few equations yet: it is better than the previous one, which was
-  /// linearised around a shutter that was far off.
+  /// Returns a new estimate once there are enough equations: it is better than the previous one, which was linearised
+  /// around a shutter that was far off.
   [[nodiscard]] shutter_estimate best(const shutter_estimate& now) const {
     return last_ && !(now.read_out_deviation <= 2.0 * last_->read_out_deviation) ? *last_ : now;
   }
@@ -146,7 +146,7 @@ class shutter_observer {
   row_view pending_;
   std::optional<map_keyframe> pending_keyframe_;
   std::optional<vec6> before_, before_that_;             ///< the motion to the pending frame, and to the previous one
-  std::vector<depth_change> changes_;                    ///< of the present frame
+  std::vector<depth_change> changes_;                    ///< of the current frame
   double watched_ = 0.0, decided_ = 0.0, looked_ = 0.0;  ///< seconds
 };
 

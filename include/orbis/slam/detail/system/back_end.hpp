@@ -24,7 +24,7 @@ namespace orbis::slam::detail {
 
 /// Calls `work` for each job in the order of `push`. `stop` and the destructor wait for the running job and discard the
 /// others. If jobs use a pointer to their worker, call `stop` before the pointer is reset. If `work` throws, the worker
-/// ends: the other jobs are discarded, and `push`, `wait` and `wait_for_room` rethrow the exception from then on.
+/// ends: the other jobs are discarded, and `push`, `wait` and `wait_for_room` rethrow the exception afterwards.
 template <std::movable Job>
 class worker {
  public:
@@ -47,7 +47,7 @@ class worker {
   void push(Job job) {
     push_unless(std::move(job), [](const auto&, const Job&) { return false; });
   }
-  /// As `push`, but does nothing if an equal job is already in the queue.
+  /// Like `push`, but does nothing if an equal job is already in the queue.
   void push_once(Job job) requires std::equality_comparable<Job> {
     push_unless(std::move(job), [](const auto& jobs, const Job& other) {
       return std::find(jobs.begin(), jobs.end(), other) != jobs.end();
@@ -167,7 +167,7 @@ class back_end {
     mapper_.process(k, [] { return false; });
     if (closer_.close(k)) closer_.adjust_globally(shared_.atlas.current(k).map);
   }
-  /// Returns true if the limit of waiting keyframes is reached and no further one should be made.
+  /// Returns true if the limit of waiting keyframes is reached and no more keyframes should be made.
   [[nodiscard]] bool is_full() const { return mapping_ && mapping_->waiting() >= most_waiting(); }
   /// Waits until `is_full` is false.
   void wait_for_room() const {

@@ -45,7 +45,7 @@ struct shared_state {
 
   [[nodiscard]] std::unique_lock<std::mutex> lock() const { return lock_fairly(next_map_mutex_, map_mutex_); }
   [[nodiscard]] std::unique_lock<std::mutex> edit() const { return lock_fairly(next_edit_mutex_, edit_mutex_); }
-  /// As `edit`, without waiting: check if the lock is owned.
+  /// Like `edit`, without waiting: check whether the lock is owned.
   [[nodiscard]] std::unique_lock<std::mutex> try_edit() const {
     return std::unique_lock{edit_mutex_, std::try_to_lock};
   }
@@ -62,7 +62,7 @@ struct shared_state {
     return {k, frame.timestamp, frame.index, frame.T_world_camera};
   }
 
-  /// Returns the keyframes with the most similar appearance, one of each place.
+  /// Returns the keyframes with the most similar appearance, one for each place.
   template <std::predicate<map_keyframe> Exclude>
   [[nodiscard]] std::vector<map_keyframe> similar(const typename Places::signature& bow_vector, std::size_t count,
                                                   Exclude&& exclude) {
@@ -81,7 +81,8 @@ struct shared_state {
   }
 
  private:
-  /// The next thread holds `next` while it waits: a plain mutex may be relocked before waiting threads wake up.
+  /// The next thread in line holds `next` while it waits, because a plain mutex may be relocked before waiting threads
+  /// wake up.
   [[nodiscard]] static std::unique_lock<std::mutex> lock_fairly(std::mutex& next, std::mutex& mutex) {
     const std::lock_guard first{next};
     return std::unique_lock{mutex};

@@ -39,7 +39,7 @@ class frame_log {
     frames_.pop_front();
   }
 
-  /// Returns the present poses of the kept frames that were tracked in a map, or in one that was merged into it. Empty
+  /// Returns the current poses of the kept frames that were tracked in a map, or in one that was merged into it. Empty
   /// if there is no such map. O(frames).
   template <feature_descriptor D>
   [[nodiscard]] orbis::trajectory trajectory(const basic_atlas<D>& maps, map_id map) const {
@@ -53,7 +53,7 @@ class frame_log {
     return all;
   }
 
-  /// Returns the reference keyframes of the kept frames that are in a map, by their present ids. O(frames).
+  /// Returns the reference keyframes of the kept frames that are in a map, by their current ids. O(frames).
   template <feature_descriptor D>
   [[nodiscard]] std::vector<keyframe_id> references(const basic_atlas<D>& maps, map_id map) const {
     std::vector<keyframe_id> all;
@@ -65,7 +65,7 @@ class frame_log {
     return all;
   }
 
-  /// Returns the map with most frames, kept or not, the oldest if equal; the active map if there are no frames.
+  /// Returns the map with most frames, kept or not; the oldest on ties; the active map if there are no frames.
   /// O(frames).
   template <feature_descriptor D>
   [[nodiscard]] map_id largest_map(const basic_atlas<D>& maps) const {

@@ -67,7 +67,7 @@ class front_end {
     if (settings.estimates_shutter) observer_.emplace();
   }
 
-  /// The present shutter, as given or estimated.
+  /// The current shutter, given or estimated.
   [[nodiscard]] const camera::shutter& shutter() const noexcept { return shutter_; }
   /// The estimate of the shutter; empty unless it is estimated.
   [[nodiscard]] std::optional<shutter_estimate> estimated_shutter() const {
@@ -88,7 +88,7 @@ class front_end {
   /// The tracked frames, at most the latest `options::trajectory_frames`.
   [[nodiscard]] const frame_log& log() const noexcept { return log_; }
   [[nodiscard]] double last_timestamp() const noexcept { return last_.timestamp; }
-  /// The present pose of the last tracked frame; it follows later corrections of its keyframe.
+  /// The current pose of the last tracked frame; it follows later corrections of its keyframe.
   [[nodiscard]] se3 last_pose(const atlas_type& maps) const {
     const map_keyframe k = maps.current(last_reference_);
     return maps.contains(k.map) && maps.at(k.map).remembers(k.keyframe)
@@ -357,8 +357,8 @@ class front_end {
     return left;
   }
 
-  /// With a rolling shutter, moves the keypoints of a frame to its time, by the motion since the last frame to its
-  /// present pose.
+  /// With a rolling shutter, moves the keypoints of a frame to its time, by the motion from the last frame to its
+  /// current pose.
   void move_keypoints(frame_type& f) const {
     if (!shutter_.is_global()) move_to_frame_time(f, rig_, shutter_, motion_between(last_, f));
   }
@@ -456,7 +456,7 @@ class front_end {
     return inliers;
   }
   /// Checks a frame tracked by `inliers` landmarks against its depth. If the depth disagrees with the pose but agrees
-  /// with another one, tracks from that pose. Returns as `localize`.
+  /// with another one, tracks from that pose. Returns the same as `localize`.
   std::size_t recheck_with_depth(frame_type& f, atlas_type& maps, std::size_t inliers, bool is_frozen,
                                  const row_follower& follow_rows) {
     // If something moves in the view, it causes the disagreement.
@@ -502,7 +502,7 @@ class front_end {
   bool begins_map_ = false;
   std::optional<map_keyframe> first_keyframe_;
   std::vector<start_point> start_points_;  ///< points of both frames, in the world, until the second is a keyframe
-  std::optional<double> lost_since_;       ///< timestamp; empty: since the next frame
+  std::optional<double> lost_since_;       ///< timestamp; empty: that of the next frame
   map_keyframe reference_;                 ///< the keyframe with which the current frame shares most landmarks
   frame_type last_;                        ///< the last frame that was tracked
   map_keyframe last_reference_;            ///< its reference ...

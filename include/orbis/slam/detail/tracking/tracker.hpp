@@ -61,7 +61,7 @@ class tracker {
   tracker(const camera_rig<Camera>& rig, const options& settings) : rig_{rig}, options_{settings} {}
 
   /// Searches for the observations of the last frame: its landmarks, and its other points with depth. `last` has its
-  /// present pose, and landmarks by ids of the map at that time. `predicted`: the expected `T_world_camera`.
+  /// current pose, and landmarks by the ids of the map at that time. `predicted`: the expected `T_world_camera`.
   std::size_t by_motion(basic_frame<D>& f, const basic_map<D>& m, const basic_frame<D>& last, const se3& predicted,
                         moving_features<Camera, D, Matchers>& moving) const {
     for (const double widening : {1.0, 2.0}) {
@@ -78,8 +78,8 @@ class tracker {
     return 0;
   }
 
-  /// As `by_motion`, for a camera that may have turned in any direction by up to half of its view since the last frame:
-  /// tries the turned poses with most matches, from the last frame's position. About 80 searches.
+  /// Like `by_motion`, for a camera that may have turned in any direction by up to half of its view since the last
+  /// frame: tries the turned poses with most matches, from the last frame's position. About 80 searches.
   std::size_t by_turning(basic_frame<D>& f, const basic_map<D>& m, const basic_frame<D>& last) const {
     const auto& camera = rig_.camera();
     const auto corner = camera.unproject({0.0, 0.0});
