@@ -38,9 +38,9 @@
 
 namespace orbis::interop {
 
-/// A geometry at a pose, as an `octree::overlap_shape`. A mesh consists of its triangles: voxels entirely inside of a
-/// closed one do not overlap it. Results are those of FCL for each box, within its tolerance (1e-6 for most pairs). The
-/// geometry is shared.
+/// A geometry at a pose, as an `octree::overlap_shape`. A mesh consists of its triangles: voxels entirely inside a
+/// closed mesh do not overlap it. Results are those of FCL for each box, within its tolerance (1e-6 for most pairs).
+/// The geometry is shared.
 class fcl_shape {
  public:
   /// @pre geometry != nullptr; a finite pose
@@ -79,8 +79,8 @@ class fcl_shape {
 };
 
 #if FCL_HAVE_OCTOMAP
-/// Copies the map for FCL's own functions: occupied according to the sensor model, free elsewhere, including unknown
-/// space. O(voxels), as large as OctoMap's map. Requires FCL built with OctoMap.
+/// Copies the map for FCL's own functions: voxels are occupied according to the sensor model; all other space,
+/// including unknown space, is free. O(voxels); uses as much memory as an OctoMap map. Requires FCL built with OctoMap.
 template <octree::octomap_model Model>
 [[nodiscard]] std::shared_ptr<fcl::OcTreed> to_fcl(const octree::occupancy_octree<Model>& map) {
   const std::shared_ptr<const octomap::OcTree> tree = to_octomap(map);

@@ -45,7 +45,7 @@ template <octree::octomap_model Model>
 }
 /// Converts a map and its colours to an `octomap::ColorOcTree`. A leaf is split where the colours of its voxels differ,
 /// so that none is lost; OctoMap's own `prune()` would merge and average them. Inner nodes have the average of their
-/// children. For OctoMap white means no colour; colours of unknown voxels are omitted. O(nodes).
+/// children. In OctoMap, white means no colour; colours of unknown voxels are omitted. O(nodes).
 /// @pre map.tree_depth() == octree::default_tree_depth
 template <octree::octomap_model Model, color_payload Color>
 [[nodiscard]] std::unique_ptr<octomap::ColorOcTree> to_octomap(const octree::occupancy_octree<Model>& map,
@@ -56,7 +56,7 @@ template <octree::octomap_model Model, color_payload Color>
 }
 
 /// Converts an `octomap::OcTree` to a map. The tree's sensor parameters are not used; the map has those of the Model.
-/// Errors: malformed for a log-odds that is not finite, unsupported for a tree of another depth than 16.
+/// Errors: malformed for a log-odds that is not finite, unsupported for a tree whose depth is not 16.
 template <octree::octomap_model Model = octree::log_odds<>>
 [[nodiscard]] result<octree::occupancy_octree<Model>> from_octomap(const octomap::OcTree& tree) {
   return detail::read_tree<Model>(tree, [](auto&&...) { return true; });

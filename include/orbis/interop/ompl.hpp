@@ -90,8 +90,7 @@ class ompl_validity_checker : public ompl::base::StateValidityChecker {
 };
 
 /// Checks whether the robot is free on the straight segment from one state to another: in continuous space, not at
-/// samples. Safe for concurrent use, but OMPL's counts of motions are approximate then, as those of its own validator
-/// are.
+/// samples. Safe for concurrent use, but OMPL's motion counters are then approximate, as with its own validator.
 template <nav::planning_space Space>
 class ompl_motion_validator : public ompl::base::MotionValidator {
  public:

@@ -24,7 +24,7 @@
 
 namespace orbis::interop {
 
-/// Converts a colour of Open3D (0 ... 1); values outside, and NaN, are clamped.
+/// Converts an Open3D colour (0 ... 1); values outside this range, and NaN, are clamped.
 [[nodiscard]] inline rgb8 color_from_open3d(const vec3& color) noexcept {
   const auto byte = [](double v) {
     return v > 0 ? static_cast<std::uint8_t>(std::lround(255.0 * std::min(v, 1.0))) : std::uint8_t{0};

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Points that lie in a buffer at regular distances, in place: matrices, images of points, packed
+/// Points at a constant stride in a buffer, read in place: matrices, images of points, packed
 /// messages, columns of a table.
 ///
 /// Eigen's matrices need none of this: `m.colwise()` and `m.rowwise()` are ranges of points already.
@@ -16,7 +16,7 @@
 
 namespace orbis::interop {
 
-/// Where the points are, in numbers of the type `S`.
+/// Layout of the points, in units of numbers of type `S`.
 struct point_layout {
   std::ptrdiff_t point_stride = 3;       ///< from one point to the next
   std::ptrdiff_t coordinate_stride = 1;  ///< from x to y, and from y to z
