@@ -19,7 +19,7 @@
 /// | replanning.hpp | checks a path after map changes, and replans only if it is blocked |
 /// | robot_trajectory.hpp | paths as trajectories in time, within bounds on speed and acceleration |
 /// | squared_distances.hpp | the distance field without a map: exact squared distances in voxels |
-/// | map_access.hpp | read access of planning to a map, also one of another library |
+/// | map_access.hpp | read access of planning to a map, including maps of other libraries |
 #pragma once
 
 #include <orbis/nav/distance_field.hpp>

@@ -178,7 +178,7 @@ TEST_CASE("every layout with a file missing, misnamed, empty or of another forma
         CHECK_THAT(message, Contains(folder.path().filename().string()));  // names the folder or a file in it
         const bool says = std::any_of(words.begin(), words.end(),
                                       [&](const std::string& word) { return message.find(word) != std::string::npos; });
-        const bool lists = message.find("no known recording; the folder ") != std::string::npos;
+        const bool lists = message.find("not a known recording; the folder ") != std::string::npos;
         CHECK((says || lists));
       }
   }

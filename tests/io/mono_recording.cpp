@@ -180,15 +180,16 @@ TEST_CASE("recordings with depth or with two cameras give the images of one") {
 TEST_CASE("a folder that is no recording is told what was looked for and what is there") {
   const temporary_folder folder;
   CHECK_THAT(message_of(io::open_mono_recording(folder.path())),
-             Contains("known are rgb.txt (TUM)") && Contains("mav0/cam0") && Contains("the folder is empty"));
+             Contains("known layouts: rgb.txt (TUM)") && Contains("mav0/cam0") && Contains("the folder is empty"));
   folder.write("readme.md", "");
   for (const char c : {'a', 'b', 'c', 'd'}) folder.write(std::string{c} + ".tiff", "");
   folder.write("cam_left/x", "");
   const std::string there = "the folder holds cam_left/, readme.md, 4 .tiff files";
   CHECK_THAT(message_of(io::open_mono_recording(folder.path())), Contains(there));
   CHECK_THAT(message_of(io::open_recording(folder.path())),
-             Contains("known are rgb.txt and depth.txt") && Contains(there));
-  CHECK_THAT(message_of(io::open_stereo_recording(folder.path())), Contains("known are image_0") && Contains(there));
+             Contains("known layouts: rgb.txt and depth.txt") && Contains(there));
+  CHECK_THAT(message_of(io::open_stereo_recording(folder.path())),
+             Contains("known layouts: image_0") && Contains(there));
   CHECK_THAT(message_of(io::open_mono_recording(folder.path(), {.format = mono_format::images})),
              Contains("no PNG or JPEG images in it") && Contains(there));
   for (int i = 0; i != 12; ++i) folder.write("seq" + std::to_string(i) + "/x", "");

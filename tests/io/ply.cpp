@@ -197,6 +197,6 @@ TEST_CASE("hostile PLY headers are refused without a large allocation") {
   CHECK(bad("format ascii 1.0\nelement face 0\nproperty list uchar int i\nend_header\n") == "there are no vertices");
   CHECK(bad("format binary_little_endian 1.0\nelement face 1\nproperty list uint double i\nelement vertex 1\n" + xyz +
             "end_header\n\xFF\xFF\xFF\xFF")
-            .find("end early") != std::string::npos);
+            .find("ends early") != std::string::npos);
   CHECK(io::parse_ply("solid stl").error().message == "is not a PLY file");
 }

@@ -136,7 +136,7 @@ TEST_CASE("Alignment says why it has no answer") {
   CHECK(why(line, line).code == errc::degenerate);
   CHECK(why(line, line).message == "all points are collinear or coincident");
   CHECK(why(place, place).message == "all points are collinear or coincident");
-  CHECK(why(nans, line).message == "only 0 of 20 pairs are finite, three are needed");
+  CHECK(why(nans, line).message == "only 0 of 20 pairs are finite; three are needed");
   CHECK(why(std::vector<vec3>(2, vec3::Zero()), std::vector<vec3>(2, vec3::Zero())).code == errc::no_data);
   CHECK(why(std::vector<vec3>(3, vec3::Zero()), line).code == errc::invalid_argument);
   for (const double bad : test::bad_thresholds)

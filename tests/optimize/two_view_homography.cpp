@@ -186,7 +186,7 @@ TEST_CASE("The homography says why there is none") {
   CHECK(why(line, m.second).message == "all points are collinear or coincident");
   CHECK(why(m.first, line).message == "all points are collinear or coincident");
   CHECK(why(std::vector<vec2>(50, vec2(1, 2)), std::vector<vec2>(50, vec2(1, 2))).code == errc::degenerate);
-  CHECK(why(nans, m.second).message == "only 0 of 50 matches are finite, four are needed");
+  CHECK(why(nans, m.second).message == "only 0 of 50 matches are finite; four are needed");
   CHECK(why({vec2(0, 0)}, {vec2(0, 0)}).code == errc::no_data);
   CHECK(why({vec2(0, 0)}, m.second).code == errc::invalid_argument);
 }

@@ -129,7 +129,7 @@ TEST_CASE("A file with one wrong bit says in which section") {
   const auto m = parsed(newer);
   REQUIRE_FALSE(m.has_value());
   CHECK(m.error().code == errc::unsupported);
-  CHECK(m.error().message == "version 5, this reads versions 1 to 4");
+  CHECK(m.error().message == "version 5; only versions 1 to 4 are supported");
 }
 
 TEST_CASE("A file says what sensor the map was made with, and one of version 1 is read, which does not") {

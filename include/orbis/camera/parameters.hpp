@@ -112,7 +112,7 @@ struct parameters_of<radial_tangential> {
     double* const j = by_parameters.data();
     detail::by_camera_matrix(g * x + 2.0 * d.p1 * x * y + d.p2 * (s + 2.0 * x * x),
                              g * y + d.p1 * (s + 2.0 * y * y) + 2.0 * d.p2 * x * y, j);
-    const double u = k.fx * x * inverse, v = k.fy * y * inverse;  // derivative by the numerator of g
+    const double u = k.fx * x * inverse, v = k.fy * y * inverse;  // derivative with respect to the numerator of g
     const double along[8] = {s, ss, 0.0, 0.0, sss, -g * s, -g * ss, -g * sss};
     for (int i = 0; i != 8; ++i) {
       j[8 + 2 * i] = u * along[i];

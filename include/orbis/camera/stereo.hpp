@@ -43,7 +43,7 @@ stereo_rig(Left, Right, se3) -> stereo_rig<Left, Right>;
 /// Options of `rectify`.
 struct rectify_options {
   int width = 0;                   ///< of the rectified images, pixels; 0: width of the left camera
-  int height = 0;                  ///< likewise
+  int height = 0;                  ///< of the rectified images, pixels; 0: height of the left camera
   std::optional<double> focal{};   ///< of the rectified camera, pixels; default: see `rectify`
   double max_magnification = 1.5;  ///< maximum ratio of the default focal length to that at the image centres
 };
@@ -135,7 +135,7 @@ template <camera_model Left, camera_model Right>
     return false;
   const int w = rig.left.width(), h = rig.left.height();
   if (rig.right.width() != w || rig.right.height() != h || w == 0 || h == 0) return false;
-  // Pinhole cameras: rays differ by the same step everywhere, so a few pixels suffice, whatever the static type.
+  // Pinhole cameras: rays differ by the same step everywhere, so a few pixels suffice, regardless of the static type.
   const auto like = [&](const auto& camera, const pinhole& k) {
     for (const double v : {0.0, 0.3, 1.0})
       for (const double u : {0.0, 0.6, 1.0}) {

@@ -95,7 +95,7 @@ struct isolation_step {
 
 using filter_step =
     std::variant<ray_step, density_step, isolation_step, cluster_options, statistical_options, radius_options>;
-/// Filters in order; each step judges the points that the previous ones left. The density, isolation and cluster tests
+/// Filters in order; each step tests the points that the previous ones kept. The density, isolation and cluster tests
 /// share one pass over the neighbours of the points present before the first of them.
 using filter_chain = std::vector<filter_step>;
 

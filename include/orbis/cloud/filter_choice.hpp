@@ -22,7 +22,7 @@ struct select_options {
   std::size_t neighbors = 8;            ///< neighbours over which a point's spacing is averaged; > 0
   std::optional<vec3> sensor_origin{};  ///< position from which all points were seen, metres
   /// Distance of each point from the sensor that saw it, metres; overrides sensor_origin. Points with a non-finite
-  /// range are not judged by range.
+  /// range are not tested by range.
   std::span<const float> ranges{};
   /// Samples of the views, in their order, drawn earlier with the default options. They save one pass over each view.
   const view_samples* samples = nullptr;

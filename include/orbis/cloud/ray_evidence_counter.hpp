@@ -45,7 +45,7 @@ struct ray_evidence_options {
   float margin = 0.02F;          ///< allowance for noise and small pose errors, metres:
   float margin_growth = 0.005F;  ///< margin + margin_growth z^2 at depth z; 1 / metres
   float slant = 1.0F;      ///< fraction of the window's depth range added to the margin for rays that pass through
-  float min_depth = 0.0F;  ///< a view does not judge points at or below this depth, metres
+  float min_depth = 0.0F;  ///< a view gives no evidence on points at or below this depth, metres
   float max_depth = std::numeric_limits<float>::max();  ///< nor those beyond this
   bool resolve_ghosts = true;  ///< read the views a second time to find parts that most others contradict
   float ghost_reach = 0.3F;    ///< maximum distance in front of a measurement of a surface that contradicts it, metres

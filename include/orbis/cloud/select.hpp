@@ -13,7 +13,7 @@
 ///
 /// A step is part of the chosen chain only if it removes points.
 ///
-/// The library orbis::compiled holds the part that judges points alone; callers with views include select-inl.hpp.
+/// The library orbis::compiled contains the part that uses points alone; callers with views include select-inl.hpp.
 #pragma once
 
 #include <cassert>

@@ -147,8 +147,8 @@ template <execution_policy Policy, point_range Points>
 
 /// Returns the indices, ascending, of the points whose mean distance to their `neighbors` nearest neighbours, divided
 /// by the spacing that the sensor explains at their range, is at most mu + `sigma_multiplier` sigma of that quotient
-/// over the cloud. Keeps points of unknown range, so all points if no range is known (`judged` is 0 then). O(n log n)
-/// for fixed k; the same result for every policy.
+/// over the cloud. Keeps points of unknown range, and hence all points if no range is known (`judged` is then 0). O(n
+/// log n) for fixed k; the same result for every policy.
 /// @pre neighbors > 0, fewer than 2^32 points; see `range_statistical_decision`
 template <execution_policy Policy, point_range Points>
 [[nodiscard]] std::vector<std::uint32_t> range_statistical_inliers(const Policy& policy, const Points& points,

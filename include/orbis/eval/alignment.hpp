@@ -70,7 +70,7 @@ struct alignment {
   constexpr const char* where = "trajectory alignment";
   if (pairs.size() < 3)
     return fail(errc::no_data, where,
-                "only " + std::to_string(pairs.size()) + " poses have a reference pose, at least 3 are needed");
+                "only " + std::to_string(pairs.size()) + " poses have a reference pose; at least 3 are needed");
   const auto n = static_cast<double>(pairs.size());
   vec3 mean_e = zeros<vec3>(), mean_r = zeros<vec3>();
   for (const pose_pair& p : pairs) {
@@ -91,7 +91,7 @@ struct alignment {
   auto [u, s, v] = singular_values_of<3>(covariance);
   if (!(s[1] > 1e-9 * std::sqrt(variance_e * variance_r)) || !(s[1] > 0.0))
     return fail(errc::degenerate, where,
-                "all positions are collinear, the rotation about their line is not determined");
+                "all positions are collinear: the rotation about their line is not determined");
   // If the best orthogonal matrix is a reflection, the best rotation flips the weakest direction.
   if (determinant(u) * determinant(v) < 0.0) {
     s[2] = -s[2];

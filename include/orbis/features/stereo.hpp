@@ -45,7 +45,7 @@ struct sliding_square {
 
   int side = 0;
   pixel_rows square;  ///< with `side` readable pixels or more
-  pixel_rows strip;   ///< likewise `side` + `shifts` - 1
+  pixel_rows strip;   ///< with `side` + `shifts` - 1 readable pixels or more
 };
 
 /// Sets `sums[k]` to four times the sum of absolute differences between the square and the strip starting at column
@@ -58,7 +58,7 @@ void slide_differences(const sliding_square& s, int shifts, std::int32_t* sums);
 /// Options of `stereo_matcher`. "Pixels of a level" refers to the keypoint's pyramid level.
 struct stereo_options {
   int levels = 8;               ///< of the extractor's image pyramid; ignored if the pyramids are given
-  float scale_factor = 1.2F;    ///< between two of its levels; likewise
+  float scale_factor = 1.2F;    ///< between two of its levels; ignored if the pyramids are given
   float min_disparity = 0.0F;   ///< minimum of left minus right coordinate, pixels
   float max_disparity = 1e9F;   ///< maximum of the same
   float rows = 2.0F;            ///< maximum row difference of both keypoints, pixels of a level

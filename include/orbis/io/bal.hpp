@@ -19,8 +19,8 @@
 namespace orbis::io {
 
 /// The problem in `text`; `where` names the source in errors. Linear in the length of the text; memory is proportional
-/// to it, whatever the first line says. Errors, with the line: malformed; unsupported (compressed, as the files of the
-/// project's site are).
+/// to it, regardless of the numbers in the first line. Errors, with the line: malformed; unsupported (compressed, as
+/// the files of the project's site are).
 [[nodiscard]] result<bal_problem> parse_bal(std::string_view text, const std::filesystem::path& where = {});
 
 /// Reads a whole stream; see `parse_bal`. Errors: unreadable, malformed, unsupported.

@@ -61,7 +61,7 @@ namespace detail {
   if (!camera) return fail(camera.error());
   if (!*camera)
     return fail(errc::invalid_argument, folder.string(),
-                "the camera is not known: put a camera.toml into the folder, or name a camera");
+                "the camera is not known: put a camera.toml into the folder, or specify a camera");
   index.fps = (*camera)->fps;
   index.shutter = (*camera)->shutter;
   if (present(right_file)) {

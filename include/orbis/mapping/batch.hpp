@@ -157,7 +157,7 @@ template <class Octree, execution_policy Policy, keyframe_range Keyframes, camer
     return image.width() == camera.width() && image.height() == camera.height();
   };
   const auto wrong_size = [] {
-    return fail(errc::invalid_argument, "keyframes", "an image is not of the camera's size");
+    return fail(errc::invalid_argument, "keyframes", "the size of an image differs from the camera's");
   };
   const auto finite_pose = [](const auto& k) { return all_finite(se3(k.T_world_camera).to_matrix()); };
   const std::size_t looks = view_passes(options.filter);

@@ -5,7 +5,7 @@
 /// @code
 ///   using live = orbis::mapping::live_map<orbis::octree::occupancy_octree<>, orbis::camera::pinhole>;
 ///   live map{camera, {.resolution = 0.05}};
-///   map.add_keyframe(seq, frame, depth, T_world_camera);        // in the map at once
+///   map.add_keyframe(seq, frame, depth, T_world_camera);        // in the map immediately
 ///   ...
 ///   map.set_poses(keyframes);                                   // after each step of the SLAM system
 ///   map.correct(seq, {.time = 5ms, .robot = T_world_camera.translation()});
@@ -119,7 +119,7 @@ class live_map {
 
   /// Adds a keyframe, or replaces the depth image and pose of an existing one. `frame`: the index of its frame, which
   /// orders keyframes; `depth`: as integrated into the map, without the pixels that a filter removed; `T_world_camera`:
-  /// if it is not finite, the keyframe waits outside the map for a pose. The newest keyframe is in the map at once.
+  /// if it is not finite, the keyframe waits outside the map for a pose. The newest keyframe is in the map immediately.
   /// `what` is only stored, see is_filtered. Error: that of `Depths::put`; the keyframe is nevertheless in the map.
   /// O(marking, see octree::scan_marker) and Depths::put. @pre depth has the camera's size
   template <execution_policy Policy>

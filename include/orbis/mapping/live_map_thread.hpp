@@ -313,7 +313,7 @@ class live_map_thread {
       case job::keyframe: {
         bool judged = moving_.has_value();
         if (moving_ && listeners_.poll_poses) {
-          // Keyframes are compared at poses of one moment: the present ones, including that of the new keyframe.
+          // Keyframes are compared at poses of one moment: the current ones, including that of the new keyframe.
           const keyframe_poses& now = poll(true);
           const auto at = std::ranges::find(now.poses, j.frame, &keyframe_position::frame);
           judged = at != now.poses.end();

@@ -83,7 +83,7 @@ class moving_filter {
   /// Re-evaluates one of the last keyframes that are due, and updates its image in the map (live_map::set_depth) if the
   /// verdict has changed; the map follows with `correct`. Call it until nothing is due, or the next keyframe is more
   /// urgent: the remaining ones are evaluated together with that one. Errors: those of live_map::set_depth; the
-  /// keyframe is evaluated nevertheless. O(cells), and marking if the image changes.
+  /// keyframe is nevertheless evaluated. O(cells), and marking if the image changes.
   template <execution_policy Policy, octree::replayable_octree Octree, depth_history Depths>
   result<void> revise(const Policy& policy, live_map<Octree, Camera, Depths>& map) {
     for (auto& v : judge_.views()) {

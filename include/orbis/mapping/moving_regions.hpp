@@ -60,8 +60,8 @@ class moving_regions {
   explicit moving_regions(const Camera& camera, const moving_region_options& options = {})
       : options_{options}, grid_{camera} {}
 
-  /// Finds the moving regions. Returns true if there are any. O(pixels + cells log cells); returns at once if no mark
-  /// moves. @pre the image has the camera's size
+  /// Finds the moving regions. Returns true if there are any. O(pixels + cells log cells); returns immediately if no
+  /// mark moves. @pre the image has the camera's size
   template <camera::depth_source Depth>
   [[nodiscard]] bool find(const Depth& depth, std::span<const marked_pixel> marks) {
     removed_.clear();

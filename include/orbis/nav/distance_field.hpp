@@ -143,8 +143,8 @@ class metric_distances {
 using distance_view = metric_distances<squared_distance_view>;
 
 /// Signed distance at `p` (metres) and its gradient, from two fields of one map: a normal one, and one with the option
-/// `inside`. The distance is positive outside of obstacles and negative in them, where the gradient points outwards;
-/// its range is [-reach, reach], and it is interpolated like both fields. Between two adjacent voxels of which one is
+/// `inside`. The distance is positive outside obstacles and negative in them, where the gradient points outwards;
+/// its range is [-reach, reach], and it is interpolated like both fields. Between two adjacent voxels, one of which is
 /// an obstacle, it changes from minus to plus the edge of a voxel, and is 0 on the face between them. O(1).
 ///
 /// @code

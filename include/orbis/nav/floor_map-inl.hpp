@@ -148,8 +148,7 @@ class floor_search {
       return floor_state::occupied;
     return in_doubt();
   }
-  /// Sets the radius of is_steep, in cells. Call it after the reachable surfaces are known and before cells are
-  /// evaluated.
+  /// Sets the radius of is_steep, in cells. Call it after `flood` and before `judge_surface`.
   void set_radius(int radius) {
     radius_ = std::min(radius, std::max(levels_.width(), levels_.height()));
     // Sums of integers are faster, if they fit.
@@ -296,7 +295,7 @@ result<floor_map> make_floor_map(const Map& map, const ground_robot& robot, cons
   const std::optional<double> floor = options.floor ? options.floor : find_floor(map);
   if (!floor) return fail(errc::no_data, "", "the map has no floor");
   const std::optional<std::uint32_t> floor_key = grid.key(*floor - cell / 2);
-  if (!floor_key) return fail(errc::no_data, "", "the floor lies outside of the map's grid");
+  if (!floor_key) return fail(errc::no_data, "", "the floor lies outside the map's grid");
   const auto key_at = [&](int voxels_up) {
     return static_cast<std::uint32_t>(
         std::clamp<std::int64_t>(std::int64_t{*floor_key} + voxels_up, 0, std::int64_t{grid.cells()} - 1));
@@ -307,7 +306,7 @@ result<floor_map> make_floor_map(const Map& map, const ground_robot& robot, cons
     const vec3 min = flat(options.region->min), max = flat(options.region->max);
     if (!(min.x() <= max.x() && min.y() <= max.y())) return fail(errc::invalid_argument, "region", "is not a box");
     const auto named = octree::keys_between(grid, min, max);
-    if (!named) return fail(errc::no_data, "", "the region lies outside of the map's grid");
+    if (!named) return fail(errc::no_data, "", "the region lies outside the map's grid");
     box = *named;
   }
   const std::uint32_t lowest = key_at(-voxels(options.below)), highest = key_at(voxels(options.above));

@@ -46,7 +46,7 @@ struct floor_map_options {
   std::optional<double> floor{};  ///< height of the floor, metres; empty: that of find_floor
   double below = 1.0;             ///< how far below the floor ramps and stairs are followed, metres
   double above = 1.0;             ///< how far above the floor, metres
-  /// State of a cell of which too little is known: unknown, free or occupied.
+  /// State of a cell about which too little is known: unknown, free or occupied.
   octree::occupancy unknown = octree::occupancy::unknown;
   std::optional<octree::bounding_box> region{};  ///< part of the map to use (x and y), metres; empty: all
 };
@@ -61,7 +61,7 @@ struct floor_map {
 
   /// The centre of a cell, metres.
   [[nodiscard]] vec2 center(int x, int y) const noexcept { return origin + resolution * vec2{x + 0.5, y + 0.5}; }
-  /// The cell that contains `p` (metres; more than two coordinates are ignored); empty outside of the map.
+  /// The cell that contains `p` (metres; more than two coordinates are ignored); empty outside the map.
   template <class P>
   [[nodiscard]] std::optional<std::array<int, 2>> cell(const P& p) const noexcept {
     const double x = (static_cast<double>(p[0]) - origin.x()) / resolution;
@@ -69,7 +69,7 @@ struct floor_map {
     if (!(x >= 0.0 && y >= 0.0 && x < states.width() && y < states.height())) return std::nullopt;
     return std::array{static_cast<int>(x), static_cast<int>(y)};
   }
-  /// State at `p`; unknown outside of the map.
+  /// State at `p`; unknown outside the map.
   template <class P>
   [[nodiscard]] floor_state state(const P& p) const noexcept {
     const auto at = cell(p);

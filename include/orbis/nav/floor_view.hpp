@@ -27,7 +27,7 @@
 namespace orbis::nav {
 
 /// Tests whether a disc, at rest or moving along a segment, is free on a floor, i.e. has no point in common with the
-/// square of an occupied cell. The results are exact. Space outside of the map counts as unknown cells.
+/// square of an occupied cell. The results are exact. Space outside the map counts as unknown cells.
 ///
 /// A `planning_space` that ignores z: the distance between two positions is the horizontal one, and a path is reported
 /// at the height of the floor in the cells of its points. It refers to the floor map, which must not change while the
@@ -66,7 +66,7 @@ class floor_view {
   floor_view(const floor_map&, const image<std::uint8_t>&&, const planning_options& = {},
              octree::occupancy = octree::occupancy::occupied) = delete;
 
-  /// Returns true if the disc around `p` (metres) touches no obstacle. False outside of the map or the region. O(1)
+  /// Returns true if the disc around `p` (metres) touches no obstacle. False outside the map or the region. O(1)
   /// away from obstacles, O((radius / resolution)^2) near them.
   [[nodiscard]] bool is_free(const vec3& p) const { return is_free(p, p); }
   /// Returns true if the disc touches no obstacle on the straight segment from `a` to `b` (metres). O(length / distance
@@ -102,7 +102,7 @@ class floor_view {
     return options_.clearance_weight == 0.0 && options_.unknown_cost == 1.0;
   }
 
-  /// The cell of `p` (metres); empty outside of the map and of the region, and if not finite. O(1).
+  /// The cell of `p` (metres); empty outside the map or the region, and if not finite. O(1).
   [[nodiscard]] std::optional<octree::voxel_key> key(const vec3& p) const {
     const auto cell = is_in_region(p) ? map_->cell(p) : std::nullopt;
     if (!cell) return std::nullopt;

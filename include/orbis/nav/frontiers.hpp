@@ -63,7 +63,7 @@ struct cluster_options {
   std::size_t min_size = 1;  ///< of a cluster, voxels
 };
 
-/// The frontier of a map: the free voxels with an unknown voxel among their six face neighbours. Space outside of the
+/// The frontier of a map: the free voxels with an unknown voxel among their six face neighbours. Space outside the
 /// grid does not count as unknown, because it cannot be observed. The frontier depends only on the current map, not on
 /// the order of changes.
 ///
@@ -112,7 +112,7 @@ class frontiers {
   /// False if leaves of the map were left out because of `max_octants`: voxels on their faces are missing, except those
   /// next to later changes.
   [[nodiscard]] bool is_complete() const noexcept { return is_complete_; }
-  /// Returns true if the voxel belongs to the frontier; false outside of the grid. O(1)
+  /// Returns true if the voxel belongs to the frontier; false outside the grid. O(1)
   [[nodiscard]] bool contains(const octree::voxel_key& k) const noexcept {
     if (std::max({k.x, k.y, k.z}) >= grid_.cells()) return false;
     const std::uint64_t code = octree::morton_code(k);

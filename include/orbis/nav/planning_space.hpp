@@ -33,7 +33,7 @@ struct planning_options {
 ///
 /// - `dimensions`: 2 or 3, the axes along which cells have neighbours;
 /// - `resolution()`: the edge of a cell, metres;
-/// - `key(p)`: the cell of a position; empty outside the grid and of the region, and if not finite;
+/// - `key(p)`: the cell of a position; empty outside the grid or the region, and if not finite;
 /// - `contains(k)`: whether a cell is in the grid, and its centre in the region;
 /// - `center(k)`: the centre of a cell;
 /// - `clamped(p)`: the point of the grid nearest to the finite position `p` (the target of a search for a goal

@@ -200,7 +200,7 @@ class planning_view {
     return options_.clearance_weight == 0.0 && options_.unknown_cost == 1.0;
   }
 
-  /// The voxel of `p` (metres); empty outside the grid and of the region, and if not finite. O(1).
+  /// The voxel of `p` (metres); empty outside the grid or the region, and if not finite. O(1).
   [[nodiscard]] std::optional<octree::voxel_key> key(const vec3& p) const {
     return is_in_region(p) ? grid().key(p) : std::nullopt;
   }

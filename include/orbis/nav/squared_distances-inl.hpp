@@ -321,7 +321,8 @@ ORBIS_INLINE void squared_distances::keep_plane(std::uint32_t brick, unsigned ch
 
 ORBIS_INLINE void squared_distances::spread_along_y() {
   detail::slice_offer offer;
-  // Calls visit(place of a target brick, z in it, squares, the least of these) for the slices within reach of the row.
+  // Calls visit(place of a target brick, z in it, squares, the smallest of these) for the slices within reach of the
+  // row.
   const auto for_each_target = [&](const along_change& c, auto&& visit) {
     const int range = range_of(offer.least);
     const detail::brick_place p = places_[c.brick];

@@ -167,7 +167,7 @@ result<alignment_estimate<Transform>> alignment_of(std::span<const vec3> from, s
   if (pairs.size() < 3)
     return fail(
         errc::degenerate, where,
-        "only " + std::to_string(pairs.size()) + " of " + std::to_string(n) + " pairs are finite, three are needed");
+        "only " + std::to_string(pairs.size()) + " of " + std::to_string(n) + " pairs are finite; three are needed");
   from_centre /= static_cast<double>(pairs.size());
   to_centre /= static_cast<double>(pairs.size());
   mat3 spread = zeros<mat3>(), spread_to = zeros<mat3>();

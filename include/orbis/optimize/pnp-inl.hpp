@@ -31,7 +31,7 @@ result<pose_estimate> estimate_pose(std::span<const vec3> points_world, std::spa
   if (matches.size() < 3)
     return fail(errc::degenerate, where,
                 "only " + std::to_string(matches.size()) + " of " + std::to_string(n) +
-                    " matches are finite and in the camera's view, three are needed");
+                    " matches are finite and in the camera's view; three are needed");
   using estimator_type = detail::pnp_estimator<detail::pnp_matches>;
   const estimator_type estimator(matches);
   const result<ransac_estimate<estimator_type::model>> found = ransac(estimator, asked, workspace.ransac);
@@ -41,7 +41,7 @@ result<pose_estimate> estimate_pose(std::span<const vec3> points_world, std::spa
     return fail(errc::degenerate, where, why.empty() ? found.error().message : why);
   }
 
-  // From here on with the exact camera model: the pose with the least truncated squared error, and its inliers.
+  // From here on with the exact camera model: the pose with the smallest truncated squared error, and its inliers.
   const double squared_threshold = options.threshold * options.threshold;
   const auto error_at = [&](const se3& T_camera_world, std::size_t i) {
     const auto pixel = camera.project(T_camera_world * points_world[i]);

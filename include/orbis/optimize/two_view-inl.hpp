@@ -98,7 +98,7 @@ result<homography_estimate> estimate_homography(std::span<const vec2> first, std
   if (matches.size() < 4)
     return fail(
         errc::degenerate, where,
-        "only " + std::to_string(matches.size()) + " of " + std::to_string(n) + " matches are finite, four are needed");
+        "only " + std::to_string(matches.size()) + " of " + std::to_string(n) + " matches are finite; four are needed");
   first_centre /= static_cast<double>(matches.size());
   second_centre /= static_cast<double>(matches.size());
   // Relative to the centres and in units of the size of the images, so that the entries of H have similar magnitude.

@@ -76,7 +76,7 @@ template <camera::camera_model Camera>
   if (matches.size() < 5)
     return fail(errc::degenerate, where,
                 "only " + std::to_string(matches.size()) + " of " + std::to_string(n) +
-                    " matches are finite and in the camera's view, five are needed");
+                    " matches are finite and in the camera's view; five are needed");
   return detail::essential_of_matches(matches, n, options);
 }
 

@@ -47,7 +47,7 @@ template <std::size_t Bits, class Read>
     return bad("not an orbis vocabulary: it does not begin with \"orbisvoc\"");
   const auto field = [&](std::size_t at) { return load_number<std::uint32_t>(header.data() + at); };
   if (field(8) != vocabulary_version)
-    return fail(errc::unsupported, where, "version " + std::to_string(field(8)) + ", only version 1 is supported");
+    return fail(errc::unsupported, where, "version " + std::to_string(field(8)) + "; only version 1 is supported");
   if (field(16) != Bits)
     return fail(errc::unsupported, where,
                 "descriptors of " + std::to_string(field(16)) + " bits, not of " + std::to_string(Bits));
@@ -57,7 +57,7 @@ template <std::size_t Bits, class Read>
   const std::uint64_t expected =
       header.size() + std::uint64_t{nodes - 1} * (Bits / 8) + std::uint64_t{words} * 4 + std::uint64_t{inner_end} * 2;
   if (size != expected)
-    return bad(std::to_string(size) + " bytes, but what it declares takes " + std::to_string(expected));
+    return bad(std::to_string(size) + " bytes, but the header requires " + std::to_string(expected));
 
   vocabulary_tree<Bits> tree;
   tree.resize(nodes);

@@ -45,7 +45,7 @@ struct vocabulary_tree {
   }
 
   [[nodiscard]] std::uint32_t word_count() const noexcept { return static_cast<std::uint32_t>(weights.size()); }
-  /// Number of the first node after the last one with children; all nodes from it on are leaves.
+  /// Number of the first node after the last one with children; that node and all after it are leaves.
   [[nodiscard]] std::uint32_t inner_end() const noexcept { return static_cast<std::uint32_t>(nodes.size() - 1); }
   [[nodiscard]] bool is_leaf(std::uint32_t node) const noexcept {
     return node >= inner_end() || nodes[node].first_child == nodes[node + 1].first_child;

@@ -120,7 +120,8 @@ ORBIS_INLINE result<map> parse_map(std::span<const std::byte> bytes, const std::
   if (text.size() < head) return fail(errc::malformed, where, "ends before its version");
   const auto version = load_number<std::uint32_t>(text.data() + detail::map_magic.size());
   if (version == 0 || version > detail::map_version)
-    return fail(errc::unsupported, where, "version " + std::to_string(version) + ", this reads versions 1 to 4");
+    return fail(errc::unsupported, where,
+                "version " + std::to_string(version) + "; only versions 1 to 4 are supported");
 
   detail::map_reader::content parts;
   detail::map_reader read{parts, version};

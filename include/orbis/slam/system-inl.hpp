@@ -291,8 +291,8 @@ result<void> ORBIS_SLAM_SYSTEM::load_map(const std::filesystem::path& path) requ
     return fail(errc::unsupported, path.string(), "the map was made with another image pyramid");
   if (loaded->scale_is_known() != shared_.rig.scale_is_known)
     return fail(errc::unsupported, path.string(),
-                shared_.rig.scale_is_known ? "the map was made without depth, its unit of length is not the metre"
-                                           : "the map was made with depth, but this sensor measures none");
+                shared_.rig.scale_is_known ? "the map was made without depth; its unit of length is not the metre"
+                                           : "the map was made with depth, but this sensor does not measure depth");
   if (loaded->keyframes().empty()) return fail(errc::no_data, path.string(), "the map has no keyframes");
   std::vector<std::pair<keyframe_id, typename Places::signature>> bow_vectors;  // before the lock, which stops tracking
   for (const auto& k : loaded->keyframes()) bow_vectors.emplace_back(k.id, shared_.places.describe(k.features));

@@ -79,7 +79,7 @@ template <std::size_t Offset, std::size_t... I>
 /// that value in every lane. An operation costs one instruction per register unless its comment states otherwise.
 template <class T, std::size_t N, target Target>
 struct vec {
-  static_assert(std::is_arithmetic_v<T> && N >= 2 && (N & (N - 1)) == 0, "a power of two of numbers");
+  static_assert(std::is_arithmetic_v<T> && N >= 2 && (N & (N - 1)) == 0, "the number of lanes must be a power of two");
   using value_type = T;
   using target_type = Target;
   using mask_type = simd::mask<sizeof(T), N, Target>;

@@ -95,7 +95,7 @@ inline constexpr time_unit time_units[] = {
   if (!(ratio > tolerance || ratio < 1.0 / tolerance)) return {};
   char text[240];
   std::snprintf(text, sizeof text,
-                "the time between frames is %.3g s, that of a camera with %.3g frames per second %.3g s", interval, fps,
+                "the time between frames is %.3g s, but at %.3g frames per second it would be %.3g s", interval, fps,
                 1.0 / fps);
   std::string warning = text;
   if (ratio > tolerance) {

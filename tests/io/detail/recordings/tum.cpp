@@ -50,7 +50,7 @@ TEST_CASE("images are paired by time whatever the lists look like") {
     CHECK(index.frames[i].depth.filename() == expected);
     CHECK_FALSE(index.frames[i].T_world_camera.has_value());
   }
-  CHECK(mentions(index, "rgb.txt: not in order of time"));
+  CHECK(mentions(index, "rgb.txt: not in chronological order"));
   CHECK(mentions(index, "depth.txt:2: skipped"));
   CHECK(mentions(index, "1 of 4 colour images have no counterpart"));
   CHECK(mentions(index, "1 of 4 depth images have no counterpart"));

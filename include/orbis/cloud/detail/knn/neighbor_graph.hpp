@@ -152,7 +152,7 @@ class neighbor_graph {
   static constexpr std::size_t short_list = 16;
   static constexpr std::size_t long_list = 256;
   static constexpr std::uint32_t leaf_bits = leaf_width;
-  static_assert(leaf_width == 16, "four bits say which point of a leaf");
+  static_assert(leaf_width == 16, "four bits identify a point of a leaf");
 
   [[nodiscard]] bool is_in_leaf(std::size_t place) const noexcept { return place < tree_.in_leaves; }
   [[nodiscard]] const surplus_copy& copy(std::size_t place) const noexcept {

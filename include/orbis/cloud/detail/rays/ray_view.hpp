@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// One posed depth image as `ray_evidence.hpp` uses it, and a test for blocks of points that it cannot judge.
+/// One posed depth image as `ray_evidence.hpp` uses it, and a test for blocks of points on which it has no evidence.
 #pragma once
 
 #include <algorithm>
@@ -29,7 +29,7 @@ struct ray_view {
   float fx = 0, fy = 0, cx = 0, cy = 0;            ///< pinhole parameters; half a pixel is added to cx and cy
   int width = 0;
   int height = 0;
-  float min_depth = 0;  ///< exclusive lower limit of the depth of judged points, metres
+  float min_depth = 0;  ///< exclusive lower limit of the depth of tested points, metres
   float max_depth = 0;
   float margin = 0;  ///< margin + margin_growth z^2, metres
   float margin_growth = 0;

@@ -204,7 +204,7 @@ class view_verdicts {
 /// in a part of it, so the median over the tiles decides. The worst view is left out repeatedly until none stands out;
 /// if that would be half of them, all are trusted. Deterministic. Calls `also(view, cleaned view, its windows)` for
 /// each view, so that callers with further computations need no second pass: views may be costly to read. `samples`:
-/// samples of the views, if drawn before; otherwise each view is read once more. O(views (pixels + samples of all
+/// samples of the views, if drawn before; otherwise each view is read a second time. O(views (pixels + samples of all
 /// views)), and O(views) memory.
 /// @pre views' images have the camera's size; the samples are of these views
 template <execution_policy Policy, posed_depth_range Views, camera::camera_model Camera, class Also = no_view_action>

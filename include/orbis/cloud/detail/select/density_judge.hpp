@@ -55,9 +55,9 @@ struct threshold_options {
   bool needs_valley = false;  ///< without a valley remove nothing
 };
 
-/// Finds the threshold of a density test. Sparse points on surfaces are not outliers, whatever their number: regions
-/// seen from afar or at a grazing angle. The histogram therefore contains only the other points, and the threshold
-/// exceeds the spacing above which more than 40 % of the sparser points lie on surfaces.
+/// Finds the threshold of a density test. Sparse points on surfaces are not outliers, regardless of their number:
+/// regions seen from afar or at a grazing angle. The histogram therefore contains only the other points, and the
+/// threshold exceeds the spacing above which more than 40 % of the sparser points lie on surfaces.
 template <execution_policy Policy>
 [[nodiscard]] density_evidence find_threshold(const Policy& policy, surroundings& around, const reference& r,
                                               const threshold_options& manner) {

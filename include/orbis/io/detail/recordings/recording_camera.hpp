@@ -46,7 +46,7 @@ namespace orbis::io::detail {
   if (!camera) camera = index.camera;
   if (!camera)
     return fail(errc::invalid_argument, folder.string(),
-                "the camera is not known: put a camera.toml into the folder, or name a camera");
+                "the camera is not known: put a camera.toml into the folder, or specify a camera");
   std::vector<double> times;
   for (const recording_entry& frame : index.frames) times.push_back(frame.timestamp);
   if (std::string warning = describe_interval(times, camera->fps); !warning.empty())

@@ -134,7 +134,7 @@ inline result<void> check_first_frame(const recording_index& index, const std::f
 /// Error for a folder that is not a recording, with its actual content and the layouts that are known.
 [[nodiscard]] inline error unknown_recording(const std::filesystem::path& folder, const std::string& known) {
   return {errc::unsupported, folder.string(),
-          "no known recording; the folder " + describe_content(folder) + ";\n  known are " + known};
+          "not a known recording; the folder " + describe_content(folder) + ";\n  known layouts: " + known};
 }
 
 }  // namespace orbis::io::detail

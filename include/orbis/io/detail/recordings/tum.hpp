@@ -50,7 +50,7 @@ template <class Entry>
   const auto earlier = [](const Entry& a, const Entry& b) { return a.timestamp < b.timestamp; };
   if (!std::is_sorted(entries.begin(), entries.end(), earlier)) {
     std::stable_sort(entries.begin(), entries.end(), earlier);
-    notes.push_back(list.string() + ": not in order of time; sorted");
+    notes.push_back(list.string() + ": not in chronological order; sorted");
   }
   const auto repeated = std::unique(entries.begin(), entries.end(),
                                     [](const Entry& a, const Entry& b) { return a.timestamp == b.timestamp; });

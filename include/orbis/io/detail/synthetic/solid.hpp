@@ -148,7 +148,7 @@ struct hit {
     for (const double end : {-core, core}) {
       const triple from{origin.x, origin.y, origin.z - end};
       const double to_end = enters(dot(direction, direction), dot(from, direction), dot(from, from) - radius2);
-      // A hemisphere: the other half of the sphere is inside of the capsule.
+      // A hemisphere: the other half of the sphere is inside the capsule.
       if (to_end > 0.0 && to_end < h.t && (from.z + to_end * direction.z) * end >= 0.0) h.t = to_end;
     }
     return h;

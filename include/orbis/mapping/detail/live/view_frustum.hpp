@@ -61,8 +61,8 @@ class view_frustum {
   /// Extends the pyramid to a ray: x and y at z = 1.
   void include(vec2 ray) {
     if (!all_finite(ray)) return;
-    // Depth along the axis says little about rays almost perpendicular to it: rays beyond 80 degrees count as if they
-    // were at 80 degrees.
+    // Depth along the axis constrains rays almost perpendicular to it only weakly: rays beyond 80 degrees count as if
+    // they were at 80 degrees.
     constexpr double widest = 5.67;
     const double off_axis = norm(ray);
     if (off_axis > widest) ray *= widest / off_axis;

@@ -72,7 +72,7 @@ class moving_judge {
     std::vector<std::uint8_t> shown;    ///< number of other views that show the cell as well
     std::vector<std::uint8_t> removed;  ///< 1: removed, as of the last call of `accept`
     bool due = false;                   ///< it has not been compared with the newest view
-    bool unjudged = false;              ///< evidence has arrived since it was judged
+    bool unjudged = false;              ///< evidence has arrived since its last evaluation
 
     [[nodiscard]] depth_view depth() const { return depth_view{pixels.view(), scale, min_depth, max_depth}; }
     [[nodiscard]] std::vector<removed_cell> removed_cells() const {

@@ -9,8 +9,8 @@
 namespace orbis::nav::detail {
 
 // Bit i is the voxel at place i of the Morton curve: along `axis` (0: x), the low bit of its coordinate is bit `axis`
-// of i, the high bit is bit `axis + 3`. So successive voxels are 1, 7 and 1 times 2^axis places apart, and the last one
-// is 9 times 2^axis places after the first.
+// of i, the high bit is bit `axis + 3`. Successive voxels are therefore 1, 7 and 1 times 2^axis places apart, and the
+// last one is 9 times 2^axis places after the first.
 
 /// The voxels whose coordinate along the axis has the low bit 0.
 inline constexpr std::array<std::uint64_t, 3> even_voxels{0x5555555555555555, 0x3333333333333333, 0x0f0f0f0f0f0f0f0f};

@@ -45,7 +45,7 @@ struct test_cells_kernel {
     using floats = simd::native_vec<float, Target>;
     constexpr std::size_t n = floats::count;
     const float least_z = std::max(near_z, std::numeric_limits<float>::min());
-    // Tests the first `count` rays from `from` on.
+    // Tests `count` rays, starting at `from`.
     const auto is_crossed = [&](const binned_ray* from, std::size_t count) ORBIS_INLINE_LAMBDA {
       const float* const p = &from->x;
       const floats a = floats::load(p), b = floats::load(p + n), c = floats::load(p + 2 * n);

@@ -157,7 +157,7 @@ struct fresh_hits_kernel {
       if (i != 0) changed = simd::bits((differs(0) | differs(1) | differs(2)) != integers(0));
       fresh[i >> 6U] |= changed << (i & 63U);
     }
-    // A ray after one that is no hit counts as well.
+    // A ray after one that is not a hit counts as well.
     std::uint64_t before = 0;
     for (std::size_t w = 0; w != fresh.size(); ++w) {
       const std::uint64_t follows = rays.hit[w] << 1U | before;

@@ -519,7 +519,7 @@ class shared_intrinsics {
 
   std::vector<view_type> views_;
   std::vector<seen> seen_;                      ///< by observation, at the last linearisation
-  std::vector<point_part> parts_;               ///< by point, likewise
+  std::vector<point_part> parts_;               ///< by point, at the last linearisation
   std::vector<jacobians> rows_;                 ///< of the residuals of the most recently linearised point
   Eigen::MatrixXd direct_, reduced_, removed_;  ///< lower halves; `direct_`: without elimination and damping
   std::vector<double> gradient_;

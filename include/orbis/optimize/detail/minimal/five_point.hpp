@@ -122,7 +122,7 @@ inline void add_product(cubic& sum, const quadric& a, const linear& b) noexcept 
     double error = 0.0;
     mat3 normal = zeros<mat3>();
     vec3 gradient = zeros<vec3>();
-    std::array<std::array<double, 4>, 20> terms;  // including their derivatives by x, y and z
+    std::array<std::array<double, 4>, 20> terms;  // including their derivatives with respect to x, y and z
     for (std::size_t t = 0; t != 20; ++t) {
       const auto [i, j, k] = cubic_terms[t];
       const double x = power[0][i], y = power[1][j], z = power[2][k];

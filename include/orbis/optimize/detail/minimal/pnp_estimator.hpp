@@ -77,7 +77,7 @@ struct match_equations_kernel {
       const V x = p0 * inverse, y = p1 * inverse;
       const V dx = x - at(3), dy = y - at(4);
       const V u = xx * dx + xy * dy, v = yy * dy;
-      // The derivatives of u and v by the point, then by a motion of the point: rho + phi x p.
+      // The derivatives of u and v with respect to the point, then to a motion of the point: rho + phi x p.
       V a[6], b[6];
       a[0] = xx * inverse;
       a[1] = xy * inverse;

@@ -36,7 +36,7 @@ struct pnp_matches {
   std::vector<vec3> points;             ///< relative to the centre
   std::vector<vec3> rays;               ///< unit vectors
   std::vector<double> columns;          ///< eight lists, `stride` apart
-  std::vector<float> float_columns;     ///< likewise
+  std::vector<float> float_columns;     ///< the same as float
   std::vector<double> gathered;         ///< the matches of one refinement
   std::size_t stride = 0;               ///< size, rounded up to whole blocks
   vec3 centre = zeros<vec3>();
@@ -66,7 +66,7 @@ struct pnp_matches {
       matrix<2, 3> by_point;
       const auto ray = camera.unproject(pixels[i]);
       if (!ray || !camera.project(*ray, by_point)) continue;
-      // R of the QR decomposition of the derivative by x and y.
+      // R of the QR decomposition of the derivative with respect to x and y.
       const double length = std::hypot(by_point(0, 0), by_point(1, 0));
       const double along = (by_point(0, 0) * by_point(0, 1) + by_point(1, 0) * by_point(1, 1)) / length;
       const double across = (by_point(0, 0) * by_point(1, 1) - by_point(1, 0) * by_point(0, 1)) / length;

@@ -220,7 +220,7 @@ result<two_view_reconstruction> reconstruction_of_matches(const std::vector<Matc
   };
   if (usable < least)
     return fail(errc::no_data, where,
-                "only " + of(usable, n) + " matches are usable, " + std::to_string(least) + " are needed");
+                "only " + of(usable, n) + " matches are usable; " + std::to_string(least) + " are needed");
 
   // The cheapest case first: pure rotation.
   const so3 turn = dominant_rotation(matches);

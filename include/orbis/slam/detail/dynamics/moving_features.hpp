@@ -235,7 +235,7 @@ class moving_features {
     double anchored = 0.0;               ///< time of the anchor, seconds
     double moved = 0.0;                  ///< time of the last motion, or of the first observation, seconds
     bool has_anchor = false;
-    bool has_moved = false;  ///< moved by itself; otherwise excluded because of its neighbours
+    bool has_moved = false;  ///< moved on its own; otherwise excluded because of its neighbours
   };
 
   std::size_t split_motions(basic_frame<D>& f, const basic_map<D>& m, const search_list<D>& list,

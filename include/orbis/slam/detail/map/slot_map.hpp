@@ -103,7 +103,7 @@ class slot_map {
   }
 
   /// Appends all objects and erased ids of `other`, which count as erased now. Returns the amount by which its ids
-  /// grow. Ids inside the objects are not changed. O(ids of `other`), in steps of 256 for long forgotten ones.
+  /// grow. Ids inside the objects are not changed. O(ids of `other`), in steps of 256 for ids forgotten long ago.
   /// @pre at most `most_ids` ids in all
   std::uint32_t append(slot_map&& other) {
     assert(other.slots_.size() <= most_ids - slots_.size());

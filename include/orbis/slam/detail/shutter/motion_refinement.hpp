@@ -276,7 +276,7 @@ class early_depth_twist {
   void determine(const std::array<mat6, 3>& h, const twist_prior& prior) {
     pose_covariance_ = inverse(h[0]);
     if (!prior.T_world_before) return;
-    // The prior relates the twist to both poses, of which the former one is not exact either.
+    // The prior relates the twist to both poses; the previous pose is not exact either.
     const double by_pose = (1.0 + prior.trend) / prior.interval;
     const mat6 tie = inverse(variances_of(prior, 1.0) + by_pose * by_pose * former_covariance_);
     const mat6 mixed = h[1] + by_pose * tie;

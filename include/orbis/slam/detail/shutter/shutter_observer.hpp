@@ -127,7 +127,7 @@ class shutter_observer {
                                    std::abs(next.depth_delay - assumed.depth_delay));
     if (change < same) return std::nullopt;
     estimator_.clear();
-    views_.clear();  // their depths were read with the former delay
+    views_.clear();  // their depths were read with the previous delay
     interrupt();
     last_ = estimate_;
     return next;

@@ -162,7 +162,7 @@ class front_end {
     if (is_tracking()) lost_since_ = last_.timestamp;
     if (!lost_since_) lost_since_ = f.timestamp;
     state_ = track_state::lost;
-    // Finding two frames takes time: if little is lost, the search begins at once.
+    // Finding two frames takes time: if little is lost, the search begins immediately.
     const bool is_here = last_.size() != 0 && maps.current(last_reference_).map == maps.active_id();
     const bool at_once =
         is_here && !rig_.scale_is_known && maps.active().keyframes().size() < options_.recovery.min_map_keyframes;
