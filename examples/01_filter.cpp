@@ -33,11 +33,11 @@ int main(int argc, char** argv) {
   // mu + 1.0 sigma of all points. The result holds the indices of the points that stay.
   const std::vector<std::uint32_t> statistical =
       orbis::cloud::statistical_inliers(orbis::par, cloud.points, {.neighbors = 50, .sigma_multiplier = 1.0});
-  std::printf("statistical filter: %zu of %zu points stay\n", statistical.size(), cloud.size());
+  std::printf("statistical filter: %zu of %zu points kept\n", statistical.size(), cloud.size());
 
   // The automatic filter examines the cloud, and selects the filter and its parameters.
   const auto automatic = orbis::cloud::filter_automatically(orbis::par, cloud.points);
-  std::printf("automatic filter: %zu points stay; %s: %s\n", automatic.inliers.size(),
+  std::printf("automatic filter: %zu points kept; %s: %s\n", automatic.inliers.size(),
               to_string(automatic.choice.chain).c_str(), automatic.choice.reason.c_str());
 
   if (argc < 3) return 0;

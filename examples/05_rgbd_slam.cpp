@@ -35,7 +35,7 @@ int run(Recording&& recording) {
   slam.wait();
   map.finish();
 
-  const auto snapshot = map.latest();  // does not change any more; any thread may take one at any time
+  const auto snapshot = map.latest();  // immutable; any thread may take one at any time
   const auto trajectory = slam.trajectory();
   std::printf("%zu frames, %zu tracked, %zu keyframes, %zu leaves in the map\n", i, trajectory.size(),
               snapshot->keyframes, snapshot->map.num_leaves());

@@ -58,7 +58,8 @@ int run(int argc, char** argv) {
   if (voxels.is_too_large(resolution, examples::free_memory()))
     return report_error(2, "--resolution: " + voxels.describe(resolution, "the image") + ", too many");
   if (voxels.takes_long(resolution))
-    std::fprintf(stderr, "depth_to_octree: %s; this takes long\n", voxels.describe(resolution, "the image").c_str());
+    std::fprintf(stderr, "depth_to_octree: %s; this takes a long time\n",
+                 voxels.describe(resolution, "the image").c_str());
   orbis::octree::occupancy_octree<> map{resolution};
   const orbis::camera::depth_view metres{*depth, units};
   const auto scan = map.integrate(metres, camera->model, orbis::se3{orbis::so3{q}, orbis::vec3{p.data()}});

@@ -37,7 +37,7 @@ struct lens_comparison {
 [[nodiscard]] std::optional<focal_doubt> find_doubt(std::span<const orbis::slam::calibrated_parameter> found);
 /// The doubt that follows from a map made with the camera. A wrong focal length scales the distances between poses by
 /// some percent, but so does distortion that a pinhole does not model: empty if distortion fits the images clearly
-/// better, or if they are inconclusive. Runs one or two small self-calibrations, in some tenths of a second.
+/// better, or if they are inconclusive. Runs one or two small self-calibrations, in a few tenths of a second.
 [[nodiscard]] std::optional<focal_doubt> find_doubt(const orbis::slam::map& map,
                                                     const orbis::camera::any_camera& camera,
                                                     const orbis::slam::options& options);

@@ -79,7 +79,7 @@ void add_map_options(CLI::App& cmd, settings& s) {
       ->check(CLI::IsMember(filter_names()))
       ->capture_default_str()
       ->type_name("MODE");
-  cmd.add_option("--neighbors", s.neighbors, "number of neighbours of the filter (statistical: 50, radius: 5)")
+  cmd.add_option("--neighbors", s.neighbors, "number of neighbours for the filter (statistical: 50, radius: 5)")
       ->check(within<std::size_t>(1, 100'000))
       ->type_name("N");
   metres(cmd, "--radius", s.radius, "search radius of the radius filter in metres", 1e-6, 1000.0);
@@ -93,9 +93,8 @@ void add_map_options(CLI::App& cmd, settings& s) {
         0, 1'000'000)
       ->capture_default_str();
   cmd.add_option("--threads", s.threads,
-                 "number of threads of filter and octree (all cores); 1: one thread for everything; implies "
-                 "--deterministic, and "
-                 "tracking waits for the live map")
+                 "number of threads for filter and octree (all cores); 1: a single thread for everything, implies "
+                 "--deterministic, and tracking waits for the live map")
       ->check(within(1U, 1024U))
       ->type_name("N");
   cmd.add_flag("--quiet", s.quiet, "print errors only");
@@ -228,7 +227,7 @@ void add_slam_options(CLI::App& cmd, settings& s) {
   if (cmd.get_name() == "run") add_intrinsics_option(cmd, s);
   add_switch(cmd, "--moving", s.moving, "detect moving objects and exclude them from tracking and mapping");
   add_switch(cmd, "--depth-term", s.depth_term,
-             "use depth images in addition to features in pose estimation, and alone where features fail");
+             "use depth images in addition to features in pose estimation, and on their own where features fail");
   cmd.add_flag("--deterministic", s.deterministic,
                "byte-identical results in every run: mapping and loop closing run between frames, not in parallel");
   cmd.add_flag(
@@ -315,7 +314,7 @@ std::string contradiction(const settings& s) {
     return "--map-every-frame needs a live map: remove --batch-map or --localize-only";
   if (s.localize_only && !s.save_map.empty()) return "--localize-only does not change the map: remove --save-map";
   if (s.robot_step && !s.on_floor) return "--step needs --ground";
-  if (s.localize_only && !s.floor_map.empty()) return "--localize-only makes no floor map: remove --floor-map";
+  if (s.localize_only && !s.floor_map.empty()) return "--localize-only does not build a floor map: remove --floor-map";
   if (s.viewer.empty() && s.viewer_hold) return "--viewer-hold needs --viewer";
   if (!has_viewer(s.viewer)) return missing_viewer_message(s.viewer);
   return {};

@@ -3,7 +3,7 @@
 /// Handling of SIGINT (Ctrl-C), SIGTERM and SIGHUP (closed terminal).
 ///
 /// Initially the first signal ends the program. While a run collects results, the first signal asks it to stop and to
-/// write its results so far, and the second one ends the program at once. Before a signal ends the program, its
+/// write its results so far, and the second one ends the program immediately. Before a signal ends the program, its
 /// temporary files are removed.
 #pragma once
 

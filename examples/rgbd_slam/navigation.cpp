@@ -118,9 +118,9 @@ orbis::result<navigation_results> navigate(const octree& map, const orbis::traje
   }
   r.planning_ms = std::chrono::duration<double, std::milli>(console::clock::now() - start).count();
 
-  const std::string outcome =
-      r.path.empty() ? "no path: " + r.path_status
-                     : text("path of a %s: %.2f m, straight %.2f m", robot_text(r).c_str(), r.path_m, r.straight_m);
+  const std::string outcome = r.path.empty() ? "no path: " + r.path_status
+                                             : text("path of a %s: %.2f m, straight line %.2f m", robot_text(r).c_str(),
+                                                    r.path_m, r.straight_m);
   if (floor || !cameras.empty()) {
     const double height = !r.path.empty() && !r.drives ? r.path.front().z()
                           : floor                      ? floor->floor + 0.5 * s.robot_height

@@ -125,7 +125,7 @@ orbis::result<void> check_resolution(const std::vector<orbis::vec3f>& points, co
   const std::string text = rays.describe(s.resolution, "the space between origin and points");
   if (rays.is_too_large(s.resolution, examples::free_memory()))
     return orbis::fail(orbis::errc::invalid_argument, "--resolution", text + ", too many");
-  console.warn(r.warnings.emplace_back(text + "; this takes long"));
+  console.warn(r.warnings.emplace_back(text + "; this takes a long time"));
   return {};
 }
 
@@ -231,7 +231,7 @@ exit_code map_without_slam(const settings& s, console& console) {
     auto source = open_source(s, console);
     if (!source) return give_up(source.error());
     if (source->is_monocular())
-      return give_up({orbis::errc::unsupported, s.input.string(), "a monocular recording gives no map"});
+      return give_up({orbis::errc::unsupported, s.input.string(), "a monocular recording cannot produce a map"});
     recording = *std::move(source);
   }
   const auto inputs = inputs_of(s, recording ? recording->files : std::vector<std::filesystem::path>{});

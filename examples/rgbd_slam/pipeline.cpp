@@ -47,7 +47,7 @@ exit_code end_untracked(results& r, const tracked_frames& tracked, const frame_s
                         result_files& files, console& console) {
   if (interrupts::stop_requested()) {
     console.error(
-        {orbis::errc::cancelled, s.out.string(), "interrupted before a frame was tracked; nothing was written"});
+        {orbis::errc::cancelled, s.out.string(), "interrupted before any frame was tracked; nothing was written"});
     return interrupted;
   }
   if (tracked.stopped) return report_no_start(r, explain_stop(tracked, source), bad_input, files, console);

@@ -47,7 +47,7 @@ orbis::result<octree> read_map(const std::filesystem::path& path) {
   const auto begins_with = [&](std::string_view magic) { return bytes->starts_with(magic); };
   if (begins_with("# Octomap OcTree binary file")) return orbis::octree::read_bt<octree::model>(view, path.string());
   if (begins_with("# Octomap OcTree file")) return orbis::octree::read_ot<octree::model>(view, path.string());
-  return orbis::fail(orbis::errc::unsupported, path.string(), "is no octree map (.bt or .ot)");
+  return orbis::fail(orbis::errc::unsupported, path.string(), "is not an octree map (.bt or .ot)");
 }
 
 orbis::result<void> write_path(const std::filesystem::path& path, const std::vector<vec3>& points) {
@@ -116,7 +116,7 @@ std::string describe_blocker(const octree& map, const settings& s, const vec3& p
   return text(" by an obstacle at %.3f,%.3f,%.3f", nearest.x(), nearest.y(), nearest.z());
 }
 
-/// The same for a robot that drives. Cells of the floor are obstacles, unknown, or outside of the floor map.
+/// The same for a robot that drives. Cells of the floor are obstacles, unknown, or outside the floor map.
 std::string describe_blocker(const nav::floor_map& floor, const settings& s, const vec3& p) {
   struct blocker {
     double distance = std::numeric_limits<double>::infinity();  // from `p` to the cell
@@ -137,7 +137,7 @@ std::string describe_blocker(const nav::floor_map& floor, const settings& s, con
   const char* const remedy = " (--unknown free treats it as free)";
   if (touches(obstacle)) return text(" by an obstacle at %.3f,%.3f", obstacle.at.x(), obstacle.at.y());
   if (touches(unknown)) return text(" by unknown space alone at %.3f,%.3f%s", unknown.at.x(), unknown.at.y(), remedy);
-  return std::string{" by unknown space alone, outside of the floor map"} + remedy;
+  return std::string{" by unknown space alone, outside the floor map"} + remedy;
 }
 
 /// The free position nearest to `p`, of the centres of cells within 2 m; empty if there is none.
@@ -247,7 +247,7 @@ exit_code plan(const settings& s, console& console) {
                             ? plan_in(nav::planning_view{*map, *field, cylinder, within}, *map, s)
                             : plan_in(nav::planning_view{*map, *field, nav::ball{s.robot_radius}, within}, *map, s);
   const std::string outcome = found.why.empty()
-                                  ? text("path of %.3f m over %zu points, straight %.3f m, found in %.1f ms",
+                                  ? text("path of %.3f m over %zu points, straight line %.3f m, found in %.1f ms",
                                          found.path.length, found.path.points.size(), (s.to - s.from).norm(), found.ms)
                                   : "no path: " + std::string{to_string(found.path.status)};
   console.finish(outcome);

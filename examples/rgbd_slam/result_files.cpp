@@ -188,7 +188,7 @@ result<result_files> result_files::begin(const settings& s) {
     return orbis::fail(orbis::errc::write_failed, path.string(), "the map cannot be saved: " + why);
   };
   std::error_code ec;
-  // Adds a file that may be outside of the output folder. `others`: all files that are created with it.
+  // Adds a file that may be outside the output folder. `others`: all files that are created with it.
   const auto add = [&](const fs::path& file, const file_names& others, std::size_t& index) -> result<void> {
     const fs::path folder = folder_of(file);
     for (const fs::path& f : {s.out, folder})

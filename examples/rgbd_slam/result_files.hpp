@@ -81,7 +81,7 @@ class result_files {
   std::filesystem::path out_;
   std::string map_name_, floor_name_;
   std::size_t map_folder_ = 0, floor_folder_ = 0;
-  std::vector<staged_folder> folders_;  ///< the output folder, and the folders of files outside of it
+  std::vector<staged_folder> folders_;  ///< the output folder, and the folders of files outside it
 };
 
 }  // namespace app

@@ -81,7 +81,7 @@ struct shutter_results {
   std::string from;  ///< "given", "camera" or "estimated"
   orbis::camera::shutter shutter{};
   double read_out_deviation = std::numeric_limits<double>::quiet_NaN();  ///< standard deviation of an estimate, seconds
-  double delay_deviation = std::numeric_limits<double>::quiet_NaN();     ///< likewise
+  double delay_deviation = std::numeric_limits<double>::quiet_NaN();     ///< standard deviation, seconds
 };
 
 /// The camera intrinsics of the run, pixels.

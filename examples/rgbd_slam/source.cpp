@@ -34,7 +34,7 @@ using orbis::fail;
 using orbis::result;
 using orbis::slam::sensor_kind;
 
-constexpr const char* camera_request = "name a camera";
+constexpr const char* camera_request = "specify a camera";
 
 /// Adds the name of the option to a reader's request for a camera.
 orbis::error with_option(orbis::error e) {
@@ -191,7 +191,7 @@ result<frame_source> open_recording(const settings& s) {
     orbis::error e = with_option(opened.error());
     if (e.code == orbis::errc::unsupported && s.sensor == "auto" && s.format == "auto") {
       const auto add = [&](const char* sensor, const orbis::error& other) {
-        constexpr std::string_view before = "known are ";
+        constexpr std::string_view before = "known layouts: ";
         if (const std::size_t at = other.message.find(before); at != std::string::npos)
           e.message += sensor + other.message.substr(at + before.size());
       };
@@ -229,8 +229,8 @@ void note_depth_folders(const std::filesystem::path& folder, std::vector<std::st
     if (name.find("depth") != std::string::npos && it->is_directory(ignored))
       notes.push_back(
           "the folder " + name +
-          "/ is not used: the recording is taken for one of a camera without depth. Call it depth/, or list "
-          "its images in depth.txt, to use it");
+          "/ is not used: the recording is treated as one without depth. To use it, rename it to depth/ or list "
+          "its images in depth.txt");
   }
 }
 
@@ -467,7 +467,7 @@ result<void> check_resolution(frame_source& source, const settings& s) {
   const std::string text = voxels.describe(s.resolution, "the first frame alone");
   if (voxels.is_too_large(s.resolution, examples::free_memory()))
     return fail(orbis::errc::invalid_argument, "--resolution", text + ", too many");
-  source.notes.push_back(text + "; this takes long");
+  source.notes.push_back(text + "; this takes a long time");
   return {};
 }
 
@@ -509,7 +509,7 @@ result<void> check_images(frame_source& source) {
                            std::string{". Check depth_scale of the camera: stored depth / depth_scale = metres"});
     return {};
   }
-  if (source.sensor == sensor_kind::rgbd) source.notes.emplace_back("depth images have hardly any depth");
+  if (source.sensor == sensor_kind::rgbd) source.notes.emplace_back("the depth images contain almost no measurements");
   return {};
 }
 

@@ -237,7 +237,7 @@ std::string robot_text(const navigation_results& n) {
 
 std::string path_text(const navigation_results& n) {
   if (n.path.empty()) return n.path_status;
-  return text("%.2f m for a %s, straight %.2f m (%.2f times), found in %.1f ms", n.path_m, robot_text(n).c_str(),
+  return text("%.2f m for a %s, straight line %.2f m (%.2f times), found in %.1f ms", n.path_m, robot_text(n).c_str(),
               n.straight_m, n.path_m / n.straight_m, n.planning_ms);
 }
 

@@ -282,7 +282,7 @@ orbis::result<tracked_frames> track(const frame_source& source, const shutter_re
   interrupts::keep_results(s.quiet
                                ? ""
                                : "\nrgbd_slam: stopping; the results so far are mapped and written. Interrupt again to "
-                                 "stop at once and leave the folder unchanged\n");
+                                 "stop immediately and leave the folder unchanged\n");
   upright_worlds worlds{source, s};
   slam.listen({.keyframe_made = [&out](const orbis::slam::keyframe_event& made) {
     ++out.slam.keyframes_made;
@@ -337,7 +337,7 @@ orbis::error explain_miss(const tracked_frames& tracked, const settings& s) {
                         " frames shows a place in it";
   if (tracked.slam.tracked != 0) message += "; the results are those of a new map";
   if (tracked.slam.tracked != 0 && examples::is_same_file(s.load_map, s.save_map))
-    message += ", which was not saved over it";
+    message += "; it was not saved over the loaded map";
   return {orbis::errc::no_data, s.load_map.string(), std::move(message)};
 }
 

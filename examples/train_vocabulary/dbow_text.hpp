@@ -3,7 +3,7 @@
 /// Vocabularies in the text format of DBoW2, the format of ORB-SLAM's vocabulary.
 ///
 /// The first line contains branching, depth, the score (0 to 5; ignored, as scores are types here) and the weighting
-/// (0 tf-idf, 1 tf, 2 idf, 3 binary). Each further line is a node; nodes are numbered from 1. A line contains the
+/// (0 tf-idf, 1 tf, 2 idf, 3 binary). Each subsequent line is a node; nodes are numbered from 1. A line contains the
 /// number of the parent (0: the root), 1 for a word or 0 for an inner node, the bytes of the descriptor, and the
 /// weight.
 #pragma once

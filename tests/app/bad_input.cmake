@@ -80,7 +80,7 @@ file(WRITE ${WORK}/file "text")
 app_fails(2 "file: " run file --out out)
 file(MAKE_DIRECTORY ${WORK}/nothing)
 app(2 run nothing --out out)
-check(err MATCHES "rgbd_slam: nothing: no known recording")
+check(err MATCHES "rgbd_slam: nothing: not a known recording")
 
 # Voxels of which one frame would fill the memory are refused before they do.
 make_recording(${WORK}/sharp 2 640)
@@ -159,7 +159,7 @@ check(frames EQUAL 3)
 
 # What only some recordings have.
 app_fails(2 "--topics: needs a ROS bag; good is none" run good --out out --topics /a,/b)
-app_fails(2 "good: a monocular recording gives no map" map good --out out --sensor mono)
+app_fails(2 "good: a monocular recording cannot produce a map" map good --out out --sensor mono)
 foreach(sequence seq-01 seq-02)
   file(COPY_FILE ${WORK}/good/rgb/000000.png ${WORK}/${sequence}.png)
   file(COPY ${WORK}/${sequence}.png DESTINATION ${WORK}/scene/${sequence})

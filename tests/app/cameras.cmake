@@ -78,7 +78,7 @@ check(frames LESS 10)
 
 # No device, or no library for it.
 app_fails(2 "no depth camera is connected|this build has no support for depth cameras: .*libopenni2-dev" live /no/such/device --out none)
-app_fails(2 "unknown camera: name it with --camera|has no support for video cameras: .*libopencv-videoio-dev"
+app_fails(2 "unknown camera: specify it with --camera|has no support for video cameras: .*libopencv-videoio-dev"
           live /dev/video99 --sensor stereo --out none)
 app_fails(2 "by-id/usb: cannot be opened as a video camera|no support for video cameras"
           live /dev/v4l/by-id/usb --camera kinect --out none)

@@ -67,7 +67,7 @@ check(camera_before STREQUAL after)
 execute_process(COMMAND bash -c "ulimit -v 400000; exec \"$@\"" limited ${APP} ${depth} no.bt --camera 1,1,1,1 --resolution 0.02
                 WORKING_DIRECTORY ${WORK} RESULT_VARIABLE result ERROR_VARIABLE err)
 check(result EQUAL 2)
-if(NOT err MATCHES "^depth_to_octree: voxels of 20 mm: [^\n]* billion of them, [^\n]* GB. this takes long\ndepth_to_octree: out of memory\n$")
+if(NOT err MATCHES "^depth_to_octree: voxels of 20 mm: [^\n]* billion of them, [^\n]* GB. this takes a long time\ndepth_to_octree: out of memory\n$")
   message(FATAL_ERROR "depth_to_octree said\n${err}")
 endif()
 check(NOT EXISTS ${WORK}/no.bt)

@@ -75,4 +75,4 @@ check(err MATCHES "the folder above, [^\n]*/r, is a recording with depth")
 # Three lines for a folder that is no recording.
 file(WRITE ${WORK}/nothing/readme.md "")
 app(2 run nothing --out out)
-check(err MATCHES "^rgbd_slam: nothing: no known recording. the folder holds readme.md.\n  known are [^\n]*\n  with two cameras [^\n]*. with one [^\n]*\n$")
+check(err MATCHES "^rgbd_slam: nothing: not a known recording. the folder holds readme.md.\n  known layouts: [^\n]*\n  with two cameras [^\n]*. with one [^\n]*\n$")

@@ -55,7 +55,7 @@ app_fails(3 "tracking never started: no two of 3 frames have enough matching fea
 # A folder of images is one camera's where nothing else is in it.
 file(MAKE_DIRECTORY ${WORK}/nothing)
 app(2 run nothing --sensor mono --out out)
-check(err MATCHES "nothing: no known recording. the folder [^\n]*\n  known are rgb.txt [^\n]*image_0 or image_2")
+check(err MATCHES "nothing: not a known recording. the folder [^\n]*\n  known layouts: rgb.txt [^\n]*image_0 or image_2")
 if(EXISTS ${DATA}/kitti07_mono)
   app(0 run ${DATA}/kitti07_mono --deterministic --out kitti)
   summary(kitti_sensor ${WORK}/kitti sensor)

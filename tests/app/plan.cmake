@@ -56,7 +56,7 @@ must_exist(${WORK} way.txt way.png)
 length_of(length way.txt)
 check(length GREATER 1560)  # two sides of 0.74 m and 0.78 m, to where the ball passes the plate's edge
 check(length LESS 1760)
-check(out MATCHES "straight 1.100 m")
+check(out MATCHES "straight line 1.100 m")
 app(0 plan plate/map.ot --from 0.5,0.5,0.5 --to 0.5,1.6,0.5 --radius 0.1 --unknown free --out way.txt)
 length_of(length way.txt)
 check(length EQUAL 1100)

@@ -25,7 +25,7 @@ foreach(kind "stereo;image_0, image_1" "rgbd;rgb.txt and depth.txt")
   list(GET kind 0 sensor)
   list(GET kind 1 layout)
   app(2 run nothing --sensor ${sensor} --out out)
-  check(err MATCHES "nothing: no known recording. the folder [^\n]*\n  known are ${layout}")
+  check(err MATCHES "nothing: not a known recording. the folder [^\n]*\n  known layouts: ${layout}")
 endforeach()
 
 # Two lists of images are stereo where there is no depth.

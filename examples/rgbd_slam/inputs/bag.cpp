@@ -289,7 +289,7 @@ class bag_recording final : public file_recording {
     const auto info = info_of(*first_);
     if (!info)
       return fail(errc::invalid_argument, path_,
-                  "unknown camera: there is no sensor_msgs/CameraInfo for " + first_->name + "; name a camera");
+                  "unknown camera: there is no sensor_msgs/CameraInfo for " + first_->name + "; specify a camera");
     auto model = camera_of(*info, first_->is_rectified(), where(*first_));
     if (!model) return fail(model.error());
     camera = {.model = *std::move(model), .depth_scale = in_metres ? metres_scale : 1000.0, .fps = rate()};

@@ -110,7 +110,7 @@ result<std::unique_ptr<file_recording>> read_video(const std::filesystem::path& 
     return fail(errc::unsupported, path.string(), "is not a folder, a bag, or a video that OpenCV can read");
   if (!camera)
     return fail(errc::invalid_argument, path.string(),
-                "unknown camera: put a camera.toml next to the video, or name a camera");
+                "unknown camera: put a camera.toml next to the video, or specify a camera");
   std::vector<std::string> notes;
   auto times = times_in(reader, notes);
   if (times.empty()) return fail(errc::no_data, path.string(), "the video contains no images");

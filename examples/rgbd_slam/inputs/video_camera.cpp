@@ -55,7 +55,8 @@ result<std::unique_ptr<camera_device>> video_camera_of(const device_options& opt
   const std::string name = options.name.empty() ? "/dev/video0" : options.name;
   if (options.sensor == orbis::slam::sensor_kind::rgbd)
     return fail(errc::unsupported, name, "a video camera has no depth");
-  if (!options.camera) return fail(errc::invalid_argument, name, "unknown camera: name it with --camera camera.toml");
+  if (!options.camera)
+    return fail(errc::invalid_argument, name, "unknown camera: specify it with --camera camera.toml");
   const bool is_number = name.find_first_not_of("0123456789") == std::string::npos && name.size() < 4;
   cv::VideoCapture reader;
   const bool opened = is_number ? reader.open(std::stoi(name), cv::CAP_V4L2) : reader.open(name, cv::CAP_V4L2);

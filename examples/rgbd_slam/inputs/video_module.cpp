@@ -62,7 +62,7 @@ bool has_video_cameras() { return false; }
 orbis::result<std::unique_ptr<file_recording>> open_video(const std::filesystem::path& path,
                                                           const file_recording_options&) {
   return fail(errc::unsupported, path.string(),
-              "is no folder, and this build has no support for videos: it was built without OpenCV's videoio "
+              "is not a folder, and this build has no support for videos: it was built without OpenCV's videoio "
               "(libopencv-videoio-dev)");
 }
 

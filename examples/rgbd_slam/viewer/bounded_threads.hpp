@@ -16,9 +16,9 @@
 
 namespace app {
 
-/// A fixed number of threads for connections. If too many connections wait, further ones wait in the system's bounded
-/// queue. `TaskQueue` is cpp-httplib's, whose `enqueue` returns void before version 0.15, and since then true if the
-/// job was accepted: here every job is.
+/// A fixed number of threads for connections. If too many connections wait, additional ones wait in the system's
+/// bounded queue. `TaskQueue` is cpp-httplib's, whose `enqueue` returns void before version 0.15, and since then true
+/// if the job was accepted: here every job is.
 template <class TaskQueue>
 class bounded_threads final : public TaskQueue {
   using taken = decltype(std::declval<TaskQueue&>().enqueue(std::function<void()>{}));

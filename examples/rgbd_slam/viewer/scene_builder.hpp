@@ -82,7 +82,7 @@ class scene_builder {
   /// Updates the scene and returns it. Queries SLAM and the map at most every few hundred milliseconds, for at most a
   /// tenth of the time each.
   const viewer_scene& update(const scene_sources& sources);
-  /// As above, but queries at once.
+  /// As above, but queries immediately.
   const viewer_scene& update_at_once(const scene_sources& sources);
   /// As above, for the last time, after the last frame. Frees the data for following corrections.
   void finish(const scene_sources& sources);

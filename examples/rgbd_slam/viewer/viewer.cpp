@@ -12,7 +12,7 @@ namespace app {
 namespace {
 
 std::string why_no_live_map(const settings& s) {
-  if (s.localize_only) return "no voxels: --localize-only makes no octree";
+  if (s.localize_only) return "no voxels: --localize-only does not build an octree";
   return s.live_map ? "" : "no voxels yet: with --batch-map the octree is built at the end";
 }
 

@@ -103,7 +103,7 @@ class web_backend final : public viewer_backend {
   void serve() {
     try {
       if (!server_.listen_after_bind())
-        throw std::runtime_error{"the server of the viewer accepts no more connections"};
+        throw std::runtime_error{"the viewer's server does not accept any more connections"};
     } catch (...) {
       note(std::current_exception());
     }
@@ -159,8 +159,8 @@ void web_backend::set_up() {
                                 "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
                                 "connect-src 'self'; img-src blob:; base-uri 'none'; form-action 'none'"}});
   server_.set_pre_routing_handler([](const httplib::Request& request, httplib::Response& response) {
-    // The library would answer all requested ranges together, thousands of times the size of the whole. The answer has
-    // no body, because the library would cut that as well.
+    // The library would send all requested ranges together, thousands of times the size of the whole file. The answer
+    // has no body, because the library would cut that as well.
     if (request.has_header("Range")) {
       response.status = 416;
       response.set_header("Connection", "close");

@@ -24,7 +24,7 @@ void main() {
   on_face = vec2(0.0);
   shade = vec3(0.0);
   if (dot(cube.xyz - eye, forward) < nearest || cube.z > highest) {
-    gl_Position = vec4(2.0, 2.0, 2.0, 1.0);  // outside of the view: not drawn
+    gl_Position = vec4(2.0, 2.0, 2.0, 1.0);  // outside the view: not drawn
     return;
   }
   int axis = gl_VertexID / 6;
