@@ -77,7 +77,7 @@ struct flag_between {
       const float tolerance = flying_tolerance(w, limits);
       const float share = limits.margin * std::abs(a - b);
       const float clear = tolerance < share ? share : tolerance;
-      // A difference that the slopes themselves explain over that distance is no edge.
+      // A difference that the slopes themselves explain over that distance is not an edge.
       const float steep = std::abs(a_slope) + std::abs(b_slope);
       const float far_apart = limits.jump * tolerance;
       const float jump = far_apart < steep ? steep : far_apart;

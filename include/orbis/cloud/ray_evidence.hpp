@@ -27,7 +27,7 @@ namespace orbis::cloud {
 /// Let a point be at depth z in a view, m = margin + margin_growth z^2, and consider the depths in the window around
 /// its pixel. The view passes *through* the point if every pixel of the window has a depth and the nearest exceeds z by
 /// more than m + slant (farthest - nearest). It *supports* the point if the nearest, the farthest or the middle depth
-/// is within m of z. Otherwise it is no evidence. The view that measured the point, if among `views`, supports it.
+/// is within m of z. Otherwise it gives no evidence. The view that measured the point, if among `views`, supports it.
 ///
 /// Since rays end at the first surface, this detects only the front one of two surfaces that exclude each other. With
 /// `resolve_ghosts` every view is therefore read a second time, part by part: if its rays pass through points with more

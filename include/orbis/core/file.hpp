@@ -72,7 +72,8 @@ class temporary_file {
     if (failure) return failure;
     exists_ = false;
 #ifdef ORBIS_HAS_POSIX_FILES
-    // The file is complete and in place: a folder that cannot be synced (e.g. without read permission) is no failure.
+    // The file is complete and in place: a folder that cannot be synced (e.g. without read permission) is not a
+    // failure.
     const std::filesystem::path folder = target.has_parent_path() ? target.parent_path() : ".";
     if (const int names = ::open(folder.c_str(), O_RDONLY | O_CLOEXEC); names >= 0) {
       static_cast<void>(::fsync(names));

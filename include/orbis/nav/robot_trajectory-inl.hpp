@@ -53,7 +53,7 @@ ORBIS_INLINE void robot_trajectory::set_times(const motion_limits& limits, const
     if (p != 0 && stops[p]) u.back() = 0.0, ++stops_;
     for (int k = 0; k != n; ++k) {
       const double h = piece.length / n, s = k * h;
-      // |q'| is least and |q''| greatest in the middle of a corner.
+      // |q'| is smallest and |q''| largest in the middle of a corner.
       const auto far = std::max(norm(piece.first(s)), norm(piece.first(s + h)));
       const auto near = std::max(norm(piece.second(s)), norm(piece.second(s + h)));
       all.push_back({p, s, h, is_line ? 1.0 : far, is_line ? 0.0 : near});

@@ -333,7 +333,7 @@ ORBIS_INLINE void squared_distances::spread_along_y() {
     }
   };
   std::optional<detail::brick_directory::cursor> bricks{directory_};
-  for (const along_change& c : along_) {  // distances that rose
+  for (const along_change& c : along_) {  // distances that increased
     detail::offer_row(c.before, c.after, offer);
     if (offer.least == detail::no_offer) continue;
     for_each_target(c, [&](const detail::brick_place& p, int z, const std::uint16_t* squares, int gap) {
@@ -352,7 +352,7 @@ ORBIS_INLINE void squared_distances::spread_along_y() {
     for (int z = 0; z != 8; ++z)
       if ((stages_[i].stale_plane >> z & 1) != 0) make_plane(i, z);
   }
-  for (const along_change& c : along_) {  // distances that fell
+  for (const along_change& c : along_) {  // distances that decreased
     detail::offer_row(c.after, c.before, offer);
     if (offer.least == detail::no_offer) continue;
     for_each_target(c, [&](const detail::brick_place& p, int z, const std::uint16_t* squares, int gap) {
@@ -387,7 +387,7 @@ ORBIS_INLINE void squared_distances::make_plane(std::uint32_t brick, int z) {
       const std::uint32_t other = directory_.find({p.x, p.y + side * step, p.z});
       if (is_brick(other)) {
         top = kernels_.add_rows(best.data(), stages_[other].along.data() + 64 * z, squares(-8 * side * step));
-      } else if (is_full(other)) {  // obstacles from its nearest row on
+      } else if (is_full(other)) {  // all obstacles, starting with its nearest row
         static constexpr std::array<std::uint8_t, 64> all{};
         top = kernels_.add_rows(best.data(), all.data(), squares(-8 * side * step));
         break;
@@ -395,7 +395,7 @@ ORBIS_INLINE void squared_distances::make_plane(std::uint32_t brick, int z) {
     }
   }
   stages& s = stages_[brick];
-  // Once more as a slice without neighbours, to apply the bound.
+  // Combined again as a slice without neighbours, to apply the bound.
   s.plane_top[static_cast<std::size_t>(z)] =
       kernels_.combine_slices(best.data(), nullptr, nullptr, 0, bound(), s.plane.data() + 64 * z);
 }

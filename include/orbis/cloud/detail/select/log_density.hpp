@@ -158,7 +158,7 @@ struct valley {
   for (std::size_t i = bins; i-- > 0;) {
     const double x = first + (static_cast<double>(i) + 0.5) * width;
     if (x < lowest) break;
-    // Adding 2 accounts for shot noise: a bump of a few points is no peak.
+    // Adding 2 accounts for shot noise: a bump of a few points is not a peak.
     const double ratio = (peak + 2) / (smooth[i] + 2);
     if (x <= 3.2 && ratio >= best.ratio) best = {x, ratio};
     peak = std::max(peak, smooth[i]);

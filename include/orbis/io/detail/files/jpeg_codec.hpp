@@ -152,7 +152,7 @@ class jpeg_encoder {
     info_.client_data = this;
     destination_.init_destination = [](j_compress_ptr info) { make_room(info); };
     destination_.empty_output_buffer = [](j_compress_ptr info) -> boolean {
-      make_room(info);  // the buffer is full, whatever `free_in_buffer` is
+      make_room(info);  // the buffer is full, regardless of `free_in_buffer`
       return TRUE;
     };
     destination_.term_destination = [](j_compress_ptr info) {

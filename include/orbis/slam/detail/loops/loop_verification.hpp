@@ -355,7 +355,7 @@ class checker {
     const auto localized = localize(n.image, T_world_camera, options_.radius, nullptr);
     if (!localized.ok() || localized.inliers < options_.supporter_inliers) return false;
     if (rig_.scale_is_known) return true;
-    // If the neighbour is clearly apart, its distance must agree with the scale.
+    // If the neighbour is at a clear distance, that distance must agree with the scale.
     const se3 T_keyframe_neighbor =
         (s_.landmarks.T_world_camera * found.T_candidate_keyframe).inverse() * localized.T_world_camera;
     const double expected = found.scale * norm(n.T_keyframe_camera.translation());

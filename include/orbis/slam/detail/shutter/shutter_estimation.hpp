@@ -42,7 +42,7 @@ struct depth_change {
   /// Returns this slope if depth changes evenly there, as on a surface; otherwise zero: an edge between the readings
   /// would be mistaken for a motion.
   [[nodiscard]] depth_change if_even(float depth) const noexcept {
-    constexpr float limit = 0.02F;  // 1 / metres: some deviations of a depth camera's noise
+    constexpr float limit = 0.02F;  // 1 / metres: a few standard deviations of a depth camera's noise
     return std::abs(later + earlier) <= limit * depth * depth ? *this : depth_change{};
   }
   /// Metres per second.
