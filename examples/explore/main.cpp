@@ -171,8 +171,8 @@ struct explorer {
   }
 };
 
-/// The share of the reachable free space that the map knows to be free: of the voxels that touch no surface and are
-/// connected with the start. `air`: their number.
+/// The share of the reachable free space, i.e. of the voxels that touch no surface and are connected to the start, that
+/// the map knows to be free. `air`: the number of these voxels.
 double coverage(const explorer& robot, const vec3& start, std::size_t& air) {
   const auto& grid = robot.map.grid();
   const auto keys = *orbis::octree::keys_between(grid, robot.world.bounds().min, robot.world.bounds().max);

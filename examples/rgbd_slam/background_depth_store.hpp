@@ -49,7 +49,7 @@ class background_depth_store {
   }
   void erase(std::uint64_t frame) { store_.erase(frame); }
   void free_buffers() { store_.free_buffers(); }
-  /// The error by which images are in memory instead of the spill file; empty if there was none.
+  /// The error because of which images are in memory instead of the spill file; empty if there was none.
   [[nodiscard]] const std::optional<orbis::error>& unspilled() const { return unspilled_; }
 
  private:

@@ -35,8 +35,8 @@ struct lens_comparison {
 /// The doubt that follows from calibrated parameters; empty if the calibration is inconclusive, as with a held
 /// parameter.
 [[nodiscard]] std::optional<focal_doubt> find_doubt(std::span<const orbis::slam::calibrated_parameter> found);
-/// The doubt that follows from a map made with the camera. A wrong focal length scales the distances between poses by
-/// some percent, but so does distortion that a pinhole does not model: empty if distortion fits the images clearly
+/// The doubt that follows from a map made with the camera. A wrong focal length scales the distances between poses by a
+/// few percent, but so does distortion that a pinhole does not model: empty if distortion fits the images clearly
 /// better, or if they are inconclusive. Runs one or two small self-calibrations, in a few tenths of a second.
 [[nodiscard]] std::optional<focal_doubt> find_doubt(const orbis::slam::map& map,
                                                     const orbis::camera::any_camera& camera,
@@ -44,7 +44,7 @@ struct lens_comparison {
 /// Returns true if a calibration found a clearly different focal length, even if other parameters were held.
 [[nodiscard]] bool has_other_focal_length(std::span<const orbis::slam::calibrated_parameter> found);
 /// Compares the pinhole calibration of a map, done with the options `how`, with one that includes distortion. Empty if
-/// the camera is no pinhole or the calibration fails. Runs one self-calibration.
+/// the camera is not a pinhole camera or the calibration fails. Runs one self-calibration.
 [[nodiscard]] std::optional<lens_comparison> compare_lens(const orbis::slam::map& map,
                                                           const orbis::camera::any_camera& camera,
                                                           const orbis::slam::calibration_summary& as_pinhole,

@@ -37,8 +37,8 @@ class live_mapping {
     std::uint64_t frame;
     orbis::slam::map_keyframe keyframe;
   };
-  /// Fills in the current poses of the keyframes in the active map and the list of keyframes that no map contains any
-  /// more, and returns true. Returns false if nothing changed since the last call and `always` is false.
+  /// Fills in the current poses of the keyframes in the active map and the list of keyframes that are no longer in any
+  /// map, and returns true. Returns false if nothing changed since the last call and `always` is false.
   using find_poses = std::function<bool(const std::vector<made>&, poses&, bool always)>;
 
   /// `where` is called on the map's thread until `stop`. `spill_file`: for depth images beyond the memory budget, see
@@ -50,7 +50,8 @@ class live_mapping {
   /// Adds frame number `frame`, which has become a keyframe.
   void add(std::size_t frame, orbis::slam::map_keyframe keyframe, const orbis::se3& T_world_camera,
            const orbis::camera::rgbd_frame& image);
-  /// Adds the tracked frame number `frame`, which is no keyframe; its pose follows the keyframe of frame `reference`.
+  /// Adds the tracked frame number `frame`, which is not a keyframe; its pose follows the keyframe of frame
+  /// `reference`.
   void add_frame(std::size_t frame, std::uint64_t reference, const orbis::se3& T_reference_camera,
                  const orbis::camera::rgbd_frame& image);
   /// The frame of the newest keyframe for which `is_wanted(made)` is true.

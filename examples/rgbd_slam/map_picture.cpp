@@ -129,7 +129,7 @@ class picture {
       }
   }
 
-  /// Returns true if nothing was drawn on the pixels that are averaged from (x, y) on.
+  /// Returns true if nothing was drawn on the block of averaged pixels that starts at (x, y).
   [[nodiscard]] bool is_empty(int x, int y) const {
     for (int j = 0; j != oversampling; ++j)
       for (int i = 0; i != oversampling; ++i)

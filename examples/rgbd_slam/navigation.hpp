@@ -16,15 +16,15 @@
 
 namespace app {
 
-/// How far a distance field is to reach for a robot and for a picture, as far as one can, metres.
+/// The reach of the distance field in metres, for a robot and for a picture, within the limits of the field.
 [[nodiscard]] inline double field_reach(double robot_radius, double resolution) {
   return std::min(std::max(1.0, robot_radius + 2 * resolution), 181 * resolution);
 }
 
-/// Makes the floor map, writes it to `floor_file` if `s.floor_map` is given (where it will be, which messages name),
-/// plans a path between two places that the camera saw, on the floor or else of a ball through the air, and draws
-/// navigation.png into `folder`. No picture where there is neither a floor nor a camera. Errors: write_failed, of the
-/// picture; for the floor map see `navigation_results::unsaved`.
+/// Makes the floor map; writes it to `floor_file` if `s.floor_map` (its final path, used in messages) is given; plans a
+/// path between two places that the camera saw, on the floor or otherwise for a ball through the air; and draws
+/// navigation.png into `folder`. There is no picture without a floor and a camera. Errors: write_failed (the picture);
+/// for the floor map see `navigation_results::unsaved`.
 [[nodiscard]] orbis::result<navigation_results> navigate(const orbis::octree::occupancy_octree<>& map,
                                                          const orbis::trajectory& cameras, const settings& s,
                                                          const std::filesystem::path& folder,

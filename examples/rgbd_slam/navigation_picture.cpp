@@ -31,7 +31,7 @@ rgb8 mixed(rgb8 a, rgb8 b, double t) {
   };
   return {byte(a.r, b.r), byte(a.g, b.g), byte(a.b, b.b)};
 }
-/// Free space: white far from obstacles, orange beside them.
+/// The colour of a cost: white in free space far from obstacles, orange next to them.
 rgb8 cost_color(std::uint8_t cost) {
   namespace cost_of = orbis::nav::floor_cost;
   if (cost == cost_of::lethal) return dark;
@@ -41,7 +41,7 @@ rgb8 cost_color(std::uint8_t cost) {
 }
 rgb8 distance_color(double share) { return mixed(at_obstacle, far_off, std::sqrt(std::max(0.0, share))); }
 
-/// Of a colour, in a legend.
+/// An entry of the legend: a colour and its meaning.
 struct meaning {
   rgb8 color;
   std::string text;
@@ -52,7 +52,7 @@ struct window {
   vec2 low, high;
 };
 
-/// Of the floor map, or of all that is known.
+/// The window of the floor map, or of all known space.
 window window_of(const navigation_picture& what) {
   if (what.floor != nullptr) {
     const auto& f = *what.floor;
@@ -67,7 +67,7 @@ window window_of(const navigation_picture& what) {
   return w;
 }
 
-/// A picture of the window, whose cells are colored by where their middles are.
+/// Draws the window; the colour of a pixel is determined by the position of its centre.
 template <class ColorAt>
 orbis::image<rgb8> draw(const window& w, int width, int height, const ColorAt& color_at) {
   orbis::image<rgb8> out(width, height);

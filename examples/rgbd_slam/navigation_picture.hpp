@@ -22,11 +22,11 @@ struct navigation_picture {
   double height = 0.0;                                ///< of the slice, metres
   const orbis::nav::floor_map* floor = nullptr;       ///< null: no floor is drawn
   double radius = 0.2;                                ///< of the robot, metres
-  std::vector<orbis::vec3> path{};  ///< world, metres; drawn over the slice, or over the floor if that is all
+  std::vector<orbis::vec3> path{};  ///< world, metres; drawn over the slice, or over the floor if there is no slice
   bool drives = false;              ///< the path is drawn over the floor
 };
 
-/// As PNG. Coordinates are those of the world. Errors: write_failed.
+/// Writes the picture as PNG. Coordinates are those of the world. Errors: write_failed.
 [[nodiscard]] orbis::result<void> write_navigation_picture(const navigation_picture& what,
                                                            const std::filesystem::path& path);
 

@@ -110,7 +110,7 @@ void keep_finite(orbis::point_cloud& cloud) {
   if (finite.size() != cloud.size()) cloud = orbis::cloud::extract(cloud, finite);
 }
 
-/// Warns if voxels are so small that the rays to the points take long, and fails if they may fill the memory.
+/// Warns if voxels are so small that the rays to the points take a long time, and fails if the map may fill the memory.
 orbis::result<void> check_resolution(const std::vector<orbis::vec3f>& points, const orbis::vec3& origin,
                                      const settings& s, results& r, console& console) {
   examples::voxel_estimate rays;

@@ -157,7 +157,7 @@ class posed_frames {
   }
   [[nodiscard]] iterator end() const { return {*this, size()}; }
 
-  /// The error by which depth images are in memory instead of the spill file; empty if there was none.
+  /// The error because of which depth images are in memory instead of the spill file; empty if there was none.
   [[nodiscard]] const std::optional<orbis::error>& unspilled() const {
     depths_->finish();
     return depths_->unspilled();

@@ -220,7 +220,7 @@ result<frame_source> open_recording(const settings& s) {
   return source;
 }
 
-/// Notes folders whose names say that they hold depth images, which a recording of one camera does not use.
+/// Notes folders whose names indicate depth images, which a recording of one camera does not use.
 void note_depth_folders(const std::filesystem::path& folder, std::vector<std::string>& notes) {
   std::error_code failure;
   for (std::filesystem::directory_iterator it{folder, failure}, end; !failure && it != end; it.increment(failure)) {
@@ -471,8 +471,8 @@ result<void> check_resolution(frame_source& source, const settings& s) {
   return {};
 }
 
-/// Reads the first frame, so that images that do not suit the camera are an error before tracking starts, and adds a
-/// note if depths are so far from those of a room that the depth scale must be wrong.
+/// Reads the first frame, so that images that do not match the camera are reported before tracking starts, and adds a
+/// note if depths are so implausible that the depth scale must be wrong.
 result<void> check_images(frame_source& source) {
   if (source.frames == 0 || source.is_live || source.made) return {};
   constexpr std::size_t samples = 4;

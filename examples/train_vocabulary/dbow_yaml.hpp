@@ -75,7 +75,7 @@ class yaml_scanner {
     text_.remove_prefix(end + 1);
     return key;
   }
-  /// Reads the value of a key: in quotes, or up to a comma, a brace or (outside of braces) the end of the line.
+  /// Reads the value of a key: in quotes, or up to a comma, a brace or (outside braces) the end of the line.
   [[nodiscard]] std::string_view take_value(bool in_braces) noexcept {
     while (!text_.empty() && (text_.front() == ' ' || text_.front() == '\t' || (in_braces && is_blank(text_.front()))))
       drop();

@@ -63,7 +63,7 @@ struct file_recording_options {
 /// Splits an image into its left and right halves. @pre its width is even
 [[nodiscard]] source_frame side_by_side(double timestamp, const orbis::image<orbis::rgb8>& both);
 
-/// Checks that a camera's settings suit a sensor. `width`, `height`: of an image, or of two images side by side.
+/// Checks that a camera's settings match a sensor. `width`, `height`: of an image, or of two images side by side.
 [[nodiscard]] orbis::result<void> check_camera(const orbis::camera::camera_settings& camera,
                                                orbis::slam::sensor_kind sensor, int width, int height,
                                                const std::string& where);

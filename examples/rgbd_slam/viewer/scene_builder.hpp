@@ -90,7 +90,7 @@ class scene_builder {
   void forget();
   /// Replaces the voxels of the live map.
   void set_voxels(std::vector<voxel> colored);
-  /// Sets the reason why there is no live map. No pixels of keyframes are stored then.
+  /// Sets the reason why there is no live map. In that case no pixels of keyframes are stored.
   void set_no_voxels(std::string why) {
     scene_.voxels.absent = std::move(why);
     forget_colors();
