@@ -112,7 +112,7 @@ template <std::size_t Bits = 256>
       set_byte<Bits>(descriptor, i, byte);
     }
     if (!take_number(line, weight) || !good_weight(weight))
-      return bad(line_number, "no weight from 0 to 1e20 after " + std::to_string(Bits / 8) + " bytes");
+      return bad(line_number, "expected a weight from 0 to 1e20 after " + std::to_string(Bits / 8) + " bytes");
     if (!take_field(line).empty()) return bad(line_number, "extra text after the node");
     list.parents.push_back(parent);
     list.descriptors.push_back(descriptor);

@@ -45,7 +45,7 @@ class random_bits {
     return static_cast<std::uint32_t>((((*this)() >> 32U) * n) >> 32U);
   }
   /// Approximately normal with mean 0 and standard deviation 1, accurate out to four sigma: a centred binomial of 64
-  /// coin flips, smoothed by a uniform of its own step width. Uses no libm function.
+  /// coin flips, smoothed by a uniform number as wide as one of its steps. Uses no libm function.
   [[nodiscard]] constexpr double normal() noexcept {
     const result_type first = (*this)();  // named, since the evaluation order of arguments is unspecified
     return normal_of(first, (*this)());

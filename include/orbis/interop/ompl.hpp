@@ -33,9 +33,9 @@
 
 namespace orbis::interop {
 
-/// Position of a state in metres: the values of a `RealVectorStateSpace` of two or three dimensions, or of the first
-/// part of a compound space (`SE2StateSpace`, `SE3StateSpace`), which must be one. The rest of the state is ignored:
-/// rotation about the vertical does not change the robot's shape.
+/// Position of a state in metres: the values of a `RealVectorStateSpace` of two or three dimensions, or those of the
+/// first part of a compound space (`SE2StateSpace`, `SE3StateSpace`), if that part is such a space. The rest of the
+/// state is ignored: rotation about the vertical does not change the robot's shape.
 class ompl_position {
  public:
   /// @pre the space is of such a type

@@ -35,7 +35,7 @@ namespace detail {
   return lists || (present(folder / "right") && !first_present(folder, {"left", "rgb"}).empty());
 }
 
-/// The images in `folder`, by their names (`order_by_name`). Errors: no_data.
+/// The images in `folder`, ordered by name (`order_by_name`). Errors: no_data.
 [[nodiscard]] inline result<std::vector<stamped_file>> named_images(const std::filesystem::path& folder, double fps,
                                                                     std::vector<std::string>& notes) {
   const keyed_images images = order_by_name(images_in(folder));

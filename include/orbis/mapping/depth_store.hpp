@@ -169,7 +169,7 @@ class depth_store {
     }
     return {};
   }
-  /// Images used after the list was made are more recently used than all in it.
+  /// Lists the images in memory, the most recently used first. Images used later are more recent than all listed ones.
   void list_uses() {
     for (const auto& [frame, e] : entries_)
       if (!e.spilled) oldest_.push_back({e.last_use, frame});

@@ -172,7 +172,7 @@ class distance_field : public metric_distances<squared_distances> {
                           (options.unknown == octree::occupancy::occupied) != options.inside},
                          options.reach},
         options_{options} {}
-  /// A field of `map`.
+  /// The field of `map`.
   template <planning_map Map>
   explicit distance_field(const Map& map, const distance_field_options& options = {})
       : distance_field{map_access<Map>::grid(map), options} {

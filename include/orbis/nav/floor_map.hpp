@@ -51,7 +51,7 @@ struct floor_map_options {
   std::optional<octree::bounding_box> region{};  ///< part of the map to use (x and y), metres; empty: all
 };
 
-/// The floor by square cells, one for each column of voxels. Cell (0, 0) has the smallest x and y.
+/// The floor as a grid of square cells, one for each column of voxels. Cell (0, 0) has the smallest x and y.
 struct floor_map {
   double resolution = 0.0;      ///< the edge of a cell, metres
   vec2 origin = zeros<vec2>();  ///< the low corner of cell (0, 0), metres

@@ -208,12 +208,12 @@ template <planning_space Space>
 
 }  // namespace detail
 
-/// A path of the robot `from` a start `to` a goal (metres): the straight segment if it is free and costs its length;
-/// otherwise a cheap path over cell centres (see path_method), shortened in continuous space afterwards, or the
-/// straight segment if no other path leads there. Without `shorten` always a path over cell centres. Every segment is
-/// free by `space.is_free`: the robot touches no obstacle anywhere on it. If the goal cannot be reached, `status` gives
-/// the reason and the path leads to the nearest reachable point. A passage between two cell centres that is wide enough
-/// for the robot only off the grid is not found.
+/// A path of the robot `from` a start `to` a goal (metres): the straight segment if it is free and its cost equals its
+/// length; otherwise a cheap path over cell centres (see path_method), shortened in continuous space afterwards, or the
+/// straight segment if no other path leads there. Without `shorten`, the path always leads over cell centres. Every
+/// segment is free by `space.is_free`: the robot touches no obstacle anywhere on it. If the goal cannot be reached,
+/// `status` gives the reason and the path leads to the nearest reachable point. A passage between two cell centres that
+/// is wide enough for the robot only off the grid is not found.
 ///
 /// O(n log n) for n expanded cells, 16 kB for each 8x8x8 voxels (2 kB for each 8x8 cells of a floor) visited, and
 /// `max_checks` segment checks for shortening. An unreachable goal costs little if it, or the start, is in a small

@@ -13,7 +13,7 @@
 /// @endcode
 ///
 /// An object that selects its kernels when it is constructed must be constructed under the limit. The limit is the only
-/// state shared between threads here; the library itself never sets it.
+/// state in this header that threads share; the library itself never sets it.
 #pragma once
 
 #include <algorithm>

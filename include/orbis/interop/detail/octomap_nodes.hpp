@@ -89,7 +89,8 @@ template <class Tree, octree::octomap_model Model, class FinishLeaf>
 /// The level of an octant, the largest node that occupancy_octree::edit_octant changes in one call.
 inline constexpr int octant_level = 2;
 
-/// Builds a map from OctoMap's nodes. Calls `see_leaf(node, key, level)` for each leaf; it returns false to stop.
+/// Builds a map from OctoMap's nodes. Calls `see_leaf(node, key, level)` for each leaf; the callback returns false to
+/// stop.
 template <class Tree, class Model, class SeeLeaf>
 class tree_reader {
  public:

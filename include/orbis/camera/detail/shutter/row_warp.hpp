@@ -41,7 +41,8 @@ struct row_time {
   [[nodiscard]] static row_time between(double first, double second) noexcept { return {first, second - first}; }
 };
 
-/// The pixel that observes a point at another time, and its depth there as a multiple of its depth here.
+/// The pixel that observes a point at another time, and the ratio of the depth at that pixel to the depth at the
+/// original one.
 struct warped_pixel {
   double x = 0.0, y = 0.0, ratio = 0.0;
 };

@@ -48,7 +48,7 @@ struct read_surface_kernel {
     int width, height;
     const float* surface;  ///< inverse depth of the target surface ...
     const float *x, *y;    ///< ... the position where it was read ...
-    const float* ratio;    ///< ... and the depth there as a multiple of the depth here
+    const float* ratio;    ///< ... and the ratio of the depth at that position to the depth at this pixel
     const float* inverse;  ///< of the image as read, with a border of one zero pixel
     float* metres;         ///< 0 where undefined
   };

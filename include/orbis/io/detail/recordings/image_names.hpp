@@ -24,7 +24,7 @@
 
 namespace orbis::io::detail {
 
-/// The images directly in `folder`, by name.
+/// The images directly in `folder`, sorted by name.
 [[nodiscard]] inline std::vector<std::filesystem::path> images_in(const std::filesystem::path& folder) {
   auto paths = list_folder(folder);
   std::erase_if(paths, [](const auto& path) { return !is_image_name(path); });

@@ -180,7 +180,7 @@ struct associated_files {
                                                                               const std::filesystem::path& list,
                                                                               std::vector<std::string>& notes) {
   return parse_list<associated_files>(
-      text, list, "two pairs of time stamp and file name",
+      text, list, "two pairs of a time stamp and a file name",
       [&](std::string_view line) { return parse_association(line, list.parent_path()); }, notes);
 }
 

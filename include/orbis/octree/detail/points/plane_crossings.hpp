@@ -69,7 +69,8 @@ struct plane_stack {
   }
 };
 
-/// Coordinates are unsigned fixed-point numbers: ten bits of cell, plane_stack::fraction bits of fraction.
+/// Coordinates are unsigned fixed-point numbers: ten bits for the cell, and plane_stack::fraction bits for the
+/// fraction.
 struct mark_crossings_kernel {
   template <simd::target Target>
   static ORBIS_ALWAYS_INLINE void run(const plane_stack& w, queued_rays& rays, std::size_t begin, std::size_t end,

@@ -52,7 +52,7 @@ struct ray_setup {
   }
 };
 
-/// Upper bound in voxels of the difference between the arithmetic of a traversal and the one here.
+/// Upper bound in voxels of the difference between the arithmetic of a traversal and that of this header.
 inline constexpr double ray_doubt = 1e-8;
 /// Rays that cross more planes are traversed step by step.
 inline constexpr std::int32_t max_ray_planes = 4096;

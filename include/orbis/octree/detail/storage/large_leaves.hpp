@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Leaves larger than a brick: few, and found by the name of any node that they may be.
+/// Leaves larger than a brick. There are few of them; they are looked up by the name of each larger node that contains
+/// a voxel.
 #pragma once
 
 #include <array>

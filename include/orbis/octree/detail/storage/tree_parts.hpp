@@ -79,7 +79,7 @@ template <class T>
 
 /// Walks the part of a tree above its bricks, children before parents. `Visitor` has `open()`, which begins an inner
 /// node and returns a collector of its children with `add(i, child)`; `close(level, collected)`, which returns the
-/// value that the parent passes to `add`; and `content(part)`, which does so for a part.
+/// value that the parent passes to `add`; and `content(part)`, which returns such a value for a part.
 template <class T, class Visitor>
 class upper_walk {
  public:

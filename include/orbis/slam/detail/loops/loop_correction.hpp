@@ -106,9 +106,9 @@ template <class T>
   return summary.iterations;
 }
 
-/// Moves poses to agree with the edges, whose ends are indices of the poses; those with a nonzero entry in `is_fixed`
-/// are held. `scale_is_known`: all scales are 1 and stay 1; otherwise scales are adjusted as well. Returns the number
-/// of iterations; empty, with unusable poses, if it fails or `callback` cancels it.
+/// Moves poses so that they agree with the edges, whose ends are indices of the poses; those with a nonzero entry in
+/// `is_fixed` are held. `scale_is_known`: all scales are 1 and stay 1; otherwise scales are adjusted as well. Returns
+/// the number of iterations; empty, with unusable poses, if it fails or `callback` cancels it.
 template <class S = double>
 [[nodiscard]] std::optional<int> optimize_poses(std::type_identity_t<std::span<basic_sim3<S>>> poses,
                                                 const std::vector<essential_edge>& edges,

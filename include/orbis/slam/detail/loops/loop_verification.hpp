@@ -243,8 +243,8 @@ class checker {
                          features::rotation_consistency{};
     return matcher(s_.seen.features, s_.known.features);
   }
-  /// Estimates the rigid motion between the points of the matches by RANSAC; if lengths are not measured, with the
-  /// scale.
+  /// Estimates the rigid motion between the points of the matches by RANSAC, together with the scale if lengths are not
+  /// measured.
   [[nodiscard]] bool align(const std::vector<features::match>& matches, loop_match& found) const {
     if (!rig_.scale_is_known) return align_scaled(matches, found);
     std::vector<vec3> from, to;

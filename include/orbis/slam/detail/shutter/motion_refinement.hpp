@@ -32,7 +32,8 @@ struct moving_pose {
 };
 
 /// The prior of the twist, before the frame is used: the mean motion since a previous pose, extrapolated by part of its
-/// change, within the acceleration of a hand; without a previous pose, the motion of a hand.
+/// change, with a deviation for the acceleration of a hand-held camera. Without a previous pose, the prior only limits
+/// the twist to that of a hand-held camera.
 struct twist_prior {
   std::optional<se3> T_world_before;   ///< the previous pose ...
   double interval = 0.0;               ///< ... and the seconds since
