@@ -140,7 +140,7 @@ void add_plan_options(CLI::App& cmd, settings& s, std::string& from, std::string
       ->type_name("M");
   cmd.add_option_function<std::string>(
          "--unknown", [&s](const std::string& what) { s.unknown_is_free = what == "free"; },
-         "treat unknown space as obstacle (default) or free")
+         "treat unknown space as an obstacle (default) or as free")
       ->check(CLI::IsMember({"obstacle", "free"}))
       ->type_name("WHAT");
   cmd.add_option("--out", s.out, "write the points of the path, one per line")->check(not_empty)->type_name("FILE");
