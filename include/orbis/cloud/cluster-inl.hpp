@@ -207,8 +207,8 @@ template <execution_policy Policy>
   return out;
 }
 
-/// Numbers components by their first points. `vertex(i)`: vertex of point `i` of the cloud, negative if it has none.
-/// `stays(i)`: true if a point without a vertex is nevertheless an inlier.
+/// Numbers components in the order of their first points. `vertex(i)`: vertex of point `i` of the cloud, negative if it
+/// has none. `stays(i)`: true if a point without a vertex is nevertheless an inlier.
 template <class Vertex, class Stays>
 [[nodiscard]] cluster_result numbered(linked_components found, std::size_t count, const Vertex& vertex,
                                       const Stays& stays) {

@@ -219,7 +219,7 @@ class voxel_sums {
     const voxel_sums* sums_ = nullptr;
     std::vector<std::array<std::uint64_t, 8>> chosen_;  ///< by brick number, one bit per cell
   };
-  /// Makes a subset. `chosen`: per voxel, in the order of `cloud`, nonzero if it is chosen. O(voxels + bricks log
+  /// Creates a subset. `chosen`: per voxel, in the order of `cloud`, nonzero if it is chosen. O(voxels + bricks log
   /// bricks).
   [[nodiscard]] choice choose(std::span<const char> chosen) const {
     assert(chosen.size() == occupied_);

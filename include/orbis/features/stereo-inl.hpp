@@ -15,7 +15,8 @@ namespace orbis::features::detail {
 struct slide_differences_kernel {
   using signature = void(const sliding_square&, int shifts, std::int32_t* sums);
 
-  /// Lanes are shifts. Pixels are multiplied by four, so that means are integers to a quarter of a grey value.
+  /// Each lane holds one shift. Pixels are multiplied by four, so that mean values are integers in units of a quarter
+  /// of a grey value.
   template <class Target>
   static ORBIS_ALWAYS_INLINE void run(const sliding_square& s, int shifts, std::int32_t* sums) {
     using bytes = simd::vec<std::uint8_t, 16, Target>;

@@ -78,10 +78,10 @@ class occupancy_octree {
   using value_type = typename Model::value_type;  ///< type of a stored value (log-odds)
   using leaf = octree_leaf<value_type>;
 
-  /// Makes an empty map. `resolution`: edge of a voxel, metres. `tree_depth`: the map is 2^tree_depth voxels wide.
+  /// Creates an empty map. `resolution`: edge of a voxel, metres. `tree_depth`: the map is 2^tree_depth voxels wide.
   /// @pre resolution finite and > 0; 5 <= tree_depth <= max_tree_depth
   explicit occupancy_octree(double resolution, int tree_depth = default_tree_depth) : grid_{resolution, tree_depth} {}
-  /// Makes a map from bricks, for the library's own readers. @pre no brick is outside the grid
+  /// Creates a map from bricks, for the library's own readers. @pre no brick is outside the grid
   occupancy_octree(double resolution, int tree_depth, detail::brick_store<value_type> store)
       : grid_{resolution, tree_depth}, store_{std::move(store)} {}
 

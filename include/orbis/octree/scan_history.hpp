@@ -65,7 +65,7 @@ class scan_history {
   using octree_type = Octree;
   using model = typename Octree::model;
 
-  /// Makes an empty map. `resolution`: edge of a voxel, metres. `tree_depth`: the map is 2^tree_depth voxels wide.
+  /// Creates an empty map. `resolution`: edge of a voxel, metres. `tree_depth`: the map is 2^tree_depth voxels wide.
   /// @pre as for occupancy_octree
   explicit scan_history(double resolution, int tree_depth = default_tree_depth) : map_{resolution, tree_depth} {
     map_.track_changes();
@@ -155,7 +155,7 @@ class scan_history {
 
   [[nodiscard]] static bool is_before(const place& p, std::uint64_t frame) noexcept { return p.frame < frame; }
   [[nodiscard]] typename std::vector<place>::iterator find(std::uint64_t frame) noexcept;
-  /// Returns the number of the scan of `frame`; makes a new one if needed.
+  /// Returns the number of the scan of `frame`; creates one if needed.
   [[nodiscard]] std::uint32_t make_scan(std::uint64_t frame);
   /// Position (existing or for insertion) of the scan of `frame` among those that use a brick.
   [[nodiscard]] std::vector<detail::brick_use>::iterator place_of(std::vector<detail::brick_use>& uses,

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A sparse layer of payload for a map: colours, labels or counts, with at most one value per voxel, under the keys of
-/// the map.
+/// A sparse layer of payload for a map: colours, labels or counts, with at most one value per voxel, addressed by the
+/// keys of the map.
 #pragma once
 
 #include <algorithm>

@@ -26,7 +26,7 @@ class basic_atlas {
  public:
   using map_type = basic_map<D>;
 
-  /// Makes an atlas with one empty map. `levels`, `scale_factor`, `min_shared`: as for `basic_map`, the same for all
+  /// Creates an atlas with one empty map. `levels`, `scale_factor`, `min_shared`: as for `basic_map`, the same for all
   /// maps.
   explicit basic_atlas(int levels = 8, double scale_factor = 1.2, std::uint32_t min_shared = 15)
       : levels_{levels}, scale_factor_{scale_factor}, min_shared_{min_shared} {
@@ -63,7 +63,7 @@ class basic_atlas {
     maps_.try_emplace(active_, std::move(m));
     return active_;
   }
-  /// Makes a map the active one. @pre contains(id)
+  /// Activates a map. @pre contains(id)
   void activate(map_id id) {
     assert(contains(id));
     active_ = id;

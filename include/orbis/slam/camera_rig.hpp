@@ -33,7 +33,7 @@ struct camera_rig {
 template <class Camera>
 camera_rig(optimize::reprojection<Camera>, pyramid_scales) -> camera_rig<Camera>;
 
-/// Makes the rig of a camera from the settings of a system.
+/// Creates the rig of a camera from the settings of a system.
 template <camera::camera_model Camera>
 [[nodiscard]] camera_rig<Camera> make_rig(Camera camera, const options& settings) {
   return {{std::move(camera), settings.bf},

@@ -45,14 +45,14 @@ class basic_map {
   using landmark_type = basic_landmark<D>;
 
   basic_map() = default;
-  /// Makes an empty map. `levels`, `scale_factor`: of the extractor's image pyramid; `min_shared`: minimum number of
+  /// Creates an empty map. `levels`, `scale_factor`: of the extractor's image pyramid; `min_shared`: minimum number of
   /// shared landmarks of an edge in the covisibility graph.
   basic_map(int levels, double scale_factor, std::uint32_t min_shared = 15) : covisibility_{min_shared} {
     content_.levels = levels;
     content_.scale_factor = scale_factor;
     content_.min_shared = min_shared;
   }
-  /// Makes a map from its content. `keyframe.landmarks` are set from the observations of the landmarks. O(map).
+  /// Creates a map from its content. `keyframe.landmarks` are set from the observations of the landmarks. O(map).
   /// @pre the content is consistent: ids refer to existing entries, and no keypoint observes two landmarks
   explicit basic_map(detail::map_content<D> content);
 

@@ -50,7 +50,7 @@ concept grey_extractor = feature_extractor<E> && std::invocable<const E&, image_
 
 namespace detail {
 
-/// Makes a frame of features with rays, before their depth is measured. Features whose pixel has no ray get NaN.
+/// Creates a frame of features with rays, before their depth is measured. Features whose pixel has no ray get NaN.
 template <camera::camera_model Camera, feature_descriptor D>
 [[nodiscard]] basic_frame<D> frame_of(const camera_rig<Camera>& rig, features::basic_features<D> features,
                                       sensor_kind sensor) {
@@ -128,7 +128,7 @@ struct stereo_memory {
 
 namespace detail {
 
-/// Makes a frame of the left features. `Pixels`: the images, or the pyramids that the extractor made of them.
+/// Creates a frame from the left features. `Pixels`: the images, or the pyramids that the extractor built from them.
 template <camera::camera_model Camera, feature_descriptor D, class Pixels>
 [[nodiscard]] basic_frame<D> match_stereo(const camera_rig<Camera>& rig, stereo_memory& memory,
                                           features::basic_features<D> left, const Pixels& left_pixels,
@@ -150,7 +150,7 @@ template <camera::camera_model Camera, feature_descriptor D, class Pixels>
 
 }  // namespace detail
 
-/// Makes a frame of the left image of a rectified pair (`camera::rectify`). A feature has the right coordinate that
+/// Creates a frame from the left image of a rectified pair (`camera::rectify`). A feature has the right coordinate that
 /// `features::stereo_matcher` finds for it, or none; its depth is `options::bf` over the disparity, if that is within
 /// the rig's range. Features without a right coordinate become landmarks once other keyframes observe them with enough
 /// parallax. @pre both images have the size of the camera
@@ -190,7 +190,7 @@ template <camera::camera_model Camera, feature_extractor Extractor>
     return detail::match_stereo(rig, memory, extract(left), grey_left, extract(right), grey_right);
 }
 
-/// Makes a frame of one image, in colour or grey, without depth. @pre the image has the size of the camera
+/// Creates a frame from one image, in colour or grey, without depth. @pre the image has the size of the camera
 template <camera::camera_model Camera, feature_extractor Extractor, class Pixel>
 requires std::invocable<const Extractor&, image_view<const Pixel>>
 [[nodiscard]] basic_frame<descriptor_of_t<Extractor>> measure_monocular(const camera_rig<Camera>& rig,

@@ -18,7 +18,7 @@
 
 namespace orbis::slam {
 
-/// Conditions for making a keyframe of a frame.
+/// Conditions for a frame to become a keyframe.
 struct keyframe_options {
   double interval = 0.3;  ///< seconds since the last keyframe, after which motion is a sufficient reason
   /// Metres (without depth, median depths of the view) since the last keyframe that count as motion ...
@@ -26,8 +26,8 @@ struct keyframe_options {
   double turned = 0.06;              ///< ... or radians
   double inlier_ratio = 0.75;        ///< a keyframe is made below this fraction of the reference keyframe's landmarks
   double inlier_ratio_start = 0.4;   ///< `inlier_ratio` while the map has one keyframe
-  std::size_t min_inliers = 15;      ///< no keyframe is made with this number of inliers or fewer
-  std::size_t close_tracked = 100;   ///< a keyframe is made with fewer tracked close points than this ...
+  std::size_t min_inliers = 15;      ///< no keyframe is created with this number of inliers or fewer
+  std::size_t close_tracked = 100;   ///< a keyframe is created with fewer tracked close points than this ...
   std::size_t close_untracked = 70;  ///< ... and more untracked close points than this
 };
 

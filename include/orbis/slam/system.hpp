@@ -83,10 +83,10 @@ class system {
   using map_type = basic_map<descriptor_type>;
   using revision_type = pose_revision;
 
-  /// Makes a system with an extractor made from `settings.features` and default places.
+  /// Creates a system with an extractor built from `settings.features` and default places.
   explicit system(Camera camera, const options& settings = {}) requires
       std::constructible_from<Extractor, const features::orb_options&> && std::default_initializable<Places>;
-  /// Makes a system with a custom extractor and, optionally, custom places. `settings.features.levels` and
+  /// Creates a system with a custom extractor and, optionally, custom places. `settings.features.levels` and
   /// `scale_factor` must describe the image pyramid of the extractor.
   system(Camera camera, const options& settings, Extractor extractor, Places places = Places{});
   system(const system&) = delete;
@@ -111,7 +111,7 @@ class system {
   /// As above, for one image without depth, for a system with `monocular_options`.
   track_result track(double timestamp, image_view<const rgb8> color);
   track_result track(double timestamp, image_view<const std::uint8_t> grey) requires grey_extractor<Extractor>;
-  /// As above, for a sensor of another kind: `measure(rig, extract)` makes the frame, like the functions of
+  /// As above, for a sensor of another kind: `measure(rig, extract)` creates the frame, like the functions of
   /// `measure.hpp`, with the depth of each feature, or 0. In this case there is no depth image (`options::depth_term`),
   /// and depth is assumed to be measured at the frame's time. With orbis::compiled, include
   /// `<orbis/slam/system-inl.hpp>`.
@@ -164,7 +164,7 @@ class system {
   [[nodiscard]] map_id active_map() const;
   /// Returns the map in which most frames were tracked. O(frames).
   [[nodiscard]] map_id largest_map() const;
-  /// Makes a map the active one; the camera is relocalised in it. Returns false if there is no such map.
+  /// Activates a map; the camera is relocalised in it. Returns false if there is no such map.
   bool activate(map_id map);
 
   /// Calls `read(const atlas_type&)` with the lock held: no map changes during the call, and tracking waits. `read`
@@ -203,7 +203,7 @@ class system {
   }
   /// Tracks a measured frame; the frame has no features if its images could not be used.
   track_result track_frame(double timestamp, frame_type f, const row_follower& follow, detail::stopwatch& clock);
-  /// Localises a frame and makes a keyframe of it if required. Records the time of localisation with `clock`.
+  /// Localises a frame and turns it into a keyframe if required. Records the time of localisation with `clock`.
   std::optional<map_keyframe> localize(frame_type f, const row_follower& follow, track_result& result,
                                        detail::stopwatch& clock);
   /// Passes a new keyframe to the callbacks and the back end.

@@ -68,7 +68,7 @@ inline constexpr time_unit time_units[] = {
   return describe(*first) + " to " + describe(*last);
 }
 
-/// The median difference of consecutive times, which ascend. @pre times.size() >= 2
+/// The median difference of consecutive times. @pre times ascend, times.size() >= 2
 [[nodiscard]] inline double median_interval(const std::vector<double>& times) {
   std::vector<double> steps;
   for (std::size_t i = 1; i < times.size(); ++i) steps.push_back(times[i] - times[i - 1]);
@@ -77,8 +77,8 @@ inline constexpr time_unit time_units[] = {
   return *middle;
 }
 
-/// Returns true if times, which ascend, are frame numbers: whole numbers, mostly less than ten apart, and far smaller
-/// than seconds since 1970.
+/// Returns true if ascending times are frame numbers: whole numbers, mostly less than ten apart, and far smaller than
+/// seconds since 1970.
 [[nodiscard]] inline bool are_frame_numbers(const std::vector<double>& times) {
   constexpr double most_apart = 10.0, highest = 1e8;
   return times.size() >= 2 && times.front() >= 0.0 && times.back() < highest &&
@@ -86,8 +86,8 @@ inline constexpr time_unit time_units[] = {
          median_interval(times) < most_apart;
 }
 
-/// A warning if the median interval of times, which ascend, is more than 30 times longer or shorter than that of a
-/// camera with `fps` frames per second; empty otherwise. It states the factor that the unit of the times seems to have.
+/// A warning if the median interval of ascending times is more than 30 times longer or shorter than that of a camera
+/// with `fps` frames per second; empty otherwise. It states the factor that the unit of the times seems to have.
 [[nodiscard]] inline std::string describe_interval(const std::vector<double>& times, double fps) {
   constexpr double tolerance = 30.0;
   if (times.size() < 3) return {};

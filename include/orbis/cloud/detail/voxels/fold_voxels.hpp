@@ -192,7 +192,7 @@ class voxel_parts {
     std::uint32_t index;
   };
 
-  /// Numbers of voxels by their first points.
+  /// Assigns numbers to voxels in the order of their first points.
   class first_points {
    public:
     template <execution_policy Policy>

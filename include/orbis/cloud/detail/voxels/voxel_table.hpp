@@ -33,7 +33,7 @@ class voxel_table {
     Record record;
   };
 
-  /// Makes an empty table. New rows begin with the record `empty`.
+  /// Creates an empty table. New rows begin with the record `empty`.
   explicit voxel_table(const Record& empty) : empty_{empty} { clear(0); }
 
   /// Removes all rows and makes room for `expected` ones. Keeps the memory.

@@ -185,7 +185,7 @@ class jpeg_encoder {
     return true;
   }
 
-  /// Moves the JPEG out. @pre write() was true
+  /// Returns the JPEG, moved out of this object. @pre write() was true
   [[nodiscard]] std::string take() { return std::move(bytes_); }
   /// Returns true if `write` failed because it ran out of memory.
   [[nodiscard]] bool out_of_memory() const { return errors_.base.msg_code == JERR_OUT_OF_MEMORY; }

@@ -51,7 +51,7 @@ struct surface {
   }
 };
 
-/// Makes surfaces from the depth images of one camera. Reuses its memory and that of the surface.
+/// Builds surfaces from the depth images of one camera. Reuses its memory and that of the surface.
 template <camera::camera_model Camera>
 class surface_builder {
  public:

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Makes a keyframe of a frame, and landmarks of its depth.
+/// Turns a frame into a keyframe, and its depth into landmarks.
 #pragma once
 
 #include <algorithm>

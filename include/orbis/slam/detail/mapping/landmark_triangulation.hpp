@@ -99,8 +99,8 @@ struct view_pair {
 };
 
 /// Matches keypoints without a landmark of a keyframe with those of its best neighbours, along epipolar lines, and
-/// makes landmarks of the matches. The position is triangulated, or taken from the depth of either keypoint if that is
-/// more precise. A match becomes a landmark with both observations if
+/// creates landmarks from the matches. The position is triangulated, or taken from the depth of either keypoint if that
+/// is more precise. A match becomes a landmark with both observations if
 /// - it is in front of both cameras;
 /// - the angle between the rays is large enough (not required if depth is used);
 /// - it agrees with both keypoints (chi-square, 95 %), and with their depth if available;

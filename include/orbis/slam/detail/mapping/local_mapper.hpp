@@ -65,10 +65,10 @@ std::size_t cull_landmarks(basic_map<D>& m, keyframe_id newest, const culling_op
   return removed;
 }
 
-/// Returns true if enough of a keyframe's landmarks that are closer than `close_depth` (metres; infinite: all, if no
-/// depth is measured) are observed by enough other keyframes at the same or a finer pyramid level. False for a keyframe
-/// without close landmarks. O(observations of its landmarks). Source: R. Mur-Artal, J. D. Tardos, "ORB-SLAM2", T-RO 33
-/// (2017), section III.C, after ORB-SLAM (2015), VI.E.
+/// Returns true if enough of a keyframe's landmarks that are closer than `close_depth` (metres; infinite if no depth is
+/// measured, so that all count) are observed by enough other keyframes at the same or a finer pyramid level. False for
+/// a keyframe without close landmarks. O(observations of its landmarks). Source: R. Mur-Artal, J. D. Tardos,
+/// "ORB-SLAM2", T-RO 33 (2017), section III.C, after ORB-SLAM (2015), VI.E.
 template <feature_descriptor D>
 [[nodiscard]] bool is_redundant(const basic_map<D>& m, keyframe_id id, double close_depth, const culling_options& o) {
   const auto& k = m.at(id);

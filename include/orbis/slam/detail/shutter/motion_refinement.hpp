@@ -269,7 +269,7 @@ class early_depth_twist {
     return prior.twist_before + gain_ * (refined - prior.twist_before);
   }
 
-  /// Makes the current frame the previous one.
+  /// Sets the previous frame to the current one.
   void advance() { former_covariance_ = pose_covariance_; }
 
  private:

@@ -170,7 +170,7 @@ class front_end {
     return begin_map(f, maps, drop);
   }
 
-  /// Makes the keyframe that shares most landmarks with the frame the reference.
+  /// Sets the reference to the keyframe that shares most landmarks with the frame.
   void update_reference(const frame_type& f, const atlas_type& maps) {
     if (!maps.active().keyframes().empty())
       reference_ = {maps.active_id(), most_shared(maps.active(), f, reference_.keyframe)};
