@@ -380,7 +380,7 @@ std::variant<settings, exit_code> read_command_line(int argc, char** argv) {
 
   CLI::App* run = cli.add_subcommand(
       "run", "SLAM on a recording (TUM, 7-Scenes, ICL-NUIM, ScanNet; stereo or monocular: KITTI, ASL, images)");
-  run->add_option("DATASET", s.input, "folder of the recording, ROS 1 bag (.bag), or video")->required()->type_name("");
+  run->add_option("DATASET", s.input, "folder of the recording, ROS bag (.bag, .mcap, .db3 or folder), or video")->required()->type_name("");
   add_recording_options(*run, s);
   add_frame_options(*run, s);
   add_map_options(*run, s);

@@ -22,6 +22,7 @@
 #include "../common/voxel_estimate.hpp"
 #include "background.hpp"
 #include "camera_files.hpp"
+#include "inputs/bag_file.hpp"
 #include "inputs/file_recording.hpp"
 #include "inputs/live_source.hpp"
 #include "interrupts.hpp"
@@ -286,14 +287,14 @@ result<frame_source> open_file(const settings& s) {
   if (const auto ending = s.input.extension(); ending == ".png" || ending == ".jpg" || ending == ".jpeg")
     return fail(orbis::errc::unsupported, s.input.string(),
                 "is one image; name its folder, " + std::filesystem::absolute(s.input).parent_path().string());
-  if (is_text(s.input))
+  if (!is_bag(s.input) && is_text(s.input))
     return fail(orbis::errc::unsupported, s.input.string(),
                 "is a text file, neither a bag nor a video; a recording with lists is opened by its folder, " +
                     std::filesystem::absolute(s.input).parent_path().string());
   const auto camera = camera_option(s);
   if (!camera) return fail(camera.error());
   const file_recording_options options{.sensor = wanted_sensor(s), .camera = *camera, .topics = s.topics};
-  auto opened = s.input.extension() == ".bag" ? open_bag(s.input, options) : open_video(s.input, options);
+  auto opened = is_bag(s.input) ? open_bag(s.input, options) : open_video(s.input, options);
   if (!opened) return fail(with_option(opened.error()));
   const std::shared_ptr<const file_recording> recording = *std::move(opened);
   frame_source source;
@@ -535,10 +536,11 @@ result<frame_source> open_source(const settings& s, console& console) {
   std::error_code ignored;
   const auto open = [&] {
     if (s.what == command::live) return open_live(s);
-    if (!s.topics.empty() && s.input.extension() != ".bag")
+    const bool bag = is_bag(s.input);
+    if (!s.topics.empty() && !bag)
       return result<frame_source>{
           fail(orbis::errc::invalid_argument, "--topics", "needs a ROS bag; " + s.input.string() + " is none")};
-    if (std::filesystem::is_regular_file(s.input, ignored)) return open_file(s);
+    if (bag || std::filesystem::is_regular_file(s.input, ignored)) return open_file(s);
     switch (sensor_of(s)) {
       case sensor_kind::stereo: return open_stereo_recording(s);
       case sensor_kind::monocular: return open_mono_recording(s);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// make_inputs FOLDER FRAMES WIDTH: a synthetic recording as a ROS bag (room.bag, if this build has a library for it)
-// and as a video of two images side by side (pair.avi, likewise) with camera.toml. Names the files that it made.
+// make_inputs FOLDER FRAMES WIDTH: a synthetic recording as a ROS bag (room.bag) and as a video of two images side by
+// side (pair.avi, if this build has a library for it) with camera.toml. Names the optional files that it made.
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
@@ -10,11 +10,10 @@
 #include <orbis/io/camera_file.hpp>
 #include <orbis/io/synthetic.hpp>
 
+#include "ros_bag_writer.hpp"
+
 #ifdef RGBD_SLAM_VIDEO
 #include <opencv2/videoio.hpp>
-#endif
-#ifdef RGBD_SLAM_BAG
-#include "ros_bag_writer.hpp"
 #endif
 
 int main(int argc, char** argv) {
@@ -26,7 +25,6 @@ int main(int argc, char** argv) {
   std::filesystem::create_directories(folder);
   if (!orbis::io::write_camera(folder / "camera.toml", recording.stereo_camera())) return 1;
 
-#ifdef RGBD_SLAM_BAG
   orbis::test::ros_bag_writer bag{folder / "room.bag"};
   for (std::size_t i = 0; i != recording.size(); ++i) {
     const auto frame = recording.frame(i).value();
@@ -39,8 +37,6 @@ int main(int argc, char** argv) {
   }
   bag.info("/camera/color/camera_info", 1000.0, recording.camera().model.k());
   bag.close();
-  std::puts("room.bag");
-#endif
 #ifdef RGBD_SLAM_VIDEO
   const int height = width / 4 * 3;
   cv::VideoWriter video{

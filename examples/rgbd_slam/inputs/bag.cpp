@@ -1,22 +1,21 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "inputs/file_recording.hpp"
-
-#ifdef RGBD_SLAM_BAG
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <map>
 #include <mutex>
 #include <string_view>
+#include <tuple>
 #include <utility>
-
-#include <rosbag/bag.h>
-#include <rosbag/view.h>
 
 #include <orbis/camera/stereo.hpp>
 #include <orbis/core/trajectory.hpp>
 
+#include "inputs/bag_file.hpp"
+#include "inputs/depth_registration.hpp"
+#include "inputs/file_recording.hpp"
+#include "inputs/frame_tree.hpp"
 #include "inputs/ros_images.hpp"
 #include "inputs/ros_messages.hpp"
 
@@ -26,46 +25,27 @@ namespace {
 using orbis::errc;
 using orbis::fail;
 using orbis::result;
+using orbis::slam::sensor_kind;
 using color_image = orbis::image<orbis::rgb8>;
 using depth_image = orbis::image<std::uint16_t>;
 
-/// The camera of `info`. `rectified`: the images are rectified.
-result<orbis::camera::any_camera> camera_of(const ros_messages::camera_info& info, bool rectified,
-                                            const std::string& where) {
-  if (info.width == 0 || info.height == 0 || info.width > 65536 || info.height > 65536)
-    return fail(errc::malformed, where, "has a camera without image size: is the camera calibrated?");
-  const auto width = static_cast<int>(info.width), height = static_cast<int>(info.height);
-  const orbis::camera::intrinsics k =
-      rectified && info.P[0] > 0.0
-          ? orbis::camera::intrinsics{width, height, info.P[0], info.P[5], info.P[2], info.P[6]}
-          : orbis::camera::intrinsics{width, height, info.K[0], info.K[4], info.K[2], info.K[5]};
-  if (!orbis::camera::is_valid(k))
-    return fail(errc::malformed, where, "has no camera matrix: is the camera calibrated?");
-  const auto& d = info.D;
-  if (!std::all_of(d.begin(), d.end(), [](double v) { return std::isfinite(v); }))
-    return fail(errc::malformed, where, "has a distortion that is not finite");
-  const bool is_straight = std::all_of(d.begin(), d.end(), [](double v) { return v == 0.0; });
-  if (rectified || is_straight) return orbis::camera::any_camera{orbis::camera::pinhole{k}};
-  const auto at = [&](std::size_t i) { return i < d.size() ? d[i] : 0.0; };
-  if (info.distortion_model == "equidistant" && d.size() == 4)
-    return orbis::camera::any_camera{orbis::camera::kannala_brandt{k, {d[0], d[1], d[2], d[3]}}};
-  if ((info.distortion_model == "plumb_bob" || info.distortion_model == "rational_polynomial") && d.size() >= 4 &&
-      d.size() <= 8)
-    return orbis::camera::any_camera{
-        orbis::camera::radial_tangential{k, {at(0), at(1), at(2), at(3), at(4), at(5), at(6), at(7)}}};
-  return fail(errc::unsupported, where,
-              "distortion model \"" + in_short(info.distortion_model) + "\" with " + std::to_string(d.size()) +
-                  " numbers is not supported; use plumb_bob, rational_polynomial or equidistant");
+double seconds(std::int64_t nanoseconds) {
+  constexpr std::int64_t second = 1'000'000'000;
+  return static_cast<double>(nanoseconds / second) + 1e-9 * static_cast<double>(nanoseconds % second);
 }
 
-/// The messages of a topic.
-struct topic {
-  std::string name, type, encoding;  ///< encoding: of the first image, or the format of a compressed image
-  std::vector<double> times;         ///< of their headers, ascending
-  std::vector<rosbag::MessageInstance> messages;
+/// A topic of images.
+struct topic : bag_topic {
+  std::string encoding;       ///< of the first image, or the format of a compressed image
+  std::string frame_id;       ///< of the first image
+  std::vector<double> times;  ///< of the headers, ascending
   [[nodiscard]] bool is_compressed() const { return type == "sensor_msgs/CompressedImage"; }
   [[nodiscard]] bool is_depth() const { return is_depth_encoding(encoding) || name.ends_with("/compressedDepth"); }
   [[nodiscard]] bool is_read() const { return is_compressed() || is_known_encoding(encoding); }
+  /// Returns true if the name indicates depth that is registered to colour.
+  [[nodiscard]] bool is_registered() const {
+    return name.find("registered") != std::string::npos || name.find("aligned") != std::string::npos;
+  }
   /// Returns true if the name indicates rectified images: "image_rect" and "rect", but not "direct".
   [[nodiscard]] bool is_rectified() const {
     for (std::size_t at = name.find("rect"); at != std::string::npos; at = name.find("rect", at + 1))
@@ -91,53 +71,16 @@ bool is_pair(const std::string& left, const std::string& right) {
 
 class bag_recording final : public file_recording {
  public:
-  bag_recording() { kind = "ROS bag"; }
-
-  result<void> open(const std::filesystem::path& path, const file_recording_options& options) {
-    path_ = path.string();
-    files = {path};
-    try {
-      bag_.open(path_, rosbag::bagmode::Read);
-      return set_up(options);
-    } catch (const std::exception& e) {  // of the library, for a damaged bag or another file
-      return fail(errc::malformed, path_, std::string{"is not a readable ROS 1 bag: "} + e.what());
-    }
+  bag_recording(bag contents, std::string path) : path_{std::move(path)}, bag_{std::move(contents)} {
+    kind = "ROS bag";
+    files = bag_.files;
+    notes = bag_.notes;
   }
-  [[nodiscard]] std::size_t size() const override { return frames_.size(); }
-  [[nodiscard]] result<source_frame> frame(std::size_t i) const override {
-    const std::lock_guard lock{mutex_};
-    auto first = read_color(*first_, frames_[i].first);
-    if (!first) return fail(first.error());
-    source_frame f;
-    f.timestamp = first_->times[frames_[i].first];
-    f.depth_scale = camera.depth_scale;
-    f.color = straight_ ? straight_->left().bilinear(first->view()) : *std::move(first);
-    if (sensor == orbis::slam::sensor_kind::rgbd) {
-      auto depth = read_depth(frames_[i].second);
-      if (!depth) return fail(depth.error());
-      f.depth = *std::move(depth);
-    } else if (sensor == orbis::slam::sensor_kind::stereo) {
-      auto second = read_color(*second_, frames_[i].second);
-      if (!second) return fail(second.error());
-      f.right = straight_ ? straight_->right().bilinear(second->view()) : *std::move(second);
-    }
-    return f;
-  }
-  [[nodiscard]] result<color_image> color(std::size_t i) const override {
-    const std::lock_guard lock{mutex_};
-    auto first = read_color(*first_, frames_[i].first);
-    if (first && straight_) return straight_->left().bilinear(first->view());
-    return first;
-  }
-
- private:
-  [[nodiscard]] std::string where(const topic& of) const { return path_ + " " + of.name; }
 
   result<void> set_up(const file_recording_options& options) {
     list_topics();
     if (auto chosen = choose(options); !chosen) return chosen;
-    for (topic* t : {first_, second_})
-      if (t != nullptr) read_times(*t);
+    if (auto read = read_times(); !read) return read;
     pair_frames();
     if (frames_.empty())
       return fail(errc::no_data, path_,
@@ -146,27 +89,69 @@ class bag_recording final : public file_recording {
                       : "no image of " + first_->name + " has a counterpart in " + second_->name + " at its time");
     images_of = first_->name + (second_ != nullptr ? " and " + second_->name : "");
     if (auto known = find_camera(options); !known) return known;
+    if (sensor == sensor_kind::rgbd)
+      if (auto registered = register_depth(); !registered) return registered;
     if (auto fits = frame(0); !fits) return fail(fits.error());
     return {};
   }
 
-  void list_topics() {
-    rosbag::View all{bag_};
-    for (const rosbag::ConnectionInfo* c : all.getConnections())
-      if (c->datatype == "sensor_msgs/Image" || c->datatype == "sensor_msgs/CompressedImage")
-        topics_[c->topic].type = c->datatype;
-    for (auto& [name, t] : topics_) {
-      t.name = name;
-      rosbag::View view{bag_, rosbag::TopicQuery(name)};
-      for (const rosbag::MessageInstance& m : view) t.messages.push_back(m);
-      if (t.messages.empty()) continue;
-      if (t.is_compressed()) {
-        if (const auto m = t.messages.front().instantiate<ros_messages::compressed_image>()) t.encoding = m->format;
-      } else if (const auto m = t.messages.front().instantiate<ros_messages::image>()) {
-        t.encoding = m->encoding;
-      }
+  [[nodiscard]] std::size_t size() const override { return frames_.size(); }
+  [[nodiscard]] result<source_frame> frame(std::size_t i) const override {
+    auto first = color(i);
+    if (!first) return fail(first.error());
+    source_frame f;
+    f.timestamp = first_->times[frames_[i].first];
+    f.depth_scale = camera.depth_scale;
+    f.color = *std::move(first);
+    if (sensor == sensor_kind::rgbd) {
+      auto depth = read_depth(frames_[i].second);
+      if (!depth) return fail(depth.error());
+      f.depth = registration_ ? (*registration_)(depth->view(), camera.depth_scale) : *std::move(depth);
+    } else if (sensor == sensor_kind::stereo) {
+      auto second = read_color(*second_, frames_[i].second);
+      if (!second) return fail(second.error());
+      f.right = straight_ ? straight_->right().bilinear(second->view()) : *std::move(second);
     }
-    std::erase_if(topics_, [](const auto& t) { return t.second.messages.empty(); });
+    return f;
+  }
+  [[nodiscard]] result<color_image> color(std::size_t i) const override {
+    auto first = read_color(*first_, frames_[i].first);
+    if (first && straight_) return straight_->left().bilinear(first->view());
+    return first;
+  }
+
+ private:
+  [[nodiscard]] std::string where(const topic& of) const { return path_ + " " + of.name; }
+  [[nodiscard]] result<std::string> read(const bag_message& m, std::size_t most = whole_message) const {
+    const std::lock_guard lock{mutex_};
+    return bag_.read(m, most);
+  }
+
+  /// The images: encoding and frame are those of the first message that can be read.
+  void list_topics() {
+    for (bag_topic& from : bag_.topics) {
+      if (from.type != "sensor_msgs/Image" && from.type != "sensor_msgs/CompressedImage") continue;
+      topic t{std::move(from), {}, {}, {}};
+      const auto reads = [&](const bag_message& m) {
+        const auto bytes = read(m);
+        if (!bytes) return false;
+        const auto take = [&](const auto& image, const std::string& encoding) {
+          t.encoding = encoding;
+          t.frame_id = image.header.frame_id;
+          return true;
+        };
+        if (t.is_compressed()) {
+          const auto image = ros_messages::parse<ros_messages::compressed_image>(*bytes, t.coding, t.name);
+          return image && take(*image, image->format);
+        }
+        const auto image = ros_messages::parse<ros_messages::image>(*bytes, t.coding, t.name);
+        return image && take(*image, image->encoding);
+      };
+      if (std::ranges::find_if(t.messages, reads) != t.messages.end())
+        topics_.try_emplace(t.name, std::move(t));
+      else
+        notes.push_back("no image of " + t.name + " can be read");
+    }
   }
 
   [[nodiscard]] std::string describe_topics() const {
@@ -179,16 +164,17 @@ class bag_recording final : public file_recording {
     const auto wrong = [&](const std::string& what) {
       return fail(errc::invalid_argument, path_, what + "; " + describe_topics());
     };
-    if (topics_.empty()) return fail(errc::no_data, path_, "the bag contains no images");
+    if (topics_.empty())
+      return fail(errc::no_data, path_, "the bag contains no images" + (notes.empty() ? "" : "; " + notes.back()));
     if (!options.topics.empty()) {
       for (const std::string& name : options.topics)
         if (!topics_.contains(name)) return wrong("has no images in " + name);
       if (options.topics.size() > 2) return wrong("needs one or two topics");
       first_ = &topics_.at(options.topics[0]);
       if (options.topics.size() == 2) second_ = &topics_.at(options.topics[1]);
-      sensor = second_ == nullptr    ? orbis::slam::sensor_kind::monocular
-               : second_->is_depth() ? orbis::slam::sensor_kind::rgbd
-                                     : orbis::slam::sensor_kind::stereo;
+      sensor = second_ == nullptr    ? sensor_kind::monocular
+               : second_->is_depth() ? sensor_kind::rgbd
+                                     : sensor_kind::stereo;
       if (options.sensor && *options.sensor != sensor) return wrong("the topics do not match --sensor");
       return {};
     }
@@ -197,13 +183,15 @@ class bag_recording final : public file_recording {
     int best_color = -1, best_depth = -1, best_left = -1;
     const auto worth = [](const topic& t) {
       const bool is_mosaic = t.encoding.starts_with("bayer");
-      const bool is_color = !is_mosaic && (contains(t.encoding, "rgb") || contains(t.encoding, "bgr"));
+      bool is_color = false;
+      for (const char* part : {"rgb", "bgr", "yuv", "uyvy", "yuyv"}) is_color |= contains(t.encoding, part);
+      is_color &= !is_mosaic;
       return 8 * !t.is_compressed() + 4 * is_color + 2 * is_mosaic + t.is_rectified();
     };
     for (auto& [name, t] : topics_) {
       if (t.is_depth()) {
         if (!t.is_read()) continue;
-        const int value = 2 * (contains(name, "registered") || contains(name, "aligned")) + !t.is_compressed();
+        const int value = 4 * t.is_registered() + 2 * !t.is_compressed() + t.is_rectified();
         if (value > best_depth) depth = &t, best_depth = value;
         continue;
       }
@@ -213,14 +201,13 @@ class bag_recording final : public file_recording {
         if (is_pair(name, other_name) && !other.is_depth() && worth(t) > best_left)
           left = &t, right = &other, best_left = worth(t);
     }
-    const auto possible = [&](orbis::slam::sensor_kind s) {
-      return s == orbis::slam::sensor_kind::rgbd     ? color != nullptr && depth != nullptr
-             : s == orbis::slam::sensor_kind::stereo ? left != nullptr
-                                                     : color != nullptr;
+    const auto possible = [&](sensor_kind s) {
+      return s == sensor_kind::rgbd     ? color != nullptr && depth != nullptr
+             : s == sensor_kind::stereo ? left != nullptr
+                                        : color != nullptr;
     };
-    std::optional<orbis::slam::sensor_kind> found = options.sensor;
-    for (const orbis::slam::sensor_kind s :
-         {orbis::slam::sensor_kind::rgbd, orbis::slam::sensor_kind::stereo, orbis::slam::sensor_kind::monocular})
+    std::optional<sensor_kind> found = options.sensor;
+    for (const sensor_kind s : {sensor_kind::rgbd, sensor_kind::stereo, sensor_kind::monocular})
       if (!found && possible(s)) found = s;
     if (!found || !possible(*found)) {
       const bool any_unread =
@@ -228,31 +215,63 @@ class bag_recording final : public file_recording {
       return wrong(any_unread ? "has no suitable images in a supported encoding" : "has no suitable images");
     }
     sensor = *found;
-    first_ = sensor == orbis::slam::sensor_kind::stereo ? left : color;
-    second_ = sensor == orbis::slam::sensor_kind::rgbd     ? depth
-              : sensor == orbis::slam::sensor_kind::stereo ? right
-                                                           : nullptr;
+    first_ = sensor == sensor_kind::stereo ? left : color;
+    second_ = sensor == sensor_kind::rgbd ? depth : sensor == sensor_kind::stereo ? right : nullptr;
     return {};
   }
 
-  /// Reads the times of the headers, or the recording times if the headers have none.
-  static void read_times(topic& t) {
-    std::vector<std::pair<double, std::size_t>> order;
-    for (const rosbag::MessageInstance& m : t.messages) {
-      const auto header = m.instantiate<ros_messages::stamp>();
-      const bool has_time = header && (header->sec != 0 || header->nsec != 0);
-      order.emplace_back(has_time ? header->sec + 1e-9 * header->nsec : m.getTime().toSec(), order.size());
+  /// Reads the times of the headers, in the order of the file, or the recording times if the headers have none. Omits
+  /// messages that cannot be read and repeated times.
+  result<void> read_times() {
+    struct entry {
+      topic* of;
+      const bag_message* message;
+      std::int64_t time;
+    };
+    std::vector<entry> entries;
+    for (topic* t : {first_, second_})
+      if (t != nullptr)
+        for (const bag_message& m : t->messages) entries.push_back({t, &m, 0});
+    std::ranges::sort(entries, {}, [](const entry& e) {
+      return std::tuple{e.message->file, e.message->chunk, e.message->at};
+    });
+    std::map<topic*, std::string> failures;
+    std::map<topic*, std::size_t> failed;
+    for (entry& e : entries) {
+      constexpr std::size_t most = 1024;  // bytes; the time is at the beginning
+      const auto bytes = read(*e.message, most);
+      if (!bytes && bytes.error().code == errc::unsupported) return fail(bytes.error());
+      message_reader in{bytes ? *bytes : std::string_view{}, e.of->coding};
+      e.time = ros_messages::read_stamp(in);
+      if (bytes && in.ok()) continue;
+      failures.try_emplace(e.of, bytes ? "the message is damaged" : bytes.error().to_string());
+      ++failed[e.of];
+      e.message = nullptr;
     }
-    std::stable_sort(order.begin(), order.end());
-    order.erase(
-        std::unique(order.begin(), order.end(), [](const auto& a, const auto& b) { return a.first == b.first; }),
-        order.end());
-    std::vector<rosbag::MessageInstance> sorted;
-    for (const auto& [time, i] : order) {
-      t.times.push_back(time);
-      sorted.push_back(t.messages[i]);
+    for (const auto& [of, why] : failures)
+      notes.push_back(std::to_string(failed[of]) + " images of " + of->name +
+                      " cannot be read and are omitted: " + why);
+    std::erase_if(entries, [](const entry& e) { return e.message == nullptr; });
+    for (topic* t : {first_, second_}) {
+      if (t == nullptr) continue;
+      // A time of zero is that of a simulation that begins there, or there is no time in the header.
+      std::int64_t least = std::numeric_limits<std::int64_t>::max();
+      for (const entry& e : entries)
+        if (e.of == t && e.time != 0) least = std::min(least, e.time);
+      constexpr std::int64_t soon = 10'000'000'000;  // nanoseconds
+      std::vector<std::pair<std::int64_t, bag_message>> order;
+      for (const entry& e : entries)
+        if (e.of == t) order.emplace_back(e.time == 0 && least > soon ? e.message->time : e.time, *e.message);
+      const auto time = [](const auto& one) { return one.first; };
+      std::ranges::stable_sort(order, {}, time);
+      order.erase(std::ranges::unique(order, {}, time).begin(), order.end());
+      t->messages.clear();
+      for (const auto& [when, message] : order) {
+        t->times.push_back(seconds(when));
+        t->messages.push_back(message);
+      }
     }
-    t.messages.swap(sorted);
+    return {};
   }
 
   void pair_frames() {
@@ -260,29 +279,32 @@ class bag_recording final : public file_recording {
       for (std::uint32_t i = 0; i != first_->times.size(); ++i) frames_.push_back({i, i});
       return;
     }
-    frames_ = orbis::associate(first_->times, second_->times, sensor == orbis::slam::sensor_kind::rgbd ? 0.020 : 0.005);
+    frames_ = orbis::associate(first_->times, second_->times, sensor == sensor_kind::rgbd ? 0.020 : 0.005);
     if (const std::size_t unpaired = first_->times.size() - frames_.size(); unpaired != 0)
       notes.push_back(std::to_string(unpaired) + " of " + std::to_string(first_->times.size()) + " images of " +
                       first_->name + " have no counterpart and are omitted");
   }
 
-  /// The first `CameraInfo` of the camera of `of`; null if there is none.
-  boost::shared_ptr<ros_messages::camera_info> info_of(const topic& of) {
+  /// The first `CameraInfo` of the camera of `of`; empty if there is none.
+  [[nodiscard]] std::optional<ros_messages::camera_info> info_of(const topic& of) const {
     std::string name = of.name;
     if (of.is_compressed()) name = name.substr(0, name.rfind('/'));
     name = name.substr(0, name.rfind('/') + 1) + "camera_info";
-    rosbag::View view{bag_, rosbag::TopicQuery(name)};
-    for (const rosbag::MessageInstance& m : view)
-      if (auto info = m.instantiate<ros_messages::camera_info>()) return info;
-    return {};
+    for (const bag_topic& t : bag_.topics)
+      if (t.name == name && t.type == "sensor_msgs/CameraInfo")
+        for (const bag_message& m : t.messages)
+          if (const auto bytes = read(m))
+            if (auto info = ros_messages::parse<ros_messages::camera_info>(*bytes, t.coding, name))
+              return *std::move(info);
+    return std::nullopt;
   }
 
   result<void> find_camera(const file_recording_options& options) {
-    const bool in_metres = sensor == orbis::slam::sensor_kind::rgbd && is_in_metres(second_->encoding);
+    const bool in_metres = sensor == sensor_kind::rgbd && is_in_metres(second_->encoding);
     if (options.camera) {
       camera = *options.camera;
       if (in_metres) camera.depth_scale = metres_scale;
-      if (sensor == orbis::slam::sensor_kind::stereo && !camera.baseline)
+      if (sensor == sensor_kind::stereo && !camera.baseline)
         return fail(errc::invalid_argument, path_, "a stereo camera needs a baseline");
       return {};
     }
@@ -290,14 +312,14 @@ class bag_recording final : public file_recording {
     if (!info)
       return fail(errc::invalid_argument, path_,
                   "unknown camera: there is no sensor_msgs/CameraInfo for " + first_->name + "; specify a camera");
-    auto model = camera_of(*info, first_->is_rectified(), where(*first_));
+    auto model = ros_messages::camera_of(*info, first_->is_rectified(), where(*first_));
     if (!model) return fail(model.error());
     camera = {.model = *std::move(model), .depth_scale = in_metres ? metres_scale : 1000.0, .fps = rate()};
-    if (sensor != orbis::slam::sensor_kind::stereo) return {};
+    if (sensor != sensor_kind::stereo) return {};
 
     const auto other = info_of(*second_);
     if (!other) return fail(errc::invalid_argument, path_, "there is no sensor_msgs/CameraInfo for " + second_->name);
-    const auto right = camera_of(*other, second_->is_rectified(), where(*second_));
+    const auto right = ros_messages::camera_of(*other, second_->is_rectified(), where(*second_));
     if (!right) return fail(right.error());
     // P of the right camera is that of the left one, shifted along x; R rotates the rays of a camera to rectified ones.
     const double baseline = other->P[0] > 0.0 ? (info->P[3] - other->P[3]) / other->P[0] : 0.0;
@@ -326,6 +348,53 @@ class bag_recording final : public file_recording {
     return {};
   }
 
+  /// Calls `f` with each transform of the topics of transforms: those named tf_static, or all others.
+  template <class F>
+  void for_each_transform(bool is_static, const F& f) const {
+    for (const bag_topic& t : bag_.topics)
+      if ((t.type == "tf2_msgs/TFMessage" || t.type == "tf/tfMessage") && t.name.ends_with("tf_static") == is_static)
+        for (const bag_message& m : t.messages)
+          if (const auto bytes = read(m))
+            if (const auto transforms =
+                    ros_messages::parse<std::vector<ros_messages::transform>>(*bytes, t.coding, t.name))
+              for (const ros_messages::transform& one : *transforms) f(one);
+  }
+  /// The frames of /tf_static, and those of /tf if `with_moving` or if there is no such topic.
+  [[nodiscard]] frame_tree read_frames(bool with_moving) const {
+    frame_tree tree;
+    bool any = false;
+    const auto add = [&](const ros_messages::transform& t) { tree.add(t), any = true; };
+    for_each_transform(true, add);
+    if (with_moving || !any) for_each_transform(false, add);
+    return tree;
+  }
+
+  /// Prepares registration of depth to colour with both cameras and the transform between them, unless the names, the
+  /// frames or the sizes of the images indicate that it is registered.
+  result<void> register_depth() {
+    if (second_->is_registered()) return {};
+    const bool same_frame = first_->frame_id == second_->frame_id;
+    const auto info = info_of(*second_);
+    const bool same_size = !info || (static_cast<int>(info->width) == camera.model.width() &&
+                                     static_cast<int>(info->height) == camera.model.height());
+    if (same_frame && same_size) return {};
+    const auto T_color_depth =
+        same_frame ? std::optional{orbis::se3{}} : read_frames(false).transform(first_->frame_id, second_->frame_id);
+    const std::string frames =
+        "depth in the frame \"" + in_short(second_->frame_id) + "\", colour in \"" + in_short(first_->frame_id) + "\"";
+    if (!T_color_depth || !info) {
+      unregistered_ = " (" + frames + "; " +
+                      (info ? "no static transform connects them" : "no CameraInfo for " + second_->name) + ")";
+      notes.push_back("depth is used as if it were registered to colour, but may not be" + unregistered_);
+      return {};
+    }
+    const auto model = ros_messages::camera_of(*info, second_->is_rectified(), where(*second_));
+    if (!model) return fail(model.error());
+    registration_.emplace(*model, camera.model, *T_color_depth);
+    images_of += " (registered by tf)";
+    return {};
+  }
+
   /// Images per second.
   [[nodiscard]] double rate() const {
     const auto& t = first_->times;
@@ -334,78 +403,62 @@ class bag_recording final : public file_recording {
   }
 
   template <class Image>
-  [[nodiscard]] result<Image> sized(result<Image> image, const topic& of) const {
-    if (!image) return image;
-    const auto& k = straight_ ? (&of == first_ ? raw_left_.k() : raw_right_.k()) : camera.model.k();
-    if (image->width() == k.width && image->height() == k.height) return image;
-    const std::string why =
-        sensor == orbis::slam::sensor_kind::rgbd && &of == second_ ? ": depth is not registered to colour" : "";
+  [[nodiscard]] result<Image> sized(result<Image> image, int width, int height, const topic& of) const {
+    if (!image || (image->width() == width && image->height() == height)) return image;
+    const bool is_depth = sensor == sensor_kind::rgbd && &of == second_;
     return fail(errc::malformed, where(of),
                 "the image has " + std::to_string(image->width()) + "x" + std::to_string(image->height()) +
-                    " pixels, the camera " + std::to_string(k.width) + "x" + std::to_string(k.height) + why);
+                    " pixels, the camera " + std::to_string(width) + "x" + std::to_string(height) +
+                    (is_depth ? ": depth is not registered to colour" + unregistered_ : ""));
   }
   /// `decode` of a message of either type.
   template <class Decode>
   [[nodiscard]] auto decoded(const topic& of, std::size_t i, const Decode& decode) const
       -> decltype(decode(ros_messages::image{}, std::string{})) {
+    const auto bytes = read(of.messages[i]);
+    if (!bytes) return fail(bytes.error());
     if (of.is_compressed()) {
-      if (const auto m = of.messages[i].instantiate<ros_messages::compressed_image>()) return decode(*m, where(of));
-    } else if (const auto m = of.messages[i].instantiate<ros_messages::image>()) {
+      const auto m = ros_messages::parse<ros_messages::compressed_image>(*bytes, of.coding, where(of));
+      if (!m) return fail(m.error());
       return decode(*m, where(of));
     }
-    return fail(errc::malformed, where(of), "is not a " + of.type);
+    const auto m = ros_messages::parse<ros_messages::image>(*bytes, of.coding, where(of));
+    if (!m) return fail(m.error());
+    return decode(*m, where(of));
   }
-  [[nodiscard]] result<color_image> read_color(const topic& of, std::size_t i) const try {
-    return sized(decoded(of, i, [](const auto& m, const std::string& from) { return color_of(m, from); }), of);
-  } catch (const std::exception& e) {  // of the library
-    return fail(errc::malformed, where(of), e.what());
+  [[nodiscard]] result<color_image> read_color(const topic& of, std::size_t i) const {
+    const auto& k = straight_ ? (&of == first_ ? raw_left_.k() : raw_right_.k()) : camera.model.k();
+    return sized(decoded(of, i, [](const auto& m, const std::string& from) { return color_of(m, from); }), k.width,
+                 k.height, of);
   }
-  [[nodiscard]] result<depth_image> read_depth(std::size_t i) const try {
-    return sized(decoded(*second_, i, [](const auto& m, const std::string& from) { return depth_of(m, from); }),
-                 *second_);
-  } catch (const std::exception& e) {
-    return fail(errc::malformed, where(*second_), e.what());
+  [[nodiscard]] result<depth_image> read_depth(std::size_t i) const {
+    auto depth = decoded(*second_, i, [](const auto& m, const std::string& from) { return depth_of(m, from); });
+    if (registration_) return sized(std::move(depth), registration_->width(), registration_->height(), *second_);
+    return sized(std::move(depth), camera.model.width(), camera.model.height(), *second_);
   }
 
   std::string path_;
-  rosbag::Bag bag_;
-  mutable std::mutex mutex_;  // guards the bag, which reads into an internal buffer
+  mutable std::mutex mutex_;  // guards the bag
+  mutable bag bag_;
   std::map<std::string, topic> topics_;
   topic* first_ = nullptr;   // colour, or the left image
   topic* second_ = nullptr;  // depth, or the right image; null: monocular
   std::vector<orbis::index_pair> frames_;
   std::optional<orbis::camera::rectification> straight_;  // of stereo images that are not rectified yet
   orbis::camera::any_camera raw_left_, raw_right_;
+  std::optional<depth_registration> registration_;  // of depth that is not registered yet
+  std::string unregistered_;                        // why it cannot be registered
 };
 
 }  // namespace
 
-bool has_bags() { return true; }
-
 result<std::unique_ptr<file_recording>> open_bag(const std::filesystem::path& path,
                                                  const file_recording_options& options) {
-  std::error_code ignored;
-  if (!std::filesystem::exists(path, ignored)) return fail(errc::not_found, path.string(), "no such file");
-  auto bag = std::make_unique<bag_recording>();
-  if (auto opened = bag->open(path, options); !opened) return fail(opened.error());
-  return bag;
+  auto contents = bag::open(path);
+  if (!contents) return fail(contents.error());
+  auto recording = std::make_unique<bag_recording>(*std::move(contents), path.string());
+  if (auto ready = recording->set_up(options); !ready) return fail(ready.error());
+  return recording;
 }
 
 }  // namespace app
-
-#else
-
-namespace app {
-
-bool has_bags() { return false; }
-
-orbis::result<std::unique_ptr<file_recording>> open_bag(const std::filesystem::path& path,
-                                                        const file_recording_options&) {
-  return orbis::fail(orbis::errc::unsupported, path.string(),
-                     "this build has no support for ROS bags: it was built without rosbag_storage "
-                     "(librosbag-storage-dev)");
-}
-
-}  // namespace app
-
-#endif

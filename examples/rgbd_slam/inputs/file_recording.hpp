@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Recordings in one file, read with optional libraries: videos (OpenCV's videoio) and ROS 1 bags (rosbag_storage).
+/// Videos (read with OpenCV's videoio, if this build has it) and ROS bags.
 #pragma once
 
 #include <cstddef>
@@ -42,9 +42,8 @@ struct file_recording_options {
   std::vector<std::string> topics{};                       ///< topics of a bag; empty: automatic
 };
 
-/// Returns true if this build reads them.
+/// Returns true if this build reads videos.
 [[nodiscard]] bool has_videos();
-[[nodiscard]] bool has_bags();
 
 /// Opens a video: images of one camera, or, with `sensor` stereo, the left and the right image of a rectified pair side
 /// by side. Times are the container's. The camera is that of the options, or of `camera.toml` next to the file. Reads
@@ -53,10 +52,11 @@ struct file_recording_options {
 [[nodiscard]] orbis::result<std::unique_ptr<file_recording>> open_video(const std::filesystem::path& path,
                                                                         const file_recording_options& options);
 
-/// Opens a ROS 1 bag with `sensor_msgs/Image` or `sensor_msgs/CompressedImage`, and `sensor_msgs/CameraInfo`: colour
-/// and registered depth (16UC1 in millimetres, 32FC1 in metres), the images of a stereo camera, or of one camera. See
-/// ros_images.hpp for the encodings. Reads through the bag once, for the times of its messages. Errors: as above, and
-/// invalid_argument (missing topics; the message lists the existing ones).
+/// Opens a bag of ROS 1 or ROS 2 (see bag_file.hpp) with `sensor_msgs/Image` or `sensor_msgs/CompressedImage`, and
+/// `sensor_msgs/CameraInfo`: colour and depth (16UC1 in millimetres, 32FC1 in metres), the images of a stereo camera,
+/// or of one camera. See ros_images.hpp for the encodings. Depth of another frame than colour is registered with both
+/// cameras and the transform between them. Reads through the bag once, for the times of its messages. Errors: as above,
+/// and invalid_argument (missing topics; the message lists the existing ones).
 [[nodiscard]] orbis::result<std::unique_ptr<file_recording>> open_bag(const std::filesystem::path& path,
                                                                       const file_recording_options& options);
 

@@ -1,18 +1,16 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#ifdef RGBD_SLAM_BAG
 #include "inputs/ros_images.hpp"
 
 #include <algorithm>
-#include <array>
 #include <bit>
 #include <cmath>
 #include <cstddef>
-#include <cstring>
 #include <optional>
 #include <utility>
 
 #include <opencv2/imgproc.hpp>
 
+#include <orbis/core/bytes.hpp>
 #include <orbis/io/jpeg.hpp>
 #include <orbis/io/png.hpp>
 
@@ -30,14 +28,18 @@ bool contains(std::string_view text, std::string_view part) { return text.find(p
 /// The encoding of the image before compression, from the format.
 std::string_view encoding_in(std::string_view format) { return format.substr(0, format.find(';')); }
 
-/// OpenCV's conversion code for a Bayer mosaic.
-std::optional<int> mosaic_of(std::string_view encoding) {
+/// OpenCV's conversion code for a Bayer mosaic or for colours of pairs of pixels (YUV 4:2:2).
+std::optional<int> conversion_of(std::string_view encoding) {
   for (const auto& [name, code] :
        {std::pair{"bayer_rggb8", cv::COLOR_BayerRGGB2RGB}, std::pair{"bayer_bggr8", cv::COLOR_BayerBGGR2RGB},
-        std::pair{"bayer_gbrg8", cv::COLOR_BayerGBRG2RGB}, std::pair{"bayer_grbg8", cv::COLOR_BayerGRBG2RGB}})
+        std::pair{"bayer_gbrg8", cv::COLOR_BayerGBRG2RGB}, std::pair{"bayer_grbg8", cv::COLOR_BayerGRBG2RGB},
+        std::pair{"yuv422", cv::COLOR_YUV2RGB_UYVY}, std::pair{"uyvy", cv::COLOR_YUV2RGB_UYVY},
+        std::pair{"yuv422_yuy2", cv::COLOR_YUV2RGB_YUY2}, std::pair{"yuyv", cv::COLOR_YUV2RGB_YUY2}})
     if (encoding == name) return code;
   return std::nullopt;
 }
+
+bool is_mosaic(std::string_view encoding) { return encoding.starts_with("bayer_"); }
 
 /// Bytes per pixel of an encoding; 0 if it is not supported.
 std::size_t bytes_of(std::string_view encoding) {
@@ -46,7 +48,7 @@ std::size_t bytes_of(std::string_view encoding) {
         std::pair{"8UC3", 3U}, std::pair{"rgba8", 4U}, std::pair{"bgra8", 4U}, std::pair{"16UC1", 2U},
         std::pair{"mono16", 2U}, std::pair{"32FC1", 4U}})
     if (encoding == name) return bytes;
-  return mosaic_of(encoding) ? 1 : 0;
+  return !conversion_of(encoding) ? 0 : is_mosaic(encoding) ? 1 : 2;
 }
 
 result<void> check_pixels(const ros_messages::image& m, const std::string& where) {
@@ -58,22 +60,15 @@ result<void> check_pixels(const ros_messages::image& m, const std::string& where
   return {};
 }
 
-template <class T>
-T read_as(const std::uint8_t* p, bool swap) {
-  std::array<std::uint8_t, sizeof(T)> bytes;
-  std::memcpy(bytes.data(), p, sizeof(T));
-  if (swap) std::reverse(bytes.begin(), bytes.end());
-  return std::bit_cast<T>(bytes);
-}
-
 /// The stored value of a depth in metres; 0 if it is invalid or too large.
 std::uint16_t stored_of(float z) {
   const double stored = std::isfinite(z) && z > 0.0F ? metres_scale * static_cast<double>(z) + 0.5 : 0.0;
   return stored < 65535.0 ? static_cast<std::uint16_t>(stored) : std::uint16_t{0};
 }
 
-std::string_view bytes_in(const ros_messages::compressed_image& m) {
-  return {reinterpret_cast<const char*>(m.data.data()), m.data.size()};
+/// A row of an image. @pre the image has enough pixels
+const char* row_of(const ros_messages::image& m, int y) {
+  return m.data.data() + std::size_t{m.step} * static_cast<std::size_t>(y);
 }
 
 }  // namespace
@@ -89,18 +84,21 @@ result<color_image> color_of(const ros_messages::image& m, const std::string& wh
   if (auto ok = check_pixels(m, where); !ok) return fail(ok.error());
   if (is_depth_encoding(m.encoding)) return fail(errc::unsupported, where, "is a depth image, not a colour image");
   color_image out(static_cast<int>(m.width), static_cast<int>(m.height));
-  if (const auto mosaic = mosaic_of(m.encoding)) {
-    if (m.width < 4 || m.height < 4)
+  if (const auto conversion = conversion_of(m.encoding)) {
+    const bool mosaic = is_mosaic(m.encoding);
+    if (mosaic && (m.width < 4 || m.height < 4))
       return fail(errc::malformed, where, "a Bayer mosaic must have at least 4x4 pixels");
-    const cv::Mat from(out.height(), out.width(), CV_8UC1, const_cast<std::uint8_t*>(m.data.data()), m.step);
+    if (!mosaic && m.width % 2 != 0)
+      return fail(errc::malformed, where, "an image with colours of pairs of pixels must have an even width");
+    const cv::Mat from(out.height(), out.width(), mosaic ? CV_8UC1 : CV_8UC2, const_cast<char*>(m.data.data()), m.step);
     cv::Mat to(out.height(), out.width(), CV_8UC3, out.data());
-    cv::cvtColor(from, to, *mosaic);
+    cv::cvtColor(from, to, *conversion);
     return out;
   }
   const std::size_t bytes = bytes_of(m.encoding);
   const bool is_rgb = m.encoding.starts_with("rgb");
   for (int y = 0; y != out.height(); ++y) {
-    const std::uint8_t* p = m.data.data() + std::size_t{m.step} * static_cast<std::size_t>(y);
+    const auto* p = reinterpret_cast<const std::uint8_t*>(row_of(m, y));
     for (int x = 0; x != out.width(); ++x, p += bytes)
       out(x, y) = bytes == 1 ? orbis::rgb8{*p, *p, *p}
                   : is_rgb   ? orbis::rgb8{p[0], p[1], p[2]}
@@ -110,13 +108,12 @@ result<color_image> color_of(const ros_messages::image& m, const std::string& wh
 }
 
 result<color_image> color_of(const ros_messages::compressed_image& m, const std::string& where) {
-  const std::string_view bytes = bytes_in(m);
   const bool has_colors = contains(m.format, "compressed bgr") || contains(m.format, "compressed rgb");
   if (m.format.starts_with("bayer_") && !has_colors)
     return fail(errc::unsupported, where,
                 "the encoding " + in_short(m.format) + " of compressed images is not supported");
-  if (orbis::io::is_png(bytes)) return orbis::io::decode_png_color(bytes, where);
-  if (orbis::io::is_jpeg(bytes)) return orbis::io::decode_jpeg(bytes, where);
+  if (orbis::io::is_png(m.data)) return orbis::io::decode_png_color(m.data, where);
+  if (orbis::io::is_jpeg(m.data)) return orbis::io::decode_jpeg(m.data, where);
   return fail(errc::unsupported, where, "is neither PNG nor JPEG (format \"" + in_short(m.format) + "\")");
 }
 
@@ -124,13 +121,14 @@ result<depth_image> depth_of(const ros_messages::image& m, const std::string& wh
   if (auto ok = check_pixels(m, where); !ok) return fail(ok.error());
   if (!is_depth_encoding(m.encoding))
     return fail(errc::unsupported, where, "is not a depth image: its encoding is " + in_short(m.encoding));
-  const bool in_metres = is_in_metres(m.encoding),
-             swap = (m.is_bigendian != 0) == (std::endian::native == std::endian::little);
+  const bool in_metres = is_in_metres(m.encoding);
+  const std::endian order = m.is_bigendian != 0 ? std::endian::big : std::endian::little;
   depth_image out(static_cast<int>(m.width), static_cast<int>(m.height));
   for (int y = 0; y != out.height(); ++y) {
-    const std::uint8_t* p = m.data.data() + std::size_t{m.step} * static_cast<std::size_t>(y);
+    const char* p = row_of(m, y);
     for (int x = 0; x != out.width(); ++x, p += in_metres ? 4 : 2)
-      out(x, y) = in_metres ? stored_of(read_as<float>(p, swap)) : read_as<std::uint16_t>(p, swap);
+      out(x, y) =
+          in_metres ? stored_of(orbis::load_number<float>(p, order)) : orbis::load_number<std::uint16_t>(p, order);
   }
   return out;
 }
@@ -138,7 +136,7 @@ result<depth_image> depth_of(const ros_messages::image& m, const std::string& wh
 result<depth_image> depth_of(const ros_messages::compressed_image& m, const std::string& where) {
   constexpr std::size_t header = 12;  // the kind, and the two quantisation parameters
   const bool has_header = contains(m.format, "compressedDepth");
-  std::string_view bytes = bytes_in(m);
+  std::string_view bytes = m.data;
   if (!is_depth_encoding(m.format) || contains(m.format, "rvl") || (is_in_metres(m.format) && !has_header))
     return fail(errc::unsupported, where,
                 "compressed depth in the format \"" + in_short(m.format) + "\" is not supported");
@@ -147,8 +145,7 @@ result<depth_image> depth_of(const ros_messages::compressed_image& m, const std:
   auto out = orbis::io::decode_png_depth(bytes, where);
   if (!out || !is_in_metres(m.format)) return out;
   // The stored value is a / z + b.
-  const bool swap = std::endian::native == std::endian::big;
-  const float a = read_as<float>(m.data.data() + 4, swap), b = read_as<float>(m.data.data() + 8, swap);
+  const auto a = orbis::load_number<float>(m.data.data() + 4), b = orbis::load_number<float>(m.data.data() + 8);
   if (!(a > 0.0F) || !std::isfinite(a) || !std::isfinite(b))
     return fail(errc::malformed, where, "the header of a compressed depth image has no scale");
   for (std::uint16_t& v : out->pixels()) v = v == 0 ? std::uint16_t{0} : stored_of(a / (static_cast<float>(v) - b));
@@ -156,4 +153,3 @@ result<depth_image> depth_of(const ros_messages::compressed_image& m, const std:
 }
 
 }  // namespace app
-#endif

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The pixels of images in ROS 1 bags, by the encoding of a `sensor_msgs/Image` or the format of a
+/// The pixels of images in ROS bags, by the encoding of a `sensor_msgs/Image` or the format of a
 /// `sensor_msgs/CompressedImage`. Formats are "ENCODING; CODEC compressed ..." or, of depth, "ENCODING; compressedDepth
 /// CODEC".
 #pragma once
@@ -32,8 +32,8 @@ inline constexpr double metres_scale = 5000.0;
   return name.size() <= most ? std::string{name} : std::string{name.substr(0, most)} + "...";
 }
 
-/// Decodes a grey or colour image, or a Bayer mosaic, with demosaicing. `where` names the source in errors. Errors:
-/// unsupported (encoding), malformed (too few pixels, damaged).
+/// Decodes a grey or colour image, YUV 4:2:2, or a Bayer mosaic, with demosaicing. `where` names the source in errors.
+/// Errors: unsupported (encoding), malformed (too few pixels, damaged).
 [[nodiscard]] orbis::result<orbis::image<orbis::rgb8>> color_of(const ros_messages::image& m, const std::string& where);
 [[nodiscard]] orbis::result<orbis::image<orbis::rgb8>> color_of(const ros_messages::compressed_image& m,
                                                                 const std::string& where);

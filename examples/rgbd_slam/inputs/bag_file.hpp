@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Topics and messages of ROS bags, regardless of their container: ROS 1 bags (format 2.0), MCAP files, and SQLite
+/// databases of rosbag2.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <limits>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <orbis/core/result.hpp>
+
+#include "inputs/byte_source.hpp"
+#include "inputs/message_reader.hpp"
+
+namespace app {
+
+/// The position of a message, and the time when it was recorded.
+struct bag_message {
+  std::int64_t time = 0;  ///< nanoseconds
+  std::uint64_t at = 0;   ///< in the file or chunk; of SQLite the row
+  std::uint32_t chunk = 0, file = 0;
+};
+
+struct bag_topic {
+  std::string name, type;  ///< type as in ROS 1: "sensor_msgs/Image"
+  message_encoding coding = message_encoding::cdr;
+  std::vector<bag_message> messages;
+};
+
+/// Reads one file. Lists only messages that `bag_recording` may need: images, cameras, transforms and poses. Memory: 24
+/// bytes per listed message and 8 per chunk; two decompressed chunks. Not thread-safe.
+class bag_file {
+ public:
+  virtual ~bag_file() = default;
+  /// The first `most` bytes of a message. Errors: malformed, unreadable, unsupported (compression).
+  [[nodiscard]] virtual orbis::result<std::string> read(const bag_message& m, std::size_t most) = 0;
+  /// Frees memory that the next call of `read` allocates again.
+  virtual void rest() {}
+
+  std::vector<bag_topic> topics;
+  std::vector<std::string> notes;  ///< warnings, e.g. that the file is truncated
+};
+
+inline constexpr std::size_t whole_message = std::size_t{1} << 30U;  ///< bytes; larger messages and chunks are rejected
+
+/// The name of a type in ROS 1: "sensor_msgs/Image" of "sensor_msgs/msg/Image".
+[[nodiscard]] std::string ros1_type(std::string_view type);
+/// Returns true if messages of this type of ROS 1 are listed.
+[[nodiscard]] bool is_listed_type(std::string_view type);
+/// The number of listed messages, e.g. "12 messages".
+[[nodiscard]] std::string count_messages(const std::vector<bag_topic>& topics);
+
+/// Lists the messages of a file. `where` names it in errors and notes. Truncated files and files without an index give
+/// their complete messages, and a note. Errors: malformed, unsupported.
+[[nodiscard]] orbis::result<std::unique_ptr<bag_file>> open_rosbag1(byte_source file, const std::string& where);
+[[nodiscard]] orbis::result<std::unique_ptr<bag_file>> open_mcap(byte_source file, const std::string& where);
+/// Leaves the database and its write-ahead log unchanged, and creates no files.
+[[nodiscard]] orbis::result<std::unique_ptr<bag_file>> open_sqlite_bag(const std::filesystem::path& path);
+
+/// Returns true if `path` is a bag or a folder with one: by the first bytes of the file, by its name if it is damaged,
+/// or by the files of the folder.
+[[nodiscard]] bool is_bag(const std::filesystem::path& path);
+
+/// The files of a bag as one: a lone file, or the folder of a rosbag2 with its parts, whose metadata.yaml may be
+/// missing.
+class bag {
+ public:
+  /// Errors: not_found, unreadable, malformed, unsupported, no_data.
+  [[nodiscard]] static orbis::result<bag> open(const std::filesystem::path& path);
+
+  /// The first `most` bytes of a message. Errors: as for `bag_file`.
+  [[nodiscard]] orbis::result<std::string> read(const bag_message& m, std::size_t most = whole_message);
+
+  std::vector<bag_topic> topics;  ///< each with messages, in order of their times
+  std::vector<std::string> notes;
+  std::vector<std::filesystem::path> files;
+
+ private:
+  std::vector<std::unique_ptr<bag_file>> parts_;
+  std::uint32_t last_ = 0;  // the part that was read last
+};
+
+}  // namespace app

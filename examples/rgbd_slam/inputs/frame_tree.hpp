@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// The coordinate frames of a robot and the transforms between them, as published on /tf_static and /tf.
+#pragma once
+
+#include <algorithm>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <orbis/core/se3.hpp>
+
+#include "inputs/ros_messages.hpp"
+
+namespace app {
+
+class frame_tree {
+ public:
+  struct link {
+    std::string parent;
+    orbis::se3 T_parent_child;
+    bool is_constant = true;
+  };
+
+  /// Adds a transform; a link whose transforms differ moves.
+  void add(const ros_messages::transform& t) {
+    const auto [at, is_new] = links_.try_emplace(t.child_frame_id, link{t.header.frame_id, t.T_parent_child});
+    link& known = at->second;
+    if (is_new || (known.parent == t.header.frame_id && is_equal(known.T_parent_child, t.T_parent_child))) return;
+    known = {t.header.frame_id, t.T_parent_child, false};
+  }
+
+  /// The link of a frame to its parent; null for a root and for an unknown frame.
+  [[nodiscard]] const link* find(const std::string& frame) const {
+    const auto at = links_.find(frame);
+    return at == links_.end() ? nullptr : &at->second;
+  }
+  /// The frame, its parent, and so on to the root. A cycle ends before it repeats.
+  [[nodiscard]] std::vector<std::string> path_to_root(std::string frame) const {
+    std::vector<std::string> path{frame};
+    for (const link* up = find(frame); up != nullptr; up = find(path.back())) {
+      if (std::ranges::find(path, up->parent) != path.end()) break;
+      path.push_back(up->parent);
+    }
+    return path;
+  }
+  /// `T_a_b`; empty if the frames are not connected by constant links.
+  [[nodiscard]] std::optional<orbis::se3> transform(const std::string& a, const std::string& b) const {
+    const auto up_a = constant_path(a), up_b = constant_path(b);
+    for (const auto& [frame_a, T_frame_a] : up_a)
+      for (const auto& [frame_b, T_frame_b] : up_b)
+        if (frame_a == frame_b) return T_frame_a.inverse() * T_frame_b;
+    return std::nullopt;
+  }
+
+ private:
+  static bool is_equal(const orbis::se3& a, const orbis::se3& b) {
+    return a.translation() == b.translation() &&
+           a.rotation().unit_quaternion().coeffs() == b.rotation().unit_quaternion().coeffs();
+  }
+  /// The ancestors of a frame up to the first link that moves, with the pose of the frame in each.
+  [[nodiscard]] std::vector<std::pair<std::string, orbis::se3>> constant_path(const std::string& frame) const {
+    std::vector<std::pair<std::string, orbis::se3>> path;
+    orbis::se3 T_up_frame;
+    for (const std::string& up : path_to_root(frame)) {
+      if (!path.empty()) {
+        const link& last = *find(path.back().first);
+        if (!last.is_constant) break;
+        T_up_frame = last.T_parent_child * T_up_frame;
+      }
+      path.emplace_back(up, T_up_frame);
+    }
+    return path;
+  }
+
+  std::map<std::string, link> links_;
+};
+
+}  // namespace app

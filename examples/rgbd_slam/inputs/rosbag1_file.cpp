@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// ROS 1 bags, format 2.0 (wiki.ros.org/Bags/Format/2.0): a record is a header of named fields and data, each after its
+// length.
+#include <string_view>
+
+#include "inputs/chunked_bag.hpp"
+
+namespace app {
+namespace {
+
+constexpr std::uint64_t magic = 13, most_head = 1U << 20U;  // bytes
+
+/// The value of a field among several; empty if there is none.
+std::string_view field(std::string_view fields, std::string_view name) {
+  message_reader in{fields, message_encoding::ros1};
+  while (in.rest() != 0 && in.ok()) {
+    const std::string_view one = in.string();
+    if (one.size() > name.size() && one.starts_with(name) && one[name.size()] == '=')
+      return one.substr(name.size() + 1);
+  }
+  return {};
+}
+
+/// The number in a field; 0 if there is none.
+template <class T>
+T number(std::string_view fields, std::string_view name) {
+  return message_reader{field(fields, name), message_encoding::ros1}.number<T>();
+}
+
+std::int64_t time_of(message_reader& in) {
+  const std::int64_t seconds = in.number<std::uint32_t>();
+  return seconds * 1'000'000'000 + in.number<std::uint32_t>();
+}
+
+class rosbag1_file final : public chunked_bag {
+ public:
+  using chunked_bag::chunked_bag;
+
+ private:
+  enum operation : std::uint8_t { message = 2, bag_header, index, chunk, chunk_info, connection };
+
+  std::uint64_t first_record() override { return magic; }
+  /// 0 if the bag was not closed.
+  std::uint64_t definitions() override {
+    const std::string bytes = file_.read(magic, 4096);
+    message_reader in{bytes, message_encoding::ros1};
+    const std::string_view fields = in.string();
+    return number<std::uint8_t>(fields, "op") == bag_header ? number<std::uint64_t>(fields, "index_pos") : 0;
+  }
+
+  std::optional<bag_record> record_at(byte_source& from, std::uint64_t at) override {
+    bag_record r;
+    if (&from == &file_ && at == file_.size() && definitions() != 0) {
+      r.what = bag_record::kind::end;
+      r.next = at + 1;
+      return r;
+    }
+    std::string bytes = from.read(at, 256);
+    const std::size_t length = message_reader{bytes, message_encoding::ros1}.number<std::uint32_t>();
+    if (length > most_head) return std::nullopt;
+    if (bytes.size() < length + 8) bytes = from.read(at, length + 8);
+    message_reader in{bytes, message_encoding::ros1};
+    const std::string_view fields = in.string();
+    r.size = in.number<std::uint32_t>();
+    const auto code = number<std::uint8_t>(fields, "op");
+    if (!in.ok() || code < message || code > connection) return std::nullopt;
+    r.data = at + in.position();
+    r.channel = number<std::uint32_t>(fields, "conn");
+    if (code == message) {
+      r.what = bag_record::kind::message;
+      message_reader time{field(fields, "time"), message_encoding::ros1};
+      r.time = time_of(time);
+    }
+    if (code == chunk) {
+      r.what = bag_record::kind::chunk;
+      r.plain_size = number<std::uint32_t>(fields, "size");
+      if (const std::string_view method = field(fields, "compression"); method != "none") r.compression = method;
+      // The lengths of a chunk are written after its messages: those of an interrupted recording are zero.
+      if (r.size == 0 && !r.compression.empty() && r.data < from.size()) {
+        r.size = from.size() - r.data;
+        r.plain_size = whole_message;
+      }
+    }
+    if (code == index) r.what = bag_record::kind::index;
+    if (code == connection) {
+      r.what = bag_record::kind::topic;
+      r.topic.name = field(fields, "topic");
+      const std::string definition = from.read(r.data, std::min(r.size, most_head));
+      r.topic.type = field(definition, "type");
+      r.topic.coding = message_encoding::ros1;
+    }
+    r.next = r.data + r.size;
+    return r;
+  }
+
+  std::vector<bag_message> entries(std::string_view bytes) override {
+    message_reader in{bytes, message_encoding::ros1};
+    std::vector<bag_message> messages(bytes.size() / 12);
+    for (bag_message& m : messages) {
+      m.time = time_of(in);
+      m.at = in.number<std::uint32_t>();
+    }
+    return messages;
+  }
+};
+
+}  // namespace
+
+orbis::result<std::unique_ptr<bag_file>> open_rosbag1(byte_source file, const std::string& where) {
+  auto bag = std::make_unique<rosbag1_file>(std::move(file), where);
+  if (auto opened = bag->open(); !opened) return orbis::fail(opened.error());
+  return bag;
+}
+
+}  // namespace app

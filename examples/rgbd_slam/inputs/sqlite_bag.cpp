@@ -1,0 +1,132 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// The SQLite databases of rosbag2: a table of topics and one of messages.
+#include "inputs/bag_file.hpp"
+
+#ifdef RGBD_SLAM_SQLITE
+#include <algorithm>
+#include <map>
+#include <utility>
+
+#include <sqlite3.h>
+#endif
+
+namespace app {
+
+using orbis::errc;
+using orbis::fail;
+using orbis::result;
+
+#ifdef RGBD_SLAM_SQLITE
+namespace {
+
+struct closer {
+  void operator()(sqlite3* database) const { sqlite3_close(database); }
+  void operator()(sqlite3_stmt* statement) const { sqlite3_finalize(statement); }
+};
+using statement = std::unique_ptr<sqlite3_stmt, closer>;
+
+/// The bytes of a column, whose type may be text or a blob.
+std::string_view column(const statement& row, int i) {
+  const void* bytes = sqlite3_column_blob(row.get(), i);
+  const int size = sqlite3_column_bytes(row.get(), i);
+  return bytes == nullptr ? std::string_view{}
+                          : std::string_view{static_cast<const char*>(bytes), static_cast<std::size_t>(size)};
+}
+
+/// Makes reading the last page of a truncated file an error; SQLite would complete it with zeros.
+void reject_short_reads(sqlite3* database) {
+  sqlite3_file* file = nullptr;
+  sqlite3_file_control(database, "main", SQLITE_FCNTL_FILE_POINTER, &file);
+  if (file == nullptr || file->pMethods == nullptr) return;
+  static const sqlite3_io_methods& plain = *file->pMethods;  // the same for all files of "unix-none"
+  static const sqlite3_io_methods strict = [] {
+    sqlite3_io_methods methods = plain;
+    methods.xRead = [](sqlite3_file* from, void* to, int size, sqlite3_int64 at) {
+      const int state = plain.xRead(from, to, size, at);
+      return state == SQLITE_IOERR_SHORT_READ ? SQLITE_IOERR_READ : state;
+    };
+    return methods;
+  }();
+  file->pMethods = &strict;
+}
+
+class sqlite_bag final : public bag_file {
+ public:
+  explicit sqlite_bag(std::string path) : path_{std::move(path)} {}
+
+  result<void> open() {
+    // Without locks and in exclusive mode, SQLite reads a write-ahead log but creates no files. A "writable" schema
+    // makes it accept files that are shorter than their header indicates.
+    sqlite3* opened = nullptr;
+    sqlite3_open_v2(path_.c_str(), &opened, SQLITE_OPEN_READONLY, "unix-none");
+    database_.reset(opened);
+    reject_short_reads(opened);
+    sqlite3_exec(database_.get(), "PRAGMA locking_mode = EXCLUSIVE; PRAGMA writable_schema = ON", nullptr, nullptr,
+                 nullptr);
+
+    std::map<std::int64_t, std::size_t> topic_of_id;
+    const statement rows = prepare("SELECT id, name, type, serialization_format FROM topics");
+    int state = sqlite3_step(rows.get());
+    for (; state == SQLITE_ROW; state = sqlite3_step(rows.get())) {
+      const std::string type = ros1_type(column(rows, 2));
+      if (!is_listed_type(type) || column(rows, 3) != "cdr") continue;
+      topic_of_id[sqlite3_column_int64(rows.get(), 0)] = topics.size();
+      topics.push_back({std::string{column(rows, 1)}, type, message_encoding::cdr, {}});
+    }
+    const statement found = prepare("SELECT id, topic_id, timestamp FROM messages ORDER BY id");
+    read_ = prepare("SELECT data FROM messages WHERE id = ?");
+    if (!rows || !found || !read_) return fail(errc::malformed, path_, "is not a readable bag of ROS 2: " + reason());
+    const bool has_topics = state == SQLITE_DONE;
+    for (state = sqlite3_step(found.get()); state == SQLITE_ROW; state = sqlite3_step(found.get()))
+      if (const auto topic = topic_of_id.find(sqlite3_column_int64(found.get(), 1)); topic != topic_of_id.end())
+        topics[topic->second].messages.push_back(
+            {sqlite3_column_int64(found.get(), 2), static_cast<std::uint64_t>(sqlite3_column_int64(found.get(), 0))});
+    if (state == SQLITE_DONE && has_topics) return {};
+    const std::string why = reason();
+    for (bag_topic& t : topics)
+      std::erase_if(t.messages, [&](const bag_message& m) { return !read(m, whole_message); });
+    notes.push_back(path_ + ": the bag is truncated or damaged (" + why + "); " + count_messages(topics) +
+                    " can be read");
+    return {};
+  }
+
+  result<std::string> read(const bag_message& m, std::size_t most) override {
+    sqlite3_bind_int64(read_.get(), 1, static_cast<sqlite3_int64>(m.at));
+    const int state = sqlite3_step(read_.get());
+    std::string bytes{state == SQLITE_ROW ? column(read_, 0).substr(0, most) : std::string_view{}};
+    const int error = sqlite3_errcode(database_.get());
+    const std::string why = reason();
+    sqlite3_reset(read_.get());
+    if (state == SQLITE_ROW && (error == SQLITE_ROW || error == SQLITE_OK)) return bytes;
+    return fail(errc::malformed, path_, "message " + std::to_string(m.at) + " cannot be read: " + why);
+  }
+
+ private:
+  [[nodiscard]] statement prepare(const char* sql) const {
+    sqlite3_stmt* made = nullptr;
+    sqlite3_prepare_v2(database_.get(), sql, -1, &made, nullptr);
+    return statement{made};
+  }
+  [[nodiscard]] std::string reason() const { return sqlite3_errmsg(database_.get()); }
+
+  std::string path_;
+  std::unique_ptr<sqlite3, closer> database_;
+  statement read_;
+};
+
+}  // namespace
+
+result<std::unique_ptr<bag_file>> open_sqlite_bag(const std::filesystem::path& path) {
+  auto bag = std::make_unique<sqlite_bag>(path.string());
+  if (auto opened = bag->open(); !opened) return fail(opened.error());
+  return bag;
+}
+#else
+result<std::unique_ptr<bag_file>> open_sqlite_bag(const std::filesystem::path& path) {
+  return fail(errc::unsupported, path.string(),
+              "is an SQLite database, for which this build has no library (libsqlite3-dev)");
+}
+#endif
+
+}  // namespace app

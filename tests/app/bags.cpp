@@ -1,0 +1,192 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// The bags in tests/app/bags: containers and messages that other implementations wrote, and what is left of them if
+// they are cut off.
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <orbis/core/file.hpp>
+
+#include "inputs/bag_file.hpp"
+#include "inputs/file_recording.hpp"
+#include "io/recordings.hpp"
+#include "support/catch.hpp"
+
+using namespace orbis;
+using Catch::Matchers::Contains;
+using slam::sensor_kind;
+using test::message_of;
+using test::temporary_folder;
+
+namespace {
+
+const std::filesystem::path bags{BAGS};
+constexpr camera::intrinsics k{16, 12, 20.0, 20.0, 7.5, 5.5};
+
+const std::string color_topic = "/camera/camera/color/image_raw";
+
+/// The colours that make_bags.mjs writes.
+void check_color(const image<rgb8>& color, std::size_t i) {
+  REQUIRE(color.width() == 16);
+  REQUIRE(color.height() == 12);
+  for (const auto& [x, y] : {std::pair{0, 0}, {15, 11}, {3, 7}})
+    CHECK(color(x, y) == rgb8{static_cast<std::uint8_t>(10 * static_cast<int>(i) + x),
+                              static_cast<std::uint8_t>(20 + y),
+                              static_cast<std::uint8_t>(200 - x - static_cast<int>(i))});
+}
+
+/// The depth that make_bags.mjs writes: a wall at 400 mm, then the pixels from `first` to `last` at 410 mm, 420 mm...
+void check_depth(const app::source_frame& frame, std::size_t i, std::pair<int, int> first, std::pair<int, int> last) {
+  const double stored = (0.4 + 0.01 * static_cast<double>(i)) * frame.depth_scale;
+  for (int y = 0; y != 12; ++y)
+    for (int x = 0; x != 16; ++x) {
+      const bool is_set = i == 0 || (x >= first.first && x <= last.first && y >= first.second && y <= last.second);
+      INFO(x << ' ' << y);
+      CHECK(frame.depth(x, y) == (is_set ? static_cast<std::uint16_t>(std::lround(stored)) : 0));
+    }
+}
+
+/// Checks `n` frames at intervals of 0.1 s, with depth that is registered in the bag.
+void check_frames(const app::file_recording& bag, std::size_t n, double begin) {
+  CHECK(bag.sensor == sensor_kind::rgbd);
+  CHECK(bag.camera.model.k() == k);
+  REQUIRE(bag.size() == n);
+  for (std::size_t i = 0; i != n; ++i) {
+    const auto frame = bag.frame(i).value();
+    CHECK(frame.timestamp == Approx(begin + 0.1 * static_cast<double>(i)).epsilon(1e-15).margin(1e-6));
+    check_color(frame.color, i);
+    check_depth(frame, i, {6, 4}, {6, 4});
+    CHECK(bag.color(i).value() == frame.color);
+  }
+}
+
+std::vector<std::filesystem::path> all_bags() {
+  std::vector<std::filesystem::path> files;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator{bags})
+    if (app::is_bag(entry.path()) && entry.is_regular_file()) files.push_back(entry.path());
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+}  // namespace
+
+TEST_CASE("bags of all containers and compressions have the same frames") {
+  const auto [name, frames, begin] = GENERATE(table<const char*, std::size_t, double>({
+      {"no_chunks.mcap", 3, 100.0},
+      {"no_index_lz4.mcap", 3, 0.0},
+      {"no_stamps.mcap", 3, 50.25},  // the times of recording
+      {"ros1.mcap", 3, 5.0},
+      {"split", 4, 1.7e9},
+      {"messages_zstd.db3", 3, 1.7e9},
+      {"wal/wal.db3", 3, 1.7e9},
+      {"bz2.bag", 3, 1.7e9},
+      {"lz4.bag", 3, 1.7e9},
+  }));
+  INFO(name);
+  REQUIRE(app::is_bag(bags / name));
+  const auto bag = app::open_bag(bags / name, {}).value();
+  CHECK(bag->notes.empty());
+  check_frames(*bag, frames, begin);
+}
+
+TEST_CASE("depth that is not registered is registered by both cameras and the static transforms") {
+  const std::string name = GENERATE("realsense_zstd.mcap", "none.bag");
+  const auto bag = app::open_bag(bags / name, {}).value();
+  CHECK(bag->notes.empty());
+  CHECK(bag->images_of == color_topic + " and /camera/camera/depth/image_rect_raw (registered by tf)");
+  REQUIRE(bag->size() == 3);
+  for (std::size_t i = 0; i != 3; ++i) {
+    const auto frame = bag->frame(i).value();
+    check_color(frame.color, i);
+    // The depth camera is 15 mm to the right; its pixel (6, 4) has twice the size of a colour pixel.
+    check_depth(frame, i, {8, 5}, {10, 6});
+  }
+  CHECK_THAT(message_of(app::open_bag(bags / "no_tf.mcap", {})),
+             Contains("depth is not registered to colour") && Contains("no static transform connects them"));
+  const auto color = app::open_bag(bags / "no_tf.mcap", {.topics = {color_topic}}).value();
+  CHECK(color->sensor == sensor_kind::monocular);
+  CHECK(color->images_of == color_topic);
+}
+
+TEST_CASE("an interrupted bag gives its complete messages, and a note") {
+  const std::string name = GENERATE("interrupted.bag.active", "interrupted_lz4.bag.active");
+  const auto bag = app::open_bag(bags / name, {}).value();
+  REQUIRE(!bag->notes.empty());
+  CHECK_THAT(bag->notes[0], Contains("the bag is truncated, damaged or was not closed; "));
+  check_frames(*bag, 2, 1.7e9);
+}
+
+TEST_CASE("a database and its write-ahead log are not changed, and no files are created") {
+  const temporary_folder folder;
+  for (const char* file : {"wal.db3", "wal.db3-wal"}) std::filesystem::copy(bags / "wal" / file, folder.path() / file);
+  CHECK(app::is_bag(folder.path()));
+  check_frames(*app::open_bag(folder.path() / "wal.db3", {}).value(), 3, 1.7e9);
+  std::size_t count = 0;
+  for (const auto& entry : std::filesystem::directory_iterator{folder.path()}) {
+    CHECK(read_file(entry.path()).value() == read_file(bags / "wal" / entry.path().filename()).value());
+    ++count;
+  }
+  CHECK(count == 2);
+  std::filesystem::remove(folder.path() / "wal.db3-wal");
+  CHECK(app::open_bag(folder.path(), {}).value()->size() == 2);
+}
+
+TEST_CASE("a folder without metadata, with missing or damaged parts gives the rest") {
+  const temporary_folder folder;
+  for (const char* file : {"split_0.db3", "split_1.db3"})
+    std::filesystem::copy(bags / "split" / file, folder.path() / file);
+  CHECK(app::is_bag(folder.path()));
+  const auto whole = app::open_bag(folder.path(), {}).value();
+  CHECK_THAT(whole->notes.at(0), Contains("metadata.yaml is missing or damaged"));
+  check_frames(*whole, 4, 1.7e9);
+
+  std::filesystem::copy(bags / "split/metadata.yaml", folder.path() / "metadata.yaml");
+  folder.write("split_1.db3", "damaged");
+  const auto first = app::open_bag(folder.path(), {}).value();
+  CHECK_THAT(first->notes.at(0), Contains("split_1.db3: is not a readable bag"));
+  CHECK(first->size() == 2);
+  std::filesystem::remove(folder.path() / "split_1.db3");
+  CHECK_THAT(app::open_bag(folder.path(), {}).value()->notes.at(0),
+             Contains("split_1.db3, listed in metadata.yaml, is missing"));
+
+  folder.write("split_1.db3.zstd", "\x28\xb5\x2f\xfd and so on");
+  CHECK_THAT(message_of(app::open_bag(folder.path(), {})),
+             Contains("is compressed as a whole; decompress it first: zstd -d split_1.db3.zstd"));
+  std::filesystem::remove(folder.path() / "split_0.db3");
+  std::filesystem::remove(folder.path() / "split_1.db3.zstd");
+  CHECK_THAT(message_of(app::open_bag(folder.path(), {})), Contains("contains no .db3 or .mcap file"));
+  CHECK(!app::is_bag(BAGS "/README.md"));
+  CHECK(!app::is_bag(bags));  // it has other files
+}
+
+TEST_CASE("a bag that is cut off anywhere gives complete frames or an error") {
+  const temporary_folder folder;
+  std::size_t opened = 0, failed = 0;
+  for (const auto& bag : all_bags()) {
+    INFO(bag);
+    const std::string bytes = read_file(bag).value();
+    const std::string name = bag.filename().string();
+    for (std::size_t size = bytes.size(); size > 0; size -= std::min<std::size_t>(size, 61)) {
+      folder.write(name, std::string_view{bytes}.substr(0, size));
+      const auto recording = app::open_bag(folder.path() / name, {});
+      ++(recording ? opened : failed);
+      if (!recording) {
+        CHECK(recording.error().to_string().size() < 600);
+        continue;
+      }
+      for (std::size_t i = 0; i != (*recording)->size(); ++i) {
+        const auto frame = (*recording)->frame(i);
+        INFO(message_of(frame));
+        REQUIRE(frame);
+        check_color(frame->color, i + (name == "split_1.db3" ? 2 : 0));
+      }
+    }
+  }
+  CHECK(opened > failed / 4);
+  CHECK(failed > 100);
+}
