@@ -181,6 +181,9 @@ void add_recording_options(CLI::App& cmd, settings& s) {
       ->delimiter(',')
       ->expected(1, 2)
       ->type_name("A,B");
+  cmd.add_option("--truth-topic", s.truth_topic,
+                 "ground truth of a ROS bag: topic of poses, odometry or transforms (/tf) (none)")
+      ->type_name("NAME");
   add_camera_option(cmd, s);
 }
 
@@ -380,7 +383,9 @@ std::variant<settings, exit_code> read_command_line(int argc, char** argv) {
 
   CLI::App* run = cli.add_subcommand(
       "run", "SLAM on a recording (TUM, 7-Scenes, ICL-NUIM, ScanNet; stereo or monocular: KITTI, ASL, images)");
-  run->add_option("DATASET", s.input, "folder of the recording, ROS bag (.bag, .mcap, .db3 or folder), or video")->required()->type_name("");
+  run->add_option("DATASET", s.input, "folder of the recording, ROS bag (.bag, .mcap, .db3 or folder), or video")
+      ->required()
+      ->type_name("");
   add_recording_options(*run, s);
   add_frame_options(*run, s);
   add_map_options(*run, s);

@@ -43,6 +43,7 @@ struct settings {
   std::string format = "auto";
   std::vector<std::string>
       topics;               ///< image topics of a ROS bag: colour and depth, or left and right; empty: automatic
+  std::string truth_topic;  ///< topic of poses of a ROS bag; empty: no ground truth
   std::string camera;       ///< file or preset; empty: from the recording
   std::size_t frames = 0;   ///< maximum number of frames; 0: all
   std::size_t stride = 1;   ///< use every stride-th frame

@@ -293,7 +293,7 @@ result<frame_source> open_file(const settings& s) {
                     std::filesystem::absolute(s.input).parent_path().string());
   const auto camera = camera_option(s);
   if (!camera) return fail(camera.error());
-  const file_recording_options options{.sensor = wanted_sensor(s), .camera = *camera, .topics = s.topics};
+  const file_recording_options options{.sensor = wanted_sensor(s), .camera = *camera, .topics = s.topics, .truth_topic = s.truth_topic};
   auto opened = is_bag(s.input) ? open_bag(s.input, options) : open_video(s.input, options);
   if (!opened) return fail(with_option(opened.error()));
   const std::shared_ptr<const file_recording> recording = *std::move(opened);
@@ -306,6 +306,9 @@ result<frame_source> open_file(const settings& s) {
   source.frames = limited(recording->size(), s);
   source.notes = recording->notes;
   source.files = recording->files;
+  source.ground_truth = recording->ground_truth;
+  source.truth_of = recording->truth_of;
+  subtract_origin(source);
   source.frame = [recording, stride = s.stride](std::size_t i) { return recording->frame(i * stride); };
   source.color = [recording, stride = s.stride](std::size_t i) { return recording->color(i * stride); };
   return source;
@@ -518,7 +521,8 @@ std::string describe(const frame_source& source) {
   return source.title + ": " + (source.is_live ? "live camera" : std::to_string(source.frames) + " frames") + ", " +
          std::to_string(source.camera.model.width()) + " x " + std::to_string(source.camera.model.height()) +
          (source.images_of.empty() ? "" : ", images from " + source.images_of) +
-         (source.ground_truth.empty() ? "" : ", with ground truth");
+         (source.ground_truth.empty() ? "" : ", with ground truth") +
+         (source.truth_of.empty() ? "" : " from " + source.truth_of);
 }
 
 }  // namespace
@@ -537,9 +541,9 @@ result<frame_source> open_source(const settings& s, console& console) {
   const auto open = [&] {
     if (s.what == command::live) return open_live(s);
     const bool bag = is_bag(s.input);
-    if (!s.topics.empty() && !bag)
-      return result<frame_source>{
-          fail(orbis::errc::invalid_argument, "--topics", "needs a ROS bag; " + s.input.string() + " is none")};
+    if ((!s.topics.empty() || !s.truth_topic.empty()) && !bag)
+      return result<frame_source>{fail(orbis::errc::invalid_argument, s.topics.empty() ? "--truth-topic" : "--topics",
+                                       "needs a ROS bag; " + s.input.string() + " is none")};
     if (bag || std::filesystem::is_regular_file(s.input, ignored)) return open_file(s);
     switch (sensor_of(s)) {
       case sensor_kind::stereo: return open_stereo_recording(s);

@@ -54,6 +54,7 @@ struct frame_source {
   std::function<void()> rest;
   orbis::vec3 origin = orbis::vec3::Zero();  ///< subtracted from all positions, metres
   orbis::trajectory ground_truth;            ///< empty if unknown
+  std::string truth_of;                      ///< topic and frames of a bag's ground truth; empty for other sources
   /// The ground truth has no orientations: it defines no world frame, and cannot place depth images.
   bool truth_has_positions_only = false;
   std::vector<std::filesystem::path> files;  ///< input files

@@ -54,6 +54,12 @@ struct topic : bag_topic {
   }
 };
 
+bool is_transform_type(const std::string& type) { return type == "tf2_msgs/TFMessage" || type == "tf/tfMessage"; }
+bool is_pose_type(const std::string& type) {
+  return type == "nav_msgs/Odometry" || type == "geometry_msgs/PoseStamped" ||
+         type == "geometry_msgs/PoseWithCovarianceStamped";
+}
+
 bool contains(const std::string& text, std::string_view part) { return text.find(part) != std::string::npos; }
 
 /// Returns true if the topics are those of a left and a right camera.
@@ -91,6 +97,8 @@ class bag_recording final : public file_recording {
     if (auto known = find_camera(options); !known) return known;
     if (sensor == sensor_kind::rgbd)
       if (auto registered = register_depth(); !registered) return registered;
+    if (!options.truth_topic.empty())
+      if (auto known = read_truth(options.truth_topic); !known) return known;
     if (auto fits = frame(0); !fits) return fail(fits.error());
     return {};
   }
@@ -323,9 +331,16 @@ class bag_recording final : public file_recording {
     if (!right) return fail(right.error());
     // P of the right camera is that of the left one, shifted along x; R rotates the rays of a camera to rectified ones.
     const double baseline = other->P[0] > 0.0 ? (info->P[3] - other->P[3]) / other->P[0] : 0.0;
-    if (!(baseline > 0.0)) return fail(errc::malformed, where(*second_), "P of its CameraInfo has no baseline");
     orbis::se3 T_left_right{orbis::so3{}, orbis::vec3{baseline, 0.0, 0.0}};
-    if (!first_->is_rectified()) {
+    if (!(baseline > 0.0)) {
+      const auto by_frames = read_frames(false).transform(first_->frame_id, second_->frame_id);
+      if (!by_frames || first_->frame_id == second_->frame_id)
+        return fail(errc::malformed, where(*second_),
+                    "P of its CameraInfo has no baseline, and no static transform "
+                    "connects its frame to that of " +
+                        first_->name);
+      T_left_right = *by_frames;
+    } else if (!first_->is_rectified()) {
       const auto rotation = [](const auto& R) -> std::optional<orbis::so3> {
         orbis::mat3 m;
         m << R[0], R[1], R[2], R[3], R[4], R[5], R[6], R[7], R[8];
@@ -352,12 +367,15 @@ class bag_recording final : public file_recording {
   template <class F>
   void for_each_transform(bool is_static, const F& f) const {
     for (const bag_topic& t : bag_.topics)
-      if ((t.type == "tf2_msgs/TFMessage" || t.type == "tf/tfMessage") && t.name.ends_with("tf_static") == is_static)
+      if (is_transform_type(t.type) && t.name.ends_with("tf_static") == is_static)
         for (const bag_message& m : t.messages)
           if (const auto bytes = read(m))
             if (const auto transforms =
                     ros_messages::parse<std::vector<ros_messages::transform>>(*bytes, t.coding, t.name))
-              for (const ros_messages::transform& one : *transforms) f(one);
+              for (ros_messages::transform one : *transforms) {
+                if (one.header.stamp == 0) one.header.stamp = m.time;
+                f(one);
+              }
   }
   /// The frames of /tf_static, and those of /tf if `with_moving` or if there is no such topic.
   [[nodiscard]] frame_tree read_frames(bool with_moving) const {
@@ -393,6 +411,92 @@ class bag_recording final : public file_recording {
     registration_.emplace(*model, camera.model, *T_color_depth);
     images_of += " (registered by tf)";
     return {};
+  }
+
+  /// Reads the poses of a topic as the ground truth of the camera.
+  result<void> read_truth(const std::string& name) {
+    std::string others;
+    const bag_topic* from = nullptr;
+    for (const bag_topic& t : bag_.topics) {
+      if (!is_transform_type(t.type) && !is_pose_type(t.type)) continue;
+      if (t.name == name) from = &t;
+      others += (others.empty() ? "; there are poses in " : ", ") + t.name;
+    }
+    if (from == nullptr) return fail(errc::invalid_argument, path_, "has no poses in " + name + others);
+    const auto known = is_transform_type(from->type) ? read_truth_of_frames(name) : read_truth_of_body(*from);
+    if (!known) return known;
+    if (straight_)
+      for (orbis::stamped_pose& p : ground_truth)
+        p.T_world_camera = p.T_world_camera * orbis::se3{straight_->R_left_rectified(), orbis::vec3::Zero()};
+    if (ground_truth.empty()) return fail(errc::no_data, path_, "no pose of " + name + " can be used");
+    return {};
+  }
+
+  result<void> read_truth_of_body(const bag_topic& from) {
+    const bool has_child = from.type == "nav_msgs/Odometry";
+    ros_messages::transform pose;
+    for (const bag_message& m : from.messages) {
+      const auto bytes = read(m);
+      if (!bytes) return fail(bytes.error());
+      message_reader in{*bytes, from.coding};
+      read_pose(in, pose, has_child);
+      if (!in.ok()) return fail(errc::malformed, path_ + " " + from.name, "a pose is damaged");
+      ground_truth.push_back({seconds(pose.header.stamp != 0 ? pose.header.stamp : m.time), pose.T_parent_child});
+    }
+    sort_by_time(ground_truth);
+    const std::string camera_frame = first_->frame_id;
+    truth_of = from.name + " (" + (has_child ? pose.child_frame_id : "body") + " in " + pose.header.frame_id + ")";
+    const auto T_body_camera =
+        has_child ? read_frames(false).transform(pose.child_frame_id, camera_frame) : std::nullopt;
+    for (orbis::stamped_pose& p : ground_truth)
+      if (T_body_camera) p.T_world_camera = p.T_world_camera * *T_body_camera;
+    if (!has_child)
+      notes.push_back("poses of " + from.name + " are used as those of the camera; " + from.type + " names no body");
+    else if (!T_body_camera)
+      notes.push_back("poses of " + from.name + " are those of " + pose.child_frame_id +
+                      ", not of the camera: no static transform connects it to " + camera_frame);
+    return {};
+  }
+
+  /// The poses of the camera's frame in the root of the frames, at the times of the images.
+  result<void> read_truth_of_frames(const std::string& name) {
+    constexpr double most_gap = 0.5, most_distance = 0.05;  // seconds; between two transforms, and to the nearest one
+    const frame_tree tree = read_frames(true);
+    const std::vector<std::string> path = tree.path_to_root(first_->frame_id);
+    std::map<std::string, orbis::trajectory> moving;  // by the name of the child
+    for (const std::string& frame : path)
+      if (const auto* link = tree.find(frame); link != nullptr && !link->is_constant) moving[frame];
+    if (moving.empty())
+      return fail(errc::no_data, path_,
+                  "no transform of " + name + " moves the camera's frame \"" + path.front() + "\", whose root is \"" +
+                      path.back() + "\"");
+    for_each_transform(false, [&](const ros_messages::transform& t) {
+      const auto at = moving.find(t.child_frame_id);
+      if (at != moving.end() && t.header.frame_id == tree.find(t.child_frame_id)->parent)
+        at->second.push_back({seconds(t.header.stamp), t.T_parent_child});
+    });
+    for (auto& [frame, poses] : moving) sort_by_time(poses);
+    for (const orbis::index_pair& f : frames_) {
+      const double time = first_->times[f.first];
+      std::optional<orbis::se3> T_up_camera{orbis::se3{}};
+      for (std::size_t i = 0; i + 1 < path.size() && T_up_camera; ++i) {
+        const auto at = moving.find(path[i]);
+        const auto T_up = at == moving.end() ? std::optional{tree.find(path[i])->T_parent_child}
+                                             : orbis::interpolate(at->second, time, most_gap, most_distance);
+        T_up_camera = T_up ? std::optional{*T_up * *T_up_camera} : std::nullopt;
+      }
+      if (T_up_camera) ground_truth.push_back({time, *T_up_camera});
+    }
+    truth_of = name + " (" + path.front() + " in " + path.back() + ")";
+    if (ground_truth.size() != frames_.size())
+      notes.push_back(std::to_string(frames_.size() - ground_truth.size()) + " of " + std::to_string(frames_.size()) +
+                      " images have no pose in " + name);
+    return {};
+  }
+
+  static void sort_by_time(orbis::trajectory& poses) {
+    std::ranges::stable_sort(poses, {}, &orbis::stamped_pose::timestamp);
+    poses.erase(std::ranges::unique(poses, {}, &orbis::stamped_pose::timestamp).begin(), poses.end());
   }
 
   /// Images per second.

@@ -13,6 +13,7 @@
 #include <orbis/camera/settings.hpp>
 #include <orbis/core/image.hpp>
 #include <orbis/core/result.hpp>
+#include <orbis/core/trajectory.hpp>
 
 #include "source.hpp"
 
@@ -32,6 +33,8 @@ class file_recording {
   std::string kind;       ///< "video", "ROS bag"
   std::string images_of;  ///< the used topics of a bag; empty for videos
   orbis::camera::camera_settings camera;
+  orbis::trajectory ground_truth;            ///< empty if unknown
+  std::string truth_of;                      ///< the topic and the frames of the ground truth
   std::vector<std::string> notes;            ///< warnings
   std::vector<std::filesystem::path> files;  ///< input files
 };
@@ -40,6 +43,7 @@ struct file_recording_options {
   std::optional<orbis::slam::sensor_kind> sensor{};        ///< empty: by the file
   std::optional<orbis::camera::camera_settings> camera{};  ///< replaces the file's calibration
   std::vector<std::string> topics{};                       ///< topics of a bag; empty: automatic
+  std::string truth_topic{};                               ///< topic of poses of a bag; empty: no ground truth
 };
 
 /// Returns true if this build reads videos.
@@ -55,8 +59,9 @@ struct file_recording_options {
 /// Opens a bag of ROS 1 or ROS 2 (see bag_file.hpp) with `sensor_msgs/Image` or `sensor_msgs/CompressedImage`, and
 /// `sensor_msgs/CameraInfo`: colour and depth (16UC1 in millimetres, 32FC1 in metres), the images of a stereo camera,
 /// or of one camera. See ros_images.hpp for the encodings. Depth of another frame than colour is registered with both
-/// cameras and the transform between them. Reads through the bag once, for the times of its messages. Errors: as above,
-/// and invalid_argument (missing topics; the message lists the existing ones).
+/// cameras and the transform between them. The ground truth comes from poses (`PoseStamped`,
+/// `PoseWithCovarianceStamped`, `Odometry`) or from `/tf`. Reads through the bag once, for the times of its messages.
+/// Errors: as above, and invalid_argument (missing topics; the message lists the existing ones).
 [[nodiscard]] orbis::result<std::unique_ptr<file_recording>> open_bag(const std::filesystem::path& path,
                                                                       const file_recording_options& options);
 

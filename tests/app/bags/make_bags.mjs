@@ -147,6 +147,26 @@ function scene(version, { begin, frames = 3, kind = "raw", zero_stamps = false, 
   return out.map(([topic, type, t, message]) => ({ topic, type, t, data: serialize(version, type, message) }));
 }
 
+/// Two cameras whose CameraInfo has no baseline: their frames are 0.25 m apart.
+function stereo() {
+  const version = 2, out = [];
+  const put = (topic, type, t, message) => out.push({ topic, type, t, data: serialize(version, type, message) });
+  put("/tf_static", "tf2_msgs/TFMessage", 1, {
+    transforms: [{ header: header(version, 1, "left_optical"), child_frame_id: "right_optical", transform: { translation: vector(0.25, 0, 0), rotation: no_turn } }],
+  });
+  const k = [20, 0, 7.5, 0, 20, 5.5, 0, 0, 1], r = [1, 0, 0, 0, 1, 0, 0, 0, 1], p = [20, 0, 7.5, 0, 0, 20, 5.5, 0, 0, 0, 1, 0];
+  for (let i = 0; i < 3; ++i)
+    for (const [side, encoding, bytes] of [["left", "mono8", 1], ["right", "yuv422_yuy2", 2]]) {
+      const common = { header: header(version, 1 + 0.1 * i, side + "_optical"), height: 12, width: 16 };
+      put(`/stereo/${side}/camera_info`, "sensor_msgs/CameraInfo", 1, {
+        ...common, distortion_model: "plumb_bob", d: [0, 0, 0, 0, 0], k, r, p, binning_x: 0, binning_y: 0,
+        roi: { x_offset: 0, y_offset: 0, height: 0, width: 0, do_rectify: false },
+      });
+      put(`/stereo/${side}/image_raw`, "sensor_msgs/Image", 1, { ...common, encoding, is_bigendian: 0, step: 16 * bytes, data: Buffer.alloc(16 * 12 * bytes, 126) });
+    }
+  return out;
+}
+
 // --- containers -----------------------------------------------------------------------------------------------------
 
 const ros2_type = (type) => type.replace("/", "/msg/");
@@ -247,6 +267,8 @@ if (process.argv[2] !== "--check") {
   await write_mcap("ros1.mcap", scene(1, { begin: 5, kind: "compressed", truth: false }), { version: 1 });
   await write_mcap("no_tf.mcap", scene(2, { begin: epoch, tf: false, truth: false }), { compression: "zstd" });
   await write_mcap("no_stamps.mcap", scene(2, { begin: 50, kind: "registered", tf: false, truth: false, zero_stamps: true }), { compression: "zstd" });
+
+  await write_mcap("stereo.mcap", stereo(), { compression: "zstd" });
 
   mkdirSync("split", { recursive: true });
   const two = scene(2, { begin: epoch, frames: 4, kind: "compressed", truth: false });
