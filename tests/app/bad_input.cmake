@@ -159,6 +159,7 @@ check(frames EQUAL 3)
 
 # What only some recordings have.
 app_fails(2 "--topics: needs a ROS bag; good is none" run good --out out --topics /a,/b)
+app_fails(2 "--truth-topic: needs a ROS bag; good is none" run good --out out --truth-topic /a)
 app_fails(2 "good: a monocular recording cannot produce a map" map good --out out --sensor mono)
 foreach(sequence seq-01 seq-02)
   file(COPY_FILE ${WORK}/good/rgb/000000.png ${WORK}/${sequence}.png)

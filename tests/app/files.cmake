@@ -12,6 +12,11 @@ check(err MATCHES "images from /camera/color/image_raw and /camera/depth_registe
 summary(tracked ${WORK}/bag tracked)
 check(tracked EQUAL 20)
 must_exist(${WORK}/bag trajectory.txt cloud.ply map.bt summary.json report.html)
+app(0 run in/room --truth-topic /odom --deterministic --resolution 0.1 --out rosbag2)
+check(err MATCHES "room: 20 frames, 320 x 240, images from /camera/color/image_raw and /camera/depth_registered/image, with ground truth from /odom .camera in world.")
+summary(ate ${WORK}/rosbag2 ate_rmse_m)
+check(ate LESS 0.01)
+app_fails(2 "has no poses in /none; there are poses in /odom" run in/room --truth-topic /none --out out)
 app(0 run in/room.bag --topics /camera/color/image_raw,/camera/depth_registered/image --deterministic --frames 3 --resolution 0.1 --out two)
 app_fails(2 "has no images in /none; it contains /camera/color/image_raw .rgb8., /camera/depth_registered/image .32FC1."
           run in/room.bag --topics /none --out out)

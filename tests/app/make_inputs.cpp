@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// make_inputs FOLDER FRAMES WIDTH: a synthetic recording as a ROS bag (room.bag) and as a video of two images side by
-// side (pair.avi, if this build has a library for it) with camera.toml. Names the optional files that it made.
+// make_inputs FOLDER FRAMES WIDTH: a synthetic recording as bags of ROS 1 and ROS 2 (room.bag, room) and as a video of
+// two images side by side (pair.avi, if this build has a library for it) with camera.toml. Names the optional files
+// that it made.
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
@@ -25,18 +26,24 @@ int main(int argc, char** argv) {
   std::filesystem::create_directories(folder);
   if (!orbis::io::write_camera(folder / "camera.toml", recording.stereo_camera())) return 1;
 
-  orbis::test::ros_bag_writer bag{folder / "room.bag"};
+  std::filesystem::create_directories(folder / "room");
+  orbis::test::ros_bag_writer old{folder / "room.bag", 1}, bag{folder / "room" / "room_0.mcap", 2};
   for (std::size_t i = 0; i != recording.size(); ++i) {
     const auto frame = recording.frame(i).value();
     const double t = 1000.0 + frame.timestamp;
     orbis::image<float> depth(frame.depth.width(), frame.depth.height());
     for (int y = 0; y != depth.height(); ++y)
       for (int x = 0; x != depth.width(); ++x) depth(x, y) = static_cast<float>(frame.depth(x, y) / frame.depth_scale);
-    bag.image("/camera/color/image_raw", t, "rgb8", frame.color.view());
-    bag.image<float>("/camera/depth_registered/image", t, "32FC1", depth.view());
+    for (orbis::test::ros_bag_writer* to : {&old, &bag}) {
+      to->image("/camera/color/image_raw", t, "rgb8", frame.color.view());
+      to->image<float>("/camera/depth_registered/image", t, "32FC1", depth.view());
+      to->odometry("/odom", t, recording.ground_truth()[i].T_world_camera);
+    }
   }
-  bag.info("/camera/color/camera_info", 1000.0, recording.camera().model.k());
-  bag.close();
+  for (orbis::test::ros_bag_writer* to : {&old, &bag}) {
+    to->info("/camera/color/camera_info", 1000.0, recording.camera().model.k());
+    to->close();
+  }
 #ifdef RGBD_SLAM_VIDEO
   const int height = width / 4 * 3;
   cv::VideoWriter video{
