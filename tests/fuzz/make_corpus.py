@@ -5,6 +5,7 @@
 Valid files, files cut short, files that declare more than they hold, and files made to hurt. What the
 fuzzers found besides is kept there as found_*. The JPEG files in read_jpeg are libjpeg's.
 """
+import bz2
 import pathlib
 import random
 import struct
@@ -679,7 +680,8 @@ def texts():
 
 
 def ros_messages():
-    """The first byte is the kind: 0 an image, 1 a compressed one, 2 a camera."""
+    """The first byte is the kind: 0 an image, 1 a compressed one, 2 a camera, 3 transforms, 4 odometry, 5 a pose; with
+    8 more ("8", "9", ":" and so on) the message is one of ROS 2."""
     text = lambda t: struct.pack("<I", len(t)) + t
     header = struct.pack("<3I", 7, 100, 250000000) + text(b"camera")
 
@@ -740,6 +742,134 @@ def ros_messages():
     camera("no_number", b"plumb_bob", (float("nan"),), k=(525.0, 0, float("inf"), 0, 525.0, 239.5, 0, 0, 1))
     camera("other", b"m" * 300, (1, 2, 3))
 
+    # Transforms and poses, and the messages of ROS 2: numbers are aligned after four bytes for the byte order.
+    class Message:
+        def __init__(self, cdr, order="<"):
+            self.cdr, self.order, self.bytes = cdr, order, (bytes((0, order == "<", 0, 0)) if cdr else b"")
+
+        def add(self, kinds, *values):
+            for kind, value in zip(kinds, values):
+                size = struct.calcsize(self.order + kind)
+                if self.cdr:
+                    self.bytes += bytes(-(len(self.bytes) - 4) % size)
+                self.bytes += struct.pack(self.order + kind, value)
+            return self
+
+        def text(self, t, end=b"\0"):
+            t = t + end if self.cdr else t
+            self.add("I", len(t)).bytes += t
+            return self
+
+        def header(self, frame=b"map"):
+            if not self.cdr:
+                self.add("I", 7)
+            return self.add("II", 100, 250000000).text(frame)
+
+    pose = (1.0, 2.0, 3.0, 0.0, 0.0, 0.6, 0.8)
+    for cdr, order, first in ((False, "<", 48), (True, "<", 56), (True, ">", 56)):
+        kind = "ros1" if not cdr else "cdr" if order == "<" else "cdr_big_endian"
+        message = lambda: Message(cdr, order)
+        save = lambda number, name, m: write("read_ros", f"{name}_{kind}", bytes((first + number,)) + m.bytes)
+        seven = "d" * 7
+
+        def transforms(count, *rotations):
+            m = message().add("I", count)
+            for rotation in rotations:
+                m.header().text(b"odom").add(seven, *pose[:3], *rotation)
+            return m
+
+        save(3, "transforms", transforms(2, pose[3:], (1, 0, 0, 0)))
+        save(3, "transforms_too_many", transforms(2**32 - 1, pose[3:]))
+        save(3, "transforms_no_rotation", transforms(1, (0, 0, 0, 0)))
+        save(4, "odometry", message().header().text(b"base_link").add(seven, *pose))
+        save(5, "pose", message().header().add(seven, *pose))
+        save(5, "pose_not_finite", message().header().add(seven, float("nan"), *pose[1:]))
+        if not cdr:
+            continue
+        m = message().header(b"camera").add("II", 2, 3).text(b"rgb8").add("BI", 0, 9).text(bytes(range(18)), b"")
+        save(0, "image", m)
+        save(0, "image_huge", message().header(b"camera").add("II", 2, 3).text(b"rgb8").add("BII", 0, 9, 2**32 - 1))
+        save(0, "image_yuv", message().header().add("II", 2, 4).text(b"yuv422_yuy2").add("BI", 0, 8).text(bytes(range(16)), b""))
+        save(1, "compressed", message().header(b"camera").text(b"rgb8; png compressed bgr8").text(color, b""))
+        m = message().header(b"camera").add("II", 480, 640).text(b"plumb_bob").add("I" + "d" * 5, 5, 0.1, -0.2, 1e-3, 1e-3, 0.01)
+        m.add("d" * 30, 525, 0, 319.5, 0, 525, 239.5, 0, 0, 1, 1, 0, 0, 0, 1, 0, 0, 0, 1, 525, 0, 319.5, -50, 0, 525, 239.5, 0, 0, 0, 1, 0)
+        save(2, "camera", m.add("IIIIIIB", *7 * (0,)))
+
+
+def bags():
+    """MCAP files and ROS 1 bags: with and without chunks and indices, and interrupted."""
+    u16, u32, u64 = (lambda n, kind=kind: struct.pack(kind, n) for kind in ("<H", "<I", "<Q"))
+    text = lambda t: u32(len(t)) + t
+    stored = {  # not compressed, but in a frame
+        b"": lambda b: b,
+        b"zstd": lambda b: b"\x28\xb5\x2f\xfd\0\x58" + u32(1 | len(b) << 3)[:3] + b,
+        b"lz4": lambda b: b"\x04\x22\x4d\x18\x60\x40\x82" + u32(len(b) | 1 << 31) + b + u32(0),
+        b"bz2": bz2.compress,
+    }
+    magic = b"\x89MCAP0\r\n"
+    record = lambda code, fields: bytes((code,)) + u64(len(fields)) + fields
+    topics = ((1, b"/image", b"sensor_msgs/msg/Image"), (2, b"/chatter", b"std_msgs/msg/String"))
+    definitions = lambda: b"".join(record(3, u16(i) + text(kind) + text(b"ros2msg") + text(b""))
+                                   + record(4, u16(i) + u16(i) + text(name) + text(b"cdr") + text(b""))
+                                   for i, name, kind in topics)
+    message = lambda i, time: record(5, u16(i) + u32(0) + u64(time) + u64(time) + b"message %d" % time)
+    start, end = magic + record(1, text(b"ros2") + text(b"")), record(15, u32(0))
+
+    def chunk(compression, content, size=None, with_index=False, pack=None):
+        packed = (pack or stored[compression])(content)
+        size = len(content) if size is None else size
+        out = record(6, u64(1) + u64(2) + u64(size) + u32(0) + text(compression) + u64(len(packed)) + packed)
+        return out + (record(7, u16(1) + text(u64(1) + u64(0))) if with_index else b"")
+
+    def mcap(name, data, summary=b"", closed=True):
+        at = len(start + data + end) if summary else 0
+        write("read_bag", "mcap_" + name, start + data + (
+            end + summary + record(2, u64(at) + u64(0) + u32(0)) + magic if closed else b""))
+
+    content = definitions() + message(1, 1) + message(2, 2) + message(1, 3)
+    mcap("plain", content)
+    for method in (b"", b"zstd", b"lz4", b"bz2", b"other"):
+        name = "chunk_" + (method.decode() or "none")
+        pack = stored.get(method, lambda b: b)
+        mcap(name, chunk(method, content, pack=pack))
+        mcap(name + "_indexed", chunk(method, message(1, 1), with_index=True, pack=pack), definitions())
+        mcap(name + "_not_closed", chunk(method, content, pack=pack), closed=False)
+    mcap("chunk_too_long", chunk(b"zstd", content, 2**62))
+    mcap("chunk_too_short", chunk(b"zstd", content, 10))
+    mcap("chunk_runs", chunk(b"zstd", content, 2**20, pack=lambda b: b"\x28\xb5\x2f\xfd\0\x58" + u32(3 | 0x1ffff << 3)[:3] + b"\0"))
+    mcap("index_wrong", chunk(b"lz4", message(1, 1)) + record(7, u16(1) + text(u64(1) + u64(2**63) + u64(1) + u64(5))), definitions())
+    mcap("huge_record", b"\x05" + u64(2**64 - 1) + b"abc", closed=False)
+    mcap("cut", content[:-3], closed=False)
+    write("read_bag", "mcap_empty", magic)
+
+    def fields(**values):
+        return b"".join(text(key.encode() + b"=" + value) for key, value in values.items())
+
+    old = lambda head, data: text(head) + text(data)
+    connection = lambda i, name, kind: old(fields(op=b"\7", conn=u32(i), topic=name), fields(topic=name, type=kind, md5sum=b"*"))
+    connections = connection(0, b"/image", b"sensor_msgs/Image") + connection(1, b"/chatter", b"std_msgs/String")
+    said = lambda i, time: old(fields(op=b"\2", conn=u32(i), time=u32(time) + u32(0)), b"message %d" % time)
+    content = connections + said(0, 1) + said(1, 2) + said(0, 3)
+
+    def bag(name, data, closed=True):
+        head = lambda at: text(fields(op=b"\3", index_pos=u64(at), conn_count=u32(2), chunk_count=u32(1))) + text(b" " * 40)
+        before = b"#ROSBAG V2.0\n"
+        at = len(before + head(0) + data) if closed else 0
+        write("read_bag", "bag_" + name, before + head(at) + data + (connections if closed else b""))
+
+    for method in (b"none", b"bz2", b"lz4", b"other"):
+        packed = stored.get(b"" if method == b"none" else method, lambda b: b)(content)
+        chunk = lambda size, data: old(fields(op=b"\5", compression=method, size=u32(size)), data)
+        name = method.decode()
+        index = old(fields(op=b"\4", ver=u32(1), conn=u32(0), count=u32(1)), u32(1) + u32(0) + u32(len(connections)))
+        bag(name, chunk(len(content), packed))
+        bag(name + "_indexed", chunk(len(content), packed) + index)
+        bag(name + "_not_closed", chunk(len(content), packed) + chunk(0, b"") + packed[:-5], False)
+    bag("long_header", u32(2**32 - 1) + b"abc", False)
+    bag("long_data", text(fields(op=b"\2", conn=u32(0), time=bytes(8))) + u32(2**32 - 1) + b"abc", False)
+    bag("long_field", text(u32(2**32 - 1) + b"op=\2") + text(b""), False)
+    write("read_bag", "bag_empty", b"#ROSBAG V2.0\n")
+
 
 def configs():
     """The first byte is the command: 0 run, 1 demo, 2 live, 3 map."""
@@ -796,4 +926,5 @@ if __name__ == "__main__":
     depth_images()
     compressed_depths()
     ros_messages()
+    bags()
     configs()

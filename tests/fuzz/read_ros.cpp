@@ -1,20 +1,22 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// Any bytes as a message of a ROS 1 bag: an image, a compressed image or a camera, as the first byte says; serialised
-// as in a bag. Images are read as colour and as depth, cameras as those of rectified images and of others.
+// Any bytes as a message of a ROS bag: the first byte says the kind (an image, a compressed image, a camera,
+// transforms, a pose, odometry), and the encoding (ROS 1 or CDR). Images are read as colour and as depth, cameras as
+// those of rectified images and of others.
 #include <cmath>
 #include <cstdint>
-#include <exception>
 #include <optional>
-#include <string>
+#include <string_view>
+#include <vector>
 
-// For what it keeps to itself.
 #include "fuzz/target.hpp"
-#include "rgbd_slam/inputs/bag.cpp"
+#include "rgbd_slam/inputs/ros_images.hpp"
+#include "rgbd_slam/inputs/ros_messages.hpp"
 
 namespace {
 
 using namespace orbis;
+namespace ros = app::ros_messages;
 
 void check_error(const error& e) {
   fuzz::require(e.code == errc::malformed || e.code == errc::unsupported,
@@ -22,19 +24,24 @@ void check_error(const error& e) {
   fuzz::require(!e.message.empty() && e.to_string().size() < 300, "the reason is given, and short");
 }
 
-/// The message that the bytes are; nothing where the library says that they are none.
+/// The message that the bytes are; empty if they are none.
 template <class Message>
-[[nodiscard]] std::optional<Message> message_of(const std::uint8_t* data, std::size_t size) try {
+[[nodiscard]] std::optional<Message> message_of(std::string_view bytes, app::message_encoding encoding) {
   std::optional<Message> m;
   const std::size_t peak = fuzz::peak_bytes_of([&] {
-    // The library does not change what it reads.
-    ros::serialization::IStream in{const_cast<std::uint8_t*>(data), static_cast<std::uint32_t>(size)};
-    ros::serialization::deserialize(in, m.emplace());
+    auto read = ros::parse<Message>(bytes, encoding, "fuzz.bag");
+    if (read)
+      m = *std::move(read);
+    else
+      check_error(read.error());
   });
-  fuzz::require(peak <= 8192 + 4 * size, "a message takes memory in proportion to its bytes");
+  fuzz::require(peak <= 8192 + 8 * bytes.size(), "a message takes memory in proportion to its bytes");
   return m;
-} catch (const std::exception&) {
-  return std::nullopt;
+}
+
+void check_pose(const se3& pose) {
+  fuzz::require(pose.translation().allFinite(), "positions are numbers");
+  fuzz::require(std::abs(pose.rotation().unit_quaternion().norm() - 1.0) < 1e-9, "rotations have norm one");
 }
 
 template <class Read>
@@ -47,18 +54,18 @@ void check_image(Read&& read, std::size_t most_bytes) {
 }
 
 template <class Message>
-void check_images(const std::uint8_t* data, std::size_t size, std::size_t most_bytes) {
-  const auto m = message_of<Message>(data, size);
+void check_images(std::string_view bytes, app::message_encoding encoding, std::size_t most_bytes) {
+  const auto m = message_of<Message>(bytes, encoding);
   if (!m) return;
   check_image([&] { return app::color_of(*m, "fuzz.bag"); }, most_bytes);
   check_image([&] { return app::depth_of(*m, "fuzz.bag"); }, most_bytes);
 }
 
-void check_camera(const std::uint8_t* data, std::size_t size) {
-  const auto m = message_of<app::ros_messages::camera_info>(data, size);
+void check_camera(std::string_view bytes, app::message_encoding encoding) {
+  const auto m = message_of<ros::camera_info>(bytes, encoding);
   if (!m) return;
   for (const bool rectified : {false, true}) {
-    const auto read = app::camera_of(*m, rectified, "fuzz.bag");
+    const auto read = ros::camera_of(*m, rectified, "fuzz.bag");
     if (!read) {
       check_error(read.error());
       continue;
@@ -74,12 +81,24 @@ void check_camera(const std::uint8_t* data, std::size_t size) {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   if (size == 0) return 0;
-  const unsigned kind = data[0] % 3U;
-  ++data, --size;
+  const std::string_view bytes{reinterpret_cast<const char*>(data) + 1, size - 1};
+  const auto encoding = (data[0] & 8U) != 0 ? app::message_encoding::cdr : app::message_encoding::ros1;
   // As they are, a byte may be a pixel of three; compressed, deflate makes 1032 bytes of one, and a bit may stand for a
   // pixel.
-  if (kind == 0) check_images<app::ros_messages::image>(data, size, 8192 + 4 * size);
-  if (kind == 1) check_images<app::ros_messages::compressed_image>(data, size, 8192 + 24 * (1032 * size + 1024));
-  if (kind == 2) check_camera(data, size);
+  switch (data[0] % 8U) {
+    case 0: check_images<ros::image>(bytes, encoding, 8192 + 4 * size); break;
+    case 1: check_images<ros::compressed_image>(bytes, encoding, 8192 + 24 * (1032 * size + 1024)); break;
+    case 2: check_camera(bytes, encoding); break;
+    case 3:
+      if (const auto m = message_of<std::vector<ros::transform>>(bytes, encoding))
+        for (const ros::transform& t : *m) check_pose(t.T_parent_child);
+      break;
+    default: {
+      app::message_reader in{bytes, encoding};
+      ros::transform m;
+      read_pose(in, m, data[0] % 8U == 4);
+      if (in.ok()) check_pose(m.T_parent_child);
+    }
+  }
   return 0;
 }
