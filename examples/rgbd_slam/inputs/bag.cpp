@@ -333,7 +333,7 @@ class bag_recording final : public file_recording {
     const double baseline = other->P[0] > 0.0 ? (info->P[3] - other->P[3]) / other->P[0] : 0.0;
     orbis::se3 T_left_right{orbis::so3{}, orbis::vec3{baseline, 0.0, 0.0}};
     if (!(baseline > 0.0)) {
-      const auto by_frames = read_frames(false).transform(first_->frame_id, second_->frame_id);
+      const auto by_frames = static_transform(first_->frame_id, second_->frame_id);
       if (!by_frames || first_->frame_id == second_->frame_id)
         return fail(errc::malformed, where(*second_),
                     "P of its CameraInfo has no baseline, and no static transform "
@@ -377,14 +377,18 @@ class bag_recording final : public file_recording {
                 f(one);
               }
   }
-  /// The frames of /tf_static, and those of /tf if `with_moving` or if there is no such topic.
-  [[nodiscard]] frame_tree read_frames(bool with_moving) const {
+  /// The frames of /tf_static, and those of other topics if `with_others`.
+  [[nodiscard]] frame_tree read_frames(bool with_others) const {
     frame_tree tree;
-    bool any = false;
-    const auto add = [&](const ros_messages::transform& t) { tree.add(t), any = true; };
+    const auto add = [&](const ros_messages::transform& t) { tree.add(t); };
     for_each_transform(true, add);
-    if (with_moving || !any) for_each_transform(false, add);
+    if (with_others) for_each_transform(false, add);
     return tree;
+  }
+  /// `T_a_b` of frames that do not move relative to each other, in ROS 1 also published on /tf; empty if unknown.
+  [[nodiscard]] std::optional<orbis::se3> static_transform(const std::string& a, const std::string& b) const {
+    const auto found = read_frames(false).transform(a, b);
+    return found ? found : read_frames(true).transform(a, b);
   }
 
   /// Prepares registration of depth to colour with both cameras and the transform between them, unless the names, the
@@ -397,7 +401,7 @@ class bag_recording final : public file_recording {
                                      static_cast<int>(info->height) == camera.model.height());
     if (same_frame && same_size) return {};
     const auto T_color_depth =
-        same_frame ? std::optional{orbis::se3{}} : read_frames(false).transform(first_->frame_id, second_->frame_id);
+        same_frame ? std::optional{orbis::se3{}} : static_transform(first_->frame_id, second_->frame_id);
     const std::string frames =
         "depth in the frame \"" + in_short(second_->frame_id) + "\", colour in \"" + in_short(first_->frame_id) + "\"";
     if (!T_color_depth || !info) {
@@ -446,8 +450,7 @@ class bag_recording final : public file_recording {
     sort_by_time(ground_truth);
     const std::string camera_frame = first_->frame_id;
     truth_of = from.name + " (" + (has_child ? pose.child_frame_id : "body") + " in " + pose.header.frame_id + ")";
-    const auto T_body_camera =
-        has_child ? read_frames(false).transform(pose.child_frame_id, camera_frame) : std::nullopt;
+    const auto T_body_camera = has_child ? static_transform(pose.child_frame_id, camera_frame) : std::nullopt;
     for (orbis::stamped_pose& p : ground_truth)
       if (T_body_camera) p.T_world_camera = p.T_world_camera * *T_body_camera;
     if (!has_child)

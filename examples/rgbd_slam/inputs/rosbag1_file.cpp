@@ -51,7 +51,9 @@ class rosbag1_file final : public chunked_bag {
 
   std::optional<bag_record> record_at(byte_source& from, std::uint64_t at) override {
     bag_record r;
-    if (&from == &file_ && at == file_.size() && definitions() != 0) {
+    if (&from == &file_ && at == file_.size()) {
+      const std::uint64_t last = definitions();
+      if (last == 0 || last >= at) return std::nullopt;  // not closed, or cut off
       r.what = bag_record::kind::end;
       r.next = at + 1;
       return r;

@@ -22,6 +22,7 @@ namespace {
 
 struct closer {
   void operator()(sqlite3* database) const { sqlite3_close(database); }
+  void operator()(sqlite3_blob* blob) const { sqlite3_blob_close(blob); }
   void operator()(sqlite3_stmt* statement) const { sqlite3_finalize(statement); }
 };
 using statement = std::unique_ptr<sqlite3_stmt, closer>;
@@ -53,7 +54,7 @@ void reject_short_reads(sqlite3* database) {
 
 class sqlite_bag final : public bag_file {
  public:
-  explicit sqlite_bag(std::string path) : path_{std::move(path)} {}
+  sqlite_bag(std::string path, std::uintmax_t size) : path_{std::move(path)}, file_size_{size} {}
 
   result<void> open() {
     // Without locks and in exclusive mode, SQLite reads a write-ahead log but creates no files. A "writable" schema
@@ -75,8 +76,7 @@ class sqlite_bag final : public bag_file {
       topics.push_back({std::string{column(rows, 1)}, type, message_encoding::cdr, {}});
     }
     const statement found = prepare("SELECT id, topic_id, timestamp FROM messages ORDER BY id");
-    read_ = prepare("SELECT data FROM messages WHERE id = ?");
-    if (!rows || !found || !read_) return fail(errc::malformed, path_, "is not a readable bag of ROS 2: " + reason());
+    if (!rows || !found) return fail(errc::malformed, path_, "is not a readable bag of ROS 2: " + reason());
     const bool has_topics = state == SQLITE_DONE;
     for (state = sqlite3_step(found.get()); state == SQLITE_ROW; state = sqlite3_step(found.get()))
       if (const auto topic = topic_of_id.find(sqlite3_column_int64(found.get(), 1)); topic != topic_of_id.end())
@@ -92,14 +92,18 @@ class sqlite_bag final : public bag_file {
   }
 
   result<std::string> read(const bag_message& m, std::size_t most) override {
-    sqlite3_bind_int64(read_.get(), 1, static_cast<sqlite3_int64>(m.at));
-    const int state = sqlite3_step(read_.get());
-    std::string bytes{state == SQLITE_ROW ? column(read_, 0).substr(0, most) : std::string_view{}};
-    const int error = sqlite3_errcode(database_.get());
-    const std::string why = reason();
-    sqlite3_reset(read_.get());
-    if (state == SQLITE_ROW && (error == SQLITE_ROW || error == SQLITE_OK)) return bytes;
-    return fail(errc::malformed, path_, "message " + std::to_string(m.at) + " cannot be read: " + why);
+    sqlite3_blob* opened = nullptr;
+    int state =
+        sqlite3_blob_open(database_.get(), "main", "messages", "data", static_cast<sqlite3_int64>(m.at), 0, &opened);
+    const std::unique_ptr<sqlite3_blob, closer> blob{opened};
+    const auto size = static_cast<std::size_t>(sqlite3_blob_bytes(opened));
+    if (state == SQLITE_OK && size <= file_size_) {
+      std::string bytes(std::min(size, most), '\0');
+      state = sqlite3_blob_read(opened, bytes.data(), static_cast<int>(bytes.size()), 0);
+      if (state == SQLITE_OK) return bytes;
+    }
+    return fail(errc::malformed, path_,
+                "message " + std::to_string(m.at) + " cannot be read: " + sqlite3_errstr(state));
   }
 
  private:
@@ -111,14 +115,20 @@ class sqlite_bag final : public bag_file {
   [[nodiscard]] std::string reason() const { return sqlite3_errmsg(database_.get()); }
 
   std::string path_;
+  std::uintmax_t file_size_;  // with the write-ahead log
   std::unique_ptr<sqlite3, closer> database_;
-  statement read_;
 };
 
 }  // namespace
 
 result<std::unique_ptr<bag_file>> open_sqlite_bag(const std::filesystem::path& path) {
-  auto bag = std::make_unique<sqlite_bag>(path.string());
+  std::uintmax_t size = 0;
+  for (const char* ending : {"", "-wal"}) {
+    std::error_code error;
+    const std::uintmax_t more = std::filesystem::file_size(path.string() + ending, error);
+    if (!error) size += more;
+  }
+  auto bag = std::make_unique<sqlite_bag>(path.string(), size);
   if (auto opened = bag->open(); !opened) return fail(opened.error());
   return bag;
 }
