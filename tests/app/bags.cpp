@@ -214,6 +214,27 @@ TEST_CASE("a folder without metadata, with missing or damaged parts gives the re
   CHECK(!app::is_bag(bags));  // it has other files
 }
 
+TEST_CASE("an unknown compression is named, and damaged images are omitted with a note") {
+  const temporary_folder folder;
+  const auto changed = [&](const char* name, const std::string& from, const std::string& to) {
+    std::string bytes = read_file(bags / name).value();
+    const std::size_t at = bytes.find(from);
+    REQUIRE(at != std::string::npos);
+    return folder.write(name, bytes.replace(at, to.size(), to));
+  };
+  for (const auto& file :
+       {changed("lz4.bag", "=lz4", "=xyz"),
+        changed("realsense_zstd.mcap", std::string("\4\0\0\0zstd", 8), std::string("\4\0\0\0xyz2", 8))})
+    CHECK_THAT(message_of(app::open_bag(file, {})), Contains("the compression \"xyz") && Contains("is not supported"));
+  std::string bytes = read_file(bags / "lz4.bag").value();
+  bytes.replace(6500, 100, std::string(100, '\xff'));  // in the second chunk
+  const auto bag = app::open_bag(folder.write("damaged.bag", bytes), {}).value();
+  CHECK_THAT(bag->notes.at(0), Contains("1 images of /camera/camera/aligned_depth_to_color/image_raw/compressedDepth "
+                                        "cannot be read and are omitted: ") &&
+                                   Contains("a message is damaged in the chunk at byte 6387"));
+  check_frames(*bag, 2, 1.7e9);
+}
+
 TEST_CASE("a bag that is cut off anywhere gives complete frames or an error") {
   const temporary_folder folder;
   std::size_t opened = 0, failed = 0;

@@ -34,6 +34,13 @@ double seconds(std::int64_t nanoseconds) {
   return static_cast<double>(nanoseconds / second) + 1e-9 * static_cast<double>(nanoseconds % second);
 }
 
+/// Sorts by a member, and removes elements of a repeated time.
+template <class T, class Time>
+void sort_by_time(std::vector<T>& all, Time T::*time) {
+  std::ranges::stable_sort(all, {}, time);
+  all.erase(std::unique(all.begin(), all.end(), [&](const T& a, const T& b) { return a.*time == b.*time; }), all.end());
+}
+
 /// A topic of images.
 struct topic : bag_topic {
   std::string encoding;       ///< of the first image, or the format of a compressed image
@@ -84,7 +91,7 @@ class bag_recording final : public file_recording {
   }
 
   result<void> set_up(const file_recording_options& options) {
-    list_topics();
+    if (auto listed = list_topics(); !listed) return listed;
     if (auto chosen = choose(options); !chosen) return chosen;
     if (auto read = read_times(); !read) return read;
     pair_frames();
@@ -135,31 +142,37 @@ class bag_recording final : public file_recording {
     return bag_.read(m, most);
   }
 
-  /// The images: encoding and frame are those of the first message that can be read.
-  void list_topics() {
+  /// Lists the topics of images. Encoding and frame are those of the first message that can be read.
+  result<void> list_topics() {
     for (bag_topic& from : bag_.topics) {
       if (from.type != "sensor_msgs/Image" && from.type != "sensor_msgs/CompressedImage") continue;
       topic t{std::move(from), {}, {}, {}};
-      const auto reads = [&](const bag_message& m) {
+      const auto take = [&](const auto& image, const std::string& encoding) {
+        if (!image) return false;
+        t.encoding = encoding;
+        t.frame_id = image->header.frame_id;
+        return true;
+      };
+      bool is_found = false;
+      for (const bag_message& m : t.messages) {
         const auto bytes = read(m);
-        if (!bytes) return false;
-        const auto take = [&](const auto& image, const std::string& encoding) {
-          t.encoding = encoding;
-          t.frame_id = image.header.frame_id;
-          return true;
-        };
+        if (!bytes && bytes.error().code == errc::unsupported) return fail(bytes.error());
+        if (!bytes) continue;
         if (t.is_compressed()) {
           const auto image = ros_messages::parse<ros_messages::compressed_image>(*bytes, t.coding, t.name);
-          return image && take(*image, image->format);
+          is_found = take(image, image ? image->format : "");
+        } else {
+          const auto image = ros_messages::parse<ros_messages::image>(*bytes, t.coding, t.name);
+          is_found = take(image, image ? image->encoding : "");
         }
-        const auto image = ros_messages::parse<ros_messages::image>(*bytes, t.coding, t.name);
-        return image && take(*image, image->encoding);
-      };
-      if (std::ranges::find_if(t.messages, reads) != t.messages.end())
+        if (is_found) break;
+      }
+      if (is_found)
         topics_.try_emplace(t.name, std::move(t));
       else
         notes.push_back("no image of " + t.name + " can be read");
     }
+    return {};
   }
 
   [[nodiscard]] std::string describe_topics() const {
@@ -270,9 +283,7 @@ class bag_recording final : public file_recording {
       std::vector<std::pair<std::int64_t, bag_message>> order;
       for (const entry& e : entries)
         if (e.of == t) order.emplace_back(e.time == 0 && least > soon ? e.message->time : e.time, *e.message);
-      const auto time = [](const auto& one) { return one.first; };
-      std::ranges::stable_sort(order, {}, time);
-      order.erase(std::ranges::unique(order, {}, time).begin(), order.end());
+      sort_by_time(order, &std::pair<std::int64_t, bag_message>::first);
       t->messages.clear();
       for (const auto& [when, message] : order) {
         t->times.push_back(seconds(when));
@@ -447,7 +458,7 @@ class bag_recording final : public file_recording {
       if (!in.ok()) return fail(errc::malformed, path_ + " " + from.name, "a pose is damaged");
       ground_truth.push_back({seconds(pose.header.stamp != 0 ? pose.header.stamp : m.time), pose.T_parent_child});
     }
-    sort_by_time(ground_truth);
+    sort_by_time(ground_truth, &orbis::stamped_pose::timestamp);
     const std::string camera_frame = first_->frame_id;
     truth_of = from.name + " (" + (has_child ? pose.child_frame_id : "body") + " in " + pose.header.frame_id + ")";
     const auto T_body_camera = has_child ? static_transform(pose.child_frame_id, camera_frame) : std::nullopt;
@@ -478,7 +489,7 @@ class bag_recording final : public file_recording {
       if (at != moving.end() && t.header.frame_id == tree.find(t.child_frame_id)->parent)
         at->second.push_back({seconds(t.header.stamp), t.T_parent_child});
     });
-    for (auto& [frame, poses] : moving) sort_by_time(poses);
+    for (auto& [frame, poses] : moving) sort_by_time(poses, &orbis::stamped_pose::timestamp);
     for (const orbis::index_pair& f : frames_) {
       const double time = first_->times[f.first];
       std::optional<orbis::se3> T_up_camera{orbis::se3{}};
@@ -495,11 +506,6 @@ class bag_recording final : public file_recording {
       notes.push_back(std::to_string(frames_.size() - ground_truth.size()) + " of " + std::to_string(frames_.size()) +
                       " images have no pose in " + name);
     return {};
-  }
-
-  static void sort_by_time(orbis::trajectory& poses) {
-    std::ranges::stable_sort(poses, {}, &orbis::stamped_pose::timestamp);
-    poses.erase(std::ranges::unique(poses, {}, &orbis::stamped_pose::timestamp).begin(), poses.end());
   }
 
   /// Images per second.
