@@ -227,11 +227,11 @@ TEST_CASE("an unknown compression is named, and damaged images are omitted with 
         changed("realsense_zstd.mcap", std::string("\4\0\0\0zstd", 8), std::string("\4\0\0\0xyz2", 8))})
     CHECK_THAT(message_of(app::open_bag(file, {})), Contains("the compression \"xyz") && Contains("is not supported"));
   std::string bytes = read_file(bags / "lz4.bag").value();
-  bytes.replace(6500, 100, std::string(100, '\xff'));  // in the second chunk
+  bytes.replace(bytes.rfind("=lz4") + 80, 100, std::string(100, '\xff'));  // in the last chunk
   const auto bag = app::open_bag(folder.write("damaged.bag", bytes), {}).value();
   CHECK_THAT(bag->notes.at(0), Contains("1 images of /camera/camera/aligned_depth_to_color/image_raw/compressedDepth "
                                         "cannot be read and are omitted: ") &&
-                                   Contains("a message is damaged in the chunk at byte 6387"));
+                                   Contains("a message is damaged in the chunk at byte "));
   check_frames(*bag, 2, 1.7e9);
 }
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// Writes the bags of this folder; see README.md. Messages and containers are written by other implementations than the
-// reader of rgbd_slam, except for the ROS 1 container, for which npm has only a reader (`--check` reads them with it).
+// Writes the bags of ROS 2 of this folder; see README.md.
 import { execFileSync } from "node:child_process";
 import { mkdirSync, renameSync, rmSync, writeFileSync } from "node:fs";
 import { McapWriter, TempBuffer } from "@mcap/core";
@@ -11,12 +10,7 @@ import ros1 from "@foxglove/rosmsg-serialization";
 import zlib from "node:zlib";
 
 const tool = (name, input, ...args) => execFileSync(name, args, { input, maxBuffer: 1 << 26 });
-const compressors = {
-  none: (b) => b,
-  zstd: (b) => tool("zstd", b, "-c", "-q"),
-  lz4: (b) => tool("lz4", b, "-c", "-q"),
-  bz2: (b) => tool("bzip2", b, "-c"),
-};
+const compressors = { zstd: (b) => tool("zstd", b, "-c", "-q"), lz4: (b) => tool("lz4", b, "-c", "-q") };
 
 // --- messages -------------------------------------------------------------------------------------------------------
 
@@ -206,106 +200,39 @@ function write_sqlite(name, messages, { compress = false, before = "PRAGMA page_
       const id = 1 + topics.findIndex(([topic]) => topic === m.topic);
       return `INSERT INTO messages(topic_id, timestamp, data) VALUES (${id}, ${BigInt(Math.round(m.t * 1e6)) * 1000n}, X'${data.toString("hex")}');`;
     }),
-
   ];
   tool("sqlite3", sql.join("\n"), name);
-}
-
-/// wiki.ros.org/Bags/Format/2.0. `closed`: with index and connections at the end, as after a complete recording.
-function write_rosbag1(name, messages, { compression = "none", closed = true, per_chunk = 8 } = {}) {
-  const u32 = (n) => { const b = Buffer.alloc(4); b.writeUInt32LE(n); return b; };
-  const u64 = (n) => { const b = Buffer.alloc(8); b.writeBigUInt64LE(BigInt(n)); return b; };
-  const time = (t) => { const s = stamp(1, t); return Buffer.concat([u32(s.sec), u32(s.nsec)]); };
-  const fields = (all) => Buffer.concat(Object.entries(all).flatMap(([key, value]) => {
-    const one = Buffer.concat([Buffer.from(key + "="), typeof value === "string" ? Buffer.from(value) : value]);
-    return [u32(one.length), one];
-  }));
-  const record = (head, data) => { const h = fields(head); return Buffer.concat([u32(h.length), h, u32(data.length), data]); };
-  const op = (n) => Buffer.from([n]);
-  const topics = [...new Map(messages.map((m) => [m.topic, m.type])).entries()];
-  const connection = ([topic, type], i) => record({ op: op(7), conn: u32(i), topic }, fields({ topic, type, md5sum: "*", message_definition: "" }));
-  const of = (m) => topics.findIndex(([topic]) => topic === m.topic);
-  const bag_header = (position, chunks) => {
-    const head = fields({ op: op(3), index_pos: u64(position), conn_count: u32(position ? topics.length : 0), chunk_count: u32(position ? chunks : 0) });
-    return Buffer.concat([u32(head.length), head, u32(4096 - 8 - head.length), Buffer.alloc(4096 - 8 - head.length, " ")]);
-  };
-  const body = [], infos = [];
-  let at = 13 + 4096, known = 0;
-  for (let first = 0; first < messages.length; first += per_chunk) {
-    const these = messages.slice(first, first + per_chunk), parts = [], index = new Map();
-    let offset = 0;
-    const add = (b) => { parts.push(b); offset += b.length; };
-    for (const m of these) {
-      for (; known <= of(m); ++known) add(connection(topics[known], known));
-      if (!index.has(of(m))) index.set(of(m), []);
-      index.get(of(m)).push(Buffer.concat([time(m.t), u32(offset)]));
-      add(record({ op: op(2), conn: u32(of(m)), time: time(m.t) }, m.data));
-    }
-    const plain = Buffer.concat(parts), is_last = first + per_chunk >= messages.length;
-    infos.push(record({ op: op(6), ver: u32(1), chunk_pos: u64(at), start_time: time(these[0].t), end_time: time(these.at(-1).t), count: u32(index.size) },
-      Buffer.concat([...index].flatMap(([conn, entries]) => [u32(conn), u32(entries.length)]))));
-    const packed = compressors[compression](plain);
-    let chunk = record({ op: op(5), compression, size: u32(plain.length) }, packed);
-    if (!closed && is_last)  // interrupted: the lengths of the last chunk are not written yet
-      chunk = Buffer.concat([record({ op: op(5), compression, size: u32(0) }, Buffer.alloc(0)), packed.subarray(0, packed.length - 100)]);
-    const indices = closed || !is_last ? [...index].map(([conn, entries]) => record({ op: op(4), ver: u32(1), conn: u32(conn), count: u32(entries.length) }, Buffer.concat(entries))) : [];
-    for (const b of [chunk, ...indices]) { body.push(b); at += b.length; }
-  }
-  const end = closed ? [...topics.map(connection), ...infos] : [];
-  writeFileSync(name, Buffer.concat([Buffer.from("#ROSBAG V2.0\n"), bag_header(closed ? at : 0, infos.length), ...body, ...end]));
 }
 
 // --- the bags -------------------------------------------------------------------------------------------------------
 
 const epoch = 1700000000;
-if (process.argv[2] !== "--check") {
-  await write_mcap("realsense_zstd.mcap", scene(2, { begin: epoch }), { compression: "zstd" });
-  await write_mcap("no_index_lz4.mcap", scene(2, { begin: 0, kind: "registered", tf: false, truth: false }), {
-    compression: "lz4", useStatistics: false, useSummaryOffsets: false, repeatSchemas: false, repeatChannels: false, useMessageIndex: false, useChunkIndex: false,
-  });
-  await write_mcap("no_chunks.mcap", scene(2, { begin: 100, kind: "compressed", truth: false }), { useChunks: false });
-  await write_mcap("ros1.mcap", scene(1, { begin: 5, kind: "compressed", truth: false }), { version: 1 });
-  await write_mcap("no_tf.mcap", scene(2, { begin: epoch, tf: false, truth: false }), { compression: "zstd" });
-  await write_mcap("no_stamps.mcap", scene(2, { begin: 50, kind: "registered", tf: false, truth: false, zero_stamps: true }), { compression: "zstd" });
+await write_mcap("realsense_zstd.mcap", scene(2, { begin: epoch }), { compression: "zstd" });
+await write_mcap("no_index_lz4.mcap", scene(2, { begin: 0, kind: "registered", tf: false, truth: false }), {
+  compression: "lz4", useStatistics: false, useSummaryOffsets: false, repeatSchemas: false, repeatChannels: false, useMessageIndex: false, useChunkIndex: false,
+});
+await write_mcap("no_chunks.mcap", scene(2, { begin: 100, kind: "compressed", truth: false }), { useChunks: false });
+await write_mcap("ros1.mcap", scene(1, { begin: 5, kind: "compressed", truth: false }), { version: 1 });
+await write_mcap("no_tf.mcap", scene(2, { begin: epoch, tf: false, truth: false }), { compression: "zstd" });
+await write_mcap("no_stamps.mcap", scene(2, { begin: 50, kind: "registered", tf: false, truth: false, zero_stamps: true }), { compression: "zstd" });
+await write_mcap("stereo.mcap", stereo(), { compression: "zstd" });
 
-  await write_mcap("stereo.mcap", stereo(), { compression: "zstd" });
-
-  mkdirSync("split", { recursive: true });
-  const two = scene(2, { begin: epoch, frames: 4, kind: "compressed", truth: false });
-  const half = two.findIndex((m) => m.t >= epoch + 0.2 + 0.25);
-  write_sqlite("split/split_0.db3", two.slice(0, half));
-  write_sqlite("split/split_1.db3", two.slice(half));
-  writeFileSync("split/metadata.yaml", [
-    "rosbag2_bagfile_information:", "  version: 5", "  storage_identifier: sqlite3", "  duration:", "    nanoseconds: 300000000",
-    "  relative_file_paths:", "    - split_0.db3", "    - split_1.db3", "  compression_format: \"\"", "  compression_mode: \"\"", ""].join("\n"));
-  write_sqlite("messages_zstd.db3", scene(2, { begin: epoch, kind: "compressed", tf: false, truth: false }), { compress: true });
-  // Interrupted while the last messages are in the write-ahead log only: the shell is killed before it moves them.
-  const log = scene(2, { begin: epoch, kind: "compressed", tf: false, truth: false });
-  const last = log.findIndex((m) => m.t >= epoch + 0.2 + 0.25);
-  mkdirSync("wal", { recursive: true });
-  rmSync("wal/wal.db3-wal", { force: true });
-  write_sqlite("wal/wal.db3", log.slice(0, last), { before: "PRAGMA page_size = 512; PRAGMA journal_mode = WAL;" });
-  const rest = log.slice(last).map((m) => `INSERT INTO messages(topic_id, timestamp, data) SELECT id, ${BigInt(Math.round(m.t * 1e6)) * 1000n}, X'${m.data.toString("hex")}' FROM topics WHERE name = '${m.topic}';`);
-  execFileSync("sh", ["-c", "sqlite3 wal/wal.db3"], { input: [...rest, ".shell cp wal/wal.db3-wal wal/log; cp wal/wal.db3 wal/kept"].join("\n") });
-  renameSync("wal/kept", "wal/wal.db3");
-  renameSync("wal/log", "wal/wal.db3-wal");
-
-  const old = (options) => scene(1, { begin: epoch, kind: "compressed", truth: false, ...options });
-  write_rosbag1("none.bag", scene(1, { begin: epoch, truth: false }));
-  write_rosbag1("bz2.bag", old(), { compression: "bz2" });
-  write_rosbag1("lz4.bag", old(), { compression: "lz4" });
-  write_rosbag1("interrupted.bag.active", old(), { closed: false });
-  write_rosbag1("interrupted_lz4.bag.active", old(), { closed: false, compression: "lz4" });
-} else {
-  const { Bag } = (await import("@foxglove/rosbag")).default;
-  const { FileReader } = (await import("@foxglove/rosbag/node.js")).default;
-  for (const name of ["none.bag", "bz2.bag", "lz4.bag"]) {
-    const bag = new Bag(new FileReader(name), {
-      decompress: { bz2: (b) => tool("bzip2", b, "-dc"), lz4: (b) => tool("lz4", b, "-dc") }, parse: false,
-    });
-    await bag.open();
-    const counts = {};
-    for await (const m of bag.messageIterator()) counts[m.topic] = (counts[m.topic] ?? 0) + 1;
-    console.log(name, counts);
-  }
-}
+mkdirSync("split", { recursive: true });
+const two = scene(2, { begin: epoch, frames: 4, kind: "compressed", truth: false });
+const half = two.findIndex((m) => m.t >= epoch + 0.2 + 0.25);
+write_sqlite("split/split_0.db3", two.slice(0, half));
+write_sqlite("split/split_1.db3", two.slice(half));
+writeFileSync("split/metadata.yaml", [
+  "rosbag2_bagfile_information:", "  version: 5", "  storage_identifier: sqlite3", "  duration:", "    nanoseconds: 300000000",
+  "  relative_file_paths:", "    - split_0.db3", "    - split_1.db3", "  compression_format: \"\"", "  compression_mode: \"\"", ""].join("\n"));
+write_sqlite("messages_zstd.db3", scene(2, { begin: epoch, kind: "compressed", tf: false, truth: false }), { compress: true });
+// Interrupted while the last messages are in the write-ahead log only: the shell is killed before it moves them.
+const log = scene(2, { begin: epoch, kind: "compressed", tf: false, truth: false });
+const last = log.findIndex((m) => m.t >= epoch + 0.2 + 0.25);
+mkdirSync("wal", { recursive: true });
+rmSync("wal/wal.db3-wal", { force: true });
+write_sqlite("wal/wal.db3", log.slice(0, last), { before: "PRAGMA page_size = 512; PRAGMA journal_mode = WAL;" });
+const rest = log.slice(last).map((m) => `INSERT INTO messages(topic_id, timestamp, data) SELECT id, ${BigInt(Math.round(m.t * 1e6)) * 1000n}, X'${m.data.toString("hex")}' FROM topics WHERE name = '${m.topic}';`);
+execFileSync("sh", ["-c", "sqlite3 wal/wal.db3"], { input: [...rest, ".shell cp wal/wal.db3-wal wal/log; cp wal/wal.db3 wal/kept"].join("\n") });
+renameSync("wal/kept", "wal/wal.db3");
+renameSync("wal/log", "wal/wal.db3-wal");
