@@ -298,7 +298,7 @@ result<frame_source> open_file(const settings& s) {
   if (!opened) return fail(with_option(opened.error()));
   const std::shared_ptr<const file_recording> recording = *std::move(opened);
   frame_source source;
-  source.title = s.input.filename().string();
+  source.title = std::filesystem::weakly_canonical(s.input).filename().string();  // of "folder/", too
   source.kind = recording->kind;
   source.images_of = recording->images_of;
   source.camera = recording->camera;

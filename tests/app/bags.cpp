@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // The bags in tests/app/bags: containers and messages that other implementations wrote, and what is left of them if
-// they are cut off.
+// they are cut off. Needs all libraries for bags.
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -17,6 +17,7 @@
 #include "io/recordings.hpp"
 #include "support/catch.hpp"
 
+#if defined RGBD_SLAM_SQLITE && defined RGBD_SLAM_LZ4 && defined RGBD_SLAM_ZSTD && defined RGBD_SLAM_BZ2
 using namespace orbis;
 using Catch::Matchers::Contains;
 using slam::sensor_kind;
@@ -243,9 +244,10 @@ TEST_CASE("a bag that is cut off anywhere gives complete frames or an error") {
     const std::string bytes = read_file(bag).value();
     const std::string name = bag.filename().string();
     std::size_t frames = 0;  // of the whole file
-    for (std::size_t size = bytes.size(); size > 0; size -= std::min<std::size_t>(size, 61)) {
-      folder.write(name, std::string_view{bytes}.substr(0, size));
-      const auto recording = app::open_bag(folder.path() / name, {});
+    const auto path = folder.write(name, bytes);
+    for (std::size_t size = bytes.size(); size > 0; size -= std::min<std::size_t>(size, 31)) {
+      std::filesystem::resize_file(path, size);
+      const auto recording = app::open_bag(path, {});
       ++(recording ? opened : failed);
       if (!recording) {
         CHECK(recording.error().to_string().size() < 600);
@@ -264,3 +266,4 @@ TEST_CASE("a bag that is cut off anywhere gives complete frames or an error") {
   CHECK(opened > failed / 4);
   CHECK(failed > 100);
 }
+#endif
