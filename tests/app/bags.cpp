@@ -230,7 +230,7 @@ TEST_CASE("an unknown compression is named, and damaged images are omitted with 
   std::string bytes = read_file(bags / "lz4.bag").value();
   bytes.replace(bytes.rfind("=lz4") + 80, 100, std::string(100, '\xff'));  // in the last chunk
   const auto bag = app::open_bag(folder.write("damaged.bag", bytes), {}).value();
-  CHECK_THAT(bag->notes.at(0), Contains("1 images of /camera/camera/aligned_depth_to_color/image_raw/compressedDepth "
+  CHECK_THAT(bag->notes.at(0), Contains("1 images of /camera/camera/color/image_raw/compressed "
                                         "cannot be read and are omitted: ") &&
                                    Contains("a message is damaged in the chunk at byte "));
   check_frames(*bag, 2, 1.7e9);

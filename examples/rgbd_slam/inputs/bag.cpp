@@ -46,6 +46,8 @@ struct topic : bag_topic {
   std::string encoding;       ///< of the first image, or the format of a compressed image
   std::string frame_id;       ///< of the first image
   std::vector<double> times;  ///< of the headers, ascending
+  std::size_t unread = 0;     ///< number of omitted messages
+  std::string reason;         ///< why the first one is omitted
   [[nodiscard]] bool is_compressed() const { return type == "sensor_msgs/CompressedImage"; }
   [[nodiscard]] bool is_depth() const { return is_depth_encoding(encoding) || name.ends_with("/compressedDepth"); }
   [[nodiscard]] bool is_read() const { return is_compressed() || is_known_encoding(encoding); }
@@ -146,7 +148,7 @@ class bag_recording final : public file_recording {
   result<void> list_topics() {
     for (bag_topic& from : bag_.topics) {
       if (from.type != "sensor_msgs/Image" && from.type != "sensor_msgs/CompressedImage") continue;
-      topic t{std::move(from), {}, {}, {}};
+      topic t{std::move(from), {}, {}, {}, 0, {}};
       const auto take = [&](const auto& image, const std::string& encoding) {
         if (!image) return false;
         t.encoding = encoding;
@@ -256,8 +258,6 @@ class bag_recording final : public file_recording {
     std::ranges::sort(entries, {}, [](const entry& e) {
       return std::tuple{e.message->file, e.message->chunk, e.message->at};
     });
-    std::map<topic*, std::string> failures;
-    std::map<topic*, std::size_t> failed;
     for (entry& e : entries) {
       constexpr std::size_t most = 1024;  // bytes; the time is at the beginning
       const auto bytes = read(*e.message, most);
@@ -265,16 +265,15 @@ class bag_recording final : public file_recording {
       message_reader in{bytes ? *bytes : std::string_view{}, e.of->coding};
       e.time = ros_messages::read_stamp(in);
       if (bytes && in.ok()) continue;
-      failures.try_emplace(e.of, bytes ? "the message is damaged" : bytes.error().to_string());
-      ++failed[e.of];
+      if (e.of->unread++ == 0) e.of->reason = bytes ? "a message is damaged" : bytes.error().to_string();
       e.message = nullptr;
     }
-    for (const auto& [of, why] : failures)
-      notes.push_back(std::to_string(failed[of]) + " images of " + of->name +
-                      " cannot be read and are omitted: " + why);
     std::erase_if(entries, [](const entry& e) { return e.message == nullptr; });
     for (topic* t : {first_, second_}) {
       if (t == nullptr) continue;
+      if (t->unread != 0)
+        notes.push_back(std::to_string(t->unread) + " images of " + t->name +
+                        " cannot be read and are omitted: " + t->reason);
       // A time of zero is that of a simulation that begins there, or there is no time in the header.
       std::int64_t least = std::numeric_limits<std::int64_t>::max();
       for (const entry& e : entries)

@@ -46,8 +46,9 @@ std::vector<fs::path> parts_in(const fs::path& folder) {
     const std::string x = a.string(), y = b.string();
     return std::pair{x.size(), x} < std::pair{y.size(), y};
   });
-  std::erase_if(
-      parts, [](const fs::path& p) { return p.extension() == ".zstd" && fs::exists(fs::path{p}.replace_extension()); });
+  std::erase_if(parts, [&](const fs::path& p) {
+    return p.extension() == ".zstd" && fs::exists(fs::path{p}.replace_extension(), error);
+  });
   return parts;
 }
 

@@ -71,7 +71,7 @@ void chunked_bag::add(std::uint32_t channel, const bag_message& m) {
 }
 
 result<void> chunked_bag::list(std::uint32_t chunk, bool has_end) {
-  const auto opened = open(chunk);
+  const auto opened = open_chunk(chunk);
   if (!opened) return fail(opened.error());
   std::uint64_t at = opened->begin;
   while (auto r = record_at(*opened->source, at)) {
@@ -86,7 +86,7 @@ result<void> chunked_bag::list(std::uint32_t chunk, bool has_end) {
   return {};
 }
 
-result<chunked_bag::opened_chunk> chunked_bag::open(std::uint32_t chunk) {
+result<chunked_bag::opened_chunk> chunked_bag::open_chunk(std::uint32_t chunk) {
   const auto r = record_at(file_, chunks_[chunk]);
   if (!r || r->what != kind::chunk) return fail(errc::unreadable, where_, "the file has changed");
   if (r->compression.empty())  // its messages are read from the file
@@ -109,7 +109,7 @@ result<chunked_bag::opened_chunk> chunked_bag::open(std::uint32_t chunk) {
 result<std::string> chunked_bag::read(const bag_message& m, std::size_t most) {
   opened_chunk in{&file_, 0, file_.size()};
   if (m.chunk != no_chunk) {
-    auto opened = open(m.chunk);
+    auto opened = open_chunk(m.chunk);
     if (!opened) return fail(opened.error());
     in = *opened;
   }

@@ -66,7 +66,7 @@ class chunked_bag : public bag_file {
   void define(bag_record& r);
   void add(std::uint32_t channel, const bag_message& m);
   orbis::result<void> list(std::uint32_t chunk, bool has_end);
-  orbis::result<opened_chunk> open(std::uint32_t chunk);
+  orbis::result<opened_chunk> open_chunk(std::uint32_t chunk);
 
   std::string where_;
   std::map<std::uint32_t, std::size_t> topic_of_channel_;

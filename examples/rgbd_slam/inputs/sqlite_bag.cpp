@@ -82,12 +82,13 @@ class sqlite_bag final : public bag_file {
       if (const auto topic = topic_of_id.find(sqlite3_column_int64(found.get(), 1)); topic != topic_of_id.end())
         topics[topic->second].messages.push_back(
             {sqlite3_column_int64(found.get(), 2), static_cast<std::uint64_t>(sqlite3_column_int64(found.get(), 0))});
-    if (state == SQLITE_DONE && has_topics) return {};
-    const std::string why = reason();
-    for (bag_topic& t : topics)
-      std::erase_if(t.messages, [&](const bag_message& m) { return !read(m, whole_message); });
-    notes.push_back(path_ + ": the bag is truncated or damaged (" + why + "); " + count_messages(topics) +
-                    " can be read");
+    // Pages at the end of a truncated file hold the rest of messages that begin in earlier pages.
+    const auto can_read = [&](const bag_message& m) { return read(m, whole_message).has_value(); };
+    const bool has_ends = std::ranges::all_of(
+        topics, [&](const bag_topic& t) { return t.messages.empty() || can_read(t.messages.back()); });
+    if (state == SQLITE_DONE && has_topics && has_ends) return {};
+    for (bag_topic& t : topics) std::erase_if(t.messages, [&](const bag_message& m) { return !can_read(m); });
+    notes.push_back(path_ + ": the bag is truncated or damaged; " + count_messages(topics) + " can be read");
     return {};
   }
 

@@ -185,7 +185,7 @@ async function write_mcap(name, messages, { compression = "none", version = 2, .
   writeFileSync(name, file.get());
 }
 
-function write_sqlite(name, messages, { compress = false, before = "PRAGMA page_size = 1024;" } = {}) {
+function write_sqlite(name, messages, { compress = false, before = "PRAGMA page_size = 512;" } = {}) {
   for (const ending of ["", "-wal", "-shm"]) rmSync(name + ending, { force: true });
   const topics = [...new Map(messages.map((m) => [m.topic, m.type])).entries()];
   const sql = [
