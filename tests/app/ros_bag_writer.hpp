@@ -56,6 +56,8 @@ class ros_bag_writer {
  public:
   explicit ros_bag_writer(std::filesystem::path path, int version = 1) : path_{std::move(path)}, version_{version} {}
 
+  std::string frame = "camera";  ///< of the following images and cameras
+
   template <class T>
   void image(const std::string& topic, double time, const std::string& encoding, image_view<const T> pixels) {
     const std::size_t row = static_cast<std::size_t>(pixels.width()) * sizeof(T);
@@ -84,12 +86,15 @@ class ros_bag_writer {
     for (int i = 0; i != 6; ++i) m.number(0);  // no binning, no region
     write(topic, "sensor_msgs/CameraInfo", time, m.number('\0'));
   }
+  void transform(const std::string& topic, double time, const std::string& child, const se3& T_frame_child) {
+    ros_message m{version_};
+    m.number(std::uint32_t{1}).header(time, frame).text(child);
+    write(topic, "tf2_msgs/TFMessage", time, m.numbers(numbers_of(T_frame_child)));
+  }
   /// The pose of the frame "camera" in "world".
   void odometry(const std::string& topic, double time, const se3& T_world_camera) {
-    const vec3& t = T_world_camera.translation();
-    const auto& q = T_world_camera.rotation().unit_quaternion();
     ros_message m{version_};
-    m.header(time, "world").text("camera").numbers({t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w()});
+    m.header(time, "world").text("camera").numbers(numbers_of(T_world_camera));
     write(topic, "nav_msgs/Odometry", time, m.numbers(std::vector<double>(36 + 6 + 36)));
   }
 
@@ -107,7 +112,12 @@ class ros_bag_writer {
 
   [[nodiscard]] ros_message begin(double time) const {
     ros_message m{version_};
-    return m.header(time, "camera");
+    return m.header(time, frame);
+  }
+  static std::vector<double> numbers_of(const se3& pose) {
+    const vec3& t = pose.translation();
+    const auto& q = pose.rotation().unit_quaternion();
+    return {t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w()};
   }
   void write(const std::string& topic, const std::string& type, double time, const ros_message& m) {
     topic_messages& t = topics_.try_emplace(topic, topic_messages{topics_.size(), type, {}}).first->second;
