@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <string_view>
+#include <tuple>
 #include <utility>
 
 #include <orbis/core/file.hpp>
@@ -107,6 +108,13 @@ bool is_listed_type(std::string_view type) {
   return std::ranges::find(types, type) != std::end(types);
 }
 
+bag_topic& topic_like(std::vector<bag_topic>& topics, const bag_topic& t) {
+  const auto same = std::ranges::find_if(topics, [&](const bag_topic& other) {
+    return std::tie(other.name, other.type, other.coding) == std::tie(t.name, t.type, t.coding);
+  });
+  return same != topics.end() ? *same : topics.emplace_back(bag_topic{t.name, t.type, t.coding, {}});
+}
+
 std::string count_messages(const std::vector<bag_topic>& topics) {
   std::size_t count = 0;
   for (const bag_topic& t : topics) count += t.messages.size();
@@ -157,13 +165,8 @@ result<bag> bag::open(const fs::path& path) {
     for (const std::string& note : (*part)->notes) all.notes.push_back(note);
     for (bag_topic& t : (*part)->topics) {
       for (bag_message& m : t.messages) m.file = static_cast<std::uint32_t>(all.parts_.size());
-      const auto same = std::ranges::find_if(all.topics, [&](const bag_topic& other) {
-        return std::tie(other.name, other.type, other.coding) == std::tie(t.name, t.type, t.coding);
-      });
-      if (same == all.topics.end())
-        all.topics.push_back(std::move(t));
-      else
-        same->messages.insert(same->messages.end(), t.messages.begin(), t.messages.end());
+      std::vector<bag_message>& to = topic_like(all.topics, t).messages;
+      to.insert(to.end(), t.messages.begin(), t.messages.end());
     }
     (*part)->topics.clear();
     all.parts_.push_back(*std::move(part));

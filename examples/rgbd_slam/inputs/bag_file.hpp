@@ -7,9 +7,9 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
-#include <limits>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <orbis/core/result.hpp>
@@ -52,6 +52,8 @@ inline constexpr std::size_t whole_message = std::size_t{1} << 30U;  ///< bytes;
 [[nodiscard]] std::string ros1_type(std::string_view type);
 /// Returns true if messages of this type of ROS 1 are listed.
 [[nodiscard]] bool is_listed_type(std::string_view type);
+/// The topic of the name, type and encoding of `t` in a list; appended without messages if it is not there.
+[[nodiscard]] bag_topic& topic_like(std::vector<bag_topic>& topics, const bag_topic& t);
 /// The number of listed messages, e.g. "12 messages".
 [[nodiscard]] std::string count_messages(const std::vector<bag_topic>& topics);
 

@@ -2,7 +2,6 @@
 #include "inputs/chunked_bag.hpp"
 
 #include <algorithm>
-#include <tuple>
 #include <utility>
 
 #include "inputs/decompression.hpp"
@@ -51,18 +50,10 @@ result<void> chunked_bag::open() {
   return {};
 }
 
-void chunked_bag::define(bag_record& r) {
-  bag_topic& t = r.topic;
-  if (topic_of_channel_.contains(r.channel)) return;
-  if (!is_listed_type(t.type)) {
-    topic_of_channel_[r.channel] = unlisted;
-    return;
-  }
-  const auto same = std::ranges::find_if(topics, [&](const bag_topic& other) {
-    return std::tie(other.name, other.type, other.coding) == std::tie(t.name, t.type, t.coding);
-  });
-  topic_of_channel_[r.channel] = static_cast<std::size_t>(same - topics.begin());
-  if (same == topics.end()) topics.push_back(std::move(t));
+void chunked_bag::define(const bag_record& r) {
+  const auto [at, is_new] = topic_of_channel_.try_emplace(r.channel, unlisted);
+  if (is_new && is_listed_type(r.topic.type))
+    at->second = static_cast<std::size_t>(&topic_like(topics, r.topic) - topics.data());
 }
 
 void chunked_bag::add(std::uint32_t channel, const bag_message& m) {

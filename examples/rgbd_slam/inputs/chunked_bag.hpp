@@ -10,6 +10,8 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <string_view>
+#include <utility>
 #include <vector>
 
 #include "inputs/bag_file.hpp"
@@ -63,7 +65,7 @@ class chunked_bag : public bag_file {
     bool is_complete = true;
   };
 
-  void define(bag_record& r);
+  void define(const bag_record& r);
   void add(std::uint32_t channel, const bag_message& m);
   orbis::result<void> list(std::uint32_t chunk, bool has_end);
   orbis::result<opened_chunk> open_chunk(std::uint32_t chunk);
