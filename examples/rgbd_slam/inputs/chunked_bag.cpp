@@ -52,8 +52,9 @@ result<void> chunked_bag::open() {
 
 void chunked_bag::define(const bag_record& r) {
   const auto [at, is_new] = topic_of_channel_.try_emplace(r.channel, unlisted);
-  if (is_new && is_listed_type(r.topic.type))
-    at->second = static_cast<std::size_t>(&topic_like(topics, r.topic) - topics.data());
+  if (!is_new || !is_listed_type(r.topic.type)) return;
+  const bag_topic& topic = topic_like(topics, r.topic);  // may move the list
+  at->second = static_cast<std::size_t>(&topic - topics.data());
 }
 
 void chunked_bag::add(std::uint32_t channel, const bag_message& m) {
