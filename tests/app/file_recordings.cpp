@@ -216,6 +216,26 @@ TEST_CASE("bags with one camera give compressed images and lenses") {
   CHECK(lens->distortion().k3 == 0.003);
 }
 
+TEST_CASE("the topics of librealsense's bags are found") {
+  const temporary_folder folder;
+  const auto path = folder.path() / "a.bag";
+  {
+    test::ros_bag_writer bag{path};
+    const std::string color = "/device_0/sensor_1/Color_0/", depth = "/device_0/sensor_0/Depth_0/";
+    bag.info(depth + "info/camera_info", 1.0, k);
+    bag.info(color + "info/camera_info", 1.0, k);
+    bag.image(color + "image/data", 1.0, "rgb8", view(plain(1, 2, 3)));
+    bag.image(depth + "image/data", 1.0, "mono16", view(image<std::uint16_t>(32, 24, 1500)));
+    bag.close();
+  }
+  const auto bag = app::open_bag(path, {}).value();
+  CHECK(bag->sensor == sensor_kind::rgbd);
+  CHECK(bag->camera.model.k() == k);
+  CHECK(bag->frame(0).value().depth(3, 3) == 1500);
+  REQUIRE(bag->notes.size() == 1);  // no transform between the cameras
+  CHECK_THAT(bag->notes[0], Contains("registered"));
+}
+
 TEST_CASE("the mosaic of a colour filter becomes a colour image") {
   const temporary_folder folder;
   const auto path = folder.path() / "a.bag";

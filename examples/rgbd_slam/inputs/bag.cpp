@@ -303,17 +303,18 @@ class bag_recording final : public file_recording {
                       first_->name + " have no counterpart and are omitted");
   }
 
-  /// The first `CameraInfo` of the camera of `of`; empty if there is none.
+  /// The first `CameraInfo` of the camera of `of`; empty if there is none. It is in `camera_info` next to the images,
+  /// or, in bags of librealsense, in `info/camera_info` next to `image/data`.
   [[nodiscard]] std::optional<ros_messages::camera_info> info_of(const topic& of) const {
-    std::string name = of.name;
-    if (of.is_compressed()) name = name.substr(0, name.rfind('/'));
-    name = name.substr(0, name.rfind('/') + 1) + "camera_info";
-    for (const bag_topic& t : bag_.topics)
-      if (t.name == name && t.type == "sensor_msgs/CameraInfo")
-        for (const bag_message& m : t.messages)
-          if (const auto bytes = read(m))
-            if (auto info = ros_messages::parse<ros_messages::camera_info>(*bytes, t.coding, name))
-              return *std::move(info);
+    const auto above = [](const std::string& name) { return name.substr(0, name.rfind('/')); };
+    const std::string stream = above(of.is_compressed() ? above(of.name) : of.name);
+    for (const std::string& name : {stream + "/camera_info", above(stream) + "/info/camera_info"})
+      for (const bag_topic& t : bag_.topics)
+        if (t.name == name && t.type == "sensor_msgs/CameraInfo")
+          for (const bag_message& m : t.messages)
+            if (const auto bytes = read(m))
+              if (auto info = ros_messages::parse<ros_messages::camera_info>(*bytes, t.coding, name))
+                return *std::move(info);
     return std::nullopt;
   }
 
