@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cmath>
 #include <cstdio>
 #include <initializer_list>
@@ -88,17 +89,50 @@ class named_values {
   std::vector<cv::FileNode> tables_;
 };
 
+/// Focal lengths and principal point in pixels.
+using focal_and_center = std::array<double, 4>;
+
+/// Those of a 3x3 camera matrix by rows, or by columns, as Open3D and MATLAB write it; empty if it is none.
+std::optional<focal_and_center> of_matrix(const std::array<double, 9>& m) {
+  const auto vanishes = [&](std::size_t i) { return std::abs(m[i]) <= 1e-3 * std::abs(m[0]); };
+  if (m[8] != 1.0 || !vanishes(1) || !vanishes(3)) return std::nullopt;
+  if (vanishes(6) && vanishes(7)) return focal_and_center{m[0], m[4], m[2], m[5]};
+  if (vanishes(2) && vanishes(5)) return focal_and_center{m[0], m[4], m[6], m[7]};
+  return std::nullopt;
+}
+
+/// The intrinsics of an image, whose size may be unknown (0). Errors: malformed.
+result<orbis::camera::intrinsics> checked(const focal_and_center& f, int width, int height, const std::string& where) {
+  if (!(f[0] > 0.0 && f[1] > 0.0 && f[0] < 1e9 && f[1] < 1e9 && std::abs(f[2]) < 1e9 && std::abs(f[3]) < 1e9))
+    return fail(errc::malformed, where, "the focal lengths must be above zero, and the principal point finite");
+  if (f[0] > 5.0 * f[1] || f[1] > 5.0 * f[0])
+    return fail(errc::malformed, where, "the two focal lengths differ by more than a factor of 5");
+  return orbis::camera::intrinsics{width, height, f[0], f[1], f[2], f[3]};
+}
+
+std::string lower_case(std::string text) {
+  for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return text;
+}
+
 result<orbis::camera::any_camera> model_of(const orbis::camera::intrinsics& k, const std::string& name,
                                            std::vector<double> d, const std::string& where) {
   if (std::all_of(d.begin(), d.end(), [](double v) { return v == 0.0; }))
     return orbis::camera::any_camera{orbis::camera::pinhole{k}};
   if (!std::all_of(d.begin(), d.end(), [](double v) { return std::isfinite(v); }))
     return fail(errc::malformed, where, "the distortion is not finite");
-  const bool is_fisheye = name == "equidistant" || name == "fisheye" || name.find("annala") != std::string::npos;
-  const bool is_inverse = name.find("inverse") != std::string::npos;
+  std::string model = lower_case(name);
+  if (model.starts_with("distortion.")) model.erase(0, 11);  // librealsense
+  const auto is_one_of = [&](std::initializer_list<const char*> names) {
+    return std::find(names.begin(), names.end(), model) != names.end();
+  };
+  const bool is_fisheye =
+      is_one_of({"equidistant", "fisheye", "opencv_fisheye", "kannala_brandt", "kannalabrandt8", "kannala_brandt4"});
+  const bool is_radtan = is_one_of({"", "plumb_bob", "rational_polynomial", "radtan", "radial-tangential",
+                                    "brown_conrady", "brown conrady", "pinhole", "perspective", "opencv"});
   if (is_fisheye && d.size() == 4)
     return orbis::camera::any_camera{orbis::camera::kannala_brandt{k, {d[0], d[1], d[2], d[3]}}};
-  if (!is_fisheye && !is_inverse && d.size() >= 4 && d.size() <= 8) {
+  if (is_radtan && d.size() >= 4 && d.size() <= 8) {
     d.resize(8);
     return orbis::camera::any_camera{
         orbis::camera::radial_tangential{k, {d[0], d[1], d[2], d[3], d[4], d[5], d[6], d[7]}}};
@@ -117,11 +151,14 @@ result<camera_file> camera_of(const named_values& values, const std::filesystem:
   const auto is_size = [](double v) { return v >= 0.0 && v <= 1e5 && v == std::floor(v); };
   if (!is_size(width) || !is_size(height) || (width == 0.0) != (height == 0.0))
     return fail(errc::malformed, where, "width and height must be whole numbers up to 100000");
-  std::array<double, 4> f{};                                                 // fx, fy, cx, cy
-  if (const auto m = values.numbers({"intrinsic_matrix"}); m.size() == 9) {  // Open3D: by columns
-    f = {m[0], m[4], m[6] + m[2], m[7] + m[5]};                              // the other corner is zero
-  } else if (const auto rows = values.numbers({"camera_matrix", "K", "k"}); rows.size() == 9) {
-    f = {rows[0], rows[4], rows[2], rows[5]};
+  focal_and_center f{};
+  auto matrix = values.numbers({"intrinsic_matrix", "camera_matrix", "K", "k"});
+  if (matrix.size() == 9) {
+    std::array<double, 9> m{};
+    std::copy(matrix.begin(), matrix.end(), m.begin());
+    const auto found = of_matrix(m);
+    if (!found) return fail(errc::malformed, where, "the camera matrix is not fx 0 cx, 0 fy cy, 0 0 1");
+    f = *found;
   } else {
     const std::array<std::optional<double>, 4> named{values.number({"fx", "fl_x", "Camera.fx", "Camera1.fx"}),
                                                      values.number({"fy", "fl_y", "Camera.fy", "Camera1.fy"}),
@@ -134,9 +171,8 @@ result<camera_file> camera_of(const named_values& values, const std::filesystem:
       f[i] = *named[i];
     }
   }
-  const orbis::camera::intrinsics k{static_cast<int>(width), static_cast<int>(height), f[0], f[1], f[2], f[3]};
-  if (!(f[0] > 0.0 && f[1] > 0.0 && f[0] < 1e9 && f[1] < 1e9 && std::abs(f[2]) < 1e9 && std::abs(f[3]) < 1e9))
-    return fail(errc::malformed, where, "the focal lengths must be above zero, and the principal point finite");
+  const auto k = checked(f, static_cast<int>(width), static_cast<int>(height), where);
+  if (!k) return fail(k.error());
   auto d = values.numbers({"distortion_coefficients", "D", "d", "coeffs", "distortion"});
   for (const char* const prefix : {"Camera.", "Camera1."}) {
     std::vector<double> orb;
@@ -144,7 +180,7 @@ result<camera_file> camera_of(const named_values& values, const std::filesystem:
       orb.push_back(values.number({(prefix + std::string{name}).c_str()}).value_or(0.0));
     if (d.empty() && values.number({(prefix + std::string{"k1"}).c_str()})) d = orb;
   }
-  auto model = model_of(k, values.text({"distortion_model", "model", "Camera.type"}), d, where);
+  auto model = model_of(*k, values.text({"distortion_model", "model", "Camera.type"}), d, where);
   if (!model) return fail(model.error());
   file.camera.model = *model;
   if (const auto scale =
@@ -157,23 +193,30 @@ result<camera_file> camera_of(const named_values& values, const std::filesystem:
   return file;
 }
 
-/// A 3x3 camera matrix, or the upper left part of a 4x4 one; or fx, fy, cx, cy, as in the layout of ETH3D and BAD SLAM,
-/// whose depth scale is 5000.
+/// A 3x3 camera matrix, or the upper left part of a 4x4 one; or fx, fy, cx, cy. The depth scale is 5000 if the folder
+/// has the list of ETH3D's layout.
 result<camera_file> read_matrix(const std::string& text, const std::filesystem::path& path) {
   std::istringstream in{text};
   in.imbue(std::locale::classic());
-  const std::vector<double> m{std::istream_iterator<double>{in}, {}};
-  if (!in.eof() || (m.size() != 4 && m.size() != 9 && m.size() != 16))
-    return fail(errc::malformed, path.string(), "a camera matrix has 9 numbers, or 16");
-  const std::size_t row = m.size() == 9 ? 3 : 4;
+  const std::vector<double> v{std::istream_iterator<double>{in}, {}};
+  std::optional<focal_and_center> f;
+  if (in.eof() && v.size() == 4) f = focal_and_center{v[0], v[1], v[2], v[3]};
+  if (in.eof() && (v.size() == 9 || v.size() == 16)) {
+    const std::size_t row = v.size() == 9 ? 3 : 4;
+    std::array<double, 9> m{};
+    for (std::size_t i = 0; i != 9; ++i) m[i] = v[i / 3 * row + i % 3];
+    f = of_matrix(m);
+  }
+  if (!f)
+    return fail(errc::malformed, path.string(), "is neither a camera matrix, fx 0 cx 0 fy cy 0 0 1, nor fx fy cx cy");
+  const auto k = checked(*f, 0, 0, path.string());
+  if (!k) return fail(k.error());
   camera_file file;
   file.path = path;
-  const bool is_eth3d = m.size() == 4;
-  const std::array<double, 4> f{m[0], m[is_eth3d ? 1 : row + 1], m[2], m[is_eth3d ? 3 : row + 2]};
-  if (is_eth3d) file.camera.depth_scale = 5000.0;
-  if (!(f[0] > 0.0 && f[1] > 0.0 && f[0] < 1e9 && f[1] < 1e9 && std::abs(f[2]) < 1e9 && std::abs(f[3]) < 1e9))
-    return fail(errc::malformed, path.string(), "the focal lengths must be above zero, and the principal point finite");
-  file.camera.model = orbis::camera::pinhole{orbis::camera::intrinsics{0, 0, f[0], f[1], f[2], f[3]}};
+  file.camera.model = orbis::camera::pinhole{*k};
+  std::error_code ignored;
+  if (v.size() == 4 && std::filesystem::exists(path.parent_path() / "associated.txt", ignored))
+    file.camera.depth_scale = 5000.0;
   return file;
 }
 
@@ -182,12 +225,12 @@ result<camera_file> read_matrix(const std::string& text, const std::filesystem::
 std::string camera_file::describe() const {
   const orbis::camera::intrinsics& k = camera.model.k();
   char text[200];
-  std::snprintf(text, sizeof text, "%d x %d, fx %.6g, fy %.6g, cx %.6g, cy %.6g, depth_scale %.6g%s", k.width, k.height,
-                k.fx, k.fy, k.cx, k.cy, camera.depth_scale,
+  std::snprintf(text, sizeof text, ": %d x %d, fx %.6g, fy %.6g, cx %.6g, cy %.6g, depth_scale %.6g%s", k.width,
+                k.height, k.fx, k.fy, k.cx, k.cy, camera.depth_scale,
                 has_depth_scale                ? ""
                 : camera.depth_scale == 1000.0 ? " (millimetres are assumed)"
                                                : " (that of ETH3D is assumed)");
-  return "the camera is that of " + path.filename().string() + ": " + text;
+  return "the camera is that of " + path.filename().string() + ", " + std::string{camera.model.model_name()} + text;
 }
 
 result<camera_file> read_camera_file(const std::filesystem::path& path) {

@@ -66,7 +66,7 @@ auto open_with_camera(const settings& s, Options options, Open&& open, std::opti
   if (!camera) return fail(camera.error());
   options.camera = *camera;
   auto opened = open(options);
-  if (opened || !opened.error().message.ends_with(camera_request)) return opened;
+  if (opened || *camera || opened.error().code != orbis::errc::invalid_argument) return opened;
   const auto path = find_camera_file(s.input);
   if (path.empty()) return opened;
   auto file = read_camera_file(path);
@@ -288,12 +288,15 @@ result<frame_source> open_file(const settings& s) {
     return fail(orbis::errc::unsupported, s.input.string(),
                 "is one image; name its folder, " + std::filesystem::absolute(s.input).parent_path().string());
   if (!is_bag(s.input) && is_text(s.input))
-    return fail(orbis::errc::unsupported, s.input.string(),
-                "is a text file, neither a bag nor a video; a recording with lists is opened by its folder, " +
-                    std::filesystem::absolute(s.input).parent_path().string());
+    return fail(
+        orbis::errc::unsupported, s.input.string(),
+        "is not a folder, a bag, or a video that OpenCV can read, but text; a recording with lists is opened by its "
+        "folder, " +
+            std::filesystem::absolute(s.input).parent_path().string());
   const auto camera = camera_option(s);
   if (!camera) return fail(camera.error());
-  const file_recording_options options{.sensor = wanted_sensor(s), .camera = *camera, .topics = s.topics, .truth_topic = s.truth_topic};
+  const file_recording_options options{
+      .sensor = wanted_sensor(s), .camera = *camera, .topics = s.topics, .truth_topic = s.truth_topic};
   auto opened = is_bag(s.input) ? open_bag(s.input, options) : open_video(s.input, options);
   if (!opened) return fail(with_option(opened.error()));
   const std::shared_ptr<const file_recording> recording = *std::move(opened);

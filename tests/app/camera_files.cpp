@@ -56,16 +56,18 @@ TEST_CASE("cameras in the files of other programs are read") {
     CHECK((k.fx == 525.5 && k.fy == 526.5 && k.cx == 319.5 && k.cy == 239.5));
     CHECK(file->camera.model.model_name() == e.model);
     CHECK(std::abs(file->camera.depth_scale - e.depth_scale) < 1e-9);
-    CHECK_THAT(file->describe(), Contains(e.name) && Contains("640 x 480, fx 525.5"));
+    CHECK_THAT(file->describe(), Contains(e.name + ", " + e.model) && Contains("640 x 480, fx 525.5"));
     CHECK(app::named_camera((folder / e.name).string()).has_value());
   }
   for (const char* const text :
-       {"525.5 0 319.5\n0 526.5 239.5\n0 0 1\n", "525.5 0 319.5 0 0 526.5 239.5 0 0 0 1 0 0 0 0 1"}) {
+       {"525.5 0 319.5\n0 526.5 239.5\n0 0 1\n", "525.5 0 319.5 0 0 526.5 239.5 0 0 0 1 0 0 0 0 1",
+        "525.5 0 0\n0 526.5 0\n319.5 239.5 1\n", "525.5 526.5 319.5 239.5\n"}) {
     const auto file = app::read_camera_file(folder.write("cam_K.txt", text));
     CHECK(file.value().camera.model.k().cx == 319.5);
     CHECK(file->camera.model.width() == 0);  // unknown
     CHECK_THAT(file->describe(), Contains("millimetres are assumed"));
   }
+  folder.write("associated.txt", "");
   const auto eth3d = app::read_camera_file(folder.write("calibration.txt", "525.5 526.5 319.5 239.5\n")).value();
   CHECK((eth3d.camera.model.k().fy == 526.5 && eth3d.camera.model.k().cy == 239.5));
   CHECK_THAT(eth3d.describe(), Contains("depth_scale 5000 (that of ETH3D is assumed)"));
@@ -79,8 +81,19 @@ TEST_CASE("files that are no cameras are refused in one sentence") {
         std::tuple{"a.json", std::string{"{\"width\": 640, \"height\": 480}"}, "has no camera"},
         std::tuple{"a.json", std::string{"{\"fx\": "}, "not valid JSON"},
         std::tuple{"a.json", std::string(300, '['), "nested"}, std::tuple{"a.json", std::string(300, '{'), "nested"},
-        std::tuple{"a.json", std::string{}, ""}, std::tuple{"a.yaml", std::string{"- 1\n- 2\n"}, ""},
-        std::tuple{"a.yaml", std::string{"\x01\x02\xFF: ["}, ""},
+        std::tuple{"a.json", std::string{}, "JSON"}, std::tuple{"a.yaml", std::string{"- 1\n- 2\n"}, "JSON"},
+        std::tuple{"a.yaml", std::string{"\x01\x02\xFF: ["}, "JSON"},
+        std::tuple{"a.txt", std::string{"525 525 319.5 239.5 0.26 -0.95 -0.005 0.002 1.16\n"},
+                   "neither a camera matrix"},
+        std::tuple{"a.json", std::string{R"({"width": 6, "height": 4, "K": [7, 7, 3, 2, 0, 0, 0, 0, 1]})"},
+                   "camera matrix"},
+        std::tuple{"a.json", std::string{R"({"width": 6, "height": 4, "fx": 900, "fy": 1, "cx": 1, "cy": 1})"},
+                   "factor"},
+        std::tuple{
+            "a.json",
+            std::string{R"({"width": 6, "height": 4, "fx": 1, "fy": 1, "cx": 1, "cy": 1, "distortion_model": "fov",
+                                   "d": [0.1, 0.1, 0.1, 0.1]})"},
+            "distortion model \"fov\""},
         std::tuple{"a.json", std::string{R"({"width": 640, "height": 480, "fx": -1, "fy": 1, "cx": 1, "cy": 1})"},
                    "above zero"},
         std::tuple{"a.json",
@@ -89,7 +102,7 @@ TEST_CASE("files that are no cameras are refused in one sentence") {
         std::tuple{"a.json",
                    std::string{R"({"width": 6, "height": 4, "fx": 1, "fy": 1, "cx": 1, "cy": 1, "coeffs": [1, 2]})"},
                    "distortion model"},
-        std::tuple{"a.txt", std::string{"1 0 2\n0 1 2\n"}, "9 numbers"}}) {
+        std::tuple{"a.txt", std::string{"1 0 2\n0 1 2\n"}, "camera matrix"}}) {
     const auto file = app::read_camera_file(folder.write(name, text));
     INFO(text);
     REQUIRE_FALSE(file.has_value());

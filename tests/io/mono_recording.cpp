@@ -104,6 +104,14 @@ TEST_CASE("a camera of the ASL layout is read alone and from within its folder")
   folder.write("mav0/state_groundtruth_estimate0/data.csv",
                "1403636579763555584,1.0,2.0,3.0,1.0,0.0,0.0,0.0\n1403636579813555456,1.5,2.0,3.0,1.0,0.0,0.0,0.0\n");
   CHECK(io::detect_stereo_format(folder.path()) == io::stereo_format::automatic);  // without a second camera
+  {
+    // A clock that counts nanoseconds from the start.
+    const temporary_folder uptime;
+    write_images(uptime, {"mav0/cam0/data/0.png", "mav0/cam0/data/50000000.png"});
+    uptime.write("mav0/cam0/data.csv", "#timestamp [ns],filename\n0,0.png\n50000000,50000000.png\n");
+    uptime.write("mav0/cam0/sensor.yaml", sensor_yaml);
+    CHECK(times_of(io::open_mono_recording(uptime.path()).value()) == std::vector<double>{0.0, 0.05});
+  }
   for (const char* const where : {".", "mav0", "mav0/cam0", "mav0/cam0/"}) {
     const auto path = folder.path() / where;
     CHECK(io::detect_mono_format(path) == mono_format::asl);

@@ -300,3 +300,24 @@ TEST_CASE("the stereo excerpt of KITTI opens as a pair of lists") {
   CHECK(recording.ground_truth().size() == 51);
   CHECK(recording.frame(50).value().right.width() == 1226);
 }
+
+TEST_CASE("times of stereo recordings have the unit of their clock or a warning") {
+  const temporary_folder folder;
+  folder.write("camera.toml", test::tiny_camera + std::string{"baseline = 0.2\nfps = 10\n"});
+  std::string left, right;
+  for (int i = 0; i != 4; ++i) {
+    const std::string n = std::to_string(i);
+    folder.write("left/" + n + ".png", test::tiny_color(1));
+    folder.write("right/" + n + ".png", test::tiny_color(2));
+    left += std::to_string(100.5 * i) + " left/" + n + ".png\n";
+    right += std::to_string(100.5 * i) + " right/" + n + ".png\n";
+  }
+  folder.write("left.txt", left);  // milliseconds
+  folder.write("right.txt", right);
+  const auto slow = io::open_stereo_recording(folder.path()).value();
+  REQUIRE(slow.notes().size() == 1);
+  CHECK_THAT(slow.notes()[0], Catch::Matchers::Contains("1000 times too large"));
+  folder.write("left.txt", "0 left/0.png\n1 left/1.png\n2 left/2.png\n");  // frame numbers
+  folder.write("right.txt", "0 right/0.png\n1 right/1.png\n2 right/2.png\n");
+  CHECK(io::open_stereo_recording(folder.path()).value().timestamp(2) == 0.2);
+}

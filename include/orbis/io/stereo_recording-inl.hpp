@@ -43,6 +43,7 @@ namespace detail {
     return fail(
         errc::no_data, folder.string(),
         "there are no images named by numbers (000000.png) or times in it; the folder " + describe_content(folder));
+  note_order(folder, images, true, notes);
   std::vector<stamped_file> files;
   const auto times = images.times(fps);
   for (std::size_t i = 0; i != times.size(); ++i) files.push_back({times[i], images.paths[i]});
@@ -82,6 +83,7 @@ namespace detail {
   }
 
   std::vector<stamped_file> lists[2];
+  bool have_whole_times = true;
   for (const int i : {0, 1}) {
     const auto list = i == 0 ? first_present(folder, {"left.txt", "rgb.txt"}) : first_present(folder, {"right.txt"});
     const auto numbered = i == 0 ? first_present(folder, {"left", "rgb"}) : folder / "right";
@@ -90,10 +92,13 @@ namespace detail {
     if (!files) return fail(files.error());
     lists[i] = *std::move(files);
     if (!list.empty()) images.files.push_back(list);
+    have_whole_times = have_whole_times && !list.empty() && are_whole(times_of(lists[i]));
   }
   if (auto paired = pair_images(lists[0], lists[1], folder, max_time_difference, images); !paired)
     return fail(paired.error());
-  if (const auto truth = read_ground_truth(folder, max_time_difference, images); !truth) return fail(truth.error());
+  if (have_whole_times) convert_frame_numbers(images, index.fps);
+  if (const auto truth = read_ground_truth(folder, max_time_difference, images, index.fps); !truth)
+    return fail(truth.error());
   return index;
 }
 
@@ -172,6 +177,7 @@ ORBIS_INLINE result<stereo_recording> open_stereo_recording(const std::filesyste
   if (!index) return fail(index.error());
   if (const auto unused = folder / "camera.toml"; has_cameras && detail::present(unused))
     index->images.notes.push_back(unused.string() + ": not used; the two cameras are those of " + cameras);
+  detail::note_interval(index->images, index->fps);
   // Check before the rectification maps are made: a wrong size may exceed the memory.
   const auto& file = index->images.frames.front().color;
   const camera::any_camera& left = index->cameras.left;

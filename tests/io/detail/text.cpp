@@ -12,10 +12,11 @@ namespace io = orbis::io;
 
 TEST_CASE("lines are numbered from 1 and come without comments and blanks and line ends") {
   std::vector<std::pair<std::string, std::size_t>> seen;
-  io::detail::for_each_line("\xEF\xBB\xBF# head\r\n a b \r\n\r\n\t# more\n c\nd", [&](std::string_view line, std::size_t n) {
-    seen.emplace_back(line, n);
-    return true;
-  });
+  io::detail::for_each_line("\xEF\xBB\xBF# head\r\n a b \r\n\r\n\t# more\n c\nd",
+                            [&](std::string_view line, std::size_t n) {
+                              seen.emplace_back(line, n);
+                              return true;
+                            });
   CHECK(seen == std::vector<std::pair<std::string, std::size_t>>{{"a b", 2}, {"c", 5}, {"d", 6}});
 }
 

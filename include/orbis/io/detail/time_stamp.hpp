@@ -45,11 +45,13 @@ inline constexpr time_unit time_units[] = {
   }
 }
 
-/// Parses a time stamp in the unit of its digits (`unit_of`). Returns seconds; empty if it is not a finite number.
-[[nodiscard]] inline std::optional<double> parse_time_stamp(std::string_view stamp) noexcept {
+/// Parses a time stamp in `unit`, by default that of its digits (`unit_of`). Returns seconds; empty if it is not a
+/// finite number.
+[[nodiscard]] inline std::optional<double> parse_time_stamp(std::string_view stamp,
+                                                            std::optional<time_unit> unit = {}) noexcept {
   double t = 0.0;
   if (!parse_number(stamp, t) || !std::isfinite(t)) return std::nullopt;
-  return t * unit_of(stamp).seconds;
+  return t * unit.value_or(unit_of(stamp)).seconds;
 }
 
 /// A time in seconds for messages, with at most 6 decimals.
@@ -77,12 +79,15 @@ inline constexpr time_unit time_units[] = {
   return *middle;
 }
 
+[[nodiscard]] inline bool are_whole(const std::vector<double>& times) {
+  return std::all_of(times.begin(), times.end(), [](double t) { return t == std::floor(t); });
+}
+
 /// Returns true if ascending times are frame numbers: whole numbers, mostly less than ten apart, and far smaller than
 /// seconds since 1970.
 [[nodiscard]] inline bool are_frame_numbers(const std::vector<double>& times) {
   constexpr double most_apart = 10.0, highest = 1e8;
-  return times.size() >= 2 && times.front() >= 0.0 && times.back() < highest &&
-         std::all_of(times.begin(), times.end(), [](double t) { return t == std::floor(t); }) &&
+  return times.size() >= 2 && times.front() >= 0.0 && times.back() < highest && are_whole(times) &&
          median_interval(times) < most_apart;
 }
 
@@ -98,13 +103,14 @@ inline constexpr time_unit time_units[] = {
                 "the time between frames is %.3g s, but at %.3g frames per second it would be %.3g s", interval, fps,
                 1.0 / fps);
   std::string warning = text;
-  if (ratio > tolerance) {
-    const double thousands = std::clamp(std::round(std::log10(ratio) / 3.0), 1.0, 6.0);
+  // A unit that is mistaken makes a factor of a power of 1000; other factors have other reasons.
+  const double power = std::clamp(std::round(std::log10(ratio) / 3.0), 1.0, 6.0);
+  if (ratio > tolerance && std::abs(ratio / std::pow(1000.0, power) - 1.0) < 0.3) {
     std::snprintf(text, sizeof text, "; the time stamps seem to be %.0f times too large: write them in seconds",
-                  std::pow(1000.0, thousands));
+                  std::pow(1000.0, power));
     return warning + text;
   }
-  return warning + "; check the unit of the time stamps, and fps of the camera";
+  return warning + "; check the unit of the time stamps, which are seconds, and fps of the camera";
 }
 
 }  // namespace orbis::io::detail

@@ -95,9 +95,57 @@ TEST_CASE("what a folder of images has besides pairs is used or noted") {
 TEST_CASE("images with equal names that are neither numbers nor times pair by these names") {
   const temporary_folder folder;
   folder.write("camera.toml", test::tiny_camera);
+  int value = 0;
   for (const char* const name : {"a", "b", "door"})
-    write_pair(folder, std::string{"rgb/"} + name + ".png", std::string{"depth/"} + name + ".png", 3);
-  CHECK(io::open_recording(folder.path()).value().size() == 3);
+    write_pair(folder, std::string{"rgb/"} + name + ".png", std::string{"depth/"} + name + ".png", ++value);
+  const auto recording = io::open_recording(folder.path()).value();
+  REQUIRE(recording.size() == 3);
+  CHECK(recording.frame(2).value().depth(0, 0) == 3);
+  REQUIRE(recording.notes().size() == 1);
+  CHECK_THAT(recording.notes()[0], Contains("alphabetical order"));
+}
+
+TEST_CASE("one image with another name changes neither order nor times of the rest") {
+  const temporary_folder folder;
+  folder.write("camera.toml", test::tiny_camera);
+  for (int i = 0; i != 12; ++i)
+    write_pair(folder, "rgb/" + std::to_string(i) + ".png", "depth/" + std::to_string(i) + ".png", i + 1);
+  folder.write("rgb/preview.png", test::tiny_color(99));
+  folder.write("rgb/._0.png", "resource fork");
+  folder.write("depth/._0.png", "resource fork");
+  const auto recording = io::open_recording(folder.path()).value();
+  REQUIRE(recording.size() == 12);
+  for (std::size_t i = 0; i != 12; ++i) {
+    CHECK(recording.frame(i).value().color(0, 0).r == i + 1);
+    CHECK(recording.timestamp(i) == static_cast<double>(i) / 30.0);
+  }
+  REQUIRE(recording.notes().size() == 1);
+  CHECK_THAT(recording.notes()[0], Contains("1 images with other names (preview.png) are skipped"));
+}
+
+TEST_CASE("a ground truth of frame numbers or of seconds has the poses of the right frames") {
+  for (const bool has_list : {false, true})
+    for (const bool truth_has_numbers : {false, true}) {
+      const temporary_folder folder;
+      folder.write("camera.toml", std::string{test::tiny_camera} + "fps = 10\n");
+      std::string list, truth;
+      for (int i = 0; i != 40; ++i) {
+        const std::string n = std::to_string(i);
+        write_pair(folder, "rgb/" + n + ".png", "depth/" + n + ".png", i + 1);
+        list += n + " rgb/" + n + ".png " + n + " depth/" + n + ".png\n";
+        truth += (truth_has_numbers ? n : std::to_string(0.1 * i)) + " " + n + " 0 0 0 0 0 1\n";
+      }
+      if (has_list) folder.write("associations.txt", list);
+      folder.write("groundtruth.txt", truth);
+      INFO(has_list << truth_has_numbers);
+      const auto recording = io::open_recording(folder.path()).value();
+      REQUIRE(recording.size() == 40);
+      for (std::size_t i = 0; i != 40; ++i) {
+        const auto pose = recording.frame(i).value().T_world_camera;
+        REQUIRE(pose.has_value());
+        CHECK(std::abs(pose->translation().x() - static_cast<double>(i)) < 1e-4);
+      }
+    }
 }
 
 TEST_CASE("folders whose images do not pair are refused with both names") {

@@ -24,6 +24,17 @@ TEST_CASE("names of images are times, numbers, or neither") {
   CHECK(order({"a1.png", "b1.png"}).keys_are == image_keys::alphabet);
   CHECK(order({"a.png", "b.png"}).keys == std::vector<double>{0, 1});
   CHECK(order({"1.png", "a.png"}).keys_are == image_keys::alphabet);
+  // The form that most names have decides; others are left out.
+  const auto most = order({"0.png", "1.png", "10.png", "2.png", "preview.png"});
+  CHECK(most.paths == paths{"0.png", "1.png", "2.png", "10.png"});
+  CHECK(most.others == paths{"preview.png"});
+  // Seconds and nanoseconds, without and with leading zeros; seconds and microseconds.
+  CHECK(order({"1311868164_119999999.png", "1311868164_20000000.png", "1311868165_5.png"}).keys ==
+        std::vector<double>{1311868164.02, 1311868164.119999999, 1311868165.000000005});
+  CHECK(order({"rgb-1311868164-119999999.png", "rgb-1311868164-020000000.png"}).keys ==
+        std::vector<double>{1311868164.02, 1311868164.119999999});
+  CHECK(order({"1311868164_020000.png", "1311868164_120000.png"}).keys ==
+        std::vector<double>{1311868164.02, 1311868164.12});
   CHECK(order({"12345678901234567890.png"}).keys_are == image_keys::alphabet);  // no number, no time
   CHECK(order({}).paths.empty());
 }

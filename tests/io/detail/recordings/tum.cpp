@@ -91,7 +91,7 @@ TEST_CASE("an association list decides and may name depth first") {
     CHECK(index.frames[0].color.filename() == "1.00.png");
     CHECK(index.frames[0].depth.filename() == "1.04.png");
     CHECK(index.frames[1].depth.filename() == "1.30.png");
-    CHECK(mentions(index, pass == 0 ? "associations.txt:3: skipped" : "not in order"));
+    CHECK(mentions(index, pass == 0 ? "associations.txt:3: skipped" : "not in chronological order"));
     folder.write("associations.txt", "1.30 depth/1.30.png 1.03 rgb/1.03.png\n1.04 depth/1.04.png 1.00 rgb/1.00.png\n");
   }
 }

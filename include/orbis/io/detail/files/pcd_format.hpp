@@ -226,7 +226,7 @@ inline result<cloud_columns> read_pcd_columns(std::string_view bytes, const std:
   const auto header = take_pcd_header(bytes, where);
   if (!header) return fail(header.error());
   if (header->point_size == 0) return fail(errc::unsupported, where, "the points have no x, y and z");
-  const auto ends_early = [&] { return fail(errc::malformed, where, "the data end early or are damaged"); };
+  const auto ends_early = [&] { return fail(errc::malformed, where, "the data ends early or is damaged"); };
   if (header->data == pcd_data::ascii) return read_pcd_text(bytes, *header, all, where);
   if (header->data == pcd_data::binary) {
     if (header->points > bytes.size() / header->point_size) return ends_early();

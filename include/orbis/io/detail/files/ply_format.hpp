@@ -160,7 +160,7 @@ inline result<cloud_columns> read_ply_columns(std::string_view bytes, const std:
   if (!header) return fail(header.error());
   const bool text = header->format == ply_format::ascii;
   ply_body body{bytes, header->format};
-  const auto ends_early = [&] { return fail(errc::malformed, where, "the data end early or are damaged"); };
+  const auto ends_early = [&] { return fail(errc::malformed, where, "the data ends early or is damaged"); };
   std::optional<cloud_columns> read;
   std::vector<std::string> others;
   for (const ply_element& element : header->elements) {

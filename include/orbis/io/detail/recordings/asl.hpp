@@ -139,7 +139,7 @@ struct asl_images {
   if (!list) return fail(list.error());
   auto camera = parse_asl_camera(*settings, where / "sensor.yaml");
   if (!camera) return fail(camera.error());
-  auto files = parse_image_list(*list, where / "data.csv", where / "data", to.notes);
+  auto files = parse_image_list(*list, where / "data.csv", where / "data", to.notes, time_units[3]);
   if (!files) return fail(files.error());
   to.files.insert(to.files.end(), {where / "sensor.yaml", where / "data.csv"});
   return asl_images{*std::move(camera), *std::move(files)};

@@ -55,19 +55,6 @@ namespace orbis::io::detail {
   return !color_folder_of(folder).empty() && !depth_folder_of(folder).empty();
 }
 
-/// Notes the folders with images in `folder` that are not among the `used` ones.
-inline void note_unused_folders(const std::filesystem::path& folder, const std::vector<std::filesystem::path>& used,
-                                std::vector<std::string>& notes) {
-  std::string unused;
-  for (const auto& path : list_folder(folder)) {
-    std::error_code ignored;
-    if (!std::filesystem::is_directory(path, ignored) || std::find(used.begin(), used.end(), path) != used.end())
-      continue;
-    if (!images_in(path).empty()) unused += (unused.empty() ? "" : ", ") + path.filename().string() + "/";
-  }
-  if (!unused.empty()) notes.push_back(folder.string() + ": the images in " + unused + " are not used");
-}
-
 /// Pairs images by equal numbers, by times at most `max_time_difference` seconds apart, or by equal names. Errors:
 /// invalid_argument (the names do not pair).
 [[nodiscard]] inline result<std::vector<index_pair>> pair_by_name(const keyed_images& color, const keyed_images& depth,
@@ -115,6 +102,8 @@ inline void note_unused_folders(const std::filesystem::path& folder, const std::
   std::vector<stamped_file> colors;
   for (std::size_t i = 0; i != times.size(); ++i) colors.push_back({times[i], color.paths[i]});
   if (const auto read = read_image_times(folder, colors, index); !read) return fail(read.error());
+  note_order(color_folder, color, !index.files.empty(), index.notes);
+  note_order(depth_folder, depth, true, index.notes);
   for (const auto& [c, d] : *pairs)
     if (c < colors.size()) index.frames.push_back({colors[c].timestamp, colors[c].path, depth.paths[d], {}});
   const auto span = [](const keyed_images& images) {
@@ -130,7 +119,7 @@ inline void note_unused_folders(const std::filesystem::path& folder, const std::
                             " images have no counterpart and are skipped: colour is " + span(color) + ", depth " +
                             span(depth));
   note_unused_folders(folder, {color_folder, depth_folder}, index.notes);
-  if (const auto truth = read_ground_truth(folder, max_time_difference, index); !truth) return fail(truth.error());
+  if (const auto truth = read_ground_truth(folder, max_time_difference, index, fps); !truth) return fail(truth.error());
   return index;
 }
 

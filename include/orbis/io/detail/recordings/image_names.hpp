@@ -4,13 +4,18 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <numeric>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <system_error>
+#include <tuple>
+#include <utility>
 #include <vector>
 
 #include <orbis/core/file.hpp>
@@ -24,10 +29,11 @@
 
 namespace orbis::io::detail {
 
-/// The images directly in `folder`, sorted by name.
+/// The images directly in `folder`, sorted by name, without hidden files.
 [[nodiscard]] inline std::vector<std::filesystem::path> images_in(const std::filesystem::path& folder) {
   auto paths = list_folder(folder);
-  std::erase_if(paths, [](const auto& path) { return !is_image_name(path); });
+  std::erase_if(paths,
+                [](const auto& path) { return !is_image_name(path) || path.filename().string().starts_with('.'); });
   return paths;
 }
 
@@ -39,6 +45,7 @@ struct keyed_images {
   image_keys keys_are = image_keys::alphabet;
   std::vector<double> keys;
   std::vector<std::filesystem::path> paths;
+  std::vector<std::filesystem::path> others;  ///< images whose names have another form
 
   /// Times in seconds. `fps`: rate of images without times.
   [[nodiscard]] std::vector<double> times(double fps) const {
@@ -49,70 +56,123 @@ struct keyed_images {
   }
 };
 
-/// The number in a file name: its last digits, with a fraction if it has one, and the text around it.
+/// The number in a file name: its last digits, with a fraction or the seconds before them if it has those, and the text
+/// around it.
 struct name_number {
   std::string_view before, number, after;
+  std::string_view fraction;  ///< of `seconds_nanoseconds`, the part after the seconds in `number`
 
   explicit name_number(std::string_view stem) {
     constexpr std::string_view digits = "0123456789";
     const std::size_t end = stem.find_last_of(digits) + 1;
     if (end == 0) return;
     std::size_t begin = stem.find_last_not_of(digits, end - 1) + 1;
-    if (begin >= 2 && stem[begin - 1] == '.' && digits.find(stem[begin - 2]) != std::string_view::npos)
-      begin = stem.find_last_not_of(digits, begin - 2) + 1;
+    const auto digits_before = [&](std::size_t at) { return at - (stem.find_last_not_of(digits, at - 1) + 1); };
+    if (begin >= 2 && stem[begin - 1] == '.' && digits_before(begin - 1) != 0) {
+      begin -= 1 + digits_before(begin - 1);
+    } else if (begin >= 11 && (stem[begin - 1] == '_' || stem[begin - 1] == '-') && digits_before(begin - 1) == 10 &&
+               stem[begin - 11] != '0' && end - begin <= 9) {
+      fraction = stem.substr(begin, end - begin);
+      begin -= 11;
+    }
     before = stem.substr(0, begin);
     number = stem.substr(begin, end - begin);
     after = stem.substr(end);
   }
   /// Returns true if the number is a time: it has a fraction, or the digits of a time since 1970.
   [[nodiscard]] bool is_time() const {
-    return number.find('.') != std::string_view::npos || !(unit_of(number) == time_units[0]) ||
+    return !fraction.empty() || number.find('.') != std::string_view::npos || !(unit_of(number) == time_units[0]) ||
            (number.size() == 10 && number.front() != '0');
+  }
+  /// The time in seconds, or the frame number. `unit`: of the fraction after whole seconds.
+  [[nodiscard]] std::optional<double> key(double unit) const {
+    if (!fraction.empty()) {
+      double whole = 0.0, part = 0.0;
+      const bool good = parse_number(number.substr(0, 10), whole) && parse_number(fraction, part);
+      return good ? std::optional{whole + part * unit} : std::nullopt;
+    }
+    if (is_time()) return parse_time_stamp(number);
+    std::uint32_t frame = 0;
+    return parse_number(number, frame) ? std::optional<double>{frame} : std::nullopt;
   }
 };
 
-/// Orders images by their names: `1305031102.1753.png` and `1403636579763555584.png` are times (`parse_time_stamp`),
-/// `frame_000123.png` is frame 123. If the names have no common form, they keep their order.
+/// Orders images by their names: `1305031102.1753.png`, `1403636579763555584.png` and `1311868164_20000000.png`
+/// (seconds and nanoseconds) are times, `frame_000123.png` is frame 123. The form that most names have decides; images
+/// with other names are left out. Without such a form, all images keep their alphabetical order.
 [[nodiscard]] inline keyed_images order_by_name(std::vector<std::filesystem::path> paths) {
+  struct image {
+    double key = 0.0;
+    std::size_t index = 0;
+  };
   std::vector<std::string> stems;
   for (const auto& path : paths) stems.push_back(path.stem().string());
-  const auto keys_by = [&](const auto& key_of) {
-    std::vector<double> keys;
-    const name_number first{stems.empty() ? std::string_view{} : stems.front()};
-    for (const std::string& stem : stems) {
-      const name_number name{stem};
-      const bool is_like_first = name.before == first.before && name.after == first.after;
-      const std::optional<double> key = is_like_first ? key_of(name) : std::nullopt;
-      if (!key) return std::vector<double>{};
-      keys.push_back(*key);
+  using form = std::tuple<std::string_view, std::string_view, bool, bool>;
+  const auto form_of = [](const name_number& n) { return form{n.before, n.after, n.is_time(), !n.fraction.empty()}; };
+  std::map<form, std::vector<image>> by_form;
+  std::size_t shortest = 9, longest = 0;
+  for (const std::string& stem : stems)
+    if (const name_number name{stem}; !name.fraction.empty()) {
+      shortest = std::min(shortest, name.fraction.size());
+      longest = std::max(longest, name.fraction.size());
     }
-    return keys;
-  };
-  keyed_images found;
-  found.keys_are = image_keys::times;
-  found.keys = keys_by([](const name_number& n) { return n.is_time() ? parse_time_stamp(n.number) : std::nullopt; });
-  if (found.keys.empty()) {
-    found.keys_are = image_keys::numbers;
-    found.keys = keys_by([](const name_number& n) {
-      std::uint32_t number = 0;
-      return parse_number(n.number, number) ? std::optional<double>{number} : std::nullopt;
-    });
+  // Fractions of equal lengths are decimals; others are whole numbers of the coarsest unit in which they are below 1 s.
+  const bool is_padded = shortest == longest && longest % 3 == 0;
+  const double unit = is_padded      ? std::pow(10.0, -static_cast<double>(longest))
+                      : longest <= 3 ? 1e-3
+                      : longest <= 6 ? 1e-6
+                                     : 1e-9;
+  for (std::size_t i = 0; i != stems.size(); ++i) {
+    const name_number name{stems[i]};
+    if (const auto key = name.key(unit)) by_form[form_of(name)].push_back({*key, i});
   }
-  if (found.keys.empty()) {
-    found.keys_are = image_keys::alphabet;
+  const auto most = std::max_element(by_form.begin(), by_form.end(),
+                                     [](const auto& a, const auto& b) { return a.second.size() < b.second.size(); });
+  keyed_images found;
+  if (most == by_form.end() || 2 * most->second.size() <= paths.size()) {
     found.keys.resize(paths.size());
     std::iota(found.keys.begin(), found.keys.end(), 0.0);
     found.paths = std::move(paths);
     return found;
   }
+  found.keys_are = std::get<2>(most->first) ? image_keys::times : image_keys::numbers;
   // Numbers without leading zeros are not in alphabetical order.
-  std::vector<std::size_t> order(paths.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  std::stable_sort(order.begin(), order.end(),
-                   [&](std::size_t a, std::size_t b) { return found.keys[a] < found.keys[b]; });
-  for (const std::size_t i : order) found.paths.push_back(paths[i]);
-  std::sort(found.keys.begin(), found.keys.end());
+  std::vector<image>& images = most->second;
+  std::stable_sort(images.begin(), images.end(), [](const image& a, const image& b) { return a.key < b.key; });
+  std::vector<bool> is_used(paths.size());
+  for (const image& i : images) {
+    found.keys.push_back(i.key);
+    found.paths.push_back(paths[i.index]);
+    is_used[i.index] = true;
+  }
+  for (std::size_t i = 0; i != paths.size(); ++i)
+    if (!is_used[i]) found.others.push_back(paths[i]);
   return found;
+}
+
+/// Notes images whose names do not determine their order, and images that are left out because of their names.
+/// `has_times`: their times are known by other means.
+inline void note_order(const std::filesystem::path& folder, const keyed_images& images, bool has_times,
+                       std::vector<std::string>& notes) {
+  if (images.keys_are == image_keys::alphabet && !has_times)
+    notes.push_back(folder.string() +
+                    ": the names of the images are neither numbers nor times; they are read in alphabetical order");
+  if (!images.others.empty())
+    notes.push_back(folder.string() + ": " + std::to_string(images.others.size()) + " images with other names (" +
+                    images.others.front().filename().string() + ") are skipped");
+}
+
+/// Notes the folders with images in `folder` that are not among the `used` ones.
+inline void note_unused_folders(const std::filesystem::path& folder, const std::vector<std::filesystem::path>& used,
+                                std::vector<std::string>& notes) {
+  std::string unused;
+  for (const auto& path : list_folder(folder)) {
+    std::error_code ignored;
+    if (!std::filesystem::is_directory(path, ignored) || std::find(used.begin(), used.end(), path) != used.end())
+      continue;
+    if (!images_in(path).empty()) unused += (unused.empty() ? "" : ", ") + path.filename().string() + "/";
+  }
+  if (!unused.empty()) notes.push_back(folder.string() + ": the images in " + unused + " are not used");
 }
 
 /// Replaces the times of images in order by those of `times.txt` or `timestamps.txt` in `folder`, if one exists;

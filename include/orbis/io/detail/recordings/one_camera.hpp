@@ -51,8 +51,8 @@ inline constexpr double mono_pose_distance = 0.020;
   index.files.push_back(list);
   for (const stamped_file& f : *files) index.frames.push_back({f.timestamp, f.path, {}, {}});
   if (const auto ok = check_first_frame(index, folder); !ok) return fail(ok.error());
-  if (const auto truth = read_ground_truth(folder, mono_pose_distance, index); !truth) return fail(truth.error());
   convert_frame_numbers(index, fps);
+  if (const auto truth = read_ground_truth(folder, mono_pose_distance, index, fps); !truth) return fail(truth.error());
   guess_tum_camera(folder, index);
   return index;
 }
@@ -134,13 +134,15 @@ inline constexpr double mono_pose_distance = 0.020;
 
 // --- plain folders ------------------------------------------------------------------------------
 
-/// The folder that contains the images: `folder` itself, or a subfolder with one of the usual names; empty if there are
-/// none.
+/// The folder with the images of a plain folder: itself, or the one of the usual names in it that has more images;
+/// empty if there are none.
 [[nodiscard]] inline std::filesystem::path image_folder_of(const std::filesystem::path& folder) {
-  if (!images_in(folder).empty()) return folder;
-  for (const char* const name : {"rgb", "color", "colour", "image", "images", "left", "data"})
-    if (!images_in(folder / name).empty()) return folder / name;
-  return {};
+  std::filesystem::path found;
+  std::size_t most = 0;
+  for (const auto& path : {folder, folder / "rgb", folder / "color", folder / "colour", folder / "image",
+                           folder / "images", folder / "left", folder / "data"})
+    if (const std::size_t count = images_in(path).size(); count > most) found = path, most = count;
+  return found;
 }
 
 /// The index of a plain folder of images, PNG or JPEG, in it or in `rgb`, `color`, `images`, `left` or `data`. Their
@@ -159,14 +161,12 @@ inline constexpr double mono_pose_distance = 0.020;
   std::vector<stamped_file> files;
   for (std::size_t i = 0; i != times.size(); ++i) files.push_back({times[i], images.paths[i]});
   if (const auto read = read_image_times(folder, files, index); !read) return fail(read.error());
-  if (images.keys_are == image_keys::alphabet && first_present(folder, {"times.txt", "timestamps.txt"}).empty())
-    index.notes.push_back(where.string() +
-                          ": the names of the images are neither numbers nor times; they are read in "
-                          "alphabetical order");
+  note_order(where, images, !index.files.empty(), index.notes);
+  note_unused_folders(folder, {where}, index.notes);
   auto ordered = in_order_of_time(where, std::move(files), index.notes);
   if (!ordered) return fail(ordered.error());
   for (const stamped_file& f : *ordered) index.frames.push_back({f.timestamp, f.path, {}, {}});
-  if (const auto truth = read_ground_truth(folder, mono_pose_distance, index); !truth) return fail(truth.error());
+  if (const auto truth = read_ground_truth(folder, mono_pose_distance, index, fps); !truth) return fail(truth.error());
   return index;
 }
 

@@ -31,6 +31,13 @@ namespace orbis::io::detail {
   return std::optional{*std::move(read)};
 }
 
+/// Notes a time between frames that does not suit a camera of `fps` frames per second.
+inline void note_interval(recording_index& index, double fps) {
+  std::vector<double> times;
+  for (const recording_entry& frame : index.frames) times.push_back(frame.timestamp);
+  if (std::string warning = describe_interval(times, fps); !warning.empty()) index.notes.push_back(std::move(warning));
+}
+
 /// Sets `camera` to that of the index if it is empty, with a note if that one is a guess, and notes a time between
 /// frames that does not match its rate. Errors: invalid_argument (no camera is known).
 [[nodiscard]] inline result<void> complete_camera(const std::filesystem::path& folder,
@@ -47,10 +54,7 @@ namespace orbis::io::detail {
   if (!camera)
     return fail(errc::invalid_argument, folder.string(),
                 "the camera is not known: put a camera.toml into the folder, or specify a camera");
-  std::vector<double> times;
-  for (const recording_entry& frame : index.frames) times.push_back(frame.timestamp);
-  if (std::string warning = describe_interval(times, camera->fps); !warning.empty())
-    index.notes.push_back(std::move(warning));
+  note_interval(index, camera->fps);
   return {};
 }
 

@@ -119,15 +119,17 @@ template <class Entry, class Parse>
 }
 
 /// Parses a list of lines with a time stamp (`parse_time_stamp`) and a file name, separated by blanks, a comma or a
-/// semicolon; see `parse_list`. File names are relative to `folder`. Errors: no_data.
+/// semicolon; see `parse_list`. File names are relative to `folder`. `unit`: of the time stamps; empty: by their
+/// digits. Errors: no_data.
 [[nodiscard]] inline result<std::vector<stamped_file>> parse_image_list(std::string_view text,
                                                                         const std::filesystem::path& list,
                                                                         const std::filesystem::path& folder,
-                                                                        std::vector<std::string>& notes) {
+                                                                        std::vector<std::string>& notes,
+                                                                        std::optional<time_unit> unit = {}) {
   return parse_list<stamped_file>(
       text, list, "a time stamp and a file name",
       [&](std::string_view line) -> std::optional<stamped_file> {
-        const std::optional<double> t = parse_time_stamp(next_separated(line));
+        const std::optional<double> t = parse_time_stamp(next_separated(line), unit);
         const std::string name = listed_name(line);
         if (!t || name.empty()) return std::nullopt;
         return stamped_file{*t, folder / name};
@@ -205,10 +207,41 @@ struct associated_files {
   return {};
 }
 
+/// Converts the times of frames from frame numbers to seconds at `fps` frames per second, if they are such numbers, and
+/// notes it.
+inline void convert_frame_numbers(recording_index& index, double fps) {
+  std::vector<double> times;
+  for (const recording_entry& frame : index.frames) times.push_back(frame.timestamp);
+  if (!are_frame_numbers(times)) return;
+  for (recording_entry& frame : index.frames) frame.timestamp /= fps;
+  char text[100];
+  std::snprintf(text, sizeof text, "the time stamps are frame numbers; times are those of %.6g frames per second", fps);
+  index.notes.emplace_back(text);
+}
+
+/// Converts the times of a ground truth from frame numbers to seconds at `fps` frames per second, if they are such
+/// numbers and more frames have a pose then; notes it. @pre the times of the frames are in seconds
+inline void convert_numbered_truth(recording_index& index, double max_distance, double fps) {
+  std::vector<double> times;
+  for (const stamped_pose& pose : index.ground_truth) times.push_back(pose.timestamp);
+  if (!are_frame_numbers(times)) return;
+  const auto known = [&](const trajectory& truth) {
+    return std::count_if(index.frames.begin(), index.frames.end(), [&](const recording_entry& frame) {
+      return interpolate(truth, frame.timestamp, 0.2, max_distance).has_value();
+    });
+  };
+  trajectory converted = index.ground_truth;
+  for (stamped_pose& pose : converted) pose.timestamp /= fps;
+  if (known(converted) <= known(index.ground_truth)) return;
+  index.ground_truth = std::move(converted);
+  index.notes.emplace_back("the times of the ground truth are frame numbers, too");
+}
+
 /// Reads `groundtruth.txt` of a folder, if it exists, into an index with known frames, and sets their poses
-/// (`attach_ground_truth`). Errors: unreadable, malformed (with its line), unsupported.
+/// (`attach_ground_truth`). `fps`: frames per second, for poses with frame numbers for times. Errors: unreadable,
+/// malformed (with its line), unsupported.
 [[nodiscard]] inline result<void> read_ground_truth(const std::filesystem::path& folder, double max_time_difference,
-                                                    recording_index& index) {
+                                                    recording_index& index, double fps) {
   const auto file = folder / "groundtruth.txt";
   if (!present(file)) return {};
   auto truth = read_trajectory_file(file);
@@ -216,6 +249,7 @@ struct associated_files {
     return fail(errc::malformed, file.string(), "the poses have no times; a line is timestamp tx ty tz qx qy qz qw");
   if (auto taken = take_ground_truth(std::move(truth), index); !taken) return fail(taken.error());
   index.files.push_back(file);
+  convert_numbered_truth(index, max_time_difference, fps);
   attach_ground_truth(index, max_time_difference);
   return {};
 }
@@ -250,22 +284,6 @@ inline void guess_tum_camera(const std::filesystem::path& folder, recording_inde
   }
 }
 
-/// Converts the times of frames from frame numbers to seconds at `fps` frames per second, if they are frame numbers,
-/// together with whole-numbered times of the ground truth; adds a note.
-inline void convert_frame_numbers(recording_index& index, double fps) {
-  std::vector<double> times;
-  for (const recording_entry& frame : index.frames) times.push_back(frame.timestamp);
-  if (!are_frame_numbers(times)) return;
-  for (recording_entry& frame : index.frames) frame.timestamp /= fps;
-  const bool truth_has_numbers = std::all_of(index.ground_truth.begin(), index.ground_truth.end(),
-                                             [](const auto& p) { return p.timestamp == std::floor(p.timestamp); });
-  if (truth_has_numbers)
-    for (stamped_pose& pose : index.ground_truth) pose.timestamp /= fps;
-  char text[100];
-  std::snprintf(text, sizeof text, "the time stamps are frame numbers; times are those of %.6g frames per second", fps);
-  index.notes.emplace_back(text);
-}
-
 /// The index of a TUM recording. `associations.txt` is used if it exists; otherwise colour and depth images are paired
 /// by `associate` within `max_time_difference` seconds, and images without a partner are noted. The ground truth is
 /// interpolated at the colour images' time stamps. The camera is that of the benchmark's sequences
@@ -275,13 +293,12 @@ inline void convert_frame_numbers(recording_index& index, double fps) {
 [[nodiscard]] inline result<recording_index> index_tum(const std::filesystem::path& folder,
                                                        double max_time_difference = 0.020, double fps = 30.0) {
   recording_index index;
-  const auto is_whole = [](double t) { return t == std::floor(t); };
   bool depth_is_whole = true;
   if (const auto list = association_list_of(folder); !list.empty()) {
     auto frames = read_associations(list, index.notes);
     if (!frames) return fail(frames.error());
     for (associated_files& f : *frames) {
-      depth_is_whole = depth_is_whole && is_whole(f.depth_timestamp);
+      depth_is_whole = depth_is_whole && are_whole({f.depth_timestamp});
       index.frames.push_back({f.timestamp, std::move(f.color), std::move(f.depth), {}});
     }
     index.files = {list};
@@ -299,7 +316,7 @@ inline void convert_frame_numbers(recording_index& index, double fps) {
     const auto depth = read_image_list(folder / "depth.txt", index.notes);
     if (!depth) return fail(depth.error());
     const auto times = times_of(*color), depth_times = times_of(*depth);
-    depth_is_whole = std::all_of(depth_times.begin(), depth_times.end(), is_whole);
+    depth_is_whole = are_whole(depth_times);
     for (const auto& [c, d] : associate(times, depth_times, max_time_difference))
       index.frames.push_back({times[c], (*color)[c].path, (*depth)[d].path, {}});
     if (index.frames.empty())
@@ -314,8 +331,8 @@ inline void convert_frame_numbers(recording_index& index, double fps) {
   }
   if (const auto ok = check_first_frame(index, folder); !ok) return fail(ok.error());
 
-  if (const auto truth = read_ground_truth(folder, max_time_difference, index); !truth) return fail(truth.error());
   if (depth_is_whole) convert_frame_numbers(index, fps);
+  if (const auto truth = read_ground_truth(folder, max_time_difference, index, fps); !truth) return fail(truth.error());
   guess_tum_camera(folder, index);
   return index;
 }
