@@ -30,11 +30,11 @@ foreach(name fx depth_scale)
 endforeach()
 file(WRITE ${WORK}/r/cam_K.txt "${fx} 0 79.5\n0 ${fx} 59.5\n0 0 1\n")
 execute_process(COMMAND ${APP} run r --out out ${quick} WORKING_DIRECTORY ${WORK} ERROR_VARIABLE err)
-check(err MATCHES "the camera is that of cam_K.txt: 160 x 120, fx ${fx}[^\n]*depth_scale 1000 .millimetres are assumed")
+check(err MATCHES "the camera is that of cam_K.txt, pinhole: 160 x 120, fx ${fx}[^\n]*depth_scale 1000 .millimetres are assumed")
 file(WRITE ${WORK}/r/intrinsic.json "{\"width\": 160, \"height\": 120, \"depth_scale\": ${depth_scale},"
      "\"intrinsic_matrix\": [${fx}, 0, 0, 0, ${fx}, 0, 79.5, 59.5, 1]}")
 app(0 run r --out out ${quick})
-check(err MATCHES "the camera is that of intrinsic.json: 160 x 120, fx ${fx}[^\n]*depth_scale ${depth_scale}")
+check(err MATCHES "the camera is that of intrinsic.json, pinhole: 160 x 120, fx ${fx}[^\n]*depth_scale ${depth_scale}")
 app_fails(1 "intrinsic.json: is an input" run r --quiet --out out ${quick} --save-map r/intrinsic.json)
 
 # Numbered images are no data set: the camera of ICL-NUIM is its own.
