@@ -92,7 +92,7 @@ set(tall plan small/map.bt --ground --robot-radius 0.12 --robot-height 0.9 --fro
 app_fails(4 "start blocked by unknown space alone at [0-9.]+,[0-9.]+ .--unknown free" ${tall})
 app(0 ${tall} --unknown free)
 app_fails(2 "no floor" plan plate/map.bt --from 0.5,0.5,0.5 --to 0.5,1.5,0.5 --ground)
-app_fails(2 "no octree map" plan cloud.ply --from 0,0,0 --to 1,1,1)
+app_fails(2 "is not an octree map" plan cloud.ply --from 0,0,0 --to 1,1,1)
 app_fails(2 "no.such" plan no.such --from 0,0,0 --to 1,1,1)
 file(READ ${WORK}/plate/map.ot bytes LIMIT 300)
 file(WRITE ${WORK}/half.ot "${bytes}")
