@@ -219,21 +219,86 @@ TEST_CASE("bags with one camera give compressed images and lenses") {
 TEST_CASE("the topics of librealsense's bags are found") {
   const temporary_folder folder;
   const auto path = folder.path() / "a.bag";
-  {
+  const auto write = [&](const camera::intrinsics& of_depth) {
     test::ros_bag_writer bag{path};
+    bag.frame = "0";  // of all images
     const std::string color = "/device_0/sensor_1/Color_0/", depth = "/device_0/sensor_0/Depth_0/";
-    bag.info(depth + "info/camera_info", 1.0, k);
+    bag.info(depth + "info/camera_info", 1.0, of_depth);
     bag.info(color + "info/camera_info", 1.0, k);
     bag.image(color + "image/data", 1.0, "rgb8", view(plain(1, 2, 3)));
-    bag.image(depth + "image/data", 1.0, "mono16", view(image<std::uint16_t>(32, 24, 1500)));
+    bag.image(depth + "image/data", 1.0, "mono16", view(image<std::uint16_t>(of_depth.width, of_depth.height, 1500)));
+    bag.image("/device_0/sensor_0/Infrared_1/image/data", 1.0, "mono16", view(image<std::uint16_t>(32, 24, 7)));
     bag.close();
-  }
+  };
+  write({16, 12, 15.0, 15.0, 7.5, 5.5});
+  CHECK_THAT(message_of(app::open_bag(path, {})),
+             Contains("16x12 pixels, the camera 32x24: depth is not registered to colour") &&
+                 Contains("these names identify no frames"));
+  write(k);
   const auto bag = app::open_bag(path, {}).value();
   CHECK(bag->sensor == sensor_kind::rgbd);
   CHECK(bag->camera.model.k() == k);
   CHECK(bag->frame(0).value().depth(3, 3) == 1500);
   REQUIRE(bag->notes.size() == 1);  // no transform between the cameras
   CHECK_THAT(bag->notes[0], Contains("registered"));
+}
+
+TEST_CASE("colour and depth of one camera are chosen, with a calibrated camera if there is one") {
+  const temporary_folder folder;
+  const auto path = folder.path() / "a.bag";
+  const auto chosen = [&](const auto& write) {
+    test::ros_bag_writer bag{path};
+    const auto images = [&](const std::string& topic, const std::string& frame, auto pixel, bool has_camera = true) {
+      constexpr bool is_depth = sizeof pixel == 2;
+      bag.frame = frame;
+      bag.image(topic, 1.0, is_depth ? "16UC1" : "rgb8", view(image<decltype(pixel)>(32, 24, pixel)));
+      if (has_camera) bag.info(topic.substr(0, topic.rfind('/')) + "/camera_info", 1.0, k);
+    };
+    write(images);
+    bag.close();
+    return app::open_bag(path, {}).value();
+  };
+  const rgb8 color{1, 2, 3};
+  const std::uint16_t depth = 900;
+  const auto by_frame = chosen([&](const auto& images) {
+    images("/a/color/image", "a", color);
+    images("/a/depth/image", "a_depth", depth);
+    images("/b/color/image", "b", color);
+    images("/c/depth/image", "b", depth);
+  });
+  CHECK(by_frame->images_of == "/b/color/image and /c/depth/image");
+  CHECK(by_frame->notes.empty());
+  const auto by_name = chosen([&](const auto& images) {
+    images("/a/color/image", "a", color);
+    images("/b/color/image", "b", color);
+    images("/b/depth/image", "b_depth", depth);
+  });
+  CHECK(by_name->images_of == "/b/color/image and /b/depth/image");
+  const auto of_infrared = chosen([&](const auto& images) {
+    images("/camera/color/image_raw", "color", color);
+    images("/camera/aligned_depth_to_infra1/image_raw", "infra1", depth);
+  });
+  CHECK_THAT(of_infrared->notes.at(0), Contains("may not be (depth in the frame \"infra1\", colour in \"color\""));
+  const auto calibrated = chosen([&](const auto& images) {
+    images("/a/image", "a", color, false);
+    images("/a/depth", "a", depth, false);
+    images("/b/image", "b", color);
+    images("/b/image_depth", "b", depth);
+    images("/b/image_ir", "b", depth);
+    images("/b/confidence/image", "b", depth);
+  });
+  CHECK(calibrated->images_of == "/b/image and /b/image_depth");
+}
+
+TEST_CASE("the camera of compressed images is next to them or one level higher") {
+  const temporary_folder folder;
+  const auto path = folder.path() / "a.bag";
+  test::ros_bag_writer bag{path};
+  bag.compressed("/front/left/image_compressed", 3.0, "png", io::encode_png(plain(1, 2, 3)));
+  bag.info("/front/left/camera_info", 3.0, k);
+  bag.info("/front/camera_info", 3.0, {32, 24, 99.0, 99.0, 15.5, 11.5});
+  bag.close();
+  CHECK(app::open_bag(path, {}).value()->camera.model.k() == k);
 }
 
 TEST_CASE("the mosaic of a colour filter becomes a colour image") {

@@ -41,6 +41,8 @@ void sort_by_time(std::vector<T>& all, Time T::*time) {
   all.erase(std::unique(all.begin(), all.end(), [&](const T& a, const T& b) { return a.*time == b.*time; }), all.end());
 }
 
+bool contains(std::string_view text, std::string_view part) { return text.find(part) != std::string_view::npos; }
+
 /// A topic of images.
 struct topic : bag_topic {
   std::string encoding;       ///< of the first image, or the format of a compressed image
@@ -51,9 +53,30 @@ struct topic : bag_topic {
   [[nodiscard]] bool is_compressed() const { return type == "sensor_msgs/CompressedImage"; }
   [[nodiscard]] bool is_depth() const { return is_depth_encoding(encoding) || name.ends_with("/compressedDepth"); }
   [[nodiscard]] bool is_read() const { return is_compressed() || is_known_encoding(encoding); }
-  /// Returns true if the name indicates depth that is registered to colour.
+  /// Returns true if the name indicates depth that is registered to colour, not to an infrared camera.
   [[nodiscard]] bool is_registered() const {
-    return name.find("registered") != std::string::npos || name.find("aligned") != std::string::npos;
+    return (contains(name, "registered") || contains(name, "aligned")) && !contains(name, "to_infra");
+  }
+  /// Returns true if the name indicates infrared or thermal images, or the confidence of depth: a component is one of
+  /// these words, or has one of them and does not name depth ("image_ir", but not "aligned_depth_to_infra1").
+  [[nodiscard]] bool is_auxiliary() const {
+    for (std::string_view rest = name; !rest.empty();) {
+      std::string_view component = rest.substr(0, rest.find('/'));
+      rest.remove_prefix(std::min(component.size() + 1, rest.size()));
+      if (contains(component, "depth")) continue;
+      while (!component.empty()) {
+        const std::string_view word = component.substr(0, component.find('_'));
+        component.remove_prefix(std::min(word.size() + 1, component.size()));
+        if (word == "ir" || word.starts_with("Infra") || word == "thermal" || word.starts_with("infra") ||
+            word.starts_with("confidence"))
+          return true;
+      }
+    }
+    return false;
+  }
+  /// Returns true if the frame of the images is known. All images in bags of librealsense have the frame "0".
+  [[nodiscard]] bool has_frame() const {
+    return !frame_id.empty() && frame_id != "0" && !name.ends_with("/image/data");
   }
   /// Returns true if the name indicates rectified images: "image_rect" and "rect", but not "direct".
   [[nodiscard]] bool is_rectified() const {
@@ -69,7 +92,15 @@ bool is_pose_type(const std::string& type) {
          type == "geometry_msgs/PoseWithCovarianceStamped";
 }
 
-bool contains(const std::string& text, std::string_view part) { return text.find(part) != std::string::npos; }
+/// Returns true if the images are known to be of one frame.
+bool has_same_frame(const topic& a, const topic& b) {
+  return a.has_frame() && b.has_frame() && a.frame_id == b.frame_id;
+}
+
+/// The number of components that names begin with in common.
+std::ptrdiff_t common_components(const std::string& a, const std::string& b) {
+  return std::count(a.begin(), std::ranges::mismatch(a, b).in1, '/');
+}
 
 /// Returns true if the topics are those of a left and a right camera.
 bool is_pair(const std::string& left, const std::string& right) {
@@ -201,33 +232,45 @@ class bag_recording final : public file_recording {
       if (options.sensor && *options.sensor != sensor) return wrong("the topics do not match --sensor");
       return {};
     }
-    // Preference: uncompressed, then colour over grey, then rectified over raw; depth that is registered by its name.
-    topic *color = nullptr, *depth = nullptr, *left = nullptr, *right = nullptr;
-    int best_color = -1, best_depth = -1, best_left = -1;
-    const auto worth = [](const topic& t) {
+    const bool needs_info = !options.camera;
+    const auto has_info = [&](const topic& t) { return needs_info && info_topic(t) != nullptr; };
+    // Preference: with a camera, visible light, uncompressed, then colour over grey, then rectified over raw.
+    const auto worth = [&](const topic& t) {
       const bool is_mosaic = t.encoding.starts_with("bayer");
       bool is_color = false;
       for (const char* part : {"rgb", "bgr", "yuv", "uyvy", "yuyv"}) is_color |= contains(t.encoding, part);
       is_color &= !is_mosaic;
-      return 8 * !t.is_compressed() + 4 * is_color + 2 * is_mosaic + t.is_rectified();
+      return std::tuple{has_info(t), !t.is_auxiliary(), !t.is_compressed(), is_color, is_mosaic, t.is_rectified()};
     };
+    // Of colour and depth: the same frame, then the names with most components in common.
+    const auto pair_worth = [&](const topic& c, const topic& d) {
+      return std::tuple{has_info(c),
+                        !c.is_auxiliary(),
+                        contains(d.name, "depth"),
+                        has_same_frame(c, d),
+                        common_components(c.name, d.name),
+                        worth(c),
+                        has_info(d),
+                        d.is_registered(),
+                        !d.is_compressed(),
+                        d.is_rectified()};
+    };
+    topic *lone = nullptr, *color = nullptr, *depth = nullptr, *left = nullptr, *right = nullptr;
     for (auto& [name, t] : topics_) {
-      if (t.is_depth()) {
-        if (!t.is_read()) continue;
-        const int value = 4 * t.is_registered() + 2 * !t.is_compressed() + t.is_rectified();
-        if (value > best_depth) depth = &t, best_depth = value;
-        continue;
+      if (t.is_depth() || !t.is_read()) continue;
+      if (lone == nullptr || worth(t) > worth(*lone)) lone = &t;
+      for (auto& [other_name, other] : topics_) {
+        if (!other.is_read()) continue;
+        if (other.is_depth() && !other.is_auxiliary()) {
+          if (depth == nullptr || pair_worth(t, other) > pair_worth(*color, *depth)) color = &t, depth = &other;
+        } else if (!other.is_depth() && is_pair(name, other_name)) {
+          if (left == nullptr || std::pair{worth(t), worth(other)} > std::pair{worth(*left), worth(*right)})
+            left = &t, right = &other;
+        }
       }
-      if (!t.is_read()) continue;
-      if (worth(t) > best_color) color = &t, best_color = worth(t);
-      for (auto& [other_name, other] : topics_)
-        if (is_pair(name, other_name) && !other.is_depth() && worth(t) > best_left)
-          left = &t, right = &other, best_left = worth(t);
     }
     const auto possible = [&](sensor_kind s) {
-      return s == sensor_kind::rgbd     ? color != nullptr && depth != nullptr
-             : s == sensor_kind::stereo ? left != nullptr
-                                        : color != nullptr;
+      return (s == sensor_kind::rgbd ? depth : s == sensor_kind::stereo ? left : lone) != nullptr;
     };
     std::optional<sensor_kind> found = options.sensor;
     for (const sensor_kind s : {sensor_kind::rgbd, sensor_kind::stereo, sensor_kind::monocular})
@@ -238,7 +281,7 @@ class bag_recording final : public file_recording {
       return wrong(any_unread ? "has no suitable images in a supported encoding" : "has no suitable images");
     }
     sensor = *found;
-    first_ = sensor == sensor_kind::stereo ? left : color;
+    first_ = sensor == sensor_kind::rgbd ? color : sensor == sensor_kind::stereo ? left : lone;
     second_ = sensor == sensor_kind::rgbd ? depth : sensor == sensor_kind::stereo ? right : nullptr;
     return {};
   }
@@ -303,18 +346,24 @@ class bag_recording final : public file_recording {
                       first_->name + " have no counterpart and are omitted");
   }
 
-  /// The first `CameraInfo` of the camera of `of`; empty if there is none. It is in `camera_info` next to the images,
-  /// or, in bags of librealsense, in `info/camera_info` next to `image/data`.
-  [[nodiscard]] std::optional<ros_messages::camera_info> info_of(const topic& of) const {
+  /// The topic of `CameraInfo` of the camera of `of`; null if there is none. It is `camera_info` next to the images, or
+  /// one level higher for compressed images, or, in bags of librealsense, `info/camera_info` next to `image/data`.
+  [[nodiscard]] const bag_topic* info_topic(const topic& of) const {
     const auto above = [](const std::string& name) { return name.substr(0, name.rfind('/')); };
-    const std::string stream = above(of.is_compressed() ? above(of.name) : of.name);
-    for (const std::string& name : {stream + "/camera_info", above(stream) + "/info/camera_info"})
+    const std::string next = above(of.name), higher = above(next);
+    for (const std::string& name : {next + "/camera_info", of.is_compressed() ? higher + "/camera_info" : "",
+                                    (of.is_compressed() ? above(higher) : higher) + "/info/camera_info"})
       for (const bag_topic& t : bag_.topics)
-        if (t.name == name && t.type == "sensor_msgs/CameraInfo")
-          for (const bag_message& m : t.messages)
-            if (const auto bytes = read(m))
-              if (auto info = ros_messages::parse<ros_messages::camera_info>(*bytes, t.coding, name))
-                return *std::move(info);
+        if (t.name == name && t.type == "sensor_msgs/CameraInfo") return &t;
+    return nullptr;
+  }
+  /// The first `CameraInfo` of the camera of `of` that can be read; empty if there is none.
+  [[nodiscard]] std::optional<ros_messages::camera_info> info_of(const topic& of) const {
+    if (const bag_topic* t = info_topic(of))
+      for (const bag_message& m : t->messages)
+        if (const auto bytes = read(m))
+          if (auto info = ros_messages::parse<ros_messages::camera_info>(*bytes, t->coding, t->name))
+            return *std::move(info);
     return std::nullopt;
   }
 
@@ -402,29 +451,32 @@ class bag_recording final : public file_recording {
     return found ? found : read_frames(true).transform(a, b);
   }
 
-  /// Prepares registration of depth to colour with both cameras and the transform between them, unless the names, the
-  /// frames or the sizes of the images indicate that it is registered.
+  /// Prepares registration of depth to colour with both cameras and the transform between them, unless both are known
+  /// to be of one frame and size.
   result<void> register_depth() {
-    if (second_->is_registered()) return {};
-    const bool same_frame = first_->frame_id == second_->frame_id;
+    const bool same_frame = has_same_frame(*first_, *second_);
     const auto info = info_of(*second_);
     const bool same_size = !info || (static_cast<int>(info->width) == camera.model.width() &&
                                      static_cast<int>(info->height) == camera.model.height());
     if (same_frame && same_size) return {};
-    const auto T_color_depth =
-        same_frame ? std::optional{orbis::se3{}} : static_transform(first_->frame_id, second_->frame_id);
-    const std::string frames =
-        "depth in the frame \"" + in_short(second_->frame_id) + "\", colour in \"" + in_short(first_->frame_id) + "\"";
+    const bool is_known = first_->has_frame() && second_->has_frame();
+    const auto T_color_depth = same_frame ? std::optional{orbis::se3{}}
+                               : is_known ? static_transform(first_->frame_id, second_->frame_id)
+                                          : std::nullopt;
     if (!T_color_depth || !info) {
-      unregistered_ = " (" + frames + "; " +
-                      (info ? "no static transform connects them" : "no CameraInfo for " + second_->name) + ")";
+      unregistered_ = " (depth in the frame \"" + in_short(second_->frame_id) + "\", colour in \"" +
+                      in_short(first_->frame_id) + "\"; " +
+                      (!is_known ? "these names identify no frames"
+                       : info    ? "no static transform connects them"
+                                 : "no CameraInfo for " + second_->name) +
+                      ")";
       notes.push_back("depth is used as if it were registered to colour, but may not be" + unregistered_);
       return {};
     }
     const auto model = ros_messages::camera_of(*info, second_->is_rectified(), where(*second_));
     if (!model) return fail(model.error());
     registration_.emplace(*model, camera.model, *T_color_depth);
-    images_of += " (registered by tf)";
+    images_of += same_frame ? " (registered by the cameras)" : " (registered by tf)";
     return {};
   }
 
