@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <cstring>
 #include <filesystem>
 #include <string>
 #include <utility>
@@ -236,6 +237,52 @@ TEST_CASE("an unknown compression is named, and damaged images are omitted with 
   check_frames(*bag, 2, 1.7e9);
 }
 
+TEST_CASE("a ROS 1 bag that is cut off among its definitions has all topics, and a note") {
+  const temporary_folder folder;
+  const std::string bytes = read_file(bags / "none.bag").value();
+  const auto path = folder.write("a.bag", bytes);
+  const auto whole = app::bag::open(path).value();
+  CHECK(whole.notes.empty());
+  std::uint64_t begin = 0;
+  std::memcpy(&begin, &bytes[bytes.find("index_pos=") + 10], sizeof begin);
+  REQUIRE(begin < bytes.size() - 1000);
+  for (std::size_t size = bytes.size() - 1; size >= begin; --size) {
+    std::filesystem::resize_file(path, size);
+    INFO(size);
+    const auto cut = app::bag::open(path).value();
+    REQUIRE(cut.topics.size() == whole.topics.size());
+    for (const app::bag_topic& t : cut.topics) {
+      const auto same = std::ranges::find(whole.topics, t.name, &app::bag_topic::name);
+      REQUIRE(same != whole.topics.end());
+      REQUIRE(t.messages.size() == same->messages.size());
+    }
+    REQUIRE(cut.notes.size() == 1);
+    REQUIRE_THAT(cut.notes[0], Contains("truncated"));
+  }
+}
+
+TEST_CASE("topics of an MCAP file whose summary has no schemas are found") {
+  const temporary_folder folder;
+  std::string bytes = read_file(bags / "realsense_zstd.mcap").value();
+  const auto whole = app::bag::open(bags / "realsense_zstd.mcap").value();
+  std::uint64_t at = 0;
+  std::memcpy(&at, &bytes[bytes.size() - 28], sizeof at);  // the summary, from the footer
+  std::size_t schemas = 0;
+  for (std::uint64_t length = 0; at < bytes.size() - 37; at += 9 + length) {
+    std::memcpy(&length, &bytes[at + 1], sizeof length);
+    if (bytes[at] == 3) bytes[at] = '\x7f', ++schemas;  // an unknown record
+  }
+  CHECK(schemas > 2);
+  const auto changed = app::bag::open(folder.write("a.mcap", bytes)).value();
+  CHECK(changed.notes.empty());
+  REQUIRE(changed.topics.size() == whole.topics.size());
+  for (const app::bag_topic& t : changed.topics) {
+    const auto same = std::ranges::find(whole.topics, t.name, &app::bag_topic::name);
+    REQUIRE(same != whole.topics.end());
+    CHECK(t.messages.size() == same->messages.size());
+  }
+}
+
 TEST_CASE("a bag that is cut off anywhere gives complete frames or an error") {
   const temporary_folder folder;
   std::size_t opened = 0, failed = 0;
@@ -244,6 +291,8 @@ TEST_CASE("a bag that is cut off anywhere gives complete frames or an error") {
     const std::string bytes = read_file(bag).value();
     const std::string name = bag.filename().string();
     std::size_t frames = 0;  // of the whole file
+    sensor_kind sensor{};
+    std::string images_of;
     const auto path = folder.write(name, bytes);
     for (std::size_t size = bytes.size(); size > 0; size -= std::min<std::size_t>(size, 31)) {
       std::filesystem::resize_file(path, size);
@@ -253,8 +302,11 @@ TEST_CASE("a bag that is cut off anywhere gives complete frames or an error") {
         CHECK(recording.error().to_string().size() < 600);
         continue;
       }
-      if (size == bytes.size()) frames = (*recording)->size();
-      CHECK(((*recording)->size() == frames || !(*recording)->notes.empty()));
+      const app::file_recording& found = **recording;
+      if (size == bytes.size()) frames = found.size(), sensor = found.sensor, images_of = found.images_of;
+      INFO(size << " of " << bytes.size() << " bytes: " << found.images_of);
+      CHECK(
+          ((found.size() == frames && found.sensor == sensor && found.images_of == images_of) || !found.notes.empty()));
       for (std::size_t i = 0; i != (*recording)->size(); ++i) {
         const auto frame = (*recording)->frame(i);
         INFO(message_of(frame));

@@ -179,11 +179,18 @@ class ros_bag_writer {
     const std::string chunk =
         record({{"op", "\x05"}, {"compression", "none"}, {"size", number(messages.size())}}, messages) + indices;
     const std::string magic = "#ROSBAG V2.0\n";
+    const std::string of_chunk = record({{"op", "\x06"},
+                                         {"ver", number(1)},
+                                         {"chunk_pos", bytes_of(std::uint64_t{magic.size() + 4096})},
+                                         {"start_time", stamp(0.0)},
+                                         {"end_time", stamp(0.0)},
+                                         {"count", number(0)}},
+                                        "");
     const std::string head = fields({{"op", "\x03"},
                                      {"index_pos", bytes_of(std::uint64_t{magic.size() + 4096 + chunk.size()})},
                                      {"conn_count", number(topics_.size())},
                                      {"chunk_count", number(1)}});
-    return magic + text(head) + text(std::string(4096 - 8 - head.size(), ' ')) + chunk + definitions;
+    return magic + text(head) + text(std::string(4096 - 8 - head.size(), ' ')) + chunk + definitions + of_chunk;
   }
 
   std::filesystem::path path_;

@@ -20,7 +20,6 @@ result<void> chunked_bag::open() {
       if (r->what == kind::topic) define(*r);
       at = r->next;
     }
-  const bool is_defined = !topic_of_channel_.empty();
   bool is_indexed = false;  // the last chunk
   std::uint64_t at = first_record();
   auto r = record_at(file_, at);
@@ -31,8 +30,7 @@ result<void> chunked_bag::open() {
     if (r->what == kind::chunk) {
       const auto chunk = static_cast<std::uint32_t>(chunks_.size());
       chunks_.push_back(at);
-      const auto after = is_defined && is_whole ? record_at(file_, r->next) : std::nullopt;
-      is_indexed = after && after->what == kind::index;
+      is_indexed = is_whole && has_index(r->next);
       if (!is_indexed)
         if (auto listed = list(chunk, r->next < file_.size()); !listed) return listed;
     }
@@ -48,6 +46,16 @@ result<void> chunked_bag::open() {
     notes.push_back(where_ + ": the bag is truncated, damaged or was not closed; " + count_messages(topics) +
                     " before byte " + std::to_string(at) + " can be read");
   return {};
+}
+
+bool chunked_bag::has_index(std::uint64_t at) {
+  bool is_found = false;
+  for (auto r = record_at(file_, at); r && r->what == kind::index; r = record_at(file_, at)) {
+    if (r->next > file_.size() || !topic_of_channel_.contains(r->channel)) return false;
+    is_found = true;
+    at = r->next;
+  }
+  return is_found;
 }
 
 void chunked_bag::define(const bag_record& r) {

@@ -31,7 +31,7 @@ struct bag_record {
 };
 
 /// Scans the headers of the records from front to back. Lists the messages of a chunk from its index, or from the chunk
-/// itself if it has none or if the topics are defined in chunks only.
+/// itself if it has none or if the index names a topic that is not defined yet.
 class chunked_bag : public bag_file {
  public:
   chunked_bag(byte_source file, std::string where) : file_{std::move(file)}, where_{std::move(where)} {}
@@ -65,6 +65,8 @@ class chunked_bag : public bag_file {
     bool is_complete = true;
   };
 
+  /// Returns true if a complete index of known topics is at a position.
+  bool has_index(std::uint64_t at);
   void define(const bag_record& r);
   void add(std::uint32_t channel, const bag_message& m);
   orbis::result<void> list(std::uint32_t chunk, bool has_end);

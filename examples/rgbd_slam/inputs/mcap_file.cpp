@@ -15,7 +15,7 @@ class mcap_file final : public chunked_bag {
   using chunked_bag::chunked_bag;
 
  private:
-  enum operation : std::uint8_t { footer = 2, schema, channel, message, chunk, index, data_end = 15 };
+  enum operation : std::uint8_t { footer = 2, schema_record, channel, message, chunk, index, data_end = 15 };
 
   std::uint64_t first_record() override { return magic; }
   std::uint64_t definitions() override {
@@ -36,13 +36,13 @@ class mcap_file final : public chunked_bag {
     if (!in.ok() || code == 0 || length > std::uint64_t{1} << 62U) return std::nullopt;
     bag_record r;
     r.next = at + head + length;
-    if (length > most_head - head && (code == schema || code == channel)) {
+    if (length > most_head - head && (code == schema_record || code == channel)) {
       bytes = from.read(at, std::min(head + length, most_definition));
       in = message_reader{bytes, message_encoding::ros1};
       in.skip(head);
     }
     if (code == footer || code == data_end) r.what = bag_record::kind::end;
-    if (code == schema) {
+    if (code == schema_record) {
       const auto id = in.number<std::uint16_t>();
       const std::string name = ros1_type(in.string());
       if (in.ok()) schemas_[id] = name;
@@ -50,7 +50,9 @@ class mcap_file final : public chunked_bag {
     if (code == channel) {
       r.what = bag_record::kind::topic;
       r.channel = in.number<std::uint16_t>();
-      const auto type = schemas_.find(in.number<std::uint16_t>());
+      const auto schema = in.number<std::uint16_t>();
+      const auto type = schemas_.find(schema);
+      if (schema != 0 && type == schemas_.end()) r.what = bag_record::kind::other;  // the summary may have no schemas
       r.topic.name = in.string();
       const std::string_view encoding = in.string();
       r.topic.coding = encoding == "ros1" ? message_encoding::ros1 : message_encoding::cdr;

@@ -42,18 +42,39 @@ class rosbag1_file final : public chunked_bag {
 
   std::uint64_t first_record() override { return magic; }
   /// 0 if the bag was not closed.
-  std::uint64_t definitions() override {
+  std::uint64_t definitions() override { return read_header().definitions; }
+
+  /// Numbers in the header of the bag.
+  struct header {
+    std::uint64_t definitions = 0;              // their position
+    std::uint32_t connections = 0, chunks = 0;  // records at this position
+  };
+  header read_header() {
     const std::string bytes = file_.read(magic, 4096);
     message_reader in{bytes, message_encoding::ros1};
     const std::string_view fields = in.string();
-    return number<std::uint8_t>(fields, "op") == bag_header ? number<std::uint64_t>(fields, "index_pos") : 0;
+    if (number<std::uint8_t>(fields, "op") != bag_header) return {};
+    return {number<std::uint64_t>(fields, "index_pos"), number<std::uint32_t>(fields, "conn_count"),
+            number<std::uint32_t>(fields, "chunk_count")};
+  }
+  /// Returns true if the end of the file has the definitions and chunk information that the header counts.
+  bool has_whole_end() {
+    const header known = read_header();
+    std::uint32_t connections = 0, chunks = 0;
+    std::uint64_t at = known.definitions;
+    while (at != 0 && at < file_.size()) {
+      const auto r = record_at(file_, at);
+      if (!r || r->next > file_.size()) return false;
+      (r->what == bag_record::kind::topic ? connections : chunks) += 1;
+      at = r->next;
+    }
+    return at != 0 && connections == known.connections && chunks == known.chunks;
   }
 
   std::optional<bag_record> record_at(byte_source& from, std::uint64_t at) override {
     bag_record r;
     if (&from == &file_ && at == file_.size()) {
-      const std::uint64_t last = definitions();
-      if (last == 0 || last >= at) return std::nullopt;  // not closed, or cut off
+      if (!has_whole_end()) return std::nullopt;  // not closed, or cut off
       r.what = bag_record::kind::end;
       r.next = at + 1;
       return r;
