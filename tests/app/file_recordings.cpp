@@ -6,6 +6,7 @@
 #include <cstring>
 #include <filesystem>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -299,6 +300,60 @@ TEST_CASE("the camera of compressed images is next to them or one level higher")
   bag.info("/front/camera_info", 3.0, {32, 24, 99.0, 99.0, 15.5, 11.5});
   bag.close();
   CHECK(app::open_bag(path, {}).value()->camera.model.k() == k);
+}
+
+TEST_CASE("of times that fall back the first run is used, and repeated times are omitted, with notes") {
+  const temporary_folder folder;
+  const auto path = folder.path() / "a.bag";
+  test::ros_bag_writer bag{path};
+  bag.info("/cam/camera_info", 1.0, k);
+  std::uint8_t value = 0;
+  // 2.9 and 2.9 repeat; from 0.5 on, a second run.
+  for (const double t : {1.0, 2.0, 3.0, 2.9, 2.9, 0.5, 1.5, 9.0})
+    bag.image("/cam/image_raw", t, "rgb8", view(plain(++value, 0, 0)));
+  bag.close();
+  const auto found = app::open_bag(path, {}).value();
+  REQUIRE(found->size() == 4);
+  for (const auto& [i, t, r] : {std::tuple{0U, 1.0, 1}, {1U, 2.0, 2}, {2U, 2.9, 4}, {3U, 3.0, 3}}) {
+    const auto frame = found->frame(i).value();
+    CHECK(frame.timestamp == Approx(t).epsilon(1e-12));
+    CHECK(frame.color(3, 3).r == r);
+  }
+  REQUIRE(found->notes.size() == 2);
+  CHECK_THAT(found->notes[0],
+             Contains("3 images of /cam/image_raw are omitted, as the times in the headers fall back"));
+  CHECK_THAT(found->notes[1], Contains("1 image of /cam/image_raw is omitted, as the time is that of another one"));
+}
+
+TEST_CASE("ground truth is that of the named topic; damaged poses are omitted") {
+  const temporary_folder folder;
+  const auto path = folder.path() / "a.bag";
+  test::ros_bag_writer bag{path};
+  bag.info("/cam/camera_info", 1.0, k);
+  const auto at = [](double x) { return se3{so3{}, vec3(x, 0, 0)}; };
+  bag.frame = "base";
+  bag.transform("/tf_static", 0.0, "camera", at(100.0));
+  bag.transform("/tf_static", 0.5, "camera", at(50.0));  // the latest one applies
+  for (int i = 0; i != 3; ++i) {
+    const double t = 1.0 + 0.1 * i;
+    bag.frame = "camera";
+    bag.image("/cam/image_raw", t, "rgb8", view(plain(1, 2, 3)));
+    bag.frame = "world";
+    bag.transform("/tf", t, "base", at(1.0 + i));
+    bag.transform("/other/tf", t, "base", at(7.0));
+    bag.odometry("/odom", t, i == 1 ? at(NAN) : at(i));
+  }
+  bag.close();
+  const auto found = app::open_bag(path, {.truth_topic = "/tf"}).value();
+  CHECK(found->notes.empty());
+  REQUIRE(found->ground_truth.size() == 3);
+  for (std::size_t i = 0; i != 3; ++i)
+    CHECK(found->ground_truth[i].T_world_camera.translation().x() == Approx(51.0 + static_cast<double>(i)));
+  CHECK_THAT(message_of(app::open_bag(path, {.truth_topic = "/other/tf"})),
+             Contains("no transform of /other/tf moves the camera's frame \"camera\", whose root is \"world\""));
+  const auto odometry = app::open_bag(path, {.truth_topic = "/odom"}).value();
+  CHECK(odometry->ground_truth.size() == 2);
+  CHECK_THAT(odometry->notes.at(0), Contains("1 pose of /odom is damaged and omitted"));
 }
 
 TEST_CASE("the mosaic of a colour filter becomes a colour image") {

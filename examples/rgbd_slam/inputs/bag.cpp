@@ -34,11 +34,19 @@ double seconds(std::int64_t nanoseconds) {
   return static_cast<double>(nanoseconds / second) + 1e-9 * static_cast<double>(nanoseconds % second);
 }
 
-/// Sorts by a member, and removes elements of a repeated time.
+/// Sorts by a member, and removes elements of a repeated time. Returns their number.
 template <class T, class Time>
-void sort_by_time(std::vector<T>& all, Time T::*time) {
+std::size_t sort_by_time(std::vector<T>& all, Time T::*time) {
   std::ranges::stable_sort(all, {}, time);
-  all.erase(std::unique(all.begin(), all.end(), [&](const T& a, const T& b) { return a.*time == b.*time; }), all.end());
+  const auto repeated = std::ranges::unique(all, {}, time);
+  const std::size_t count = repeated.size();
+  all.erase(repeated.begin(), repeated.end());
+  return count;
+}
+
+/// "1 image of /camera is", "2 images of /camera are".
+std::string count_of(std::size_t n, const std::string& what, const std::string& from) {
+  return std::to_string(n) + " " + what + (n == 1 ? " of " : "s of ") + from + (n == 1 ? " is" : " are");
 }
 
 bool contains(std::string_view text, std::string_view part) { return text.find(part) != std::string_view::npos; }
@@ -87,6 +95,7 @@ struct topic : bag_topic {
 };
 
 bool is_transform_type(const std::string& type) { return type == "tf2_msgs/TFMessage" || type == "tf/tfMessage"; }
+bool is_static(std::string_view name) { return name.ends_with("tf_static"); }
 bool is_pose_type(const std::string& type) {
   return type == "nav_msgs/Odometry" || type == "geometry_msgs/PoseStamped" ||
          type == "geometry_msgs/PoseWithCovarianceStamped";
@@ -315,17 +324,33 @@ class bag_recording final : public file_recording {
     for (topic* t : {first_, second_}) {
       if (t == nullptr) continue;
       if (t->unread != 0)
-        notes.push_back(std::to_string(t->unread) + " images of " + t->name +
-                        " cannot be read and are omitted: " + t->reason);
+        notes.push_back(count_of(t->unread, "image", t->name) + " omitted, as damaged or cut off: " + t->reason);
       // A time of zero is that of a simulation that begins there, or there is no time in the header.
       std::int64_t least = std::numeric_limits<std::int64_t>::max();
       for (const entry& e : entries)
         if (e.of == t && e.time != 0) least = std::min(least, e.time);
       constexpr std::int64_t soon = 10'000'000'000;  // nanoseconds
       std::vector<std::pair<std::int64_t, bag_message>> order;
-      for (const entry& e : entries)
-        if (e.of == t) order.emplace_back(e.time == 0 && least > soon ? e.message->time : e.time, *e.message);
-      sort_by_time(order, &std::pair<std::int64_t, bag_message>::first);
+      // Times that fall back are those of a second run: of a simulation that was reset, or a recording played again.
+      constexpr std::int64_t far = 1'000'000'000;  // nanoseconds
+      std::int64_t last = std::numeric_limits<std::int64_t>::min();
+      std::size_t later = 0;
+      for (const entry& e : entries) {
+        if (e.of != t) continue;
+        const bool has_time = e.time != 0 || least <= soon;
+        if (later != 0 || (has_time && e.time + far < last)) {
+          ++later;
+          continue;
+        }
+        if (has_time) last = e.time;
+        order.emplace_back(has_time ? e.time : e.message->time, *e.message);
+      }
+      if (later != 0)
+        notes.push_back(count_of(later, "image", t->name) +
+                        " omitted, as the times in the headers fall back by more than 1 s after the first " +
+                        std::to_string(order.size()));
+      if (const std::size_t repeated = sort_by_time(order, &std::pair<std::int64_t, bag_message>::first); repeated != 0)
+        notes.push_back(count_of(repeated, "image", t->name) + " omitted, as the time is that of another one");
       t->messages.clear();
       for (const auto& [when, message] : order) {
         t->times.push_back(seconds(when));
@@ -342,8 +367,8 @@ class bag_recording final : public file_recording {
     }
     frames_ = orbis::associate(first_->times, second_->times, sensor == sensor_kind::rgbd ? 0.020 : 0.005);
     if (const std::size_t unpaired = first_->times.size() - frames_.size(); unpaired != 0)
-      notes.push_back(std::to_string(unpaired) + " of " + std::to_string(first_->times.size()) + " images of " +
-                      first_->name + " have no counterpart and are omitted");
+      notes.push_back(count_of(unpaired, "image", first_->name) + " omitted, as no image of " + second_->name +
+                      " has the same time");
   }
 
   /// The topic of `CameraInfo` of the camera of `of`; null if there is none. It is `camera_info` next to the images, or
@@ -423,11 +448,11 @@ class bag_recording final : public file_recording {
     return {};
   }
 
-  /// Calls `f` with each transform of the topics of transforms: those named tf_static, or all others.
-  template <class F>
-  void for_each_transform(bool is_static, const F& f) const {
+  /// Calls `f` with each transform of the topics whose names `is_wanted`.
+  template <class Wanted, class F>
+  void for_each_transform(const Wanted& is_wanted, const F& f) const {
     for (const bag_topic& t : bag_.topics)
-      if (is_transform_type(t.type) && t.name.ends_with("tf_static") == is_static)
+      if (is_transform_type(t.type) && is_wanted(t.name))
         for (const bag_message& m : t.messages)
           if (const auto bytes = read(m))
             if (const auto transforms =
@@ -437,18 +462,27 @@ class bag_recording final : public file_recording {
                 f(one);
               }
   }
-  /// The frames of /tf_static, and those of other topics if `with_others`.
-  [[nodiscard]] frame_tree read_frames(bool with_others) const {
-    frame_tree tree;
-    const auto add = [&](const ros_messages::transform& t) { tree.add(t); };
-    for_each_transform(true, add);
-    if (with_others) for_each_transform(false, add);
+  /// The frames of /tf_static, which is read once.
+  [[nodiscard]] const frame_tree& static_frames() {
+    if (!static_frames_) {
+      static_frames_.emplace();
+      for_each_transform(is_static, [&](const ros_messages::transform& t) { static_frames_->set(t); });
+    }
+    return *static_frames_;
+  }
+  /// The frames of /tf_static and those of the other topics whose names `is_wanted`.
+  template <class Wanted>
+  [[nodiscard]] frame_tree frames_with(const Wanted& is_wanted) {
+    frame_tree tree = static_frames();
+    for_each_transform([&](const std::string& name) { return !is_static(name) && is_wanted(name); },
+                       [&](const ros_messages::transform& t) { tree.add(t); });
     return tree;
   }
   /// `T_a_b` of frames that do not move relative to each other, in ROS 1 also published on /tf; empty if unknown.
-  [[nodiscard]] std::optional<orbis::se3> static_transform(const std::string& a, const std::string& b) const {
-    const auto found = read_frames(false).transform(a, b);
-    return found ? found : read_frames(true).transform(a, b);
+  [[nodiscard]] std::optional<orbis::se3> static_transform(const std::string& a, const std::string& b) {
+    if (const auto found = static_frames().transform(a, b)) return found;
+    if (!all_frames_) all_frames_ = frames_with([](const std::string&) { return true; });
+    return all_frames_->transform(a, b);
   }
 
   /// Prepares registration of depth to colour with both cameras and the transform between them, unless both are known
@@ -487,9 +521,12 @@ class bag_recording final : public file_recording {
     for (const bag_topic& t : bag_.topics) {
       if (!is_transform_type(t.type) && !is_pose_type(t.type)) continue;
       if (t.name == name) from = &t;
-      others += (others.empty() ? "; there are poses in " : ", ") + t.name;
+      if (!is_transform_type(t.type) || !is_static(t.name))
+        others += (others.empty() ? "; there are poses in " : ", ") + t.name;
     }
     if (from == nullptr) return fail(errc::invalid_argument, path_, "has no poses in " + name + others);
+    if (is_transform_type(from->type) && is_static(name))
+      return fail(errc::invalid_argument, path_, name + " has static transforms only" + others);
     const auto known = is_transform_type(from->type) ? read_truth_of_frames(name) : read_truth_of_body(*from);
     if (!known) return known;
     if (straight_)
@@ -502,14 +539,21 @@ class bag_recording final : public file_recording {
   result<void> read_truth_of_body(const bag_topic& from) {
     const bool has_child = from.type == "nav_msgs/Odometry";
     ros_messages::transform pose;
+    std::size_t unread = 0;
     for (const bag_message& m : from.messages) {
       const auto bytes = read(m);
-      if (!bytes) return fail(bytes.error());
-      message_reader in{*bytes, from.coding};
-      read_pose(in, pose, has_child);
-      if (!in.ok()) return fail(errc::malformed, path_ + " " + from.name, "a pose is damaged");
+      if (!bytes && bytes.error().code == errc::unsupported) return fail(bytes.error());
+      message_reader in{bytes ? *bytes : std::string_view{}, from.coding};
+      ros_messages::transform one;
+      read_pose(in, one, has_child);
+      if (!bytes || !in.ok()) {
+        ++unread;
+        continue;
+      }
+      pose = std::move(one);
       ground_truth.push_back({seconds(pose.header.stamp != 0 ? pose.header.stamp : m.time), pose.T_parent_child});
     }
+    if (unread != 0) notes.push_back(count_of(unread, "pose", from.name) + " damaged and omitted");
     sort_by_time(ground_truth, &orbis::stamped_pose::timestamp);
     const std::string camera_frame = first_->frame_id;
     truth_of = from.name + " (" + (has_child ? pose.child_frame_id : "body") + " in " + pose.header.frame_id + ")";
@@ -527,7 +571,8 @@ class bag_recording final : public file_recording {
   /// The poses of the camera's frame in the root of the frames, at the times of the images.
   result<void> read_truth_of_frames(const std::string& name) {
     constexpr double most_gap = 0.5, most_distance = 0.05;  // seconds; between two transforms, and to the nearest one
-    const frame_tree tree = read_frames(true);
+    const auto is_named = [&](const std::string& topic) { return topic == name; };
+    const frame_tree tree = frames_with(is_named);
     const std::vector<std::string> path = tree.path_to_root(first_->frame_id);
     std::map<std::string, orbis::trajectory> moving;  // by the name of the child
     for (const std::string& frame : path)
@@ -536,7 +581,7 @@ class bag_recording final : public file_recording {
       return fail(errc::no_data, path_,
                   "no transform of " + name + " moves the camera's frame \"" + path.front() + "\", whose root is \"" +
                       path.back() + "\"");
-    for_each_transform(false, [&](const ros_messages::transform& t) {
+    for_each_transform(is_named, [&](const ros_messages::transform& t) {
       const auto at = moving.find(t.child_frame_id);
       if (at != moving.end() && t.header.frame_id == tree.find(t.child_frame_id)->parent)
         at->second.push_back({seconds(t.header.stamp), t.T_parent_child});
@@ -611,8 +656,9 @@ class bag_recording final : public file_recording {
   std::vector<orbis::index_pair> frames_;
   std::optional<orbis::camera::rectification> straight_;  // of stereo images that are not rectified yet
   orbis::camera::any_camera raw_left_, raw_right_;
-  std::optional<depth_registration> registration_;  // of depth that is not registered yet
-  std::string unregistered_;                        // why it cannot be registered
+  std::optional<depth_registration> registration_;        // of depth that is not registered yet
+  std::optional<frame_tree> static_frames_, all_frames_;  // empty: not read yet
+  std::string unregistered_;                              // why it cannot be registered
 };
 
 }  // namespace

@@ -166,7 +166,10 @@ result<bag> bag::open(const fs::path& path) {
     for (bag_topic& t : (*part)->topics) {
       for (bag_message& m : t.messages) m.file = static_cast<std::uint32_t>(all.parts_.size());
       std::vector<bag_message>& to = topic_like(all.topics, t).messages;
-      to.insert(to.end(), t.messages.begin(), t.messages.end());
+      if (to.empty())
+        to = std::move(t.messages);
+      else
+        to.insert(to.end(), t.messages.begin(), t.messages.end());
     }
     (*part)->topics.clear();
     all.parts_.push_back(*std::move(part));

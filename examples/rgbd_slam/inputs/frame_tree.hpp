@@ -23,6 +23,10 @@ class frame_tree {
     bool is_constant = true;
   };
 
+  /// Sets a static transform; it replaces an earlier one.
+  void set(const ros_messages::transform& t) {
+    links_.insert_or_assign(t.child_frame_id, link{t.header.frame_id, t.T_parent_child});
+  }
   /// Adds a transform; a link whose transforms differ moves.
   void add(const ros_messages::transform& t) {
     const auto [at, is_new] = links_.try_emplace(t.child_frame_id, link{t.header.frame_id, t.T_parent_child});
