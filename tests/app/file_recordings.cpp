@@ -197,6 +197,12 @@ TEST_CASE("the images of a stereo camera in a bag are rectified if they are not"
   CHECK((frame.color(2, 12).g == 8) == is_rectified);  // pulled outwards by the lens, otherwise
   CHECK(frame.color(2, 12).g < 16);
   CHECK(frame.right(16, 12) == rgb8{120, 120, 120});
+  const auto specified = app::open_bag(path, {.camera = settings}).value();
+  CHECK(specified->camera.baseline == 0.1);
+  CHECK(specified->notes.size() == (is_rectified ? 0 : 1));
+  if (!is_rectified)
+    CHECK_THAT(specified->notes[0],
+               Contains("image_raw and /stereo/right/image_raw are used as if they were rectified"));
 }
 
 TEST_CASE("bags with one camera give compressed images and lenses") {
@@ -220,9 +226,13 @@ TEST_CASE("bags with one camera give compressed images and lenses") {
 TEST_CASE("the topics of librealsense's bags are found") {
   const temporary_folder folder;
   const auto path = folder.path() / "a.bag";
-  const auto write = [&](const camera::intrinsics& of_depth) {
+  const auto write = [&](const camera::intrinsics& of_depth, const char* units = nullptr) {
     test::ros_bag_writer bag{path};
     bag.frame = "0";  // of all images
+    bag.distortion_model = "Inverse Brown Conrady";
+    bag.number("/device_0/sensor_0/option/Laser_Power/value", 0.0, 150.0F);
+    bag.number("/device_0/sensor_1/option/Depth_Units/value", 0.0, 0.5F);  // of another sensor
+    if (units != nullptr) bag.number(std::string{"/device_0/sensor_0/option/"} + units + "/value", 0.0, 0.00025F);
     const std::string color = "/device_0/sensor_1/Color_0/", depth = "/device_0/sensor_0/Depth_0/";
     bag.info(depth + "info/camera_info", 1.0, of_depth);
     bag.info(color + "info/camera_info", 1.0, k);
@@ -240,8 +250,58 @@ TEST_CASE("the topics of librealsense's bags are found") {
   CHECK(bag->sensor == sensor_kind::rgbd);
   CHECK(bag->camera.model.k() == k);
   CHECK(bag->frame(0).value().depth(3, 3) == 1500);
-  REQUIRE(bag->notes.size() == 1);  // no transform between the cameras
-  CHECK_THAT(bag->notes[0], Contains("registered"));
+  CHECK(bag->camera.depth_scale == 1000.0);
+  REQUIRE(bag->notes.size() == 2);
+  CHECK_THAT(bag->notes[0], Contains("names no unit of depth for /device_0/sensor_0/Depth_0/image/data"));
+  CHECK_THAT(bag->notes[1], Contains("registered"));  // no transform between the cameras
+  for (const char* units : {"Depth Units", "Depth_Units"}) {
+    write(k, units);
+    const auto known = app::open_bag(path, {}).value();
+    CHECK(known->camera.depth_scale == 4000.0);
+    CHECK(known->frame(0).value().depth_scale == 4000.0);
+    CHECK(known->notes.size() == 1);
+    CHECK_THAT(app::open_bag(path, {.camera = settings}).value()->notes.at(0),
+               Contains("the bag stores 4000 units of depth per metre, the specified camera 1000"));
+  }
+}
+
+TEST_CASE("the distortion of a message becomes that of the camera, or an error") {
+  const temporary_folder folder;
+  const auto path = folder.path() / "a.bag";
+  const auto open = [&](const std::string& model, const std::vector<double>& distortion) {
+    test::ros_bag_writer bag{path};
+    bag.distortion_model = model;
+    bag.image("/cam/image_raw", 1.0, "rgb8", view(plain(1, 2, 3)));
+    bag.info("/cam/camera_info", 1.0, k, 0.0, distortion);
+    bag.close();
+    return app::open_bag(path, {});
+  };
+  const auto equidistant = open("equidistant", {0.1, 0.02, 0.003, 0.0004}).value();
+  REQUIRE(equidistant->camera.model.get_if<camera::kannala_brandt>() != nullptr);
+  CHECK(equidistant->camera.model.get_if<camera::kannala_brandt>()->distortion() ==
+        camera::kannala_brandt::coefficients{0.1, 0.02, 0.003, 0.0004});
+  for (const std::size_t n : {8U, 12U, 14U}) {
+    std::vector<double> d{0.1, 0.2, 0.03, 0.04, 0.5, 0.6, 0.7, 0.8};
+    d.resize(n);
+    const auto rational = open("rational_polynomial", d).value();
+    const auto* lens = rational->camera.model.get_if<camera::radial_tangential>();
+    REQUIRE(lens != nullptr);
+    CHECK(lens->distortion().k1 == 0.1);
+    CHECK(lens->distortion().p2 == 0.04);
+    CHECK(lens->distortion().k3 == 0.5);
+    CHECK(lens->distortion().k6 == 0.8);
+    if (n == 8) continue;
+    d.back() = 0.01;
+    CHECK_THAT(message_of(open("rational_polynomial", d)), Contains("is not supported"));
+  }
+  CHECK(open("Brown Conrady", {0.1, 0.2, 0.03, 0.04, 0.5})
+            .value()
+            ->camera.model.get_if<camera::radial_tangential>()
+            ->distortion()
+            .k3 == 0.5);
+  CHECK(open("Inverse Brown Conrady", {0, 0, 0, 0, 0}).value()->camera.model.model_name() == "pinhole");
+  CHECK_THAT(message_of(open("Inverse Brown Conrady", {0.1, 0, 0, 0, 0})),
+             Contains("\"Inverse Brown Conrady\" with 5 numbers is not supported") && Contains("; specify a camera"));
 }
 
 TEST_CASE("colour and depth of one camera are chosen, with a calibrated camera if there is one") {

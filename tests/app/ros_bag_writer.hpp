@@ -75,11 +75,15 @@ class ros_bag_writer {
   void compressed(const std::string& topic, double time, const std::string& format, const std::string& data) {
     write(topic, "sensor_msgs/CompressedImage", time, begin(time).text(format).data(data));
   }
+  void number(const std::string& topic, double time, float value) {
+    write(topic, "std_msgs/Float32", time, ros_message{version_}.number(value));
+  }
+  std::string distortion_model = "plumb_bob";  ///< of the following cameras
   /// `bx`: the right camera's focal length times the baseline.
   void info(const std::string& topic, double time, const camera::intrinsics& k, double bx = 0.0,
             const std::vector<double>& distortion = {0, 0, 0, 0, 0}) {
     ros_message m = begin(time);
-    m.number(k.height).number(k.width).text("plumb_bob");
+    m.number(k.height).number(k.width).text(distortion_model);
     m.number(static_cast<std::uint32_t>(distortion.size())).numbers(distortion);
     m.numbers({k.fx, 0.0, k.cx, 0.0, k.fy, k.cy, 0.0, 0.0, 1.0}).numbers({1, 0, 0, 0, 1, 0, 0, 0, 1});
     m.numbers({k.fx, 0.0, k.cx, -bx, 0.0, k.fy, k.cy, 0.0, 0.0, 0.0, 1.0, 0.0});

@@ -5,6 +5,7 @@
 #include <limits>
 #include <map>
 #include <mutex>
+#include <sstream>
 #include <string_view>
 #include <tuple>
 #include <utility>
@@ -42,6 +43,12 @@ std::size_t sort_by_time(std::vector<T>& all, Time T::*time) {
   const std::size_t count = repeated.size();
   all.erase(repeated.begin(), repeated.end());
   return count;
+}
+
+std::string in_words(double number) {
+  std::ostringstream text;
+  text << number;
+  return text.str();
 }
 
 /// "1 image of /camera is", "2 images of /camera are".
@@ -392,6 +399,19 @@ class bag_recording final : public file_recording {
     return std::nullopt;
   }
 
+  /// Units of depth per metre in a bag of librealsense, from the option of the depth sensor; empty if there is none.
+  [[nodiscard]] std::optional<double> stored_scale() const {
+    for (const bag_topic& t : bag_.topics)
+      if (is_depth_unit(t.name, t.type) && second_->name.starts_with(t.name.substr(0, t.name.find("option/"))))
+        for (const bag_message& m : t.messages)
+          if (const auto bytes = read(m)) {
+            message_reader in{*bytes, t.coding};
+            const auto metres = static_cast<double>(in.number<float>());
+            if (in.ok() && metres > 1e-6 && metres < 1.0) return std::round(1e3 / metres) / 1e3;  // a decimal number
+          }
+    return std::nullopt;
+  }
+
   result<void> find_camera(const file_recording_options& options) {
     const bool in_metres = sensor == sensor_kind::rgbd && is_in_metres(second_->encoding);
     if (options.camera) {
@@ -399,6 +419,13 @@ class bag_recording final : public file_recording {
       if (in_metres) camera.depth_scale = metres_scale;
       if (sensor == sensor_kind::stereo && !camera.baseline)
         return fail(errc::invalid_argument, path_, "a stereo camera needs a baseline");
+      if (sensor == sensor_kind::stereo && !(first_->is_rectified() && second_->is_rectified()))
+        notes.push_back("the images of " + images_of +
+                        " are used as if they were rectified, as the camera is specified");
+      if (sensor == sensor_kind::rgbd && !in_metres)
+        if (const auto scale = stored_scale(); scale && std::abs(*scale / camera.depth_scale - 1.0) > 1e-3)
+          notes.push_back("the bag stores " + in_words(*scale) + " units of depth per metre, the specified camera " +
+                          in_words(camera.depth_scale));
       return {};
     }
     const auto info = info_of(*first_);
@@ -408,6 +435,12 @@ class bag_recording final : public file_recording {
     auto model = ros_messages::camera_of(*info, first_->is_rectified(), where(*first_));
     if (!model) return fail(model.error());
     camera = {.model = *std::move(model), .depth_scale = in_metres ? metres_scale : 1000.0, .fps = rate()};
+    if (sensor == sensor_kind::rgbd && !in_metres && second_->name.ends_with("/image/data")) {
+      if (const auto scale = stored_scale())
+        camera.depth_scale = *scale;
+      else
+        notes.push_back("the bag names no unit of depth for " + second_->name + "; it is taken as millimetres");
+    }
     if (sensor != sensor_kind::stereo) return {};
 
     const auto other = info_of(*second_);

@@ -96,7 +96,12 @@ std::string ros1_type(std::string_view type) {
   return name;
 }
 
-bool is_listed_type(std::string_view type) {
+bool is_depth_unit(std::string_view name, std::string_view type) {
+  return type == "std_msgs/Float32" &&
+         (name.ends_with("/option/Depth Units/value") || name.ends_with("/option/Depth_Units/value"));
+}
+
+bool is_listed(std::string_view name, std::string_view type) {
   constexpr std::string_view types[] = {"sensor_msgs/Image",
                                         "sensor_msgs/CompressedImage",
                                         "sensor_msgs/CameraInfo",
@@ -105,7 +110,7 @@ bool is_listed_type(std::string_view type) {
                                         "nav_msgs/Odometry",
                                         "geometry_msgs/PoseStamped",
                                         "geometry_msgs/PoseWithCovarianceStamped"};
-  return std::ranges::find(types, type) != std::end(types);
+  return std::ranges::find(types, type) != std::end(types) || is_depth_unit(name, type);
 }
 
 bag_topic& topic_like(std::vector<bag_topic>& topics, const bag_topic& t) {

@@ -32,8 +32,8 @@ struct bag_topic {
   std::vector<bag_message> messages;
 };
 
-/// Reads one file. Lists only messages that `bag_recording` may need: images, cameras, transforms and poses. Memory: 24
-/// bytes per listed message and 8 per chunk; two decompressed chunks. Not thread-safe.
+/// Reads one file. Lists only messages that `bag_recording` may need: images, cameras, units of depth, transforms and
+/// poses. Memory: 24 bytes per listed message and 8 per chunk; two decompressed chunks. Not thread-safe.
 class bag_file {
  public:
   virtual ~bag_file() = default;
@@ -50,8 +50,10 @@ inline constexpr std::size_t whole_message = std::size_t{1} << 30U;  ///< bytes;
 
 /// The name of a type in ROS 1: "sensor_msgs/Image" of "sensor_msgs/msg/Image".
 [[nodiscard]] std::string ros1_type(std::string_view type);
-/// Returns true if messages of this type of ROS 1 are listed.
-[[nodiscard]] bool is_listed_type(std::string_view type);
+/// Returns true if messages of a topic are listed. `type`: as in ROS 1.
+[[nodiscard]] bool is_listed(std::string_view name, std::string_view type);
+/// Returns true if it is the topic of the metres per unit of depth in a bag of librealsense.
+[[nodiscard]] bool is_depth_unit(std::string_view name, std::string_view type);
 /// The topic of the name, type and encoding of `t` in a list; appended without messages if it is not there.
 [[nodiscard]] bag_topic& topic_like(std::vector<bag_topic>& topics, const bag_topic& t);
 /// The number of listed messages, e.g. "12 messages".

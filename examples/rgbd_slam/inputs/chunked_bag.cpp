@@ -60,7 +60,7 @@ bool chunked_bag::has_index(std::uint64_t at) {
 
 void chunked_bag::define(const bag_record& r) {
   const auto [at, is_new] = topic_of_channel_.try_emplace(r.channel, unlisted);
-  if (!is_new || !is_listed_type(r.topic.type)) return;
+  if (!is_new || !is_listed(r.topic.name, r.topic.type)) return;
   const bag_topic& topic = topic_like(topics, r.topic);  // may move the list
   at->second = static_cast<std::size_t>(&topic - topics.data());
 }

@@ -101,15 +101,18 @@ result<orbis::camera::any_camera> camera_of(const camera_info& info, bool is_rec
   const bool is_straight = std::all_of(d.begin(), d.end(), [](double v) { return v == 0.0; });
   if (is_rectified || is_straight) return orbis::camera::any_camera{orbis::camera::pinhole{k}};
   const auto at = [&](std::size_t i) { return i < d.size() ? d[i] : 0.0; };
-  if (info.distortion_model == "equidistant" && d.size() == 4)
+  const std::string& model = info.distortion_model;
+  if (model == "equidistant" && d.size() == 4)
     return orbis::camera::any_camera{orbis::camera::kannala_brandt{k, {d[0], d[1], d[2], d[3]}}};
-  if ((info.distortion_model == "plumb_bob" || info.distortion_model == "rational_polynomial") && d.size() >= 4 &&
-      d.size() <= 8)
+  // Thin prisms and tilted sensors have 12 and 14 numbers. The second name is that of librealsense.
+  const bool is_radial = model == "plumb_bob" || model == "Brown Conrady" || model == "rational_polynomial";
+  const bool has_more = d.size() > 8 && std::any_of(d.begin() + 8, d.end(), [](double v) { return v != 0.0; });
+  if (is_radial && d.size() >= 4 && !has_more)
     return orbis::camera::any_camera{
         orbis::camera::radial_tangential{k, {at(0), at(1), at(2), at(3), at(4), at(5), at(6), at(7)}}};
   return fail(errc::unsupported, where,
-              "distortion model \"" + in_short(info.distortion_model) + "\" with " + std::to_string(d.size()) +
-                  " numbers is not supported; use plumb_bob, rational_polynomial or equidistant");
+              "distortion model \"" + in_short(model) + "\" with " + std::to_string(d.size()) +
+                  " numbers is not supported, only plumb_bob, rational_polynomial and equidistant; specify a camera");
 }
 
 }  // namespace app::ros_messages

@@ -71,7 +71,7 @@ class sqlite_bag final : public bag_file {
     int state = sqlite3_step(rows.get());
     for (; state == SQLITE_ROW; state = sqlite3_step(rows.get())) {
       const std::string type = ros1_type(column(rows, 2));
-      if (!is_listed_type(type) || column(rows, 3) != "cdr") continue;
+      if (!is_listed(column(rows, 1), type) || column(rows, 3) != "cdr") continue;
       topic_of_id[sqlite3_column_int64(rows.get(), 0)] = topics.size();
       topics.push_back({std::string{column(rows, 1)}, type, message_encoding::cdr, {}});
     }
