@@ -11,6 +11,10 @@
 #include <utility>
 #include <vector>
 
+#ifdef RGBD_SLAM_SQLITE
+#include <sqlite3.h>
+#endif
+
 #include <orbis/core/file.hpp>
 
 #include "inputs/bag_file.hpp"
@@ -184,6 +188,47 @@ TEST_CASE("a database and its write-ahead log are not changed, and no files are 
   CHECK(count == 2);
   std::filesystem::remove(folder.path() / "wal.db3-wal");
   CHECK(app::open_bag(folder.path(), {}).value()->size() == 2);
+}
+
+TEST_CASE("a database whose recording was interrupted in a transaction is read as it is, and unchanged") {
+  const temporary_folder folder, copy;
+  const auto path = folder.path() / "a.db3";
+  std::filesystem::copy(bags / "split/split_0.db3", path);
+  sqlite3* writer = nullptr;
+  REQUIRE(sqlite3_open(path.c_str(), &writer) == SQLITE_OK);
+  // More than the cache holds, so that a part is in the file before the end of the transaction.
+  REQUIRE(sqlite3_exec(writer,
+                       "PRAGMA journal_mode = DELETE; PRAGMA cache_size = 2; BEGIN;"
+                       "CREATE TABLE more (data BLOB); INSERT INTO more VALUES (randomblob(50000));",
+                       nullptr, nullptr, nullptr) == SQLITE_OK);
+  for (const char* name : {"a.db3", "a.db3-journal"}) std::filesystem::copy(folder.path() / name, copy.path() / name);
+  sqlite3_close(writer);
+  const auto interrupted = copy.path() / "a.db3";
+  const std::string bytes = read_file(interrupted).value(), journal = read_file(copy.path() / "a.db3-journal").value();
+  CHECK(app::is_bag(copy.path()));
+  const auto bag = app::open_bag(interrupted, {}).value();
+  CHECK_THAT(bag->notes.at(0), Contains("the recording was interrupted; its last messages may be damaged"));
+  check_frames(*bag, 2, 1.7e9);
+  CHECK(read_file(interrupted).value() == bytes);
+  CHECK(read_file(copy.path() / "a.db3-journal").value() == journal);
+}
+
+TEST_CASE("of a folder with metadata the listed files are read") {
+  const temporary_folder folder;
+  for (const char* file : {"split_0.db3", "split_1.db3"})
+    std::filesystem::copy(bags / "split" / file, folder.path() / file);
+  const auto frames = [&](const std::string& list) {
+    folder.write("metadata.yaml", "rosbag2_bagfile_information:\n  version: 5\n  relative_file_paths:" + list +
+                                      "\n  duration:\n    nanoseconds: 1\n");
+    const auto bag = app::open_bag(folder.path(), {}).value();
+    CHECK(bag->notes.empty());
+    return bag->size();
+  };
+  CHECK(frames("\n    - split_0.db3") == 2);
+  CHECK(frames("\n    - split_0.db3\n    - split_1.db3") == 4);
+  CHECK(frames(" [split_1.db3]") == 2);
+  CHECK(frames(" ['bag/split_0.db3',\n    \"split_1.db3\"]") == 4);
+  CHECK(frames("\n    - split_0.db3.zstd") == 2);
 }
 
 TEST_CASE("a folder without metadata, with missing or damaged parts gives the rest") {

@@ -53,21 +53,34 @@ std::vector<fs::path> parts_in(const fs::path& folder) {
   return parts;
 }
 
-/// The file names that metadata.yaml lists: the items of `relative_file_paths`.
+/// The file names that metadata.yaml lists: the items of `relative_file_paths`, in lines or as `[a, b]`.
 std::vector<std::string> listed_in(const std::string& metadata) {
   std::vector<std::string> names;
+  const auto add = [&](std::string_view item) {
+    std::string name{item};
+    std::erase_if(name, [](char c) { return c == '"' || c == '\'' || c == '\r' || c == '\n'; });
+    name.erase(0, name.find_first_not_of(' '));
+    name.erase(name.find_last_not_of(' ') + 1);
+    if (!name.empty()) names.push_back(fs::path{name}.filename().string());  // old versions store the folder, too
+  };
   bool is_list = false;
   for (std::size_t at = 0; at < metadata.size();) {
     const std::size_t end = std::min(metadata.find('\n', at), metadata.size());
     const std::string_view line = std::string_view{metadata}.substr(at, end - at);
+    const std::size_t begin = at;
     at = end + 1;
     const std::size_t dash = line.find_first_not_of(' ');
     if (line.find("relative_file_paths:") != std::string_view::npos) {
       is_list = true;
+      const std::size_t open = metadata.find('[', begin), close = metadata.find(']', begin);
+      if (open >= end || close == std::string::npos) continue;
+      for (std::size_t from = open + 1, to = 0; from < close; from = to + 1) {
+        to = std::min(metadata.find(',', from), close);
+        add(std::string_view{metadata}.substr(from, to - from));
+      }
+      return names;
     } else if (is_list && dash != std::string_view::npos && line.substr(dash).starts_with("- ")) {
-      std::string name{line.substr(dash + 2)};
-      std::erase_if(name, [](char c) { return c == '"' || c == '\'' || c == '\r'; });
-      names.push_back(fs::path{name}.filename().string());  // old versions store the folder, too
+      add(line.substr(dash + 2));
     } else if (dash != std::string_view::npos) {
       is_list = false;
     }
@@ -137,7 +150,8 @@ bool is_bag(const fs::path& path) {
     const std::string name = i->path().filename().string();
     if (has_bag_name(i->path()))
       any = true;
-    else if (name != "metadata.yaml" && !name.ends_with("-wal") && !name.ends_with("-shm"))
+    else if (name != "metadata.yaml" && !name.ends_with("-wal") && !name.ends_with("-shm") &&
+             !name.ends_with("-journal"))
       return false;
   }
   return any;
@@ -155,9 +169,22 @@ result<bag> bag::open(const fs::path& path) {
     const std::vector<std::string> listed = metadata ? listed_in(*metadata) : std::vector<std::string>{};
     if (listed.empty())
       all.notes.push_back("metadata.yaml is missing or damaged; all bag files of the folder are read");
-    for (const std::string& name : listed)
-      if (!fs::exists(path / name, error) && !fs::exists((path / name).replace_extension(), error))
+    // A listed name may have the ending of the compressed file, and the file may be decompressed.
+    const auto is_listed_as = [](const std::string& name) {
+      return [name](const fs::path& file) {
+        const std::string found = file.filename().string();
+        return found == name || found + ".zstd" == name || found == name + ".zstd";
+      };
+    };
+    std::vector<fs::path> known;
+    for (const std::string& name : listed) {
+      const auto file = std::ranges::find_if(all.files, is_listed_as(name));
+      if (file != all.files.end())
+        known.push_back(*file);
+      else
         all.notes.push_back(name + ", listed in metadata.yaml, is missing");
+    }
+    if (!known.empty()) all.files = std::move(known);
   }
   for (const fs::path& file : all.files) {
     auto part = open_part(file);

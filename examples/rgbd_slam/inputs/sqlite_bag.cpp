@@ -59,12 +59,12 @@ class sqlite_bag final : public bag_file {
   result<void> open() {
     // Without locks and in exclusive mode, SQLite reads a write-ahead log but creates no files. A "writable" schema
     // makes it accept files that are shorter than their header indicates.
-    sqlite3* opened = nullptr;
-    sqlite3_open_v2(path_.c_str(), &opened, SQLITE_OPEN_READONLY, "unix-none");
-    database_.reset(opened);
-    reject_short_reads(opened);
-    sqlite3_exec(database_.get(), "PRAGMA locking_mode = EXCLUSIVE; PRAGMA writable_schema = ON", nullptr, nullptr,
-                 nullptr);
+    connect(path_, 0);
+    if (sqlite3_exec(database_.get(), "SELECT 1 FROM topics", nullptr, nullptr, nullptr) != SQLITE_OK &&
+        sqlite3_extended_errcode(database_.get()) == SQLITE_READONLY_ROLLBACK) {
+      connect(immutable(path_), SQLITE_OPEN_URI);  // as it is, without the journal
+      notes.push_back(path_ + ": the recording was interrupted; its last messages may be damaged");
+    }
 
     std::map<std::int64_t, std::size_t> topic_of_id;
     const statement rows = prepare("SELECT id, name, type, serialization_format FROM topics");
@@ -108,6 +108,26 @@ class sqlite_bag final : public bag_file {
   }
 
  private:
+  void connect(const std::string& name, int flags) {
+    sqlite3* opened = nullptr;
+    sqlite3_open_v2(name.c_str(), &opened, SQLITE_OPEN_READONLY | flags, "unix-none");
+    database_.reset(opened);
+    reject_short_reads(opened);
+    sqlite3_exec(opened, "PRAGMA locking_mode = EXCLUSIVE; PRAGMA writable_schema = ON", nullptr, nullptr, nullptr);
+  }
+  /// The address of a database that SQLite reads as it is.
+  static std::string immutable(const std::string& path) {
+    std::string address = "file:";
+    for (const char c : path) {
+      constexpr const char* digits = "0123456789ABCDEF";
+      const auto code = static_cast<unsigned char>(c);
+      if (c == '?' || c == '#' || c == '%')
+        (address += '%') += {digits[code >> 4U], digits[code & 15U]};
+      else
+        address += c;
+    }
+    return address + "?immutable=1";
+  }
   [[nodiscard]] statement prepare(const char* sql) const {
     sqlite3_stmt* made = nullptr;
     sqlite3_prepare_v2(database_.get(), sql, -1, &made, nullptr);
