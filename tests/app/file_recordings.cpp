@@ -13,6 +13,8 @@
 #include <orbis/io/png.hpp>
 
 #include "inputs/file_recording.hpp"
+#include "inputs/ros_images.hpp"
+#include "inputs/ros_messages.hpp"
 #include "io/recordings.hpp"
 #include "ros_bag_writer.hpp"
 #include "support/catch.hpp"
@@ -109,6 +111,8 @@ TEST_CASE("what is no video or has no camera is refused in words") {
   CHECK(video->size() == 2);
   CHECK(video->files == std::vector<std::filesystem::path>{path, folder.path() / "camera.toml"});
 }
+#else
+TEST_CASE("videos") { WARN("[skipped] this build reads no videos"); }
 #endif
 
 namespace {
@@ -349,6 +353,13 @@ TEST_CASE("colour and depth of one camera are chosen, with a calibrated camera i
     images("/b/confidence/image", "b", depth);
   });
   CHECK(calibrated->images_of == "/b/image and /b/image_depth");
+
+  test::ros_bag_writer bag{path};
+  bag.info("/left/camera_info", 1.0, k);
+  bag.image("/left/image", 1.0, "rgb8", view(plain(1, 2, 3)));
+  bag.image("/right/image", 1.0, "bayer_rggb16", 32, 24, 64, std::string(64 * 24, '\0'));  // not supported
+  bag.close();
+  CHECK(app::open_bag(path, {}).value()->images_of == "/left/image");
 }
 
 TEST_CASE("the camera of compressed images is next to them or one level higher") {
@@ -414,6 +425,46 @@ TEST_CASE("ground truth is that of the named topic; damaged poses are omitted") 
   const auto odometry = app::open_bag(path, {.truth_topic = "/odom"}).value();
   CHECK(odometry->ground_truth.size() == 2);
   CHECK_THAT(odometry->notes.at(0), Contains("1 pose of /odom is damaged and omitted"));
+}
+
+TEST_CASE("a message of ROS 2 in big-endian order is read") {
+  std::string bytes{"\0\0\0\0", 4};  // CDR, big endian
+  const auto number = [&](auto value) {
+    while (bytes.size() % sizeof value != 0) bytes += '\0';
+    for (std::size_t i = sizeof value; i-- != 0;) bytes += static_cast<char>(value >> (8 * i));
+  };
+  const auto text = [&](const std::string& t) {
+    number(static_cast<std::uint32_t>(t.size() + 1));
+    bytes += t + '\0';
+  };
+  for (const std::uint32_t seconds_then_nanoseconds : {5U, 7U}) number(seconds_then_nanoseconds);
+  text("camera");
+  for (const std::uint32_t height_then_width : {2U, 3U}) number(height_then_width);
+  text("16UC1");
+  bytes += '\1';  // the pixels are big-endian, too
+  for (const std::uint32_t step_then_size : {6U, 12U}) number(step_then_size);
+  for (std::uint16_t i = 0; i != 6; ++i) number(static_cast<std::uint16_t>(1000 + i));
+  const auto m = app::ros_messages::parse<app::ros_messages::image>(bytes, app::message_encoding::cdr, "a").value();
+  CHECK(m.header.stamp == 5'000'000'007);
+  CHECK(m.header.frame_id == "camera");
+  const auto depth = app::depth_of(m, "a").value();
+  CHECK(depth(0, 0) == 1000);
+  CHECK(depth(2, 0) == 1002);
+  CHECK(depth(2, 1) == 1005);
+}
+
+TEST_CASE("big-endian depth and colours of four channels have the right values") {
+  using app::ros_messages::image;
+  const std::string metres{"\x3f\xc0\0\0", 4};  // 1.5
+  CHECK(app::depth_of(image{{}, 1, 1, "32FC1", 1, 4, metres}, "a").value()(0, 0) == 7500);
+  const std::string pixels{"\1\2\3\xff\4\5\6\0", 8};
+  const auto color = [&](const char* encoding) {
+    return app::color_of(image{{}, 1, 2, encoding, 0, 8, pixels}, "a").value();
+  };
+  CHECK(color("rgba8")(0, 0) == rgb8{1, 2, 3});
+  CHECK(color("rgba8")(1, 0) == rgb8{4, 5, 6});
+  CHECK(color("bgra8")(0, 0) == rgb8{3, 2, 1});
+  CHECK(color("bgra8")(1, 0) == rgb8{6, 5, 4});
 }
 
 TEST_CASE("the mosaic of a colour filter becomes a colour image") {
