@@ -39,10 +39,9 @@ double seconds(std::int64_t nanoseconds) {
 template <class T, class Time>
 std::size_t sort_by_time(std::vector<T>& all, Time T::*time) {
   std::ranges::stable_sort(all, {}, time);
-  const auto repeated = std::ranges::unique(all, {}, time);
-  const std::size_t count = repeated.size();
-  all.erase(repeated.begin(), repeated.end());
-  return count;
+  const std::size_t before = all.size();
+  all.erase(std::unique(all.begin(), all.end(), [&](const T& a, const T& b) { return a.*time == b.*time; }), all.end());
+  return before - all.size();
 }
 
 std::string in_words(double number) {
