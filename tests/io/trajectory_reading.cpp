@@ -136,6 +136,67 @@ TEST_CASE("layouts, separators, headers and units of trajectories are recognised
   }
 }
 
+TEST_CASE("columns of trajectories are found by their names") {
+  using enum trajectory_layout;
+  const std::string w = "read in EuRoC's layout", ns = "the time stamps are in nanoseconds", blank = " ", comma = ",";
+  struct kind {
+    std::string head, separator;
+    bool w_first;
+    int stamp_digits = 10;
+    std::vector<std::string> notes{};  // parts, in order
+    std::string before{}, after_time{};
+  };
+  const std::string at_2 = "by the header, column 2 is the time, column 3 the first of the position, and column 6";
+  const std::string at_1 = "by the header, column 1 is the time, column 3 the first of the position, and column 6";
+  const std::vector<kind> kinds{
+      {"timestamp,x,y,z,orientation_w,orientation_x,orientation_y,orientation_z", comma, true, 10, {w}},
+      {"time,x,y,z,orientation.x,orientation.y,orientation.z,orientation.w", comma, false, 19, {ns}},
+      {"%time,field.pose.position.x,field.pose.position.y,field.pose.position.z,field.pose.orientation.x,"
+       "field.pose.orientation.y,field.pose.orientation.z,field.pose.orientation.w",
+       comma,
+       false,
+       19,
+       {ns}},
+      {R"("timestamp","tx","ty","tz","qw","qx","qy","qz")", comma, true, 10, {w}},
+      {R"("timestamp [ns]";"tx";"ty";"tz";"QX";"QY";"QZ";"QW")", "; ", false, 19, {ns}},
+      {"t x y z w x y z", blank, true, 10, {w}},
+      {"t,x,y,z,x,y,z,w", comma, false, 19, {ns}},
+      {"# timestamp tx ty tz qw qx qy qz (seconds, metres)", blank, true, 10, {w}},
+      {"# timestamps in seconds, then tx ty tz qw qx qy qz", blank, true, 10, {w}},
+      {"# frame id, written by a: timestamp, tx, ty, tz, qw, qx, qy, qz", comma, true, 10, {w}},
+      {"timestamp,frame,x,y,z,qw,qx,qy,qz", comma, true, 10, {w, at_1}, "", "7,"},
+      {"timestamp,frame,x,y,z,qx,qy,qz,qw", comma, false, 10, {at_1}, "", "map,"},
+      {"# timestamp frame tx ty tz qw qx qy qz", blank, true, 10, {w, at_1}, "", "7 "},
+      {"#frame timestamp tx ty tz qw qx qy qz", blank, true, 10, {w, at_2}, "7 "},
+      {",timestamp,tx,ty,tz,qw,qx,qy,qz", comma, true, 10, {w, at_2}, "7,"},
+      {",timestamp,tx,ty,tz,qx,qy,qz,qw", comma, false, 19, {ns, at_2}, "7,"},
+      {"time,east,north,up,a,b,c,d",
+       comma,
+       false,
+       10,
+       {"line 1 does not name a quaternion (qx, qy, qz and qw, for example): read as timestamp tx ty tz qx qy qz qw"}},
+      {"time,east,north,up,a,b,c,d",
+       comma,
+       true,
+       19,
+       {w, ns,
+        "line 1 does not name a quaternion (qx, qy, qz and qw, for example): read as timestamp tx ty tz qw qx"}}};
+  const trajectory poses = some_path(20, 1);
+  for (const kind& k : kinds) {
+    INFO(k.head);
+    std::string text = k.head + "\n";
+    for (const stamped_pose& p : poses) {
+      std::string line = line_of(p, {k.w_first ? euroc : tum, k.separator, k.stamp_digits});
+      text += k.before + line.insert(line.find(k.separator) + k.separator.size(), k.after_time);
+    }
+    const auto read = io::parse_trajectory_file(text, "file.txt");
+    REQUIRE((read ? std::string{} : read.error().to_string()) == "");
+    CHECK(same_poses(read->poses, poses));
+    REQUIRE(read->notes.size() == k.notes.size());
+    for (std::size_t i = 0; i != k.notes.size(); ++i) CHECK(read->notes[i].find("file.txt: " + k.notes[i]) == 0);
+  }
+}
+
 TEST_CASE("the unit of a file is that of its first time, and of whole numbers that of its header") {
   const auto times = [](const std::string& text) {
     std::vector<double> all;
@@ -159,6 +220,10 @@ TEST_CASE("headers that name another order, and lines that are no poses, are err
   CHECK(message("# IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ\n1, 1, 0, 0, 0, 1, 2, 3\n").find(other) == 0);
   CHECK(message("time qx qy qz qw tx ty tz\n1 0 0 0 1 1 2 3\n").find(other) == 0);
   CHECK(message("#t,x,y,z,qz,qy,qx,qw\n1,0,0,0,0,0,0,1\n").find(other) == 0);
+  const std::string unnamed = "f.txt:1: the header does not name the columns of the time and the position";
+  CHECK(message("seq,sec,nsec,x,y,z,qx,qy,qz,qw\n1,2,3,1,2,3,0,0,0,1\n") == unnamed);
+  CHECK(message("time,vx,vy,vz,ax,ay,az,qx,qy,qz,qw\n1,1,2,3,1,2,3,0,0,0,1\n") == unnamed);
+  CHECK(message("time,frame,x,y,z,qx,qy,qz,qw\n1,7,1,2,3,0,0,0\n").find("f.txt:2: a pose has ") == 0);
   CHECK(message("1 2 3 4 0 0 0 1 9\n").find("f.txt:1: a pose has 8 numbers") == 0);
   CHECK(message("1 2 3 4 0 0 0 1\n1.5,,3,4,0,0,0,1\n").find("f.txt:2: a pose has 8 numbers") == 0);
   CHECK(message("1 2 3 4 0 0 0 1\n2 2 3 4 0 0 0 0\n").find("f.txt:2: the quaternion is zero") == 0);

@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cmath>
 #include <cstddef>
 #include <filesystem>
@@ -19,6 +18,7 @@
 #include <orbis/core/result.hpp>
 #include <orbis/core/se3.hpp>
 #include <orbis/core/trajectory.hpp>
+#include <orbis/io/detail/files/pose_header.hpp>
 #include <orbis/io/detail/files/pose_matrix.hpp>
 #include <orbis/io/detail/text.hpp>
 #include <orbis/io/detail/time_stamp.hpp>
@@ -37,69 +37,28 @@ struct pose_lines {
   time_unit unit = time_units[0];  ///< of the time stamps, by the first one; `entries` have seconds
   std::size_t lost = 0;            ///< lines with NaN or infinity
   std::size_t first_lost_line = 0;
+  std::vector<std::string> notes{};
 };
-
-/// Removes the next field from the front of a line: up to a comma, or else a semicolon, if the line contains one,
-/// otherwise up to blanks. A separator at the end of the line starts no field.
-[[nodiscard]] inline std::string_view next_value(std::string_view& line, char separator) {
-  if (separator == ' ') return next_field(line);
-  const std::size_t end = std::min(line.find(separator), line.size());
-  const std::string_view field = trimmed(line.substr(0, end));
-  line.remove_prefix(std::min(end + 1, line.size()));
-  return field;
-}
-[[nodiscard]] inline char separator_of(std::string_view line) {
-  return line.find(',') != line.npos ? ',' : line.find(';') != line.npos ? ';' : ' ';
-}
-
-/// The columns that a header line names.
-struct pose_header {
-  std::optional<std::size_t> quaternion;  ///< first of four columns q..., none if there are not four
-  bool w_first = false;
-  bool is_usual = true;  ///< the quaternion is after the position and in the order x, y, z, w or w, x, y, z
-  bool nanoseconds = false;
-};
-
-/// Parses a header such as `#timestamp [ns], p_RS_R_x [m], ..., q_RS_w [], ...`; units in brackets name no column.
-[[nodiscard]] inline pose_header parse_pose_header(std::string_view line) {
-  pose_header header;
-  while (!line.empty() && (line.front() == '#' || is_blank(line.front()))) line.remove_prefix(1);
-  const char separator = separator_of(line);
-  std::string last_letters;  // of columns q...
-  for (std::size_t column = 0; !line.empty();) {
-    std::string_view name = next_value(line, separator);
-    if (column == 0 && (name.find("[ns]") != name.npos || name.ends_with("_ns"))) header.nanoseconds = true;
-    if (column == 1 && name == "[ns]") header.nanoseconds = true;
-    if (name.starts_with('[')) continue;
-    name = next_field(name);
-    const bool is_q = name.size() > 1 && (name.front() == 'q' || name.front() == 'Q');
-    const char last = name.empty() ? ' ' : static_cast<char>(std::tolower(static_cast<unsigned char>(name.back())));
-    if (is_q && std::string_view{"wxyz"}.find(last) != std::string_view::npos) {
-      if (last_letters.empty()) header.quaternion = column;
-      last_letters.push_back(last);
-    }
-    ++column;
-  }
-  if (last_letters.size() != 4) header.quaternion.reset();
-  header.w_first = header.quaternion && last_letters[0] == 'w';
-  // Comments may have words before the names.
-  if (header.quaternion)
-    header.is_usual = *header.quaternion >= 4 && (last_letters == "wxyz" || last_letters == "xyzw");
-  return header;
-}
 
 /// A pose as numbers: time, position, quaternion in the order of the file. Returns an explanation if it is none; `lost`
 /// is set for NaN and infinity.
 [[nodiscard]] inline std::string parse_pose_numbers(std::string_view line, char separator, bool more_columns,
-                                                    std::array<double, 8>& v, bool& lost) {
+                                                    std::array<double, 8>& v, bool& lost,
+                                                    const pose_columns& columns = usual_columns) {
   const char* const eight = more_columns ? "a pose has a time, a position and a quaternion"
                                          : "a pose has 8 numbers: timestamp tx ty tz qx qy qz qw";
   lost = false;
-  for (double& value : v) {
+  std::size_t found = 0;
+  for (std::size_t column = 0; found != v.size(); ++column) {
+    if (line.empty()) return eight;
     const std::string_view field = next_value(line, separator);
+    const auto at = std::ranges::find(columns, column);
+    if (at == columns.end()) continue;
+    double& value = v[static_cast<std::size_t>(at - columns.begin())];
     if (field.empty()) return eight;
     if (!parse_number(field, value)) return "\"" + std::string{field.substr(0, 40)} + "\" is not a number";
     lost = lost || !std::isfinite(value);
+    ++found;
   }
   return more_columns || trimmed(line).empty() ? std::string{} : eight;
 }
@@ -120,21 +79,35 @@ struct pose_header {
 }
 
 /// Parses the lines of a trajectory in the layout of its header and first pose: a header or commas with nanoseconds are
-/// EuRoC's, 12 numbers per line KITTI's, everything else TUM's. `assumed`: the header of a file without one. Errors:
-/// malformed, with the line; unsupported (a header that names the columns in another order).
+/// EuRoC's, 12 numbers per line KITTI's, everything else TUM's. `assumed`: the header of a file without one. Notes
+/// report a line of names that is not understood, and columns that are not the first eight. Errors: malformed, with the
+/// line; unsupported (a header that names the columns in another order).
 inline result<pose_lines> parse_pose_lines(std::string_view text, const std::filesystem::path& where,
                                            pose_header assumed = {}) {
   pose_lines read;
   pose_header header = assumed;
+  std::string unknown_names;  // note on a line before the poses
   const auto start = [&](std::string_view line) {
     const char separator = separator_of(line);
+    std::string_view first = line;
     std::size_t fields = 0;
-    for (std::string_view rest = line; fields != 13 && !next_value(rest, separator).empty();) ++fields;
-    const bool nanoseconds = unit_of(next_value(line, separator)) == time_units[3];
+    for (std::string_view rest = line; !rest.empty(); ++fields) (void)next_value(rest, separator);
+    const bool nanoseconds = unit_of(next_value(first, separator)) == time_units[3];
     header.w_first = header.quaternion ? header.w_first : separator == ',' && nanoseconds;
     read.layout = header.w_first                                           ? trajectory_layout::euroc
                   : fields == 12 && separator == ' ' && !header.quaternion ? trajectory_layout::kitti
                                                                            : trajectory_layout::tum;
+    // The words before the time in a comment are names if the lines have a column for each.
+    if (header.before != 0 && fields == header.before + header.names)
+      for (std::size_t& column : header.columns) column += header.before;
+    else if (header.is_comment && fields == usual_columns.size())  // its words need not be names of columns
+      header.columns = usual_columns;
+    if (header.columns != usual_columns)
+      read.notes.push_back("by the header, column " + std::to_string(header.columns[0] + 1) + " is the time, column " +
+                           std::to_string(header.columns[1] + 1) + " the first of the position, and column " +
+                           std::to_string(header.columns[4] + 1) + " the first of the quaternion");
+    if (!unknown_names.empty() && !header.quaternion && read.layout != trajectory_layout::kitti)
+      read.notes.push_back(unknown_names + (header.w_first ? "qw qx qy qz" : "qx qy qz qw"));
   };
   const auto parse_line = [&](std::string_view line, std::size_t number) -> std::string {
     bool lost = false;
@@ -148,12 +121,14 @@ inline result<pose_lines> parse_pose_lines(std::string_view text, const std::fil
     } else {
       const char separator = separator_of(line);
       std::array<double, 8> v{};
-      if (auto why = parse_pose_numbers(line, separator, header.w_first, v, lost); !why.empty()) return why;
+      const bool more = header.w_first || header.columns != usual_columns;
+      if (auto why = parse_pose_numbers(line, separator, more, v, lost, header.columns); !why.empty()) return why;
       if (!lost) pose = pose_of(v, header.w_first);
       if (!lost && !pose)
         return header.w_first ? "a pose has a quaternion, w first, which is neither zero nor too large"
                               : "the quaternion is zero or too large";
-      const std::string_view stamp = next_value(line, separator);
+      std::string_view stamp = next_value(line, separator);
+      for (std::size_t column = 0; column != header.columns[0]; ++column) stamp = next_value(line, separator);
       const bool is_whole = stamp.find('.') == stamp.npos;
       if (read.entries.empty()) read.unit = header.nanoseconds && is_whole ? time_units[3] : unit_of(stamp);
       seconds = v[0] * read.unit.seconds;
@@ -175,13 +150,13 @@ inline result<pose_lines> parse_pose_lines(std::string_view text, const std::fil
     if (comment || (in_header && !named && !has_number(line))) {
       named = named || !comment;
       const auto found = parse_pose_header(line);
-      header.nanoseconds = header.nanoseconds || found.nanoseconds;
-      if (!found.quaternion) continue;
-      if (!found.is_usual)
-        return fail(errc::unsupported, at_line(where, number),
-                    "the columns are not time, position and quaternion (x y z w, or w x y z), in this order");
-      header.quaternion = found.quaternion;
-      header.w_first = found.w_first;
+      const bool nanoseconds = header.nanoseconds || found.nanoseconds;
+      if (!found.problem.empty()) return fail(errc::unsupported, at_line(where, number), found.problem);
+      if (found.quaternion) header = found;
+      header.nanoseconds = nanoseconds;
+      if (!comment && !found.quaternion)
+        unknown_names = "line " + std::to_string(number) +
+                        " does not name a quaternion (qx, qy, qz and qw, for example): read as timestamp tx ty tz ";
       continue;
     }
     if (in_header) start(line);
@@ -248,6 +223,7 @@ inline repeated_times keep_first(std::vector<pose_lines::entry>& entries) {
 [[nodiscard]] inline result<trajectory_reading> order_poses(pose_lines&& lines, const std::filesystem::path& where) {
   trajectory_reading read{.poses = {}, .layout = lines.layout, .lost = lines.lost, .notes = {}};
   const auto note = [&](const std::string& text) { read.notes.push_back(where.string() + ": " + text); };
+  for (const std::string& text : lines.notes) note(text);
   if (lines.lost != 0)
     note(std::to_string(lines.lost) + " poses with NaN or infinity are left out: the camera was lost there");
 
