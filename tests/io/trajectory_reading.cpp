@@ -257,6 +257,11 @@ TEST_CASE("repeated times and runs: harmless, left out, or refused") {
     return a;
   };
   const std::string a = text_of(first), b = text_of(other);
+  // Keyframes of two runs that begin with the same pose, and a run that is continued after its last 20 poses.
+  trajectory some_keyframes, other_keyframes{first[0]};
+  for (std::size_t i = 0; i != 50; ++i)
+    (i % 2 == 0 ? some_keyframes : other_keyframes).push_back((i % 2 == 0 ? first : other)[i]);
+  const trajectory last_20(first.end() - 20, first.end());
   trajectory swapped = first;
   std::swap(swapped[10], swapped[11]);
   struct kind {
@@ -274,6 +279,12 @@ TEST_CASE("repeated times and runs: harmless, left out, or refused") {
        first,
        {"backwards at line 51; two runs in one file? The 50 poses from there on are left"}},
       {a + text_of(later), appended(first, later), {}},
+      {text_of(some_keyframes) + text_of(other_keyframes),
+       some_keyframes,
+       {"backwards at line 26; two runs in one file? The 26 poses from there on are left"}},
+      {a + text_of(last_20) + text_of(later),
+       appended(first, later),
+       {"time runs backwards at line 51; two runs in one file?", "20 repeated lines are left out"}},
       {a + text_of(earlier), appended(earlier, first), {"time runs backwards at line 51; two runs in one file?"}},
       {interleaved({first, other}), first, {"50 poses with the time stamp of another pose are left out; two runs"}},
       {text_of(swapped), first, {"not in order of time; sorted"}},

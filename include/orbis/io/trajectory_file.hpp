@@ -27,10 +27,10 @@ namespace orbis::io {
 /// a line of names before the poses; if it names time, position and quaternion, other columns may precede them. Times
 /// are in seconds, or in the unit of the first one: nanoseconds if the header says so and it is a whole number,
 /// otherwise by its digits (13: milliseconds, 16: microseconds, 19: nanoseconds). Poses with NaN or infinity are lost
-/// ones. Of poses with equal times the first one is kept; of several runs that overlap in time, the first one. Notes
-/// report all of this. Errors: malformed, with the line (too few numbers, a zero quaternion); unsupported (a header
-/// that names the quaternion before the position, or in another order); degenerate (most poses have the time of another
-/// pose and differ from it). O(n log n).
+/// ones. Of poses with equal times the first one is kept; of several runs, only the first one if a later one has other
+/// poses during its time. Notes report all of this. Errors: malformed, with the line (too few numbers, a zero
+/// quaternion); unsupported (a header that names the quaternion before the position, or in another order); degenerate
+/// (most poses have the time of another pose and differ from it). O(n log n).
 [[nodiscard]] result<trajectory_reading> parse_trajectory_file(std::string_view text,
                                                                const std::filesystem::path& where = {});
 

@@ -217,9 +217,22 @@ inline repeated_times keep_first(std::vector<pose_lines::entry>& entries) {
   return removed;
 }
 
-/// The poses in order of time, each time once: the first line counts. If a later run contradicts the first one, or
-/// overlaps with it in time, only the first one is kept. Errors: degenerate (most poses have the time of another one
-/// and differ from it).
+/// Returns true if a pose of the entries from `later` on is at a time of the entries before it, which ascend, and is
+/// none of them.
+[[nodiscard]] inline bool contradicts(const std::vector<pose_lines::entry>& entries, std::size_t later) {
+  const auto begin = entries.begin(), end = begin + static_cast<std::ptrdiff_t>(later);
+  const auto earlier = [](const auto& a, const auto& b) { return a.pose.timestamp < b.pose.timestamp; };
+  return std::any_of(end, entries.end(), [&](const pose_lines::entry& e) {
+    const auto [first, last] = std::equal_range(begin, end, e, earlier);
+    const bool during = first != end && last != begin;
+    return during && std::none_of(first, last, [&](const pose_lines::entry& f) {
+             return same_pose(f.pose.T_world_camera, e.pose.T_world_camera);
+           });
+  });
+}
+
+/// The poses in order of time, each time once: the first line counts. If a later run has another pose during the first
+/// one, only the first one is kept. Errors: degenerate (most poses have the time of another one and differ from it).
 [[nodiscard]] inline result<trajectory_reading> order_poses(pose_lines&& lines, const std::filesystem::path& where) {
   trajectory_reading read{.poses = {}, .layout = lines.layout, .lost = lines.lost, .notes = {}};
   const auto note = [&](const std::string& text) { read.notes.push_back(where.string() + ": " + text); };
@@ -232,20 +245,16 @@ inline repeated_times keep_first(std::vector<pose_lines::entry>& entries) {
   const auto earlier = [](const auto& a, const auto& b) { return a.pose.timestamp < b.pose.timestamp; };
   const bool sorted = std::is_sorted(entries.begin(), entries.end(), earlier);
   const auto runs = sorted ? std::vector<std::size_t>{} : starts_of_runs(entries);
-  std::vector<pose_lines::entry> first;
+  std::vector<pose_lines::entry> first;  // the first run, if a later one contradicts it
   std::string backwards = "not in order of time; sorted";
   if (!runs.empty()) {
-    first.assign(entries.begin(), entries.begin() + static_cast<std::ptrdiff_t>(runs[0]));
+    if (contradicts(entries, runs[0]))
+      first.assign(entries.begin(), entries.begin() + static_cast<std::ptrdiff_t>(runs[0]));
     backwards =
         "time runs backwards at line " + std::to_string(entries[runs[0]].line) +
         (runs.size() == 1 ? "; two runs in one file?" : "; " + std::to_string(runs.size() + 1) + " runs in one file?");
   }
   std::stable_sort(entries.begin(), entries.end(), earlier);
-  std::size_t during_first = 0;  // poses of later runs
-  if (!runs.empty())
-    during_first = static_cast<std::size_t>(std::upper_bound(entries.begin(), entries.end(), first.back(), earlier) -
-                                            std::lower_bound(entries.begin(), entries.end(), first.front(), earlier)) -
-                   first.size();
   repeated_times repeated = keep_first(entries);
   if (2 * repeated.different > all) {
     const bool whole = entries.size() > 1 && std::all_of(entries.begin(), entries.end(), [](const auto& e) {
@@ -258,7 +267,7 @@ inline repeated_times keep_first(std::vector<pose_lines::entry>& entries) {
                      : whole       ? "the time stamps are in whole seconds; write them with more digits"
                                    : "the time stamps are written with too few digits"));
   }
-  if (during_first != 0 && (repeated.different != 0 || repeated.same == 0)) {
+  if (!first.empty()) {
     note(backwards + " The " + std::to_string(all - first.size()) + " poses from there on are left out");
     entries = std::move(first);
     repeated = keep_first(entries);
