@@ -237,15 +237,23 @@ TEST_CASE("headers that name another order, and lines that are no poses, are err
 
 TEST_CASE("repeated times and runs: harmless, left out, or refused") {
   const trajectory first = some_path(50, 1), other = some_path(50, 2);
-  trajectory later = other, between = other, earlier = other, whole = first, coarse = first, mostly_equal = first;
+  trajectory later = other, between = other, earlier = other, whole = first, coarse = first, tenths = first,
+             one_of_four, three_of_four;
   for (std::size_t i = 0; i != 50; ++i) {
     later[i].timestamp += 100.0;
     earlier[i].timestamp -= 100.0;
     between[i].timestamp += 0.02;
     whole[i].timestamp = std::floor(whole[i].timestamp);
     coarse[i].timestamp = 1.40372e9 + 0.5;
+    tenths[i].timestamp = std::round(10.0 * tenths[i].timestamp) / 10.0;
   }
-  mostly_equal[20].timestamp = mostly_equal[19].timestamp;
+  for (std::size_t i = 0; i != 48; ++i) {
+    one_of_four.push_back(first[i]);
+    if (i % 4 == 3)
+      one_of_four[i].timestamp = first[i - 1].timestamp;
+    else
+      three_of_four.push_back(first[i]);
+  }
   const auto interleaved = [](const std::vector<trajectory>& runs) {
     std::string text;
     for (std::size_t i = 0; i != runs[0].size(); ++i)
@@ -286,7 +294,13 @@ TEST_CASE("repeated times and runs: harmless, left out, or refused") {
        appended(first, later),
        {"time runs backwards at line 51; two runs in one file?", "20 repeated lines are left out"}},
       {a + text_of(earlier), appended(earlier, first), {"time runs backwards at line 51; two runs in one file?"}},
-      {interleaved({first, other}), first, {"50 poses with the time stamp of another pose are left out; two runs"}},
+      {interleaved({first, other}), {}, {"50 of 100 poses", "several runs in one file, or time stamps with too few"}},
+      {text_of(tenths), {}, {"24 of 50 poses", "the time stamps are written with too few digits"}},
+      {a + line_of(other[49], {}),
+       first,
+       {"1 poses with the time stamp of another pose are left out: several runs in one file, or time stamps with too"}},
+      {text_of(one_of_four), {}, {"12 of 48 poses", "too few digits"}},
+      {text_of(appended(one_of_four, later)), appended(three_of_four, later), {"12 poses with the time stamp"}},
       {text_of(swapped), first, {"not in order of time; sorted"}},
       {interleaved({first, other, some_path(50, 3)}), {}, {"100 of 150 poses", "too few digits"}},
       {a + b + text_of(some_path(50, 3)), {}, {"100 of 150 poses", "backwards at line 51; 3 runs in one file?"}},

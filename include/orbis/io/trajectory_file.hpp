@@ -30,7 +30,8 @@ namespace orbis::io {
 /// ones. Of poses with equal times the first one is kept; of several runs, only the first one if a later one has other
 /// poses during its time. Notes report all of this. Errors: malformed, with the line (too few numbers, a zero
 /// quaternion); unsupported (a header that names the quaternion before the position, or in another order); degenerate
-/// (most poses have the time of another pose and differ from it). O(n log n).
+/// (a quarter of the poses of one run, or more than half of the poses of several, have the time of another pose and
+/// differ from it). O(n log n).
 [[nodiscard]] result<trajectory_reading> parse_trajectory_file(std::string_view text,
                                                                const std::filesystem::path& where = {});
 

@@ -231,8 +231,25 @@ inline repeated_times keep_first(std::vector<pose_lines::entry>& entries) {
   });
 }
 
+/// Explains equal times of different poses. `entries`: each time once, ascending. Times have too few digits if they are
+/// multiples of a power of ten of seconds that is not shorter than their median interval.
+[[nodiscard]] inline std::string explain_equal_times(const std::vector<pose_lines::entry>& entries) {
+  std::vector<double> times;
+  for (const pose_lines::entry& e : entries) times.push_back(e.pose.timestamp);
+  const auto are_multiples = [&](double step) {
+    return std::ranges::all_of(times, [&](double t) { return std::abs(t / step - std::round(t / step)) < 1e-3; });
+  };
+  double step = 1.0;
+  while (step > 1e-3 && !are_multiples(step)) step /= 10.0;
+  if (times.size() >= 2 && !(are_multiples(step) && median_interval(times) < 1.5 * step))
+    return "several runs in one file, or time stamps with too few digits?";
+  return times.size() >= 2 && step == 1.0 ? "the time stamps are in whole seconds; write them with more digits"
+                                          : "the time stamps are written with too few digits";
+}
+
 /// The poses in order of time, each time once: the first line counts. If a later run has another pose during the first
-/// one, only the first one is kept. Errors: degenerate (most poses have the time of another one and differ from it).
+/// one, only the first one is kept. Errors: degenerate (a quarter of the poses of one run, or more than half of the
+/// poses of several, have the time of another one and differ from it).
 [[nodiscard]] inline result<trajectory_reading> order_poses(pose_lines&& lines, const std::filesystem::path& where) {
   trajectory_reading read{.poses = {}, .layout = lines.layout, .lost = lines.lost, .notes = {}};
   const auto note = [&](const std::string& text) { read.notes.push_back(where.string() + ": " + text); };
@@ -256,17 +273,11 @@ inline repeated_times keep_first(std::vector<pose_lines::entry>& entries) {
   }
   std::stable_sort(entries.begin(), entries.end(), earlier);
   repeated_times repeated = keep_first(entries);
-  if (2 * repeated.different > all) {
-    const bool whole = entries.size() > 1 && std::all_of(entries.begin(), entries.end(), [](const auto& e) {
-                         return e.pose.timestamp == std::floor(e.pose.timestamp);
-                       });
-    return fail(errc::degenerate, where.string(),
-                std::to_string(repeated.different) + " of " + std::to_string(all) +
-                    " poses have the time stamp of another pose: " +
-                    (!runs.empty() ? backwards
-                     : whole       ? "the time stamps are in whole seconds; write them with more digits"
-                                   : "the time stamps are written with too few digits"));
-  }
+  if (repeated.different != 0 && (runs.empty() ? 4 : 2) * repeated.different >= all + (runs.empty() ? 0 : 1))
+    return fail(
+        errc::degenerate, where.string(),
+        std::to_string(repeated.different) + " of " + std::to_string(all) +
+            " poses have the time stamp of another pose: " + (runs.empty() ? explain_equal_times(entries) : backwards));
   if (!first.empty()) {
     note(backwards + " The " + std::to_string(all - first.size()) + " poses from there on are left out");
     entries = std::move(first);
@@ -277,7 +288,7 @@ inline repeated_times keep_first(std::vector<pose_lines::entry>& entries) {
   if (repeated.same != 0) note(std::to_string(repeated.same) + " repeated lines are left out");
   if (repeated.different != 0)
     note(std::to_string(repeated.different) +
-         " poses with the time stamp of another pose are left out; two runs in one file?");
+         " poses with the time stamp of another pose are left out: " + explain_equal_times(entries));
   read.poses.reserve(entries.size());
   for (const pose_lines::entry& e : entries) read.poses.push_back(e.pose);
   return read;
