@@ -31,8 +31,8 @@ orbis::result<accuracy> compare(const orbis::trajectory& estimate, const orbis::
   }
   const auto pairs = orbis::eval::pair_poses(in_metres, truth, orbis::eval::alignment_options{}.max_time_difference);
   const auto by_pose = orbis::eval::align_poses(pairs);
-  const bool has_orientations = by_pose && !orbis::eval::lacks_orientations(pairs);
-  a.T_truth_map = has_orientations ? by_pose->T_reference_estimate : a.T_truth_estimate;
+  a.truth_lacks_orientations = orbis::eval::lacks_orientations(pairs);
+  a.T_truth_map = by_pose && !a.truth_lacks_orientations ? by_pose->T_reference_estimate : a.T_truth_estimate;
   const orbis::se3 T_estimate_truth = a.T_truth_estimate.inverse();
   for (const auto& pair : pairs) {
     const orbis::vec3 p = pair.estimate.translation();
@@ -74,6 +74,9 @@ void compare_with_truth(results& r, const frame_source& source, console& console
     r.truth_note += " The map error is that of the filtered cloud, aligned by the poses.";
   }
   if (!compared->no_rpe.empty()) console.warn(r.warnings.emplace_back("no RPE: " + compared->no_rpe));
+  if (compared->truth_lacks_orientations && !source.truth_has_positions_only)
+    console.warn(r.warnings.emplace_back(
+        "the orientations of the ground truth are all equal, but the camera turns: the world frame is not its frame"));
   r.against_truth = *std::move(compared);
   console.finish("ATE and RPE" + std::string{r.map && r.map->error_m ? ", map error" : ""});
 }

@@ -13,6 +13,7 @@
 #include <orbis/cloud/extract.hpp>
 #include <orbis/core/point.hpp>
 #include <orbis/core/trajectory.hpp>
+#include <orbis/eval/orientations.hpp>
 #include <orbis/io/cloud_fields.hpp>
 #include <orbis/io/trajectory_file.hpp>
 
@@ -49,9 +50,10 @@ orbis::result<posed_frames> frames_with_poses(const frame_source& source, const 
                                               const std::filesystem::path& spill_file,
                                               std::optional<world_results>& world, console& console) {
   if (source.truth_has_positions_only)
-    return orbis::fail(orbis::errc::unsupported, s.input.string(),
-                       "the ground truth has positions only (all orientations are 0 0 0 1), which cannot place depth "
-                       "images; use run");
+    return orbis::fail(
+        orbis::errc::unsupported, s.input.string(),
+        "all orientations of the ground truth are equal (0 0 0 1), as in files with positions only, which "
+        "cannot place depth images; use run");
   console.stage("reading");
   const auto shutter = source.camera.shutter.value_or(orbis::camera::shutter{});
   posed_frames posed{source, s, spill_file, shutter};
@@ -97,6 +99,9 @@ orbis::result<mapped> map_recording(const frame_source& source, const settings& 
   if (!map) return orbis::fail(map.error());
   results r = begin_results(s, source.title, &source, folder);
   r.world = world;
+  if (orbis::eval::has_equal_orientations(source.ground_truth))
+    console.warn(r.warnings.emplace_back(
+        "all orientations of the ground truth are equal: if the camera turned, the map is wrong; use run"));
   for (const std::string& note : mapping_notes(*posed, world)) console.warn(r.warnings.emplace_back(note));
   r.truth_note = "Mapped with the poses of the ground truth.";
   return mapped{std::move(r), *std::move(map), posed->trajectory()};

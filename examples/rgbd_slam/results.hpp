@@ -64,6 +64,7 @@ struct accuracy {
   double ate_rmse_m, ate_mean_m, ate_median_m, ate_max_m;
   std::optional<double> rpe_trans_rmse_m, rpe_rot_rmse_deg;
   std::string no_rpe;  ///< the reason if there is no RPE
+  bool truth_lacks_orientations = false;
   std::vector<compared_pose> poses;
   double scale = 1.0;           ///< metres of the ground truth per unit of length of the estimate
   orbis::se3 T_truth_estimate;  ///< aligns the estimate with the ground truth by positions (ATE)

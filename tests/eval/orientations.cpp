@@ -55,9 +55,14 @@ TEST_CASE("a reference with equal orientations gives ATE and no RPE if the estim
     CHECK(eval::rpe(with_rotation(rails, orbis::test::random_motion(random, 1.0, 2.0).rotation()), positions));
     CHECK(eval::rpe(circle(50, 0.5 * degree), positions));
     CHECK(eval::rpe(turning, circle(50, 0.01 * degree)));
+    CHECK(eval::has_equal_orientations(positions));
     CHECK(eval::has_positions_only(positions) == (seed == 0));
   }
   CHECK(eval::rpe(circle(4, 6.0), with_rotation(circle(4, 0.0), {})));  // too few to tell
+  CHECK_FALSE(eval::has_equal_orientations(circle(4, 0.0)));
+  CHECK_FALSE(eval::has_equal_orientations(circle(50, 0.01 * degree)));
+  CHECK_FALSE(eval::has_equal_orientations(with_rotation(trajectory(20), so3::exp(vec3(1, 0, 0)))));
+  CHECK_FALSE(eval::has_equal_orientations({}));
   CHECK_FALSE(eval::has_positions_only(circle(4, 0.0)));
   CHECK(eval::has_positions_only(rails));
   CHECK_FALSE(eval::has_positions_only(turning));

@@ -35,17 +35,25 @@ inline constexpr double equal_orientations = 1e-9;
   return reference <= equal_orientations && estimate > degree;
 }
 
-/// Returns true if all poses (at least `min_poses_without_orientation`) have the identity as orientation, but different
-/// positions. Use `lacks_orientations` if there is an estimate to compare with. O(n).
-[[nodiscard]] inline bool has_positions_only(const trajectory& reference) {
+/// Returns true if all poses (at least `min_poses_without_orientation`) have the same orientation, but different
+/// positions: the reference has positions only, or the camera is on rails. `lacks_orientations` decides if there is an
+/// estimate to compare with. O(n).
+[[nodiscard]] inline bool has_equal_orientations(const trajectory& reference) {
   constexpr double least_motion = 1e-3;  // metres
   if (reference.size() < min_poses_without_orientation) return false;
+  const se3& first = reference.front().T_world_camera;
   double motion = 0.0;
   for (const stamped_pose& p : reference) {
-    if (p.T_world_camera.rotation().angle() > equal_orientations) return false;
-    motion = std::max(motion, norm(p.T_world_camera.translation() - reference.front().T_world_camera.translation()));
+    if ((first.rotation().inverse() * p.T_world_camera.rotation()).angle() > equal_orientations) return false;
+    motion = std::max(motion, norm(p.T_world_camera.translation() - first.translation()));
   }
   return motion > least_motion;
+}
+
+/// Returns true if all poses have the identity as orientation, but different positions; see `has_equal_orientations`.
+/// O(n).
+[[nodiscard]] inline bool has_positions_only(const trajectory& reference) {
+  return has_equal_orientations(reference) && reference.front().T_world_camera.rotation().angle() <= equal_orientations;
 }
 
 }  // namespace orbis::eval
