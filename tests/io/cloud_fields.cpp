@@ -264,6 +264,28 @@ TEST_CASE("rounding errors of floating-point colours do not change their range")
   }
 }
 
+TEST_CASE("whole numbers in a text column of floats are packed integers") {
+  const std::string head = "FIELDS x y z rgb\nSIZE 4 4 4 4\nTYPE F F F F\nWIDTH 3\nDATA ascii\n";
+  const std::vector<rgb8> colors{{255, 0, 0}, {1, 2, 3}, {0, 0, 255}};
+  const auto red = [](const char* a, const char* b, const char* c) {
+    return "0 0 1 " + std::string{a} + "\n0 1 1 " + b + "\n1 1 1 " + c + "\n";
+  };
+  for (const std::string& body :
+       {red("16711680", "66051", "255"), red("16711680.0", "66051", "2.55e2"),
+        red("4294901760", "4278256131", "4278190335"), red("-65536", "-16711165", "-16776961")}) {
+    INFO(body);
+    const auto read = io::parse_pcd_with_fields(head + body).value();
+    CHECK(read.cloud.colors == colors);
+    CHECK(read.fields.empty());
+    CHECK(read.notes == std::vector<std::string>{
+                            "rgb is declared as floating-point, but has whole numbers: taken as packed integers"});
+  }
+  const auto bits = io::parse_pcd_with_fields(head + red("2.34180515e-38", "9.25571648e-41", "0")).value();
+  CHECK(bits.cloud.colors == std::vector<rgb8>{{255, 0, 0}, {1, 2, 3}, {0, 0, 0}});
+  CHECK(bits.notes.empty());
+  CHECK(io::parse_pcd_with_fields(head + red("0", "0", "0")).value().notes.empty());
+}
+
 TEST_CASE("alpha that varies becomes a field, and constant alpha is none") {
   for (const format& f : formats) {
     table t{.points = 2, .columns = coordinates(2)};
@@ -284,8 +306,10 @@ TEST_CASE("numbers beyond the declared type survive in text") {
       table t{.points = 3, .columns = coordinates(3)};
       t.columns.push_back(column_of("label", scalar_type::uint8, {7, -1, 300}));
       t.columns.push_back(column_of("gain", scalar_type::int16, {7, 0.5, NAN}));
+      t.columns.push_back(column_of("time", scalar_type::float32, {7, 16777216, 123456789}));
       const auto read = parse(t, f);
-      REQUIRE(read.fields.size() == 2);
+      REQUIRE(read.fields.size() == 3);
+      CHECK(numbers(read.fields[2]) == std::vector<double>{7, 16777216, 123456789});
       CHECK(numbers(read.fields[0]) == std::vector<double>{7, -1, 300});
       CHECK(same_numbers(numbers(read.fields[1]), {7, 0.5, NAN}));
     }

@@ -14,6 +14,7 @@
 #include <set>
 #include <string>
 #include <string_view>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -35,6 +36,7 @@ struct cloud_columns {
   std::array<double, 7> viewpoint{0, 0, 0, 1, 0, 0, 0};
   std::vector<std::string> left_out;  ///< other parts of the file
   std::vector<std::string> notes;
+  bool is_text = false;
 };
 
 constexpr std::string_view coordinate_names[] = {"x", "y", "z"};
@@ -61,10 +63,13 @@ constexpr std::string_view packed_color_names[] = {"rgb", "rgba"};
 }
 
 /// Stores the number `token` as the `index`-th of the column. If the column's type cannot represent it, the column
-/// becomes float64. Returns false if it is no number.
+/// becomes float64: integers of more than 24 bits in a float, for example. Returns false if it is no number.
 [[nodiscard]] inline bool store_number(cloud_field& column, std::size_t index, std::string_view token) {
   const auto store = [&](auto value) {
     if (!parse_number(token, value)) return false;
+    if constexpr (std::is_same_v<decltype(value), float>)
+      if (std::int64_t whole = 0; parse_number(token, whole) && double{value} != static_cast<double>(whole))
+        return false;
     store_little_endian(column.bytes.data() + index * sizeof value, value);
     return true;
   };
@@ -128,20 +133,26 @@ inline std::vector<rgb8> channel_colors(const std::array<const cloud_field*, 3>&
   return colors;
 }
 
-/// Colours packed as 0xAARRGGBB into integers or the bits of floats; nothing if the column holds other numbers. `alpha`
+/// Colours packed as 0xAARRGGBB into integers or the bits of floats; nothing if the column holds other numbers. In
+/// text, whole numbers in a column of floats are integers: as bits, they are colours with an unusual alpha. `alpha`
 /// receives the most significant bytes.
-inline std::optional<std::vector<rgb8>> packed_colors(const cloud_field& column, std::size_t size, std::string& alpha) {
+inline std::optional<std::vector<rgb8>> packed_colors(const cloud_field& column, std::size_t size, bool is_text,
+                                                      std::string& alpha, std::vector<std::string>& notes) {
   std::vector<rgb8> colors(size);
   alpha.resize(size);
+  bool are_integers = true, are_zero = true;
+  for (std::size_t i = 0; i != size && are_integers; ++i) {
+    const double v = number_at(column, i);
+    are_integers = v >= -2147483648.0 && v <= 4294967295.0 && v == std::floor(v);
+    are_zero = are_zero && v == 0.0;
+  }
+  const bool are_bits = column.type == scalar_type::float32 && !(is_text && are_integers && !are_zero);
+  if (!are_bits && !are_integers) return std::nullopt;
+  if (!are_bits && is_floating(column.type))
+    notes.push_back(column.name + " is declared as floating-point, but has whole numbers: taken as packed integers");
   for (std::size_t i = 0; i != size; ++i) {
-    std::uint32_t packed = 0;
-    if (column.type == scalar_type::float32) {
-      packed = load_number<std::uint32_t>(column.bytes.data() + 4 * i);
-    } else {
-      const double v = number_at(column, i);
-      if (!(v >= -2147483648.0 && v <= 4294967295.0) || v != std::floor(v)) return std::nullopt;
-      packed = static_cast<std::uint32_t>(static_cast<std::int64_t>(v));
-    }
+    const auto packed = are_bits ? load_number<std::uint32_t>(column.bytes.data() + 4 * i)
+                                 : static_cast<std::uint32_t>(static_cast<std::int64_t>(number_at(column, i)));
     colors[i] = unpacked_rgb(packed);
     alpha[i] = static_cast<char>(packed >> 24);
   }
@@ -192,7 +203,7 @@ inline result<cloud_with_fields> to_cloud(cloud_columns&& read, const std::strin
   for (std::size_t k = 0; k != std::size(packed_color_names) && !colored; ++k) {
     const cloud_field* column = find(packed_color_names[k]);
     if (column == nullptr || size_of(column->type) < 4) continue;
-    auto colors = packed_colors(*column, n, alpha);
+    auto colors = packed_colors(*column, n, read.is_text, alpha, out.notes);
     colored = colors.has_value();
     if (!colored) obstacle = column->name + " holds no packed colours";
     if (!colored) continue;

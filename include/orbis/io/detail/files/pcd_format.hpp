@@ -159,7 +159,8 @@ inline cloud_columns make_columns(const pcd_header& header, bool all,
                      .size = static_cast<std::size_t>(header.points),
                      .viewpoint = header.viewpoint,
                      .left_out = {},
-                     .notes = {}};
+                     .notes = {},
+                     .is_text = header.data == pcd_data::ascii};
   if (!header.note.empty()) read.notes.push_back(header.note);
   column_of.resize(header.fields.size());
   for (std::size_t k = 0; k != column_of.size(); ++k) {

@@ -191,6 +191,7 @@ inline result<cloud_columns> read_ply_columns(std::string_view bytes, const std:
   }
   if (!read) return fail(errc::unsupported, where, "there are no vertices");
   read->left_out = std::move(others);
+  read->is_text = text;
   return *std::move(read);
 }
 
