@@ -261,7 +261,48 @@ TEST_CASE("rounding errors of floating-point colours do not change their range")
     for (const char* name : {"red", "green", "blue"})
       t.columns.push_back(column_of(name, scalar_type::float32, {1.00001}));
     CHECK(parse(t, f).cloud.colors == std::vector<rgb8>{{255, 255, 255}});
+    CHECK(parse(t, f).notes.empty());
   }
+}
+
+TEST_CASE("the range of channels follows from the greatest one, and an unusual one is noted") {
+  struct kind {
+    scalar_type type;
+    double greatest;
+    double range;        // of the others: white is this value
+    std::string note{};  // none: usual
+  };
+  const std::string floating = "colours are floating-point numbers up to ", whole = "colours are integers up to ";
+  const std::vector<kind> kinds{{scalar_type::float32, 1.001, 1.0, floating + "1.001: taken as 0 ... 1"},
+                                {scalar_type::float32, 1.01, 1.0, floating + "1.01: taken as 0 ... 1"},
+                                {scalar_type::float64, 2.0, 1.0, floating + "2: taken as 0 ... 1"},
+                                {scalar_type::float32, 2.5, 255.0, floating + "2.5: taken as 0 ... 255"},
+                                {scalar_type::float64, 100.25, 255.0, floating + "100.25: taken as 0 ... 255"},
+                                {scalar_type::float32, 255.0, 255.0, floating + "255: taken as 0 ... 255"},
+                                {scalar_type::float32, 60000.0, 65535.0, floating + "60000: taken as 0 ... 65535"},
+                                {scalar_type::uint16, 255.0, 255.0, whole + "255: taken as 0 ... 255"},
+                                {scalar_type::uint16, 256.0, 4095.0, whole + "256: taken as 0 ... 4095"},
+                                {scalar_type::uint16, 4095.0, 4095.0, whole + "4095: taken as 0 ... 4095"},
+                                {scalar_type::uint16, 4096.0, 65535.0, whole + "4096: taken as 0 ... 65535"},
+                                {scalar_type::uint16, 16383.0, 65535.0, whole + "16383: taken as 0 ... 65535"},
+                                {scalar_type::uint16, 16384.0, 65535.0},
+                                {scalar_type::int32, 16384.0, 65535.0, whole + "16384: taken as 0 ... 65535"}};
+  for (const kind& k : kinds)
+    for (const format& f : formats) {
+      INFO(k.greatest << ", " << f.encoding);
+      const double other =
+          k.type >= scalar_type::float32 ? 0.75 * std::min(k.range, k.greatest) : std::floor(k.greatest / 2);
+      table t{.points = 2, .columns = coordinates(2)};
+      t.columns.push_back(column_of("red", k.type, {k.greatest, 0}));
+      t.columns.push_back(column_of("green", k.type, {other, 0}));
+      t.columns.push_back(column_of("blue", k.type, {0, 0}));
+      const auto byte = [&](double v) {
+        return static_cast<std::uint8_t>(std::round(255 * std::min(1.0, v / k.range)));
+      };
+      const auto read = parse(t, f);
+      CHECK(read.cloud.colors == std::vector<rgb8>{{byte(k.greatest), byte(other), 0}, {}});
+      CHECK(read.notes == (k.note.empty() ? std::vector<std::string>{} : std::vector{k.note}));
+    }
 }
 
 TEST_CASE("whole numbers in a text column of floats are packed integers") {

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <charconv>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -98,8 +99,16 @@ inline std::uint32_t packed_rgb(const rgb8& c) {
   return static_cast<std::uint32_t>(c.r) << 16 | static_cast<std::uint32_t>(c.g) << 8 | c.b;
 }
 
+/// A number for a message, with at most six digits.
+inline std::string shortened(double value) {
+  char text[32];
+  const auto [end, failure] = std::to_chars(text, text + sizeof text, value, std::chars_format::general, 6);
+  return {text, end};
+}
+
 /// Colours from three columns. The unit of a channel follows from the largest number of all channels of its kind
-/// (8-bit, wider integer, floating point): PLY does not define it. Rounding may lift floating-point numbers above 1.
+/// (8-bit, wider integer, floating point): PLY does not define it. Rounding, interpolation and lighting may lift
+/// floating-point numbers above 1; cameras give 12 bits. Notes report a range that is not that of the type.
 inline std::vector<rgb8> channel_colors(const std::array<const cloud_field*, 3>& channels, std::size_t size,
                                         std::vector<std::string>& notes) {
   const auto is_byte = [](scalar_type type) { return size_of(type) == 1; };
@@ -108,26 +117,25 @@ inline std::vector<rgb8> channel_colors(const std::array<const cloud_field*, 3>&
     if (double& most = is_floating(c->type) ? most_floating : most_integer; !is_byte(c->type))
       for (std::size_t i = 0; i != size; ++i)
         if (const double v = number_at(*c, i); std::isfinite(v)) most = std::max(most, v);
-  const auto range_of = [](double most) { return most <= 255.0 ? 255.0 : 65535.0; };
+  const auto range_of = [](double most) { return most <= 255.0 ? 255.0 : most <= 4095.0 ? 4095.0 : 65535.0; };
   std::vector<rgb8> colors(size);
   constexpr std::uint8_t rgb8::*channel_of[] = {&rgb8::r, &rgb8::g, &rgb8::b};
   std::string last_note;
   for (std::size_t k = 0; k != 3; ++k) {
     const cloud_field& c = *channels[k];
     const double most = is_floating(c.type) ? most_floating : most_integer;
-    const double range = is_byte(c.type) ? 255.0 : is_floating(c.type) && most <= 1.001 ? 1.0 : range_of(most);
+    const double range = is_byte(c.type) ? 255.0 : is_floating(c.type) && most <= 2.0 ? 1.0 : range_of(most);
     for (std::size_t i = 0; i != size; ++i) {
       double v = number_at(c, i);
       if (c.type == scalar_type::int8 && v < 0.0) v += 256.0;  // bytes declared as signed
       v = std::round(v * 255.0 / range);
       colors[i].*channel_of[k] = static_cast<std::uint8_t>(v >= 0.0 ? std::min(255.0, v) : 0.0);
     }
-    const bool usual = is_byte(c.type) || (is_floating(c.type) && range == 1.0) ||
-                       (c.type == scalar_type::uint16 && range == 65535.0) || most == 0.0;
+    const bool usual = is_byte(c.type) || (is_floating(c.type) && most <= 1.001) ||
+                       (c.type == scalar_type::uint16 && most > 65535.0 / 4.0) || most == 0.0;
     if (usual) continue;
     std::string note = std::string{"colours are "} + (is_floating(c.type) ? "floating-point numbers" : "integers") +
-                       " up to " + std::to_string(std::llround(std::min(most, 1e15))) + ": taken as 0 ... " +
-                       std::to_string(static_cast<int>(range));
+                       " up to " + shortened(most) + ": taken as 0 ... " + std::to_string(static_cast<int>(range));
     if (note != last_note) notes.push_back(last_note = std::move(note));
   }
   return colors;
