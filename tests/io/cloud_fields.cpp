@@ -162,6 +162,9 @@ struct color_kind {
 const std::vector<color_kind> color_kinds{
     {"bytes", {"red", "green", "blue"}},
     {"short names", {"r", "g", "b"}},
+    {"upper case", {"Red", "GREEN", "Blue"}},
+    {"short names in upper case", {"R", "G", "B"}},
+    {"packed, in upper case", {"RGB"}, scalar_type::uint32},
     {"diffuse", {"diffuse_red", "diffuse_green", "diffuse_blue"}},
     {"0 to 1", {"red", "green", "blue"}, scalar_type::float32, 1.0 / 255.0},
     {"0 to 1 as double", {"r", "g", "b"}, scalar_type::float64, 1.0 / 255.0},
@@ -354,6 +357,19 @@ TEST_CASE("numbers beyond the declared type survive in text") {
       CHECK(numbers(read.fields[0]) == std::vector<double>{7, -1, 300});
       CHECK(same_numbers(numbers(read.fields[1]), {7, 0.5, NAN}));
     }
+}
+
+TEST_CASE("coordinates may have names in upper case, but names in lower case come first") {
+  for (const format& f : formats) {
+    table t{.points = 2, .columns = coordinates(2)};
+    for (column& c : t.columns) c.name[0] = static_cast<char>(c.name[0] - 'a' + 'A');
+    CHECK(parse(t, f).cloud.points.at(1) == orbis::vec3f(1.25F, 1.25F, 1.25F));
+    CHECK(parse(t, f).notes.empty());
+    t.columns.push_back(column_of("x", scalar_type::float32, {8, 9}));
+    const auto read = parse(t, f);
+    CHECK(read.cloud.points.at(1) == orbis::vec3f(9, 1.25F, 1.25F));
+    CHECK(io::names_of(read.fields) == "X");
+  }
 }
 
 TEST_CASE("what a cloud leaves out is noted") {

@@ -13,6 +13,7 @@
 #include <cstring>
 #include <optional>
 #include <set>
+#include <span>
 #include <string>
 #include <string_view>
 #include <type_traits>
@@ -45,15 +46,19 @@ constexpr std::array<std::string_view, 3> color_names[] = {
     {"red", "green", "blue"}, {"r", "g", "b"}, {"diffuse_red", "diffuse_green", "diffuse_blue"}};
 constexpr std::string_view packed_color_names[] = {"rgb", "rgba"};
 
-[[nodiscard]] inline bool is_coordinate(std::string_view name) {
-  return std::ranges::find(coordinate_names, name) != std::end(coordinate_names);
+/// Returns true if a name of a file is `known`, a name in lower case.
+[[nodiscard]] inline bool is_name(std::string_view name, std::string_view known) {
+  return std::ranges::equal(name, known, {}, lower_case);
 }
+[[nodiscard]] inline bool is_one_of(std::string_view name, std::span<const std::string_view> known) {
+  return std::ranges::any_of(known, [&](std::string_view k) { return is_name(name, k); });
+}
+[[nodiscard]] inline bool is_coordinate(std::string_view name) { return is_one_of(name, coordinate_names); }
 
 /// Returns true if points or colours may be read from columns of this name.
 [[nodiscard]] inline bool is_point_or_color(std::string_view name) {
-  return is_coordinate(name) || std::ranges::find(packed_color_names, name) != std::end(packed_color_names) ||
-         std::ranges::any_of(color_names,
-                             [&](const auto& names) { return std::ranges::find(names, name) != names.end(); });
+  return is_coordinate(name) || is_one_of(name, packed_color_names) ||
+         std::ranges::any_of(color_names, [&](const auto& names) { return is_one_of(name, names); });
 }
 
 /// A column of `points` zeros. In text, coordinates are stored as double whatever the header declares.
@@ -176,7 +181,9 @@ inline result<cloud_with_fields> to_cloud(cloud_columns&& read, const std::strin
   const std::size_t n = read.size;
   std::vector<bool> used(read.columns.size(), false);
   const auto find = [&](std::string_view name) -> const cloud_field* {
-    const auto at = std::ranges::find(read.columns, name, &cloud_field::name);
+    auto at = std::ranges::find(read.columns, name, &cloud_field::name);
+    if (at == read.columns.end())
+      at = std::ranges::find_if(read.columns, [&](const cloud_field& c) { return is_name(c.name, name); });
     return at == read.columns.end() || at->count != 1 ? nullptr : &*at;
   };
   const auto use = [&](const cloud_field* column) {

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cstddef>
 #include <iterator>
 #include <optional>
@@ -80,7 +79,7 @@ struct column_name {
     name.remove_prefix(std::min(name.find_first_not_of(marks), name.size()));
     name = name.substr(0, name.find_first_of(marks));
     column_name& c = names.emplace_back(std::string{name}, nanoseconds || name.ends_with("_ns"));
-    for (char& letter : c.text) letter = static_cast<char>(std::tolower(static_cast<unsigned char>(letter)));
+    std::ranges::transform(c.text, c.text.begin(), lower_case);
   }
   return names;
 }
