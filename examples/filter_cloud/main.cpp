@@ -3,7 +3,6 @@
 // filter_cloud IN.{ply,pcd} OUT.{ply,pcd}: removes outliers from a cloud, with a filter chosen automatically or by the
 // user.
 #include <cstdio>
-#include <filesystem>
 #include <optional>
 #include <string>
 #include <vector>
@@ -44,6 +43,8 @@ int run(int argc, char** argv) {
   auto eye = xyz.empty() ? std::nullopt : std::optional{orbis::vec3{xyz.data()}};
   if (eye ? !eye->allFinite() : filter == "range-statistical")
     return report_error(1, "--origin: needs a finite position");
+  const auto format = orbis::io::cloud_format_of(output);
+  if (!format) return report_error(1, output + ": must end in .ply or .pcd");
   if (examples::is_same_file(output, input)) return report_error(1, examples::overwrite_message(output, input));
   auto found = examples::read_near_origin(input);  // written in the original coordinates
   if (!found) return report_error(2, found.error().to_string());
@@ -55,7 +56,7 @@ int run(int argc, char** argv) {
     read.fields.clear();
     read.cloud = voxel_grid(read.cloud, {.size = voxel});
   }
-  if (std::filesystem::path{output}.extension() != ".pcd") {
+  if (*format == orbis::io::cloud_format::ply) {
     if (read.viewpoint != orbis::io::cloud_with_fields{}.viewpoint)
       read.notes.emplace_back("VIEWPOINT is left out, because PLY files have none: write a .pcd file to keep it");
     for (const auto& field : read.fields)

@@ -1,8 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <cstdint>
 #include <filesystem>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include <orbis/core/bytes.hpp>
+#include <orbis/core/file.hpp>
 #include <orbis/io/cloud_file.hpp>
 #include <orbis/io/pcd.hpp>
 #include <orbis/io/ply.hpp>
@@ -22,6 +26,25 @@ TEST_CASE("a cloud is read whatever its file is called") {
   for (const char* name : {"b.pcd", "b.dat"}) {
     REQUIRE(io::write_pcd(folder / name, cloud));
     CHECK(io::read_cloud(folder / name).value().colors == cloud.colors);
+  }
+}
+
+TEST_CASE("the extension of a path is the format of a cloud, in upper and lower case") {
+  const orbis::test::temporary_folder folder;
+  const io::cloud_with_fields cloud{.cloud = {{{1, 2, 3}}, {}}, .fields = {}, .notes = {}};
+  const std::vector<std::uint32_t> all{0};
+  for (const auto& [name, begin] :
+       {std::pair{"a.PLY", "ply\n"}, {"a.Ply", "ply\n"}, {"a.pcd", "# .PCD"}, {"a.PCD", "# .PCD"}}) {
+    REQUIRE(io::write_cloud(folder / name, cloud, all));
+    const auto bytes = orbis::read_file(folder / name).value();
+    CHECK(bytes.starts_with(begin));
+    CHECK(io::read_cloud(folder / name).value().points == cloud.cloud.points);
+  }
+  CHECK(io::read_cloud(folder.write("b.PCD", "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH 1\nDATA ascii\n1 2 3\n")));
+  for (const char* name : {"a.xyz", "a", ".ply", "a.plyx"}) {
+    CHECK_FALSE(io::cloud_format_of(folder / name));
+    CHECK(io::write_cloud(folder / name, cloud, all).error().code == orbis::errc::invalid_argument);
+    CHECK_FALSE(std::filesystem::exists(folder / name));
   }
 }
 
