@@ -103,7 +103,7 @@ app_fails(2 "no_images/rgb" run no_images --out out)
 recording(bad_pose)
 file(APPEND ${WORK}/bad_pose/groundtruth.txt "9 nan 0 0 0 0 0 1\n")  # a lost pose
 app(0 map bad_pose --out lost --resolution 0.2)
-check(err MATCHES "warning: [^\n]*groundtruth.txt: 1 poses with NaN or infinity are left out")
+check(err MATCHES "warning: [^\n]*groundtruth.txt: 1 poses with NaN, infinity or a zero quaternion are left out")
 file(APPEND ${WORK}/bad_pose/groundtruth.txt "10 zero 0 0 0 0 0 1\n")
 app_fails(2 "groundtruth.txt:[0-9]+: .*zero" run bad_pose --out out)
 

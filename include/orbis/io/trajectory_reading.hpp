@@ -21,7 +21,7 @@ enum class trajectory_layout {
 struct trajectory_reading {
   trajectory poses;  ///< each time once; in KITTI's layout the time is the index of the line, see `set_times`
   trajectory_layout layout = trajectory_layout::tum;
-  std::size_t lost = 0;            ///< lines with NaN or infinity, which are left out
+  std::size_t lost = 0;            ///< lines with NaN, infinity or a zero quaternion, which are left out
   std::vector<std::string> notes;  ///< warnings for the user: the file, interpretations, and lines that are left out
 };
 

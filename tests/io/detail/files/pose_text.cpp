@@ -19,8 +19,8 @@ using orbis::test::temporary_folder;
 
 namespace {
 
-/// Marks of a lost pose that other programs write.
-const std::vector<std::string> marks{"nan", "NaN", "-nan", "inf", "-inf", "-INF", "-nan(ind)"};
+/// Marks of a lost pose that other programs write; 0 in all places.
+const std::vector<std::string> marks{"0", "nan", "NaN", "-nan", "inf", "-inf", "-INF", "-nan(ind)"};
 
 bool has_note(const std::vector<std::string>& notes, const std::string& part) {
   return std::ranges::any_of(notes, [&](const std::string& note) { return note.find(part) != note.npos; });
@@ -57,7 +57,7 @@ TEST_CASE("lost poses of a recording are left out and counted") {
     CHECK(tum.ground_truth.size() == 2);
     CHECK_FALSE(tum.frames[1].T_world_camera.has_value());
     CHECK(tum.frames[2].T_world_camera.value().translation().x() == 3.0);
-    CHECK(has_note(tum.notes, "groundtruth.txt: 1 poses with NaN or infinity are left out"));
+    CHECK(has_note(tum.notes, "groundtruth.txt: 1 poses with NaN, infinity or a zero quaternion are left out"));
 
     const std::string good = "1 0 0 1\n0 1 0 2\n0 0 1 3\n0 0 0 1\n";
     for (const char* stem : {"frame-000000", "frame-000001"}) {
@@ -87,11 +87,21 @@ TEST_CASE("lost poses of a recording are left out and counted") {
     CHECK(kitti.frames.size() == 3);
     CHECK(kitti.ground_truth.size() == 2);
 
-    const auto asl = io::detail::parse_asl_poses("1000000,1,2,3,1,0,0,0\n2000000,1," + mark + ",3,1,0,0,0\n", "a.csv");
+    const auto asl = io::detail::parse_asl_poses(
+        "1000000,1,2,3,1,0,0,0\n2000000,1,2,3," + mark + "," + mark + "," + mark + "," + mark + "\n", "a.csv");
     REQUIRE(asl.value().poses.size() == 1);
     CHECK(asl->poses[0].timestamp == Approx(1e-3));
-    CHECK(has_note(asl->notes, "a.csv: 1 poses with NaN or infinity"));
+    CHECK(has_note(asl->notes, "a.csv: 1 poses with NaN, infinity or a zero quaternion"));
   }
+}
+
+TEST_CASE("poses whose rotation is zero are lost ones") {
+  for (const char* lost : {"0 0 0 0 0 0 0 0 0 0 0 0", "0 0 0 1 0 0 0 2 0 0 0 3", "0 0 0 0\n0 0 0 0\n0 0 0 0\n0 0 0 1\n",
+                           "0.0 0 -0 0\n0 0 0 0\n0 0 0 0\n0 0 0 0\n", "1 0 0 nan"})
+    CHECK(io::detail::is_lost_pose(lost));
+  for (const char* other :
+       {"", "0 0 0 0", "1 0 0 0 0 1 0 0 0 0 1 0", "0 0 0 0 0 0 0 0 0 0 x 0", "0 0 0 0\n0 0 1e-3 0\n0 0 0 0\n0 0 0 1\n"})
+    CHECK_FALSE(io::detail::is_lost_pose(other));
 }
 
 TEST_CASE("a ground truth with unusable times is left out, in any layout of the file") {

@@ -59,16 +59,23 @@ namespace orbis::io::detail {
   return parse_pose_matrix(*text, path);
 }
 
-/// Returns true if a number of the text is NaN or infinite: data sets mark the poses of lost frames in this way.
+/// Returns true if a number of the text is NaN or infinite, or if the text is a matrix (at least 3x4, by rows) whose
+/// rotation is zero: data sets mark the poses of lost frames in these ways.
 [[nodiscard]] inline bool is_lost_pose(std::string_view text) {
-  bool lost = false;
+  bool lost = false, is_zero = true;
+  std::size_t count = 0;
   for_each_line(text, [&](std::string_view line, std::size_t) {
     double value = 0.0;
-    for (std::string_view field = next_field(line); !lost && !field.empty(); field = next_field(line))
-      lost = parse_number(field, value) && !std::isfinite(value);
+    for (std::string_view field = next_field(line); !lost && !field.empty(); field = next_field(line)) {
+      if (!parse_number(field, value)) is_zero = false;
+      lost = !std::isfinite(value);
+      const bool of_rotation = count < 12 && count % 4 != 3;
+      is_zero = is_zero && !(of_rotation && value != 0.0);
+      ++count;
+    }
     return !lost;
   });
-  return lost;
+  return lost || (is_zero && count >= 12);
 }
 
 /// A warning about frames without a pose.

@@ -35,7 +35,7 @@ struct pose_lines {
   std::vector<entry> entries;  ///< in the order of the file
   trajectory_layout layout = trajectory_layout::tum;
   time_unit unit = time_units[0];  ///< of the time stamps, by the first one; `entries` have seconds
-  std::size_t lost = 0;            ///< lines with NaN or infinity
+  std::size_t lost = 0;            ///< lines with NaN, infinity or a zero quaternion
   std::size_t first_lost_line = 0;
   std::vector<std::string> notes{};
 };
@@ -123,6 +123,7 @@ inline result<pose_lines> parse_pose_lines(std::string_view text, const std::fil
       std::array<double, 8> v{};
       const bool more = header.w_first || header.columns != usual_columns;
       if (auto why = parse_pose_numbers(line, separator, more, v, lost, header.columns); !why.empty()) return why;
+      lost = lost || (v[4] == 0.0 && v[5] == 0.0 && v[6] == 0.0 && v[7] == 0.0);
       if (!lost) pose = pose_of(v, header.w_first);
       if (!lost && !pose)
         return header.w_first ? "a pose has a quaternion, w first, which is neither zero nor too large"
@@ -255,7 +256,8 @@ inline repeated_times keep_first(std::vector<pose_lines::entry>& entries) {
   const auto note = [&](const std::string& text) { read.notes.push_back(where.string() + ": " + text); };
   for (const std::string& text : lines.notes) note(text);
   if (lines.lost != 0)
-    note(std::to_string(lines.lost) + " poses with NaN or infinity are left out: the camera was lost there");
+    note(std::to_string(lines.lost) +
+         " poses with NaN, infinity or a zero quaternion are left out: the camera was lost there");
 
   std::vector<pose_lines::entry>& entries = lines.entries;
   const std::size_t all = entries.size();
