@@ -529,6 +529,19 @@ TEST_CASE("clouds of random layouts are read exactly and survive writing") {
   }
 }
 
+TEST_CASE("the properties of a PLY have different names") {
+  const orbis::test::temporary_folder folder;
+  table t{.points = 1, .columns = coordinates(1)};
+  t.columns.push_back({"f", scalar_type::float32, 2, {1, 2}, false});
+  t.columns.push_back(column_of("f_0", scalar_type::float32, {3}));
+  t.columns.push_back({"f_2", scalar_type::uint8, 2, {4, 5}, false});
+  const std::vector<std::uint32_t> all{0};
+  REQUIRE(io::write_cloud(folder / "a.ply", parse(t, formats[4]), all));
+  const auto read = io::read_cloud_with_fields(folder / "a.ply").value();
+  CHECK(io::names_of(read.fields) == "f_1, f_2, f_0, f_2_0, f_2_1");
+  for (std::size_t k = 0; k != 5; ++k) CHECK(numbers(read.fields.at(k)) == std::vector{static_cast<double>(k + 1)});
+}
+
 TEST_CASE("fields of a cloud far from the origin survive, and its coordinates stay where they were") {
   const orbis::test::temporary_folder folder;
   const orbis::vec3 origin{455'000.0, 5'430'000.0, 100.0};

@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <charconv>
 #include <ostream>
+#include <set>
+#include <string>
 #include <string_view>
 #include <type_traits>
 
@@ -52,10 +54,16 @@ ORBIS_INLINE result<void> write_ply_vertices(const std::filesystem::path& path, 
                         " 1.0\nelement vertex " + std::to_string(vertices.count) + axis + "x" + axis + "y" + axis +
                         "z\n" +
                         (vertices.colored ? "property uchar red\nproperty uchar green\nproperty uchar blue\n" : "");
+    std::set<std::string> taken;
     for (const cloud_field& field : vertices.fields)
-      for (std::size_t e = 0; e != field.count; ++e)
-        bytes += "property " + std::string{ply_name(field.type)} + ' ' + field.name +
-                 (field.count == 1 ? "" : '_' + std::to_string(e)) + '\n';
+      if (field.count == 1) taken.insert(field.name);
+    for (const cloud_field& field : vertices.fields)
+      for (std::size_t e = 0, number = 0; e != field.count; ++e) {
+        std::string name = field.name;
+        while (field.count != 1 && !taken.insert(name = field.name + '_' + std::to_string(number++)).second) {
+        }
+        bytes += "property " + std::string{ply_name(field.type)} + ' ' + name + '\n';
+      }
     bytes += "end_header\n";
     const auto flush = [&] {
       out.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
