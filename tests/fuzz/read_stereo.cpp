@@ -48,7 +48,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if (const auto k = checked(text, [&] { return io::detail::parse_kitti_calibration(text, 0, 1, where); }))
     fuzz::require(k->fx > 0.0 && k->fy > 0.0 && k->baseline > 0.0 && std::isfinite(k->baseline),
                   "a pair has a baseline");
-  if (const auto times = checked(text, [&] { return io::detail::parse_kitti_times(text, where); }))
+  if (const auto times = checked(text, [&] { return io::detail::parse_times(text, where); }))
     for (std::size_t i = 1; i < times->size(); ++i) fuzz::require((*times)[i] > (*times)[i - 1], "times ascend");
   if (const auto poses = checked(text, [&] { return io::detail::parse_kitti_poses(text, where); }))
     for (const std::optional<se3>& pose : *poses) fuzz::require(!pose || is_rotation(*pose), "a pose is rigid");

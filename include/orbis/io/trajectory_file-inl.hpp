@@ -15,6 +15,7 @@
 #include <orbis/core/file.hpp>
 #include <orbis/core/inline.hpp>
 #include <orbis/io/detail/files/pose_text.hpp>
+#include <orbis/io/detail/files/time_list.hpp>
 #include <orbis/io/detail/text.hpp>
 #include <orbis/io/detail/time_stamp.hpp>
 #include <orbis/io/trajectory_file.hpp>
@@ -74,21 +75,12 @@ ORBIS_INLINE result<trajectory_reading> read_trajectory_file(const std::filesyst
 ORBIS_INLINE result<void> set_times(trajectory_reading& read, const std::filesystem::path& times) {
   const auto text = read_file(times);
   if (!text) return fail(text.error());
-  std::vector<double> all;
-  std::size_t bad_line = 0;
-  detail::for_each_line(*text, [&](std::string_view line, std::size_t number) {
-    const auto t = detail::parse_time_stamp(line);
-    if (!t || (!all.empty() && !(*t > all.back()))) return bad_line = number, false;
-    all.push_back(*t);
-    return true;
-  });
-  if (bad_line != 0)
-    return fail(errc::malformed, detail::at_line(times, bad_line),
-                "a line must have one time, later than the previous one");
-  if (all.size() != read.poses.size() + read.lost)
+  const auto all = detail::parse_times(*text, times);
+  if (!all) return fail(all.error());
+  if (all->size() != read.poses.size() + read.lost)
     return fail(errc::malformed, times.string(),
-                std::to_string(all.size()) + " times for " + std::to_string(read.poses.size() + read.lost) + " poses");
-  for (stamped_pose& p : read.poses) p.timestamp = all[static_cast<std::size_t>(p.timestamp)];
+                std::to_string(all->size()) + " times for " + std::to_string(read.poses.size() + read.lost) + " poses");
+  for (stamped_pose& p : read.poses) p.timestamp = (*all)[static_cast<std::size_t>(p.timestamp)];
   return {};
 }
 

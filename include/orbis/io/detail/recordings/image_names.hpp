@@ -183,7 +183,7 @@ inline void note_unused_folders(const std::filesystem::path& folder, const std::
   if (file.empty()) return {};
   const auto text = read_file(file);
   if (!text) return fail(text.error());
-  const auto times = parse_kitti_times(*text, file);
+  const auto times = parse_times(*text, file);
   if (!times) return fail(times.error());
   if (times->size() != images.size())
     index.notes.push_back(file.string() + ": " + std::to_string(times->size()) + " times for " +

@@ -23,11 +23,11 @@
 #include <orbis/core/result.hpp>
 #include <orbis/core/se3.hpp>
 #include <orbis/io/detail/files/pose_matrix.hpp>
+#include <orbis/io/detail/files/time_list.hpp>
 #include <orbis/io/detail/recordings/recording_folder.hpp>
 #include <orbis/io/detail/recordings/recording_index.hpp>
 #include <orbis/io/detail/recordings/stereo_index.hpp>
 #include <orbis/io/detail/text.hpp>
-#include <orbis/io/detail/time_stamp.hpp>
 #include <orbis/io/image.hpp>
 
 namespace orbis::io::detail {
@@ -88,25 +88,8 @@ struct kitti_calibration {
   return k;
 }
 
-/// Parses `times.txt`: time stamps (`parse_time_stamp`), one per line. Errors: malformed, with the line (not a number,
-/// or not ascending).
-[[nodiscard]] inline result<std::vector<double>> parse_kitti_times(std::string_view text,
-                                                                   const std::filesystem::path& where) {
-  std::vector<double> times;
-  std::size_t bad_line = 0;
-  for_each_line(text, [&](std::string_view line, std::size_t number) {
-    const auto t = parse_time_stamp(line);
-    if (!t || (!times.empty() && !(*t > times.back()))) return bad_line = number, false;
-    times.push_back(*t);
-    return true;
-  });
-  if (bad_line != 0)
-    return fail(errc::malformed, at_line(where, bad_line), "a line must have one time, later than the previous one");
-  return times;
-}
-
-/// Parses a file of poses: the first three rows of `T_world_camera`, 12 numbers per line; a pose with NaN or infinity
-/// is none. Errors: malformed, with the line (not 12 numbers, not a rigid transform).
+/// Parses a file of poses: the first three rows of `T_world_camera`, 12 numbers per line; a lost pose
+/// (`is_lost_pose`) is none. Errors: malformed, with the line (not 12 numbers, not a rigid transform).
 [[nodiscard]] inline result<std::vector<std::optional<se3>>> parse_kitti_poses(std::string_view text,
                                                                                const std::filesystem::path& where) {
   std::vector<std::optional<se3>> poses;
@@ -224,7 +207,7 @@ inline void add_kitti_frame(std::size_t n, const std::vector<double>& times,
   if (!times_text) return fail(times_text.error());
   const auto k = parse_kitti_calibration(*calibration_text, cameras->first, cameras->second, images.files[0]);
   if (!k) return fail(k.error());
-  const auto times = parse_kitti_times(*times_text, images.files[1]);
+  const auto times = parse_times(*times_text, images.files[1]);
   if (!times) return fail(times.error());
 
   const auto poses = read_kitti_poses(folder, k->T_first_left, times->size(), images);

@@ -108,7 +108,7 @@ inline constexpr double mono_pose_distance = 0.020;
   const auto projection = parse_kitti_projection(*calibration_text, *camera, index.files[0]);
   if (!projection) return fail(projection.error());
   const auto& p = *projection;
-  const auto times = parse_kitti_times(*times_text, index.files[1]);
+  const auto times = parse_times(*times_text, index.files[1]);
   if (!times) return fail(times.error());
   const auto poses = read_kitti_poses(folder, kitti_place(p), times->size(), index);
   if (!poses) return fail(poses.error());
