@@ -22,16 +22,17 @@ namespace orbis::io {
 /// Reads a trajectory file; see `parse_trajectory`. Errors: not_found, unreadable, malformed.
 [[nodiscard]] result<trajectory> read_trajectory(const std::filesystem::path& path);
 
-/// Parses a trajectory in the layout of its first lines: TUM, EuRoC (recognised by a header that names w before x, or
-/// by commas and nanoseconds) or KITTI. Fields are separated by blanks, commas or semicolons. Accepts `#` comments and
-/// a line of names before the poses; if it names time, position and quaternion, other columns may precede them. Times
-/// are in seconds, or in the unit of the first one: nanoseconds if the header says so and it is a whole number,
-/// otherwise by its digits (13: milliseconds, 16: microseconds, 19: nanoseconds). Poses with NaN, infinity, or a zero
-/// quaternion or rotation are lost ones. Of poses with equal times the first one is kept; of several runs, only the
-/// first one if a later one has other poses during its time. Notes report all of this. Errors: malformed, with the line
-/// (too few numbers, a quaternion that is too large or almost zero); unsupported (a header that names the quaternion
-/// before the position, or in another order); degenerate (a quarter of the poses of one run, or more than half of the
-/// poses of several, have the time of another pose and differ from it). O(n log n).
+/// Parses a trajectory in the layout of its first lines: EuRoC (the header names the quaternion with w first or, if it
+/// names none, commas separate times of 19 digits), KITTI (12 numbers) or TUM. Fields are separated by blanks, commas
+/// or semicolons. Accepts `#` comments and a line of names before the poses; if it names time, position and quaternion,
+/// other columns may precede them. Times are in seconds, or in the unit of the first one: nanoseconds if the header
+/// says so and it is a whole number, otherwise by its digits (13: milliseconds, 16: microseconds, 19: nanoseconds).
+/// Poses with NaN, infinity, or a zero quaternion or rotation are lost ones. Of poses with equal times the first one is
+/// kept; of several runs, only the first one if a later one has other poses during its time. Notes report all of this.
+/// Errors: malformed, with the line (too few numbers, a quaternion that is too large or almost zero); unsupported (a
+/// header that names the quaternion before the position, or in another order); degenerate (a quarter of the poses have
+/// the time of another pose and differ from it; with several runs, a quarter of those of the first one or more than
+/// half of all). O(n log n).
 [[nodiscard]] result<trajectory_reading> parse_trajectory_file(std::string_view text,
                                                                const std::filesystem::path& where = {});
 

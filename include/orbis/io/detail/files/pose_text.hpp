@@ -70,12 +70,17 @@ struct pose_lines {
   return se3(so3(q), vec3(v[1], v[2], v[3]));
 }
 
-/// Returns true if a field of the line is a number.
-[[nodiscard]] inline bool has_number(std::string_view line) {
+/// Returns true if no field of the line is a number, or if the fields are 0, 1, 2, ...: names of columns.
+[[nodiscard]] inline bool has_names(std::string_view line) {
   const char separator = separator_of(line);
-  for (double value = 0.0; !line.empty();)
-    if (parse_number(next_value(line, separator), value)) return true;
-  return false;
+  std::size_t numbers = 0, columns = 0;
+  bool in_order = true;
+  for (double value = 0.0; !line.empty(); ++columns)
+    if (parse_number(next_value(line, separator), value)) {
+      ++numbers;
+      in_order = in_order && value == static_cast<double>(columns);
+    }
+  return numbers == 0 || (in_order && numbers == columns && columns >= usual_columns.size());
 }
 
 /// Parses the lines of a trajectory in the layout of its header and first pose: a header or commas with nanoseconds are
@@ -148,7 +153,7 @@ inline result<pose_lines> parse_pose_lines(std::string_view text, const std::fil
     const std::string_view line = trimmed(next_line(text));
     const bool comment = line.starts_with('#');
     if (line.empty() || (comment && !in_header)) continue;
-    if (comment || (in_header && !named && !has_number(line))) {
+    if (comment || (in_header && !named && has_names(line))) {
       named = named || !comment;
       const auto found = parse_pose_header(line);
       const bool nanoseconds = header.nanoseconds || found.nanoseconds;
@@ -249,8 +254,7 @@ inline repeated_times keep_first(std::vector<pose_lines::entry>& entries) {
 }
 
 /// The poses in order of time, each time once: the first line counts. If a later run has another pose during the first
-/// one, only the first one is kept. Errors: degenerate (a quarter of the poses of one run, or more than half of the
-/// poses of several, have the time of another one and differ from it).
+/// one, only the first one is kept. Errors: degenerate (see `parse_trajectory_file`).
 [[nodiscard]] inline result<trajectory_reading> order_poses(pose_lines&& lines, const std::filesystem::path& where) {
   trajectory_reading read{.poses = {}, .layout = lines.layout, .lost = lines.lost, .notes = {}};
   const auto note = [&](const std::string& text) { read.notes.push_back(where.string() + ": " + text); };
@@ -275,18 +279,22 @@ inline repeated_times keep_first(std::vector<pose_lines::entry>& entries) {
   }
   std::stable_sort(entries.begin(), entries.end(), earlier);
   repeated_times repeated = keep_first(entries);
-  if (repeated.different != 0 && (runs.empty() ? 4 : 2) * repeated.different >= all + (runs.empty() ? 0 : 1))
-    return fail(
-        errc::degenerate, where.string(),
-        std::to_string(repeated.different) + " of " + std::to_string(all) +
-            " poses have the time stamp of another pose: " + (runs.empty() ? explain_equal_times(entries) : backwards));
+  const auto refused = [&](std::size_t poses, const std::string& why) {
+    return fail(errc::degenerate, where.string(),
+                std::to_string(repeated.different) + " of " + std::to_string(poses) +
+                    " poses have the time stamp of another pose: " + why);
+  };
+  std::size_t kept = all;
   if (!first.empty()) {
+    if (2 * repeated.different > all) return refused(all, backwards);
     note(backwards + " The " + std::to_string(all - first.size()) + " poses from there on are left out");
+    kept = first.size();
     entries = std::move(first);
     repeated = keep_first(entries);
   } else if (!sorted) {
     note(backwards);
   }
+  if (repeated.different != 0 && 4 * repeated.different >= kept) return refused(kept, explain_equal_times(entries));
   if (repeated.same != 0) note(std::to_string(repeated.same) + " repeated lines are left out");
   if (repeated.different != 0)
     note(std::to_string(repeated.different) +
