@@ -78,8 +78,8 @@ struct column_name {
     std::string_view name = field;
     name.remove_prefix(std::min(name.find_first_not_of(marks), name.size()));
     name = name.substr(0, name.find_first_of(marks));
-    column_name& c = names.emplace_back(std::string{name}, nanoseconds || name.ends_with("_ns"));
-    std::ranges::transform(c.text, c.text.begin(), lower_case);
+    names.push_back({std::string{name}, nanoseconds || name.ends_with("_ns")});
+    std::ranges::transform(name, names.back().text.begin(), lower_case);
   }
   return names;
 }
