@@ -22,6 +22,7 @@
 #include "../common/voxel_estimate.hpp"
 #include "background.hpp"
 #include "camera_files.hpp"
+#include "formatted_text.hpp"
 #include "inputs/bag_file.hpp"
 #include "inputs/file_recording.hpp"
 #include "inputs/live_source.hpp"
@@ -480,7 +481,7 @@ result<void> check_resolution(frame_source& source, const settings& s) {
 
 /// Reads the first frame, so that images that do not match the camera are reported before tracking starts, and adds a
 /// note if depths are so implausible that the depth scale must be wrong.
-result<void> check_images(frame_source& source) {
+result<void> check_images(frame_source& source, const settings& s) {
   if (source.frames == 0 || source.is_live || source.made) return {};
   constexpr std::size_t samples = 4;
   for (std::size_t sample = 0; sample != samples; ++sample) {
@@ -500,18 +501,23 @@ result<void> check_images(frame_source& source) {
     if (depths.size() < frame->depth.pixels().size() / 100) continue;  // looks at a later frame
     const auto middle = depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2);
     std::nth_element(depths.begin(), middle, depths.end());
-    constexpr double nearest = 0.2, farthest = 20.0;
+    constexpr double nearest = 0.2;
+    const double farthest = std::min(20.0, source.depth_limit(s));
     const double metres = *middle / frame->depth_scale;
+    source.median_depth = metres;
     if (metres >= nearest && metres <= farthest) return {};
-    char text[300];
+    char text[400];
     int length = std::snprintf(text, sizeof text, "the median depth of frame %zu is %.*f m (%d / depth_scale %.6g)", i,
                                metres < 10.0 ? 2 : 0, metres, static_cast<int>(*middle), frame->depth_scale);
     for (const double scale : {1000.0, 5000.0, 10000.0, 100.0})
-      if (*middle / scale >= nearest && *middle / scale <= farthest / 2.0) {
+      if (*middle / scale >= nearest && *middle / scale <= farthest) {
         length += std::snprintf(text + length, sizeof text - static_cast<std::size_t>(length),
                                 "; with depth_scale %.6g it would be %.2f m", scale, *middle / scale);
         break;
       }
+    if (metres > farthest && metres <= 20.0)
+      std::snprintf(text + length, sizeof text - static_cast<std::size_t>(length),
+                    ". Depth beyond %.3g m is not in the map (--max-depth)", farthest);
     source.notes.push_back(text +
                            std::string{". Check depth_scale of the camera: stored depth / depth_scale = metres"});
     return {};
@@ -525,7 +531,8 @@ std::string describe(const frame_source& source) {
          std::to_string(source.camera.model.width()) + " x " + std::to_string(source.camera.model.height()) +
          (source.images_of.empty() ? "" : ", images from " + source.images_of) +
          (source.ground_truth.empty() ? "" : ", with ground truth") +
-         (source.truth_of.empty() ? "" : " from " + source.truth_of);
+         (source.truth_of.empty() ? "" : " from " + source.truth_of) +
+         (source.median_depth ? ", median depth " + text("%.2f m", *source.median_depth) : "");
 }
 
 }  // namespace
@@ -556,7 +563,7 @@ result<frame_source> open_source(const settings& s, console& console) {
   };
   auto source = s.what == command::demo ? result<frame_source>{make_synthetic(s)} : open();
   if (!source) return source;
-  if (auto fits = check_images(*source); !fits) return fail(fits.error());
+  if (auto fits = check_images(*source, s); !fits) return fail(fits.error());
   if (source->is_stereo()) {
     // Up to this depth, a quarter of a pixel of disparity corresponds to about 1 % of the depth.
     constexpr double baselines = 20.0;

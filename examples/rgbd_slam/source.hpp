@@ -35,6 +35,7 @@ struct frame_source {
   double usual_max_depth = app::usual_max_depth;  ///< default maximum depth in a map, metres
   /// The maximum depth of measurements in the map, metres.
   [[nodiscard]] double depth_limit(const settings& s) const { return s.depth_limit(usual_max_depth); }
+  std::optional<double> median_depth;  ///< of one of the first frames of a recording with depth, metres
   orbis::slam::sensor_kind sensor = orbis::slam::sensor_kind::rgbd;
   [[nodiscard]] bool is_stereo() const { return sensor == orbis::slam::sensor_kind::stereo; }
   /// One camera without depth: lengths are in arbitrary units, and there is no dense map.

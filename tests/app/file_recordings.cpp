@@ -396,7 +396,7 @@ TEST_CASE("of times that fall back the first run is used, and repeated times are
   CHECK_THAT(found->notes[1], Contains("1 image of /cam/image_raw is omitted, as the time is that of another one"));
 }
 
-TEST_CASE("ground truth is that of the named topic; damaged poses are omitted") {
+TEST_CASE("ground truth is that of the named topic and damaged poses are omitted") {
   const temporary_folder folder;
   const auto path = folder.path() / "a.bag";
   test::ros_bag_writer bag{path};
