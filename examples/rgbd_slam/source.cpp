@@ -178,6 +178,26 @@ result<frame_source> open_stereo_recording(const settings& s) {
   return source;
 }
 
+/// The name of a folder in `folder` that is a recording; empty if there is none.
+std::string recording_in(const std::filesystem::path& folder) {
+  std::string first;
+  std::error_code failure;
+  for (std::filesystem::directory_iterator it{folder, failure}, end; !failure && it != end; it.increment(failure)) {
+    const std::string name = it->path().filename().string();
+    const bool is_recording = orbis::io::detect_format(it->path()) != orbis::io::recording_format::automatic ||
+                              orbis::io::detect_stereo_format(it->path()) != orbis::io::stereo_format::automatic;
+    if (is_recording && (first.empty() || name < first)) first = name;
+  }
+  return first;
+}
+
+/// A sentence about the recording whose part `folder` is; empty if the folder above is none.
+std::string recording_above(const std::filesystem::path& folder) {
+  const auto above = std::filesystem::absolute(folder / "").lexically_normal().parent_path().parent_path();
+  if (orbis::io::detect_format(above) == orbis::io::recording_format::automatic) return {};
+  return "the folder above, " + above.string() + ", is a recording with depth";
+}
+
 result<frame_source> open_recording(const settings& s) {
   using orbis::io::recording_format;
   orbis::io::recording_options options{.format = s.format == "tum"       ? recording_format::tum
@@ -192,6 +212,8 @@ result<frame_source> open_recording(const settings& s) {
   if (!opened) {
     orbis::error e = with_option(opened.error());
     if (e.code == orbis::errc::unsupported && s.sensor == "auto" && s.format == "auto") {
+      if (const std::string inner = recording_in(s.input); !inner.empty())
+        return fail(e.code, e.where, "is not a recording, but contains one: open " + (s.input / inner).string());
       const auto add = [&](const char* sensor, const orbis::error& other) {
         constexpr std::string_view before = "known layouts: ";
         if (const std::size_t at = other.message.find(before); at != std::string::npos)
@@ -246,16 +268,18 @@ result<frame_source> open_mono_recording(const settings& s) {
   std::optional<camera_file> file;
   auto opened = open_with_camera(
       s, options, [&](const auto& with) { return orbis::io::open_mono_recording(s.input, with); }, file);
-  if (!opened) return fail(with_option(opened.error()));
+  if (!opened) {
+    orbis::error e = with_option(opened.error());
+    if (const std::string above = recording_above(s.input); s.sensor == "auto" && !above.empty())
+      e.message = above + ": open that. Otherwise, " + e.message;
+    return fail(std::move(e));
+  }
   const auto recording = std::make_shared<const orbis::io::mono_recording>(*std::move(opened));
   frame_source source = make_source(*recording, "monocular recording", s);
   add_camera_file(file, source);
   if (s.sensor == "auto") {
     note_depth_folders(s.input, source.notes);
-    const auto above = std::filesystem::absolute(s.input / "").parent_path().parent_path();
-    if (orbis::io::detect_format(above) == orbis::io::recording_format::folders)
-      source.notes.push_back("images of one camera; the folder above, " + above.string() +
-                             ", is a recording with depth");
+    if (const std::string above = recording_above(s.input); !above.empty()) source.notes.push_back(above);
   }
   source.sensor = sensor_kind::monocular;
   subtract_origin(source);

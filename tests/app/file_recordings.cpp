@@ -165,6 +165,8 @@ TEST_CASE("colour and depth of a bag are found and paired by the times in their 
   CHECK(app::open_bag(path, {.topics = {"/camera/rgb/image_mono"}}).value()->color(0).value()(1, 1) == rgb8{9, 9, 9});
   CHECK_THAT(message_of(app::open_bag(path, {.topics = {"/camera/rgb/image_color", "/camera/depth/image_raw"}})),
              Contains("16x12 pixels, the camera 32x24: depth is not registered"));
+  CHECK_THAT(message_of(app::open_bag(path, {.topics = {"/camera/depth_registered/image", "/camera/rgb/image_color"}})),
+             Contains("give the topic of colour first"));
   CHECK_THAT(message_of(app::open_bag(path, {.topics = {"/nothing"}})),
              Contains("has no images in /nothing; it contains /camera/depth/image_raw (16UC1)"));
   CHECK_THAT(message_of(app::open_bag(path, {.sensor = sensor_kind::stereo})), Contains("has no suitable images"));

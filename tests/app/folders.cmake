@@ -76,6 +76,11 @@ app_fails(2 "000000.png: is one image. name its folder, .*/r/color" run r/color/
 execute_process(COMMAND ${APP} run r/color --camera r/camera.toml --out out ${quick} WORKING_DIRECTORY ${WORK} ERROR_VARIABLE err)
 check(err MATCHES "the folder above, [^\n]*/r, is a recording with depth")
 
+app_fails(2 "the folder above, [^\n]*/room, is a recording with depth: open that" run room/rgb --quiet --out out ${quick})
+file(MAKE_DIRECTORY ${WORK}/up)
+file(COPY ${WORK}/r DESTINATION ${WORK}/up)
+app_fails(2 "up: is not a recording, but contains one: open up/r" run up --quiet --out out ${quick})
+
 # Three lines for a folder that is no recording.
 file(WRITE ${WORK}/nothing/readme.md "")
 app(2 run nothing --out out)

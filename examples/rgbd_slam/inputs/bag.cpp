@@ -241,6 +241,8 @@ class bag_recording final : public file_recording {
       if (options.topics.size() > 2) return wrong("needs one or two topics");
       first_ = &topics_.at(options.topics[0]);
       if (options.topics.size() == 2) second_ = &topics_.at(options.topics[1]);
+      if (second_ != nullptr && first_->is_depth())
+        return wrong("has depth images in " + first_->name + ": give the topic of colour first, then that of depth");
       sensor = second_ == nullptr    ? sensor_kind::monocular
                : second_->is_depth() ? sensor_kind::rgbd
                                      : sensor_kind::stereo;
