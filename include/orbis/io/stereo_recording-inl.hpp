@@ -44,10 +44,7 @@ namespace detail {
         errc::no_data, folder.string(),
         "there are no images named by numbers (000000.png) or times in it; the folder " + describe_content(folder));
   note_order(folder, images, true, notes);
-  std::vector<stamped_file> files;
-  const auto times = images.times(fps);
-  for (std::size_t i = 0; i != times.size(); ++i) files.push_back({times[i], images.paths[i]});
-  return in_order_of_time(folder, std::move(files), notes);
+  return in_order_of_time(folder, images.stamped(fps), notes);
 }
 
 /// The index of such a folder. The camera `given` replaces `camera.toml`. Errors: not_found (a file), unreadable,
@@ -60,9 +57,7 @@ namespace detail {
   const auto right_file = folder / "camera_right.toml", place_file = folder / "T_left_right.txt";
   const auto camera = given_camera(folder, given, images.files);
   if (!camera) return fail(camera.error());
-  if (!*camera)
-    return fail(errc::invalid_argument, folder.string(),
-                "the camera is not known: put a camera.toml into the folder, or specify a camera");
+  if (!*camera) return fail(unknown_camera(folder));
   index.fps = (*camera)->fps;
   index.shutter = (*camera)->shutter;
   if (present(right_file)) {

@@ -27,6 +27,11 @@ namespace orbis::io::detail {
   return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
 }
 
+[[nodiscard]] inline std::string lower_cased(std::string text) {
+  for (char& c : text) c = lower_case(c);
+  return text;
+}
+
 /// The text without blanks (including CR and LF) at either end.
 [[nodiscard]] constexpr std::string_view trimmed(std::string_view text) noexcept {
   while (!text.empty() && is_blank(text.front())) text.remove_prefix(1);

@@ -32,7 +32,7 @@ namespace orbis::io::detail {
   for (const std::string_view name : names)
     for (const auto& path : paths) {
       std::error_code ignored;
-      if (lower_case(path.filename().string()) == name && std::filesystem::is_directory(path, ignored)) return path;
+      if (lower_cased(path.filename().string()) == name && std::filesystem::is_directory(path, ignored)) return path;
     }
   return {};
 }
@@ -98,9 +98,7 @@ namespace orbis::io::detail {
   recording_index index;
   const auto pairs = pair_by_name(color, depth, max_time_difference, folder);
   if (!pairs) return fail(pairs.error());
-  const std::vector<double> times = color.times(fps);
-  std::vector<stamped_file> colors;
-  for (std::size_t i = 0; i != times.size(); ++i) colors.push_back({times[i], color.paths[i]});
+  std::vector<stamped_file> colors = color.stamped(fps);
   if (const auto read = read_image_times(folder, colors, index); !read) return fail(read.error());
   note_order(color_folder, color, !index.files.empty(), index.notes);
   note_order(depth_folder, depth, true, index.notes);

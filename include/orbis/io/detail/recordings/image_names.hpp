@@ -47,11 +47,11 @@ struct keyed_images {
   std::vector<std::filesystem::path> paths;
   std::vector<std::filesystem::path> others;  ///< images whose names have another form
 
-  /// Times in seconds. `fps`: rate of images without times.
-  [[nodiscard]] std::vector<double> times(double fps) const {
-    std::vector<double> all = keys;
-    if (keys_are != image_keys::times)
-      for (double& t : all) t /= fps;
+  /// The images with times in seconds. `fps`: rate of images without times.
+  [[nodiscard]] std::vector<stamped_file> stamped(double fps) const {
+    std::vector<stamped_file> all;
+    for (std::size_t i = 0; i != keys.size(); ++i)
+      all.push_back({keys_are == image_keys::times ? keys[i] : keys[i] / fps, paths[i]});
     return all;
   }
 };

@@ -157,9 +157,7 @@ inline constexpr double mono_pose_distance = 0.020;
         errc::no_data, folder.string(),
         "no PNG or JPEG images in it, nor in rgb, color, images, left or data; the folder " + describe_content(folder));
   const keyed_images images = order_by_name(images_in(where));
-  const std::vector<double> times = images.times(fps);
-  std::vector<stamped_file> files;
-  for (std::size_t i = 0; i != times.size(); ++i) files.push_back({times[i], images.paths[i]});
+  std::vector<stamped_file> files = images.stamped(fps);
   if (const auto read = read_image_times(folder, files, index); !read) return fail(read.error());
   note_order(where, images, !index.files.empty(), index.notes);
   note_unused_folders(folder, {where}, index.notes);

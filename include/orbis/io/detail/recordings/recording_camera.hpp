@@ -31,11 +31,16 @@ namespace orbis::io::detail {
   return std::optional{*std::move(read)};
 }
 
+/// Error for a recording whose camera is neither given nor known.
+[[nodiscard]] inline error unknown_camera(const std::filesystem::path& folder) {
+  return {errc::invalid_argument, folder.string(),
+          "the camera is not known: put a camera.toml into the folder, or specify a camera"};
+}
+
 /// Notes a time between frames that does not suit a camera of `fps` frames per second.
 inline void note_interval(recording_index& index, double fps) {
-  std::vector<double> times;
-  for (const recording_entry& frame : index.frames) times.push_back(frame.timestamp);
-  if (std::string warning = describe_interval(times, fps); !warning.empty()) index.notes.push_back(std::move(warning));
+  if (std::string warning = describe_interval(times_of(index.frames), fps); !warning.empty())
+    index.notes.push_back(std::move(warning));
 }
 
 /// Sets `camera` to that of the index if it is empty, with a note if that one is a guess, and notes a time between
@@ -51,9 +56,7 @@ inline void note_interval(recording_index& index, double fps) {
     index.notes.push_back("the camera is " + index.camera_guess + ": " + text);
   }
   if (!camera) camera = index.camera;
-  if (!camera)
-    return fail(errc::invalid_argument, folder.string(),
-                "the camera is not known: put a camera.toml into the folder, or specify a camera");
+  if (!camera) return fail(unknown_camera(folder));
   note_interval(index, camera->fps);
   return {};
 }

@@ -4,7 +4,6 @@
 #pragma once
 
 #include <algorithm>
-#include <cctype>
 #include <cstddef>
 #include <filesystem>
 #include <initializer_list>
@@ -17,6 +16,7 @@
 #include <orbis/core/result.hpp>
 #include <orbis/core/trajectory.hpp>
 #include <orbis/io/detail/recordings/recording_index.hpp>
+#include <orbis/io/detail/text.hpp>
 
 namespace orbis::io::detail {
 
@@ -27,6 +27,14 @@ template <class T>
   return fail(errc::malformed, path.string(),
               "the image has " + std::to_string(read->width()) + "x" + std::to_string(read->height()) +
                   " pixels, the camera " + std::to_string(width) + "x" + std::to_string(height));
+}
+
+/// The time stamps of entries (files, frames, poses), seconds.
+template <class Entry>
+[[nodiscard]] std::vector<double> times_of(const std::vector<Entry>& entries) {
+  std::vector<double> times;
+  for (const Entry& entry : entries) times.push_back(entry.timestamp);
+  return times;
 }
 
 /// Sets the pose of every frame from the ground truth at its time: interpolated if poses are at most 0.2 s apart,
@@ -64,17 +72,12 @@ inline result<void> check_first_frame(const recording_index& index, const std::f
   return paths;
 }
 
-[[nodiscard]] inline std::string lower_case(std::string text) {
-  for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return text;
-}
-
 /// Return true if the name of a file has the extension of a supported image format; of PNG.
 [[nodiscard]] inline bool is_png_name(const std::filesystem::path& path) {
-  return lower_case(path.extension().string()) == ".png";
+  return lower_cased(path.extension().string()) == ".png";
 }
 [[nodiscard]] inline bool is_image_name(const std::filesystem::path& path) {
-  const std::string ending = lower_case(path.extension().string());
+  const std::string ending = lower_cased(path.extension().string());
   return ending == ".png" || ending == ".jpg" || ending == ".jpeg";
 }
 

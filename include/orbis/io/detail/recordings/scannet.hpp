@@ -60,19 +60,8 @@ namespace orbis::io::detail {
       ++without_depth;
       continue;
     }
-    if (const auto file = folder / "pose" / (stem + ".txt"); present(file)) {
-      const auto text = read_file(file);
-      if (!text) return fail(text.error());
-      index.files.push_back(file);
-      if (is_lost_pose(*text)) {
-        ++without_pose;
-      } else {
-        const auto pose = parse_pose_matrix(*text, file);
-        if (!pose) return fail(pose.error());
-        frame.T_world_camera = *pose;
-        index.ground_truth.push_back({frame.timestamp, *pose});
-      }
-    }
+    if (const auto read = read_frame_pose(folder / "pose" / (stem + ".txt"), frame, index, without_pose); !read)
+      return fail(read.error());
     index.frames.push_back(std::move(frame));
   }
   const auto earlier = [](const auto& a, const auto& b) { return a.timestamp < b.timestamp; };

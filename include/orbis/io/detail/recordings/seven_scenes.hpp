@@ -93,6 +93,25 @@ inline std::vector<std::filesystem::path> seven_scenes_sequences(const std::file
   return has_seven_scenes_frames(folder) || !seven_scenes_sequences(folder).empty();
 }
 
+/// Sets the pose of a frame from its file, if that exists, and adds it to the ground truth; counts a lost pose in
+/// `lost`. Errors: unreadable, malformed.
+[[nodiscard]] inline result<void> read_frame_pose(const std::filesystem::path& file, recording_entry& frame,
+                                                  recording_index& index, std::size_t& lost) {
+  if (!present(file)) return {};
+  const auto text = read_file(file);
+  if (!text) return fail(text.error());
+  index.files.push_back(file);
+  if (is_lost_pose(*text)) {
+    ++lost;
+    return {};
+  }
+  const auto pose = parse_pose_matrix(*text, file);
+  if (!pose) return fail(pose.error());
+  frame.T_world_camera = *pose;
+  index.ground_truth.push_back({frame.timestamp, *pose});
+  return {};
+}
+
 /// The index of a 7-Scenes recording, with times from the frame numbers at 30 frames per second. A scene folder with a
 /// single seq-XX is replaced by that folder. `camera-intrinsics.txt` is assumed to be the depth camera's; its image
 /// size is read from the first depth image. Errors: no_data, not_found, unreadable, malformed (a pose, with its file),
@@ -118,19 +137,8 @@ inline std::vector<std::filesystem::path> seven_scenes_sequences(const std::file
       ++without_depth;
       continue;
     }
-    if (const auto file = folder / (stem + ".pose.txt"); present(file)) {
-      const auto text = read_file(file);
-      if (!text) return fail(text.error());
-      index.files.push_back(file);
-      if (is_lost_pose(*text)) {
-        ++lost;
-      } else {
-        const auto pose = parse_pose_matrix(*text, file);
-        if (!pose) return fail(pose.error());
-        frame.T_world_camera = *pose;
-        index.ground_truth.push_back({frame.timestamp, *pose});
-      }
-    }
+    if (const auto read = read_frame_pose(folder / (stem + ".pose.txt"), frame, index, lost); !read)
+      return fail(read.error());
     index.frames.push_back(std::move(frame));
   }
   std::stable_sort(index.frames.begin(), index.frames.end(),

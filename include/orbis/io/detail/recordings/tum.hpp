@@ -36,12 +36,6 @@ struct stamped_file {
   std::filesystem::path path;
 };
 
-[[nodiscard]] inline std::vector<double> times_of(const std::vector<stamped_file>& files) {
-  std::vector<double> times;
-  for (const stamped_file& f : files) times.push_back(f.timestamp);
-  return times;
-}
-
 /// The entries of a list in chronological order, each time stamp once; notes report changes. Errors: no_data (the list
 /// is empty).
 template <class Entry>
@@ -210,9 +204,7 @@ struct associated_files {
 /// Converts the times of frames from frame numbers to seconds at `fps` frames per second, if they are such numbers, and
 /// notes it.
 inline void convert_frame_numbers(recording_index& index, double fps) {
-  std::vector<double> times;
-  for (const recording_entry& frame : index.frames) times.push_back(frame.timestamp);
-  if (!are_frame_numbers(times)) return;
+  if (!are_frame_numbers(times_of(index.frames))) return;
   for (recording_entry& frame : index.frames) frame.timestamp /= fps;
   char text[100];
   std::snprintf(text, sizeof text, "the time stamps are frame numbers; times are those of %.6g frames per second", fps);
@@ -222,9 +214,7 @@ inline void convert_frame_numbers(recording_index& index, double fps) {
 /// Converts the times of a ground truth from frame numbers to seconds at `fps` frames per second, if they are such
 /// numbers and more frames have a pose then; notes it. @pre the times of the frames are in seconds
 inline void convert_numbered_truth(recording_index& index, double max_distance, double fps) {
-  std::vector<double> times;
-  for (const stamped_pose& pose : index.ground_truth) times.push_back(pose.timestamp);
-  if (!are_frame_numbers(times)) return;
+  if (!are_frame_numbers(times_of(index.ground_truth))) return;
   const auto known = [&](const trajectory& truth) {
     return std::count_if(index.frames.begin(), index.frames.end(), [&](const recording_entry& frame) {
       return interpolate(truth, frame.timestamp, 0.2, max_distance).has_value();
