@@ -92,24 +92,36 @@ TEST_CASE("what is not in the store is not found") {
   CHECK(store.bytes_in_memory() == 0);
 }
 
-TEST_CASE("images that were packed on other threads are those that the store packs itself") {
-  depth_store direct, store;
-  std::vector<depth_store::packer> packers(4);
-  std::vector<depth_image> images;
-  for (std::uint32_t i = 0; i != 4; ++i) images.push_back(noise(i, 30 + static_cast<int>(i), 20));
-  CHECK(packers[0].bytes() == 0);
-  {
-    std::vector<std::jthread> threads;
-    for (std::size_t i = 0; i != 4; ++i) threads.emplace_back([&, i] { packers[i].pack(images[i]); });
+TEST_CASE("removed pixels are 0 until another call restores them") {
+  const scratch folder;
+  for (const std::size_t budget : {std::size_t{1} << 20U, std::size_t{0}}) {
+    depth_store store{{.memory_budget = budget, .spill_file = folder.spill()}};
+    const depth_image whole = noise(1), none(64, 48);
+    depth_image holes = whole, others = whole;
+    for (int y = 0; y != 48; ++y)
+      for (int x = 0; x != 64; ++x) (x % 7 < 3 || y == 20 ? holes : others)(x, y) = 0;
+    CHECK(store.mask(1, holes).error().where == "frame 1");
+    REQUIRE(store.put(1, whole));
+    REQUIRE(store.put(2, depth_image(0, 0)));
+    const std::size_t packed = store.bytes_in_memory() + store.bytes_spilled();
+    for (const depth_image& masked : {holes, none, others, whole, holes}) {
+      REQUIRE(store.mask(1, masked));
+      CHECK(get(store, 1) == masked);
+      depth_image again;
+      REQUIRE(store.get_whole(1, again));
+      CHECK(again == whole);
+    }
+    REQUIRE(store.mask(2, depth_image(0, 0)));
+    CHECK(get(store, 2) == depth_image(0, 0));
+    CHECK(store.bytes_in_memory() + store.bytes_spilled() > packed);
+    CHECK(store.bytes_in_memory() + store.bytes_spilled() < packed + 64 * 48 / 4);
+    REQUIRE(store.put(1, whole));  // a new image has all its pixels
+    CHECK(get(store, 1) == whole);
+    REQUIRE(store.mask(1, none));
+    store.erase(1);
+    store.erase(2);
+    CHECK(store.bytes_in_memory() + store.bytes_spilled() == 0);
   }
-  CHECK(packers[0].bytes() > 30 * 20);
-  packers.reserve(100);  // they may be moved
-  for (std::size_t i = 0; i != 4; ++i) {
-    REQUIRE(store.put(i, images[i], packers[i]));
-    REQUIRE(direct.put(i, images[i]));
-    CHECK(get(store, i) == images[i]);
-  }
-  CHECK(store.bytes_in_memory() == direct.bytes_in_memory());
 }
 
 TEST_CASE("a second image of a frame takes the place of the first") {

@@ -338,8 +338,9 @@ struct live_octree {
   result<void> scan(const Keyframe& k, const Depth& depth) {
     // Marked as filtered even before the cloud filter: pixels of moved objects may be missing, and processing may end
     // before the cloud filter's result.
+    const camera::depth_view<std::uint16_t> whole = k.depth;
     return ignore_write_failure(
-        live.add_keyframe(policy, k.frame, depth, poses.back().T_world_camera, completeness::filtered));
+        live.add_keyframe(policy, k.frame, depth, poses.back().T_world_camera, completeness::filtered, whole.pixels()));
   }
   result<typename Live::octree_type> unfiltered() {
     live.set_poses(poses, unlisted::hide);

@@ -20,12 +20,20 @@ namespace orbis::mapping {
 /// call it concurrently.
 ///
 /// `erase(frame)` removes the image, if it exists.
+///
+/// It may have a `mask(frame, pixels)` (`masks_depth`): `get` then returns `pixels`, which are those of the last `put`
+/// of this frame with 0 in pixels that a filter removed. Without it, `put` replaces the image.
 template <class S>
 concept depth_history = std::movable<S> &&
     requires(S& store, std::uint64_t frame, image_view<const std::uint16_t> pixels, image<std::uint16_t>& out) {
   { store.put(frame, pixels) } -> std::same_as<result<void>>;
   { store.get(frame, out) } -> std::same_as<result<void>>;
   store.erase(frame);
+};
+template <class S>
+concept masks_depth = depth_history<S> &&
+    requires(S& store, std::uint64_t frame, image_view<const std::uint16_t> pixels) {
+  { store.mask(frame, pixels) } -> std::same_as<result<void>>;
 };
 
 }  // namespace orbis::mapping

@@ -120,51 +120,42 @@ class live_map {
   /// Adds a keyframe, or replaces the depth image and pose of an existing one. `frame`: the index of its frame, which
   /// orders keyframes; `depth`: as integrated into the map, without the pixels that a filter removed; `T_world_camera`:
   /// if it is not finite, the keyframe waits outside the map for a pose. The newest keyframe is in the map immediately.
-  /// `what` is only stored, see is_filtered. Error: that of `Depths::put`; the keyframe is nevertheless in the map.
-  /// O(marking, see octree::scan_marker) and Depths::put. @pre depth has the camera's size
+  /// `what` is only stored, see is_filtered. `whole`: the stored values of `depth` with the pixels that a filter
+  /// removed, which may return with set_depth; empty: none was removed. Error: that of `Depths::put`; the keyframe is
+  /// nevertheless in the map. O(marking, see octree::scan_marker) and Depths::put. @pre the images have the camera's
+  /// size
   template <execution_policy Policy>
   result<octree::integration_summary> add_keyframe(const Policy& policy, std::uint64_t frame, const depth_view& depth,
                                                    const se3& T_world_camera,
-                                                   completeness what = completeness::complete) {
-    assert(depth.width() == camera_.width() && depth.height() == camera_.height());
-    std::erase_if(frames_, [&](const transient& t) { return t.frame == frame; });  // it becomes a keyframe
-    entry& k = make(frame);
-    if (k.used) drop_frames_of(frame);
-    k.filtered = what == completeness::filtered;
-    k.scale = depth.scale();
-    k.min_depth = depth.min_depth();
-    k.max_depth = depth.max_depth();
-    k.reach = std::min(detail::largest_depth(depth), options_.integration.max_range);
-    set_waiting(k, false);
-    k.wanted = if_finite(T_world_camera);
-    k.used = k.wanted;
-    octree::integration_summary summary;
-    if (k.used)
-      summary = history_.set(policy, frame, depth, camera_, *k.used, options_.integration);
-    else
-      history_.remove(frame);
-    if (auto kept = depths_.put(frame, depth.pixels()); !kept) return fail(std::move(kept.error()));
+                                                   completeness what = completeness::complete,
+                                                   image_view<const std::uint16_t> whole = {}) {
+    const auto summary = insert(policy, frame, depth, T_world_camera, what);
+    const bool is_masked = masks_depth<Depths> && !whole.empty();
+    auto kept = depths_.put(frame, is_masked ? whole : depth.pixels());
+    if (is_masked)
+      if (auto masked = mask(frame, depth.pixels()); kept) kept = std::move(masked);
+    if (!kept) return fail(std::move(kept.error()));
     return summary;
   }
-  /// Replaces the depth image of a keyframe: a later result of a filter, which sets the removed pixels to 0. The map
-  /// follows with `correct`. Errors: not_found; that of `Depths::put`.
-  /// @pre depth has the camera's size
+  /// Removes pixels from the depth image of a keyframe, in place of those removed before: a later result of a filter,
+  /// which sets the removed pixels to 0. The map follows with `correct`. Errors: not_found; that of `Depths::mask`, or
+  /// of `put` if it has none.
+  /// @pre depth has the camera's size; its other pixels are those of the keyframe's image, `whole` in add_keyframe
   template <execution_policy Policy>
   result<void> set_depth(const Policy& policy, std::uint64_t frame, const depth_view& depth) {
     const entry* const k = find(frame);
     if (k == nullptr) return fail(errc::not_found, "keyframe " + std::to_string(frame), "the map has no such keyframe");
     const se3 pose = k->wanted ? *k->wanted : se3{so3{}, filled<vec3>(std::numeric_limits<double>::quiet_NaN())};
-    if (auto added = add_keyframe(policy, frame, depth, pose, completeness::filtered); !added)
-      return fail(std::move(added.error()));
-    return {};
+    insert(policy, frame, depth, pose, completeness::filtered);
+    return mask(frame, depth.pixels());
   }
   /// Removes pixels from the depth images of several keyframes: `remove_pixels(i, depth, pixels)` sets the pixels to
   /// remove from the image of `frames[i]` to 0 in `pixels`, a copy of the stored values of `depth`; it is called on
   /// several threads. Keyframes are changed in groups of one per thread, or the whole group is unchanged if it throws.
   /// The map follows with `correct`. Stops when `on_progress`, which counts the keyframes, returns false. Errors:
   /// not_found, before anything is changed; that of `Depths::get`, whose keyframe is removed while the rest of its
-  /// group is unchanged; that of `Depths::put`, after all keyframes are processed; cancelled. For each keyframe
-  /// O(pixels), Depths::get and put, and marking. @pre no frame is listed twice
+  /// group is unchanged; that of set_depth, after all keyframes are processed; cancelled. For each keyframe O(pixels),
+  /// Depths::get and mask, and marking. @pre no frame is listed twice
   template <execution_policy Policy, class RemovePixels>
   result<void> edit_depths(const Policy& policy, std::span<const std::uint64_t> frames,
                            const RemovePixels& remove_pixels, progress on_progress = {}) {
@@ -182,7 +173,6 @@ class live_map {
         const entry& k = *find(group[i]);
         w.edited = w.depth;
         remove_pixels(next + i, view_of(k, w.depth), w.edited.view());
-        w.pack();
         if (k.wanted)
           w.marker.mark(how, history_.grid(), view_of(k, w.edited), camera_, *k.wanted, options_.integration, w.voxels);
       };
@@ -196,7 +186,7 @@ class live_map {
         set_waiting(k, false);
         k.used = k.wanted;
         if (k.used) history_.set(k.frame, w.voxels);
-        if (auto put = w.put(depths_, k.frame); !put) kept = std::move(put);
+        if (auto masked = mask(k.frame, w.edited.view()); !masked) kept = std::move(masked);
       }
       next += count;
       if (!on_progress(next, frames.size())) return fail(errc::cancelled, {}, "cancelled");
@@ -353,7 +343,6 @@ class live_map {
     for (const worker& w : workers_) {
       n += w.marker.bytes() + w.voxels.bytes();
       n += (w.depth.pixels().size() + w.edited.pixels().size()) * sizeof(std::uint16_t);
-      if constexpr (packs) n += w.packed.bytes();
     }
     return n;
   }
@@ -370,9 +359,6 @@ class live_map {
     bool filtered = false;
     std::uint64_t listed = 0;  ///< the last call of set_poses that listed it
   };
-  static constexpr bool packs = std::is_same_v<Depths, depth_store>;
-  struct no_packer {};
-  using packer = std::conditional_t<packs, depth_store::packer, no_packer>;
   struct transient {
     std::uint64_t frame, keyframe;
   };
@@ -386,20 +372,34 @@ class live_map {
     result<void> read;
     octree::scan_marker marker;
     octree::scan_voxels voxels;
-    packer packed;
-
-    /// Compresses the edited image, if that can run in parallel with other threads.
-    void pack() {
-      if constexpr (packs) packed.pack(edited.view());
-    }
-    result<void> put(Depths& depths, std::uint64_t frame) {
-      if constexpr (packs)
-        return depths.put(frame, edited.view(), packed);
-      else
-        return depths.put(frame, edited.view());
-    }
   };
 
+  /// Inserts an image into the map, but not into `depths_`.
+  template <class Policy>
+  octree::integration_summary insert(const Policy& policy, std::uint64_t frame, const depth_view& depth,
+                                     const se3& T_world_camera, completeness what) {
+    assert(depth.width() == camera_.width() && depth.height() == camera_.height());
+    std::erase_if(frames_, [&](const transient& t) { return t.frame == frame; });  // it becomes a keyframe
+    entry& k = make(frame);
+    if (k.used) drop_frames_of(frame);
+    k.filtered = what == completeness::filtered;
+    k.scale = depth.scale();
+    k.min_depth = depth.min_depth();
+    k.max_depth = depth.max_depth();
+    k.reach = std::min(detail::largest_depth(depth), options_.integration.max_range);
+    set_waiting(k, false);
+    k.wanted = if_finite(T_world_camera);
+    k.used = k.wanted;
+    if (k.used) return history_.set(policy, frame, depth, camera_, *k.used, options_.integration);
+    history_.remove(frame);
+    return {};
+  }
+  result<void> mask(std::uint64_t frame, image_view<const std::uint16_t> pixels) {
+    if constexpr (masks_depth<Depths>)
+      return depths_.mask(frame, pixels);
+    else
+      return depths_.put(frame, pixels);
+  }
   [[nodiscard]] static std::optional<se3> if_finite(const se3& T) {
     return all_finite(T.to_matrix()) ? std::optional{T} : std::nullopt;
   }

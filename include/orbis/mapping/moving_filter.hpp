@@ -71,7 +71,8 @@ class moving_filter {
       added = map.add_keyframe(policy, frame, depth, T_world_camera);
     } else {
       judge_.accept(now);
-      added = map.add_keyframe(policy, frame, judge_.masked(now), T_world_camera, completeness::filtered);
+      added =
+          map.add_keyframe(policy, frame, judge_.masked(now), T_world_camera, completeness::filtered, depth.pixels());
     }
     if (added && !settled) return fail(std::move(settled.error()));
     return added;

@@ -307,4 +307,42 @@ class depth_decoder {
   std::vector<std::uint16_t> above_, here_;  // ranks of two rows
 };
 
+/// The zeros of an image: lengths of alternating runs of other pixels and of zeros, row by row. O(pixels).
+[[nodiscard]] inline std::vector<std::byte> zeros_of(image_view<const std::uint16_t> image) {
+  std::vector<std::uint32_t> runs(1, 0);
+  bool is_zero = false;
+  for (int y = 0; y != image.height(); ++y)
+    for (const std::uint16_t v : image.row(y)) {
+      if ((v == 0) != is_zero) {
+        runs.push_back(0);
+        is_zero = !is_zero;
+      }
+      ++runs.back();
+    }
+  std::vector<std::byte> out(7 * runs.size() + 4);  // at most 48 bits each
+  group_writer to{out};
+  for (const std::uint32_t run : runs) to.put<step_bits>(run);
+  out.resize(static_cast<std::size_t>(to.finish() - out.data()));
+  out.shrink_to_fit();
+  return out;
+}
+/// Sets the pixels of an image of the same size to 0 that were 0 in the image of `zeros`. O(pixels).
+inline void set_zeros(std::span<const std::byte> zeros, image_view<std::uint16_t> image) {
+  if (zeros.empty()) return;
+  group_reader from{zeros};
+  std::uint32_t left = from.get<step_bits>();
+  bool is_zero = false;
+  for (int y = 0; y != image.height(); ++y)
+    for (std::span<std::uint16_t> rest = image.row(y); !rest.empty();) {
+      if (left == 0) {
+        left = from.get<step_bits>();
+        is_zero = !is_zero;
+      }
+      const std::size_t length = std::min<std::size_t>(left, rest.size());
+      if (is_zero) std::fill_n(rest.begin(), length, std::uint16_t{0});
+      rest = rest.subspan(length);
+      left -= static_cast<std::uint32_t>(length);
+    }
+}
+
 }  // namespace orbis::mapping::detail
