@@ -25,8 +25,7 @@ orbis::mapping::live_map_thread_options thread_options(const settings& s) {
 
 }  // namespace
 
-live_mapping::live_mapping(const frame_source& source, const settings& s, std::filesystem::path spill_file,
-                           find_poses where)
+live_mapping::live_mapping(const frame_source& source, const settings& s, keyframe_depths& depths, find_poses where)
     : where_{std::move(where)},
       depth_scale_{source.camera.depth_scale},
       waits_{s.threads == 1},
@@ -54,7 +53,7 @@ live_mapping::live_mapping(const frame_source& source, const settings& s, std::f
                    const std::lock_guard lock{results_mutex_};
                    results_.depth_error = e;
                  }},
-            orbis::mapping::depth_store{depth_options(s, std::move(spill_file))}} {}
+            live_depths{depths}} {}
 
 std::vector<live_mapping::made> live_mapping::inserted() const {
   const std::lock_guard lock{mutex_};

@@ -8,7 +8,6 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
-#include <filesystem>
 #include <functional>
 #include <mutex>
 #include <optional>
@@ -41,9 +40,9 @@ class live_mapping {
   /// map, and returns true. Returns false if nothing changed since the last call and `always` is false.
   using find_poses = std::function<bool(const std::vector<made>&, poses&, bool always)>;
 
-  /// `where` is called on the map's thread until `stop`. `spill_file`: for depth images beyond the memory budget, see
-  /// `depth_store_options`.
-  live_mapping(const frame_source& source, const settings& s, std::filesystem::path spill_file, find_poses where);
+  /// `where` is called on the map's thread until `stop`. `depths`: contains the depth images of keyframes before they
+  /// are added here; lives longer.
+  live_mapping(const frame_source& source, const settings& s, keyframe_depths& depths, find_poses where);
 
   /// Reports the number of the last tracked frame.
   void tracked(std::size_t frame) { newest_ = frame; }
@@ -91,7 +90,8 @@ class live_mapping {
   std::atomic<std::size_t> newest_{0};
   mutable std::mutex results_mutex_;
   live_results results_;  // written by the map's thread; guarded by results_mutex_ until `stop`
-  orbis::mapping::live_map_thread<live_octree::octree_type, orbis::camera::any_camera> live_;  // destroyed first
+  orbis::mapping::live_map_thread<live_octree::octree_type, orbis::camera::any_camera, live_depths>
+      live_;  // destroyed first
 };
 
 /// Warnings about the live map.

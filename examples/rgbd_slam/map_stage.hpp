@@ -10,6 +10,7 @@
 #include <orbis/mapping/live_map.hpp>
 
 #include "console.hpp"
+#include "keyframe_depths.hpp"
 #include "posed_frames.hpp"
 #include "results.hpp"
 #include "settings.hpp"
@@ -17,7 +18,7 @@
 namespace app {
 
 using built_map = orbis::mapping::built_map<orbis::octree::occupancy_octree<>>;
-using live_octree = orbis::mapping::live_map<orbis::octree::occupancy_octree<>, orbis::camera::any_camera>;
+using live_octree = orbis::mapping::live_map<orbis::octree::occupancy_octree<>, orbis::camera::any_camera, live_depths>;
 
 /// The selection of pixels that become points, and the density of the cloud.
 [[nodiscard]] orbis::mapping::dense_options dense_options(const frame_source& source, const settings& s);

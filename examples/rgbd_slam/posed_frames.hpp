@@ -20,9 +20,9 @@
 #include <orbis/slam/atlas.hpp>
 
 #include "background.hpp"
-#include "background_depth_store.hpp"
 #include "color_file.hpp"
 #include "corrected_frame.hpp"
+#include "keyframe_depths.hpp"
 #include "settings.hpp"
 #include "source.hpp"
 
@@ -36,13 +36,6 @@ inline constexpr int point_stride = 2;
 
 /// The maximum size of the colour file if colours can be read again.
 inline constexpr std::uint64_t most_color_bytes = std::uint64_t{256} << 20U;
-
-/// The options of a depth store of keyframes. Two stores share the memory budget: of the original images, and of the
-/// live map.
-[[nodiscard]] inline orbis::mapping::depth_store_options depth_options(const settings& s,
-                                                                       std::filesystem::path spill_file) {
-  return {.memory_budget = (s.depth_memory << 20U) / 2, .spill_file = std::move(spill_file)};
-}
 
 class posed_frames {
   struct unpacked {
@@ -59,7 +52,9 @@ class posed_frames {
       : source_{&source},
         shutter_{shutter},
         background_{s.threads != 1},
-        depths_{std::make_unique<background_depth_store>(depth_options(s, spill_file), background_)},
+        depths_{std::make_unique<keyframe_depths>(
+            orbis::mapping::depth_store_options{.memory_budget = s.depth_memory << 20U, .spill_file = spill_file},
+            background_)},
         colors_{spill_file.string() + ".colors", point_stride,
                 source.made ? std::numeric_limits<std::uint64_t>::max() : most_color_bytes} {}
 
@@ -158,10 +153,9 @@ class posed_frames {
   [[nodiscard]] iterator end() const { return {*this, size()}; }
 
   /// The error because of which depth images are in memory instead of the spill file; empty if there was none.
-  [[nodiscard]] const std::optional<orbis::error>& unspilled() const {
-    depths_->finish();
-    return depths_->unspilled();
-  }
+  [[nodiscard]] std::optional<orbis::error> unspilled() const { return depths_->unspilled(); }
+  /// The depth images; the live map shares them.
+  [[nodiscard]] keyframe_depths& depths() const { return *depths_; }
   /// The last error of reading an image, which then had no pixels; empty if there was none.
   [[nodiscard]] const std::optional<orbis::error>& read_error() const { return read_error_; }
 
@@ -196,7 +190,7 @@ class posed_frames {
   [[nodiscard]] std::shared_ptr<unpacked> read(std::size_t number) const {
     auto images = std::make_shared<unpacked>();
     const std::size_t index = entries_[number].index;
-    if (auto done = depths_->get(index, images->depth); !done) {
+    if (auto done = depths_->get_whole(index, images->depth); !done) {
       images->error = done.error();
       images->depth = orbis::image<std::uint16_t>(source_->camera.model.width(), source_->camera.model.height());
     }
@@ -220,7 +214,7 @@ class posed_frames {
   orbis::camera::shutter shutter_;
   bool background_;
   std::vector<entry> entries_;
-  std::unique_ptr<background_depth_store> depths_;
+  std::unique_ptr<keyframe_depths> depths_;
   color_file colors_;
   mutable std::optional<orbis::error> read_error_;
   mutable std::size_t ahead_number_ = 0;

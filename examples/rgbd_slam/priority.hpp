@@ -11,9 +11,8 @@
 
 namespace app {
 
-inline constexpr int live_map_niceness = 3;      ///< keyframes should be in the map soon
-inline constexpr int compression_niceness = 10;  ///< no thread waits for it
-inline constexpr int viewer_niceness = 10;       ///< may skip frames; takes no lock that tracking waits for
+inline constexpr int live_map_niceness = 3;  ///< keyframes should be in the map soon
+inline constexpr int viewer_niceness = 10;   ///< may skip frames; takes no lock that tracking waits for
 
 /// Reduces this thread's share of a busy processor by a fifth per step.
 inline void lower_priority([[maybe_unused]] int niceness) {

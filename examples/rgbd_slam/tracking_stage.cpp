@@ -277,7 +277,7 @@ orbis::result<tracked_frames> track(const frame_source& source, const shutter_re
                      .camera_doubt = {}};
   out.slam.sensor = source.sensor;
   if (s.live_map && !s.localize_only && !source.is_monocular())
-    out.live = std::make_unique<live_mapping>(source, s, spill_file.string() + ".live", poses_of(slam));
+    out.live = std::make_unique<live_mapping>(source, s, out.keyframes.depths(), poses_of(slam));
   const viewer::connection connection{viewer, sources_of(slam, out.live.get())};  // destroyed before its sources
   interrupts::keep_results(s.quiet
                                ? ""
@@ -347,7 +347,7 @@ std::vector<std::string> mapping_notes(const posed_frames& frames, const std::op
     notes.emplace_back(
         "the vertical is unknown: the first frame shows neither a floor nor two walls, and the camera is assumed to be "
         "level there (--gravity specifies it)");
-  if (const auto& e = frames.unspilled()) notes.push_back(e->to_string() + "; depth images are kept in memory instead");
+  if (const auto e = frames.unspilled()) notes.push_back(e->to_string() + "; depth images are kept in memory instead");
   return notes;
 }
 

@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// The depth images of the keyframes: compressed once, in the background, and shared by tracking, the live map and the
+/// final map.
+#pragma once
+
+#include <cstdint>
+#include <future>
+#include <mutex>
+#include <optional>
+#include <shared_mutex>
+#include <utility>
+
+#include <orbis/mapping/depth_store.hpp>
+
+#include "background.hpp"
+#include "priority.hpp"
+
+namespace app {
+
+/// A thread-safe depth_store.
+class keyframe_depths {
+ public:
+  /// Without `in_background` images are compressed in the caller's thread.
+  keyframe_depths(orbis::mapping::depth_store_options options, bool in_background)
+      : store_{std::move(options)}, background_{in_background} {}
+  keyframe_depths(const keyframe_depths&) = delete;
+  keyframe_depths& operator=(const keyframe_depths&) = delete;
+  ~keyframe_depths() { wait(); }
+
+  /// Copies the image; waits first if the previous one is not compressed yet, and rethrows an exception of its
+  /// compression. For one thread.
+  void put(std::uint64_t frame, const orbis::image<std::uint16_t>& depth) {
+    finish();
+    std::shared_future<void> ahead;
+    if (background_)
+      ahead = start_in_background([this, frame, copy = depth] {
+                lower_priority(live_map_niceness);
+                keep(frame, copy);
+              }).share();
+    if (!ahead.valid()) keep(frame, depth);
+    const std::lock_guard lock{ahead_mutex_};
+    ahead_ = std::move(ahead);
+  }
+  /// Waits for the last image. Rethrows an exception of its compression.
+  void finish() const {
+    if (const std::shared_future<void> last = ahead(); last.valid()) last.get();
+  }
+
+  /// See depth_store; these functions wait for the last image.
+  [[nodiscard]] orbis::result<void> get(std::uint64_t frame, orbis::image<std::uint16_t>& out) const {
+    wait();
+    const std::shared_lock lock{mutex_};
+    return store_.get(frame, out);
+  }
+  [[nodiscard]] orbis::result<void> get_whole(std::uint64_t frame, orbis::image<std::uint16_t>& out) const {
+    wait();
+    const std::shared_lock lock{mutex_};
+    return store_.get_whole(frame, out);
+  }
+  orbis::result<void> mask(std::uint64_t frame, orbis::image_view<const std::uint16_t> pixels) {
+    wait();
+    const std::lock_guard lock{mutex_};
+    return store_.mask(frame, pixels);
+  }
+  void erase(std::uint64_t frame) {
+    wait();
+    const std::lock_guard lock{mutex_};
+    store_.erase(frame);
+  }
+  void free_buffers() {
+    wait();
+    const std::lock_guard lock{mutex_};
+    store_.free_buffers();
+  }
+  /// The error because of which images are in memory instead of the spill file; empty if there was none.
+  [[nodiscard]] std::optional<orbis::error> unspilled() const {
+    wait();
+    const std::shared_lock lock{mutex_};
+    return unspilled_;
+  }
+
+ private:
+  [[nodiscard]] std::shared_future<void> ahead() const {
+    const std::lock_guard lock{ahead_mutex_};
+    return ahead_;
+  }
+  void wait() const {
+    if (const std::shared_future<void> last = ahead(); last.valid()) last.wait();
+  }
+  void keep(std::uint64_t frame, const orbis::image<std::uint16_t>& depth) {
+    const std::lock_guard lock{mutex_};
+    if (auto kept = store_.put(frame, depth); !kept) unspilled_ = kept.error();
+  }
+
+  mutable std::shared_mutex mutex_;  // guards the store
+  orbis::mapping::depth_store store_;
+  std::optional<orbis::error> unspilled_;
+  bool background_;
+  mutable std::mutex ahead_mutex_;
+  std::shared_future<void> ahead_;  // of the last image
+};
+
+/// The images as the live map has them: without the pixels that its filters removed. Models `mapping::masks_depth`.
+class live_depths {
+ public:
+  /// @pre `all` contains every image before it is put here, and lives longer
+  explicit live_depths(keyframe_depths& all) : all_{&all} {}
+  orbis::result<void> put(std::uint64_t frame, orbis::image_view<const std::uint16_t> pixels) {
+    return all_->mask(frame, pixels);
+  }
+  orbis::result<void> mask(std::uint64_t frame, orbis::image_view<const std::uint16_t> pixels) {
+    return all_->mask(frame, pixels);
+  }
+  [[nodiscard]] orbis::result<void> get(std::uint64_t frame, orbis::image<std::uint16_t>& out) const {
+    return all_->get(frame, out);
+  }
+  void erase(std::uint64_t) {}  // the final map may need it
+
+ private:
+  keyframe_depths* all_;
+};
+
+}  // namespace app
