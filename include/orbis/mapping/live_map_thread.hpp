@@ -163,6 +163,10 @@ class live_map_thread {
     }
     changed_.notify_all();
     if (thread_.joinable()) thread_.join();
+    moving_.reset();  // up to 24 images are no longer needed
+    const std::lock_guard lock{mutex_};
+    jobs_.clear();
+    spare_ = {};
     return map_;
   }
 
