@@ -88,7 +88,7 @@ result<built_map> map_frames(const posed_frames& frames, const frame_source& sou
   const auto policy = orbis::par.on(threads);
   const auto shown = console.progress();
   const auto progress = [&](std::size_t done, std::size_t total) {
-    if (done % frames.size() == 1) give_back_memory();  // of the previous pass over the frames
+    if (done % frames.size() == 0) give_back_memory();  // of a pass over the frames
     return shown(done, total);
   };
   give_back_memory();  // of tracking

@@ -231,7 +231,8 @@ template <class Octree, execution_policy Policy, keyframe_range Keyframes, camer
         ++map.skipped;
       }
       ++at;
-      if (!on_progress(++done, total)) return fail(errc::cancelled, {}, "cancelled");
+      if (++done != std::ranges::size(keyframes) && !on_progress(done, total))
+        return fail(errc::cancelled, {}, "cancelled");
     }
     window.finish();
     if (auto added = add_judged(); !added) return fail(std::move(added.error()));
@@ -246,6 +247,8 @@ template <class Octree, execution_policy Policy, keyframe_range Keyframes, camer
   map.cloud = dense.cloud(policy);
   std::vector<float> ranges = dense.ranges(policy);
   dense.finish();
+  // Only now, so that callers can return the memory of the pass to the system.
+  if (!on_progress(done, total)) return fail(errc::cancelled, {}, "cancelled");
   bool cancelled = false;
   const auto while_filtering = [&](std::size_t views_done, std::size_t) {
     cancelled = cancelled || !on_progress(done + views_done, total);
