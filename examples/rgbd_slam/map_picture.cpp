@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <numbers>
 
@@ -177,11 +179,35 @@ std::vector<vec3> framed(const std::vector<voxel>& voxels, const view_frame& fra
   return points;
 }
 
+/// The voxels with neighbours of the same size that are drawn as well: the faces between them are hidden.
+class drawn_voxels {
+ public:
+  drawn_voxels(const std::vector<voxel>& voxels, const view_frame& frame) {
+    for (const voxel& v : voxels)
+      if (is_shown(frame.T_view_world * v.center.cast<double>(), frame)) keys_.push_back(key(v));
+    std::sort(keys_.begin(), keys_.end());
+  }
+  [[nodiscard]] bool contain_neighbor(const voxel& v, int axis, int side) const {
+    auto wanted = key(v);
+    wanted[static_cast<std::size_t>(axis) + 1] += side;
+    return std::binary_search(keys_.begin(), keys_.end(), wanted);
+  }
+
+ private:
+  using key_type = std::array<long, 4>;  // bits of the size, and the index along each axis
+  static key_type key(const voxel& v) {
+    const auto index = [&](int axis) { return std::lround(v.center[axis] / v.size - 0.5F); };
+    return {std::bit_cast<std::int32_t>(v.size), index(0), index(1), index(2)};
+  }
+  std::vector<key_type> keys_;
+};
+
 orbis::image<rgb8> draw(const std::vector<voxel>& voxels, const view_frame& frame, coloring how, const eye& e,
                         int width, int height) {
   picture canvas{width * oversampling, height * oversampling};
   // Cubes are aligned with the world; the columns of the rotation are their axes in the view.
   const orbis::mat3 axes = frame.T_view_world.rotation_matrix();
+  const drawn_voxels drawn{voxels, frame};
   for (const voxel& v : voxels) {
     const vec3 center = frame.T_view_world * v.center.cast<double>();
     if (!is_shown(center, frame)) continue;
@@ -192,6 +218,7 @@ orbis::image<rgb8> draw(const std::vector<voxel>& voxels, const view_frame& fram
       const double side = half.dot(e.position - center) > 0 ? 1.0 : -1.0;  // only one of two opposite faces is visible
       const vec3 face = center + side * half;
       if ((e.position - face).dot(side * half) <= 0) continue;  // the camera is between the two
+      if (drawn.contain_neighbor(v, axis, side > 0 ? 1 : -1)) continue;
       const vec3 u = 0.5 * static_cast<double>(v.size) * axes.col((axis + 1) % 3);
       const vec3 w = 0.5 * static_cast<double>(v.size) * axes.col((axis + 2) % 3);
       const std::array<vec3, 4> corners{e.see(face + u + w), e.see(face + u - w), e.see(face - u - w),
