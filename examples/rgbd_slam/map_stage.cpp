@@ -32,6 +32,14 @@ std::string describe(const built_map& map) {
          std::string{to_string(map.filter.mode)} + ", octree of " + count_text(map.octree.num_leaves()) + " leaves";
 }
 
+/// The first part of the reason for the removed points.
+std::string describe(const orbis::mapping::moving_count& moving) {
+  if (moving.pixels == 0) return {};
+  return std::to_string(moving.pixels) + " pixels of " + std::to_string(moving.keyframes) +
+         (moving.keyframes == 1 ? " keyframe show" : " keyframes show") +
+         " moved objects (rays of other keyframes pass through them) and were removed; ";
+}
+
 /// Marks the voxels of the points as occupied.
 tree occupied_only(const std::vector<vec3f>& points, double resolution) {
   tree map{resolution};
@@ -150,7 +158,7 @@ result<map_results> write_map(built_map map, const settings& s, const std::files
   if (!done) return orbis::fail(done.error());
 
   m.filter_mode = to_string(map.filter.mode);
-  m.filter_reason = map.filter.reason;
+  m.filter_reason = describe(map.moving) + map.filter.reason;
   m.resolution = s.resolution;
   m.unfiltered = numbers_of(*map.unfiltered_octree, bt_bytes_unfiltered);
   m.filtered = numbers_of(map.octree, bt_bytes);

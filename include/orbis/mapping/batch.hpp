@@ -11,7 +11,6 @@
 #include <optional>
 #include <ranges>
 #include <span>
-#include <string>
 #include <utility>
 #include <vector>
 
@@ -84,16 +83,6 @@ struct built_map {
 };
 
 namespace detail {
-
-[[nodiscard]] inline double milliseconds_since(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
-}
-
-[[nodiscard]] inline std::string reason_of(const moving_count& moving) {
-  return std::to_string(moving.pixels) + " pixels of " + std::to_string(moving.keyframes) +
-         (moving.keyframes == 1 ? " keyframe show" : " keyframes show") +
-         " moved objects (rays of other keyframes pass through them) and were removed";
-}
 
 /// A keyframe's depth image without moved objects.
 template <camera::depth_source Depth>
@@ -262,7 +251,6 @@ template <class Octree, execution_policy Policy, keyframe_range Keyframes, camer
   std::vector<float>{}.swap(ranges);
   done += looks * std::ranges::size(keyframes);
   map.filter = std::move(filtered.report);
-  if (map.moving.pixels != 0) map.filter.reason = reason_of(map.moving) + "; " + map.filter.reason;
   map.inliers = std::move(filtered.inliers);
   std::vector<char> kept(map.cloud.size(), 0);
   for (const std::uint32_t i : map.inliers) kept[i] = 1;

@@ -44,6 +44,14 @@
 
 namespace orbis::mapping {
 
+namespace detail {
+
+[[nodiscard]] inline double milliseconds_since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+}
+
+}  // namespace detail
+
 struct live_map_options {
   double resolution = 0.05;                   ///< the edge of a voxel, metres; > 0
   octree::integration_options integration{};  ///< of every depth image

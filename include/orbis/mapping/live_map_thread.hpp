@@ -347,7 +347,7 @@ class live_map_thread {
         revise(std::chrono::nanoseconds::max());
         for (;;) {  // an error removes a keyframe
           const auto finished = map_.finish(policy_);
-          correction_.milliseconds += milliseconds_since(start);
+          correction_.milliseconds += detail::milliseconds_since(start);
           if (finished) {
             correction_.keyframes += finished->keyframes;
             correction_.bricks += finished->bricks;
@@ -359,7 +359,7 @@ class live_map_thread {
         correction_ = {};
         break;
     }
-    if (inserted) tell_insertion(j, waiting, milliseconds_since(start));
+    if (inserted) tell_insertion(j, waiting, detail::milliseconds_since(start));
   }
   /// Polls the current poses and passes them to the map. Returns the reply: empty if the poses have not changed.
   const keyframe_poses& poll(bool always = false) {
@@ -389,7 +389,7 @@ class live_map_thread {
   void correct(const std::optional<vec3>& robot) {
     const auto start = clock::now();
     const auto progress = map_.correct(policy_, {.time = options_.correction_slice, .robot = robot});
-    correction_.milliseconds += milliseconds_since(start);
+    correction_.milliseconds += detail::milliseconds_since(start);
     if (!progress) {  // the keyframe whose image is lost was removed
       report(progress.error());
       if (map_.pending() == 0) tell_correction();
@@ -414,7 +414,8 @@ class live_map_thread {
     }
     publish();
     if (listeners_.inserted)
-      listeners_.inserted({j.frame, j.kind == job::keyframe, milliseconds, milliseconds_since(j.since), waiting});
+      listeners_.inserted(
+          {j.frame, j.kind == job::keyframe, milliseconds, detail::milliseconds_since(j.since), waiting});
   }
   void tell_refusal(const job& j) {
     {
@@ -440,9 +441,6 @@ class live_map_thread {
   }
   void report(const error& e) const {
     if (listeners_.failed) listeners_.failed(e);
-  }
-  [[nodiscard]] static double milliseconds_since(clock::time_point start) {
-    return std::chrono::duration<double, std::milli>(clock::now() - start).count();
   }
 
   const live_map_thread_options options_;
