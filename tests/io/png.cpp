@@ -37,9 +37,10 @@ image<T> pattern(int width, int height) {
   return pixels;
 }
 
-/// A PNG of any kind by libpng itself; rows are bytes as PNG stores them.
-std::string encode(int width, int height, int bits, int type, int interlace,
-                   const std::vector<std::vector<png_byte>>& rows) {
+/// A PNG of any kind by libpng itself; rows are bytes as PNG stores them. `change` prepares the encoder.
+std::string encode(
+    int width, int height, int bits, int type, int interlace, const std::vector<std::vector<png_byte>>& rows,
+    void (*change)(png_structp) = [](png_structp) {}) {
   std::string bytes;
   png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, nullptr, nullptr);
   png_infop info = png_create_info_struct(png);
@@ -51,6 +52,7 @@ std::string encode(int width, int height, int bits, int type, int interlace,
       [](png_structp) {});
   png_set_IHDR(png, info, static_cast<png_uint_32>(width), static_cast<png_uint_32>(height), bits, type, interlace,
                PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
+  change(png);
   const png_color palette[] = {{1, 2, 3}, {40, 50, 60}, {255, 128, 0}, {9, 8, 7}};
   const png_byte alpha[] = {0, 128};
   if (type == PNG_COLOR_TYPE_PALETTE) {
@@ -112,6 +114,28 @@ TEST_CASE("an interlaced PNG has its pixels in place") {
   const auto read = io::decode_png_color(encode(11, 9, 8, PNG_COLOR_TYPE_GRAY, PNG_INTERLACE_ADAM7, rows)).value();
   for (int y = 0; y != 9; ++y)
     for (int x = 0; x != 11; ++x) CHECK(read(x, y).g == 13 * y + 3 * x);
+}
+
+TEST_CASE("depth images of every filter, split or interlaced, have their pixels in place") {
+  image<std::uint16_t> depth(33, 21);
+  orbis::random_bits random{5};
+  for (auto& d : depth.pixels()) d = static_cast<std::uint16_t>(random.below(3) == 0 ? 0 : 1000 + random.below(40000));
+  std::vector<std::vector<png_byte>> rows(21);
+  for (int y = 0; y != 21; ++y)
+    for (const std::uint16_t d : depth.view().row(y)) {
+      rows[static_cast<std::size_t>(y)].push_back(static_cast<png_byte>(d >> 8U));
+      rows[static_cast<std::size_t>(y)].push_back(static_cast<png_byte>(d));
+    }
+  const auto check = [&](int interlace, void (*change)(png_structp)) {
+    CHECK(io::decode_png_depth(encode(33, 21, 16, PNG_COLOR_TYPE_GRAY, interlace, rows, change)).value() == depth);
+  };
+  check(PNG_INTERLACE_NONE, [](png_structp png) { png_set_filter(png, 0, PNG_FILTER_NONE); });
+  check(PNG_INTERLACE_NONE, [](png_structp png) { png_set_filter(png, 0, PNG_FILTER_SUB); });
+  check(PNG_INTERLACE_NONE, [](png_structp png) { png_set_filter(png, 0, PNG_FILTER_UP); });
+  check(PNG_INTERLACE_NONE, [](png_structp png) { png_set_filter(png, 0, PNG_FILTER_AVG); });
+  check(PNG_INTERLACE_NONE, [](png_structp png) { png_set_filter(png, 0, PNG_FILTER_PAETH); });
+  check(PNG_INTERLACE_NONE, [](png_structp png) { png_set_compression_buffer_size(png, 100); });
+  check(PNG_INTERLACE_ADAM7, [](png_structp) {});
 }
 
 TEST_CASE("a depth image that is not 16-bit grey is refused in words") {

@@ -5,11 +5,13 @@
 
 #include <bit>
 #include <cstddef>
+#include <utility>
 
 #include <png.h>
 
 #include <orbis/core/inline.hpp>
 #include <orbis/io/detail/files/png_codec.hpp>
+#include <orbis/io/detail/files/png_depth.hpp>
 #include <orbis/io/png.hpp>
 
 namespace orbis::io {
@@ -30,6 +32,9 @@ ORBIS_INLINE result<image<rgb8>> decode_png_color(std::string_view bytes, const 
 }
 
 ORBIS_INLINE result<image<std::uint16_t>> decode_png_depth(std::string_view bytes, const std::string& where) {
+#ifdef ORBIS_LIBDEFLATE
+  if (auto plain = detail::decode_plain_depth(bytes)) return *std::move(plain);
+#endif
   detail::png_decoder decoder{bytes};
   if (!decoder.read_header()) return detail::damaged_png(where, decoder);
   if (!decoder.grey() || decoder.bits() != 16)
