@@ -127,6 +127,8 @@ void append_world_points(const Depth& depth, const pixel_rays& rays, const se3& 
       points.emplace_back(p[0], p[1], p[2]);
     }
 }
+/// The same; computes the camera's rays in every call, which takes longer than the points if it has a distortion. For
+/// several images, keep a pixel_rays.
 template <camera::depth_source Depth, camera::camera_model Camera>
 void append_world_points(const Depth& depth, const Camera& camera, const se3& T_world_camera,
                          std::vector<vec3f>& points) {
