@@ -9,9 +9,9 @@
 #ifdef ORBIS_LIBDEFLATE
 
 #include <bit>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <cstdlib>
 #include <memory>
 #include <optional>
 #include <string_view>
