@@ -59,6 +59,7 @@ void check_jacobian(const Camera& camera) {
     const vec3 p = 0.6 * test::random_point_in_view(random);
     pose_observation o{.point = vec3::Zero(), .pixel = vec2(100, 50)};
     if (trial % 2 == 0) o.right = 3.0;
+    if (trial % 4 == 0) o.depth_weight = 0.3;
     mat3 j;
     const auto r = model.residual(p, o, j);
     REQUIRE(r.has_value());

@@ -25,6 +25,7 @@ TEST_CASE("Observations stand in their lanes, whether they fit or come piece by 
     for (std::size_t i = 0; i != n; ++i) {
       seen[i] = {test::random_vector(random, 3.0), vec2(random.normal(), random.normal())};
       if (i % 2 == 0) seen[i].right = random.normal();
+      if (i % 4 == 0) seen[i].depth_weight = 0.5;
       if (i % 7 == 3) seen[i].point.y() = nan;
       outliers[i] = i % 3 == 1;
     }
@@ -42,7 +43,7 @@ TEST_CASE("Observations stand in their lanes, whether they fit or come piece by 
           if (!usable) continue;
           CHECK(lanes.y[i] == seen[first + i].point.y());
           CHECK(lanes.v[i] == seen[first + i].pixel.y());
-          CHECK(std::isnan(lanes.right[i]) == !seen[first + i].has_depth());
+          CHECK(lanes.depth_weight[i] == (seen[first + i].has_depth() ? seen[first + i].depth_weight : 0.0));
         }
         visited += count;
       });

@@ -27,6 +27,7 @@ void check_reprojection(const Camera& camera) {
     const vec3 point = pose * test::random_point_in_view(random);
     bundle_observation o{.pixel = vec2(random.uniform(0, 640), random.uniform(0, 480)), .information = 0.7};
     if (trial % 2 == 0) o.right = random.uniform(0, 640);
+    if (trial % 4 == 0) o.depth_weight = 0.3;
     test::check_jacobians(model, pose, point, o);
   }
   bundle_observation behind;

@@ -23,6 +23,7 @@ struct bundle_observation {
   vec2 pixel = zeros<vec2>();
   double right = std::numeric_limits<double>::quiet_NaN();  ///< as in `pose_observation`; NaN without depth
   double information = 1.0;                                 ///< 1 / sigma^2 of the pixel, 1 / pixel^2
+  double depth_weight = 1.0;                                ///< as in `pose_observation`
 };
 
 /// Manifold of the state of a camera: its type, and the effect of a step. `m.retract(p, d)` is the estimate after the

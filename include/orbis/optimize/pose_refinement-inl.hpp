@@ -69,7 +69,8 @@ class pose_pieces {
       lanes_.z[i] = o.point.z();
       lanes_.u[i] = o.pixel.x();
       lanes_.v[i] = o.pixel.y();
-      lanes_.right[i] = o.right;
+      lanes_.right[i] = o.has_depth() ? o.right : 0.0;
+      lanes_.depth_weight[i] = o.has_depth() ? o.depth_weight : 0.0;
       lanes_.information[i] = o.information;
       lanes_.active[i] = use && outliers_[first + i] == 0 ? o.information : 0.0;
     }

@@ -15,16 +15,16 @@ ORBIS_ALWAYS_INLINE auto reprojection<Camera>::lanes_in_camera(const view&, cons
                                                                L* r, L (*by_q)[3], L (*)[1]) const {
   camera::lane_projection<L> p;
   camera::lanes_of<Camera>::template project<Derive>(camera, q[0], q[1], q[2], p);
-  const L has_depth = L::load(measurements + 24), inverse_z = 1.0 / q[2];
+  const L depth_weight = L::load(measurements + 24), inverse_z = 1.0 / q[2];
   const L shift = bf * inverse_z;
   r[0] = p.u - L::load(measurements);
   r[1] = p.v - L::load(measurements + 8);
-  r[2] = has_depth * ((p.u - shift) - L::load(measurements + 16));
+  r[2] = depth_weight * ((p.u - shift) - L::load(measurements + 16));
   if constexpr (Derive) {
     for (int i = 0; i != 3; ++i) {
       by_q[0][i] = p.j[0][i];
       by_q[1][i] = p.j[1][i];
-      by_q[2][i] = has_depth * (i == 2 ? p.j[0][2] + shift * inverse_z : p.j[0][i]);
+      by_q[2][i] = depth_weight * (i == 2 ? p.j[0][2] + shift * inverse_z : p.j[0][i]);
     }
   }
   return p.valid;

@@ -23,6 +23,8 @@ struct pose_observation {
   /// The virtual right coordinate `u - bf / depth` of an RGB-D or stereo camera, pixels; NaN if the depth is unknown.
   double right = std::numeric_limits<double>::quiet_NaN();
   double information = 1.0;  ///< 1 / sigma^2 of the pixel, 1 / pixel^2
+  /// Factor of the third residual: sigma of the pixel over sigma of the right coordinate, finite and not negative.
+  double depth_weight = 1.0;
   [[nodiscard]] bool has_depth() const noexcept { return !std::isnan(right); }
 };
 
@@ -68,8 +70,8 @@ struct reprojection {
     set_block(j, 0, 0, projection);
     for (int i = 0; i != 3; ++i) j(2, i) = 0.0;
     if (o.has_depth()) {
-      for (int i = 0; i != 3; ++i) j(2, i) = projection(0, i);
-      j(2, 2) += bf / (point_camera.z() * point_camera.z());
+      for (int i = 0; i != 3; ++i) j(2, i) = o.depth_weight * projection(0, i);
+      j(2, 2) += o.depth_weight * bf / (point_camera.z() * point_camera.z());
     }
     return difference(*pixel, point_camera.z(), o);
   }
@@ -103,17 +105,18 @@ struct reprojection {
     to[0] = o.pixel.x();
     to[8] = o.pixel.y();
     to[16] = std::isnan(o.right) ? 0.0 : o.right;
-    to[24] = std::isnan(o.right) ? 0.0 : 1.0;
+    to[24] = std::isnan(o.right) ? 0.0 : o.depth_weight;
   }
   template <bool Derive, class L>
   auto lanes_in_camera(const view&, const double* measurements, const L* q, L* r, L (*by_q)[3], L (*)[1]) const;
 
  private:
   [[nodiscard]] static pose_observation as_pose_observation(const observation& o) {
-    return {zeros<vec3>(), o.pixel, o.right, o.information};
+    return {zeros<vec3>(), o.pixel, o.right, o.information, o.depth_weight};
   }
   [[nodiscard]] vec3 difference(const vec2& pixel, double z, const pose_observation& o) const {
-    return {pixel.x() - o.pixel.x(), pixel.y() - o.pixel.y(), o.has_depth() ? right(pixel.x(), z) - o.right : 0.0};
+    return {pixel.x() - o.pixel.x(), pixel.y() - o.pixel.y(),
+            o.has_depth() ? o.depth_weight * (right(pixel.x(), z) - o.right) : 0.0};
   }
 };
 

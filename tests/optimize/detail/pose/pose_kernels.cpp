@@ -35,7 +35,8 @@ std::vector<pose_observation> observe() {
   for (int i = 0; i != 40; ++i) {
     const vec3 p = test::random_point_in_view(random);
     const vec2 pixel = *pinhole_camera.project(p) + vec2(3.0 * random.normal(), 3.0 * random.normal());
-    seen.push_back({p, pixel, i % 3 == 0 ? none : pixel.x() - bf / p.z(), random.uniform(0.2, 1.0)});
+    seen.push_back(
+        {p, pixel, i % 3 == 0 ? none : pixel.x() - bf / p.z(), random.uniform(0.2, 1.0), random.uniform(0.2, 1.0)});
   }
   seen[11].point.z() = -2.0;
   return seen;
@@ -44,7 +45,9 @@ std::vector<pose_observation> observe() {
 void put(const std::vector<pose_observation>& seen, pose_lanes& lanes) {
   for (std::size_t i = 0; i != seen.size(); ++i) {
     lanes.x[i] = seen[i].point.x(), lanes.y[i] = seen[i].point.y(), lanes.z[i] = seen[i].point.z();
-    lanes.u[i] = seen[i].pixel.x(), lanes.v[i] = seen[i].pixel.y(), lanes.right[i] = seen[i].right;
+    lanes.u[i] = seen[i].pixel.x(), lanes.v[i] = seen[i].pixel.y(),
+    lanes.right[i] = seen[i].has_depth() ? seen[i].right : 0.0;
+    lanes.depth_weight[i] = seen[i].has_depth() ? seen[i].depth_weight : 0.0;
     lanes.information[i] = seen[i].information;
     lanes.active[i] = i == 5 ? 0.0 : seen[i].information;
   }

@@ -296,7 +296,7 @@ class shared_intrinsics {
                                std::size_t k) const {
     const bundle_observation& o = observations_[k];
     auto r = residual_.residual(views[o.pose], points[o.point], o);
-    if (r && !std::isnan(o.right)) (*r)[2] -= (*r)[0];  // the depth alone: bf times the difference of inverse depths
+    if (r && !std::isnan(o.right)) (*r)[2] -= o.depth_weight * (*r)[0];  // the depth alone: bf times the difference of inverse depths
     return r ? o.information * squared_norm(*r) : std::numeric_limits<double>::infinity();
   }
   [[nodiscard]] double cost_of(const estimate& e) const {
@@ -349,9 +349,10 @@ class shared_intrinsics {
       auto r = residual_.linearize_in_camera(view, q, o, by_q, by_all);
       if (!r) continue;
       if (!std::isnan(o.right)) {
-        (*r)[2] -= (*r)[0];
-        for (int i = 0; i != 3; ++i) by_q(2, i) -= by_q(0, i);
-        for (int i = 0; i != parameters::count; ++i) by_all(2, i) -= by_all(0, i);
+        const double w = o.depth_weight;
+        (*r)[2] -= w * (*r)[0];
+        for (int i = 0; i != 3; ++i) by_q(2, i) -= w * by_q(0, i);
+        for (int i = 0; i != parameters::count; ++i) by_all(2, i) -= w * by_all(0, i);
       }
       s.takes_part = true;
       s.row = row_of_[o.pose];

@@ -23,10 +23,11 @@ namespace orbis::optimize::detail {
 struct alignas(64) pose_lanes {
   static constexpr std::size_t capacity = 1024;
   using row = std::array<double, capacity>;
-  row x, y, z;      ///< the point
-  row u, v, right;  ///< its pixel; `right` is NaN where the depth is unknown
-  row information;  ///< 0 for unusable observations
-  row active;       ///< the information of the inliers, 0 for outliers
+  row x, y, z;       ///< the point
+  row u, v, right;   ///< its pixel
+  row depth_weight;  ///< 0 where the depth is unknown
+  row information;   ///< 0 for unusable observations
+  row active;        ///< the information of the inliers, 0 for outliers
 };
 
 /// The normal equations of a pose `T_camera_world` with steps on the left, `exp(xi) * T`.
@@ -55,7 +56,7 @@ struct pose_block {
   L r0, r1, r2;
   L chi2;
   camera::lane_projection<L> projection;
-  camera::mask_of<L> has_depth;
+  L depth_weight;
   L inverse_z;
 };
 
@@ -69,11 +70,10 @@ ORBIS_ALWAYS_INLINE void see(const pose_lanes& in, std::size_t i, const L& infor
   b.z = r(2, 0) * wx + r(2, 1) * wy + r(2, 2) * wz + at.translation.z();
   camera::lanes_of<Camera>::template project<Jacobian>(camera, b.x, b.y, b.z, b.projection);
   b.inverse_z = 1.0 / b.z;
-  const L right = L::load(&in.right[i]);
-  b.has_depth = right == right;
+  b.depth_weight = L::load(&in.depth_weight[i]);
   b.r0 = b.projection.u - L::load(&in.u[i]);
   b.r1 = b.projection.v - L::load(&in.v[i]);
-  b.r2 = select(b.has_depth, b.projection.u - at.bf * b.inverse_z - right, L(0.0));
+  b.r2 = b.depth_weight * (b.projection.u - at.bf * b.inverse_z - L::load(&in.right[i]));
   b.chi2 = information * (b.r0 * b.r0 + b.r1 * b.r1 + b.r2 * b.r2);
   b.projection.valid = b.projection.valid & (b.chi2 <= L(std::numeric_limits<double>::max()));
 }
@@ -104,8 +104,8 @@ ORBIS_ALWAYS_INLINE void sum_pose(const pose_lanes& in, std::size_t count, const
 
     // M = w J^T J and v = w J^T r for steps of the point; then applies the chain rule for a step of the pose.
     const auto& j = b.projection.j;
-    const L j20 = select(b.has_depth, j[0][0], L(0.0));
-    const L j22 = select(b.has_depth, j[0][2] + at.bf * b.inverse_z * b.inverse_z, L(0.0));
+    const L j20 = b.depth_weight * j[0][0];
+    const L j22 = b.depth_weight * (j[0][2] + at.bf * b.inverse_z * b.inverse_z);
     const L w00 = weight * j[0][0], w02 = weight * j[0][2], w11 = weight * j[1][1], w12 = weight * j[1][2];
     const L w20 = weight * j20, w22 = weight * j22;
     L m00 = w00 * j[0][0] + w20 * j20;
@@ -118,7 +118,7 @@ ORBIS_ALWAYS_INLINE void sum_pose(const pose_lanes& in, std::size_t count, const
     L v1 = w11 * b.r1;
     L v2 = w02 * b.r0 + w12 * b.r1 + w22 * b.r2;
     if constexpr (!aligned) {
-      const L j21 = select(b.has_depth, j[0][1], L(0.0));
+      const L j21 = b.depth_weight * j[0][1];
       const L w01 = weight * j[0][1], w10 = weight * j[1][0], w21 = weight * j21;
       m00 = m00 + w10 * j[1][0];
       m01 = w00 * j[0][1] + w10 * j[1][1] + w20 * j21;
