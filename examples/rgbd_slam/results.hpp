@@ -92,6 +92,7 @@ struct intrinsics_results {
 };
 
 struct slam_results {
+  double exposure = 0.0;  ///< of the colour images, estimated from their motion blur, seconds; 0: no blur
   orbis::slam::sensor_kind sensor = orbis::slam::sensor_kind::rgbd;
   std::size_t keyframes_made = 0;
   /// The unit of lengths, for display.

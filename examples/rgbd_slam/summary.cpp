@@ -78,7 +78,8 @@ std::string summary_json(const results& r) {
                   {"read_out_deviation_ms", s ? milliseconds(s->shutter.read_out_deviation) : null},
                   {"depth_read_out_ms", s ? milliseconds(s->shutter.shutter.depth_read_out) : null},
                   {"depth_delay_ms", s ? milliseconds(s->shutter.shutter.depth_delay) : null},
-                  {"depth_delay_deviation_ms", s ? milliseconds(s->shutter.delay_deviation) : null}};
+                  {"depth_delay_deviation_ms", s ? milliseconds(s->shutter.delay_deviation) : null},
+                  {"exposure_ms", s ? milliseconds(s->exposure) : null}};
   j["intrinsics"] = {{"from", s ? json(s->intrinsics.from) : null},
                      {"fx", s ? json(s->intrinsics.fx) : null},
                      {"fy", s ? json(s->intrinsics.fy) : null},

@@ -300,6 +300,7 @@ orbis::result<tracked_frames> track(const frame_source& source, const shutter_re
 
   collect(slam, out);
   out.slam.shutter = shutter;
+  out.slam.exposure = slam.exposure();
   const auto& k = source.camera.model.k();
   out.slam.intrinsics = {source.camera_is_refined ? "refined" : "given", k.fx, k.fy, k.cx, k.cy};
   if (source.sensor == orbis::slam::sensor_kind::rgbd && s.load_map.empty())

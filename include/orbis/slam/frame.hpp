@@ -47,7 +47,10 @@ struct basic_frame {
   std::size_t index = 0;   ///< index in the recording, from 0
   se3 T_world_camera;      ///< in the world of the frame's map
   orbis::features::basic_features<D> features;
-  std::vector<float> depth;                   ///< metres along z; 0 if not measured
+  std::vector<float> depth;  ///< metres along z; 0 if not measured
+  /// Standard deviation of the position of each keypoint, pixels of its pyramid level; empty: 1. Not stored in map
+  /// files.
+  std::vector<float> deviations;
   std::vector<vec3> rays;                     ///< through each keypoint, scaled to z = 1; NaN if the pixel has no ray
   std::vector<landmark_id> landmarks;         ///< observed by each keypoint, or `no_id`
   orbis::features::keypoint_grid grid;        ///< of the keypoints
@@ -68,6 +71,10 @@ struct basic_frame {
   [[nodiscard]] vec3 point_camera(std::size_t i) const { return static_cast<double>(depth[i]) * rays[i]; }
   /// Like `point_camera`, in the world frame. @pre has_depth(i)
   [[nodiscard]] vec3 point_world(std::size_t i) const { return T_world_camera * point_camera(i); }
+  /// Returns the deviation of keypoint `i`, pixels of its pyramid level.
+  [[nodiscard]] double deviation(std::size_t i) const {
+    return deviations.empty() ? 1.0 : static_cast<double>(deviations[i]);
+  }
   [[nodiscard]] vec2 pixel(std::size_t i) const { return {features.keypoints[i].x, features.keypoints[i].y}; }
 };
 

@@ -11,6 +11,7 @@
 #include <orbis/features/descriptor.hpp>
 #include <orbis/slam/extractor.hpp>
 #include <orbis/slam/ids.hpp>
+#include <orbis/slam/landmark_patch.hpp>
 
 namespace orbis::slam {
 
@@ -32,6 +33,7 @@ struct basic_landmark {
   double max_distance = 0.0;              ///< distance at which it appears at the finest pyramid level, metres
   std::vector<observation> observations;  ///< by ascending keyframe; at most one per keyframe
   keyframe_id created;                    ///< the keyframe that created it
+  landmark_patch patch;                   ///< not stored in map files
   std::uint32_t visible = 0;              ///< number of frames in which it was expected
   std::uint32_t found = 0;                ///< number of frames in which it was found
   bool has_current_descriptor = false;    ///< true if `descriptor` was chosen from the current observations

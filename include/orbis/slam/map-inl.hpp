@@ -197,10 +197,14 @@ bool basic_map<D>::erase_observation(landmark_id l, const observation& noted) {
 template <feature_descriptor D>
 void basic_map<D>::fuse(landmark_id from, landmark_id into) {
   assert(from != into && has_landmark(into));
-  const landmark_type l = remove(from, into);
-  for (const observation& o : l.observations) add_observation(into, o.keyframe, o.feature);
-  content_.landmarks[into].found += l.found;
-  content_.landmarks[into].visible += l.visible;
+  landmark_type l = remove(from, into);
+  for (const observation& o : l.observations)
+    if (add_observation(into, o.keyframe, o.feature))  // measured with the other patch
+      set_deviation(o.keyframe, o.feature, l.patch.corner_deviation);
+  landmark_type& by = content_.landmarks[into];
+  if (by.patch.pixels == nullptr) by.patch = std::move(l.patch);
+  by.found += l.found;
+  by.visible += l.visible;
 }
 
 template <feature_descriptor D>

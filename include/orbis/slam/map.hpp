@@ -125,6 +125,14 @@ class basic_map {
   }
   /// @pre has_landmark(id)
   void set_position(landmark_id id, const vec3& position) { content_.landmarks[id].position = position; }
+  /// @pre has_landmark(id)
+  void set_patch(landmark_id id, landmark_patch patch) { content_.landmarks[id].patch = std::move(patch); }
+  /// Sets the deviation of a keypoint (`basic_frame::deviations`). @pre has_keyframe(id)
+  void set_deviation(keyframe_id id, std::uint32_t feature, double deviation) {
+    auto& of_keyframe = content_.keyframes[id].deviations;
+    of_keyframe.resize(at(id).size(), 1.0F);
+    of_keyframe[feature] = static_cast<float>(deviation);
+  }
   /// Moves a keyframe by `T_new_old`, a motion in the world, whose scale enters `scale_of`. @pre has_keyframe(id)
   void move_keyframe(keyframe_id id, const sim3& T_new_old) {
     set_pose(id, moved(T_new_old, at(id).T_world_camera));
@@ -135,6 +143,7 @@ class basic_map {
     landmark_type& l = content_.landmarks[id];
     l.position = T_new_old * l.position;
     l.normal = T_new_old.rotation() * l.normal;
+    l.patch.move(T_new_old);
     l.min_distance *= T_new_old.scale();
     l.max_distance *= T_new_old.scale();
   }

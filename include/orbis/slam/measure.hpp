@@ -81,20 +81,50 @@ template <feature_descriptor D>
   return points < settings.min_start_points ? 0 : points;
 }
 
+/// Working memory for the grey image of a frame and its pyramid.
+struct image_memory {
+  image<std::uint8_t> grey{};
+  features::image_pyramid pyramid{};  ///< of the last image; empty if the extractor makes none
+
+  /// Extracts the features of a colour image.
+  template <feature_extractor Extractor>
+  [[nodiscard]] auto extract_with(const Extractor& extract, image_view<const rgb8> color) {
+    if constexpr (features::pyramid_extractor<Extractor>) {
+      if (grey.width() != color.width() || grey.height() != color.height())
+        grey = image<std::uint8_t>(color.width(), color.height());
+      features::luma(color, grey.view());
+      decltype(extract(color)) found;
+      extract.into(found, pyramid, std::as_const(grey).view());
+      return found;
+    } else {
+      return extract(color);
+    }
+  }
+};
+
 /// Extracts the features of a colour image and reads their depth from the registered depth image. Depth outside the
 /// rig's range is not used. @pre all images have the size of the camera
 template <camera::camera_model Camera, feature_extractor Extractor, camera::depth_source Depth>
 [[nodiscard]] basic_frame<descriptor_of_t<Extractor>> measure_rgbd(const camera_rig<Camera>& rig,
                                                                    const Extractor& extract,
-                                                                   image_view<const rgb8> color, const Depth& depth) {
+                                                                   image_view<const rgb8> color, const Depth& depth,
+                                                                   image_memory& memory) {
   const auto usable = [&](double z) { return z >= rig.min_depth && z <= rig.max_depth; };
-  auto f = detail::frame_of(rig, extract(color), sensor_kind::rgbd);
+  auto f = detail::frame_of(rig, memory.extract_with(extract, color), sensor_kind::rgbd);
   for (std::size_t i = 0; i < f.size(); ++i) {
     const auto& k = f.features.keypoints[i];
     const auto z = std::isnan(f.rays[i].x()) ? std::nullopt : features::depth_at(depth, k.x, k.y);
     f.depth[i] = z && usable(z->z) ? static_cast<float>(z->z) : 0.0F;
   }
   return f;
+}
+/// As above.
+template <camera::camera_model Camera, feature_extractor Extractor, camera::depth_source Depth>
+[[nodiscard]] basic_frame<descriptor_of_t<Extractor>> measure_rgbd(const camera_rig<Camera>& rig,
+                                                                   const Extractor& extract,
+                                                                   image_view<const rgb8> color, const Depth& depth) {
+  image_memory memory;
+  return measure_rgbd(rig, extract, color, depth, memory);
 }
 
 /// Sets `depth` of `f.as_read` to the depth at the time of each keypoint's row of the colour image: reads the depth

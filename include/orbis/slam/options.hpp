@@ -66,6 +66,15 @@ struct depth_term_options {
   std::size_t min_inliers = 5;   ///< minimum number of landmarks per direction of the pose that surfaces leave free
 };
 
+/// Measurement of landmarks in the image by patches.
+struct patch_options {
+  bool enabled = true;  ///< off: the positions of landmarks are those of the keypoints
+  /// Exposure time of the colour image, during which it blurs if the camera moves, seconds; 0: no blur. Empty:
+  /// estimated.
+  std::optional<double> exposure{};
+  double min_correlation = 0.8;  ///< minimum normalised correlation of a patch with the image
+};
+
 /// Recovery from lost tracking.
 struct recovery_options {
   std::size_t candidates = 8;         ///< maximum number of keyframes tried for relocalisation
@@ -231,6 +240,7 @@ struct options {
   bool scale_is_measured = true;
   start_options start{};
   depth_term_options depth_term{};
+  patch_options patches{};
   place_options places{};
   triangulation_options triangulation{};
   fusion_options fusion{};

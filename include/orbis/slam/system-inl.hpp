@@ -65,9 +65,15 @@ template <camera::depth_source Depth>
 track_result ORBIS_SLAM_SYSTEM::track(double timestamp, image_view<const rgb8> color, const Depth& depth) {
   detail::stopwatch clock;
   front_end_->depth().clear_depth();
+  front_end_->patches().set_image({});
   if (!are_usable(timestamp, color, depth)) return track_frame(timestamp, {}, {}, clock);
-  frame_type f = measure_rgbd(shared_.rig, extract_, color, depth);
+  frame_type f = measure_rgbd(shared_.rig, extract_, color, depth, image_);
   front_end_->depth().set_depth(depth);
+  front_end_->patches().set_image(
+      {&image_.pyramid, [&](const vec2& pixel) {
+         const auto at = features::depth_at(depth, static_cast<float>(pixel.x()), static_cast<float>(pixel.y()));
+         return at && at->z >= shared_.rig.min_depth && at->z <= shared_.rig.max_depth ? at->z : 0.0;
+       }});
   return track_frame(
       timestamp, std::move(f),
       [&](frame_type& seen, const frame_motion& m) { follow_rows(shared_.rig, m, seen, depth); }, clock);
@@ -80,6 +86,7 @@ const Measure&, const camera_rig<Camera>&,
     const Extractor& > track_result ORBIS_SLAM_SYSTEM::track_measured(double timestamp, const Measure& measure) {
   detail::stopwatch clock;
   front_end_->depth().clear_depth();
+  front_end_->patches().set_image({});
   return track_frame(timestamp, std::isfinite(timestamp) ? measure(shared_.rig, extract_) : frame_type{}, {}, clock);
 }
 
@@ -235,6 +242,9 @@ orbis::trajectory ORBIS_SLAM_SYSTEM::keyframe_trajectory() const {
 
 ORBIS_SLAM_SYSTEM_TEMPLATE
 std::optional<shutter_estimate> ORBIS_SLAM_SYSTEM::estimated_shutter() const { return front_end_->estimated_shutter(); }
+
+ORBIS_SLAM_SYSTEM_TEMPLATE
+double ORBIS_SLAM_SYSTEM::exposure() const { return front_end_->patches().exposure(); }
 
 ORBIS_SLAM_SYSTEM_TEMPLATE
 std::size_t ORBIS_SLAM_SYSTEM::landmark_count() const {

@@ -158,6 +158,9 @@ class system {
   [[nodiscard]] orbis::trajectory keyframe_trajectory() const;
   /// Returns the estimated shutter; empty without `options::estimates_shutter`. For the tracking thread only.
   [[nodiscard]] std::optional<shutter_estimate> estimated_shutter() const;
+  /// The exposure time of the images, seconds: `patch_options::exposure`, or the estimate from their motion blur, which
+  /// is 0 unless blur is visible. For the tracking thread.
+  [[nodiscard]] double exposure() const;
   /// The number of landmarks of the active map.
   [[nodiscard]] std::size_t landmark_count() const;
   [[nodiscard]] track_counters counters() const;
@@ -214,6 +217,7 @@ class system {
   options options_;
   Extractor extract_;
   stereo_memory stereo_;
+  image_memory image_;
   detail::shared_state<Camera, descriptor_type, Places> shared_;
   std::unique_ptr<front_end> front_end_;
   track_state reported_state_ = track_state::not_started;

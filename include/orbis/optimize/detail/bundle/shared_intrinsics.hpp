@@ -296,7 +296,8 @@ class shared_intrinsics {
                                std::size_t k) const {
     const bundle_observation& o = observations_[k];
     auto r = residual_.residual(views[o.pose], points[o.point], o);
-    if (r && !std::isnan(o.right)) (*r)[2] -= o.depth_weight * (*r)[0];  // the depth alone: bf times the difference of inverse depths
+    if (r && !std::isnan(o.right))
+      (*r)[2] -= o.depth_weight * (*r)[0];  // the depth alone: bf times the difference of inverse depths
     return r ? o.information * squared_norm(*r) : std::numeric_limits<double>::infinity();
   }
   [[nodiscard]] double cost_of(const estimate& e) const {

@@ -3,6 +3,7 @@
 /// The observation of a point by a keypoint, and the test for their agreement.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 
 #include <orbis/camera/model.hpp>
@@ -15,7 +16,8 @@
 
 namespace orbis::slam::detail {
 
-/// Returns the observation of `point` (world, metres) by keypoint `i` of a frame.
+/// Returns the observation of `point` (world, metres), which may be any point, by keypoint `i` of a frame: the
+/// deviation of the keypoint is a pixel of its level.
 template <camera::camera_model Camera, feature_descriptor D>
 [[nodiscard]] optimize::pose_observation observation_of(const camera_rig<Camera>& rig, const basic_frame<D>& f,
                                                         std::size_t i, const vec3& point) {
@@ -24,6 +26,23 @@ template <camera::camera_model Camera, feature_descriptor D>
   o.pixel = f.pixel(i);
   if (f.has_depth(i)) o.right = rig.model.right(o.pixel.x(), static_cast<double>(f.depth[i]));
   o.information = rig.scales.information(f.features.keypoints[i].octave);
+  return o;
+}
+
+/// Sets the weights of an observation of the landmark whose patch determined the position of the keypoint. `deviation`:
+/// of the keypoint, pixels of its level (`basic_frame::deviation`). The deviation of the depth remains the same, except
+/// that the third residual contains that of the pixel.
+inline void set_deviation(optimize::pose_observation& o, double deviation) {
+  o.information /= deviation * deviation;
+  o.depth_weight = std::min(1.0, deviation);
+}
+
+/// Returns the observation of the landmark of keypoint `i`, at `position` (world, metres).
+template <camera::camera_model Camera, feature_descriptor D>
+[[nodiscard]] optimize::pose_observation landmark_observation(const camera_rig<Camera>& rig, const basic_frame<D>& f,
+                                                              std::size_t i, const vec3& position) {
+  optimize::pose_observation o = observation_of(rig, f, i, position);
+  set_deviation(o, f.deviation(i));
   return o;
 }
 

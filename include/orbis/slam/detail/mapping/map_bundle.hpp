@@ -65,8 +65,8 @@ struct bundle_snapshot {
     for (const observation& seen : l.observations) {
       const std::uint32_t pose = index_of(seen.keyframe);
       if (pose == no_id) continue;
-      const auto at = observation_of<Camera, D>(rig, m.at(seen.keyframe), seen.feature, l.position);
-      observations.push_back({pose, point, at.pixel, at.right, at.information});
+      const auto at = landmark_observation<Camera, D>(rig, m.at(seen.keyframe), seen.feature, l.position);
+      observations.push_back({pose, point, at.pixel, at.right, at.information, at.depth_weight});
       sources.push_back(seen);
     }
   }

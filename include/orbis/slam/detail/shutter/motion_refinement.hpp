@@ -92,6 +92,7 @@ void find_row_observations(const basic_frame<D>& f, const basic_map<D>& m, const
     o.seen.pixel = {static_cast<double>(read.x), static_cast<double>(read.y)};
     if (read.depth > 0.0F) o.seen.right = rig.model.right(o.seen.pixel.x(), static_cast<double>(read.depth));
     o.seen.information = rig.scales.information(f.features.keypoints[i].octave);
+    set_deviation(o.seen, f.deviation(i));
     o.time = shutter.color_time(o.seen.pixel.y(), rig.camera().height());
   }
 }
@@ -102,7 +103,8 @@ void find_observations(const basic_frame<D>& f, const basic_map<D>& m, const cam
                        std::vector<row_observation>& to) {
   to.clear();
   for (std::size_t i = 0; i != f.size(); ++i)
-    if (f.landmarks[i] != no_id) to.push_back({observation_of(rig, f, i, m.landmark_at(f.landmarks[i]).position)});
+    if (f.landmarks[i] != no_id)
+      to.push_back({landmark_observation(rig, f, i, m.landmark_at(f.landmarks[i]).position)});
 }
 
 /// Width of Huber's loss of these residuals, standard deviations: as in the refinement of the pose alone.

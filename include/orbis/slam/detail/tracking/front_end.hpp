@@ -26,6 +26,7 @@
 #include <orbis/slam/detail/tracking/keyframe_decision.hpp>
 #include <orbis/slam/detail/tracking/monocular_start.hpp>
 #include <orbis/slam/detail/tracking/motion_model.hpp>
+#include <orbis/slam/detail/tracking/patch_tracker.hpp>
 #include <orbis/slam/detail/tracking/tracker.hpp>
 #include <orbis/slam/ids.hpp>
 #include <orbis/slam/matchers.hpp>
@@ -59,6 +60,7 @@ class front_end {
       : tracker_{rig, settings},
         moving_{rig, settings},
         depth_{rig, settings.depth_term},
+        patches_{rig, settings.patches},
         start_{rig, settings.start, settings.seed},
         rig_{rig},
         options_{settings},
@@ -78,6 +80,9 @@ class front_end {
 
   /// The depth tracker. Pass it the depth image of the next frame before the frame is localised.
   [[nodiscard]] depth_tracker<Camera>& depth() noexcept { return depth_; }
+
+  /// The patch tracker. Pass it the image of the next frame before the frame is localised.
+  [[nodiscard]] patch_tracker<Camera, D>& patches() noexcept { return patches_; }
 
   [[nodiscard]] track_state state() const noexcept { return state_; }
   [[nodiscard]] bool is_tracking() const noexcept {
@@ -194,6 +199,7 @@ class front_end {
     basic_map<D>& m = maps.active();
     first_new_ = m.landmark_end();
     const keyframe_id id = insert_keyframe(m, f, options_);
+    if (patches_.is_ready()) patches_.add_patches(m, id, f, twist_of(f));
     for (const start_point& p : std::exchange(start_points_, {})) {
       const landmark_id l = m.add_landmark(id, p.second, p.position);
       m.add_observation(l, first_keyframe_->keyframe, p.first);
@@ -215,6 +221,7 @@ class front_end {
     if (!is_tracking()) return;
     if (last_.index + 1 == f.index && state_ == track_state::tracking && last_.size() != 0)
       motion_.set({last_.timestamp, last_.T_world_camera}, {f.timestamp, f.T_world_camera});
+    last_mean_twist_ = motion_between(last_, f);
     last_reference_ = reference_;
     start_.reset();
     const basic_keyframe<D>& reference = maps.active().at(reference_.keyframe);
@@ -340,9 +347,21 @@ class front_end {
     return tracker_.by_turning(f, maps.active(), last_) == 0 ? 0 : track_found(f, maps, is_frozen, follow_rows);
   }
   std::size_t track_local_map(frame_type& f, basic_map<D>& m, double radius, bool is_frozen) {
-    return tracker_.on_local_map(
+    const std::size_t inliers = tracker_.on_local_map(
         f, m, reference_.keyframe, radius, moving_, [&](landmark_id l) { is_frozen ? void() : m.count_visible(l); },
         [&](landmark_id l) { is_frozen ? void() : m.count_found(l); });
+    if (inliers == 0 || !patches_.is_ready()) return inliers;
+    patches_.align(f, m, twist_of(f));
+    const std::size_t left = refine_on_landmarks(f, m, rig_);
+    if (left != 0) patches_.update_deviation(f, m);
+    return left;
+  }
+  /// The motion of a frame, per second: that since the last frame, extrapolated by half of its change (see
+  /// `twist_prior`); zero if the last frame is not the one before.
+  [[nodiscard]] vec6 twist_of(const frame_type& f) const {
+    if (last_.size() == 0 || last_.index + 1 != f.index) return zeros<vec6>();
+    const vec6 mean = motion_between(last_, f);
+    return motion_.is_known() ? vec6(mean + 0.5 * (mean - last_mean_twist_)) : mean;
   }
 
   /// Removes the landmarks of a frame that disagree with its pose. Returns the number left.
@@ -487,6 +506,7 @@ class front_end {
   tracker<Camera, D, Matchers> tracker_;
   moving_features<Camera, D, Matchers> moving_;
   depth_tracker<Camera> depth_;
+  patch_tracker<Camera, D> patches_;
   monocular_start<Camera, D> start_;  ///< for maps without a known scale
   const camera_rig<Camera>& rig_;
   const options& options_;
@@ -495,6 +515,8 @@ class front_end {
   std::vector<row_observation> rows_;  ///< reused working memory
   early_depth_twist early_depth_;
   frame_type before_recheck_;  ///< reused working memory
+
+  vec6 last_mean_twist_ = zeros<vec6>();  ///< between the last two frames
 
   double held_since_ = 0.0;  ///< time of the last tracked frame whose pose was not determined by depth alone, seconds
 

@@ -50,6 +50,36 @@ std::size_t refine_on_matches(basic_frame<D>& f, const search_list<D>& list, std
   return refined.inliers;
 }
 
+/// Refines the pose of `f` on its landmarks, of which it keeps those that agree with the result. Returns their number;
+/// 0 if the pose cannot be determined.
+template <feature_descriptor D, camera::camera_model Camera>
+std::size_t refine_on_landmarks(basic_frame<D>& f, const basic_map<D>& m, const camera_rig<Camera>& rig) {
+  std::vector<optimize::pose_observation> observations;
+  std::vector<std::size_t> keypoints;
+  for (std::size_t i = 0; i != f.size(); ++i) {
+    if (f.landmarks[i] == no_id) continue;
+    observations.push_back(landmark_observation(rig, f, i, m.landmark_at(f.landmarks[i]).position));
+    keypoints.push_back(i);
+  }
+  std::vector<std::uint8_t> outliers(keypoints.size());
+  const auto refined = optimize::refine_pose(std::span<const optimize::pose_observation>(observations), rig.model,
+                                             f.T_world_camera, std::span<std::uint8_t>(outliers));
+  if (!refined.ok()) return 0;
+  f.T_world_camera = refined.T_world_camera;
+  const se3 T_camera_world = f.T_world_camera.inverse();
+  std::size_t kept = refined.inliers;
+  for (std::size_t k = 0; k != keypoints.size(); ++k) {
+    if (outliers[k] == 0) continue;
+    const std::size_t i = keypoints[k];
+    f.deviations[i] = std::max(1.0F, f.deviations[i]);
+    if (agrees(rig, f, T_camera_world, i, observations[k].point))
+      ++kept;
+    else
+      f.landmarks[i] = no_id;
+  }
+  return kept;
+}
+
 /// Estimates poses of frames in a map. Each function sets the pose of the frame and the landmarks that agree with it,
 /// and returns the number of matches that agree, 0 if the pose cannot be determined. The map is not changed.
 ///

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Estimation of the exposure time from the motion blur of patches.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+
+namespace orbis::slam::detail {
+
+/// Compares exposure times by the correlation of patches that are blurred accordingly. Old evidence fades, so that the
+/// estimate follows automatic exposure.
+class exposure_estimation {
+ public:
+  static constexpr std::size_t count = 9;
+  /// The exposure times that are compared, seconds.
+  [[nodiscard]] static constexpr double candidate(std::size_t i) noexcept { return 0.004 * static_cast<double>(i); }
+
+  /// Adds the correlations of one patch in one frame, by candidate. A patch counts as much as its blur changes.
+  void add(const std::array<double, count>& correlations) noexcept {
+    constexpr double memory = 0.999;
+    weight_ = memory * weight_ + 1.0;
+    for (std::size_t i = 0; i != count; ++i) sums_[i] = memory * sums_[i] + correlations[i];
+  }
+
+  /// The estimate, seconds: the best candidate, refined by a parabola; 0 until there is enough evidence.
+  [[nodiscard]] double exposure() const noexcept {
+    constexpr double enough = 100.0, clear = 0.002;  // patches; gain of the mean correlation
+    const auto best = static_cast<std::size_t>(std::max_element(sums_.begin(), sums_.end()) - sums_.begin());
+    if (weight_ < enough || sums_[best] - sums_[0] < clear * weight_) return 0.0;
+    if (best + 1 == count) return candidate(best);
+    const double before = sums_[best - 1] - sums_[best], after = sums_[best + 1] - sums_[best];
+    const double curvature = before + after;
+    return candidate(best) + (curvature < 0.0 ? 0.5 * (before - after) / curvature * candidate(1) : 0.0);
+  }
+
+ private:
+  std::array<double, count> sums_{};
+  double weight_ = 0.0;
+};
+
+}  // namespace orbis::slam::detail

@@ -1,0 +1,281 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Subpixel positions of landmarks in the image of a frame, also in a blurred one.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include <orbis/camera/model.hpp>
+#include <orbis/core/image.hpp>
+#include <orbis/core/se3.hpp>
+#include <orbis/core/types.hpp>
+#include <orbis/features/pyramid.hpp>
+#include <orbis/slam/camera_rig.hpp>
+#include <orbis/slam/detail/map/point_observation.hpp>
+#include <orbis/slam/detail/shutter/row_times.hpp>
+#include <orbis/slam/detail/tracking/exposure_estimation.hpp>
+#include <orbis/slam/detail/tracking/patch_match.hpp>
+#include <orbis/slam/frame.hpp>
+#include <orbis/slam/landmark_patch.hpp>
+#include <orbis/slam/map.hpp>
+#include <orbis/slam/options.hpp>
+
+namespace orbis::slam::detail {
+
+/// The image of a frame, which is valid while the frame is tracked.
+struct frame_image {
+  const features::image_pyramid* levels = nullptr;  ///< those of the keypoints; null: not available
+  /// Returns the depth at a pixel, metres; 0 if it is unknown. Empty if there is no depth image.
+  std::function<double(const vec2& pixel)> depth_at{};
+
+  [[nodiscard]] bool empty() const noexcept { return levels == nullptr || levels->empty(); }
+};
+
+/// Measures where the landmarks of a frame are in its image, by comparison with their patches. A detector finds a
+/// corner in a blurred image somewhere on its streak. A patch is found where the landmark is in the middle of the
+/// exposure, to a fraction of a pixel.
+template <camera::camera_model Camera, feature_descriptor D>
+class patch_tracker {
+ public:
+  patch_tracker(const camera_rig<Camera>& rig, const patch_options& settings) : rig_{rig}, options_{settings} {}
+
+  /// Sets the image of the next frame. It must remain valid until the next call.
+  void set_image(frame_image image) { image_ = std::move(image); }
+  /// Returns true if there is an image to measure in.
+  [[nodiscard]] bool is_ready() const noexcept { return options_.enabled && !image_.empty(); }
+
+  /// The exposure time, given or estimated, seconds.
+  [[nodiscard]] double exposure() const noexcept { return options_.exposure.value_or(estimation_.exposure()); }
+
+  /// Moves the keypoints that observe landmarks to where their patches are in the image, and sets `f.deviations`.
+  /// `twist`: the motion of the camera in its own frame, per second. O(landmarks of the frame). @pre is_ready()
+  void align(basic_frame<D>& f, const basic_map<D>& m, const vec6& twist) {
+    const double seconds = exposure();
+    const se3 T_camera_world = f.T_world_camera.inverse();
+    f.deviations.assign(f.size(), 1.0F);
+    aligned_.clear();
+    std::size_t moving = 0;
+    for (std::size_t i = 0; i != f.size(); ++i) {
+      const double scale = rig_.scales.scale(f.features.keypoints[i].octave);
+      constexpr double far = 1e3;  // metres
+      const vec2 motion = motion_of(f.has_depth(i) ? f.point_camera(i) : vec3(far * f.rays[i]), twist);
+      f.deviations[i] = static_cast<float>(corner_deviation(seconds * norm(motion) / scale));
+      if (f.landmarks[i] == no_id) continue;
+      const basic_landmark<D>& l = m.landmark_at(f.landmarks[i]);
+      const auto view = view_of(f, i, l, T_camera_world, motion);
+      if (!view) continue;
+      constexpr std::size_t every = 32;  // patch: a fraction of the time of the alignment
+      if (!options_.exposure && shows_exposure(l.patch, *view) && moving++ % every == 0)
+        compare_exposures(l.patch, *view);
+      const auto found = match(l.patch, *view, seconds);
+      if (!found || found->correlation < options_.min_correlation) continue;
+      const vec2 shift = found->shift.x() * view->across + found->shift.y() * view->down;
+      move_keypoint(f, i, view->pixel + shift, view->delay);
+      f.deviations[i] = static_cast<float>(deviation_);
+      aligned_.push_back(static_cast<std::uint32_t>(i));
+    }
+    f.grid.assign(f.features.keypoints);
+  }
+
+  /// Updates the deviation of patches from the reprojection errors of the last aligned frame, at its refined pose.
+  void update_deviation(const basic_frame<D>& f, const basic_map<D>& m) {
+    constexpr std::size_t enough = 30;
+    constexpr double least = 0.3, most = 1.0, rate = 0.05;
+    errors_.clear();
+    const se3 T_camera_world = f.T_world_camera.inverse();
+    for (const std::uint32_t i : aligned_) {
+      if (f.landmarks[i] == no_id) continue;
+      const auto at = rig_.camera().project(T_camera_world * m.landmark_at(f.landmarks[i]).position);
+      if (at) errors_.push_back(norm(*at - f.pixel(i)) / rig_.scales.scale(f.features.keypoints[i].octave));
+    }
+    if (errors_.size() < enough) return;
+    const auto middle = errors_.begin() + static_cast<std::ptrdiff_t>(errors_.size() / 2);
+    std::nth_element(errors_.begin(), middle, errors_.end());
+    constexpr double median_of_rayleigh = 1.1774;
+    deviation_ += rate * (std::clamp(*middle / median_of_rayleigh, least, most) - deviation_);
+  }
+
+  /// Gives the landmarks of a new keyframe that have no patch one from its image. These keypoints define where the
+  /// landmarks are in images. `f`: the frame from which the keyframe was made. @pre is_ready()
+  void add_patches(basic_map<D>& m, keyframe_id id, const basic_frame<D>& f, const vec6& twist) const {
+    const se3 T_camera_world = f.T_world_camera.inverse();
+    for (std::uint32_t i = 0; i != f.size(); ++i) {
+      const landmark_id l = m.at(id).landmarks[i];
+      if (l == no_id || m.landmark_at(l).patch.pixels != nullptr) continue;
+      auto patch = patch_at(f, i, T_camera_world * m.landmark_at(l).position, twist);
+      if (!patch) continue;
+      m.set_patch(l, *std::move(patch));
+      m.set_deviation(id, i, deviation_);
+    }
+  }
+
+ private:
+  /// A landmark's expected place in the image.
+  struct patch_view {
+    vec2 pixel, across, down;  ///< of the centre of the patch, and the steps to its next pixels, pixels of the image
+    vec2 delay;                ///< its motion from the frame's time to that of its row, pixels of the image
+    vec2 motion;               ///< pixels of the patch per second
+    image_view<const std::uint8_t> level;
+  };
+
+  /// The deviation of a corner's position, pixels: it may be found anywhere on its streak, of `length` pixels.
+  [[nodiscard]] static double corner_deviation(double length) noexcept {
+    return std::sqrt(1.0 + length * length / 12.0);
+  }
+  /// Returns the position of keypoint `i` in the image, pixels.
+  [[nodiscard]] static vec2 read_pixel(const basic_frame<D>& f, std::size_t i) {
+    return f.as_read.empty() ? f.pixel(i)
+                             : vec2(static_cast<double>(f.as_read[i].x), static_cast<double>(f.as_read[i].y));
+  }
+  /// Converts a pixel of the image to one of a pyramid level.
+  [[nodiscard]] vec2 on_level(const vec2& pixel, image_view<const std::uint8_t> level) const {
+    return {features::image_pyramid::full_coordinate(pixel.x(), rig_.camera().width(), level.width()),
+            features::image_pyramid::full_coordinate(pixel.y(), rig_.camera().height(), level.height())};
+  }
+  /// The sides of a pixel of a level, pixels of the image.
+  [[nodiscard]] vec2 pixel_size(image_view<const std::uint8_t> level) const {
+    return {static_cast<double>(rig_.camera().width()) / level.width(),
+            static_cast<double>(rig_.camera().height()) / level.height()};
+  }
+  /// Returns the motion of a point (camera frame, metres) in the image, pixels per second; 0 if it is out of view.
+  [[nodiscard]] vec2 motion_of(const vec3& point, const vec6& twist) const {
+    matrix<2, 3> by_point;
+    if (!rig_.camera().project(point, by_point)) return zeros<vec2>();
+    return by_point * (cross(tail<3>(twist), point) + head<3>(twist));
+  }
+  /// Returns the level with the pixel size nearest to `scale`, pixels of the image.
+  [[nodiscard]] std::size_t nearest_level(double scale) const {
+    const auto levels = std::min(image_.levels->size(), static_cast<std::size_t>(rig_.scales.levels()));
+    std::size_t level = 0;
+    while (level + 1 < levels && rig_.scales.scale(static_cast<int>(level)) * std::sqrt(rig_.scales.factor()) < scale)
+      ++level;
+    return level;
+  }
+
+  /// Returns the expected place of landmark `l`, which keypoint `i` observes. Empty without a patch, if the patch is
+  /// out of view, or if it appears at a very different size.
+  [[nodiscard]] std::optional<patch_view> view_of(const basic_frame<D>& f, std::size_t i, const basic_landmark<D>& l,
+                                                  const se3& T_camera_world, const vec2& motion) const {
+    if (l.patch.pixels == nullptr) return std::nullopt;
+    constexpr double arm = 4.0;  // pixels of the patch
+    const vec3 point = T_camera_world * l.position;
+    const mat3 rotation = T_camera_world.rotation_matrix();
+    const auto centre = rig_.camera().project(point);
+    const auto right = rig_.camera().project(point + arm * (rotation * l.patch.across));
+    const auto below = rig_.camera().project(point + arm * (rotation * l.patch.down));
+    if (!centre || !right || !below) return std::nullopt;
+    patch_view v;
+    v.delay = read_pixel(f, i) - f.pixel(i);
+    v.pixel = *centre + v.delay;
+    v.across = (*right - *centre) / arm;
+    v.down = (*below - *centre) / arm;
+    const double area = v.across.x() * v.down.y() - v.across.y() * v.down.x();
+    const double scale = rig_.scales.scale(f.features.keypoints[i].octave), share = area / (scale * scale);
+    constexpr double most = 5.0;
+    if (!(share > 1.0 / most && share < most)) return std::nullopt;
+    v.motion = {(v.down.y() * motion.x() - v.down.x() * motion.y()) / area,
+                (v.across.x() * motion.y() - v.across.y() * motion.x()) / area};
+    v.level = (*image_.levels)[nearest_level(std::sqrt(area))];
+    return v;
+  }
+  [[nodiscard]] std::optional<patch_shift> match(const landmark_patch& patch, const patch_view& v,
+                                                 double seconds) const {
+    const vec2 size = pixel_size(v.level);
+    const auto on_grid = [&](const vec2& step) { return vec2(step.x() / size.x(), step.y() / size.y()); };
+    return match_patch(patch, seconds * patch.motion, seconds * v.motion, v.level,
+                       {on_level(v.pixel, v.level), on_grid(v.across), on_grid(v.down)});
+  }
+  /// Returns true if the blur of the image differs from that of the patch. Opposite motions have the same blur.
+  [[nodiscard]] static bool shows_exposure(const landmark_patch& patch, const patch_view& v) {
+    constexpr double visible = 100.0;  // pixels of the patch per second
+    return std::min(norm(v.motion - patch.motion), norm(v.motion + patch.motion)) > visible;
+  }
+  void compare_exposures(const landmark_patch& patch, const patch_view& v) {
+    std::array<double, exposure_estimation::count> correlations;
+    for (std::size_t k = 0; k != correlations.size(); ++k) {
+      const auto found = match(patch, v, exposure_estimation::candidate(k));
+      if (!found) return;
+      correlations[k] = found->correlation;
+    }
+    estimation_.add(correlations);
+  }
+
+  /// Moves keypoint `i` to a pixel of the image, and reads its depth there. `delay`: its motion from the frame's time
+  /// to that of its row.
+  void move_keypoint(basic_frame<D>& f, std::size_t i, const vec2& to, const vec2& delay) const {
+    const auto read_ray = rig_.camera().unproject(to), ray = rig_.camera().unproject(to - delay);
+    if (!read_ray || !ray) return;
+    auto& at = f.features.keypoints[i];
+    at.x = static_cast<float>(to.x() - delay.x()), at.y = static_cast<float>(to.y() - delay.y());
+    f.rays[i] = *ray / ray->z();
+    if (image_.depth_at) f.depth[i] = static_cast<float>(image_.depth_at(to));
+    if (f.as_read.empty()) return;
+    keypoint_as_read& read = f.as_read[i];
+    read.x = static_cast<float>(to.x()), read.y = static_cast<float>(to.y());
+    read.ray_x = read_ray->x() / read_ray->z(), read.ray_y = read_ray->y() / read_ray->z();
+    if (image_.depth_at) read.depth = read.stored_depth = f.depth[i];
+  }
+
+  /// Returns the patch around keypoint `i`, which observes `point` (camera frame, metres); empty near the border.
+  [[nodiscard]] std::optional<landmark_patch> patch_at(const basic_frame<D>& f, std::size_t i, const vec3& point,
+                                                       const vec6& twist) const {
+    const auto octave = static_cast<std::size_t>(f.features.keypoints[i].octave);
+    if (octave >= image_.levels->size() || !(point.z() > 0.0)) return std::nullopt;
+    const auto level = (*image_.levels)[octave];
+    const vec2 pixel = read_pixel(f, i), at = on_level(pixel, level), size = pixel_size(level);
+    constexpr double c = landmark_patch::centre;
+    if (!(at.x() >= c && at.y() >= c && at.x() + c < level.width() - 1.01 && at.y() + c < level.height() - 1.01))
+      return std::nullopt;
+    const auto across = step_on_surface(pixel, vec2(size.x(), 0.0), point.z());
+    const auto down = step_on_surface(pixel, vec2(0.0, size.y()), point.z());
+    if (!across || !down) return std::nullopt;
+    landmark_patch patch;
+    patch.across = f.T_world_camera.rotation() * *across;
+    patch.down = f.T_world_camera.rotation() * *down;
+    const vec2 motion = motion_of(point, twist);
+    patch.motion = {motion.x() / size.x(), motion.y() / size.y()};
+    patch.corner_deviation = corner_deviation(exposure() * norm(patch.motion));
+    auto pixels = std::make_shared<landmark_patch::pixel_array>();
+    for (int y = 0, k = 0; y != landmark_patch::size; ++y)
+      for (int x = 0; x != landmark_patch::size; ++x, ++k) {
+        const float value = interpolate(level, static_cast<float>(at.x() + x - c), static_cast<float>(at.y() + y - c));
+        (*pixels)[static_cast<std::size_t>(k)] = static_cast<std::uint8_t>(0.5F + value);
+      }
+    patch.pixels = std::move(pixels);
+    return patch;
+  }
+  /// Returns the motion on the surface (camera frame, metres) by a step in the image, pixels. If the depth image is
+  /// flat around the pixel, its slope is that of the surface; otherwise the surface is parallel to the image. `z`:
+  /// depth at the pixel, metres. Empty if a pixel has no ray.
+  [[nodiscard]] std::optional<vec3> step_on_surface(const vec2& pixel, const vec2& step, double z) const {
+    constexpr double arm = 4.0, unevenness = 0.01, steepest = 0.1;  // steps; shares of the depth
+    const vec2 before = pixel - arm * step, after = pixel + arm * step;
+    const auto ray_before = rig_.camera().unproject(before), ray_after = rig_.camera().unproject(after);
+    if (!ray_before || !ray_after) return std::nullopt;
+    double rise = 0.0;
+    if (image_.depth_at)
+      if (const double a = image_.depth_at(before), b = image_.depth_at(after); a > 0.0 && b > 0.0)
+        if (std::abs(0.5 * (a + b) - z) < unevenness * z && std::abs(b - a) < steepest * z) rise = 0.5 * (b - a);
+    const vec3 end = (z + rise) / ray_after->z() * *ray_after, begin = (z - rise) / ray_before->z() * *ray_before;
+    return vec3((end - begin) / (2.0 * arm));
+  }
+
+  const camera_rig<Camera>& rig_;
+  const patch_options& options_;
+  frame_image image_;
+  exposure_estimation estimation_;
+  double deviation_ = 0.5;              ///< of the position of a patch, pixels of its level
+  std::vector<std::uint32_t> aligned_;  ///< keypoints of the last frame
+  std::vector<double> errors_;          ///< reused working memory
+};
+
+}  // namespace orbis::slam::detail
