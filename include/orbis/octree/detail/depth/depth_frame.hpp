@@ -31,18 +31,16 @@ struct depth_frame : view_frame {
   endpoint_image ends;
   direction_index map;  ///< for cameras other than pinholes
 
-  /// Computes the parameters of the tests. `ray_error`: maximum deviation of rays from those of their pixels, at z = 1.
+  /// Computes the parameters of the tests.
   /// @pre `ends` and, if needed, `map` belong to the image
-  void set_scene(const depth_sensor& sensor, float ray_error = 0.0F) {
+  void set_scene(const depth_sensor& sensor) {
     const pixel_rays& rays = ends.rays();
     const int width = rays.width(), height = rays.height();
     if (rays.separable()) {
       scene.map = nullptr;
       const vec2f focal = rays.focal().cast<float>(), center = rays.center().cast<float>();
-      set_view(sensor,
-               {focal.x(), focal.y(), center.x(), center.y(), width, height, rays.x(0)[0], rays.x(0)[width - 1],
-                *rays.y(0), *rays.y(height - 1)},
-               ray_error);
+      set_view(sensor, {focal.x(), focal.y(), center.x(), center.y(), width, height, rays.x(0)[0], rays.x(0)[width - 1],
+                        *rays.y(0), *rays.y(height - 1)});
     } else {
       scene.map = &map;
       set_view(sensor, {map.focal().x(), map.focal().y(), map.center().x(), map.center().y(), width, height,
@@ -53,11 +51,8 @@ struct depth_frame : view_frame {
   /// Returns true if the rays are dense enough for testing voxels to be faster than walking rays. With less than one
   /// pixel per half voxel edge, most voxels would have to be tested individually.
   [[nodiscard]] bool is_dense(const end_counts& counts) const {
-    return is_dense(counts.sum_z / static_cast<double>(counts.used + counts.truncated),
-                    static_cast<double>(scene.voxel), static_cast<double>(std::max(scene.fx, scene.fy)));
-  }
-  [[nodiscard]] static bool is_dense(double mean_z, double voxel, double focal) {
-    return mean_z < 0.45 * voxel * focal;
+    const double mean_z = counts.sum_z / static_cast<double>(counts.used + counts.truncated);
+    return mean_z < 0.45 * static_cast<double>(scene.voxel) * static_cast<double>(std::max(scene.fx, scene.fy));
   }
   [[nodiscard]] std::size_t memory_bytes() const noexcept {
     return view_frame::memory_bytes() + ends.memory_bytes() + map.memory_bytes();

@@ -10,10 +10,8 @@
 #include <cassert>
 #include <cstddef>
 #include <cstdint>
-#include <span>
 #include <vector>
 
-#include <orbis/camera/pinhole.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/simd.hpp>
 #include <orbis/octree/depth_points.hpp>
@@ -59,27 +57,11 @@ class endpoint_image {
     return counts;
   }
 
-  /// Begins an image of this size whose ends are filled in through `ends()`.
-  void lay_out(int width, int height) {
-    resize(width, height);
-    std::fill(z_.end() - pixel_rays::padding, z_.end(), 0.0F);
-  }
-  /// Depths of all rows of that image, `stride()` values per row.
-  [[nodiscard]] std::span<float> ends() noexcept { return std::span{z_}.first(z_.size() - pixel_rays::padding); }
-  /// Reduces the image to the part that starts at pixel `first` of `ends()`, which is the image of `camera`.
-  /// @pre there are no ends elsewhere; at least 16 columns remain on the right
-  void crop(const camera::pinhole& camera, std::uint32_t first) {
-    rays_.fit(camera);
-    first_ = first;
-  }
-
   [[nodiscard]] const pixel_rays& rays() const noexcept { return rays_; }
   /// Removes the end of a pixel's ray.
-  void clear(int u, int v) noexcept { z_[first_ + number(u, v)] = 0.0F; }
+  void clear(int u, int v) noexcept { z_[number(u, v)] = 0.0F; }
   /// Depths (metres) at which the rays of row `v` end, 0 without an end; padded with zeros.
-  [[nodiscard]] const float* z(int v) const noexcept {
-    return z_.data() + first_ + static_cast<std::size_t>(v) * stride_;
-  }
+  [[nodiscard]] const float* z(int v) const noexcept { return z_.data() + static_cast<std::size_t>(v) * stride_; }
   /// Offset between rows of `z`.
   [[nodiscard]] std::size_t stride() const noexcept { return stride_; }
   /// Number of a pixel. See `pixel` for the inverse.
@@ -135,7 +117,6 @@ class endpoint_image {
   void resize(int width, int height) {
     stride_ = static_cast<std::size_t>(width + 2 * pixel_rays::padding - 1) & ~std::size_t{15};
     z_.resize(stride_ * static_cast<std::size_t>(height) + pixel_rays::padding);
-    first_ = 0;
   }
   void add_row(worker& w, scan_masks& masks, const depth_sensor& sensor, const depth_scan& scan, int v) {
     float* const z = z_.data() + static_cast<std::size_t>(v) * stride_;
@@ -178,7 +159,7 @@ class endpoint_image {
   fresh_kernel* fresh_ = nullptr;
   pixel_rays rays_;
   std::vector<float> z_;
-  std::size_t stride_ = 0, first_ = 0;
+  std::size_t stride_ = 0;
   std::vector<worker> workers_;
 };
 

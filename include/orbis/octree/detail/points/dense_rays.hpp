@@ -22,7 +22,7 @@
 #include <orbis/octree/detail/points/binned_rays.hpp>
 #include <orbis/octree/detail/points/cell_tests.hpp>
 #include <orbis/octree/detail/points/direction_windows.hpp>
-#include <orbis/octree/detail/points/scan_sample.hpp>
+#include <orbis/octree/detail/points/ray_traversal.hpp>
 #include <orbis/octree/detail/storage/scan_masks.hpp>
 
 namespace orbis::octree::detail {
@@ -170,7 +170,7 @@ class dense_rays {
   /// individually.
   [[nodiscard]] bool is_worthwhile(double voxel) const {
     const double planes = sample_.length / voxel, apart = windows_.spacing * planes;  // apart: voxels, at the ends
-    return 6.0 + 1000.0 * apart * apart < 20.0 + 0.5 * planes;
+    return 6.0 + 300.0 * apart * apart < 20.0 + 0.5 * planes;
   }
   template <class Point>
   void sample(const float3& origin, std::size_t count, Point&& point, double limit) {
@@ -178,12 +178,16 @@ class dense_rays {
     sample_.length = 0.0;
     random_bits random{1};
     for (std::size_t k = 0; k != most_sampled; ++k) {
-      const std::size_t i = place_in_stretch(k, most_sampled, count - 1, random);
+      // Random places avoid aliasing between regular steps and the rows of a scan.
+      const double place = (static_cast<double>(k) + random.uniform()) / static_cast<double>(most_sampled);
+      const float3 p = point(std::min(static_cast<std::size_t>(place * static_cast<double>(count)), count - 1));
       vec3 d;
-      const auto length = length_of_ray(origin, point(i), limit, d);
-      if (!length) continue;
-      sample_.directions.push_back(d);
-      sample_.length += *length;
+      for (std::size_t axis = 0; axis != 3; ++axis)
+        d[static_cast<int>(axis)] = static_cast<double>(p[axis]) - static_cast<double>(origin[axis]);
+      const double length = norm(d);
+      if (!(length > 0.0 && length < 1e30)) continue;
+      sample_.directions.push_back(d / length);
+      sample_.length += std::min(length, limit);
     }
     sample_.length /= static_cast<double>(std::max<std::size_t>(1, sample_.directions.size()));
   }
