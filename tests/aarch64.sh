@@ -96,7 +96,7 @@ places=(tests/core/simd.cpp tests/core/simd tests/core/rounded.cpp tests/core/by
   tests/optimize/detail/bundle tests/optimize/detail/sparse tests/optimize/detail/pose
   tests/optimize/pose_refinement_pose_pieces.cpp
   tests/optimize/bundle_instances*.cpp  # shared by the tests of bundle adjustment
-  tests/octree/detail/storage tests/octree/detail/points tests/octree/detail/depth tests/nav/detail/floor
+  tests/octree/detail/storage tests/octree/detail/mark tests/nav/detail/floor
   tests/nav/squared_distances.cpp)
 mapfile -t kernels < <(for place in "${places[@]}"; do if [[ -e $place ]]; then find "$place" -name '*.cpp'; fi; done | sort)
 parts=()

@@ -16,7 +16,7 @@
 #include <orbis/core/execution.hpp>
 #include <orbis/core/point.hpp>
 #include <orbis/octree/accessor.hpp>
-#include <orbis/octree/detail/points/skipping_traversal.hpp>
+#include <orbis/octree/detail/mark/rays/skipping_traversal.hpp>
 #include <orbis/octree/sensor_model.hpp>
 
 namespace orbis::octree {

@@ -20,7 +20,6 @@
 #include <orbis/camera/pinhole.hpp>
 #include <orbis/camera/world_point.hpp>
 #include <orbis/core/se3.hpp>
-#include <orbis/octree/detail/points/ray_traversal.hpp>
 
 namespace orbis::octree {
 
@@ -123,7 +122,7 @@ void append_world_points(const Depth& depth, const pixel_rays& rays, const se3& 
       const float z = depth(u, v);
       const auto [x, y] = rays.at(u, v);
       if (!(z > 0.0F) || std::isnan(x)) continue;
-      const detail::float3 p = camera::world_point(pose, x, y, z);
+      const auto p = camera::world_point(pose, x, y, z);
       points.emplace_back(p[0], p[1], p[2]);
     }
 }

@@ -3,8 +3,8 @@
 /// The functions of occupancy_octree.hpp.
 #pragma once
 
-#include <orbis/octree/detail/points/point_integrator.hpp>
-#include <orbis/octree/detail/points/scan_buffers.hpp>
+#include <orbis/octree/detail/mark/point_integrator.hpp>
+#include <orbis/octree/detail/mark/scan_buffers.hpp>
 #include <orbis/octree/detail/storage/apply_scan.hpp>
 #include <orbis/octree/detail/storage/palette_kernels.hpp>
 #include <orbis/octree/occupancy_octree.hpp>

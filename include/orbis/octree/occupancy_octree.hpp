@@ -31,9 +31,9 @@
 #include <orbis/octree/accessor.hpp>
 #include <orbis/octree/cast_ray.hpp>
 #include <orbis/octree/change_log.hpp>
-#include <orbis/octree/detail/depth/depth_scan.hpp>
-#include <orbis/octree/detail/points/ray_traversal.hpp>
-#include <orbis/octree/detail/points/scan_scratch.hpp>
+#include <orbis/octree/detail/mark/depth/depth_scan.hpp>
+#include <orbis/octree/detail/mark/rays/ray_traversal.hpp>
+#include <orbis/octree/detail/mark/scan_scratch.hpp>
 #include <orbis/octree/detail/storage/brick.hpp>
 #include <orbis/octree/detail/storage/large_leaves.hpp>
 #include <orbis/octree/detail/storage/leaves.hpp>

@@ -26,7 +26,7 @@
 #include <orbis/core/se3.hpp>
 #include <orbis/octree/change_log.hpp>
 #include <orbis/octree/detail/history/brick_uses.hpp>
-#include <orbis/octree/detail/points/scan_scratch.hpp>
+#include <orbis/octree/detail/mark/scan_scratch.hpp>
 #include <orbis/octree/integration.hpp>
 #include <orbis/octree/occupancy_octree.hpp>
 #include <orbis/octree/scan_voxels.hpp>

@@ -7,7 +7,7 @@
 #include <cassert>
 
 #include <orbis/core/inline.hpp>
-#include <orbis/octree/detail/points/scan_buffers.hpp>
+#include <orbis/octree/detail/mark/scan_buffers.hpp>
 #include <orbis/octree/detail/storage/palette_kernels.hpp>
 #include <orbis/octree/detail/storage/scan_masks.hpp>
 #include <orbis/octree/scan_voxels.hpp>

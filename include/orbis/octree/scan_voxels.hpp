@@ -16,8 +16,8 @@
 #include <orbis/core/execution.hpp>
 #include <orbis/core/point.hpp>
 #include <orbis/core/se3.hpp>
-#include <orbis/octree/detail/depth/depth_scan.hpp>
-#include <orbis/octree/detail/points/scan_scratch.hpp>
+#include <orbis/octree/detail/mark/depth/depth_scan.hpp>
+#include <orbis/octree/detail/mark/scan_scratch.hpp>
 #include <orbis/octree/integration.hpp>
 #include <orbis/octree/key.hpp>
 

@@ -10,7 +10,6 @@
 #include <cstdint>
 #include <vector>
 
-#include <orbis/octree/detail/points/ray_traversal.hpp>
 #include <orbis/octree/detail/storage/brick.hpp>
 #include <orbis/octree/key.hpp>
 
@@ -54,20 +53,6 @@ class scan_masks {
     const std::uint32_t place = place_in_brick(k);
     at(k).free[place >> 6U] |= std::uint64_t{1} << (place & 63U);
   }
-  /// Marks the voxels that the ray crosses as free, see traverse_ray.
-  void mark_ray(const voxel_grid& grid, const float3& origin, const voxel_key& from, const float3& end,
-                const voxel_key& to) {
-    voxel_key last{~std::uint32_t{0}, 0, 0};  // in no brick
-    std::uint64_t* free = nullptr;
-    traverse_ray(grid, origin, from, end, to, [&](const voxel_key& k) {
-      if ((((k.x ^ last.x) | (k.y ^ last.y) | (k.z ^ last.z)) >> 3U) != 0) {
-        free = at(k).free.data();
-        last = k;
-      }
-      const std::uint32_t place = place_in_brick(k);
-      free[place >> 6U] |= std::uint64_t{1} << (place & 63U);
-    });
-  }
   /// Adds the marks of `other`.
   void merge(const scan_masks& other) {
     for (const scan_brick& from : other.bricks_) {
@@ -95,6 +80,19 @@ class scan_masks {
   hash_index index_;
   std::vector<scan_brick> bricks_;
   std::size_t last_ = 0;  ///< the last brick used; consecutive voxels are mostly in the same one
+};
+
+/// Callback that sets the bits of the voxels of a named brick that a miss would not change. It is type-erased, so that
+/// no algorithm is compiled for each map type. Can be called from several threads.
+struct saturated_voxels {
+  using words = std::array<std::uint64_t, 8>;
+
+  void (*find)(const void* map, std::uint64_t name, words&) = nullptr;  ///< null: no voxel is saturated
+  const void* map = nullptr;
+
+  void operator()(std::uint64_t name, words& saturated) const {
+    if (find != nullptr) find(map, name, saturated);
+  }
 };
 
 /// Calls `visit(place)` for the place in the brick of every bit set in `masks`.

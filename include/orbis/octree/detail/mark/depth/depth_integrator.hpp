@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Finds the voxels that a depth image observes free and occupied. The voxels are found one by one by projection
+/// instead of ray by ray, and are exactly those that the traversal of every ray finds.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <bit>
+#include <cassert>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include <orbis/core/execution.hpp>
+#include <orbis/core/se3.hpp>
+#include <orbis/core/simd.hpp>
+#include <orbis/octree/detail/mark/depth/depth_descent.hpp>
+#include <orbis/octree/detail/mark/depth/depth_frame.hpp>
+#include <orbis/octree/detail/mark/depth/depth_scan.hpp>
+#include <orbis/octree/detail/mark/depth/endpoint_rows.hpp>
+#include <orbis/octree/detail/mark/depth/first_steps.hpp>
+#include <orbis/octree/detail/mark/rays/point_keys.hpp>
+#include <orbis/octree/detail/mark/rays/ray_traversal.hpp>
+#include <orbis/octree/detail/storage/node_name.hpp>
+#include <orbis/octree/detail/storage/scan_masks.hpp>
+#include <orbis/octree/integration.hpp>
+
+namespace orbis::octree::detail {
+
+/// World points of the pixels of a depth image, row by row, as a source of points; NaN for pixels without a point.
+struct pixel_points {
+  const depth_scan& scan;
+  const pixel_rays& rays;
+  camera::float_pose pose;
+  std::size_t count = static_cast<std::size_t>(rays.width()) * static_cast<std::size_t>(rays.height());
+
+  [[nodiscard]] float3 operator()(std::size_t i) const {
+    const auto width = static_cast<std::size_t>(rays.width());
+    const auto u = static_cast<int>(i % width), v = static_cast<int>(i / width);
+    const float z = scan.depth(u, v);
+    const auto [x, y] = rays.at(u, v);
+    return camera::world_point(pose, x, y, z > 0.0F ? z : std::numeric_limits<float>::quiet_NaN());
+  }
+};
+inline void load_points(const pixel_points& points, std::size_t begin, std::size_t count, point_batch& batch) {
+  for (std::size_t i = 0; i != count; ++i) {
+    const float3 p = points(begin + i);
+    batch.x[i] = p[0];
+    batch.y[i] = p[1];
+    batch.z[i] = p[2];
+  }
+}
+
+/// Marks the voxels of depth images. Reuses its memory between images.
+///
+/// The octree is descended from a node around all rays. Nodes that no ray reaches are dropped, and nodes whose voxels
+/// are all certainly crossed are filled; a min/max pyramid of the ray ends decides both. The remaining voxels are at
+/// surfaces and at the border of the view: such a voxel is free if the ray of one of its pixels crosses it. If rounding
+/// could change the result, the exact traversal of that ray decides.
+class depth_integrator {
+ public:
+  /// Marks the voxels in `masks` that the every_ray integration of the image's world points marks (see
+  /// append_world_points). Voxels that a miss would not change according to `saturated` may be missing from the free
+  /// ones, and an occupied voxel may or may not be free as well. The summary's voxel counts stay zero. The same voxels
+  /// under every policy.
+  ///
+  /// If the rays are too sparse for this method, or too close to the border of the grid, marks only the occupied voxels
+  /// and sets `needs_rays`: the caller must mark the rays to the pixels, see `points`.
+  ///
+  /// `saturated(name, mask)` sets the bits of such voxels of a named brick; it can be called from several threads.
+  /// O(pixels + bricks seen + voxels at surfaces).
+  /// @pre depth and camera have the same size
+  template <execution_policy Policy>
+  integration_summary mark(const Policy& policy, const voxel_grid& grid, const depth_scan& scan,
+                           const se3& T_world_camera, const integration_options& options, scan_masks& masks,
+                           const saturated_voxels& saturated, bool& needs_rays) {
+    needs_rays = false;
+    const depth_sensor sensor{grid, T_world_camera, options.max_range};
+    masks.clear();
+    const end_counts ends = frame_.ends.find_ends(policy, sensor, scan, masks);
+    if (sensor.key && ends.leaves) {
+      if (!frame_.ends.rays().separable()) frame_.map.fit(frame_.ends.rays());
+      frame_.set_scene(sensor);
+      const auto bounds = frame_.bounds_of(sensor, ends.max_z);
+      if (bounds && frame_.is_dense(ends))
+        mark_free(policy, sensor, scan, ends.max_z, *bounds, masks, saturated);
+      else
+        needs_rays = true;
+    }
+    return {.used = ends.used, .truncated = ends.truncated, .rejected = ends.rejected};
+  }
+  /// Like `mark`, but finds only the occupied voxels.
+  template <execution_policy Policy>
+  integration_summary mark_ends(const Policy& policy, const voxel_grid& grid, const depth_scan& scan,
+                                const se3& T_world_camera, const integration_options& options, scan_masks& masks) {
+    const depth_sensor sensor{grid, T_world_camera, options.max_range};
+    masks.clear();
+    const end_counts ends = frame_.ends.find_ends(policy, sensor, scan, masks);
+    return {.used = ends.used, .truncated = ends.truncated, .rejected = ends.rejected};
+  }
+
+  /// Returns the world points of the image that was marked last. Valid as long as `scan`, and until the next image.
+  [[nodiscard]] pixel_points points(const depth_scan& scan, const se3& T_world_camera) const {
+    return {scan, frame_.ends.rays(), camera::float_pose{T_world_camera}};
+  }
+
+  [[nodiscard]] std::size_t memory_bytes() const noexcept {
+    std::size_t bytes = frame_.memory_bytes() + workers_.capacity() * sizeof(descent_worker);
+    for (const descent_worker& w : workers_) bytes += w.memory_bytes();
+    return bytes;
+  }
+
+ private:
+  // -- one frame
+
+  template <class Policy>
+  void mark_free(const Policy& policy, const depth_sensor& sensor, const depth_scan& scan, float max_z,
+                 const std::pair<voxel_key, voxel_key>& bounds, scan_masks& masks, const saturated_voxels& saturated) {
+    if (frame_.scene.map != nullptr) walk_outer(sensor, scan, masks);
+    frame_.pyramid.build(frame_.ends.rays().width(), frame_.ends.rays().height(), max_z,
+                         [&](int v) { return frame_.ends.z(v); });
+    frame_.list_nodes(sensor, bounds.first, bounds.second);
+    const bool on_face = frame_.is_on_face(sensor);
+
+    const auto end = [&](int u, int v) { return end_of(sensor, scan, u, v); };
+    descend_nodes(policy, frame_, sensor, depth_rays{frame_, sensor, end}, on_face, masks, saturated, workers_);
+    if (on_face) {
+      first_voxels around{sensor};
+      for_each_end(sensor, scan, [&](const ray_endpoint& e) { around.add(e); });
+      around.mark(masks);
+    }
+  }
+
+  // -- traversal of every ray, for the few cases that need it
+
+  template <class Use>
+  void for_each_end(const depth_sensor& sensor, const depth_scan& scan, Use&& use) const {
+    for (int v = 0; v != frame_.ends.rays().height(); ++v)
+      for (int u = 0; u != frame_.ends.rays().width(); ++u)
+        if (frame_.ends.z(v)[u] > 0.0F) use(end_of(sensor, scan, u, v));
+  }
+  [[nodiscard]] ray_endpoint end_of(const depth_sensor& sensor, const depth_scan& scan, int u, int v) const {
+    const auto [x, y] = frame_.ends.rays().at(u, v);
+    return sensor.end(x, y, scan.depth(u, v));
+  }
+  /// Walks the rays outside the map's angular limits, and removes their ends.
+  void walk_outer(const depth_sensor& sensor, const depth_scan& scan, scan_masks& masks) {
+    for (const auto& [u, v] : frame_.map.outer()) {
+      if (!(frame_.ends.z(v)[u] > 0.0F)) continue;
+      const ray_endpoint e = end_of(sensor, scan, u, v);
+      mark_ray(masks, sensor.grid, sensor.pose.centre, *sensor.key, e.point, e.key);
+      frame_.ends.clear(u, v);
+    }
+  }
+  depth_frame frame_;
+  std::vector<descent_worker> workers_;
+};
+
+}  // namespace orbis::octree::detail

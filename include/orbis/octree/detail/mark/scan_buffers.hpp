@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Reusable buffers of the algorithms that find the voxels of a scan.
+#pragma once
+
+#include <cstddef>
+#include <limits>
+
+#include <orbis/core/execution.hpp>
+#include <orbis/core/point.hpp>
+#include <orbis/core/se3.hpp>
+#include <orbis/octree/detail/mark/depth/depth_integrator.hpp>
+#include <orbis/octree/detail/mark/depth/depth_scan.hpp>
+#include <orbis/octree/detail/mark/point_integrator.hpp>
+#include <orbis/octree/detail/storage/scan_masks.hpp>
+#include <orbis/octree/integration.hpp>
+#include <orbis/octree/key.hpp>
+
+namespace orbis::octree::detail {
+
+struct scan_buffers {
+  point_integrator points;
+  depth_integrator depth;
+  scan_masks masks;
+
+  [[nodiscard]] std::size_t memory_bytes() const noexcept {
+    return sizeof(scan_buffers) + points.memory_bytes() + depth.memory_bytes() + masks.memory_bytes();
+  }
+};
+
+/// Marks a depth image, in either mode. Returns masks stored in `buffers`; writes the counts of pixels to `summary`.
+template <class Policy>
+const scan_masks& mark_depth(const Policy& policy, scan_buffers& buffers, const voxel_grid& grid,
+                             const depth_scan& scan, const se3& T_world_camera, const integration_options& options,
+                             integration_summary& summary, const saturated_voxels& saturated = {}) {
+  scan_masks& masks = buffers.masks;
+  if (options.mode == ray_mode::every_ray) {
+    bool needs_rays = false;
+    summary = buffers.depth.mark(policy, grid, scan, T_world_camera, options, masks, saturated, needs_rays);
+    if (needs_rays) {
+      const float3 origin = camera::float_pose{T_world_camera}.centre;
+      buffers.points.mark(policy, grid, buffers.depth.points(scan, T_world_camera), origin, options, saturated);
+      masks.merge(buffers.points.masks());
+    }
+    return masks;
+  }
+  // The range test applies to a voxel's centre, not to its points.
+  integration_options unlimited = options;
+  unlimited.max_range = std::numeric_limits<double>::infinity();
+  const std::size_t rejected = buffers.depth.mark_ends(policy, grid, scan, T_world_camera, unlimited, masks).rejected;
+  const float3 origin = coordinates<float>(T_world_camera.translation());
+  summary = buffers.points.mark_centers(policy, grid, masks, origin, options);
+  summary.rejected += rejected;
+  return buffers.points.masks();
+}
+
+}  // namespace orbis::octree::detail
