@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <array>
 
+#include <orbis/octree/scan-inl.hpp>
 #include <orbis/octree/scan_history-inl.hpp>
-#include <orbis/octree/scan_voxels-inl.hpp>
 
 namespace orbis::octree {
 
@@ -11,9 +11,8 @@ using options = integration_options;
 template class scan_history<>;
 template integration_summary scan_marker::mark_points(const parallel_policy&, const voxel_grid&,
                                                       const detail::point_view&, const std::array<float, 3>&,
-                                                      const options&, scan_voxels&);
+                                                      const options&, scan&);
 template integration_summary scan_marker::mark_depth(const parallel_policy&, const voxel_grid&,
-                                                     const detail::depth_scan&, const se3&, const options&,
-                                                     scan_voxels&);
+                                                     const detail::depth_scan&, const se3&, const options&, scan&);
 
 }  // namespace orbis::octree

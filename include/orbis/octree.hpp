@@ -14,7 +14,7 @@
 /// | overlap.hpp | collision tests of boxes, spheres and capsules |
 /// | change_log.hpp | log of voxels changed since a revision |
 /// | scan_history.hpp | a map that follows its scans when they change, are removed or arrive late |
-/// | scan_voxels.hpp | voxels observed by one scan, packed; the marker that finds them |
+/// | scan.hpp | voxels observed by one scan, packed; the marker that finds them |
 /// | decay.hpp | decay of voxels that are not observed |
 /// | voxel_layer.hpp | colours, labels or counts per voxel of a map |
 /// | files.hpp | reading and writing of OctoMap's `.bt` and `.ot` files |
@@ -32,7 +32,7 @@
 #include <orbis/octree/occupancy_octree.hpp>
 #include <orbis/octree/octants.hpp>
 #include <orbis/octree/overlap.hpp>
+#include <orbis/octree/scan.hpp>
 #include <orbis/octree/scan_history.hpp>
-#include <orbis/octree/scan_voxels.hpp>
 #include <orbis/octree/sensor_model.hpp>
 #include <orbis/octree/voxel_layer.hpp>

@@ -42,19 +42,19 @@ image<float> wavy_depth(random_bits& random) {
   return depth;
 }
 
-struct scan {
+struct view {
   image<float> depth;  ///< empty: points
   std::vector<vec3f> points;
   se3 T_world_camera;
 };
-scan random_scan(random_bits& random) {
+view random_scan(random_bits& random) {
   const se3 pose = test::random_motion(random, 0.4, 0.5);
   if (random.below(4) != 0) return {wavy_depth(random), {}, pose};
   const vec3f origin = pose.translation().cast<float>();
   return {{}, test::shell_scan(random, 300, origin), pose};
 }
 template <class Policy, class Map, class... Frame>
-void put(const Policy& policy, Map& map, const scan& s, const integration_options& options, Frame... frame) {
+void put(const Policy& policy, Map& map, const view& s, const integration_options& options, Frame... frame) {
   constexpr bool is_history = sizeof...(Frame) == 1;
   const auto call = [&](auto&&... what) {
     if constexpr (is_history)
@@ -69,7 +69,7 @@ void put(const Policy& policy, Map& map, const scan& s, const integration_option
 }
 
 template <class Octree>
-Octree map_of(const std::map<std::uint64_t, scan>& scans, const integration_options& options) {
+Octree map_of(const std::map<std::uint64_t, view>& scans, const integration_options& options) {
   Octree map{0.1};
   for (const auto& [frame, s] : scans) put(seq, map, s, options);
   return map;
@@ -119,7 +119,7 @@ std::string check_random_calls(const parallel_policy& policy, std::uint64_t seed
   random_bits random{seed};
   random_bits budgets{mix64(bricks)};
   scan_history<octree_type> history{0.1};
-  std::map<std::uint64_t, scan> scans;
+  std::map<std::uint64_t, view> scans;
   mirror<octree_type> follower{history.map()};
   std::size_t replayed = 0;
   for (int step = 0; step != 60; ++step) {
@@ -190,7 +190,7 @@ TEST_CASE("The newest scan is in a history's map at once, an older one after a r
   scan_history<> history{0.05};
   occupancy_octree<> map{0.05};
   for (std::uint64_t frame = 10; frame != 16; ++frame) {
-    const scan s{wavy_depth(random), {}, test::random_motion(random, 0.2, 0.2)};
+    const view s{wavy_depth(random), {}, test::random_motion(random, 0.2, 0.2)};
     const auto got = history.set(seq, frame, camera::depth_view(s.depth), small_camera, s.T_world_camera);
     map.integrate(camera::depth_view(s.depth), small_camera, s.T_world_camera);
     const auto [free, occupied] = history.find_scan(frame)->counts();
@@ -201,7 +201,7 @@ TEST_CASE("The newest scan is in a history's map at once, an older one after a r
   }
   const std::string before = ot_bytes(history.map());
   const occupancy_octree<> snapshot = history.map();
-  const scan late{wavy_depth(random), {}, test::random_motion(random, 0.2, 0.2)};
+  const view late{wavy_depth(random), {}, test::random_motion(random, 0.2, 0.2)};
   history.set(seq, 3, camera::depth_view(late.depth), small_camera, late.T_world_camera);
   CHECK(history.stale_bricks() > 10);
   history.replay(seq, {.time = std::chrono::nanoseconds{0}});  // does something even so
@@ -218,7 +218,7 @@ TEST_CASE("The newest scan is in a history's map at once, an older one after a r
 TEST_CASE("What stays as it was is not replayed, and nothing is left of a history without scans") {
   random_bits random{6};
   scan_history<> history{0.05};
-  std::vector<scan> scans;
+  std::vector<view> scans;
   for (std::uint64_t frame = 0; frame != 5; ++frame) {
     scans.push_back(random_scan(random));
     put(seq, history, scans.back(), {}, frame);
@@ -245,8 +245,9 @@ TEST_CASE("Marked voxels are packed without loss, and replaying allocates nothin
   random_bits random{8};
   scan_marker marker;
   scan_history<> history{0.05};
-  scan_voxels voxels;
-  std::vector<scan> scans;
+  scan voxels;
+  occupancy_octree<> integrated{0.05}, applied{0.05};
+  std::vector<view> scans;
   for (std::uint64_t frame = 0; frame != 8; ++frame) {
     scans.push_back({wavy_depth(random), {}, test::random_motion(random, 0.2, 0.2)});
     const auto& s = scans.back();
@@ -272,6 +273,11 @@ TEST_CASE("Marked voxels are packed without loss, and replaying allocates nothin
     CHECK(got.free == free);
     CHECK(got.occupied == occupied);
     CHECK(voxels.counts() == std::pair{free, occupied});
+    const auto at_once = integrated.integrate(camera::depth_view(s.depth), small_camera, s.T_world_camera);
+    const auto counted = applied.apply(voxels);
+    CHECK(counted.free == at_once.free);
+    CHECK(counted.occupied == at_once.occupied);
+    CHECK(ot_bytes(applied) == ot_bytes(integrated));
     history.set(frame, voxels);
   }
   if (!test::counts_allocations()) return;

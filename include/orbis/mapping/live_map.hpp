@@ -378,7 +378,7 @@ class live_map {
     image<std::uint16_t> depth, edited;
     result<void> read;
     octree::scan_marker marker;
-    octree::scan_voxels voxels;
+    octree::scan voxels;
   };
 
   /// Inserts an image into the map, but not into `depths_`.

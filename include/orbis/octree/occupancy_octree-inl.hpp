@@ -8,6 +8,7 @@
 #include <orbis/octree/detail/storage/apply_scan.hpp>
 #include <orbis/octree/detail/storage/palette_kernels.hpp>
 #include <orbis/octree/occupancy_octree.hpp>
+#include <orbis/octree/scan.hpp>
 
 namespace orbis::octree {
 
@@ -49,6 +50,17 @@ integration_summary occupancy_octree<Model>::integrate_depth(const parallel_poli
   const detail::scan_masks& masks = detail::mark_depth(policy, buffers, grid_, scan, T_world_camera, options, summary,
                                                        detail::saturated_in<Model>(store_));
   detail::apply_scan<Model>(store_, masks, summary, track_.on ? &track_.log : nullptr);
+  return summary;
+}
+
+template <sensor_model Model>
+integration_summary occupancy_octree<Model>::apply(const scan& voxels) {
+  begin_change();
+  integration_summary summary;
+  for (const scan::part& p : voxels.parts())
+    detail::apply_brick<Model>(
+        store_, p.name, [&](const auto& visit) { voxels.for_each_octant(p, visit); }, summary,
+        track_.on ? &track_.log : nullptr);
   return summary;
 }
 

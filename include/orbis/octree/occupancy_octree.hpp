@@ -48,6 +48,8 @@ namespace orbis::octree {
 /// stored value of voxel i, in Morton order (morton_code(key) & 63); bit i of `known` is set if the voxel is known.
 using detail::block;
 
+class scan;  // scan.hpp
+
 /// A leaf of the pruned octree: a cube of voxels with equal log-odds.
 template <class T>
 struct octree_leaf {
@@ -123,6 +125,11 @@ class occupancy_octree {
                                 const integration_options& options = {}) {
     return integrate(seq, depth, camera, T_world_camera, options);
   }
+
+  /// Applies the voxels of a scan that was marked before, for example on another thread (see scan_marker): `integrate`
+  /// is marking and applying. Returns the numbers of voxels observed free and occupied. O(bricks observed).
+  /// @pre the scan was marked for this grid
+  integration_summary apply(const scan& voxels);
 
   /// Calls `change(store, log)` with the storage, as one revision of the change log, for the library's own algorithms:
   /// the type of the store is internal and may change. `change` must record every voxel that it changes in `log`; `log`

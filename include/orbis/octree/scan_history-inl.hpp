@@ -10,8 +10,8 @@
 #include <orbis/octree/detail/storage/apply_scan.hpp>
 #include <orbis/octree/detail/storage/brick.hpp>
 #include <orbis/octree/occupancy_octree-inl.hpp>
+#include <orbis/octree/scan-inl.hpp>
 #include <orbis/octree/scan_history.hpp>
-#include <orbis/octree/scan_voxels-inl.hpp>
 #include <orbis/octree/sensor_model.hpp>
 
 namespace orbis::octree {
@@ -38,8 +38,8 @@ void replay_brick(const brick_store<typename Model::value_type>& store, const us
     out.octants[i].known = 0;
   }
   for (const brick_use& u : b.uses) {
-    const scan_voxels& scan = voxels_of(u.scan);
-    scan.for_each_octant(scan.parts()[u.part], [&](unsigned i, std::uint64_t free, std::uint64_t occupied) {
+    const scan& seen = voxels_of(u.scan);
+    seen.for_each_octant(seen.parts()[u.part], [&](unsigned i, std::uint64_t free, std::uint64_t occupied) {
       if ((b.stale >> i & 1U) != 0) update_block<Model>(out.octants[i], free, occupied);
     });
   }
@@ -81,10 +81,10 @@ bool store_replayed(brick_store<T>& store, std::uint64_t name, const replayed_br
 
 namespace detail {
 
-[[nodiscard]] inline unsigned octants_of(const scan_voxels::part& p) noexcept { return p.free | p.occupied | p.full; }
+[[nodiscard]] inline unsigned octants_of(const scan::part& p) noexcept { return p.free | p.occupied | p.full; }
 /// Mask of the octants of a brick for which the observations of two scans differ.
-[[nodiscard]] inline unsigned different_octants(const scan_voxels& a, const scan_voxels::part& in_a,
-                                                const scan_voxels& b, const scan_voxels::part& in_b) noexcept {
+[[nodiscard]] inline unsigned different_octants(const scan& a, const scan::part& in_a, const scan& b,
+                                                const scan::part& in_b) noexcept {
   const auto x = a.masks(in_a), y = b.masks(in_b);
   unsigned different = 0;
   for (unsigned i = 0; i != 8; ++i)
@@ -95,7 +95,7 @@ namespace detail {
 }  // namespace detail
 
 template <replayable_octree Octree>
-void scan_history<Octree>::set(std::uint64_t frame, const scan_voxels& voxels) {
+void scan_history<Octree>::set(std::uint64_t frame, const scan& voxels) {
   const std::uint32_t number = make_scan(frame);
   change_uses(number, voxels);
   scans_[number].voxels = voxels;
@@ -115,7 +115,7 @@ bool scan_history<Octree>::remove(std::uint64_t frame) {
 }
 
 template <replayable_octree Octree>
-const scan_voxels* scan_history<Octree>::find_scan(std::uint64_t frame) const noexcept {
+const scan* scan_history<Octree>::find_scan(std::uint64_t frame) const noexcept {
   const auto at = std::lower_bound(order_.begin(), order_.end(), frame, is_before);
   return at == order_.end() || at->frame != frame ? nullptr : &scans_[at->number].voxels;
 }
@@ -138,9 +138,9 @@ std::size_t scan_history<Octree>::replay_stale(const parallel_policy& policy, co
 
 template <replayable_octree Octree>
 std::size_t scan_history<Octree>::bytes() const noexcept {
-  std::size_t n = uses_.bytes() + scans_.capacity() * sizeof(scan) + order_.capacity() * sizeof(place) +
+  std::size_t n = uses_.bytes() + scans_.capacity() * sizeof(entry) + order_.capacity() * sizeof(place) +
                   (free_.capacity() + fresh_.capacity()) * sizeof(std::uint32_t);
-  for (const scan& s : scans_) n += s.voxels.bytes();
+  for (const entry& s : scans_) n += s.voxels.bytes();
   return n;
 }
 
@@ -176,11 +176,11 @@ auto scan_history<Octree>::place_of(std::vector<detail::brick_use>& uses, std::u
 }
 
 template <replayable_octree Octree>
-void scan_history<Octree>::change_uses(std::uint32_t number, const scan_voxels& after) {
-  const scan& s = scans_[number];
+void scan_history<Octree>::change_uses(std::uint32_t number, const scan& after) {
+  const entry& s = scans_[number];
   const auto old_parts = s.voxels.parts(), new_parts = after.parts();
   std::size_t i = 0;
-  const auto drop = [&](const scan_voxels::part& p) {
+  const auto drop = [&](const scan::part& p) {
     const std::uint32_t brick = uses_.number_of(p.name);
     auto& uses = uses_[brick].uses;
     uses.erase(place_of(uses, s.frame));
@@ -188,7 +188,7 @@ void scan_history<Octree>::change_uses(std::uint32_t number, const scan_voxels& 
   };
   fresh_.clear();
   for (std::uint32_t j = 0; j != new_parts.size(); ++j) {
-    const scan_voxels::part& p = new_parts[j];
+    const scan::part& p = new_parts[j];
     for (; i != old_parts.size() && old_parts[i].name < p.name; ++i) drop(old_parts[i]);
     const std::uint32_t brick = uses_.number_of(p.name);
     auto& uses = uses_[brick].uses;
@@ -211,16 +211,13 @@ void scan_history<Octree>::change_uses(std::uint32_t number, const scan_voxels& 
 template <replayable_octree Octree>
 void scan_history<Octree>::apply_fresh(std::uint32_t number) {
   if (fresh_.empty()) return;
-  const scan_voxels& voxels = scans_[number].voxels;
+  const scan& voxels = scans_[number].voxels;
   map_.change_store([&](auto& store, change_log* log) {
+    integration_summary counted;
     for (const std::uint32_t i : fresh_) {
-      const scan_voxels::part& p = voxels.parts()[i];
-      const voxel_key key = detail::named_key(p.name);
-      auto& b = store.make(key);
-      voxels.for_each_octant(p, [&](unsigned octant, std::uint64_t free, std::uint64_t occupied) {
-        const std::uint64_t changed = detail::apply_octant<model>(store, b, octant, occupied, free).changed;
-        if (log != nullptr) log->record(child_key(key, octant, node_cells(detail::octant_level)), changed);
-      });
+      const scan::part& p = voxels.parts()[i];
+      detail::apply_brick<model>(
+          store, p.name, [&](const auto& visit) { voxels.for_each_octant(p, visit); }, counted, log);
     }
   });
 }
@@ -230,7 +227,7 @@ void scan_history<Octree>::replay_first(const parallel_policy& policy, detail::b
                                         change_log* log, std::size_t count) {
   if (replayed_.size() < count) replayed_.resize(count);
   const auto stale = uses_.stale().first(count);
-  const auto voxels_of = [&](std::uint32_t number) -> const scan_voxels& { return scans_[number].voxels; };
+  const auto voxels_of = [&](std::uint32_t number) -> const scan& { return scans_[number].voxels; };
   for_each_index(policy, count, 4,
                  [&](std::size_t i) { detail::replay_brick<model>(store, uses_[stale[i]], voxels_of, replayed_[i]); });
   unknown_.clear();

@@ -29,7 +29,7 @@
 #include <orbis/octree/detail/mark/scan_scratch.hpp>
 #include <orbis/octree/integration.hpp>
 #include <orbis/octree/occupancy_octree.hpp>
-#include <orbis/octree/scan_voxels.hpp>
+#include <orbis/octree/scan.hpp>
 
 namespace orbis::octree {
 
@@ -112,11 +112,11 @@ class scan_history {
   /// Sets the scan of `frame` to voxels that were marked earlier, for example on another thread. O(bricks observed
   /// before and now x log(scans that use a brick)).
   /// @pre `voxels` were marked for this grid
-  void set(std::uint64_t frame, const scan_voxels& voxels);
+  void set(std::uint64_t frame, const scan& voxels);
   /// Removes a scan; the octants it observed become stale. Returns true if it existed. O(its bricks + scans).
   bool remove(std::uint64_t frame);
   /// Returns the voxels of a scan, valid until it changes; null if the scan does not exist. O(log scans).
-  [[nodiscard]] const scan_voxels* find_scan(std::uint64_t frame) const noexcept;
+  [[nodiscard]] const scan* find_scan(std::uint64_t frame) const noexcept;
   [[nodiscard]] bool contains(std::uint64_t frame) const noexcept { return find_scan(frame) != nullptr; }
   /// Number of scans.
   [[nodiscard]] std::size_t size() const noexcept { return order_.size(); }
@@ -144,9 +144,9 @@ class scan_history {
   using value_type = typename Octree::value_type;
   static constexpr std::size_t batch = 64;  ///< bricks that one thread replays before they are stored
 
-  struct scan {
+  struct entry {
     std::uint64_t frame = 0;
-    scan_voxels voxels;
+    scan voxels;
   };
   struct place {
     std::uint64_t frame;
@@ -162,7 +162,7 @@ class scan_history {
                                                                   std::uint64_t frame) const noexcept;
   /// Updates the bricks' lists of scans from the old voxels of scan `number` to `after`. If the scan is the newest of a
   /// brick, apply_fresh handles the brick; otherwise octants become stale.
-  void change_uses(std::uint32_t number, const scan_voxels& after);
+  void change_uses(std::uint32_t number, const scan& after);
   /// Applies the parts of a scan that are the newest in their bricks.
   void apply_fresh(std::uint32_t number);
   std::size_t replay_stale(const parallel_policy& policy, const replay_limits& limits);
@@ -170,13 +170,13 @@ class scan_history {
   void replay_first(const parallel_policy& policy, detail::brick_store<value_type>& store, change_log* log,
                     std::size_t count);
   Octree map_;
-  std::vector<scan> scans_;          ///< by number
+  std::vector<entry> scans_;         ///< by number
   std::vector<std::uint32_t> free_;  ///< unused numbers
   std::vector<place> order_;         ///< by frame
   detail::brick_uses uses_;
 
   scan_marker marker_;
-  scan_voxels marked_;
+  scan marked_;
   std::vector<std::uint32_t> fresh_;  ///< parts of the current scan that are the newest in their bricks
   std::vector<detail::replayed_brick<value_type>> replayed_;
   std::vector<std::uint64_t> unknown_;  ///< bricks whose voxels have all become unknown

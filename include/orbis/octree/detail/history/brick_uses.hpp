@@ -24,7 +24,7 @@ struct replayed_brick {
   std::array<std::uint64_t, 8> changed{};  ///< zero for octants that were not replayed
 };
 
-/// One scan's part of a brick: the scan's number and the part's index in scan_voxels::parts().
+/// One scan's part of a brick: the scan's number and the part's index in octree::scan::parts().
 struct brick_use {
   std::uint32_t scan, part;
 };

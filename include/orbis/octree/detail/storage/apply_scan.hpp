@@ -98,28 +98,39 @@ octant_change apply_octant(brick_store<typename Model::value_type>& store, brick
   return {changed, free};
 }
 
-/// Applies a scan: a hit to every voxel marked occupied, a miss to every other one marked free. Counts them in
-/// `summary`, and records the changes in `log` unless it is null.
+/// Applies the observations of one brick: a hit to every occupied voxel, a miss to every free one. `for_each(visit)`
+/// calls `visit(octant, free, occupied)` with disjoint masks. Counts the voxels in `summary`, and records the changes
+/// in `log` unless it is null.
+template <sensor_model Model, class ForEachOctant>
+void apply_brick(brick_store<typename Model::value_type>& store, std::uint64_t name, const ForEachOctant& for_each,
+                 integration_summary& summary, change_log* log) {
+  const voxel_key key = named_key(name);
+  bool matters = !is_saturated_leaf<Model>(store, key);
+  for_each([&](std::uint32_t, std::uint64_t, std::uint64_t occupied) {
+    summary.occupied += static_cast<std::size_t>(std::popcount(occupied));
+    matters = matters || occupied != 0;
+  });
+  if (!matters) return;  // a large leaf is split only if one of its voxels changes
+  auto& b = store.make(key);
+  for_each([&](std::uint32_t octant, std::uint64_t free, std::uint64_t occupied) {
+    const auto [changed, missed] = apply_octant<Model>(store, b, octant, occupied, free);
+    summary.free += static_cast<std::size_t>(std::popcount(missed));
+    if (log != nullptr) log->record(child_key(key, octant, node_cells(octant_level)), changed);
+  });
+}
+
+/// Applies the masks of a scan, in which a voxel both free and occupied counts as occupied; see apply_brick.
 template <sensor_model Model>
 void apply_scan(brick_store<typename Model::value_type>& store, const scan_masks& scan, integration_summary& summary,
                 change_log* log) {
-  for (const scan_brick& s : scan.bricks()) {
-    const voxel_key key = named_key(s.name);
-    bool matters = !is_saturated_leaf<Model>(store, key);
-    for (std::uint32_t i = 0; i != 8; ++i) {
-      const std::uint64_t occupied = s.occupied[i];
-      summary.occupied += static_cast<std::size_t>(std::popcount(occupied));
-      matters = matters || occupied != 0;
-    }
-    if (!matters) continue;  // a large leaf is split only if one of its voxels changes
-    auto& b = store.make(key);
-    for (std::uint32_t i = 0; i != 8; ++i) {
-      if ((s.occupied[i] | s.free[i]) == 0) continue;
-      const auto [changed, missed] = apply_octant<Model>(store, b, i, s.occupied[i], s.free[i] & ~s.occupied[i]);
-      summary.free += static_cast<std::size_t>(std::popcount(missed));
-      if (log != nullptr) log->record(child_key(key, i, node_cells(octant_level)), changed);
-    }
-  }
+  for (const scan_brick& s : scan.bricks())
+    apply_brick<Model>(
+        store, s.name,
+        [&](const auto& visit) {
+          for (std::uint32_t i = 0; i != 8; ++i)
+            if ((s.occupied[i] | s.free[i]) != 0) visit(i, s.free[i] & ~s.occupied[i], s.occupied[i]);
+        },
+        summary, log);
 }
 
 }  // namespace orbis::octree::detail

@@ -31,7 +31,7 @@ class scan_masks;
 /// The voxels that one scan observes free and occupied: two disjoint sets, as bit masks of octants of 4x4x4 voxels,
 /// grouped by bricks of 8x8x8. A mask is stored only if it is neither empty nor a completely free octant. A depth image
 /// of 640x480 pixels takes about 10 kB at 5 cm and 100 kB at 2 cm.
-class scan_voxels {
+class scan {
  public:
   /// One brick. In the 8-bit masks, bit i is octant i.
   struct part {
@@ -90,7 +90,7 @@ class scan_voxels {
     parts_.clear();
     words_.clear();
   }
-  friend bool operator==(const scan_voxels&, const scan_voxels&) = default;
+  friend bool operator==(const scan&, const scan&) = default;
 
  private:
   friend class scan_marker;
@@ -102,7 +102,10 @@ class scan_voxels {
   std::vector<std::uint64_t> words_;
 };
 
-/// Finds the voxels that `occupancy_octree::integrate` would observe free and occupied, without a map. Reuses its
+using scan_voxels [[deprecated("use octree::scan")]] = scan;
+
+/// Finds the voxels that `occupancy_octree::integrate` would observe free and occupied, without a map; see
+/// occupancy_octree::apply and scan_history::set. Reuses its
 /// buffers: marking allocates nothing once they have grown. Use one marker per thread.
 class scan_marker {
  public:
@@ -112,14 +115,14 @@ class scan_marker {
   /// @pre depth and camera have the same size
   template <execution_policy Policy, camera::depth_source Depth, camera::camera_model Camera>
   integration_summary mark(const Policy& policy, const voxel_grid& grid, const Depth& depth, const Camera& camera,
-                           const se3& T_world_camera, const integration_options& options, scan_voxels& voxels) {
+                           const se3& T_world_camera, const integration_options& options, scan& voxels) {
     return mark_depth(detail::as_parallel(policy), grid, detail::depth_scan{depth, camera}, T_world_camera, options,
                       voxels);
   }
   /// Marks points in the world frame (metres), seen from `origin`. O(points x voxels per ray).
   template <execution_policy Policy, point_range Points, point_like Origin>
   integration_summary mark(const Policy& policy, const voxel_grid& grid, const Points& points, const Origin& origin,
-                           const integration_options& options, scan_voxels& voxels) {
+                           const integration_options& options, scan& voxels) {
     return mark_points(detail::as_parallel(policy), grid, scratch_.view(points), coordinates<float>(origin), options,
                        voxels);
   }
@@ -130,14 +133,13 @@ class scan_marker {
 
  private:
   template <class Policy>
-  integration_summary mark_depth(const Policy& policy, const voxel_grid& grid, const detail::depth_scan& scan,
-                                 const se3& T_world_camera, const integration_options& options, scan_voxels& voxels);
+  integration_summary mark_depth(const Policy& policy, const voxel_grid& grid, const detail::depth_scan& image,
+                                 const se3& T_world_camera, const integration_options& options, scan& voxels);
   template <class Policy>
   integration_summary mark_points(const Policy& policy, const voxel_grid& grid, const detail::point_view& points,
-                                  const std::array<float, 3>& origin, const integration_options& options,
-                                  scan_voxels& voxels);
+                                  const std::array<float, 3>& origin, const integration_options& options, scan& voxels);
   /// Packs the masks of a scan, and counts its voxels.
-  void pack(const detail::scan_masks& masks, scan_voxels& voxels, integration_summary& summary);
+  void pack(const detail::scan_masks& masks, scan& voxels, integration_summary& summary);
 
   detail::scan_scratch scratch_;
   std::vector<std::pair<std::uint64_t, std::uint32_t>> order_;
@@ -146,5 +148,5 @@ class scan_marker {
 }  // namespace orbis::octree
 
 #ifndef ORBIS_COMPILED
-#include <orbis/octree/scan_voxels-inl.hpp>
+#include <orbis/octree/scan-inl.hpp>
 #endif

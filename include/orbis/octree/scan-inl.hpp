@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The functions of scan_voxels.hpp.
+/// The functions of scan.hpp.
 #pragma once
 
 #include <algorithm>
@@ -10,11 +10,11 @@
 #include <orbis/octree/detail/mark/scan_buffers.hpp>
 #include <orbis/octree/detail/storage/palette_kernels.hpp>
 #include <orbis/octree/detail/storage/scan_masks.hpp>
-#include <orbis/octree/scan_voxels.hpp>
+#include <orbis/octree/scan.hpp>
 
 namespace orbis::octree {
 
-ORBIS_INLINE void scan_voxels::add(const detail::scan_brick& b) {
+ORBIS_INLINE void scan::add(const detail::scan_brick& b) {
   part p{.name = b.name, .first = static_cast<std::uint32_t>(words_.size())};
   for (unsigned i = 0; i != 8; ++i) {
     const auto bit = static_cast<std::uint8_t>(1U << i);
@@ -34,8 +34,7 @@ ORBIS_INLINE void scan_voxels::add(const detail::scan_brick& b) {
   if ((p.free | p.occupied | p.full) != 0) parts_.push_back(p);
 }
 
-ORBIS_INLINE void scan_marker::pack(const detail::scan_masks& masks, scan_voxels& voxels,
-                                    integration_summary& summary) {
+ORBIS_INLINE void scan_marker::pack(const detail::scan_masks& masks, scan& voxels, integration_summary& summary) {
   const std::vector<detail::scan_brick>& bricks = masks.bricks();
   order_.resize(bricks.size());
   for (std::uint32_t i = 0; i != bricks.size(); ++i) order_[i] = {bricks[i].name, i};
@@ -53,11 +52,11 @@ ORBIS_INLINE void scan_marker::pack(const detail::scan_masks& masks, scan_voxels
 
 template <class Policy>
 integration_summary scan_marker::mark_depth(const Policy& policy, const voxel_grid& grid,
-                                            const detail::depth_scan& scan, const se3& T_world_camera,
-                                            const integration_options& options, scan_voxels& voxels) {
+                                            const detail::depth_scan& image, const se3& T_world_camera,
+                                            const integration_options& options, scan& voxels) {
   integration_summary summary;
   const detail::scan_masks& masks =
-      detail::mark_depth(policy, scratch_.get<detail::scan_buffers>(), grid, scan, T_world_camera, options, summary);
+      detail::mark_depth(policy, scratch_.get<detail::scan_buffers>(), grid, image, T_world_camera, options, summary);
   pack(masks, voxels, summary);
   return summary;
 }
@@ -65,7 +64,7 @@ integration_summary scan_marker::mark_depth(const Policy& policy, const voxel_gr
 template <class Policy>
 integration_summary scan_marker::mark_points(const Policy& policy, const voxel_grid& grid,
                                              const detail::point_view& points, const std::array<float, 3>& origin,
-                                             const integration_options& options, scan_voxels& voxels) {
+                                             const integration_options& options, scan& voxels) {
   detail::point_integrator& marker = scratch_.get<detail::scan_buffers>().points;
   integration_summary summary = marker.mark(policy, grid, points, origin, options);
   pack(marker.masks(), voxels, summary);
