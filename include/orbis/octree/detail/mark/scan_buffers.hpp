@@ -5,6 +5,7 @@
 
 #include <cstddef>
 #include <limits>
+#include <memory>
 
 #include <orbis/core/execution.hpp>
 #include <orbis/core/point.hpp>
@@ -20,11 +21,12 @@ namespace orbis::octree::detail {
 
 struct scan_buffers {
   point_integrator points;
-  depth_integrator depth;
+  std::unique_ptr<depth_integrator> depth;  ///< made by the first image: programs without images do not compile it
   scan_masks masks;
 
   [[nodiscard]] std::size_t memory_bytes() const noexcept {
-    return sizeof(scan_buffers) + points.memory_bytes() + depth.memory_bytes() + masks.memory_bytes();
+    return sizeof(scan_buffers) + points.memory_bytes() + (depth ? sizeof(*depth) + depth->memory_bytes() : 0) +
+           masks.memory_bytes();
   }
 };
 
@@ -34,12 +36,13 @@ const scan_masks& mark_depth(const Policy& policy, scan_buffers& buffers, const 
                              const depth_scan& scan, const se3& T_world_camera, const integration_options& options,
                              integration_summary& summary, const saturated_voxels& saturated = {}) {
   scan_masks& masks = buffers.masks;
+  if (buffers.depth == nullptr) buffers.depth = std::make_unique<depth_integrator>();
   if (options.mode == ray_mode::every_ray) {
     bool needs_rays = false;
-    summary = buffers.depth.mark(policy, grid, scan, T_world_camera, options, masks, saturated, needs_rays);
+    summary = buffers.depth->mark(policy, grid, scan, T_world_camera, options, masks, saturated, needs_rays);
     if (needs_rays) {
       const float3 origin = camera::float_pose{T_world_camera}.centre;
-      buffers.points.mark(policy, grid, buffers.depth.points(scan, T_world_camera), origin, options, saturated);
+      buffers.points.mark(policy, grid, buffers.depth->points(scan, T_world_camera), origin, options, saturated);
       masks.merge(buffers.points.masks());
     }
     return masks;
@@ -47,7 +50,7 @@ const scan_masks& mark_depth(const Policy& policy, scan_buffers& buffers, const 
   // The range test applies to a voxel's centre, not to its points.
   integration_options unlimited = options;
   unlimited.max_range = std::numeric_limits<double>::infinity();
-  const std::size_t rejected = buffers.depth.mark_ends(policy, grid, scan, T_world_camera, unlimited, masks).rejected;
+  const std::size_t rejected = buffers.depth->mark_ends(policy, grid, scan, T_world_camera, unlimited, masks).rejected;
   const float3 origin = coordinates<float>(T_world_camera.translation());
   summary = buffers.points.mark_centers(policy, grid, masks, origin, options);
   summary.rejected += rejected;
