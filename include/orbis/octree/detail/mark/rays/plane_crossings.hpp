@@ -156,7 +156,8 @@ struct mark_crossings_kernel {
         const mask unsure = alive & (is_close(part_u, part_v) | (both & (abs(order) <= order_doubt)));
         doubtful_lanes = doubtful_lanes | unsure;
         alive = and_not(alive, unsure);
-        if (const mask through = both & alive; any(through)) {
+        // On AVX-512 compressing costs less than a branch that is predicted wrongly.
+        if (const mask through = both & alive; Target::bytes == 64 || any(through)) {
           const integers corner = last ^ (changed & select(order > 0.0F, bits_u, bits_v));
           waiting += simd::compress_store(between.data() + waiting, corner + layer, through);
         }
