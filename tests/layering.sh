@@ -34,6 +34,15 @@ while IFS=: read -r file line text; do
   [[ -n ${allowed[$component]+known} ]] || complain "$file:$line: $component is in no layer"
 done <<<"$(grep -rnE '^ *# *include *<orbis/' --include='*.hpp' . | sed 's|^\./||' | grep '/.*:.*:')"
 
+# Folders of octree/detail: each includes only those before it.
+order=(storage mark/rays mark/depth mark/windows mark)
+for ((i = 0; i != ${#order[@]}; ++i)); do
+  for ((j = i + 1; j != ${#order[@]}; ++j)); do
+    hits=$(grep -nE "^ *# *include *<orbis/octree/detail/${order[j]}/[^/>]*>" "octree/detail/${order[i]}"/*.hpp || true)
+    [[ -z $hits ]] || complain "$hits: included by a folder that comes before"
+  done
+done
+
 # The detail/ of a component is private: no umbrella header, other component, document or example includes it, and no
 # document mentions it.
 private() {  # <pattern, whose first group is the component> <where>...
