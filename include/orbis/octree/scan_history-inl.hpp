@@ -77,10 +77,6 @@ bool store_replayed(brick_store<T>& store, std::uint64_t name, const replayed_br
   return b.is_known();
 }
 
-}  // namespace detail
-
-namespace detail {
-
 [[nodiscard]] inline unsigned octants_of(const scan::part& p) noexcept { return p.free | p.occupied | p.full; }
 /// Mask of the octants of a brick for which the observations of two scans differ.
 [[nodiscard]] inline unsigned different_octants(const scan& a, const scan::part& in_a, const scan& b,
