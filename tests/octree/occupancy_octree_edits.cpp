@@ -23,7 +23,7 @@ using namespace orbis::octree::detail;
 namespace {
 
 template <class Map>
-void scan(Map& map, random_bits& random, int scans) {
+void add_scans(Map& map, random_bits& random, int scans) {
   for (int i = 0; i != scans; ++i) {
     const vec3f origin = test::random_points(random, 1, 0.4)[0];
     map.integrate(test::shell_scan(random, 600, origin), origin);
@@ -53,7 +53,7 @@ TEST_CASE("Maximum likelihood is OctoMap's") {
 TEST_CASE("Values can be changed and forgotten all over the map") {
   random_bits random{42};
   occupancy_octree<> map{0.1};
-  scan(map, random, 5);
+  add_scans(map, random, 5);
   const occupancy_octree<> before = map;
   map.transform([](float v) { return v < -1.0F ? std::nullopt : std::optional{v * 0.5F}; });
   std::size_t halved = 0, forgotten = 0;
@@ -74,7 +74,7 @@ TEST_CASE("Values can be changed and forgotten all over the map") {
 TEST_CASE("A rolling window evicts what lies outside and takes it back") {
   random_bits random{43};
   occupancy_octree<> map{0.05};
-  scan(map, random, 4);
+  add_scans(map, random, 4);
   map.set_unknown_node({32768 + 1024, 32768, 32768}, 10, -0.5F);  // a large leaf, 51 m away
   const auto whole = ot_bytes(map);
   const std::size_t leaves = map.num_leaves();
@@ -131,7 +131,7 @@ TEST_CASE("Memory stays bounded behind a rolling window") {
 TEST_CASE("A copy is a snapshot that does not change and costs little memory of its own") {
   random_bits random{45};
   occupancy_octree<> map{0.05};
-  scan(map, random, 4);
+  add_scans(map, random, 4);
   const occupancy_octree<> snapshot = map;
   const auto bytes = ot_bytes(snapshot);
   CHECK(snapshot.buffer_bytes() == 0);
@@ -142,11 +142,11 @@ TEST_CASE("A copy is a snapshot that does not change and costs little memory of 
     ++shared;
   });
   CHECK(shared > 100);
-  scan(map, random, 4);
+  add_scans(map, random, 4);
   CHECK(ot_bytes(snapshot) == bytes);
   CHECK(ot_bytes(map) != bytes);
   occupancy_octree<> fork = snapshot;
-  scan(fork, random, 1);
+  add_scans(fork, random, 1);
   CHECK(ot_bytes(snapshot) == bytes);
 }
 
@@ -182,7 +182,7 @@ TEST_CASE("Readers on other threads use snapshots while the writer goes on") {
       }
     });
   for (int i = 1; i <= scans; ++i) {
-    scan(map, random, 1);
+    add_scans(map, random, 1);
     leaves[static_cast<std::size_t>(i)] = map.num_leaves();
     hits[static_cast<std::size_t>(i)] = rays_that_hit(map);
     const std::lock_guard lock{guard};
@@ -246,10 +246,10 @@ TEST_CASE("A mirror that applies the logged changes stays the same map") {
       case 2: {
         const vec3 half = vec3::Constant(round == 2 ? 1.0 : 0.8);
         CHECK(map.evict_outside({-half, half}, [](const auto&) {}) > 0);
-        scan(map, random, 2);
+        add_scans(map, random, 2);
         break;
       }
-      default: scan(map, random, 2); break;
+      default: add_scans(map, random, 2); break;
     }
     update();
     known += map.num_leaves();
@@ -363,7 +363,7 @@ TEST_CASE("Pruning merges equal bricks and a scan through a saturated leaf does 
 
   random_bits random{49};
   occupancy_octree<> room{0.1};
-  scan(room, random, 8);
+  add_scans(room, random, 8);
   const auto bytes_of_room = ot_bytes(room);
   room.prune();
   CHECK(ot_bytes(room) == bytes_of_room);
