@@ -35,7 +35,7 @@ while IFS=: read -r file line text; do
 done <<<"$(grep -rnE '^ *# *include *<orbis/' --include='*.hpp' . | sed 's|^\./||' | grep '/.*:.*:')"
 
 # Folders of octree/detail: each includes only those before it.
-order=(storage mark/rays mark/depth mark/windows mark)
+order=(storage mark/rays mark/depth mark/windows mark/organised mark)
 for ((i = 0; i != ${#order[@]}; ++i)); do
   for ((j = i + 1; j != ${#order[@]}; ++j)); do
     hits=$(grep -nE "^ *# *include *<orbis/octree/detail/${order[j]}/[^/>]*>" "octree/detail/${order[i]}"/*.hpp || true)

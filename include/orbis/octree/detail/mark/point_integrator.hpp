@@ -19,6 +19,7 @@
 
 #include <orbis/core/execution.hpp>
 #include <orbis/core/rounded.hpp>
+#include <orbis/octree/detail/mark/organised/organised_rays.hpp>
 #include <orbis/octree/detail/mark/rays/limit_rays.hpp>
 #include <orbis/octree/detail/mark/rays/point_keys.hpp>
 #include <orbis/octree/detail/mark/rays/ray_rasterizer.hpp>
@@ -49,11 +50,16 @@ class point_integrator {
     if (!is_finite(origin)) return {.used = 0, .truncated = 0, .rejected = count};
     const sensor from = start(grid, origin, options);
     if (options.mode == ray_mode::every_ray) {
-      if (from.key && dense_.plan(grid, origin, count, point, from.max_range)) {
-        if (const auto done = mark_dense(policy, from, point, saturated)) return *done;
+      const auto done_by = [&](auto& marker) -> std::optional<integration_summary> {
+        if (!from.key || !marker.plan(grid, origin, count, point, from.max_range)) return std::nullopt;
+        auto done = mark_by(marker, policy, from, point, saturated);
+        if (done) return done;
         for (worker& w : active_) w.clear();
         start(grid, origin, options);
-      }
+        return std::nullopt;
+      };
+      if (const auto done = done_by(organised_)) return *done;
+      if (const auto done = done_by(dense_)) return *done;
       for_each_with_worker(policy, count, 4096, [&](worker& w, std::size_t begin, std::size_t end) {
         w.add_points(from, begin, end, point, [](std::size_t, std::size_t) {});
       });
@@ -78,7 +84,7 @@ class point_integrator {
   }
 
   [[nodiscard]] std::size_t memory_bytes() const noexcept {
-    std::size_t bytes = workers_.capacity() * sizeof(worker) + dense_.memory_bytes();
+    std::size_t bytes = workers_.capacity() * sizeof(worker) + organised_.memory_bytes() + dense_.memory_bytes();
     for (const worker& w : workers_) bytes += w.masks.memory_bytes() + w.ends.memory_bytes() + w.sweep.memory_bytes();
     return bytes;
   }
@@ -226,13 +232,13 @@ class point_integrator {
     });
     for (worker& w : active_) w.add_batched(from);
   }
-  /// Marks a scan by the plan of dense_; empty on failure.
-  template <class Policy>
-  std::optional<integration_summary> mark_dense(const Policy& policy, const sensor& from, const point_source& point,
-                                                const saturated_voxels& saturated) {
+  /// Marks a scan by the plan of organised_ or dense_; empty on failure.
+  template <class Marker, class Policy>
+  std::optional<integration_summary> mark_by(Marker& marker, const Policy& policy, const sensor& from,
+                                             const point_source& point, const saturated_voxels& saturated) {
     const std::size_t count = point.count;
     const std::size_t workers = active_.size();
-    dense_.start(from.origin, count, workers);
+    marker.start(from.origin, count, workers);
     const auto range = [&](std::size_t i) {
       const std::size_t share = (count / workers + point_batch::capacity) & ~(point_batch::capacity - 1);
       return std::pair{std::min(count, i * share), std::min(count, (i + 1) * share)};
@@ -240,7 +246,7 @@ class point_integrator {
     for_each_index(policy, workers, 1, [&](std::size_t i) {
       worker& w = workers_[i];
       const auto [begin, end] = range(i);
-      w.add_points(from, begin, end, point, [&](std::size_t first, std::size_t n) { dense_.add(i, w.rays, first, n); });
+      w.add_points(from, begin, end, point, [&](std::size_t first, std::size_t n) { marker.add(i, w.rays, first, n); });
       w.sweep.flush(w.masks);
     });
     worker& all = join_workers();
@@ -248,7 +254,7 @@ class point_integrator {
                                static_cast<double>(from.origin[2])}};
     const depth_sensor camera{from.grid, pose, from.max_range};
     const auto end_of = [&](std::uint32_t i) { return from.end(point(i)); };
-    if (!dense_.mark(policy, camera, range, end_of, all.masks, saturated)) return std::nullopt;
+    if (!marker.mark(policy, camera, range, end_of, all.masks, saturated)) return std::nullopt;
     return all.summary;
   }
   template <class Policy>
@@ -277,6 +283,7 @@ class point_integrator {
     });
   }
 
+  organised_rays organised_;
   dense_rays dense_;
   std::vector<worker> workers_ = std::vector<worker>(1);  ///< never shrinks, to keep the memory
   std::span<worker> active_;                              ///< workers of the current scan

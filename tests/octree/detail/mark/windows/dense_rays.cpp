@@ -14,7 +14,7 @@
 #include <orbis/octree/detail/mark/point_integrator.hpp>
 #include <orbis/octree/detail/mark/windows/dense_rays.hpp>
 
-#include "octree/detail/mark/windows/scan_walk.hpp"
+#include "octree/detail/mark/scan_walk.hpp"
 #include "support/allocations.hpp"
 #include "support/catch.hpp"
 

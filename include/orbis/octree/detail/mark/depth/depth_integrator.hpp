@@ -4,109 +4,22 @@
 /// instead of ray by ray, and are exactly those that the traversal of every ray finds.
 #pragma once
 
-#include <algorithm>
 #include <cstddef>
-#include <cstdint>
 #include <limits>
 #include <utility>
-#include <vector>
 
 #include <orbis/core/execution.hpp>
 #include <orbis/core/se3.hpp>
-#include <orbis/core/simd.hpp>
-#include <orbis/octree/detail/mark/depth/depth_descent.hpp>
-#include <orbis/octree/detail/mark/depth/depth_pyramid.hpp>
+#include <orbis/octree/detail/mark/depth/depth_frame.hpp>
 #include <orbis/octree/detail/mark/depth/depth_scan.hpp>
-#include <orbis/octree/detail/mark/depth/direction_index.hpp>
-#include <orbis/octree/detail/mark/depth/endpoint_image.hpp>
 #include <orbis/octree/detail/mark/depth/endpoint_rows.hpp>
 #include <orbis/octree/detail/mark/depth/first_steps.hpp>
-#include <orbis/octree/detail/mark/depth/view_frame.hpp>
-#include <orbis/octree/detail/mark/depth/voxel_ray_test.hpp>
 #include <orbis/octree/detail/mark/rays/point_keys.hpp>
 #include <orbis/octree/detail/mark/rays/ray_traversal.hpp>
 #include <orbis/octree/detail/storage/scan_masks.hpp>
 #include <orbis/octree/integration.hpp>
 
 namespace orbis::octree::detail {
-
-/// The view of a depth image: one ray per pixel. Fill `ends` and, for cameras other than pinholes, `map`; then call
-/// set_scene. See view_frame for the remaining steps.
-struct depth_frame : view_frame {
-  using sample_kernel = unsigned(const depth_scene&, const endpoint_image&, const child_offsets&, const float3&,
-                                 const children&, unsigned);
-  using test_kernel = bool(const endpoint_image&, const voxel_test&, const pixel_box&, float,
-                           std::vector<std::uint32_t>&);
-
-  chosen_kernel<sample_children_kernel, sample_kernel, simd::avx2> sample;
-  chosen_kernel<test_pixels_kernel, test_kernel> test_pixels;
-  endpoint_image ends;
-  direction_index map;  ///< for cameras other than pinholes
-
-  /// Computes the parameters of the tests.
-  /// @pre `ends` and, if needed, `map` belong to the image
-  void set_scene(const depth_sensor& sensor) {
-    const pixel_rays& rays = ends.rays();
-    const int width = rays.width(), height = rays.height();
-    if (rays.separable()) {
-      scene.map = nullptr;
-      const vec2f focal = rays.focal().cast<float>(), center = rays.center().cast<float>();
-      set_view(sensor, {focal.x(), focal.y(), center.x(), center.y(), width, height, rays.x(0)[0], rays.x(0)[width - 1],
-                        *rays.y(0), *rays.y(height - 1)});
-    } else {
-      scene.map = &map;
-      set_view(sensor, {map.focal().x(), map.focal().y(), map.center().x(), map.center().y(), width, height,
-                        map.min_x(), map.max_x(), map.min_y(), map.max_y()});
-    }
-    set_spacing(half_diagonal());
-  }
-  /// Returns true if the rays are dense enough for testing voxels to be faster than walking rays. With less than one
-  /// pixel per half voxel edge, most voxels would have to be tested individually.
-  [[nodiscard]] bool is_dense(const end_counts& counts) const {
-    const double mean_z = counts.sum_z / static_cast<double>(counts.used + counts.truncated);
-    return mean_z < 0.45 * static_cast<double>(scene.voxel) * static_cast<double>(std::max(scene.fx, scene.fy));
-  }
-  [[nodiscard]] std::size_t memory_bytes() const noexcept {
-    return view_frame::memory_bytes() + ends.memory_bytes() + map.memory_bytes();
-  }
-};
-
-/// Rays of a depth image for the descent.
-struct depth_rays {
-  const depth_frame& frame;
-  const depth_sensor& sensor;
-  const void* ends;
-  ray_endpoint (*end_of)(const void* ends, int u, int v);  ///< end of the ray of a pixel
-
-  /// `end(u, v)` returns the ray_endpoint of a pixel.
-  template <class End>
-  depth_rays(const depth_frame& f, const depth_sensor& s, const End& end)
-      : frame{f}, sensor{s}, ends{&end}, end_of{[](const void* e, int u, int v) -> ray_endpoint {
-          return (*static_cast<const End*>(e))(u, v);
-        }} {}
-
-  [[nodiscard]] unsigned sample(const child_offsets& o, const float3& world, const children& c, unsigned wanted) const {
-    return frame.sample(frame.scene, frame.ends, o, world, c, wanted);
-  }
-  [[nodiscard]] bool test(const voxel_test& t, const pixel_box& box, float near_z,
-                          std::vector<std::uint32_t>& unsure) const {
-    return frame.test_pixels(frame.ends, t, box, near_z, unsure);
-  }
-  /// Returns true if a ray of `part` may cross the voxel, which lies in the tile of `size` x `size` pixels at (u, v).
-  [[nodiscard]] bool may_cross(const voxel_test& t, const pixel_box& part, std::int32_t u, std::int32_t v,
-                               std::int32_t size) const {
-    const pixel_rays& rays = frame.ends.rays();
-    if (rays.separable())
-      return t.may_cross(rays.x(0)[part.u0], rays.x(0)[part.u1], *rays.y(part.v0), *rays.y(part.v1));
-    const auto& tile = frame.map.tile_at(u, v, size);
-    return tile.x0 <= tile.x1 && t.may_cross(tile.x0, tile.x1, tile.y0, tile.y1);
-  }
-  /// Returns true if the walk of a ray for which `test` was undecided visits the voxel.
-  [[nodiscard]] bool visits(std::uint32_t number, const voxel_key& voxel) const {
-    const auto [u, v] = frame.ends.pixel(number);
-    return crosses(sensor, end_of(ends, u, v), voxel);
-  }
-};
 
 /// World points of the pixels of a depth image, row by row, as a source of points; NaN for pixels without a point.
 struct pixel_points {
@@ -185,11 +98,7 @@ class depth_integrator {
     return {scan, frame_.ends.rays(), camera::float_pose{T_world_camera}};
   }
 
-  [[nodiscard]] std::size_t memory_bytes() const noexcept {
-    std::size_t bytes = frame_.memory_bytes() + workers_.capacity() * sizeof(descent_worker);
-    for (const descent_worker& w : workers_) bytes += w.memory_bytes();
-    return bytes;
-  }
+  [[nodiscard]] std::size_t memory_bytes() const noexcept { return frame_.memory_bytes(); }
 
  private:
   // -- one frame
@@ -198,14 +107,8 @@ class depth_integrator {
   void mark_free(const Policy& policy, const depth_sensor& sensor, const depth_scan& scan, float max_z,
                  const std::pair<voxel_key, voxel_key>& bounds, scan_masks& masks, const saturated_voxels& saturated) {
     if (frame_.scene.map != nullptr) walk_outer(sensor, scan, masks);
-    frame_.pyramid.build(frame_.ends.rays().width(), frame_.ends.rays().height(), max_z,
-                         [&](int v) { return frame_.ends.z(v); });
-    frame_.list_nodes(sensor, bounds.first, bounds.second);
-    const bool on_face = frame_.is_on_face(sensor);
-
     const auto end = [&](int u, int v) { return end_of(sensor, scan, u, v); };
-    descend_nodes(policy, frame_, sensor, depth_rays{frame_, sensor, end}, on_face, masks, saturated, workers_);
-    if (on_face) {
+    if (mark_image(policy, frame_, sensor, max_z, bounds, end, masks, saturated)) {
       first_voxels around{sensor};
       for_each_end(sensor, scan, [&](const ray_endpoint& e) { around.add(e); });
       around.mark(masks);
@@ -233,8 +136,8 @@ class depth_integrator {
       frame_.ends.clear(u, v);
     }
   }
+
   depth_frame frame_;
-  std::vector<descent_worker> workers_;
 };
 
 }  // namespace orbis::octree::detail

@@ -10,8 +10,10 @@
 #include <cassert>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
+#include <orbis/camera/pinhole.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/simd.hpp>
 #include <orbis/octree/depth_points.hpp>
@@ -56,12 +58,25 @@ class endpoint_image {
     }
     return counts;
   }
+  /// Begins an image of this size. Returns the depths of its rows and the padding, for the caller to fill in.
+  [[nodiscard]] std::span<float> lay_out(int width, int height) {
+    resize(width, height);
+    return z_;
+  }
+  /// Reduces that image to the part that starts at pixel `first`, which is the image of `camera`.
+  /// @pre there are no ends elsewhere; at least 16 columns remain on the right
+  void crop(const camera::pinhole& camera, std::uint32_t first) {
+    rays_.fit(camera);
+    first_ = first;
+  }
 
   [[nodiscard]] const pixel_rays& rays() const noexcept { return rays_; }
   /// Removes the end of a pixel's ray.
-  void clear(int u, int v) noexcept { z_[number(u, v)] = 0.0F; }
+  void clear(int u, int v) noexcept { z_[first_ + number(u, v)] = 0.0F; }
   /// Depths (metres) at which the rays of row `v` end, 0 without an end; padded with zeros.
-  [[nodiscard]] const float* z(int v) const noexcept { return z_.data() + static_cast<std::size_t>(v) * stride_; }
+  [[nodiscard]] const float* z(int v) const noexcept {
+    return z_.data() + first_ + static_cast<std::size_t>(v) * stride_;
+  }
   /// Offset between rows of `z`.
   [[nodiscard]] std::size_t stride() const noexcept { return stride_; }
   /// Number of a pixel. See `pixel` for the inverse.
@@ -117,6 +132,7 @@ class endpoint_image {
   void resize(int width, int height) {
     stride_ = static_cast<std::size_t>(width + 2 * pixel_rays::padding - 1) & ~std::size_t{15};
     z_.resize(stride_ * static_cast<std::size_t>(height) + pixel_rays::padding);
+    first_ = 0;
   }
   void add_row(worker& w, scan_masks& masks, const depth_sensor& sensor, const depth_scan& scan, int v) {
     float* const z = z_.data() + static_cast<std::size_t>(v) * stride_;
@@ -159,7 +175,7 @@ class endpoint_image {
   fresh_kernel* fresh_ = nullptr;
   pixel_rays rays_;
   std::vector<float> z_;
-  std::size_t stride_ = 0;
+  std::size_t stride_ = 0, first_ = 0;
   std::vector<worker> workers_;
 };
 

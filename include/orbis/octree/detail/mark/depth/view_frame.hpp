@@ -48,7 +48,8 @@ struct view_frame {
   std::vector<node> nodes;             ///< nodes at list_level that rays may touch
 
   /// Computes those parameters of the tests that depend on the view; the caller sets those that depend on the rays.
-  void set_view(const depth_sensor& sensor, const view_extent& e) {
+  /// `ray_error`: maximum deviation of rays from their assumed directions, at z = 1.
+  void set_view(const depth_sensor& sensor, const view_extent& e, float ray_error = 0.0F) {
     depth_scene& s = scene;
     const auto& rows = sensor.pose.rows;
     for (std::size_t i = 0; i != 3; ++i) {
@@ -73,8 +74,8 @@ struct view_frame {
     for (const float c : sensor.pose.centre) l1 += std::fabs(c);
     s.voxel = static_cast<float>(sensor.grid.resolution());
     s.margin_0 = u * (8.0F * l1 + 8.0F * s.voxel);
-    s.margin_1 = 64.0F * u;
-    s.pixel_margin = 0.01F + 1e-6F * (s.last_u + s.last_v);
+    s.margin_1 = 64.0F * u + ray_error;
+    s.pixel_margin = 0.01F + 1e-6F * (s.last_u + s.last_v) + ray_error * std::max(s.fx, s.fy);
     s.near_z = 0.1F * s.voxel;
     const float slope = 2.0F * (1.0F + std::max(std::fabs(s.min_x), std::fabs(s.max_x)) +
                                 std::max(std::fabs(s.min_y), std::fabs(s.max_y)));

@@ -20,6 +20,7 @@
 #include <orbis/octree/detail/mark/depth/view_frame.hpp>
 #include <orbis/octree/detail/mark/depth/voxel_ray_test.hpp>
 #include <orbis/octree/detail/mark/rays/ray_traversal.hpp>
+#include <orbis/octree/detail/mark/rays/scan_sample.hpp>
 #include <orbis/octree/detail/mark/windows/binned_rays.hpp>
 #include <orbis/octree/detail/mark/windows/cell_tests.hpp>
 #include <orbis/octree/detail/mark/windows/direction_windows.hpp>
@@ -178,16 +179,12 @@ class dense_rays {
     sample_.length = 0.0;
     random_bits random{1};
     for (std::size_t k = 0; k != most_sampled; ++k) {
-      // Random places avoid aliasing between regular steps and the rows of a scan.
-      const double place = (static_cast<double>(k) + random.uniform()) / static_cast<double>(most_sampled);
-      const float3 p = point(std::min(static_cast<std::size_t>(place * static_cast<double>(count)), count - 1));
+      const std::size_t i = place_in_stretch(k, most_sampled, count - 1, random);
       vec3 d;
-      for (std::size_t axis = 0; axis != 3; ++axis)
-        d[static_cast<int>(axis)] = static_cast<double>(p[axis]) - static_cast<double>(origin[axis]);
-      const double length = norm(d);
-      if (!(length > 0.0 && length < 1e30)) continue;
-      sample_.directions.push_back(d / length);
-      sample_.length += std::min(length, limit);
+      const auto length = length_of_ray(origin, point(i), limit, d);
+      if (!length) continue;
+      sample_.directions.push_back(d);
+      sample_.length += *length;
     }
     sample_.length /= static_cast<double>(std::max<std::size_t>(1, sample_.directions.size()));
   }

@@ -62,7 +62,7 @@ struct scan {
   }
 };
 
-/// Marks a scan with dense_rays, however many or few its rays are for the voxels; false if it cannot
+/// Marks a scan with dense_rays or organised_rays, however many or few its rays are for the voxels; false if it cannot
 /// be done.
 template <class Policy, class Rays>
 [[nodiscard]] bool mark(const Policy& policy, Rays& rays, const scan& s, scan_masks& masks,
