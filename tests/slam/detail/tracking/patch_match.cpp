@@ -90,6 +90,17 @@ TEST_CASE("Blur in the image, in the patch, or in both does not move a patch") {
   CHECK((!ignored || ignored->correlation < 0.95));
 }
 
+TEST_CASE("Blur of any length and direction stays within the memory of a patch") {
+  const auto image = picture(zeros<vec2>());
+  const auto patch = patch_of(zeros<vec2>());
+  for (double x = -13.0; x <= 13.0; x += 1.0)
+    for (double y = 0.0; y <= 13.0; y += 1.0) {
+      const auto found = match_patch(patch, vec2(x, y), vec2(y, x), image, at(32.0, 32.0));
+      if (found) CHECK(std::abs(found->correlation) <= 1.0 + 1e-6);
+    }
+  CHECK(match_patch(patch, vec2(std::nan(""), 0.0), zeros<vec2>(), image, at(32.0, 32.0)));  // taken as no blur
+}
+
 TEST_CASE("A patch without texture, outside of the image, or elsewhere is not found") {
   const auto patch = patch_of(zeros<vec2>());
   const auto image = picture(zeros<vec2>());

@@ -37,7 +37,7 @@ class line_kernel {
 
   explicit line_kernel(vec2 line) {
     const double longest = std::max(std::abs(line.x()), std::abs(line.y()));
-    if (longest < 0.1) {
+    if (!(longest >= 0.1)) {
       weights_[count_++] = {0, 0, 1.0F};
       return;
     }
@@ -152,7 +152,7 @@ struct match_patch_kernel {
     // The image around the expected place, in the pixels of the patch.
     constexpr int window = side + 2 * (around + 1), margin = line_kernel::reach, stride = window + 2 * margin + 4;
     static_assert(window == 16 && stride % 8 == 0);
-    std::array<float, std::size_t{stride} * (window + 2 * margin)> seen;
+    std::array<float, std::size_t{stride} * (window + 2 * margin) + 8> seen;  // a vector may end after its row
     if (!sample<Target>(image, expected, by_patch, seen.data(), stride)) return false;
     float there[window][16];
     by_patch.apply<window, Target>(seen.data() + margin * stride + margin, stride, there[0]);
