@@ -38,7 +38,8 @@ struct keypoint_as_read {
   float stored_depth = 0.0F;        ///< depth image at the keypoint, metres; 0 if not measured
 };
 
-/// An image as features of descriptor type `D`. All vectors have one entry per keypoint.
+/// An image as features of descriptor type `D`. All vectors have one entry per keypoint, except those that
+/// may be empty.
 template <feature_descriptor D>
 struct basic_frame {
   using descriptor_type = D;

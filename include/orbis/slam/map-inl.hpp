@@ -199,8 +199,8 @@ void basic_map<D>::fuse(landmark_id from, landmark_id into) {
   assert(from != into && has_landmark(into));
   landmark_type l = remove(from, into);
   for (const observation& o : l.observations)
-    if (add_observation(into, o.keyframe, o.feature))  // measured with the other patch
-      set_deviation(o.keyframe, o.feature, l.patch.corner_deviation);
+    if (add_observation(into, o.keyframe, o.feature) && l.patch.pixels != nullptr)  // was measured with that patch
+      set_deviation(o.keyframe, o.feature, std::max(at(o.keyframe).deviation(o.feature), l.patch.corner_deviation));
   landmark_type& by = content_.landmarks[into];
   if (by.patch.pixels == nullptr) by.patch = std::move(l.patch);
   by.found += l.found;
@@ -290,10 +290,17 @@ bool basic_map<D>::attach(landmark_id id, keyframe_id k, std::uint32_t feature) 
 }
 
 template <feature_descriptor D>
+void basic_map<D>::release(const observation& o) {
+  keyframe_type& k = content_.keyframes[o.keyframe];
+  k.landmarks[o.feature] = no_id;
+  if (!k.deviations.empty()) k.deviations[o.feature] = std::max(1.0F, k.deviations[o.feature]);
+}
+
+template <feature_descriptor D>
 void basic_map<D>::detach(landmark_id id, keyframe_id k) {
   landmark_type& l = content_.landmarks[id];
   const auto at = l.observations.begin() + (l.seen_by(k) - l.observations.data());
-  content_.keyframes[k].landmarks[at->feature] = no_id;
+  release(*at);
   l.observations.erase(at);
   l.has_current_descriptor = false;
   if (l.observations.empty()) content_.landmarks.erase(id);
@@ -304,7 +311,7 @@ auto basic_map<D>::remove(landmark_id id, landmark_id replacement) -> landmark_t
   landmark_type l = std::move(content_.landmarks[id]);
   content_.landmarks.erase(id, replacement);
   for (auto o = l.observations.begin(); o != l.observations.end(); ++o) {
-    content_.keyframes[o->keyframe].landmarks[o->feature] = no_id;
+    release(*o);
     for (auto other = std::next(o); other != l.observations.end(); ++other)
       covisibility_.unshare(o->keyframe, other->keyframe);
   }

@@ -208,6 +208,8 @@ class basic_map {
   }
   /// Adds both sides of an observation, without updating the covisibility graph.
   bool attach(landmark_id id, keyframe_id k, std::uint32_t feature);
+  /// Clears the landmark of a keypoint, whose position is no longer that of a patch.
+  void release(const observation& o);
   /// Removes both sides of an observation, without updating the covisibility graph. @pre the observation exists
   void detach(landmark_id id, keyframe_id k);
   landmark_type remove(landmark_id id, landmark_id replacement);

@@ -69,8 +69,8 @@ struct depth_term_options {
 /// Measurement of landmarks in the image by patches.
 struct patch_options {
   bool enabled = true;  ///< off: the positions of landmarks are those of the keypoints
-  /// Exposure time of the colour image, during which it blurs if the camera moves, seconds; 0: no blur. Empty:
-  /// estimated.
+  /// Exposure time of the colour image, during which it blurs if the camera moves, seconds; 0: no blur. Finite, >= 0.
+  /// Empty: estimated, up to 0.032.
   std::optional<double> exposure{};
   double min_correlation = 0.8;  ///< minimum normalised correlation of a patch with the image
 };

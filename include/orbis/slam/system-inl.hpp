@@ -69,11 +69,13 @@ track_result ORBIS_SLAM_SYSTEM::track(double timestamp, image_view<const rgb8> c
   if (!are_usable(timestamp, color, depth)) return track_frame(timestamp, {}, {}, clock);
   frame_type f = measure_rgbd(shared_.rig, extract_, color, depth, image_);
   front_end_->depth().set_depth(depth);
-  front_end_->patches().set_image(
-      {&image_.pyramid, [&](const vec2& pixel) {
-         const auto at = features::depth_at(depth, static_cast<float>(pixel.x()), static_cast<float>(pixel.y()));
-         return at && at->z >= shared_.rig.min_depth && at->z <= shared_.rig.max_depth ? at->z : 0.0;
-       }});
+  detail::frame_image pixels{&image_.pyramid};
+  if (shared_.rig.scale_is_known)
+    pixels.depth_at = [&](const vec2& pixel) {
+      const auto at = features::depth_at(depth, static_cast<float>(pixel.x()), static_cast<float>(pixel.y()));
+      return at && at->z >= shared_.rig.min_depth && at->z <= shared_.rig.max_depth ? at->z : 0.0;
+    };
+  front_end_->patches().set_image(std::move(pixels));
   return track_frame(
       timestamp, std::move(f),
       [&](frame_type& seen, const frame_motion& m) { follow_rows(shared_.rig, m, seen, depth); }, clock);

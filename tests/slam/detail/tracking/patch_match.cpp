@@ -98,7 +98,9 @@ TEST_CASE("Blur of any length and direction stays within the memory of a patch")
       const auto found = match_patch(patch, vec2(x, y), vec2(y, x), image, at(32.0, 32.0));
       if (found) CHECK(std::abs(found->correlation) <= 1.0 + 1e-6);
     }
-  CHECK(match_patch(patch, vec2(std::nan(""), 0.0), zeros<vec2>(), image, at(32.0, 32.0)));  // taken as no blur
+  for (const double bad : {std::nan(""), 1e300 * 1e10})  // taken as no blur
+    for (const vec2& line : {vec2(bad, 0.0), vec2(5.0, bad), vec2(bad, bad)})
+      CHECK(match_patch(patch, line, zeros<vec2>(), image, at(32.0, 32.0)));
 }
 
 TEST_CASE("A patch without texture, outside of the image, or elsewhere is not found") {

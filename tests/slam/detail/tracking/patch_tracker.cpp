@@ -120,7 +120,7 @@ const vec6 moves = stacked(vec3(0.1, -0.05, 0.08), vec3(0.05, 0.4, 0.1));
 TEST_CASE("Keypoints move to where their landmarks are, and are trusted more") {
   scene s(moves, 0.0);
   CHECK(error_of(s.w, s.next, s.m, s.T_world_next) > 1.0);
-  s.patches.align(s.next, s.m, s.twist);
+  REQUIRE(s.patches.align(s.next, s.m, s.twist));
   CHECK(error_of(s.w, s.next, s.m, s.T_world_next) < 0.1);
   CHECK(std::count_if(s.next.deviations.begin(), s.next.deviations.end(), [](float d) { return d < 1.0F; }) ==
         static_cast<std::ptrdiff_t>(s.next.size()));
@@ -138,7 +138,7 @@ TEST_CASE("Keypoints as read by a rolling shutter keep their delay") {
     s.next.features.keypoints[i].x -= static_cast<float>(delay.x());
     s.next.features.keypoints[i].y -= static_cast<float>(delay.y());
   }
-  s.patches.align(s.next, s.m, s.twist);
+  REQUIRE(s.patches.align(s.next, s.m, s.twist));
   for (std::size_t i = 0; i != s.next.size(); ++i) {
     const vec2 read(s.next.as_read[i].x, s.next.as_read[i].y);
     CHECK(norm(read - s.next.pixel(i) - delay) < 1e-3);
@@ -157,11 +157,11 @@ TEST_CASE("The exposure is found from the blur of patches") {
   }
   for (int k = 0; k != 60; ++k) {
     slam::frame again = s.next;
-    s.patches.align(again, s.m, s.twist);
+    static_cast<void>(s.patches.align(again, s.m, s.twist));
   }
   CHECK(std::abs(s.patches.exposure() - exposure) < 0.003);
   slam::frame blurred = s.next;
-  s.patches.align(blurred, s.m, s.twist);
+  REQUIRE(s.patches.align(blurred, s.m, s.twist));
   CHECK(error_of(s.w, blurred, s.m, s.T_world_next) < 0.2);
 }
 
@@ -173,7 +173,24 @@ TEST_CASE("Without an image, or without patches, keypoints stay") {
   CHECK(s.patches.is_ready());
   for (auto& l : s.m.landmarks()) s.m.set_patch(l.id, {});
   const slam::frame before = s.next;
-  s.patches.align(s.next, s.m, s.twist);
+  CHECK_FALSE(s.patches.align(s.next, s.m, s.twist));
   CHECK(s.next.features.keypoints == before.features.keypoints);
-  CHECK(*std::min_element(s.next.deviations.begin(), s.next.deviations.end()) >= 1.0F);
+  CHECK(s.next.deviations.empty());
+}
+
+TEST_CASE("Keypoints that lose their landmark move back to where the detector found them") {
+  scene s(moves, 0.0);
+  slam::detail::keep_as_read(s.next);
+  const slam::frame before = s.next;
+  REQUIRE(s.patches.align(s.next, s.m, s.twist));
+  s.next.landmarks[3] = slam::no_id;
+  s.patches.move_back(s.next, false);
+  CHECK(s.next.features.keypoints[3] == before.features.keypoints[3]);
+  CHECK(s.next.rays[3] == before.rays[3]);
+  CHECK(s.next.depth[3] == before.depth[3]);
+  CHECK(s.next.as_read[3].x == before.as_read[3].x);
+  CHECK(s.next.deviation(3) >= 1.0);
+  CHECK_FALSE(s.next.features.keypoints[4] == before.features.keypoints[4]);
+  s.patches.move_back(s.next, true);
+  CHECK(s.next.features.keypoints == before.features.keypoints);
 }

@@ -29,9 +29,9 @@ template <camera::camera_model Camera, feature_descriptor D>
   return o;
 }
 
-/// Sets the weights of an observation of the landmark whose patch determined the position of the keypoint. `deviation`:
-/// of the keypoint, pixels of its level (`basic_frame::deviation`). The deviation of the depth remains the same, except
-/// that the third residual contains that of the pixel.
+/// Sets the weights of an observation of the keypoint's own landmark. `deviation`: of the keypoint's position, pixels
+/// of its level (`basic_frame::deviation`). The deviation of the depth remains the same, except that the third residual
+/// contains that of the pixel.
 inline void set_deviation(optimize::pose_observation& o, double deviation) {
   o.information /= deviation * deviation;
   o.depth_weight = std::min(1.0, deviation);

@@ -114,7 +114,7 @@ template <camera::camera_model Camera>
 class bundle_solver {
  public:
   explicit bundle_solver(const optimize::reprojection<Camera>& model, optimize::huber loss = {})
-      : adjuster_{model, loss} {}
+      : model_{model}, adjuster_{model, loss} {}
 
   /// Calls `go_on(iteration, iterations)` before each step; if it returns false, the adjustment stops. No observation
   /// is marked as an outlier before the first half is complete. `memory`: a previous solution, whose memory is reused.
@@ -154,6 +154,7 @@ class bundle_solver {
     result.complete = accept(last);
     if (!result.usable) return result;
     find_outliers(s, result);
+    keep_rough(s, result);
     result.iterations = robust.iterations + last.iterations;
     result.initial_cost = robust.initial_cost;
     result.final_cost = last.final_cost;
@@ -169,6 +170,22 @@ class bundle_solver {
       to.outliers[i] = squared_[i] > error_limit(!std::isnan(s.observations[i].right)) ? 1 : 0;
   }
 
+  /// Removes the marks of observations that agree with the current poses and points if the deviation of their pixel is
+  /// one pixel of its level: a patch that is slightly off remains an observation.
+  void keep_rough(const bundle_snapshot& s, bundle_solution& to) const {
+    for (std::size_t i = 0; i != s.observations.size(); ++i) {
+      const optimize::bundle_observation& o = s.observations[i];
+      if (to.outliers[i] == 0 || o.depth_weight == 1.0) continue;
+      optimize::pose_observation rough;
+      rough.pixel = o.pixel;
+      rough.right = o.right;
+      rough.information = o.information * o.depth_weight * o.depth_weight;
+      const auto error = model_.residual(to.poses[o.pose].inverse() * to.points[o.point], rough);
+      if (error && squared_norm(*error) * rough.information <= error_limit(rough.has_depth())) to.outliers[i] = 0;
+    }
+  }
+
+  optimize::reprojection<Camera> model_;
   optimize::bundle_adjuster<optimize::reprojection<Camera>> adjuster_;
   std::vector<double> squared_;
 };

@@ -9,8 +9,8 @@
 
 namespace orbis::slam::detail {
 
-/// Compares exposure times by the correlation of patches that are blurred accordingly. Old evidence fades, so that the
-/// estimate follows automatic exposure.
+/// Compares exposure times of up to 32 ms by the correlation of patches that are blurred accordingly. Old evidence
+/// fades, so that the estimate follows slow changes. Patches are assumed to have the exposure time of the image.
 class exposure_estimation {
  public:
   static constexpr std::size_t count = 9;

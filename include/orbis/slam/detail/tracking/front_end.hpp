@@ -199,7 +199,8 @@ class front_end {
     basic_map<D>& m = maps.active();
     first_new_ = m.landmark_end();
     const keyframe_id id = insert_keyframe(m, f, options_);
-    if (patches_.is_ready()) patches_.add_patches(m, id, f, twist_of(f));
+    if (patches_.is_ready())
+      if (const auto motion = motion_to(f)) patches_.add_patches(m, id, f, *motion);
     for (const start_point& p : std::exchange(start_points_, {})) {
       const landmark_id l = m.add_landmark(id, p.second, p.position);
       m.add_observation(l, first_keyframe_->keyframe, p.first);
@@ -262,6 +263,7 @@ class front_end {
     }
     enter_new_map(maps, drop);
     f.landmarks.assign(f.size(), no_id);  // they are from searches in other maps
+    f.deviations.clear();
     f.T_world_camera =
         options_.find_initial_pose ? options_.find_initial_pose() : options_.initial_pose.value_or(se3{});
     if (start) add_start(*std::move(start), f, maps);
@@ -351,16 +353,19 @@ class front_end {
         f, m, reference_.keyframe, radius, moving_, [&](landmark_id l) { is_frozen ? void() : m.count_visible(l); },
         [&](landmark_id l) { is_frozen ? void() : m.count_found(l); });
     if (inliers == 0 || !patches_.is_ready()) return inliers;
-    patches_.align(f, m, twist_of(f));
+    if (!patches_.align(f, m, motion_to(f).value_or(zeros<vec6>()))) return inliers;
     const std::size_t left = refine_on_landmarks(f, m, rig_);
+    patches_.move_back(f, left == 0);
     if (left != 0) patches_.update_deviation(f, m);
     return left;
   }
   /// The motion of a frame, per second: that since the last frame, extrapolated by half of its change (see
-  /// `twist_prior`); zero if the last frame is not the one before.
-  [[nodiscard]] vec6 twist_of(const frame_type& f) const {
-    if (last_.size() == 0 || last_.index + 1 != f.index) return zeros<vec6>();
+  /// `twist_prior`). Empty if the last frame is not the one before, or the pose has jumped.
+  [[nodiscard]] std::optional<vec6> motion_to(const frame_type& f) const {
+    constexpr double fastest = 5.0, fastest_turn = 10.0;  // metres and radians per second
+    if (state_ != track_state::tracking || last_.size() == 0 || last_.index + 1 != f.index) return std::nullopt;
     const vec6 mean = motion_between(last_, f);
+    if (!(norm(head<3>(mean)) < fastest && norm(tail<3>(mean)) < fastest_turn)) return std::nullopt;
     return motion_.is_known() ? vec6(mean + 0.5 * (mean - last_mean_twist_)) : mean;
   }
 
@@ -497,6 +502,7 @@ class front_end {
     if (!depth_.determines_pose(aligned)) return false;
     f.T_world_camera = aligned.at.T_world_camera;
     f.landmarks.assign(f.size(), no_id);
+    f.deviations.clear();
     move_keypoints(f);
     state_ = track_state::tracking;
     f.held_by_depth = true;

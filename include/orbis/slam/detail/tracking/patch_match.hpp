@@ -37,7 +37,7 @@ class line_kernel {
 
   explicit line_kernel(vec2 line) {
     const double longest = std::max(std::abs(line.x()), std::abs(line.y()));
-    if (!(longest >= 0.1)) {
+    if (!(norm(line) >= 0.1 && norm(line) < 1e6)) {  // also if it is not a number
       weights_[count_++] = {0, 0, 1.0F};
       return;
     }
@@ -188,7 +188,7 @@ struct match_patch_kernel {
       if (!(std::abs(found.shift.x()) < around && std::abs(found.shift.y()) < around)) return false;
       if (step.x() * step.x() + step.y() * step.y() < enough * enough) return true;
     }
-    return true;
+    return false;
   }
 
  private:

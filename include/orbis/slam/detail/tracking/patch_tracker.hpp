@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cassert>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -46,7 +47,9 @@ struct frame_image {
 template <camera::camera_model Camera, feature_descriptor D>
 class patch_tracker {
  public:
-  patch_tracker(const camera_rig<Camera>& rig, const patch_options& settings) : rig_{rig}, options_{settings} {}
+  patch_tracker(const camera_rig<Camera>& rig, const patch_options& settings) : rig_{rig}, options_{settings} {
+    assert(!settings.exposure || (*settings.exposure >= 0.0 && std::isfinite(*settings.exposure)));
+  }
 
   /// Sets the image of the next frame. It must remain valid until the next call.
   void set_image(frame_image image) { image_ = std::move(image); }
@@ -57,12 +60,13 @@ class patch_tracker {
   [[nodiscard]] double exposure() const noexcept { return options_.exposure.value_or(estimation_.exposure()); }
 
   /// Moves the keypoints that observe landmarks to where their patches are in the image, and sets `f.deviations`.
-  /// `twist`: the motion of the camera in its own frame, per second. O(landmarks of the frame). @pre is_ready()
-  void align(basic_frame<D>& f, const basic_map<D>& m, const vec6& twist) {
+  /// `twist`: the motion of the camera in its own frame, per second. Returns false, and leaves `f.deviations` empty, if
+  /// no patch is found. O(features). @pre is_ready()
+  [[nodiscard]] bool align(basic_frame<D>& f, const basic_map<D>& m, const vec6& twist) {
     const double seconds = exposure();
     const se3 T_camera_world = f.T_world_camera.inverse();
     f.deviations.assign(f.size(), 1.0F);
-    aligned_.clear();
+    moved_.clear();
     std::size_t moving = 0;
     for (std::size_t i = 0; i != f.size(); ++i) {
       const double scale = rig_.scales.scale(f.features.keypoints[i].octave);
@@ -79,11 +83,12 @@ class patch_tracker {
       const auto found = match(l.patch, *view, seconds);
       if (!found || found->correlation < options_.min_correlation) continue;
       const vec2 shift = found->shift.x() * view->across + found->shift.y() * view->down;
-      move_keypoint(f, i, view->pixel + shift, view->delay);
+      if (!move_keypoint(f, i, view->pixel + shift, view->delay)) continue;
       f.deviations[i] = static_cast<float>(deviation_);
-      aligned_.push_back(static_cast<std::uint32_t>(i));
     }
+    if (moved_.empty()) f.deviations.clear();
     f.grid.assign(f.features.keypoints);
+    return !moved_.empty();
   }
 
   /// Updates the deviation of patches from the reprojection errors of the last aligned frame, at its refined pose.
@@ -92,7 +97,8 @@ class patch_tracker {
     constexpr double least = 0.3, most = 1.0, rate = 0.05;
     errors_.clear();
     const se3 T_camera_world = f.T_world_camera.inverse();
-    for (const std::uint32_t i : aligned_) {
+    for (const moved_keypoint& k : moved_) {
+      const std::size_t i = k.index;
       if (f.landmarks[i] == no_id) continue;
       const auto at = rig_.camera().project(T_camera_world * m.landmark_at(f.landmarks[i]).position);
       if (at) errors_.push_back(norm(*at - f.pixel(i)) / rig_.scales.scale(f.features.keypoints[i].octave));
@@ -118,7 +124,26 @@ class patch_tracker {
     }
   }
 
+  /// Moves the keypoints of the last aligned frame that no longer observe a landmark, or all, back to where the
+  /// detector found them.
+  void move_back(basic_frame<D>& f, bool all) const {
+    for (const moved_keypoint& k : moved_) {
+      if (!all && f.landmarks[k.index] != no_id) continue;
+      f.features.keypoints[k.index].x = k.x, f.features.keypoints[k.index].y = k.y;
+      f.deviations[k.index] = k.deviation, f.depth[k.index] = k.depth, f.rays[k.index] = k.ray;
+      if (!f.as_read.empty()) f.as_read[k.index] = k.read;
+    }
+    f.grid.assign(f.features.keypoints);
+  }
+
  private:
+  /// A keypoint before it was moved to a patch.
+  struct moved_keypoint {
+    std::size_t index;
+    float x, y, deviation, depth;
+    vec3 ray;
+    keypoint_as_read read;
+  };
   /// A landmark's expected place in the image.
   struct patch_view {
     vec2 pixel, across, down;  ///< of the centre of the patch, and the steps to its next pixels, pixels of the image
@@ -210,19 +235,22 @@ class patch_tracker {
   }
 
   /// Moves keypoint `i` to a pixel of the image, and reads its depth there. `delay`: its motion from the frame's time
-  /// to that of its row.
-  void move_keypoint(basic_frame<D>& f, std::size_t i, const vec2& to, const vec2& delay) const {
+  /// to that of its row. Returns false, without a change, if a pixel has no ray.
+  bool move_keypoint(basic_frame<D>& f, std::size_t i, const vec2& to, const vec2& delay) {
     const auto read_ray = rig_.camera().unproject(to), ray = rig_.camera().unproject(to - delay);
-    if (!read_ray || !ray) return;
+    if (!read_ray || !ray) return false;
     auto& at = f.features.keypoints[i];
+    moved_.push_back(
+        {i, at.x, at.y, f.deviations[i], f.depth[i], f.rays[i], f.as_read.empty() ? keypoint_as_read{} : f.as_read[i]});
     at.x = static_cast<float>(to.x() - delay.x()), at.y = static_cast<float>(to.y() - delay.y());
     f.rays[i] = *ray / ray->z();
     if (image_.depth_at) f.depth[i] = static_cast<float>(image_.depth_at(to));
-    if (f.as_read.empty()) return;
+    if (f.as_read.empty()) return true;
     keypoint_as_read& read = f.as_read[i];
     read.x = static_cast<float>(to.x()), read.y = static_cast<float>(to.y());
     read.ray_x = read_ray->x() / read_ray->z(), read.ray_y = read_ray->y() / read_ray->z();
     if (image_.depth_at) read.depth = read.stored_depth = f.depth[i];
+    return true;
   }
 
   /// Returns the patch around keypoint `i`, which observes `point` (camera frame, metres); empty near the border.
@@ -273,9 +301,9 @@ class patch_tracker {
   const patch_options& options_;
   frame_image image_;
   exposure_estimation estimation_;
-  double deviation_ = 0.5;              ///< of the position of a patch, pixels of its level
-  std::vector<std::uint32_t> aligned_;  ///< keypoints of the last frame
-  std::vector<double> errors_;          ///< reused working memory
+  double deviation_ = 0.5;             ///< of the position of a patch, pixels of its level
+  std::vector<moved_keypoint> moved_;  ///< of the last frame
+  std::vector<double> errors_;         ///< reused working memory
 };
 
 }  // namespace orbis::slam::detail

@@ -51,11 +51,13 @@ std::size_t refine_on_matches(basic_frame<D>& f, const search_list<D>& list, std
 }
 
 /// Refines the pose of `f` on its landmarks, of which it keeps those that agree with the result. Returns their number;
-/// 0 if the pose cannot be determined.
+/// 0 if the pose cannot be determined. @pre f.deviations is set
 template <feature_descriptor D, camera::camera_model Camera>
 std::size_t refine_on_landmarks(basic_frame<D>& f, const basic_map<D>& m, const camera_rig<Camera>& rig) {
   std::vector<optimize::pose_observation> observations;
   std::vector<std::size_t> keypoints;
+  observations.reserve(f.size());
+  keypoints.reserve(f.size());
   for (std::size_t i = 0; i != f.size(); ++i) {
     if (f.landmarks[i] == no_id) continue;
     observations.push_back(landmark_observation(rig, f, i, m.landmark_at(f.landmarks[i]).position));
