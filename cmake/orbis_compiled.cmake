@@ -8,6 +8,7 @@ if(PROJECT_IS_TOP_LEVEL AND NOT CMAKE_BUILD_TYPE AND NOT CMAKE_CONFIGURATION_TYP
   set(CMAKE_BUILD_TYPE Release)
 endif()
 set(ORBIS_COMPILED_COMPONENTS)
+set(ORBIS_COMPILED_NEEDS_LIBDEFLATE OFF)
 set(_orbis_sources)
 foreach(_orbis_component IN LISTS ORBIS_PROVIDED_COMPONENTS)
   file(GLOB _orbis_found CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/cmake/compiled/${_orbis_component}.cpp
@@ -17,7 +18,8 @@ foreach(_orbis_component IN LISTS ORBIS_PROVIDED_COMPONENTS)
     list(APPEND _orbis_sources ${_orbis_found})
   endif()
 endforeach()
-# Users of the library do not need the dependencies of io: io is linked privately, and publicly by users of io only.
+# Users of the library do not need the dependencies of io: io and libdeflate are linked privately, and publicly by users of
+# io only, for whom orbis-config.cmake looks for libdeflate.
 set(ORBIS_COMPILED_NEEDS ${ORBIS_COMPILED_COMPONENTS})
 list(REMOVE_ITEM ORBIS_COMPILED_NEEDS io)
 
@@ -40,10 +42,12 @@ if(_orbis_sources)
       mark_as_advanced(LIBDEFLATE_INCLUDE_DIR LIBDEFLATE_LIBRARY)
     endif()
     if(ORBIS_LIBDEFLATE AND LIBDEFLATE_INCLUDE_DIR AND LIBDEFLATE_LIBRARY)
+      set(ORBIS_COMPILED_NEEDS_LIBDEFLATE ON)
       set(ORBIS_COMPILED_LIBS_PRIVATE -ldeflate)
       target_compile_definitions(orbis_compiled PRIVATE ORBIS_LIBDEFLATE)
       target_include_directories(orbis_compiled SYSTEM PRIVATE ${LIBDEFLATE_INCLUDE_DIR})
-      target_link_libraries(orbis_compiled PRIVATE ${LIBDEFLATE_LIBRARY})
+      target_link_libraries(orbis_compiled PRIVATE $<BUILD_INTERFACE:${LIBDEFLATE_LIBRARY}>
+        INTERFACE $<INSTALL_INTERFACE:$<$<TARGET_EXISTS:orbis::libdeflate>:orbis::libdeflate>>)
     endif()
   endif()
 endif()
