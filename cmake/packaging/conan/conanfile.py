@@ -64,6 +64,7 @@ class Orbis(ConanFile):
         toolchain = CMakeToolchain(self)
         toolchain.cache_variables["ORBIS_COMPONENTS"] = ";".join(self.components())
         toolchain.cache_variables["ORBIS_BUILD_COMPILED"] = bool(self.options.compiled)
+        toolchain.cache_variables["ORBIS_LIBDEFLATE"] = False
         for programs in ("TESTS", "BENCH", "EXAMPLES"):
             toolchain.cache_variables[f"ORBIS_BUILD_{programs}"] = False
         toolchain.generate()

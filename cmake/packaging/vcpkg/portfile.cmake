@@ -28,7 +28,10 @@ vcpkg_cmake_configure(
     -DORBIS_BUILD_TESTS=OFF
     -DORBIS_BUILD_BENCH=OFF
     -DORBIS_BUILD_EXAMPLES=OFF
+    -DORBIS_LIBDEFLATE=OFF
     ${options}
+  MAYBE_UNUSED_VARIABLES
+    ORBIS_LIBDEFLATE
 )
 vcpkg_cmake_install()
 vcpkg_cmake_config_fixup(CONFIG_PATH share/cmake/orbis)
