@@ -12,6 +12,7 @@
 #include <orbis/core/random.hpp>
 #include <orbis/io/png.hpp>
 
+#include "io/libpng_file.hpp"
 #include "io/quiet.hpp"
 #include "support/catch.hpp"
 #include "support/temporary_folder.hpp"
@@ -19,6 +20,9 @@
 namespace io = orbis::io;
 using orbis::image;
 using orbis::rgb8;
+using orbis::test::big_endian;
+using orbis::test::libpng_file;
+using orbis::test::png_chunk;
 
 namespace {
 
@@ -35,37 +39,6 @@ image<T> pattern(int width, int height) {
         pixels(x, y) = static_cast<T>(x * 259 + y * 7919 + 1);
     }
   return pixels;
-}
-
-/// A PNG of any kind by libpng itself; rows are bytes as PNG stores them. `change` prepares the encoder.
-std::string encode(
-    int width, int height, int bits, int type, int interlace, const std::vector<std::vector<png_byte>>& rows,
-    void (*change)(png_structp) = [](png_structp) {}) {
-  std::string bytes;
-  png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, nullptr, nullptr);
-  png_infop info = png_create_info_struct(png);
-  png_set_write_fn(
-      png, &bytes,
-      [](png_structp p, png_bytep data, std::size_t n) {
-        static_cast<std::string*>(png_get_io_ptr(p))->append(reinterpret_cast<char*>(data), n);
-      },
-      [](png_structp) {});
-  png_set_IHDR(png, info, static_cast<png_uint_32>(width), static_cast<png_uint_32>(height), bits, type, interlace,
-               PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
-  change(png);
-  const png_color palette[] = {{1, 2, 3}, {40, 50, 60}, {255, 128, 0}, {9, 8, 7}};
-  const png_byte alpha[] = {0, 128};
-  if (type == PNG_COLOR_TYPE_PALETTE) {
-    png_set_PLTE(png, info, palette, 4);
-    png_set_tRNS(png, info, alpha, 2, nullptr);
-  }
-  png_write_info(png, info);
-  const int passes = png_set_interlace_handling(png);
-  for (int pass = 0; pass != passes; ++pass)
-    for (const auto& row : rows) png_write_row(png, row.data());
-  png_write_end(png, nullptr);
-  png_destroy_write_struct(&png, &info);
-  return bytes;
 }
 
 }  // namespace
@@ -91,18 +64,18 @@ TEST_CASE("a part of an image is written without its surroundings") {
 }
 
 TEST_CASE("PNGs of other kinds become 8-bit colour") {
-  const auto gray_alpha = encode(2, 1, 8, PNG_COLOR_TYPE_GRAY_ALPHA, PNG_INTERLACE_NONE, {{10, 0, 200, 255}});
+  const auto gray_alpha = libpng_file(2, 1, 8, PNG_COLOR_TYPE_GRAY_ALPHA, PNG_INTERLACE_NONE, {{10, 0, 200, 255}});
   CHECK(io::decode_png_color(gray_alpha).value()(0, 0) == rgb8{10, 10, 10});
   CHECK(io::decode_png_color(gray_alpha).value()(1, 0) == rgb8{200, 200, 200});
-  const auto rgba = encode(1, 2, 8, PNG_COLOR_TYPE_RGB_ALPHA, PNG_INTERLACE_NONE, {{1, 2, 3, 4}, {5, 6, 7, 8}});
+  const auto rgba = libpng_file(1, 2, 8, PNG_COLOR_TYPE_RGB_ALPHA, PNG_INTERLACE_NONE, {{1, 2, 3, 4}, {5, 6, 7, 8}});
   CHECK(io::decode_png_color(rgba).value()(0, 1) == rgb8{5, 6, 7});
-  const auto rgb16 = encode(1, 1, 16, PNG_COLOR_TYPE_RGB, PNG_INTERLACE_NONE, {{0x80, 0x80, 0xFF, 0xFF, 0, 0}});
+  const auto rgb16 = libpng_file(1, 1, 16, PNG_COLOR_TYPE_RGB, PNG_INTERLACE_NONE, {{0x80, 0x80, 0xFF, 0xFF, 0, 0}});
   CHECK(io::decode_png_color(rgb16).value()(0, 0) == rgb8{0x80, 0xFF, 0});
-  const auto palette = encode(4, 1, 2, PNG_COLOR_TYPE_PALETTE, PNG_INTERLACE_NONE, {{0b00011011}});
+  const auto palette = libpng_file(4, 1, 2, PNG_COLOR_TYPE_PALETTE, PNG_INTERLACE_NONE, {{0b00011011}});
   CHECK(io::decode_png_color(palette).value()(0, 0) == rgb8{1, 2, 3});
   CHECK(io::decode_png_color(palette).value()(2, 0) == rgb8{255, 128, 0});
   CHECK(io::decode_png_color(palette).value()(3, 0) == rgb8{9, 8, 7});
-  const auto bits = encode(3, 1, 1, PNG_COLOR_TYPE_GRAY, PNG_INTERLACE_NONE, {{0b10100000}});
+  const auto bits = libpng_file(3, 1, 1, PNG_COLOR_TYPE_GRAY, PNG_INTERLACE_NONE, {{0b10100000}});
   CHECK(io::decode_png_color(bits).value()(0, 0) == rgb8{255, 255, 255});
   CHECK(io::decode_png_color(bits).value()(1, 0) == rgb8{0, 0, 0});
 }
@@ -111,7 +84,7 @@ TEST_CASE("an interlaced PNG has its pixels in place") {
   std::vector<std::vector<png_byte>> rows(9, std::vector<png_byte>(11));
   for (std::size_t y = 0; y != 9; ++y)
     for (std::size_t x = 0; x != 11; ++x) rows[y][x] = static_cast<png_byte>(13 * y + 3 * x);
-  const auto read = io::decode_png_color(encode(11, 9, 8, PNG_COLOR_TYPE_GRAY, PNG_INTERLACE_ADAM7, rows)).value();
+  const auto read = io::decode_png_color(libpng_file(11, 9, 8, PNG_COLOR_TYPE_GRAY, PNG_INTERLACE_ADAM7, rows)).value();
   for (int y = 0; y != 9; ++y)
     for (int x = 0; x != 11; ++x) CHECK(read(x, y).g == 13 * y + 3 * x);
 }
@@ -127,7 +100,7 @@ TEST_CASE("depth images of every filter, split or interlaced, have their pixels 
       rows[static_cast<std::size_t>(y)].push_back(static_cast<png_byte>(d));
     }
   const auto check = [&](int interlace, void (*change)(png_structp)) {
-    CHECK(io::decode_png_depth(encode(33, 21, 16, PNG_COLOR_TYPE_GRAY, interlace, rows, change)).value() == depth);
+    CHECK(io::decode_png_depth(libpng_file(33, 21, 16, PNG_COLOR_TYPE_GRAY, interlace, rows, change)).value() == depth);
   };
   check(PNG_INTERLACE_NONE, [](png_structp png) { png_set_filter(png, 0, PNG_FILTER_NONE); });
   check(PNG_INTERLACE_NONE, [](png_structp png) { png_set_filter(png, 0, PNG_FILTER_SUB); });
@@ -186,15 +159,9 @@ TEST_CASE("a changed byte never crashes the PNG reader and pixels never change s
 
 TEST_CASE("a header that claims too many pixels allocates nothing") {
   // 100000 x 100000 pixels, by a header whose checksum is right.
-  std::string bytes("\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\1\x86\xA0\0\1\x86\xA0\x10\0\0\0\0", 29);
-  std::uint32_t crc = 0xFFFFFFFFU;
-  for (std::size_t i = 12; i != 29; ++i) {
-    crc ^= static_cast<unsigned char>(bytes[i]);
-    for (int bit = 0; bit != 8; ++bit) crc = (crc >> 1) ^ ((crc & 1U) != 0 ? 0xEDB88320U : 0U);
-  }
-  crc = ~crc;
-  for (const int shift : {24, 16, 8, 0}) bytes += static_cast<char>(crc >> shift);
-  bytes += std::string("\0\0\0\0IDAT\x35\xAF\x06\x1E", 12);
+  const std::string size = big_endian(100'000) + big_endian(100'000);
+  const std::string bytes =
+      "\x89PNG\r\n\x1a\n" + png_chunk("IHDR", size + std::string("\x10\0\0\0\0", 5)) + png_chunk("IDAT", "");
   const auto read = io::decode_png_depth(bytes);
   REQUIRE_FALSE(read);
   CHECK(read.error().message == "damaged PNG: claims more pixels than the file can hold");
@@ -206,16 +173,9 @@ TEST_CASE("compressed texts in a PNG take no memory") {
   std::vector<png_byte> packed(8192);
   uLongf size = packed.size();
   REQUIRE(compress2(packed.data(), &size, reinterpret_cast<const Bytef*>(text.data()), text.size(), 9) == Z_OK);
-  std::string chunk("zTXtnote\0\0", 10);
-  chunk.append(reinterpret_cast<const char*>(packed.data()), size);
-  const auto big_endian = [](std::uint32_t v) {
-    std::string bytes;
-    for (const unsigned shift : {24U, 16U, 8U, 0U}) bytes += static_cast<char>(v >> shift);
-    return bytes;
-  };
-  const auto crc = static_cast<std::uint32_t>(
-      crc32(0, reinterpret_cast<const Bytef*>(chunk.data()), static_cast<uInt>(chunk.size())));
-  const std::string whole = big_endian(static_cast<std::uint32_t>(chunk.size() - 4)) + chunk + big_endian(crc);
+  std::string note("note\0\0", 6);
+  note.append(reinterpret_cast<const char*>(packed.data()), size);
+  const std::string whole = png_chunk("zTXt", note);
   const auto original = pattern<std::uint16_t>(16, 12);
   std::string bytes = io::encode_png(original);
   for (const char* before : {"IDAT", "IEND"}) {

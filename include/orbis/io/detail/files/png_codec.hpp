@@ -24,11 +24,9 @@
 #include <orbis/core/file.hpp>
 #include <orbis/core/image.hpp>
 #include <orbis/core/result.hpp>
+#include <orbis/io/detail/files/image_limits.hpp>
 
 namespace orbis::io::detail {
-
-/// Maximum number of pixels: more than any camera has; limits the memory that a header can request.
-inline constexpr std::uint64_t max_image_pixels = std::uint64_t{1} << 28;
 
 struct png_trouble {
   std::jmp_buf jump;
@@ -71,7 +69,7 @@ class png_decoder {
     if (png_ == nullptr) throw std::bad_alloc{};
     info_ = png_create_info_struct(png_);
     if (info_ == nullptr) throw std::bad_alloc{};
-    png_set_user_limits(png_, 1U << 20, 1U << 20);
+    png_set_user_limits(png_, max_png_side, max_png_side);
     png_set_chunk_malloc_max(png_, 1U << 23);
     // Skip data other than pixels: a thousand texts of 8 kB each may expand to 8 GB.
     png_set_keep_unknown_chunks(png_, PNG_HANDLE_CHUNK_NEVER, nullptr, -1);

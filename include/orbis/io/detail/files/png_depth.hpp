@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A decoder of the PNG files of depth cameras, by libdeflate: in half of libpng's time, with the same results. Empty
-/// unless ORBIS_LIBDEFLATE is defined, as in orbis::compiled if the library is found.
+/// A decoder of the PNG files of depth cameras, by libdeflate: in half of libpng's time, with the same pixels. It
+/// leaves all other files, and the errors, to libpng. Empty unless ORBIS_LIBDEFLATE is defined, as in orbis::compiled
+/// if the library is found.
 ///
 /// "Portable Network Graphics (PNG) Specification", second edition, W3C 2003: chunks (5), filters (9).
 #pragma once
@@ -21,6 +22,7 @@
 
 #include <orbis/core/bytes.hpp>
 #include <orbis/core/image.hpp>
+#include <orbis/io/detail/files/image_limits.hpp>
 
 namespace orbis::io::detail {
 
@@ -89,13 +91,15 @@ struct packed_depth {
 }
 
 /// Decodes a 16-bit grey PNG file without interlacing in half of libpng's time. Empty for all other files and damaged
-/// ones, which libpng decodes or reports. Allocates at most 1032 times the bytes.
+/// ones, which libpng decodes or reports. Allocates a copy of the compressed pixels, their decompressed bytes, at most
+/// 1032 times as many, and the image, which is smaller than those.
 [[nodiscard]] inline std::optional<image<std::uint16_t>> decode_plain_depth(std::string_view bytes) {
   const auto packed = read_depth_chunks(bytes);
   if (!packed) return std::nullopt;
   const std::uint64_t row_bytes = 2 * std::uint64_t{packed->width} + 1, raw_bytes = row_bytes * packed->height;
-  constexpr std::uint32_t longest = 1U << 20U;
-  if (packed->width > longest || packed->height > longest || raw_bytes > 1032 * std::uint64_t{packed->pixels.size()})
+  if (packed->width > max_png_side || packed->height > max_png_side ||
+      std::uint64_t{packed->width} * packed->height > max_image_pixels ||
+      raw_bytes > 1032 * std::uint64_t{packed->pixels.size()})
     return std::nullopt;
   const std::unique_ptr<libdeflate_decompressor, void (*)(libdeflate_decompressor*)> inflate{
       libdeflate_alloc_decompressor(), libdeflate_free_decompressor};

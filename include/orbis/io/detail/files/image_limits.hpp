@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Limits of the sizes that headers of image files may state.
+#pragma once
+
+#include <cstdint>
+
+namespace orbis::io::detail {
+
+/// Maximum number of pixels: more than any camera has; limits the memory that a header can request.
+inline constexpr std::uint64_t max_image_pixels = std::uint64_t{1} << 28;
+/// Maximum width and height of a PNG.
+inline constexpr std::uint32_t max_png_side = std::uint32_t{1} << 20;
+
+}  // namespace orbis::io::detail
