@@ -2,8 +2,8 @@
 #
 # orbis::compiled: a static library of common instantiations, which saves programs compile time. Its sources,
 # cmake/compiled/<component>*.cpp, instantiate templates and kernels of the headers and contain the non-template functions.
-# Its users compile with ORBIS_COMPILED, which makes the headers declare these and changes nothing else: programs with and
-# without it can be linked together.
+# Its users compile with ORBIS_COMPILED, which makes the headers declare these; results are the same, and programs with and
+# without it can be linked together. decode_png_depth in the library may use libdeflate, which headers alone never do.
 if(PROJECT_IS_TOP_LEVEL AND NOT CMAKE_BUILD_TYPE AND NOT CMAKE_CONFIGURATION_TYPES)
   set(CMAKE_BUILD_TYPE Release)
 endif()
