@@ -124,6 +124,29 @@ TEST_CASE("removed pixels are 0 until another call restores them") {
   }
 }
 
+TEST_CASE("a mask of another size is refused, and the image remains") {
+  depth_store store;
+  REQUIRE(store.put(1, noise(1)));
+  for (const depth_image& other : {depth_image(64, 47), depth_image(48, 64), depth_image(0, 0), depth_image(128, 96)}) {
+    const auto masked = store.mask(1, other);
+    REQUIRE_FALSE(masked);
+    CHECK(masked.error().code == errc::invalid_argument);
+    CHECK(masked.error().where == "frame 1");
+  }
+  CHECK(store.mask(1, depth_image(32, 24)).error().message == "the mask has 32 x 24 pixels, the depth image 64 x 48");
+  CHECK(get(store, 1) == noise(1));
+}
+
+TEST_CASE("a mask does not count as a use of the image") {
+  const scratch folder;
+  depth_store store{{.memory_budget = 20000, .spill_file = folder.spill()}};
+  for (std::uint32_t i = 0; i != 4; ++i) REQUIRE(store.put(i, noise(i)));
+  REQUIRE(store.mask(0, depth_image(64, 48)));  // 0 remains the oldest
+  for (std::uint32_t i = 4; store.bytes_spilled() == 0; ++i) REQUIRE(store.put(i, noise(i)));
+  REQUIRE(store.erase(0));
+  CHECK(store.bytes_spilled() == 0);
+}
+
 TEST_CASE("a second image of a frame takes the place of the first") {
   const scratch folder;
   for (const std::size_t budget : {std::size_t{1} << 20U, std::size_t{0}}) {

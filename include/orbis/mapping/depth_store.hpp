@@ -70,12 +70,18 @@ class depth_store {
   }
 
   /// Removes pixels from the image of `frame`, instead of those removed by an earlier call: the ones that are 0 in
-  /// `depth`. Only their runs are stored, in memory, beyond the budget. Error: not_found. Linear in the pixels, about
-  /// 0.2 ms for 640 x 480. @pre `depth` has the size of the image, and its other pixels are those of the image
+  /// `depth`. Only their runs are stored, in memory, beyond the budget. Errors: not_found; invalid_argument if `depth`
+  /// has another size than the image. Linear in the pixels, about 0.2 ms for 640 x 480. @pre its other pixels are those
+  /// of the image
   result<void> mask(std::uint64_t frame, image_view<const std::uint16_t> depth) {
-    assert(is_part_of_image(frame, depth));
     const auto at = entries_.find(frame);
     if (at == entries_.end()) return not_stored(frame);
+    const entry& e = at->second;
+    if (depth.width() != e.width || depth.height() != e.height)
+      return fail(errc::invalid_argument, name(frame),
+                  "the mask has " + size_text(depth.width(), depth.height()) + " pixels, the depth image " +
+                      size_text(e.width, e.height));
+    assert(is_part_of_image(e, depth));
     bytes_of_masks_ -= at->second.zeros.size();
     at->second.zeros = detail::zeros_of(depth);
     bytes_of_masks_ += at->second.zeros.size();
@@ -96,15 +102,7 @@ class depth_store {
     if (at == entries_.end()) return not_stored(frame);
     const entry& e = at->second;
     std::atomic_ref{e.last_use}.store(std::atomic_ref{uses_}.fetch_add(1) + 1);
-    if (out.width() != e.width || out.height() != e.height) out = image<std::uint16_t>(e.width, e.height);
-    detail::depth_decoder decoder;
-    result<void> done;
-    if (e.spilled) {
-      const auto bytes = file_.read(*e.spilled);
-      done = bytes ? decoder.decode(*bytes, out.view()) : result<void>{fail(bytes.error())};
-    } else {
-      done = decoder.decode(e.in_memory, out.view());
-    }
+    auto done = decode(e, out);
     if (done) return done;
     out = {};
     error why = done.error();
@@ -152,11 +150,21 @@ class depth_store {
   [[nodiscard]] static tl::unexpected<error> not_stored(std::uint64_t frame) {
     return fail(errc::not_found, name(frame), "no depth image is stored for this frame");
   }
-  /// Returns true if every pixel is 0 or that of the image, which is not an error if it cannot be read.
-  [[nodiscard]] bool is_part_of_image(std::uint64_t frame, image_view<const std::uint16_t> depth) const {
+  [[nodiscard]] static std::string size_text(int width, int height) {
+    return std::to_string(width) + " x " + std::to_string(height);
+  }
+  [[nodiscard]] result<void> decode(const entry& e, image<std::uint16_t>& out) const {
+    if (out.width() != e.width || out.height() != e.height) out = image<std::uint16_t>(e.width, e.height);
+    detail::depth_decoder decoder;
+    if (!e.spilled) return decoder.decode(e.in_memory, out.view());
+    const auto bytes = file_.read(*e.spilled);
+    return bytes ? decoder.decode(*bytes, out.view()) : result<void>{fail(bytes.error())};
+  }
+  /// Returns true if every pixel is 0 or that of the image, which is not an error if it cannot be read. It does not
+  /// count as a use, so that the same images are spilled with and without assertions.
+  [[nodiscard]] bool is_part_of_image(const entry& e, image_view<const std::uint16_t> depth) const {
     image<std::uint16_t> whole;
-    if (!get_whole(frame, whole)) return true;
-    if (whole.width() != depth.width() || whole.height() != depth.height()) return false;
+    if (!decode(e, whole)) return true;
     for (int y = 0; y != depth.height(); ++y)
       for (int x = 0; x != depth.width(); ++x)
         if (depth(x, y) != 0 && depth(x, y) != whole(x, y)) return false;
