@@ -88,8 +88,8 @@ void add_map_options(CLI::App& cmd, settings& s) {
       ->capture_default_str()
       ->type_name("A");
   count(cmd, "--depth-memory", s.depth_memory,
-        "memory for the depth images of keyframes, in MB; images beyond it are written to an unnamed temporary file in "
-        "the output folder",
+        "memory for the compressed depth images of keyframes, in MB, without the masks of removed pixels; images "
+        "beyond it are written to an unnamed temporary file in the output folder",
         0, 1'000'000)
       ->capture_default_str();
   cmd.add_option("--threads", s.threads,

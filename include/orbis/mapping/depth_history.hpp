@@ -30,6 +30,7 @@ concept depth_history = std::movable<S> &&
   { store.get(frame, out) } -> std::same_as<result<void>>;
   store.erase(frame);
 };
+/// A `depth_history` with a `mask`, which removes pixels of a stored image, and restores them, without another `put`.
 template <class S>
 concept masks_depth = depth_history<S> &&
     requires(S& store, std::uint64_t frame, image_view<const std::uint16_t> pixels) {

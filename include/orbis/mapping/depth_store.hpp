@@ -30,7 +30,8 @@
 namespace orbis::mapping {
 
 struct depth_store_options {
-  /// Memory budget of the compressed images, bytes. The least recently used ones are spilled first.
+  /// Memory budget of the compressed images, bytes, without masks, which stay in memory. The least recently used ones
+  /// are spilled first.
   std::size_t memory_budget = std::size_t{64} << 20U;
   /// Path of a file that does not exist yet, in an existing folder. It is created when it is first needed and unlinked
   /// immediately, so that it is deleted with the store or when the process ends. Empty: everything stays in memory.
@@ -70,9 +71,9 @@ class depth_store {
   }
 
   /// Removes pixels from the image of `frame`, instead of those removed by an earlier call: the ones that are 0 in
-  /// `depth`. Only their runs are stored, in memory, beyond the budget. Errors: not_found; invalid_argument if `depth`
-  /// has another size than the image. Linear in the pixels, about 0.2 ms for 640 x 480. @pre its other pixels are those
-  /// of the image
+  /// `depth`. Only the runs of pixels without depth are stored, in memory, beyond the budget. Errors: not_found;
+  /// invalid_argument if `depth` has another size than the image. Linear in the pixels, about 0.2 ms for 640 x 480.
+  /// @pre the other pixels of `depth` are those of the image
   result<void> mask(std::uint64_t frame, image_view<const std::uint16_t> depth) {
     const auto at = entries_.find(frame);
     if (at == entries_.end()) return not_stored(frame);
@@ -129,7 +130,7 @@ class depth_store {
   void free_buffers() { encoder_ = {}; }
   /// Number of images.
   [[nodiscard]] std::size_t size() const noexcept { return entries_.size(); }
-  /// Size of the compressed images, and of the runs of removed pixels, in memory.
+  /// Size of the compressed images in memory, and of the masks: the runs of pixels without depth.
   [[nodiscard]] std::size_t bytes_in_memory() const noexcept { return bytes_in_memory_ + bytes_of_masks_; }
   /// Size of the compressed images in the spill file.
   [[nodiscard]] std::size_t bytes_spilled() const noexcept { return bytes_spilled_; }
