@@ -107,6 +107,11 @@ template <camera::parametric_camera Camera>
   const std::uint32_t usual = usual_parameters(before);
   constexpr auto groups = parameter_groups<Camera>();
   std::uint32_t free = usual;
+  // The errors of patches in one image have common causes, such as an error of its motion, so that they average out
+  // less than those of corners.
+  constexpr double patch_correlation = 2.5;
+  const bool by_patches = std::any_of(problem.observations.begin(), problem.observations.end(),
+                                      [](const auto& o) { return o.depth_weight < 1.0; });
   std::optional<optimize::self_calibrated<Camera>> found;
   while (!found) {
     auto poses = problem.poses;
@@ -115,6 +120,7 @@ template <camera::parametric_camera Camera>
         optimize::self_calibrate<Camera>(before, poses, points, problem.observations,
                                          {.bf = bf, .free = free, .keeps_aspect = options.keeps_aspect}, callback);
     if (!tried && tried.error().code != errc::degenerate) return fail(tried.error());
+    if (tried && by_patches) tried->covariance *= patch_correlation * patch_correlation;
     const auto is_vague = [&](std::uint32_t group) {
       return (free & group) != 0 &&
              (!tried || effect_of(tried->camera, tried->covariance, free & group) > options.max_effect);

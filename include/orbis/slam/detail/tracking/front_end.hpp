@@ -199,8 +199,10 @@ class front_end {
     basic_map<D>& m = maps.active();
     first_new_ = m.landmark_end();
     const keyframe_id id = insert_keyframe(m, f, options_);
-    if (patches_.is_ready())
-      if (const auto motion = motion_to(f)) patches_.add_patches(m, id, f, *motion);
+    const auto motion = motion_to(f);
+    const bool is_first = last_.size() == 0;
+    if (patches_.is_ready() && (motion || is_first)) patches_.add_patches(m, id, f, motion.value_or(zeros<vec6>()));
+    first_patches_ = is_first ? std::optional{id} : std::nullopt;
     for (const start_point& p : std::exchange(start_points_, {})) {
       const landmark_id l = m.add_landmark(id, p.second, p.position);
       m.add_observation(l, first_keyframe_->keyframe, p.first);
@@ -353,7 +355,10 @@ class front_end {
         f, m, reference_.keyframe, radius, moving_, [&](landmark_id l) { is_frozen ? void() : m.count_visible(l); },
         [&](landmark_id l) { is_frozen ? void() : m.count_found(l); });
     if (inliers == 0 || !patches_.is_ready()) return inliers;
-    if (!patches_.align(f, m, motion_to(f).value_or(zeros<vec6>()))) return inliers;
+    const auto motion = motion_to(f);
+    if (motion && first_patches_ && !is_frozen && m.has_keyframe(*first_patches_))
+      patches_.set_first_motion(m, *std::exchange(first_patches_, std::nullopt), *motion);
+    if (!patches_.align(f, m, motion.value_or(zeros<vec6>()))) return inliers;
     const std::size_t left = refine_on_landmarks(f, m, rig_);
     patches_.move_back(f, left == 0);
     if (left != 0) patches_.update_deviation(f, m);
@@ -522,7 +527,8 @@ class front_end {
   early_depth_twist early_depth_;
   frame_type before_recheck_;  ///< reused working memory
 
-  vec6 last_mean_twist_ = zeros<vec6>();  ///< between the last two frames
+  std::optional<keyframe_id> first_patches_;  ///< the first keyframe of the map, until its motion is known
+  vec6 last_mean_twist_ = zeros<vec6>();      ///< between the last two frames
 
   double held_since_ = 0.0;  ///< time of the last tracked frame whose pose was not determined by depth alone, seconds
 

@@ -124,6 +124,21 @@ class patch_tracker {
     }
   }
 
+  /// Sets the motion of the patches from the first keyframe of a map, which is known from the next frame only.
+  /// @pre m.has_keyframe(id), is_ready()
+  void set_first_motion(basic_map<D>& m, keyframe_id id, const vec6& twist) const {
+    const auto& k = m.at(id);
+    const se3 T_camera_world = k.T_world_camera.inverse();
+    for (std::size_t i = 0; i != k.size(); ++i) {
+      if (k.landmarks[i] == no_id || m.landmark_at(k.landmarks[i]).patch.pixels == nullptr) continue;
+      const auto& l = m.landmark_at(k.landmarks[i]);
+      const auto level = (*image_.levels)[static_cast<std::size_t>(k.features.keypoints[i].octave)];
+      landmark_patch patch = l.patch;
+      set_motion(patch, T_camera_world * l.position, pixel_size(level), twist);
+      m.set_patch(l.id, std::move(patch));
+    }
+  }
+
   /// Moves the keypoints of the last aligned frame that no longer observe a landmark, or all, back to where the
   /// detector found them.
   void move_back(basic_frame<D>& f, bool all) const {
@@ -244,15 +259,33 @@ class patch_tracker {
         {i, at.x, at.y, f.deviations[i], f.depth[i], f.rays[i], f.as_read.empty() ? keypoint_as_read{} : f.as_read[i]});
     at.x = static_cast<float>(to.x() - delay.x()), at.y = static_cast<float>(to.y() - delay.y());
     f.rays[i] = *ray / ray->z();
-    if (image_.depth_at) f.depth[i] = static_cast<float>(image_.depth_at(to));
-    if (f.as_read.empty()) return true;
+    const float stored = image_.depth_at ? static_cast<float>(image_.depth_at(to)) : f.depth[i];
+    if (f.as_read.empty()) {
+      f.depth[i] = stored;
+      return true;
+    }
     keypoint_as_read& read = f.as_read[i];
     read.x = static_cast<float>(to.x()), read.y = static_cast<float>(to.y());
     read.ray_x = read_ray->x() / read_ray->z(), read.ray_y = read_ray->y() / read_ray->z();
-    if (image_.depth_at) read.depth = read.stored_depth = f.depth[i];
+    if (!image_.depth_at) return true;
+    // What was corrected for the time of the depth image at the old pixel applies to the new one.
+    const auto corrected = [&](float depth) {
+      if (!(read.stored_depth > 0.0F && stored > 0.0F)) return stored;
+      return depth > 0.0F ? stored + (depth - read.stored_depth) : 0.0F;
+    };
+    f.depth[i] = corrected(f.depth[i]);
+    read.depth = corrected(read.depth);
+    read.stored_depth = stored;
     return true;
   }
 
+  /// Sets the motion of a patch whose landmark is at `point` (camera frame, metres). `size`: of its pixels, pixels of
+  /// the image.
+  void set_motion(landmark_patch& patch, const vec3& point, const vec2& size, const vec6& twist) const {
+    const vec2 motion = motion_of(point, twist);
+    patch.motion = {motion.x() / size.x(), motion.y() / size.y()};
+    patch.corner_deviation = corner_deviation(exposure() * norm(patch.motion));
+  }
   /// Returns the patch around keypoint `i`, which observes `point` (camera frame, metres); empty near the border.
   [[nodiscard]] std::optional<landmark_patch> patch_at(const basic_frame<D>& f, std::size_t i, const vec3& point,
                                                        const vec6& twist) const {
@@ -269,9 +302,7 @@ class patch_tracker {
     landmark_patch patch;
     patch.across = f.T_world_camera.rotation() * *across;
     patch.down = f.T_world_camera.rotation() * *down;
-    const vec2 motion = motion_of(point, twist);
-    patch.motion = {motion.x() / size.x(), motion.y() / size.y()};
-    patch.corner_deviation = corner_deviation(exposure() * norm(patch.motion));
+    set_motion(patch, point, size, twist);
     auto pixels = std::make_shared<landmark_patch::pixel_array>();
     for (int y = 0, k = 0; y != landmark_patch::size; ++y)
       for (int x = 0; x != landmark_patch::size; ++x, ++k) {
