@@ -69,6 +69,21 @@ template <camera::camera_model Camera, feature_descriptor D>
   return f;
 }
 
+/// Converts a colour image to grey, in `to`, of which it returns a view.
+[[nodiscard]] inline image_view<const std::uint8_t> grey_of(image_view<const rgb8> color, image<std::uint8_t>& to) {
+  if (to.width() != color.width() || to.height() != color.height())
+    to = image<std::uint8_t>(color.width(), color.height());
+  features::luma(color, to.view());
+  return std::as_const(to).view();
+}
+
+/// Returns the depth at a pixel, metres; 0 if it is unknown or outside the rig's range.
+template <camera::camera_model Camera, camera::depth_source Depth>
+[[nodiscard]] double usable_depth(const camera_rig<Camera>& rig, const Depth& depth, float x, float y) {
+  const auto at = features::depth_at(depth, x, y);
+  return at && at->z >= rig.min_depth && at->z <= rig.max_depth ? at->z : 0.0;
+}
+
 }  // namespace detail
 
 /// Returns the number of points with which a frame can begin a map: the number of its features with depth if lengths
@@ -90,11 +105,8 @@ struct image_memory {
   template <feature_extractor Extractor>
   [[nodiscard]] auto extract_with(const Extractor& extract, image_view<const rgb8> color) {
     if constexpr (features::pyramid_extractor<Extractor>) {
-      if (grey.width() != color.width() || grey.height() != color.height())
-        grey = image<std::uint8_t>(color.width(), color.height());
-      features::luma(color, grey.view());
       decltype(extract(color)) found;
-      extract.into(found, pyramid, std::as_const(grey).view());
+      extract.into(found, pyramid, detail::grey_of(color, grey));
       return found;
     } else {
       return extract(color);
@@ -109,12 +121,10 @@ template <camera::camera_model Camera, feature_extractor Extractor, camera::dept
                                                                    const Extractor& extract,
                                                                    image_view<const rgb8> color, const Depth& depth,
                                                                    image_memory& memory) {
-  const auto usable = [&](double z) { return z >= rig.min_depth && z <= rig.max_depth; };
   auto f = detail::frame_of(rig, memory.extract_with(extract, color), sensor_kind::rgbd);
   for (std::size_t i = 0; i < f.size(); ++i) {
     const auto& k = f.features.keypoints[i];
-    const auto z = std::isnan(f.rays[i].x()) ? std::nullopt : features::depth_at(depth, k.x, k.y);
-    f.depth[i] = z && usable(z->z) ? static_cast<float>(z->z) : 0.0F;
+    if (!std::isnan(f.rays[i].x())) f.depth[i] = static_cast<float>(detail::usable_depth(rig, depth, k.x, k.y));
   }
   return f;
 }
@@ -207,13 +217,8 @@ template <camera::camera_model Camera, feature_extractor Extractor>
                                                                      image_view<const rgb8> left,
                                                                      image_view<const rgb8> right,
                                                                      stereo_memory& memory) {
-  const auto grey_of = [](image_view<const rgb8> color, image<std::uint8_t>& to) {
-    if (to.width() != color.width() || to.height() != color.height())
-      to = image<std::uint8_t>(color.width(), color.height());
-    features::luma(color, to.view());
-    return std::as_const(to).view();
-  };
-  const auto grey_left = grey_of(left, memory.grey_left), grey_right = grey_of(right, memory.grey_right);
+  const auto grey_left = detail::grey_of(left, memory.grey_left),
+             grey_right = detail::grey_of(right, memory.grey_right);
   if constexpr (grey_extractor<Extractor>)
     return measure_stereo(rig, extract, grey_left, grey_right, memory);
   else

@@ -72,8 +72,7 @@ track_result ORBIS_SLAM_SYSTEM::track(double timestamp, image_view<const rgb8> c
   detail::frame_image pixels{&image_.pyramid};
   if (shared_.rig.scale_is_known)
     pixels.depth_at = [&](const vec2& pixel) {
-      const auto at = features::depth_at(depth, static_cast<float>(pixel.x()), static_cast<float>(pixel.y()));
-      return at && at->z >= shared_.rig.min_depth && at->z <= shared_.rig.max_depth ? at->z : 0.0;
+      return detail::usable_depth(shared_.rig, depth, static_cast<float>(pixel.x()), static_cast<float>(pixel.y()));
     };
   front_end_->patches().set_image(std::move(pixels));
   return track_frame(

@@ -224,7 +224,6 @@ class front_end {
     if (!is_tracking()) return;
     if (last_.index + 1 == f.index && state_ == track_state::tracking && last_.size() != 0)
       motion_.set({last_.timestamp, last_.T_world_camera}, {f.timestamp, f.T_world_camera});
-    last_mean_twist_ = motion_between(last_, f);
     last_reference_ = reference_;
     start_.reset();
     const basic_keyframe<D>& reference = maps.active().at(reference_.keyframe);
@@ -371,7 +370,7 @@ class front_end {
     if (state_ != track_state::tracking || last_.size() == 0 || last_.index + 1 != f.index) return std::nullopt;
     const vec6 mean = motion_between(last_, f);
     if (!(norm(head<3>(mean)) < fastest && norm(tail<3>(mean)) < fastest_turn)) return std::nullopt;
-    return motion_.is_known() ? vec6(mean + 0.5 * (mean - last_mean_twist_)) : mean;
+    return motion_.is_known() ? vec6(mean + 0.5 * (mean - motion_.twist())) : mean;
   }
 
   /// Removes the landmarks of a frame that disagree with its pose. Returns the number left.
@@ -528,7 +527,6 @@ class front_end {
   frame_type before_recheck_;  ///< reused working memory
 
   std::optional<keyframe_id> first_patches_;  ///< the first keyframe of the map, until its motion is known
-  vec6 last_mean_twist_ = zeros<vec6>();      ///< between the last two frames
 
   double held_since_ = 0.0;  ///< time of the last tracked frame whose pose was not determined by depth alone, seconds
 

@@ -32,6 +32,10 @@ class motion_model {
     if (velocity_) velocity_->head<3>() *= factor;
   }
   [[nodiscard]] bool is_known() const noexcept { return velocity_.has_value(); }
+  /// The motion of the camera in its own frame, per second; zero if it is unknown.
+  [[nodiscard]] vec6 twist() const {
+    return velocity_ && interval_ > 0.0 ? vec6(*velocity_ / interval_) : vec6(zeros<vec6>());
+  }
 
   /// Predicts `T_world_camera` at `timestamp` by continuing the motion from `last`, for at most three times the last
   /// interval; returns `last` itself if the motion is unknown.

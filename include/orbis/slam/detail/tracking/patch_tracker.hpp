@@ -69,6 +69,7 @@ class patch_tracker {
     moved_.clear();
     std::size_t moving = 0;
     for (std::size_t i = 0; i != f.size(); ++i) {
+      if (seconds == 0.0 && f.landmarks[i] == no_id) continue;  // a sharp corner
       const double scale = rig_.scales.scale(f.features.keypoints[i].octave);
       constexpr double far = 1e3;  // metres
       const vec2 motion = motion_of(f.has_depth(i) ? f.point_camera(i) : vec3(far * f.rays[i]), twist);
