@@ -10,19 +10,19 @@
 #include <orbis/camera/rgbd_frame.hpp>
 #include <orbis/camera/shutter_correction.hpp>
 #include <orbis/core/types.hpp>
+#include <orbis/slam/measure.hpp>
 
 namespace app {
 
 class frame_correction {
  public:
-  frame_correction(orbis::camera::any_camera camera, const orbis::camera::shutter& shutter)
-      : shutter_{shutter}, correct_{std::move(camera)} {}
+  explicit frame_correction(orbis::camera::any_camera camera) : correct_{std::move(camera)} {}
 
   /// The frame as a global shutter would have taken it; the frame itself if no correction is needed, or if the camera
-  /// moved too fast. `twist`: the motion during the read-out. Valid until the next call.
+  /// moved too fast. `m`: the shutter of the frame, and the motion during the read-out. Valid until the next call.
   [[nodiscard]] const orbis::camera::rgbd_frame& operator()(const orbis::camera::rgbd_frame& frame,
-                                                            const orbis::vec6& twist) {
-    if (!correct_.is_needed(shutter_, twist)) return frame;
+                                                            const orbis::slam::frame_motion& m) {
+    if (!correct_.is_needed(m.shutter, m.twist)) return frame;
     if (corrected_.depth.width() != frame.depth.width() || corrected_.depth.height() != frame.depth.height()) {
       corrected_.depth = orbis::image<std::uint16_t>(frame.depth.width(), frame.depth.height());
       corrected_.color = orbis::image<orbis::rgb8>(frame.depth.width(), frame.depth.height());
@@ -31,21 +31,20 @@ class frame_correction {
     corrected_.depth_scale = frame.depth_scale;
     corrected_.T_world_camera = frame.T_world_camera;
     const bool done =
-        correct_.depth(shutter_, twist, frame.depth_metres(), corrected_.depth.view()) &&
-        correct_.color(shutter_, twist, corrected_.depth_metres(), frame.color.view(), corrected_.color.view());
+        correct_.depth(m.shutter, m.twist, frame.depth_metres(), corrected_.depth.view()) &&
+        correct_.color(m.shutter, m.twist, corrected_.depth_metres(), frame.color.view(), corrected_.color.view());
     return done ? corrected_ : frame;
   }
 
   /// Corrects the colours of a frame whose depth is already corrected.
-  void correct_color(const orbis::camera::depth_view<std::uint16_t>& corrected, const orbis::vec6& twist,
+  void correct_color(const orbis::camera::depth_view<std::uint16_t>& corrected, const orbis::slam::frame_motion& m,
                      orbis::image<orbis::rgb8>& color) {
-    if (!correct_.is_needed(shutter_, twist)) return;
+    if (!correct_.is_needed(m.shutter, m.twist)) return;
     orbis::image<orbis::rgb8> out(color.width(), color.height());
-    if (correct_.color(shutter_, twist, corrected, color.view(), out.view())) color = std::move(out);
+    if (correct_.color(m.shutter, m.twist, corrected, color.view(), out.view())) color = std::move(out);
   }
 
  private:
-  orbis::camera::shutter shutter_;
   orbis::camera::shutter_correction<orbis::camera::any_camera> correct_;
   orbis::camera::rgbd_frame corrected_;
 };

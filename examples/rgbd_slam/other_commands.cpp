@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include <orbis/camera/depth_clock.hpp>
 #include <orbis/camera/shutter.hpp>
 #include <orbis/cloud/extract.hpp>
 #include <orbis/core/point.hpp>
@@ -56,13 +57,15 @@ orbis::result<posed_frames> frames_with_poses(const frame_source& source, const 
         "cannot place depth images; use run");
   console.stage("reading");
   const auto shutter = source.camera.shutter.value_or(orbis::camera::shutter{});
-  posed_frames posed{source, s, spill_file, shutter};
-  frame_correction correct{source.camera.model, shutter};
+  posed_frames posed{source, s, spill_file};
+  frame_correction correct{source.camera.model};
+  orbis::camera::depth_clock clock;
   orbis::se3 T_world_truth;
   read_ahead frames{source, s.threads != 1};
   for (std::size_t i = 0; frames.has_next(); ++i) {
     auto frame = frames.next();
     if (!frame) return orbis::fail(frame.error());
+    const double depth_delay = clock.update(frame->depth_timestamp.value_or(frame->timestamp) - frame->timestamp);
     if (frame->T_world_camera) {
       source.complete(*frame);
       if (posed.size() == 0) {
@@ -71,10 +74,11 @@ orbis::result<posed_frames> frames_with_poses(const frame_source& source, const 
         world = worlds.world_starting_at(frame->timestamp);
         if (world->up_from == "ground truth") T_world_truth = {};
       }
-      const orbis::vec6 twist = twist_at(source.ground_truth, frame->timestamp);
-      const orbis::camera::rgbd_frame& at_once = correct(*frame, twist);
-      posed.add(i, T_world_truth * *frame->T_world_camera,
-                &at_once == &*frame ? orbis::vec6(orbis::vec6::Zero()) : twist, at_once);
+      orbis::slam::frame_motion motion{shutter, twist_at(source.ground_truth, frame->timestamp)};
+      motion.shutter.depth_delay += depth_delay;
+      const orbis::camera::rgbd_frame& at_once = correct(*frame, motion);
+      posed.add(i, T_world_truth * *frame->T_world_camera, &at_once == &*frame ? orbis::slam::frame_motion{} : motion,
+                at_once);
     }
     console.advance(i + 1, source.frames);
   }

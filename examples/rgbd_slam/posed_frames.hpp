@@ -45,12 +45,9 @@ class posed_frames {
   };
 
  public:
-  /// `spill_file`: for depth images beyond the memory budget; see `depth_store_options`. `shutter`: of the correction
-  /// of frames that are added with a twist.
-  posed_frames(const frame_source& source, const settings& s, const std::filesystem::path& spill_file,
-               const orbis::camera::shutter& shutter = {})
+  /// `spill_file`: for depth images beyond the memory budget; see `depth_store_options`.
+  posed_frames(const frame_source& source, const settings& s, const std::filesystem::path& spill_file)
       : source_{&source},
-        shutter_{shutter},
         background_{s.threads != 1},
         depths_{std::make_unique<keyframe_depths>(
             orbis::mapping::depth_store_options{.memory_budget = s.depth_memory << 20U, .spill_file = spill_file},
@@ -58,16 +55,16 @@ class posed_frames {
         colors_{spill_file.string() + ".colors", point_stride,
                 source.made ? std::numeric_limits<std::uint64_t>::max() : most_color_bytes} {}
 
-  /// Adds frame number `i` of the source with its pose. `twist`: see below.
-  void add(std::size_t i, const orbis::se3& T_world_camera, const orbis::vec6& twist,
+  /// Adds frame number `i` of the source with its pose. `corrected_by`: see below.
+  void add(std::size_t i, const orbis::se3& T_world_camera, const orbis::slam::frame_motion& corrected_by,
            const orbis::camera::rgbd_frame& frame) {
-    add({i, {}, T_world_camera, twist}, frame);
+    add({i, {}, T_world_camera, corrected_by}, frame);
   }
-  /// Adds frame number `i` of the source, a keyframe whose pose `place` sets later. `twist`: the motion by which its
-  /// images were corrected; zero: they are the source's images.
-  void add(std::size_t i, orbis::slam::map_keyframe keyframe, const orbis::vec6& twist,
+  /// Adds frame number `i` of the source, a keyframe whose pose `place` sets later. `corrected_by`: the motion by which
+  /// its images were corrected; none: they are the source's images.
+  void add(std::size_t i, orbis::slam::map_keyframe keyframe, const orbis::slam::frame_motion& corrected_by,
            const orbis::camera::rgbd_frame& frame) {
-    add({i, keyframe, {}, twist}, frame);
+    add({i, keyframe, {}, corrected_by}, frame);
   }
   /// Sets the pose of each frame to `where(keyframe)` and drops frames without a pose.
   template <class Where>
@@ -164,7 +161,7 @@ class posed_frames {
     std::size_t index;
     orbis::slam::map_keyframe keyframe;
     orbis::se3 T_world_camera;
-    orbis::vec6 twist;
+    orbis::slam::frame_motion corrected_by;
   };
 
   void add(const entry& e, const orbis::camera::rgbd_frame& frame) {
@@ -203,15 +200,14 @@ class posed_frames {
     if (!read) images.error = read.error();
     images.color = read ? *std::move(read) : orbis::image<orbis::rgb8>{};
     const orbis::camera::depth_view depth{images.depth, source_->camera.depth_scale};
-    if (read && !e.twist.isZero(0.0))
-      frame_correction{source_->camera.model, shutter_}.correct_color(depth, e.twist, *images.color);
+    if (read && !e.corrected_by.twist.isZero(0.0))
+      frame_correction{source_->camera.model}.correct_color(depth, e.corrected_by, *images.color);
   }
   void note_error(const unpacked& images) const {
     if (images.error) read_error_ = images.error;
   }
 
   const frame_source* source_;
-  orbis::camera::shutter shutter_;
   bool background_;
   std::vector<entry> entries_;
   std::unique_ptr<keyframe_depths> depths_;

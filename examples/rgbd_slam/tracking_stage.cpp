@@ -99,12 +99,11 @@ bool is_planned_end(const orbis::error& e) {
 }
 
 /// Tracks frames up to the first unreadable one or Ctrl-C. Each map starts in a separate world frame.
-void track_frames(slam_system& slam, const frame_source& source, const settings& s,
-                  const orbis::camera::shutter& shutter, upright_worlds& worlds, tracked_frames& out, viewer& viewer,
-                  console& console) {
+void track_frames(slam_system& slam, const frame_source& source, const settings& s, upright_worlds& worlds,
+                  tracked_frames& out, viewer& viewer, console& console) {
   using orbis::slam::track_state;
   read_ahead frames{source, s.threads != 1 && !source.is_live};
-  frame_correction correct{source.camera.model, shutter};
+  frame_correction correct{source.camera.model};
   static_frames remove_moving{source.camera.model};
   camera_pace pace;
   for (std::size_t i = 0; frames.has_next() && !interrupts::stop_requested(); ++i) {
@@ -125,11 +124,12 @@ void track_frames(slam_system& slam, const frame_source& source, const settings&
     const bool has_keyframe = found.keyframe && !source.is_monocular();
     const bool is_mapped = has_keyframe || (out.live && s.map_every_frame && found.T_world_camera);
     if (is_mapped) source.complete(*frame);
-    const orbis::camera::rgbd_frame& at_once = is_mapped ? correct(*frame, found.twist) : *frame;
+    const orbis::slam::frame_motion motion{found.shutter, found.twist};
+    const orbis::camera::rgbd_frame& at_once = is_mapped ? correct(*frame, motion) : *frame;
     const orbis::camera::rgbd_frame& for_map = is_mapped ? remove_moving(at_once, slam.last_frame()) : at_once;
     if (has_keyframe)
-      out.keyframes.add(i, {found.map, *found.keyframe},
-                        &at_once == &*frame ? orbis::vec6(orbis::vec6::Zero()) : found.twist, for_map);
+      out.keyframes.add(i, {found.map, *found.keyframe}, &at_once == &*frame ? orbis::slam::frame_motion{} : motion,
+                        for_map);
     if (out.live) forward_to_live_map(slam, found, i, for_map, s, *out.live);
     viewer.show([&] { return make_viewer_frame(slam, i, found, took(), *std::move(frame)); });
     out.slam.tracking_ms.push_back(took());
@@ -270,7 +270,7 @@ orbis::result<tracked_frames> track(const frame_source& source, const shutter_re
 
   tracked_frames out{.slam = {},
                      .world = {},
-                     .keyframes = posed_frames{source, s, spill_file, shutter.shutter},
+                     .keyframes = posed_frames{source, s, spill_file},
                      .live = {},
                      .stopped = {},
                      .unsaved = {},
@@ -288,7 +288,7 @@ orbis::result<tracked_frames> track(const frame_source& source, const shutter_re
     ++out.slam.keyframes_made;
     out.slam.lost_frames.remove(made.frame);  // the first of the two frames that initialise a map without depth
   }});
-  track_frames(slam, source, s, shutter.shutter, worlds, out, viewer, console);
+  track_frames(slam, source, s, worlds, out, viewer, console);
   slam.wait();
   if (out.live) out.live->stop();
 

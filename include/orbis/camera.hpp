@@ -13,6 +13,7 @@
 /// | `depth.hpp, rgbd_frame.hpp` | depth images; a colour image with its depth image |
 /// | `rays.hpp, world_point.hpp, cloud.hpp` | rays of pixels; world points of pixels; points of a depth image |
 /// | `shutter.hpp, shutter_correction.hpp` | rolling-shutter timing; conversion to global-shutter images |
+/// | `depth_clock.hpp` | times of depth images relative to colour images, by their time stamps |
 /// | `undistort.hpp` | removal of lens distortion from images |
 /// | `stereo.hpp, stereo_frame.hpp` | stereo rigs and their rectification; a pair of stereo images |
 /// | `mono_frame.hpp` | the image of a monocular camera |
@@ -22,6 +23,7 @@
 #include <orbis/camera/any.hpp>
 #include <orbis/camera/cloud.hpp>
 #include <orbis/camera/depth.hpp>
+#include <orbis/camera/depth_clock.hpp>
 #include <orbis/camera/intrinsics.hpp>
 #include <orbis/camera/kannala_brandt.hpp>
 #include <orbis/camera/model.hpp>

@@ -50,6 +50,7 @@ TEST_CASE("the frames of a recording come one by one") {
   int count = 0;
   for (const auto& frame : io::open_recording(folder.path()).value()) {
     CHECK(frame.timestamp == count);
+    CHECK(frame.depth_timestamp.value() == Approx(count + 0.01));
     CHECK(frame.color(7, 5).g == count + 1);
     CHECK(frame.depth(7, 5) == count + 1);
     CHECK(frame.depth_scale == 5000.0);

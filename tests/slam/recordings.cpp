@@ -304,7 +304,7 @@ TEST_CASE("A rolling shutter costs little where it is known, and much where it i
   io::synthetic_options o{.frames = 120, .fps = 30.0, .seed = 3, .width = 320, .height = 240, .frames_around = 400};
   o.path.jitter = 5.0;
   o.sensor = io::synthetic_sensor_options::ideal();
-  const auto error_of = [&](const camera::shutter& is, const camera::shutter& known) {
+  const auto error_of = [&](const camera::shutter& is, const camera::shutter& known, double stamped_later = 0.0) {
     o.sensor.shutter = is;
     const io::synthetic_recording frames{o};
     slam::options settings;
@@ -314,8 +314,11 @@ TEST_CASE("A rolling shutter costs little where it is known, and much where it i
     std::vector<slam::track_state> states;
     double turned_off = 0.0;  // by the twist, radians per second
     for (std::size_t i = 0; i != frames.size(); ++i) {
-      const slam::track_result found = slam.track(frames.frame(i).value());
+      camera::rgbd_frame f = frames.frame(i).value();
+      if (stamped_later != 0.0) f.depth_timestamp = f.timestamp + stamped_later;
+      const slam::track_result found = slam.track(f);
       states.push_back(found.state);
+      CHECK(found.shutter.depth_delay == Approx(known.depth_delay + stamped_later));
       if (known.is_global()) CHECK(found.twist == vec6::Zero());
       if (i == 0 || i + 1 == frames.size()) continue;
       const vec6 motion = (frames.T_world_camera(i - 1).inverse() * frames.T_world_camera(i + 1)).log() * (o.fps / 2.0);
@@ -335,8 +338,10 @@ TEST_CASE("A rolling shutter costs little where it is known, and much where it i
   CHECK(ignored > 2.5 * modelled);
   const camera::shutter late{.color_read_out = 0.03, .depth_read_out = 0.03, .depth_delay = 0.015};
   const double followed = error_of(late, late), missed = error_of(late, rolling);
-  CAPTURE(followed, missed);
+  const double stamped = error_of(late, rolling, 0.015);
+  CAPTURE(followed, missed, stamped);
   CHECK(followed < 0.85 * missed);
+  CHECK(stamped == Approx(followed).epsilon(0.02));
   // Where all rows are of one time, only the poses around a frame tell how it moves.
   const camera::shutter early{.depth_delay = -0.015}, much_earlier{.depth_delay = -0.03};
   const double early_followed = error_of(early, early), early_missed = error_of(early, {});

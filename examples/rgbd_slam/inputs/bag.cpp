@@ -169,6 +169,7 @@ class bag_recording final : public file_recording {
     if (sensor == sensor_kind::rgbd) {
       auto depth = read_depth(frames_[i].second);
       if (!depth) return fail(depth.error());
+      f.depth_timestamp = second_->times[frames_[i].second];
       f.depth = registration_ ? (*registration_)(depth->view(), camera.depth_scale) : *std::move(depth);
     } else if (sensor == sensor_kind::stereo) {
       auto second = read_color(*second_, frames_[i].second);

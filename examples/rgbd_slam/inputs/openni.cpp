@@ -153,6 +153,7 @@ class openni_camera final : public camera_device {
         return fail(errc::malformed, name, "changed the size of its images");
     source_frame out;
     out.timestamp = seconds(both.color);
+    out.depth_timestamp = seconds(both.depth);
     out.depth_scale = camera.depth_scale;
     out.color = orbis::image<orbis::rgb8>(width, height);
     out.depth = orbis::image<std::uint16_t>(width, height);

@@ -42,6 +42,7 @@ ORBIS_INLINE result<camera::rgbd_frame> recording::frame(std::size_t i) const {
   auto image = read_registered(entry.color, depth->view());
   if (!image) return fail(image.error());
   return camera::rgbd_frame{.timestamp = entry.timestamp,
+                            .depth_timestamp = entry.depth_timestamp,
                             .color = *std::move(image),
                             .depth = *std::move(depth),
                             .depth_scale = camera_.depth_scale,

@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include <orbis/camera/shutter.hpp>
 #include <orbis/core/se3.hpp>
 #include <orbis/core/types.hpp>
 #include <orbis/features/descriptor.hpp>
@@ -63,6 +64,7 @@ struct basic_frame {
   /// The keypoints as read with a rolling shutter; the other members are for the frame's time. Empty with a global
   /// shutter.
   std::vector<keypoint_as_read> as_read;
+  camera::shutter shutter{};   ///< assumed for the frame, with the delay of its own depth image
   vec6 twist = zeros<vec6>();  ///< motion of the camera in its own frame during read-out, per second, translation first
 
   /// The number of features.

@@ -62,12 +62,14 @@ void ORBIS_SLAM_SYSTEM::listen(listeners callbacks) { shared_.callbacks = std::m
 
 ORBIS_SLAM_SYSTEM_TEMPLATE
 template <camera::depth_source Depth>
-track_result ORBIS_SLAM_SYSTEM::track(double timestamp, image_view<const rgb8> color, const Depth& depth) {
+track_result ORBIS_SLAM_SYSTEM::track(double timestamp, image_view<const rgb8> color, const Depth& depth,
+                                      std::optional<double> depth_timestamp) {
   detail::stopwatch clock;
   front_end_->depth().clear_depth();
   front_end_->patches().set_image({});
   if (!are_usable(timestamp, color, depth)) return track_frame(timestamp, {}, {}, clock);
   frame_type f = measure_rgbd(shared_.rig, extract_, color, depth, image_);
+  f.shutter.depth_delay = depth_clock_.update(depth_timestamp.value_or(timestamp) - timestamp);
   front_end_->depth().set_depth(depth);
   detail::frame_image pixels{&image_.pyramid};
   if (shared_.rig.scale_is_known)
@@ -127,7 +129,7 @@ track_result ORBIS_SLAM_SYSTEM::track_frame(double timestamp, frame_type f, cons
   track_result result;
   f.scale_is_known = shared_.rig.scale_is_known;
   if (!f.scale_is_known) std::fill(f.depth.begin(), f.depth.end(), 0.0F);
-  if (front_end_->needs_as_read()) detail::keep_as_read(f);
+  front_end_->set_shutter(f);
   f.timestamp = std::isfinite(timestamp) ? timestamp : front_end_->last_timestamp();
   f.index = front_end_->counters().frames;
   clock.lap(result.timings.features_ms);
@@ -185,6 +187,7 @@ void ORBIS_SLAM_SYSTEM::report(track_result& result, const std::optional<map_key
   if (front_end_->is_tracking()) {
     result.T_world_camera = front_end_->last_pose(shared_.atlas);
     result.twist = front_end_->last_twist();
+    result.shutter = front_end_->last_shutter();
   }
   const state_event changed{std::exchange(reported_state_, result.state), result.state,
                             front_end_->counters().frames - 1};

@@ -31,6 +31,7 @@
 
 #include <orbis/camera/any.hpp>
 #include <orbis/camera/depth.hpp>
+#include <orbis/camera/depth_clock.hpp>
 #include <orbis/camera/model.hpp>
 #include <orbis/camera/rgbd_frame.hpp>
 #include <orbis/core/image.hpp>
@@ -99,11 +100,16 @@ class system {
 
   /// Tracks the next frame. Frames whose size differs from the camera's, or without a finite timestamp, count as lost.
   /// @pre timestamps ascend
-  track_result track(const camera::rgbd_frame& f) { return track(f.timestamp, f.color.view(), f.depth_metres()); }
-  /// As above; the images are used in place. `timestamp`: seconds; `depth`: metres, registered to the colour image.
+  track_result track(const camera::rgbd_frame& f) {
+    return track(f.timestamp, f.color.view(), f.depth_metres(), f.depth_timestamp);
+  }
+  /// As above; the images are used in place. `timestamp`: of the colour image, seconds; `depth`: metres, registered to
+  /// the colour image; `depth_timestamp`: of the depth image by the same clock, if it has its own. Depth is corrected
+  /// for the difference, which is smoothed over about a second; differences of more than 0.1 s are ignored.
   /// orbis::compiled holds `camera::depth_view` of 16-bit numbers and of float; others include system-inl.hpp.
   template <camera::depth_source Depth>
-  track_result track(double timestamp, image_view<const rgb8> color, const Depth& depth);
+  track_result track(double timestamp, image_view<const rgb8> color, const Depth& depth,
+                     std::optional<double> depth_timestamp = {});
   /// As above, for a rectified stereo pair (`stereo_options`). `timestamp`: seconds.
   track_result track(double timestamp, image_view<const rgb8> left, image_view<const rgb8> right);
   track_result track(double timestamp, image_view<const std::uint8_t> left,
@@ -218,6 +224,7 @@ class system {
   Extractor extract_;
   stereo_memory stereo_;
   image_memory image_;
+  camera::depth_clock depth_clock_;
   detail::shared_state<Camera, descriptor_type, Places> shared_;
   std::unique_ptr<front_end> front_end_;
   track_state reported_state_ = track_state::not_started;

@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include <orbis/camera/shutter.hpp>
 #include <orbis/core/se3.hpp>
 #include <orbis/core/types.hpp>
 #include <orbis/slam/ids.hpp>
@@ -51,6 +52,8 @@ struct track_result {
   /// Motion of the camera in its own frame while the frame was taken with a rolling shutter: per second, translation
   /// first. Zero if unknown. Argument of `camera::shutter_correction`.
   vec6 twist = zeros<vec6>();
+  /// Shutter assumed for the frame: given or estimated, with the delay of the frame's own depth image.
+  camera::shutter shutter{};
   track_timings timings;
   [[nodiscard]] bool tracked() const noexcept { return T_world_camera.has_value(); }
 };

@@ -102,8 +102,15 @@ namespace orbis::io::detail {
   if (const auto read = read_image_times(folder, colors, index); !read) return fail(read.error());
   note_order(color_folder, color, !index.files.empty(), index.notes);
   note_order(depth_folder, depth, true, index.notes);
+  const bool are_timed =
+      color.keys_are == image_keys::times && depth.keys_are == image_keys::times && index.files.empty();
   for (const auto& [c, d] : *pairs)
-    if (c < colors.size()) index.frames.push_back({colors[c].timestamp, colors[c].path, depth.paths[d], {}});
+    if (c < colors.size())
+      index.frames.push_back({colors[c].timestamp,
+                              colors[c].path,
+                              depth.paths[d],
+                              {},
+                              are_timed ? std::optional{depth.keys[d]} : std::nullopt});
   const auto span = [](const keyed_images& images) {
     return images.paths.front().filename().string() + " to " + images.paths.back().filename().string();
   };

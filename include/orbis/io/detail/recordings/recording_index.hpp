@@ -25,8 +25,9 @@ struct color_camera {
 struct recording_entry {
   double timestamp = 0.0;  ///< of the colour image, seconds
   std::filesystem::path color;
-  std::filesystem::path depth;        ///< empty for one camera only
-  std::optional<se3> T_world_camera;  ///< ground truth, if there is one
+  std::filesystem::path depth;              ///< empty for one camera only
+  std::optional<se3> T_world_camera;        ///< ground truth, if there is one
+  std::optional<double> depth_timestamp{};  ///< of the depth image, seconds, if it has its own
 };
 
 /// A recording without its pixels.

@@ -205,7 +205,10 @@ struct associated_files {
 /// notes it.
 inline void convert_frame_numbers(recording_index& index, double fps) {
   if (!are_frame_numbers(times_of(index.frames))) return;
-  for (recording_entry& frame : index.frames) frame.timestamp /= fps;
+  for (recording_entry& frame : index.frames) {
+    frame.timestamp /= fps;
+    frame.depth_timestamp.reset();
+  }
   char text[100];
   std::snprintf(text, sizeof text, "the time stamps are frame numbers; times are those of %.6g frames per second", fps);
   index.notes.emplace_back(text);
@@ -289,7 +292,7 @@ inline void guess_tum_camera(const std::filesystem::path& folder, recording_inde
     if (!frames) return fail(frames.error());
     for (associated_files& f : *frames) {
       depth_is_whole = depth_is_whole && are_whole({f.depth_timestamp});
-      index.frames.push_back({f.timestamp, std::move(f.color), std::move(f.depth), {}});
+      index.frames.push_back({f.timestamp, std::move(f.color), std::move(f.depth), {}, f.depth_timestamp});
     }
     index.files = {list};
   } else {
@@ -308,7 +311,7 @@ inline void guess_tum_camera(const std::filesystem::path& folder, recording_inde
     const auto times = times_of(*color), depth_times = times_of(*depth);
     depth_is_whole = are_whole(depth_times);
     for (const auto& [c, d] : associate(times, depth_times, max_time_difference))
-      index.frames.push_back({times[c], (*color)[c].path, (*depth)[d].path, {}});
+      index.frames.push_back({times[c], (*color)[c].path, (*depth)[d].path, {}, depth_times[d]});
     if (index.frames.empty())
       return fail(errc::no_data, folder.string(),
                   "no colour image has a depth image within " + describe(max_time_difference) +

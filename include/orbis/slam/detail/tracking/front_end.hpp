@@ -75,8 +75,14 @@ class front_end {
   [[nodiscard]] std::optional<shutter_estimate> estimated_shutter() const {
     return observer_ ? std::optional{observer_->estimate()} : std::nullopt;
   }
-  /// Returns true if frames need `as_read`.
-  [[nodiscard]] bool needs_as_read() const noexcept { return observer_ || !shutter_.is_global(); }
+  /// Sets the shutter of a frame, whose `shutter.depth_delay` is that by its clocks, and keeps its keypoints as read if
+  /// they need a correction.
+  void set_shutter(frame_type& f) const {
+    const double by_clock = f.shutter.depth_delay;
+    f.shutter = shutter_;
+    f.shutter.depth_delay += by_clock;
+    if (observer_ || !f.shutter.is_global()) keep_as_read(f);
+  }
 
   /// The depth tracker. Pass it the depth image of the next frame before the frame is localised.
   [[nodiscard]] depth_tracker<Camera>& depth() noexcept { return depth_; }
@@ -101,7 +107,9 @@ class front_end {
                : last_.T_world_camera;
   }
   /// The motion during read-out of the last tracked frame; zero with a global shutter.
-  [[nodiscard]] vec6 last_twist() const { return shutter_.is_global() ? vec6(zeros<vec6>()) : last_.twist; }
+  [[nodiscard]] vec6 last_twist() const { return last_.shutter.is_global() ? vec6(zeros<vec6>()) : last_.twist; }
+  /// The shutter assumed for the last tracked frame.
+  [[nodiscard]] const camera::shutter& last_shutter() const { return last_.shutter; }
 
   /// Returns the last tracked frame with its features. For the tracking thread; does not read the maps. O(features).
   [[nodiscard]] tracked_frame last_frame() const {
@@ -232,9 +240,9 @@ class front_end {
     log_.add({f.timestamp, last_reference_, T_reference_last_});
     if (!f.held_by_depth || made) held_since_ = f.timestamp;
     if (made)
-      depth_.keep(*made, se3{}, f.twist, shutter_);
+      depth_.keep(*made, se3{}, f.twist, f.shutter);
     else if (depth_.needs_surface(maps, f.T_world_camera))
-      depth_.keep(last_reference_, T_reference_last_, f.twist, shutter_);
+      depth_.keep(last_reference_, T_reference_last_, f.twist, f.shutter);
     last_ = std::move(f);
   }
   /// If the trajectory is limited, limits the erased keyframes that the active map remembers: to the reference
@@ -302,9 +310,9 @@ class front_end {
   /// Tracks from the last frame, otherwise from the reference keyframe; refines the pose on the local map.
   std::size_t track_from_last(frame_type& f, atlas_type& maps, bool is_frozen, const row_follower& follow_rows) {
     const se3 predicted = motion_.predict({last_.timestamp, last_.T_world_camera}, f.timestamp);
-    if (!shutter_.is_global()) {
+    if (!f.shutter.is_global()) {
       f.T_world_camera = predicted;
-      follow_rows(f, {shutter_, motion_between(last_, f)});
+      follow_rows(f, {f.shutter, motion_between(last_, f)});
       move_keypoints(f);
     }
     moving_.set_last(last_.T_world_camera);
@@ -388,7 +396,7 @@ class front_end {
   /// With a rolling shutter, moves the keypoints of a frame to its time, by the motion from the last frame to its
   /// current pose.
   void move_keypoints(frame_type& f) const {
-    if (!shutter_.is_global()) move_to_frame_time(f, rig_, shutter_, motion_between(last_, f));
+    if (!f.shutter.is_global()) move_to_frame_time(f, rig_, f.shutter, motion_between(last_, f));
   }
   /// Passes a tracked frame to the shutter observer.
   void observe(const frame_type& f, const atlas_type& maps, const std::optional<map_keyframe>& made) {
@@ -400,39 +408,39 @@ class front_end {
   /// twist, by which the keypoints are then moved. `is_next`: the frame follows the last one.
   void refine_motion(frame_type& f, const atlas_type& maps, bool is_next, const row_follower& follow_rows) {
     const basic_map<D>& m = maps.active();
-    const bool rolls = !shutter_.is_global();
+    const bool rolls = !f.shutter.is_global();
     const bool with_depth = depth_.find_surfaces(maps, f.T_world_camera) && options_.depth_term.enabled;
     twist_prior prior;
-    if (needs_as_read() && is_next && f.timestamp > last_.timestamp)
+    if (!f.as_read.empty() && is_next && f.timestamp > last_.timestamp)
       prior =
           twist_prior::after({last_.T_world_camera, last_.twist}, f.timestamp - last_.timestamp, motion_.is_known());
     const auto expected_twist = [&] {
       return prior.T_world_before ? prior.expected(f.T_world_camera.inverse()) : f.twist;
     };
     moving_pose refined{f.T_world_camera, rolls ? expected_twist() : vec6(zeros<vec6>())};
-    const int rounds = with_depth ? 3 : !rolls ? 0 : shutter_.is_depth_simultaneous() ? 1 : 2;
+    const int rounds = with_depth ? 3 : !rolls ? 0 : f.shutter.is_depth_simultaneous() ? 1 : 2;
     if (!rolls && with_depth) find_observations(f, m, rig_, rows_);
     for (int round = 0; round != rounds; ++round) {
       if (rolls) {
-        follow_rows(f, {shutter_, refined.twist});  // depth was read with the previous motion
-        find_row_observations(f, m, rig_, shutter_, rows_);
+        follow_rows(f, {f.shutter, refined.twist});  // depth was read with the previous motion
+        find_row_observations(f, m, rig_, f.shutter, rows_);
       }
-      const auto depth = with_depth ? depth_.term_at(refined, shutter_) : std::nullopt;
+      const auto depth = with_depth ? depth_.term_at(refined, f.shutter) : std::nullopt;
       refined = refine_moving_pose(std::span<const row_observation>(rows_), rig_.model, refined, prior,
                                    with_depth ? 3 : 5, {.other = depth ? &*depth : nullptr, .moves = rolls});
-      if (shutter_.is_depth_early()) {
+      if (f.shutter.is_depth_early()) {
         early_depth_.update(std::span<const row_observation>(rows_), rig_.model, refined, prior);
         refined.twist = early_depth_.between(prior, refined.twist);
       }
     }
-    if (shutter_.is_depth_early()) early_depth_.advance();
+    if (f.shutter.is_depth_early()) early_depth_.advance();
     f.T_world_camera = refined.T_world_camera;
-    if (observer_) observer_->set_depths(f, {shutter_, rolls ? refined.twist : expected_twist()}, follow_rows);
+    if (observer_) observer_->set_depths(f, {f.shutter, rolls ? refined.twist : expected_twist()}, follow_rows);
     if (!rolls) {
       f.twist = expected_twist();
       return;
     }
-    move_to_frame_time(f, rig_, shutter(), refined.twist, [&](std::size_t i) {
+    move_to_frame_time(f, rig_, f.shutter, refined.twist, [&](std::size_t i) {
       return f.landmarks[i] == no_id ? 0.0
                                      : (refined.T_world_camera.inverse() * m.landmark_at(f.landmarks[i]).position).z();
     });
@@ -455,15 +463,15 @@ class front_end {
       return std::nullopt;
     const se3 predicted = motion_.predict({last_.timestamp, last_.T_world_camera}, f.timestamp);
     if (!depth_.find_surfaces(maps, predicted)) return std::nullopt;
-    return depth_.align(search_starts(last_.T_world_camera, predicted, interval), shutter_);
+    return depth_.align(search_starts(last_.T_world_camera, predicted, interval), f.shutter);
   }
   /// Tracks from a pose aligned by depth; refines it on the local map.
   std::size_t track_from_depth(frame_type& f, atlas_type& maps, const depth_alignment& aligned, bool is_frozen,
                                const row_follower& follow_rows) {
     f.T_world_camera = aligned.at.T_world_camera;
     moving_.clear();
-    if (!shutter_.is_global()) {
-      follow_rows(f, {shutter_, motion_between(last_, f)});
+    if (!f.shutter.is_global()) {
+      follow_rows(f, {f.shutter, motion_between(last_, f)});
       move_keypoints(f);
     }
     if (tracker_.by_motion(f, maps.active(), last_, aligned.at.T_world_camera, moving_) == 0)
@@ -476,7 +484,7 @@ class front_end {
     if (inliers < options_.min_inliers) {
       const std::size_t confirmed = drop_disagreeing(f, maps.active());
       if (confirmed < few || !depth_.has_surfaces() ||
-          !depth_.supports_pose(depth_.agreement({f.T_world_camera, f.twist}, shutter_)))
+          !depth_.supports_pose(depth_.agreement({f.T_world_camera, f.twist}, f.shutter)))
         return 0;
       f.held_by_depth = true;
     }
@@ -489,7 +497,7 @@ class front_end {
                                  const row_follower& follow_rows) {
     // If something moves in the view, it causes the disagreement.
     if (!options_.depth_term.recovers || moving_.size() != 0 || !depth_.has_surfaces()) return inliers;
-    const association seen = depth_.agreement({f.T_world_camera, f.twist}, shutter_);
+    const association seen = depth_.agreement({f.T_world_camera, f.twist}, f.shutter);
     if (seen.visible < options_.depth_term.min_points || seen.share() >= options_.depth_term.min_share) return inliers;
     const auto aligned = align_depth(f, maps);
     constexpr double better = 0.15;
