@@ -3,6 +3,7 @@
 /// Frames and keyframes: the features of an image, their depth, and the landmarks they observe.
 #pragma once
 
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <string_view>
@@ -31,12 +32,30 @@ enum class sensor_kind : std::uint8_t { unknown, rgbd, stereo, monocular };
   return "unknown";
 }
 
+/// Change of the depth of a keypoint if the depth image were `step` seconds later, and earlier, than assumed, metres; 0
+/// if unknown.
+struct depth_change {
+  static constexpr double step = 0.008;  ///< seconds: short enough that few edges are in between
+  float later = 0.0F, earlier = 0.0F;
+  /// Returns this change if depth changes evenly there, as on a surface; otherwise zero: an edge between the readings
+  /// would be mistaken for a motion.
+  [[nodiscard]] depth_change if_even(float depth) const noexcept {
+    constexpr float limit = 0.02F;  // 1 / metres: a few standard deviations of a depth camera's noise
+    return std::abs(later + earlier) <= limit * depth * depth ? *this : depth_change{};
+  }
+  /// Metres per second.
+  [[nodiscard]] double rate() const noexcept {
+    return (static_cast<double>(later) - static_cast<double>(earlier)) / (2.0 * step);
+  }
+};
+
 /// A keypoint as read by a rolling shutter, at the time of its row.
 struct keypoint_as_read {
   double ray_x = 0.0, ray_y = 0.0;  ///< ray through it, scaled to z = 1; NaN if the pixel has none
   float x = 0.0F, y = 0.0F;         ///< pixels
   float depth = 0.0F;               ///< at the time of the row, metres; 0 if unknown
   float stored_depth = 0.0F;        ///< depth image at the keypoint, metres; 0 if not measured
+  depth_change change{};            ///< of `depth`; zero unless the shutter is estimated
 };
 
 /// An image as features of descriptor type `D`. All vectors have one entry per keypoint, except those that

@@ -50,12 +50,21 @@ row_view seen(const se3& pose, const vec6& twist, const camera::shutter& is, dou
       return static_cast<float>(then.z() + z - there.z() + 0.005 * noise * random.normal());
     };
     const float now = read(0.0);
-    v.read.push_back({ray.x(), ray.y(), static_cast<float>(at.x()), static_cast<float>(at.y()), now, now});
-    v.changes.push_back({read(depth_change::step) - now, read(-depth_change::step) - now});
+    v.read.push_back({ray.x(),
+                      ray.y(),
+                      static_cast<float>(at.x()),
+                      static_cast<float>(at.y()),
+                      now,
+                      now,
+                      {read(slam::depth_change::step) - now, read(-slam::depth_change::step) - now}});
     v.landmarks.emplace_back(id);
     v.information.push_back(1.0);
   }
   return v;
+}
+
+void forget_changes(row_view& v) {
+  for (slam::keypoint_as_read& k : v.read) k.change = {};
 }
 
 slam::shutter_estimate estimate(const camera::shutter& is, double motion, double noise, bool with_depth = true) {
@@ -65,9 +74,9 @@ slam::shutter_estimate estimate(const camera::shutter& is, double motion, double
     const row_view from = seen(se3::exp(random_motion(random, 0.02)), random_motion(random, motion), is, noise, random);
     for (int i = 0; i != 4; ++i) {
       row_view to = seen(se3::exp(random_motion(random, 0.02)), random_motion(random, motion), is, noise, random);
-      if (!with_depth) to.changes.assign(to.changes.size(), {});
+      if (!with_depth) forget_changes(to);
       row_view before = from;
-      if (!with_depth) before.changes.assign(before.changes.size(), {});
+      if (!with_depth) forget_changes(before);
       const auto e = shutter_equations_of(before, to, rig, camera::shutter{});
       REQUIRE(e);
       estimator.add(k, *e);

@@ -47,6 +47,28 @@ TEST_CASE("Frames follow their keyframe, through erasing and merging, and are li
   CHECK(log.trajectory(maps, second).empty());
 }
 
+TEST_CASE("The pose of a frame can be corrected, and its motion is the mean of both intervals") {
+  random_bits random(7);
+  slam::atlas maps(8, 1.2);
+  const slam::map_id map = maps.active_id();
+  test::add_random_keyframe(random, maps.active(), 30, 20);
+  maps.active().set_pose(0, test::random_motion(random));
+  slam::detail::frame_log log(4);
+  const vec6 twist = (vec6() << 0.3, -0.1, 0.2, 0.4, 0.1, -0.3).finished();
+  for (int i = 0; i != 5; ++i) log.add({0.1 * i, {map, 0}, se3::exp(0.1 * i * twist)});
+  CHECK(log.end_number() == 5);
+  CHECK_FALSE(log.pose(0, maps));  // forgotten
+  CHECK_FALSE(log.pose(5, maps));
+  CHECK_FALSE(log.motion(1, maps));
+  CHECK_FALSE(log.motion(4, maps));
+  CHECK((log.motion(2, maps).value() - twist).norm() < 1e-9);
+  const se3 corrected = test::random_motion(random);
+  log.set_pose(3, corrected, maps);
+  CHECK((log.pose(3, maps)->inverse() * corrected).log().norm() < 1e-9);
+  CHECK((log.trajectory(maps, map)[2].T_world_camera.inverse() * corrected).log().norm() < 1e-9);
+  CHECK(log.reference(3) == slam::map_keyframe{map, 0});
+}
+
 TEST_CASE("A log names the keyframes that its frames hang on, also after their map was merged") {
   random_bits random(5);
   slam::atlas maps(8, 1.2);

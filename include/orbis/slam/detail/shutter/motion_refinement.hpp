@@ -35,12 +35,12 @@ struct moving_pose {
 /// change, with a deviation for the acceleration of a hand-held camera. Without a previous pose, the prior only limits
 /// the twist to that of a hand-held camera.
 struct twist_prior {
-  std::optional<se3> T_world_before;   ///< the previous pose ...
-  double interval = 0.0;               ///< ... and the seconds since
-  double trend = 0.0;                  ///< part of the change from `twist_before` to the mean motion that is added
-  vec6 twist_before = zeros<vec6>();   ///< at the previous pose
-  double translation_deviation = 0.5;  ///< metres per second
-  double rotation_deviation = 1.0;     ///< radians per second
+  std::optional<se3> T_world_before{};  ///< the previous pose ...
+  double interval = 0.0;                ///< ... and the seconds since
+  double trend = 0.0;                   ///< part of the change from `twist_before` to the mean motion that is added
+  vec6 twist_before = zeros<vec6>();    ///< at the previous pose; without one, the expected twist
+  double translation_deviation = 0.5;   ///< metres per second
+  double rotation_deviation = 1.0;      ///< radians per second
 
   /// Returns the prior `interval` seconds after a previous frame. With constant acceleration a trend of 1 is exact, but
   /// errors of the twist would alternate indefinitely; a trend of one half damps them. @pre interval > 0
@@ -58,7 +58,7 @@ struct twist_prior {
 
   /// Returns the expected twist at a pose.
   [[nodiscard]] vec6 expected(const se3& T_camera_world) const {
-    if (!T_world_before) return zeros<vec6>();
+    if (!T_world_before) return twist_before;
     const vec6 mean = (T_camera_world * *T_world_before).inverse().log() / interval;
     return mean + trend * (mean - twist_before);
   }
@@ -78,33 +78,33 @@ template <feature_descriptor D>
   return (before.T_world_camera.inverse() * after.T_world_camera).log() / interval;
 }
 
-/// Finds the observations of landmarks by the keypoints of a frame as read. O(features). @pre the keypoints were kept
-/// as read
+/// Finds the observations of landmarks by the keypoints of a frame, as read if the rows have times. O(features).
 template <feature_descriptor D, camera::camera_model Camera>
 void find_row_observations(const basic_frame<D>& f, const basic_map<D>& m, const camera_rig<Camera>& rig,
-                           const camera::shutter& shutter, std::vector<row_observation>& to) {
+                           std::vector<row_observation>& to) {
   to.clear();
   for (std::size_t i = 0; i != f.size(); ++i) {
     if (f.landmarks[i] == no_id) continue;
-    const keypoint_as_read& read = f.as_read[i];
+    const vec3& position = m.landmark_at(f.landmarks[i]).position;
     row_observation& o = to.emplace_back();
-    o.seen.point = m.landmark_at(f.landmarks[i]).position;
+    if (f.as_read.empty()) {
+      o.seen = landmark_observation(rig, f, i, position);
+      continue;
+    }
+    const keypoint_as_read& read = f.as_read[i];
+    o.seen.point = position;
     o.seen.pixel = {static_cast<double>(read.x), static_cast<double>(read.y)};
     if (read.depth > 0.0F) o.seen.right = rig.model.right(o.seen.pixel.x(), static_cast<double>(read.depth));
     o.seen.information = rig.scales.information(f.features.keypoints[i].octave);
     set_deviation(o.seen, f.deviation(i));
-    o.time = shutter.color_time(o.seen.pixel.y(), rig.camera().height());
+    o.time = f.shutter.color_time(o.seen.pixel.y(), rig.camera().height());
   }
 }
 
-/// As above, for a global shutter.
-template <feature_descriptor D, camera::camera_model Camera>
-void find_observations(const basic_frame<D>& f, const basic_map<D>& m, const camera_rig<Camera>& rig,
-                       std::vector<row_observation>& to) {
-  to.clear();
-  for (std::size_t i = 0; i != f.size(); ++i)
-    if (f.landmarks[i] != no_id)
-      to.push_back({landmark_observation(rig, f, i, m.landmark_at(f.landmarks[i]).position)});
+/// Returns the depth of the landmark that keypoint `i` of a frame observes, metres; 0 without one.
+template <feature_descriptor D>
+[[nodiscard]] double landmark_depth(const basic_frame<D>& f, std::size_t i, const basic_map<D>& m) {
+  return f.landmarks[i] == no_id ? 0.0 : (f.T_world_camera.inverse() * m.landmark_at(f.landmarks[i]).position).z();
 }
 
 /// Width of Huber's loss of these residuals, standard deviations: as in the refinement of the pose alone.

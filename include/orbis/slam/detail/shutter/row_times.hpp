@@ -30,8 +30,8 @@ template <feature_descriptor D>
 void keep_as_read(basic_frame<D>& f) {
   f.as_read.resize(f.size());
   for (std::size_t i = 0; i != f.size(); ++i)
-    f.as_read[i] = {f.rays[i].x(), f.rays[i].y(), f.features.keypoints[i].x, f.features.keypoints[i].y,
-                    f.depth[i],    f.depth[i]};
+    f.as_read[i] = {
+        f.rays[i].x(), f.rays[i].y(), f.features.keypoints[i].x, f.features.keypoints[i].y, f.depth[i], f.depth[i], {}};
 }
 
 /// Moves the keypoints from their read positions to those at the frame's time; sets their rays and depths, the grid and

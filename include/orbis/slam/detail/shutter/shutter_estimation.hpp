@@ -34,29 +34,11 @@
 
 namespace orbis::slam::detail {
 
-/// Change of the depth of a keypoint if the depth image were `step` seconds later, and earlier, than assumed, metres; 0
-/// if unknown.
-struct depth_change {
-  static constexpr double step = 0.008;  ///< seconds: short enough that few edges are in between
-  float later = 0.0F, earlier = 0.0F;
-  /// Returns this slope if depth changes evenly there, as on a surface; otherwise zero: an edge between the readings
-  /// would be mistaken for a motion.
-  [[nodiscard]] depth_change if_even(float depth) const noexcept {
-    constexpr float limit = 0.02F;  // 1 / metres: a few standard deviations of a depth camera's noise
-    return std::abs(later + earlier) <= limit * depth * depth ? *this : depth_change{};
-  }
-  /// Metres per second.
-  [[nodiscard]] double rate() const noexcept {
-    return (static_cast<double>(later) - static_cast<double>(earlier)) / (2.0 * step);
-  }
-};
-
 /// A frame as read, with its motion estimated from its neighbours.
 struct row_view {
   se3 T_world_camera;
   vec6 twist = zeros<vec6>();
   std::vector<keypoint_as_read> read;
-  std::vector<depth_change> changes;   ///< by keypoint
   std::vector<landmark_id> landmarks;  ///< by keypoint
   std::vector<double> information;     ///< by keypoint: 1 / variance of the pixel
 };
@@ -123,7 +105,7 @@ template <camera::camera_model Camera>
     const double error = std::sqrt(squared_norm(*r) * information);
     const double weight = information * (error <= width ? 1.0 : width / error);
     const matrix<3, 6> by_pose = side_by_side(by_point, -by_point * hat<double>(q));
-    const depth_change change_a = from.changes[at->second].if_even(a.depth), change_b = to.changes[i].if_even(b.depth);
+    const depth_change change_a = a.change.if_even(a.depth), change_b = b.change.if_even(b.depth);
     matrix<3, 2> by_shutter;
     set_column(
         by_shutter, 0,
@@ -181,7 +163,7 @@ class shutter_estimator {
   /// Returns the current estimate. The threshold for keeping an assumed value is lower than for adopting a new one.
   /// O(keyframes).
   [[nodiscard]] shutter_estimate estimate(const camera::shutter& assumed = {}) const {
-    constexpr std::size_t enough = 8;
+    constexpr std::size_t enough = 5;
     shutter_estimate result;
     if (blocks_.size() < enough) return result;
     shutter_equations sum;
@@ -212,7 +194,7 @@ class shutter_estimator {
       result.delay_deviation = std::sqrt(std::max(0.0, covariance(1, 1)));
     }
     const auto holds = [](double value, double deviation, double before, double least, double most) {
-      const double sigmas = before == 0.0 ? 5.0 : 2.5;
+      const double sigmas = before == 0.0 ? 4.0 : 2.5;
       return std::abs(value) > sigmas * deviation && std::abs(value) >= least && std::abs(value) <= most;
     };
     // A shorter read-out has no relevant effect, and no camera needs longer for an image.

@@ -30,10 +30,10 @@ class shutter_observer {
  public:
   [[nodiscard]] shutter_estimate estimate() const { return estimate_; }
 
-  /// Reads the depth of the keypoints of the current frame as if its image had been taken at other times.
+  /// Reads the depth of the keypoints of a frame as if its image had been taken at other times, and sets the changes.
   /// `read_depth(frame, motion)` sets that of `as_read`; `assumed`: the motion of the frame.
   template <feature_descriptor D, class ReadDepth>
-  void set_depths(const basic_frame<D>& f, const frame_motion& assumed, ReadDepth&& read_depth) {
+  static void set_changes(basic_frame<D>& f, const frame_motion& assumed, ReadDepth&& read_depth) {
     basic_frame<D> now, later, earlier;
     now.as_read = later.as_read = earlier.as_read = f.as_read;
     const auto read = [&](basic_frame<D>& at, double by) {
@@ -44,10 +44,9 @@ class shutter_observer {
     read(now, 0.0);
     read(later, depth_change::step);
     read(earlier, -depth_change::step);
-    changes_.assign(f.as_read.size(), {});
-    for (std::size_t i = 0; i != changes_.size(); ++i) {
+    for (std::size_t i = 0; i != f.as_read.size(); ++i) {
       const float a = earlier.as_read[i].depth, b = now.as_read[i].depth, c = later.as_read[i].depth;
-      if (a > 0.0F && b > 0.0F && c > 0.0F) changes_[i] = {c - b, a - b};
+      if (a > 0.0F && b > 0.0F && c > 0.0F) f.as_read[i].change = {c - b, a - b};
     }
   }
 
@@ -87,8 +86,6 @@ class shutter_observer {
                    const camera_rig<Camera>& rig) {
     pending_.read = f.as_read;
     pending_.landmarks = f.landmarks;
-    pending_.changes = changes_;
-    pending_.changes.resize(f.size());
     pending_.information.resize(f.size());
     for (std::size_t i = 0; i != f.size(); ++i)
       pending_.information[i] = rig.scales.information(f.features.keypoints[i].octave);
@@ -110,17 +107,17 @@ class shutter_observer {
     views_.emplace_back(id, pending_);
   }
 
-  /// Revises the estimate each time the observation time has grown by half, and discards the measurements made with the
-  /// previous shutter: the equations are linear only around the assumed values, and the gates of tracking have favoured
-  /// them. Slopes of depth are noisy, and their squares too large, so a step towards the delay is about half as long as
-  /// it should be: several steps are needed.
+  /// Revises the estimate each time the observation time has grown by a third, and discards the measurements made with
+  /// the previous shutter: the equations are linear only around the assumed values, and the gates of tracking have
+  /// favoured them. Slopes of depth are noisy, and their squares too large, so a step towards the delay is about half
+  /// as long as it should be: several steps are needed.
   [[nodiscard]] std::optional<camera::shutter> decide(const camera::shutter& assumed) {
-    constexpr double first = 2.0, often = 0.5, same = 0.001;  // seconds
+    constexpr double first = 1.0, often = 0.5, same = 0.001;  // seconds
     if (watched_ - looked_ < often) return std::nullopt;
     looked_ = watched_;
     const shutter_estimate now = estimator_.estimate(assumed);
     estimate_ = best(now);
-    if (watched_ < std::max(first, 1.5 * decided_) || !std::isfinite(now.read_out_deviation)) return std::nullopt;
+    if (watched_ < std::max(first, 1.3 * decided_) || !std::isfinite(now.read_out_deviation)) return std::nullopt;
     decided_ = watched_;
     const camera::shutter& next = estimate_.shutter;
     const double change = std::max(std::abs(next.color_read_out - assumed.color_read_out),
@@ -146,7 +143,6 @@ class shutter_observer {
   row_view pending_;
   std::optional<map_keyframe> pending_keyframe_;
   std::optional<vec6> before_, before_that_;             ///< the motion to the pending frame, and to the previous one
-  std::vector<depth_change> changes_;                    ///< of the current frame
   double watched_ = 0.0, decided_ = 0.0, looked_ = 0.0;  ///< seconds
 };
 

@@ -9,6 +9,7 @@
 #include <deque>
 #include <limits>
 #include <map>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -37,6 +38,42 @@ class frame_log {
     ++old.frames;
     old.reference = frames_.front().reference;
     frames_.pop_front();
+    ++first_number_;
+  }
+  /// The number of the next frame; the first frame has number 0.
+  [[nodiscard]] std::size_t end_number() const noexcept { return first_number_ + frames_.size(); }
+  /// Returns the reference keyframe of a kept frame, by its id when the frame was tracked.
+  /// @pre the frame is kept
+  [[nodiscard]] const map_keyframe& reference(std::size_t number) const {
+    return frames_[number - first_number_].reference;
+  }
+  /// Returns the current pose of a frame in the map of its reference; empty if one of them is not kept.
+  template <feature_descriptor D>
+  [[nodiscard]] std::optional<se3> pose(std::size_t number, const basic_atlas<D>& maps) const {
+    if (number < first_number_ || number >= end_number()) return std::nullopt;
+    const logged_frame& f = frames_[number - first_number_];
+    const map_keyframe k = maps.current(f.reference);
+    if (!maps.contains(k.map) || !maps.at(k.map).remembers(k.keyframe)) return std::nullopt;
+    return maps.at(k.map).pose_of(k.keyframe) * scaled(f.T_reference_camera, maps.at(k.map).scale_of(k.keyframe));
+  }
+  /// Returns the motion of the camera at a frame, in its own frame, per second, translation first: the mean from the
+  /// frame before it to the one after it. Empty if they are not kept, or not close in time.
+  template <feature_descriptor D>
+  [[nodiscard]] std::optional<vec6> motion(std::size_t number, const basic_atlas<D>& maps) const {
+    const auto before = pose(number - 1, maps), after = pose(number + 1, maps);
+    if (!before || !after) return std::nullopt;
+    constexpr double longest = 0.25;  // seconds
+    const double interval =
+        frames_[number + 1 - first_number_].timestamp - frames_[number - 1 - first_number_].timestamp;
+    return interval < longest ? std::optional<vec6>((before->inverse() * *after).log() / interval) : std::nullopt;
+  }
+  /// Corrects the pose of a kept frame. @pre `pose` has a value
+  template <feature_descriptor D>
+  void set_pose(std::size_t number, const se3& T_world_camera, const basic_atlas<D>& maps) {
+    logged_frame& f = frames_[number - first_number_];
+    const map_keyframe k = maps.current(f.reference);
+    const basic_map<D>& m = maps.at(k.map);
+    f.T_reference_camera = scaled(m.pose_of(k.keyframe).inverse() * T_world_camera, 1.0 / m.scale_of(k.keyframe));
   }
 
   /// Returns the current poses of the kept frames that were tracked in a map, or in one that was merged into it. Empty
@@ -87,7 +124,7 @@ class frame_log {
     map_keyframe reference;  ///< of the last frame: it leads to the map into which this one was merged
   };
 
-  std::size_t most_;
+  std::size_t most_, first_number_ = 0;
   std::deque<logged_frame> frames_;        // grows without moving its elements, so tracking does not wait
   std::map<map_id, forgotten> forgotten_;  ///< by the map in which they were tracked
 };

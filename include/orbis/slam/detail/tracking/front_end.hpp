@@ -28,6 +28,7 @@
 #include <orbis/slam/detail/tracking/motion_model.hpp>
 #include <orbis/slam/detail/tracking/patch_tracker.hpp>
 #include <orbis/slam/detail/tracking/tracker.hpp>
+#include <orbis/slam/detail/tracking/young_frames.hpp>
 #include <orbis/slam/ids.hpp>
 #include <orbis/slam/matchers.hpp>
 #include <orbis/slam/measure.hpp>
@@ -61,6 +62,7 @@ class front_end {
         moving_{rig, settings},
         depth_{rig, settings.depth_term},
         patches_{rig, settings.patches},
+        young_{rig, settings, tracker_, patches_},
         start_{rig, settings.start, settings.seed},
         rig_{rig},
         options_{settings},
@@ -243,7 +245,13 @@ class front_end {
       depth_.keep(*made, se3{}, f.twist, f.shutter);
     else if (depth_.needs_surface(maps, f.T_world_camera))
       depth_.keep(last_reference_, T_reference_last_, f.twist, f.shutter);
+    if (begins_map()) young_.begin_map();
+    if (made)
+      young_.count_keyframe();
+    else if (state_ == track_state::tracking && !f.held_by_depth && moving_.size() == 0)
+      young_.add(f, depth_quadratic_, log_);
     last_ = std::move(f);
+    young_.localize_oldest(log_, maps);
   }
   /// If the trajectory is limited, limits the erased keyframes that the active map remembers: to the reference
   /// keyframes of the frames in the trajectory, and the latest ones. O(1), except O(frames + n log n) for every
@@ -365,11 +373,9 @@ class front_end {
     const auto motion = motion_to(f);
     if (motion && first_patches_ && !is_frozen && m.has_keyframe(*first_patches_))
       patches_.set_first_motion(m, *std::exchange(first_patches_, std::nullopt), *motion);
-    if (!patches_.align(f, m, motion.value_or(zeros<vec6>()))) return inliers;
-    const std::size_t left = refine_on_landmarks(f, m, rig_);
-    patches_.move_back(f, left == 0);
-    if (left != 0) patches_.update_deviation(f, m);
-    return left;
+    const auto left = patches_.refine(f, m, motion.value_or(zeros<vec6>()));
+    if (left.value_or(0) != 0) patches_.update_deviation(f, m);
+    return left.value_or(inliers);
   }
   /// The motion of a frame, per second: that since the last frame, extrapolated by half of its change (see
   /// `twist_prior`). Empty if the last frame is not the one before, or the pose has jumped.
@@ -419,15 +425,17 @@ class front_end {
     };
     moving_pose refined{f.T_world_camera, rolls ? expected_twist() : vec6(zeros<vec6>())};
     const int rounds = with_depth ? 3 : !rolls ? 0 : f.shutter.is_depth_simultaneous() ? 1 : 2;
-    if (!rolls && with_depth) find_observations(f, m, rig_, rows_);
+    depth_quadratic_.reset();
+    if (!rolls && with_depth) find_row_observations(f, m, rig_, rows_);
     for (int round = 0; round != rounds; ++round) {
       if (rolls) {
         follow_rows(f, {f.shutter, refined.twist});  // depth was read with the previous motion
-        find_row_observations(f, m, rig_, f.shutter, rows_);
+        find_row_observations(f, m, rig_, rows_);
       }
-      const auto depth = with_depth ? depth_.term_at(refined, f.shutter) : std::nullopt;
-      refined = refine_moving_pose(std::span<const row_observation>(rows_), rig_.model, refined, prior,
-                                   with_depth ? 3 : 5, {.other = depth ? &*depth : nullptr, .moves = rolls});
+      if (with_depth) depth_quadratic_ = depth_.term_at(refined, f.shutter);
+      refined =
+          refine_moving_pose(std::span<const row_observation>(rows_), rig_.model, refined, prior, with_depth ? 3 : 5,
+                             {.other = depth_quadratic_ ? &*depth_quadratic_ : nullptr, .moves = rolls});
       if (f.shutter.is_depth_early()) {
         early_depth_.update(std::span<const row_observation>(rows_), rig_.model, refined, prior);
         refined.twist = early_depth_.between(prior, refined.twist);
@@ -435,15 +443,12 @@ class front_end {
     }
     if (f.shutter.is_depth_early()) early_depth_.advance();
     f.T_world_camera = refined.T_world_camera;
-    if (observer_) observer_->set_depths(f, {f.shutter, rolls ? refined.twist : expected_twist()}, follow_rows);
+    if (observer_) shutter_observer::set_changes(f, {f.shutter, rolls ? refined.twist : expected_twist()}, follow_rows);
     if (!rolls) {
       f.twist = expected_twist();
       return;
     }
-    move_to_frame_time(f, rig_, f.shutter, refined.twist, [&](std::size_t i) {
-      return f.landmarks[i] == no_id ? 0.0
-                                     : (refined.T_world_camera.inverse() * m.landmark_at(f.landmarks[i]).position).z();
-    });
+    move_to_frame_time(f, rig_, f.shutter, refined.twist, [&](std::size_t i) { return landmark_depth(f, i, m); });
   }
   /// Refines a pose found by a search, in the active map around the reference, on the local map. Sets `state()` if the
   /// frame is relocalised.
@@ -525,12 +530,14 @@ class front_end {
   moving_features<Camera, D, Matchers> moving_;
   depth_tracker<Camera> depth_;
   patch_tracker<Camera, D> patches_;
+  young_frames<Camera, D, Matchers> young_;
   monocular_start<Camera, D> start_;  ///< for maps without a known scale
   const camera_rig<Camera>& rig_;
   const options& options_;
   camera::shutter shutter_;
   std::optional<shutter_observer> observer_;
-  std::vector<row_observation> rows_;  ///< reused working memory
+  std::vector<row_observation> rows_;              ///< reused working memory
+  std::optional<pose_quadratic> depth_quadratic_;  ///< of the last refined frame
   early_depth_twist early_depth_;
   frame_type before_recheck_;  ///< reused working memory
 

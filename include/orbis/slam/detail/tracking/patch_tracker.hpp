@@ -25,6 +25,7 @@
 #include <orbis/slam/detail/shutter/row_times.hpp>
 #include <orbis/slam/detail/tracking/exposure_estimation.hpp>
 #include <orbis/slam/detail/tracking/patch_match.hpp>
+#include <orbis/slam/detail/tracking/tracker.hpp>
 #include <orbis/slam/frame.hpp>
 #include <orbis/slam/landmark_patch.hpp>
 #include <orbis/slam/map.hpp>
@@ -56,6 +57,13 @@ class patch_tracker {
   /// Returns true if there is an image to measure in.
   [[nodiscard]] bool is_ready() const noexcept { return options_.enabled && !image_.empty(); }
 
+  /// Returns a copy of the image. @pre is_ready()
+  [[nodiscard]] image<std::uint8_t> copy_image() const {
+    const auto from = (*image_.levels)[0];
+    image<std::uint8_t> to(from.width(), from.height());
+    for (int y = 0; y != from.height(); ++y) std::ranges::copy(from.row(y), to.view().row(y).begin());
+    return to;
+  }
   /// The exposure time, given or estimated, seconds.
   [[nodiscard]] double exposure() const noexcept { return options_.exposure.value_or(estimation_.exposure()); }
 
@@ -90,6 +98,15 @@ class patch_tracker {
     if (moved_.empty()) f.deviations.clear();
     f.grid.assign(f.features.keypoints);
     return !moved_.empty();
+  }
+
+  /// Aligns the patches of a frame and refines its pose. Returns the number of landmarks left; empty if no patch is
+  /// found. @pre is_ready()
+  [[nodiscard]] std::optional<std::size_t> refine(basic_frame<D>& f, const basic_map<D>& m, const vec6& twist) {
+    if (!align(f, m, twist)) return std::nullopt;
+    const std::size_t left = refine_on_landmarks(f, m, rig_);
+    move_back(f, left == 0);
+    return left;
   }
 
   /// Updates the deviation of patches from the reprojection errors of the last aligned frame, at its refined pose.

@@ -1,0 +1,132 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// The second localisation of the first frames of a map.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include <orbis/camera/model.hpp>
+#include <orbis/core/image.hpp>
+#include <orbis/core/se3.hpp>
+#include <orbis/features/pyramid.hpp>
+#include <orbis/slam/atlas.hpp>
+#include <orbis/slam/camera_rig.hpp>
+#include <orbis/slam/detail/dynamics/moving_features.hpp>
+#include <orbis/slam/detail/shutter/motion_refinement.hpp>
+#include <orbis/slam/detail/shutter/row_times.hpp>
+#include <orbis/slam/detail/tracking/frame_log.hpp>
+#include <orbis/slam/detail/tracking/patch_tracker.hpp>
+#include <orbis/slam/detail/tracking/tracker.hpp>
+#include <orbis/slam/frame.hpp>
+#include <orbis/slam/ids.hpp>
+#include <orbis/slam/options.hpp>
+
+namespace orbis::slam::detail {
+
+/// Keeps the first frames of a map. A young map has few landmarks, and keyframes that are not yet adjusted with later
+/// ones; the frames between its keyframes would keep the errors of that time in the trajectory. They are therefore
+/// localised once more when several keyframes have followed, with the motion between their neighbours.
+template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers>
+class young_frames {
+ public:
+  young_frames(const camera_rig<Camera>& rig, const options& settings, const tracker<Camera, D, Matchers>& track,
+               patch_tracker<Camera, D>& patches)
+      : rig_{rig}, options_{settings}, tracker_{track}, patches_{patches}, nothing_moves_{rig, settings} {}
+
+  /// Starts with the frames of a new map.
+  void begin_map() {
+    waiting_.clear();
+    count_ = 0;
+  }
+  /// Counts a keyframe.
+  void count_keyframe() { ++keyframes_; }
+
+  /// Adds the last frame of the log, with its image, if it is one of the first frames of a map. `depth`: the cost of
+  /// its pose by depth, if any.
+  void add(const basic_frame<D>& f, const std::optional<pose_quadratic>& depth, const frame_log& log) {
+    if (count_ == most || !patches_.is_ready()) return;
+    ++count_;
+    waiting_.push_back({f, patches_.copy_image(), depth, log.end_number() - 1, keyframes_});
+  }
+
+  /// If enough keyframes have followed the oldest frame, or too many frames wait, localises it again in the current
+  /// map, corrects its pose in the log, and forgets the frame. A few milliseconds.
+  void localize_oldest(frame_log& log, const basic_atlas<D>& maps) {
+    if (waiting_.empty()) return;
+    young_frame& oldest = waiting_.front();
+    const std::size_t pixels =
+        static_cast<std::size_t>(oldest.grey.width()) * static_cast<std::size_t>(oldest.grey.height());
+    if (oldest.keyframes + enough > keyframes_ && waiting_.size() * pixels < most_pixels) return;
+    if (const auto pose = localize(oldest, log, maps)) log.set_pose(oldest.number, *pose, maps);
+    waiting_.pop_front();
+  }
+
+ private:
+  static constexpr std::size_t most = 100;                ///< frames of a map
+  static constexpr std::size_t most_pixels = 20'000'000;  ///< of the frames that wait
+  static constexpr std::size_t enough = 5;                ///< keyframes
+
+  struct young_frame {
+    basic_frame<D> frame;
+    image<std::uint8_t> grey;
+    std::optional<pose_quadratic> depth;
+    std::size_t number;     ///< in the log
+    std::size_t keyframes;  ///< made before it
+  };
+
+  /// Returns the new pose; empty if the frame is not localised.
+  std::optional<se3> localize(young_frame& young, const frame_log& log, const basic_atlas<D>& maps) {
+    const auto pose = log.pose(young.number, maps);
+    if (!pose) return std::nullopt;
+    const map_keyframe before = log.reference(young.number), reference = maps.current(before);
+    const basic_map<D>& m = maps.at(reference.map);
+    const keyframe_id nearest = m.replacement_of(reference.keyframe);
+    if (nearest == no_id) return std::nullopt;
+    basic_frame<D>& f = young.frame;
+    for (landmark_id& l : f.landmarks)
+      if (l != no_id) l = m.replacement_of(maps.current(before.map, l));
+    if (young.depth)
+      young.depth->at.T_world_camera = *pose * f.T_world_camera.inverse() * young.depth->at.T_world_camera;
+    f.T_world_camera = *pose;
+
+    const auto motion = log.motion(young.number, maps);
+    if (motion) move_to_frame_time(f, rig_, f.shutter, *motion, [&](std::size_t i) { return landmark_depth(f, i, m); });
+    const auto ignore = [](landmark_id) {};
+    if (tracker_.on_local_map(f, m, nearest, options_.search_radius, nothing_moves_, ignore, ignore) <
+        options_.min_inliers)
+      return std::nullopt;
+    pyramid_.build(std::as_const(young.grey).view(), rig_.scales.levels(), rig_.scales.factor(), 1);
+    patches_.set_image({&pyramid_});
+    const auto left = patches_.refine(f, m, motion.value_or(f.twist));
+    patches_.set_image({});
+    if (left && *left < options_.min_inliers) return std::nullopt;
+
+    constexpr double deviation = 0.05;  // of the mean motion of two intervals, metres or radians per second
+    const bool moves = motion && !f.as_read.empty() && !f.shutter.is_global();
+    find_row_observations(f, m, rig_, rows_);
+    return refine_moving_pose(
+               std::span<const row_observation>(rows_), rig_.model, {f.T_world_camera, f.twist},
+               {.twist_before = f.twist, .translation_deviation = deviation, .rotation_deviation = deviation}, 5,
+               {.other = young.depth ? &*young.depth : nullptr, .moves = moves})
+        .T_world_camera;
+  }
+
+  const camera_rig<Camera>& rig_;
+  const options& options_;
+  const tracker<Camera, D, Matchers>& tracker_;
+  patch_tracker<Camera, D>& patches_;
+  moving_features<Camera, D, Matchers> nothing_moves_;
+  std::deque<young_frame> waiting_;
+  std::size_t count_ = most;  ///< added since the map began; the frames in a loaded map are not young
+  std::size_t keyframes_ = 0;
+  features::image_pyramid pyramid_;    ///< reused working memory
+  std::vector<row_observation> rows_;  ///< reused working memory
+};
+
+}  // namespace orbis::slam::detail
