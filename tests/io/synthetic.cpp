@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cmath>
@@ -9,6 +10,7 @@
 
 #include <orbis/core/random.hpp>
 #include <orbis/io/detail/synthetic/scene.hpp>
+#include <orbis/io/detail/synthetic/sensor.hpp>
 #include <orbis/io/synthetic.hpp>
 
 #include "support/catch.hpp"
@@ -187,6 +189,66 @@ TEST_CASE("motion blur averages the pictures of the exposure time") {
     return sum;
   };
   CHECK(roughness(moving.frame(20).value().color) < 0.8 * roughness(sharp.color));
+}
+
+TEST_CASE("The integration time of a depth image smears edges along the motion, and keeps planes") {
+  auto options = small().options();
+  options.sensor = io::synthetic_sensor_options::ideal();
+  const synthetic_recording sharp{options};
+  constexpr std::size_t at = 25;
+  options.sensor.depth_blur = 8;
+  options.sensor.depth_exposure = 0.0;
+  CHECK(synthetic_recording{options}.frame(at).value().depth == sharp.frame(at).value().depth);
+  options.sensor.depth_exposure = 0.01;  // about six pixels of motion
+  const synthetic_recording smeared{options};
+  const camera::rgbd_frame frame = smeared.frame(at).value();
+  const auto blurred = frame.depth_metres();
+  CHECK(frame.color == sharp.frame(at).value().color);
+  const auto exact = sharp.exact(seq, at).value().depth;
+  int plane = 0, edge = 0, between = 0;
+  for (int y = 4; y != 116; ++y)
+    for (int x = 10; x != 150; ++x) {
+      // Planes have linear disparities.
+      double bend = 0.0;
+      float nearest = exact(x, y), farthest = nearest;
+      for (int v = y - 4; v <= y + 4; ++v)
+        for (int u = x - 9; u <= x + 9; ++u) {
+          const auto disparity = [&](int du) { return 1.0 / static_cast<double>(exact(u + du, v)); };
+          bend = std::max(bend, std::abs(disparity(-1) - 2.0 * disparity(0) + disparity(1)));
+          nearest = std::min(nearest, exact(u, v));
+          farthest = std::max(farthest, exact(u, v));
+        }
+      const double z = static_cast<double>(exact(x, y)), seen = static_cast<double>(blurred(x, y));
+      if (bend < 1e-5) {
+        ++plane;
+        CHECK(std::abs(seen - z) < 0.002 * z);
+      }
+      if (std::abs(exact(x + 1, y) - exact(x, y)) < 0.2F) continue;
+      ++edge;
+      CHECK(seen > static_cast<double>(nearest) - 0.02);
+      CHECK(seen < static_cast<double>(farthest) + 0.02);
+      const double other = static_cast<double>(exact(x + 1, y));
+      between += std::min(std::abs(seen - z), std::abs(seen - other)) > 0.04 ? 1 : 0;
+    }
+  CHECK(plane > 2000);
+  REQUIRE(edge > 50);
+  CHECK(between > edge / 2);
+}
+
+TEST_CASE("In a darker room the exposure is longer, and then the noise is stronger") {
+  auto options = small().options();
+  options.sensor.motion_blur = 3;
+  options.sensor.exposure = 0.02;
+  const auto bright = synthetic_recording{options}.frame(20).value();
+  options.scene.light = 0.5;
+  options.sensor.exposure = 0.01;
+  CHECK(synthetic_recording{options}.frame(20).value().color == bright.color);
+  using io::detail::synthetic::exposed;
+  const io::synthetic_sensor_options dark = exposed({.exposure = 0.02, .max_exposure = 0.03}, 0.2);
+  CHECK(dark.exposure == 0.03);
+  CHECK(dark.colour_noise == Approx(2.0 * std::sqrt(0.1 / 0.03)));
+  CHECK(exposed({.exposure = 0.02}, 2.0).exposure == 0.01);
+  CHECK(exposed({.exposure = 0.05, .max_exposure = 0.03}, 1.0).exposure == 0.05);
 }
 
 TEST_CASE("depths are mostly those of a room") {

@@ -26,7 +26,7 @@ struct recorded_room {
                  options.fps},
         surfaces{options.scene, options.seed},
         camera{std::make_shared<texture_set>(painted(surfaces), std::max(0.003, 2.0 / k.fx)),  // a pixel at 2 m
-               k, options.depth_scale, options.sensor, options.seed} {}
+               k, options.depth_scale, exposed(options.sensor, options.scene.light), options.seed} {}
 
   [[nodiscard]] moment at(double time) const { return {surfaces.solids_at(time), path.at(time)}; }
 
@@ -46,7 +46,7 @@ ORBIS_INLINE synthetic_recording::synthetic_recording(const synthetic_options& o
     : options_{options},
       k_{detail::synthetic::usual_intrinsics(options.width, options.height)},
       room_{std::make_shared<const detail::synthetic::recorded_room>(options, k_)} {
-  assert(options.frames >= 0 && options.fps > 0.0);
+  assert(options.frames >= 0 && options.fps > 0.0 && options.scene.light > 0.0);
 }
 
 ORBIS_INLINE double synthetic_recording::surface_distance(const vec3& p_world) const noexcept {

@@ -48,8 +48,8 @@ template <execution_policy Policy>
 
 }  // namespace detail::synthetic
 
-/// A recording of a hand-held camera moving once around a furnished room, with exact ground truth. Frames are
-/// independent: they may be requested in any order and from several threads, and are byte for byte equal on every
+/// A recording of a hand-held or walking camera moving once around a furnished room, with exact ground truth. Frames
+/// are independent: they may be requested in any order and from several threads, and are byte for byte equal on every
 /// machine (except the pose, whose last bit may differ).
 ///
 /// The floor of the room is at z = 0 with the origin at its centre. The surfaces' textures are painted when they are
@@ -59,7 +59,7 @@ class synthetic_recording {
  public:
   class iterator;
 
-  /// @pre frames >= 0, fps > 0, width and height > 0, depth_scale > 0, and those of scene and path
+  /// @pre frames >= 0, fps > 0, width and height > 0, depth_scale > 0, light > 0, and those of scene and path
   explicit synthetic_recording(const synthetic_options& options = {});
 
   [[nodiscard]] std::size_t size() const noexcept { return static_cast<std::size_t>(options_.frames); }

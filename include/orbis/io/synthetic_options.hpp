@@ -20,6 +20,21 @@ struct synthetic_scene_options {
   double texture_density = 1.0;  ///< scales the number of patches painted on every surface; 0: none
   bool person = false;           ///< adds a person who walks around the room, against the camera's direction, at 1 m/s
   double wall_period = 0.0;      ///< metres; if above 0 all walls show one picture that repeats at this distance
+  double light = 1.0;  ///< illumination; at 1 the sensor's `exposure` suits it, at 0.5 it takes twice that time
+};
+
+/// The gait of a legged robot with the camera on its body: motion in addition to the path, in proportion to the speed
+/// along it. Every step lifts and pitches the body, left and right steps roll it in turn, and each impact of a foot
+/// makes it vibrate. The strength of the impacts varies from half to one and a half times the amplitudes.
+struct synthetic_gait_options {
+  double step_rate = 0.0;          ///< steps per second; 0: no gait
+  double bounce = 0.008;           ///< amplitude of the height, one oscillation per step, metres
+  double pitch = 0.012;            ///< amplitude of the pitch, one oscillation per step, radians
+  double roll = 0.020;             ///< amplitude of the roll, one oscillation per two steps, radians
+  double impact = 0.0015;          ///< amplitude of the height after an impact, metres
+  double impact_angle = 0.006;     ///< amplitude of pitch and roll after an impact, radians
+  double impact_frequency = 17.0;  ///< of the vibration after an impact, Hz
+  double impact_duration = 0.2;    ///< seconds until the vibration has decayed to 0
 };
 
 /// The motion of the camera. The path starts at rest, makes one round (360 degrees of yaw) on an ellipse about the
@@ -34,6 +49,7 @@ struct synthetic_path_options {
   bool sees_floor = false;    ///< adds a round that looks inward and down at the floor
   double wobble = 1.0;        ///< scales the slow sway in height, distance, yaw, pitch and roll
   double jitter = 1.0;        ///< scales the tremor of the hand (millimetres, tenths of degrees)
+  synthetic_gait_options gait{};
 
   /// Number of rounds of the path.
   [[nodiscard]] int rounds() const noexcept { return sees_floor ? 2 : 1; }
@@ -65,7 +81,14 @@ struct synthetic_sensor_options {
 
   double colour_noise = 2.0;  ///< standard deviation in grey values
   int motion_blur = 1;        ///< images averaged over the exposure time; 1: none
-  double exposure = 0.015;    ///< seconds; for motion blur
+  double exposure = 0.015;    ///< seconds, at a `light` of 1; for motion blur
+  /// Maximum exposure time in a darker room, seconds. Beyond that, a lack of light increases the colour noise instead,
+  /// by the square root of the missing factor.
+  double max_exposure = 0.033;
+  /// Number of depth images whose disparities are averaged over `depth_exposure`; 1: none. Planes stay planes, and
+  /// edges are smeared along the motion.
+  int depth_blur = 1;
+  double depth_exposure = 0.015;  ///< integration time of the depth image, independent of the light, seconds
 
   /// Times of the rows of an image; a frame has the pose and the time of its colour image's middle.
   camera::shutter shutter{};

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Path of a hand-held camera once around a room.
+/// Path of a hand-held or walking camera once around a room.
 #pragma once
 
 #include <algorithm>
@@ -56,7 +56,7 @@ inline void orient(camera_pose& pose, double yaw, double pitch, double roll) noe
 /// The path: poses by time.
 class camera_path {
  public:
-  /// @pre duration > 0 (seconds), 0 <= overlap < 0.5
+  /// @pre duration > 0 (seconds), 0 <= overlap < 0.5, step_rate >= 0, impact_duration > 0
   camera_path(const synthetic_path_options& options, std::uint64_t seed, double duration) noexcept
       : options_{options}, seed_{mix64(seed ^ 0x70617468ULL)}, duration_{duration} {
     start_ = upper_fraction(noise_word(seed_, 99, 0));
@@ -76,22 +76,44 @@ class camera_path {
       return options_.jitter * amplitude *
              (smooth_noise(seed_, stream, 3.0 * time) + 0.4 * smooth_noise(seed_, stream + 50, 9.0 * time));
     };
+    const body_motion body = body_at(time);
     const double reach = 1.0 + sway(0.08, 3, 0.1) + sway(0.015, 7, 0.6) + 0.6 * inward;
     camera_pose pose;
     pose.position = {reach * options_.semi_axis_x * cos_turns(turn) + tremble(0.004, 0),
                      reach * options_.semi_axis_y * sin_turns(turn) + tremble(0.004, 1),
-                     options_.height + sway(0.10, 2, 0.3) + sway(0.02, 11, 0.8) + tremble(0.004, 2)};
+                     options_.height + sway(0.10, 2, 0.3) + sway(0.02, 11, 0.8) + tremble(0.004, 2) + body.height};
     constexpr double turns_per_radian = 0.15915494309189535;
     const double yaw =
         turn - 0.5 * inward + sway(0.035, 2, 0.7) + sway(0.008, 5, 0.2) + turns_per_radian * tremble(0.006, 3);
     const double pitch = turns_per_radian * (options_.pitch - 0.35 * inward + sway(0.09, 3, 0.45) +
-                                             sway(0.02, 8, 0.15) + tremble(0.006, 4));
-    const double roll = turns_per_radian * (sway(0.05, 2, 0.55) + sway(0.02, 6, 0.35) + tremble(0.006, 5));
+                                             sway(0.02, 8, 0.15) + tremble(0.006, 4) + body.pitch);
+    const double roll = turns_per_radian * (sway(0.05, 2, 0.55) + sway(0.02, 6, 0.35) + tremble(0.006, 5) + body.roll);
     orient(pose, yaw, pitch, roll);
     return pose;
   }
 
  private:
+  /// Motion of a walking body: height in metres, angles in radians.
+  struct body_motion {
+    double height = 0.0, pitch = 0.0, roll = 0.0;
+  };
+
+  [[nodiscard]] body_motion body_at(double time) const noexcept {
+    const synthetic_gait_options& gait = options_.gait;
+    if (gait.step_rate == 0.0) return {};
+    const double steps = gait.step_rate * time + upper_fraction(noise_word(seed_, 100, 0));
+    const std::int64_t step = floor_of(steps);
+    const double since = (steps - static_cast<double>(step)) / gait.step_rate;  // the impact, seconds
+    const double fading = std::max(0.0, 1.0 - since / gait.impact_duration);
+    const double strength = 0.5 + upper_fraction(noise_word(seed_, 101, static_cast<std::uint64_t>(step)));
+    const double shake = strength * fading * fading * fading * sin_turns(gait.impact_frequency * since);
+    const double side = step % 2 == 0 ? 1.0 : -1.0;  // of the foot
+    const double speed = speed_at(time / duration_);
+    return {speed * (gait.impact * shake - gait.bounce * cos_turns(steps)),
+            speed * (gait.impact_angle * shake + gait.pitch * sin_turns(steps)),
+            speed * (side * gait.impact_angle * shake + gait.roll * sin_turns(0.5 * steps))};
+  }
+
   /// 0 looking outward, 1 looking inward, at the fraction `s` of the second round: changes smoothly in its first and
   /// last quarter.
   [[nodiscard]] static double inwardness(double s) noexcept {
@@ -101,12 +123,18 @@ class camera_path {
   /// Fraction of the round trip completed at the fraction `s` of the time: accelerates, moves uniformly, brakes, rests.
   [[nodiscard]] double progress(double s) const noexcept {
     const double t = std::clamp(s / (1.0 - options_.overlap), 0.0, 1.0);
-    constexpr double ramp = 0.06;
     constexpr double speed = 1.0 / (1.0 - ramp);
     if (t < ramp) return 0.5 * speed * t * t / ramp;
     if (t > 1.0 - ramp) return 1.0 - 0.5 * speed * (1.0 - t) * (1.0 - t) / ramp;
     return speed * (t - 0.5 * ramp);
   }
+  /// Speed of `progress`, relative to its maximum.
+  [[nodiscard]] double speed_at(double s) const noexcept {
+    const double t = std::clamp(s / (1.0 - options_.overlap), 0.0, 1.0);
+    return std::min({1.0, t / ramp, (1.0 - t) / ramp});
+  }
+
+  static constexpr double ramp = 0.06;  ///< fraction of the trip that it accelerates, and that it brakes
 
   synthetic_path_options options_;
   std::uint64_t seed_;

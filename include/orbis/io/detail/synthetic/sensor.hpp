@@ -23,6 +23,15 @@ namespace orbis::io::detail::synthetic {
 /// The published standard deviation (metres) at depth `z` (metres).
 [[nodiscard]] inline double axial_deviation(double z) noexcept { return 0.0012 + 0.0019 * (z - 0.4) * (z - 0.4); }
 
+/// The sensor with the exposure time and the noise that automatic exposure chooses in this light, relative to that
+/// which `exposure` suits.
+[[nodiscard]] inline synthetic_sensor_options exposed(synthetic_sensor_options sensor, double light) noexcept {
+  const double longest = std::max(sensor.exposure, sensor.max_exposure), needed = sensor.exposure / light;
+  if (needed > longest) sensor.colour_noise *= std::sqrt(needed / longest);
+  sensor.exposure = std::min(needed, longest);
+  return sensor;
+}
+
 /// Applies the errors of one frame, row by row; rows are independent of each other.
 class sensor {
  public:

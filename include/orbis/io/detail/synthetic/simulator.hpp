@@ -47,12 +47,11 @@ class simulator {
     assert(depth_scale > 0.0);
   }
 
-  /// Error-free colour, depth (metres) and angles at one moment.
+  /// Error-free colour, depth (metres) and angles at one moment; without the colour image if `with_color` is false.
   template <execution_policy Policy>
-  [[nodiscard]] exact_view exact(const Policy& policy, const moment& m) const {
+  [[nodiscard]] exact_view exact(const Policy& policy, const moment& m, bool with_color = true) const {
     const renderer picture{m.solids, *textures_, m.pose, k_};
-    exact_view out{image<rgb8>(k_.width, k_.height), image<float>(k_.width, k_.height),
-                   image<float>(k_.width, k_.height)};
+    exact_view out = blank(with_color);
     for_each_index(policy, static_cast<std::size_t>(picture.tile_rows()), 1,
                    [&](std::size_t row) { picture.render_tile_row(static_cast<int>(row), out); });
     return out;
@@ -63,8 +62,7 @@ class simulator {
   template <execution_policy Policy, class At, class RowTime>
   [[nodiscard]] exact_view exact_rows(const Policy& policy, const At& at, double time, const RowTime& row_time,
                                       bool with_color = true) const {
-    exact_view out{with_color ? image<rgb8>(k_.width, k_.height) : image<rgb8>(), image<float>(k_.width, k_.height),
-                   image<float>(k_.width, k_.height)};
+    exact_view out = blank(with_color);
     for_each_index(policy, static_cast<std::size_t>(k_.height), renderer::tile, [&](std::size_t row) {
       const int y = static_cast<int>(row);
       const moment m = at(time + row_time(y));
@@ -79,11 +77,11 @@ class simulator {
     exact_view seen = color_view(policy, at, time);
     if (sensor_.motion_blur > 1) blur(policy, at, time, seen.color);
     if (!sensor_.shutter.is_depth_simultaneous()) {
-      exact_view surface = exact_rows(
-          policy, at, time, [&](int y) { return sensor_.shutter.depth_time(y, k_.height); }, false);
+      exact_view surface = depth_view(policy, at, time);
       seen.depth = std::move(surface.depth);
       seen.cosine = std::move(surface.cosine);
     }
+    if (sensor_.depth_blur > 1) smear(policy, at, time, seen.depth);
 
     camera::rgbd_frame f;
     f.timestamp = time;
@@ -123,11 +121,42 @@ class simulator {
   }
 
  private:
+  [[nodiscard]] exact_view blank(bool with_color) const {
+    return {with_color ? image<rgb8>(k_.width, k_.height) : image<rgb8>(), image<float>(k_.width, k_.height),
+            image<float>(k_.width, k_.height)};
+  }
+
   /// The exact view while the colour image is read out around `time`.
   template <execution_policy Policy, class At>
   [[nodiscard]] exact_view color_view(const Policy& policy, const At& at, double time) const {
     if (sensor_.shutter.color_read_out == 0.0) return exact(policy, at(time));
     return exact_rows(policy, at, time, [&](int y) { return sensor_.shutter.color_time(y, k_.height); });
+  }
+
+  /// The exact view, without colour, while the depth image of the frame at `time` is read out.
+  template <execution_policy Policy, class At>
+  [[nodiscard]] exact_view depth_view(const Policy& policy, const At& at, double time) const {
+    if (sensor_.shutter.depth_read_out == 0.0) return exact(policy, at(time + sensor_.shutter.depth_delay), false);
+    return exact_rows(
+        policy, at, time, [&](int y) { return sensor_.shutter.depth_time(y, k_.height); }, false);
+  }
+
+  /// The time of image `i` of `count`, spread evenly over an exposure that is centred on 0.
+  [[nodiscard]] static double part_time(double exposure, int i, int count) noexcept {
+    return exposure * ((i + 0.5) / count - 0.5);
+  }
+
+  /// Replaces depths by those of mean disparity over the integration time, which is centred on the depth image's time.
+  /// At an edge both surfaces contribute, in proportion to the time for which the pixel sees them.
+  template <execution_policy Policy, class At>
+  void smear(const Policy& policy, const At& at, double time, image<float>& depth) const {
+    const int count = sensor_.depth_blur;
+    std::vector<double> sums(depth.pixels().size());
+    for (int k = 0; k != count; ++k) {
+      const exact_view part = depth_view(policy, at, time + part_time(sensor_.depth_exposure, k, count));
+      for (std::size_t i = 0; i != sums.size(); ++i) sums[i] += 1.0 / static_cast<double>(part.depth.pixels()[i]);
+    }
+    for (std::size_t i = 0; i != sums.size(); ++i) depth.pixels()[i] = static_cast<float>(count / sums[i]);
   }
 
   /// Averages images spread evenly over the exposure time, which is centred on `time`.
@@ -136,7 +165,7 @@ class simulator {
     const int count = sensor_.motion_blur;
     std::vector<std::uint32_t> sums(3 * color.pixels().size());
     for (int k = 0; k != count; ++k) {
-      const exact_view part = color_view(policy, at, time + sensor_.exposure * ((k + 0.5) / count - 0.5));
+      const exact_view part = color_view(policy, at, time + part_time(sensor_.exposure, k, count));
       for (std::size_t i = 0; i != color.pixels().size(); ++i) {
         const rgb8 c = part.color.pixels()[i];
         sums[3 * i] += c.r;
