@@ -286,6 +286,26 @@ void add_calibration_options(CLI::App& cmd, settings& s) {
   cmd.add_flag("--quiet", s.quiet, "print errors only");
 }
 
+void add_benchmark_options(CLI::App& cmd, settings& s) {
+  cmd.add_option("FOLDER", s.inputs, "recordings, or folders in or below which there are recordings")
+      ->required()
+      ->type_name("");
+  cmd.add_flag(
+      "--quick", s.quick,
+      "only the deterministic run of each recording; otherwise three runs with threads follow, in parallel with "
+      "0, 1 and 2 busy loops");
+  CLI::Option* json = cmd.add_flag("--json", s.json, "print JSON");
+  cmd.add_flag("--markdown", s.markdown, "print tables as Markdown")->excludes(json);
+  cmd.add_option("--out", s.out, "keep the results in this folder: RECORDING/RUN")->check(not_empty)->type_name("DIR");
+  add_frame_options(cmd, s);
+  cmd.add_option("--run-config", s.run_config, "options of the runs, as for run --config")
+      ->check(CLI::Validator{CLI::ExistingFile}.description(""))
+      ->type_name("FILE");
+  cmd.footer(
+      "CPU time and peak memory are those of whole runs, with map and report. Sizes of octrees are those of .bt\n"
+      "files, before and after the filter. Exit code 1 if a run failed; the others go on.");
+}
+
 /// The camera libraries that this program was built with, and without.
 std::string build_features() {
   const auto support = [](bool has, const char* what, const char* package) {
@@ -376,9 +396,9 @@ std::variant<settings, exit_code> read_command_line(int argc, char** argv) {
   CLI::App cli{"RGB-D SLAM and mapping: from a recording to a trajectory, a cloud and an octree map", "rgbd_slam"};
   cli.require_subcommand(1);
   cli.footer(
-      "Exit codes: 0 success, 1 bad usage, 2 unreadable or damaged input (or output that cannot be\n"
-      "written), 3 tracking never started, or the camera was never found in the loaded map,\n"
-      "4 no path (plan), 5 the motion does not determine the camera (calibrate).\n"
+      "Exit codes: 0 success, 1 bad usage, or a failed run (benchmark), 2 unreadable or damaged input (or\n"
+      "output that cannot be written), 3 tracking never started, or the camera was never found in the\n"
+      "loaded map, 4 no path (plan), 5 the motion does not determine the camera (calibrate).\n"
       "An interrupted run keeps its results so far (130).");
 
   CLI::App* run = cli.add_subcommand(
@@ -443,6 +463,9 @@ std::variant<settings, exit_code> read_command_line(int argc, char** argv) {
   CLI::App* way = cli.add_subcommand("plan", "find the shortest path of a robot in an octree map");
   add_plan_options(*way, s, from, to);
 
+  CLI::App* trial = cli.add_subcommand("benchmark", "run all recordings in folders, and print a table of the results");
+  add_benchmark_options(*trial, s);
+
   CLI::App* calibration =
       cli.add_subcommand("calibrate", "estimate the camera's intrinsics and depth scale from a recording");
   add_calibration_options(*calibration, s);
@@ -457,12 +480,13 @@ std::variant<settings, exit_code> read_command_line(int argc, char** argv) {
   for (CLI::App* cmd : {run, live, demo, map})
     cmd->add_option("--config", s.config, "read options from a TOML file, such as resolution = 0.02")
         ->type_name("FILE");
-  for (CLI::App* cmd : {run, live, demo, eval, map, way, calibration}) cmd->get_formatter()->column_width(28);
+  for (CLI::App* cmd : {run, live, demo, eval, map, way, calibration, trial}) cmd->get_formatter()->column_width(28);
 
   const auto is_asked_for = [&](const CLI::App* command) { return command->get_name() == argv[1]; };
   if (argc > 1 && argv[1][0] != '-' && cli.get_subcommands(is_asked_for).empty())
     return report_error(
-        "no command \"" + std::string{argv[1]} + "\"; use run, live, demo, eval, map, plan or calibrate", bad_usage);
+        "no command \"" + std::string{argv[1]} + "\"; use run, live, demo, eval, map, plan, calibrate or benchmark",
+        bad_usage);
   try {
     cli.parse(argc, argv);
   } catch (const CLI::CallForHelp&) {
@@ -473,13 +497,14 @@ std::variant<settings, exit_code> read_command_line(int argc, char** argv) {
   }
 
   CLI::App* chosen = cli.get_subcommands().front();
-  s.what = chosen == run    ? command::run
-           : chosen == demo ? command::demo
-           : chosen == eval ? command::eval
-           : chosen == map  ? command::map
-           : chosen == way  ? command::plan
-           : chosen == live ? command::live
-                            : command::calibrate;
+  s.what = chosen == run     ? command::run
+           : chosen == demo  ? command::demo
+           : chosen == eval  ? command::eval
+           : chosen == map   ? command::map
+           : chosen == way   ? command::plan
+           : chosen == live  ? command::live
+           : chosen == trial ? command::benchmark
+                             : command::calibrate;
   if (!s.config.empty())
     if (const auto failed = read_config(*chosen, s.config.string())) return *failed;
   set_profile_defaults(*chosen, s);

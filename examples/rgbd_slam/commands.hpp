@@ -13,5 +13,6 @@ namespace app {
 [[nodiscard]] exit_code map_without_slam(const settings& s, console& console);  ///< map
 [[nodiscard]] exit_code plan(const settings& s, console& console);              ///< plan
 [[nodiscard]] exit_code calibrate(const settings& s, console& console);         ///< calibrate
+[[nodiscard]] exit_code benchmark(const settings& s, console& console);         ///< benchmark
 
 }  // namespace app

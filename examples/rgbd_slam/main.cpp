@@ -42,6 +42,7 @@ int run(int argc, char** argv) {
       case app::command::map: return app::map_without_slam(settings, console);
       case app::command::plan: return app::plan(settings, console);
       case app::command::calibrate: return app::calibrate(settings, console);
+      case app::command::benchmark: return app::benchmark(settings, console);
     }
   } catch (const std::exception& e) {  // out of memory or threads
     console.error({orbis::errc::unreadable, {}, examples::describe_exception(e)});

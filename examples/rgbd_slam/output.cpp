@@ -34,7 +34,7 @@ void list_files(results& r, const result_files& files, const file_names& coming,
 
 results begin_results(const settings& s, const std::string& title, const frame_source* source,
                       const std::filesystem::path& folder) {
-  constexpr const char* names[] = {"run", "demo", "eval", "map", "plan", "calibrate", "live"};
+  constexpr const char* names[] = {"run", "demo", "eval", "map", "plan", "calibrate", "live", "benchmark"};
   results r;
   r.command = names[static_cast<int>(s.what)];
   r.title = title;

@@ -18,6 +18,7 @@ namespace app {
 enum exit_code : int {
   done = 0,
   bad_usage = 1,
+  run_failed = 1,  ///< at least one run of a benchmark
   bad_input = 2,
   never_tracked = 3,
   no_path = 4,
@@ -28,16 +29,18 @@ enum exit_code : int {
 /// The default maximum depth of measurements in a map, metres.
 inline constexpr double usual_max_depth = 4.0;
 
-enum class command { run, demo, eval, map, plan, calibrate, live };
+enum class command { run, demo, eval, map, plan, calibrate, live, benchmark };
 
 struct settings {
   command what = command::run;
 
-  std::filesystem::path input;      ///< recording, cloud, octree map (plan), estimated trajectory, or device (live)
-  std::filesystem::path reference;  ///< ground truth (eval)
-  std::filesystem::path out;        ///< output folder or file
-  std::filesystem::path config;     ///< file with options; empty: none
-  std::string profile = "default";  ///< one of `profile_names`
+  std::filesystem::path input;  ///< recording, cloud, octree map (plan), estimated trajectory, or device (live)
+  std::vector<std::filesystem::path> inputs;  ///< folders in or below which recordings are (benchmark)
+  std::filesystem::path reference;            ///< ground truth (eval)
+  std::filesystem::path out;                  ///< output folder or file
+  std::filesystem::path config;               ///< file with options; empty: none
+  std::filesystem::path run_config;           ///< file with options of the runs (benchmark); empty: none
+  std::string profile = "default";            ///< one of `profile_names`
 
   std::string sensor = "auto";  ///< "rgbd", "stereo", "mono", or "auto": by the recording
   std::string format = "auto";
@@ -92,6 +95,8 @@ struct settings {
   bool deterministic = false;
   bool quiet = false;
   bool json = false;
+  bool markdown = false;    ///< print tables as Markdown (benchmark)
+  bool quick = false;       ///< deterministic runs only (benchmark)
   bool with_scale = false;  ///< also estimate the scale of the trajectory (eval)
 
   /// The maximum depth of measurements in the map, metres; `usual` if the user gave none.

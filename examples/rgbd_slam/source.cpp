@@ -184,9 +184,7 @@ std::string recording_in(const std::filesystem::path& folder) {
   std::error_code failure;
   for (std::filesystem::directory_iterator it{folder, failure}, end; !failure && it != end; it.increment(failure)) {
     const std::string name = it->path().filename().string();
-    const bool is_recording = orbis::io::detect_format(it->path()) != orbis::io::recording_format::automatic ||
-                              orbis::io::detect_stereo_format(it->path()) != orbis::io::stereo_format::automatic;
-    if (is_recording && (first.empty() || name < first)) first = name;
+    if (is_recording(it->path()) && (first.empty() || name < first)) first = name;
   }
   return first;
 }
@@ -567,6 +565,13 @@ std::string origin_note(const orbis::vec3& origin) {
                 "the coordinates are far from their origin: all results are relative to (%.0f, %.0f, %.0f)", origin.x(),
                 origin.y(), origin.z());
   return text;
+}
+
+bool is_recording(const std::filesystem::path& path) {
+  using namespace orbis::io;
+  const mono_format mono = detect_mono_format(path);
+  return detect_format(path) != recording_format::automatic || detect_stereo_format(path) != stereo_format::automatic ||
+         (mono != mono_format::automatic && mono != mono_format::images) || is_bag(path);
 }
 
 result<frame_source> open_source(const settings& s, console& console) {

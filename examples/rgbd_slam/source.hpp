@@ -67,6 +67,10 @@ struct frame_source {
 /// The warning about a subtracted origin.
 [[nodiscard]] std::string origin_note(const orbis::vec3& origin);
 
+/// Returns true if `open_source` recognises the layout of a folder or a bag. False for videos and for plain folders of
+/// images.
+[[nodiscard]] bool is_recording(const std::filesystem::path& path);
+
 /// Opens the recording of the settings and prints a description.
 [[nodiscard]] orbis::result<frame_source> open_source(const settings& s, console& console);
 
