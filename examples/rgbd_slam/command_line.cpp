@@ -422,6 +422,10 @@ std::variant<settings, exit_code> read_command_line(int argc, char** argv) {
       ->capture_default_str();
   demo->add_flag("--plain", s.plain, "record one round, without the person and stray depths");
   demo->add_flag("--person", s.person, "with --plain: a person walks through the room");
+  demo->add_flag(
+      "--walk", s.walk,
+      "the camera is on a walking robot in a dim room: steps and vibrations, motion blur in colour and depth, "
+      "rolling shutter");
   add_map_options(*demo, s);
   add_slam_options(*demo, s);
   add_viewer_options(*demo, s);

@@ -54,6 +54,7 @@ struct settings {
   std::uint64_t seed = 1;   ///< seed of the synthetic recording
   bool plain = false;       ///< synthetic recording of one round, without a person and stray depths
   bool person = false;      ///< a person walks through the plain room, too
+  bool walk = false;        ///< the synthetic camera is on a walking robot in a dim room, and has a rolling shutter
   std::optional<orbis::vec3> origin;   ///< origin of the rays to a cloud's points, metres (map)
   std::optional<orbis::vec3> gravity;  ///< direction of gravity in the frame of the first camera
 

@@ -427,6 +427,16 @@ class renderer {
   std::shared_ptr<const orbis::io::synthetic_recording> recording_;
 };
 
+/// Puts the camera on a robot that walks through a dim room.
+void make_walk(orbis::io::synthetic_options& options) {
+  options.scene.light = 0.6;
+  options.path.jitter = 0.0;  // no hand
+  options.path.gait.step_rate = 2.0;
+  options.sensor.motion_blur = 6;
+  options.sensor.depth_blur = 4;
+  options.sensor.shutter = {.color_read_out = 0.02, .depth_read_out = 0.02};
+}
+
 frame_source make_synthetic(const settings& s) {
   constexpr std::size_t round = 360;  // one degree per frame
   const orbis::io::synthetic_path_options path{.sees_floor = !s.plain};
@@ -434,18 +444,19 @@ frame_source make_synthetic(const settings& s) {
   const std::size_t frames = s.frames == 0 ? rounds * round : std::min<std::size_t>(s.frames * s.stride, 1'000'000);
   const bool person = s.person || !s.plain;
   const auto width = static_cast<int>(s.width / 4 * 4);
-  const orbis::io::synthetic_options options{.frames = static_cast<int>(frames),
-                                             .seed = s.seed,
-                                             .width = width,
-                                             .height = width / 4 * 3,
-                                             .frames_around = static_cast<int>(std::max(frames / rounds, round)),
-                                             .scene = {.person = person},
-                                             .path = path,
-                                             .sensor = {.stray_depths = s.plain ? 0.0 : 0.001}};
+  orbis::io::synthetic_options options{.frames = static_cast<int>(frames),
+                                       .seed = s.seed,
+                                       .width = width,
+                                       .height = width / 4 * 3,
+                                       .frames_around = static_cast<int>(std::max(frames / rounds, round)),
+                                       .scene = {.person = person},
+                                       .path = path,
+                                       .sensor = {.stray_depths = s.plain ? 0.0 : 0.001}};
+  if (s.walk) make_walk(options);
   const auto recording = std::make_shared<const orbis::io::synthetic_recording>(options);  // of no frame: small
   const auto frames_of = std::make_shared<renderer>(options);
   frame_source source;
-  source.title = "synthetic room";
+  source.title = s.walk ? "synthetic room, walking robot" : "synthetic room";
   source.kind = "rendered on the fly, seed " + std::to_string(s.seed) + (person ? ", with a person" : "") +
                 (s.sensor == "stereo" ? ", stereo"
                  : s.sensor == "mono" ? ", one camera"

@@ -116,6 +116,19 @@ summary(leaves ${WORK}/stray octree leaves)
 summary(leaves_unfiltered ${WORK}/stray octree leaves_unfiltered)
 check(leaves LESS leaves_unfiltered)
 
+# A walking robot: its camera shakes, its images are blurred, and its shutter rolls.
+app(0 demo --plain --walk --frames 40 --width 320 --resolution 0.1 --out walk --quiet --threads 1)
+summary(tracked ${WORK}/walk tracked)
+check(tracked EQUAL 40)
+summary(walking ${WORK}/walk rpe_trans_rmse_m)
+summary(by_hand ${WORK}/demo rpe_trans_rmse_m)
+check(walking GREATER by_hand)
+check(walking LESS 0.02)
+summary(shutter ${WORK}/walk shutter from)
+check(shutter STREQUAL "camera")
+file(READ ${WORK}/walk/report.html walk_page)
+check(walk_page MATCHES "<h1>synthetic room, walking robot</h1>")
+
 # --quiet says nothing; one thread means the same bytes as --deterministic.
 app(0 demo --plain --frames 40 --width 320 --resolution 0.1 --out again --save-map again.map --quiet --threads 1)
 string(LENGTH "${out}${err}" said)
