@@ -14,6 +14,7 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <string_view>
 #include <system_error>
 #include <thread>
 #include <utility>
@@ -29,6 +30,7 @@
 #endif
 
 #include <orbis/core/file.hpp>
+#include <orbis/io/recording.hpp>
 
 #include "commands.hpp"
 #include "formatted_text.hpp"
@@ -51,18 +53,25 @@ struct found_recording {
   fs::path path;
 };
 
+/// Returns true for a sequence of 7-Scenes, and for a scene, whose folders are sequences.
+bool is_scene(const fs::path& path) {
+  return orbis::io::detect_format(path) == orbis::io::recording_format::seven_scenes;
+}
+
 /// Adds the recordings in and below `path`, in the order of their names; not those inside recordings. `seen`: canonical
 /// paths of the folders so far.
 void find_recordings(const fs::path& path, std::set<fs::path>& seen, std::vector<fs::path>& found) {
   std::error_code failure;
   if (!seen.insert(fs::weakly_canonical(path, failure)).second) return;
-  if (is_recording(path)) return found.push_back(path);
+  const bool is_whole = is_recording(path), may_be_scene = is_whole && is_scene(path);
+  if (is_whole && !may_be_scene) return found.push_back(path);
   std::vector<fs::path> inside;
   for (fs::directory_iterator it{path, failure}, end; !failure && it != end; it.increment(failure)) {
     std::error_code ignored;
     const bool is_hidden = it->path().filename().string().starts_with('.');
     if (!is_hidden && (it->is_directory(ignored) || is_recording(it->path()))) inside.push_back(it->path());
   }
+  if (may_be_scene && std::count_if(inside.begin(), inside.end(), is_scene) < 2) return found.push_back(path);
   std::sort(inside.begin(), inside.end());
   for (const fs::path& p : inside) find_recordings(p, seen, found);
 }

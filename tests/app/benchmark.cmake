@@ -67,6 +67,15 @@ foreach(signal INT TERM)
   check(NOT left)
 endforeach()
 
+# The sequences of a scene are separate recordings.
+foreach(sequence seq-01 seq-02)
+  file(COPY_FILE ${WORK}/data/room/rgb/000000.png ${WORK}/color.png)
+  file(COPY ${WORK}/color.png DESTINATION ${WORK}/scenes/office/${sequence})
+  file(RENAME ${WORK}/scenes/office/${sequence}/color.png ${WORK}/scenes/office/${sequence}/frame-000000.color.png)
+endforeach()
+app(1 benchmark scenes --quick)
+check(out MATCHES "\noffice/seq-01 .*\noffice/seq-02 ")
+
 app_fails(2 "temporary: no new recording" benchmark temporary)
 app_fails(2 "nowhere: does not exist" benchmark nowhere)
 app_fails(1 "--json excludes --markdown" benchmark data --json --markdown)
