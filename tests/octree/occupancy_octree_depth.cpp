@@ -1,9 +1,16 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // Maps of depth images against maps of the same points, ours and OctoMap's.
+#include <csignal>
 #include <limits>
 #include <optional>
+#include <utility>
 #include <vector>
+
+#ifdef __unix__
+#include <sys/wait.h>
+#include <unistd.h>
+#endif
 
 #include <orbis/camera/pinhole.hpp>
 #include <orbis/io/recording.hpp>
@@ -144,3 +151,33 @@ TEST_CASE("A depth image without measurements or with a pose that is no number c
   }
   CHECK(map.num_leaves() == 0);
 }
+
+TEST_CASE("A depth image without pixels changes nothing") {
+  occupancy_octree<> map{0.05};
+  for (const auto& [width, height] : {std::pair{0, 0}, std::pair{64, 0}, std::pair{0, 48}})
+    for (const ray_mode mode : {ray_mode::every_ray, ray_mode::discretized}) {
+      const image<float> depth(width, height, 1.0F);
+      const camera::pinhole camera{width, height, 50.0, 50.0, 31.5, 23.5};
+      const auto nothing = map.integrate(camera::depth_view(depth), camera, se3{}, {.mode = mode});
+      CHECK(nothing.used + nothing.truncated + nothing.rejected + nothing.free + nothing.occupied == 0);
+    }
+  CHECK(map.empty());
+}
+
+#if defined(__unix__) && !defined(NDEBUG)
+TEST_CASE("A negative range of a depth image is a broken precondition, found before any work") {
+  const image<float> depth(160, 120, 2.0F);
+  const camera::pinhole camera{160, 120, 160.0, 160.0, 79.5, 59.5};
+  const pid_t child = ::fork();
+  if (child == 0) {
+    std::signal(SIGABRT, SIG_DFL);
+    ::close(STDERR_FILENO);
+    occupancy_octree<> map{0.05};
+    map.integrate(camera::depth_view(depth), camera, se3{}, {.max_range = -1.0});
+    ::_exit(0);
+  }
+  int status = 0;
+  REQUIRE(::waitpid(child, &status, 0) == child);
+  CHECK((WIFSIGNALED(status) && WTERMSIG(status) == SIGABRT));
+}
+#endif

@@ -3,6 +3,7 @@
 /// Reusable buffers of the algorithms that find the voxels of a scan.
 #pragma once
 
+#include <cassert>
 #include <cstddef>
 #include <limits>
 #include <memory>
@@ -35,7 +36,11 @@ template <class Policy>
 const scan_masks& mark_depth(const Policy& policy, scan_buffers& buffers, const voxel_grid& grid,
                              const depth_scan& scan, const se3& T_world_camera, const integration_options& options,
                              integration_summary& summary, const saturated_voxels& saturated = {}) {
+  assert(options.max_range >= 0.0);
   scan_masks& masks = buffers.masks;
+  masks.clear();
+  summary = {};
+  if (scan.visit([](const auto& d) { return d.width() == 0 || d.height() == 0; })) return masks;
   if (buffers.depth == nullptr) buffers.depth = std::make_unique<depth_integrator>();
   if (options.mode == ray_mode::every_ray) {
     bool needs_rays = false;
