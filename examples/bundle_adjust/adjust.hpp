@@ -110,7 +110,7 @@ int adjust(const settings& s, orbis::io::bal_problem& problem, Loss loss) {
     return report_error(2, s.input + ": the cost is not finite: the numbers are too large");
   if (!s.output.empty()) {
     b.write_to(problem);
-    if (const auto done = write_bal(s.output, problem); !done) return report_error(2, done.error().to_string());
+    if (const auto done = write_bal(s.output, problem); !done) return report_error(2, examples::describe(done.error()));
   }
   if (s.json) {
     print_json(s, b, summary);

@@ -33,7 +33,7 @@ int run(int argc, char** argv) {
   cli.add_flag("--json", s.json, "print the summary as JSON");
   if (const auto code = examples::parse(cli, argc, argv)) return *code;
   auto problem = orbis::io::read_bal(std::filesystem::path{s.input});
-  if (!problem) return report_error(2, problem.error().to_string());
+  if (!problem) return report_error(2, examples::describe(problem.error()));
   return s.loss == "cauchy" || s.loss == "tukey" ? adjust_redescending(s, *problem) : adjust_convex(s, *problem);
 }
 

@@ -11,6 +11,8 @@
 
 #include <CLI/CLI.hpp>
 
+#include <orbis/core/quote.hpp>
+
 #include "memory.hpp"
 #include "report_error.hpp"
 
@@ -23,7 +25,8 @@ namespace examples {
     return std::nullopt;
   } catch (const CLI::ParseError& e) {
     if (e.get_exit_code() == 0) return cli.exit(e);
-    return report_error(cli.get_name().c_str(), 1, e.what() + std::string{" (--help shows the usage)"});
+    return report_error(cli.get_name().c_str(), 1,
+                        orbis::shortened(e.what()) + std::string{" (--help shows the usage)"});
   }
 }
 

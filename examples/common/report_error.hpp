@@ -8,6 +8,9 @@
 #include <string>
 #include <string_view>
 
+#include <orbis/core/quote.hpp>
+#include <orbis/core/result.hpp>
+
 namespace examples {
 
 /// The text in one line: without control characters, and with words of more than 200 characters cut, as input files and
@@ -25,6 +28,11 @@ namespace examples {
       all += "...";
   }
   return all;
+}
+
+/// "where: message", with the end of a long path.
+[[nodiscard]] inline std::string describe(const orbis::error& e) {
+  return orbis::error{e.code, orbis::shortened_path(e.where), e.message}.to_string();
 }
 
 /// Prints "PROGRAM: why" on standard error. Returns `code`.

@@ -7,6 +7,8 @@
 #include <string>
 #include <system_error>
 
+#include <orbis/core/quote.hpp>
+
 namespace examples {
 
 /// Returns true if both names refer to the same existing file, also by links.
@@ -17,7 +19,8 @@ namespace examples {
 
 /// The error message if `output` is the file `input`.
 [[nodiscard]] inline std::string overwrite_message(const std::string& output, const std::string& input) {
-  return output + ": is an input (" + input + ") and would be overwritten: choose another name for the result";
+  return orbis::shortened_path(output) + ": is an input (" + orbis::shortened_path(input) +
+         ") and would be overwritten: choose another name for the result";
 }
 
 }  // namespace examples

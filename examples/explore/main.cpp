@@ -270,7 +270,8 @@ int run(int argc, char** argv) {
   std::printf("views: %d\npath: %.2f m\ncoverage: %.2f %% of %.1f m3\nfrontier: %zu voxels\nended: %s\n", robot.views,
               robot.travelled, 100.0 * share, static_cast<double>(air) * std::pow(resolution, 3),
               robot.frontiers.size(), why.c_str());
-  if (const auto written = write_bt(robot.map, output); !written) return report_error(2, written.error().to_string());
+  if (const auto written = write_bt(robot.map, output); !written)
+    return report_error(2, examples::describe(written.error()));
   return 0;
 }
 

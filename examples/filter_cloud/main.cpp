@@ -47,7 +47,7 @@ int run(int argc, char** argv) {
   if (!format) return report_error(1, output + ": must end in .ply or .pcd");
   if (examples::is_same_file(output, input)) return report_error(1, examples::overwrite_message(output, input));
   auto found = examples::read_near_origin(input);  // written in the original coordinates
-  if (!found) return report_error(2, found.error().to_string());
+  if (!found) return report_error(2, examples::describe(found.error()));
   auto& [read, origin] = *found;
   const auto in_file = read.cloud.size();
   if (eye) *eye -= origin;
@@ -77,7 +77,8 @@ int run(int argc, char** argv) {
                     : filter == "cluster"           ? cluster_inliers(par, p, {k.value_or(12)})
                                           : (best = filter_automatically(par, p, {k.value_or(8), eye})).inliers;
   const auto why = filter == "auto" ? to_string(best.choice.chain) + ": " + best.choice.reason : filter;
-  if (auto ok = orbis::io::write_cloud(output, read, kept, origin); !ok) return report_error(2, ok.error().to_string());
+  if (auto ok = orbis::io::write_cloud(output, read, kept, origin); !ok)
+    return report_error(2, examples::describe(ok.error()));
   std::printf("%zu points, %zu to filter, %zu kept; %s\n", in_file, finite.size(), kept.size(), why.c_str());
   return 0;
 }

@@ -73,7 +73,7 @@ int run(const settings& s, orbis::io::g2o_graph& graph, Loss loss) {
   if (!std::isfinite(summary.initial_cost) || !std::isfinite(summary.final_cost))
     return report_error(2, s.input + ": the cost is not finite: the numbers are too large");
   if (!s.output.empty())
-    if (const auto done = write_g2o(s.output, graph); !done) return report_error(2, done.error().to_string());
+    if (const auto done = write_g2o(s.output, graph); !done) return report_error(2, examples::describe(done.error()));
   if (s.json)
     print_json(s, graph, summary);
   else
@@ -100,7 +100,7 @@ int run_command(int argc, char** argv) {
   cli.add_flag("--json", s.json, "print the summary as JSON");
   if (const auto code = examples::parse(cli, argc, argv)) return *code;
   auto graph = orbis::io::read_g2o(s.input);
-  if (!graph) return report_error(2, graph.error().to_string());
+  if (!graph) return report_error(2, examples::describe(graph.error()));
   if (s.chordal) {
     const auto start =
         examples::start_chordally(std::span{graph->vertices}, graph->edges,

@@ -15,6 +15,7 @@
 #include <CLI/Formatter.hpp>
 
 #include <orbis/camera/presets.hpp>
+#include <orbis/core/quote.hpp>
 #include <orbis/io/toml.hpp>
 
 #include "../common/report_error.hpp"
@@ -39,7 +40,7 @@ CLI::Validator within(T low, T high, std::string unit = {}) {
   return CLI::Validator(
       [low, high, range = text_of_range.str()](std::string& text) -> std::string {
         T value{};
-        if (!CLI::detail::lexical_cast(text, value)) return "\"" + text + "\" is not a valid number";
+        if (!CLI::detail::lexical_cast(text, value)) return orbis::in_quotes(text) + " is not a valid number";
         if (!(value >= low && value <= high)) return text + " is outside " + range;
         return {};
       },
@@ -109,7 +110,7 @@ void add_robot_options(CLI::App& cmd, settings& s) {
       ->check(CLI::Validator(
           [](const std::string& name) -> std::string {
             const std::string ending = std::filesystem::path{name}.extension().string();
-            return ending == ".yaml" || ending == ".yml" ? "" : "\"" + name + "\" does not end in .yaml";
+            return ending == ".yaml" || ending == ".yml" ? "" : orbis::in_quotes(name) + " does not end in .yaml";
           },
           ""))
       ->type_name("FILE");
@@ -255,7 +256,7 @@ void add_viewer_options(CLI::App& cmd, settings& s) {
       ->check(CLI::Validator(
           [](const std::string& name) {
             const bool is_known = name.empty() || name == "window" || name == "web";
-            return is_known ? std::string{} : "\"" + name + "\" is neither window nor web";
+            return is_known ? std::string{} : orbis::in_quotes(name) + " is neither window nor web";
           },
           ""))
       ->expected(0, 1)
@@ -346,14 +347,17 @@ std::string contradiction(const settings& s) {
 /// Sets options that are not on the command line from a TOML file whose keys are the long names of the options.
 std::optional<exit_code> read_config(CLI::App& cmd, const std::string& path) {
   const auto table = orbis::io::read_toml(path);
-  if (!table) return report_error(table.error().to_string(), bad_input);
+  if (!table) return report_error(examples::describe(table.error()), bad_input);
   for (const auto& [key, value] : *table) {
     const std::string name{key.str()};
     CLI::Option* option = cmd.get_option_no_throw("--" + name);
     if (option == nullptr || name == "config" || name == "help")
-      return report_error(path + ": \"" + name + "\" is not an option of " + cmd.get_name(), bad_usage);
+      return report_error(
+          orbis::shortened_path(path) + ": " + orbis::in_quotes(name) + " is not an option of " + cmd.get_name(),
+          bad_usage);
     if (value.is_table() || value.is_array())
-      return report_error(path + ": " + name + ": must be a single value", bad_usage);
+      return report_error(orbis::shortened_path(path) + ": " + orbis::shortened(name, 60) + ": must be a single value",
+                          bad_usage);
     if (option->count() != 0) continue;  // the command line takes precedence
     std::ostringstream as_text;
     if (value.is_string())
@@ -364,7 +368,7 @@ std::optional<exit_code> read_config(CLI::App& cmd, const std::string& path) {
       option->add_result(as_text.str());
       option->run_callback();
     } catch (const CLI::ParseError& e) {
-      return report_error(path + ": " + e.what(), bad_usage);
+      return report_error(orbis::shortened_path(path) + ": " + orbis::shortened(e.what()), bad_usage);
     }
   }
   return std::nullopt;
@@ -488,16 +492,16 @@ std::variant<settings, exit_code> read_command_line(int argc, char** argv) {
 
   const auto is_asked_for = [&](const CLI::App* command) { return command->get_name() == argv[1]; };
   if (argc > 1 && argv[1][0] != '-' && cli.get_subcommands(is_asked_for).empty())
-    return report_error(
-        "no command \"" + std::string{argv[1]} + "\"; use run, live, demo, eval, map, plan, calibrate or benchmark",
-        bad_usage);
+    return report_error("no command " + orbis::in_quotes(argv[1]) +
+                            "; use run, live, demo, eval, map, plan, calibrate or benchmark",
+                        bad_usage);
   try {
     cli.parse(argc, argv);
   } catch (const CLI::CallForHelp&) {
     std::fputs(cli.help().c_str(), stdout);
     return done;
   } catch (const CLI::ParseError& e) {
-    return report_error(std::string{e.what()} + " (--help shows the usage)", bad_usage);
+    return report_error(orbis::shortened(e.what()) + " (--help shows the usage)", bad_usage);
   }
 
   CLI::App* chosen = cli.get_subcommands().front();
@@ -514,18 +518,19 @@ std::variant<settings, exit_code> read_command_line(int argc, char** argv) {
   set_profile_defaults(*chosen, s);
   if (!origin.empty()) {
     s.origin = vector_of(origin);
-    if (!s.origin) return report_error("--origin: \"" + origin + "\" is not x,y,z in metres", bad_usage);
+    if (!s.origin) return report_error("--origin: " + orbis::in_quotes(origin) + " is not x,y,z in metres", bad_usage);
   }
   for (const auto& [text, name, p] : {std::tuple{&from, "--from", &s.from}, {&to, "--to", &s.to}}) {
     if (chosen != way) break;
     const auto point = vector_of(*text);
-    if (!point) return report_error(std::string{name} + ": \"" + *text + "\" is not x,y,z in metres", bad_usage);
+    if (!point)
+      return report_error(std::string{name} + ": " + orbis::in_quotes(*text) + " is not x,y,z in metres", bad_usage);
     *p = *point;
   }
   if (!gravity.empty()) {
     s.gravity = vector_of(gravity);
     if (!s.gravity || s.gravity->isZero())
-      return report_error("--gravity: \"" + gravity + "\" is not a direction x,y,z", bad_usage);
+      return report_error("--gravity: " + orbis::in_quotes(gravity) + " is not a direction x,y,z", bad_usage);
   }
   if (const std::string what = contradiction(s); !what.empty()) return report_error(what, bad_usage);
   return s;

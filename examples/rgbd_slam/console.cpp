@@ -7,6 +7,8 @@
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
+#include <orbis/core/quote.hpp>
+
 #include "../common/report_error.hpp"
 
 namespace app {
@@ -69,7 +71,7 @@ void console::warn(const std::string& message) {
 
 void console::error(const orbis::error& e) {
   clear_bar();
-  std::string text = one_line(e.where) + (e.where.empty() ? "" : ": ");
+  std::string text = orbis::shortened_path(e.where) + (e.where.empty() ? "" : ": ");
   for (std::size_t begin = 0; begin <= e.message.size();) {  // a message may have several lines
     const std::size_t end = std::min(e.message.find('\n', begin), e.message.size());
     text += (begin == 0 ? "" : "\n") + one_line(e.message.substr(begin, end - begin));

@@ -30,6 +30,7 @@
 #include <vector>
 
 #include <orbis/core/file.hpp>
+#include <orbis/core/quote.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/places/vocabulary.hpp>
 #include <orbis/places/vocabulary_tree.hpp>
@@ -163,7 +164,7 @@ class dbow_yaml_parser {
           if (!number(value, weights_are_) || weights_are_ > 3) return reject("the weighting must be in 0 ... 3");
         } else if (key == "k" || key == "L" || key == "scoringType") {
           std::uint32_t ignored = 0;  // given by the tree; scores are types
-          if (!number(value, ignored)) return reject("\"" + std::string{key} + "\" is not a number");
+          if (!number(value, ignored)) return reject(orbis::in_quotes(key) + " is not a number");
         }
       }
     }

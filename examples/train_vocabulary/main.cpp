@@ -42,7 +42,7 @@ int write(const settings& s, const places::vocabulary& words) {
   const std::string bytes = places::vocabulary_bytes(words);
   const auto done = orbis::write_file_atomically(
       s.output, [&](std::ostream& out) { out.write(bytes.data(), static_cast<std::streamsize>(bytes.size())); });
-  if (!done) return report_error(2, done.error().to_string());
+  if (!done) return report_error(2, examples::describe(done.error()));
   std::printf("%zu words, %zu nodes, %u levels, %zu bytes\n", words.size(), words.nodes(), words.depth(), bytes.size());
   return 0;
 }
@@ -54,18 +54,18 @@ int train(const settings& s) {
       images.push_back(std::move(v.found));
   for (const std::string& folder : s.recordings) {
     auto seen = sources::of_recording(folder, s.stride, s.features, 0);
-    if (!seen) return report_error(2, seen.error().to_string());
+    if (!seen) return report_error(2, examples::describe(seen.error()));
     for (sources::view& v : seen->views) images.push_back(std::move(v.found));
   }
   const auto words = places::train(orbis::par, images, s.training);
-  if (!words) return report_error(2, words.error().to_string());
+  if (!words) return report_error(2, examples::describe(words.error()));
   return write(s, *words);
 }
 
 int convert(const settings& s) {
   if (examples::is_same_file(s.output, s.input)) return report_error(1, examples::overwrite_message(s.output, s.input));
   const auto words = dbow::load_vocabulary(s.input);
-  if (!words) return report_error(2, words.error().to_string());
+  if (!words) return report_error(2, examples::describe(words.error()));
   return write(s, *words);
 }
 
@@ -84,7 +84,7 @@ int judge(const settings& s) {
   }
   for (const std::string& folder : s.recordings) {
     auto seen = sources::of_recording(folder, s.stride, 1000, 0);
-    if (!seen) return report_error(2, seen.error().to_string());
+    if (!seen) return report_error(2, examples::describe(seen.error()));
     tasks.push_back({.name = folder.substr(folder.find_last_of('/') + 1),
                      .camera = seen->camera,
                      .map = std::move(seen->views),
@@ -96,7 +96,7 @@ int judge(const settings& s) {
   std::vector<std::pair<std::string, places::vocabulary>> all{{"(default)", places::default_vocabulary()}};
   for (const std::string& file : s.inputs) {
     auto words = dbow::load_vocabulary(file);
-    if (!words) return report_error(2, words.error().to_string());
+    if (!words) return report_error(2, examples::describe(words.error()));
     all.emplace_back(file.substr(file.find_last_of('/') + 1), *std::move(words));
   }
   for (const auto& [name, words] : all)

@@ -21,6 +21,7 @@
 /// | `simd.hpp` | vector kernels, written once for every instruction set |
 /// | `hash_index.hpp, cow_pages.hpp` | hash tables from keys to positions; copy-on-write arrays |
 /// | `bits.hpp, bytes.hpp` | bit counts and bit strings; byte orders, checksums, base-85 text |
+/// | `quote.hpp` | short quotations in messages |
 /// | `utf8.hpp` | validation of UTF-8 |
 #pragma once
 
@@ -35,6 +36,7 @@
 #include <orbis/core/jacobi.hpp>
 #include <orbis/core/point.hpp>
 #include <orbis/core/point_cloud.hpp>
+#include <orbis/core/quote.hpp>
 #include <orbis/core/random.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/core/rounded.hpp>

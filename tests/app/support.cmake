@@ -12,11 +12,11 @@ function(check)  # condition...
   endif()
 endfunction()
 
-# Runs the program; its exit code must be `code`. Leaves `out` and `err` behind.
+# Runs the program; its exit code must be `code`, a regular expression. Leaves `out` and `err` behind.
 macro(app code)
   execute_process(COMMAND ${APP} ${ARGN} WORKING_DIRECTORY ${WORK} RESULT_VARIABLE result OUTPUT_VARIABLE out
                   ERROR_VARIABLE err)
-  if(NOT result STREQUAL "${code}")
+  if(NOT result MATCHES "^(${code})$")
     message(FATAL_ERROR "rgbd_slam ${ARGN}\nleft with ${result}, not ${code}\n${out}${err}")
   endif()
 endmacro()

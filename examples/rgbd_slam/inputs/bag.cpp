@@ -11,6 +11,7 @@
 #include <utility>
 
 #include <orbis/camera/stereo.hpp>
+#include <orbis/core/quote.hpp>
 #include <orbis/core/trajectory.hpp>
 
 #include "inputs/bag_file.hpp"
@@ -226,7 +227,8 @@ class bag_recording final : public file_recording {
 
   [[nodiscard]] std::string describe_topics() const {
     std::string text;
-    for (const auto& [name, t] : topics_) text += (text.empty() ? "" : ", ") + name + " (" + in_short(t.encoding) + ")";
+    for (const auto& [name, t] : topics_)
+      text += (text.empty() ? "" : ", ") + name + " (" + orbis::shortened(t.encoding, 60) + ")";
     return text.empty() ? "it contains no images" : "it contains " + text;
   }
 
@@ -533,8 +535,8 @@ class bag_recording final : public file_recording {
                                : is_known ? static_transform(first_->frame_id, second_->frame_id)
                                           : std::nullopt;
     if (!T_color_depth || !info) {
-      unregistered_ = " (depth in the frame \"" + in_short(second_->frame_id) + "\", colour in \"" +
-                      in_short(first_->frame_id) + "\"; " +
+      unregistered_ = " (depth in the frame \"" + orbis::shortened(second_->frame_id, 60) + "\", colour in \"" +
+                      orbis::shortened(first_->frame_id, 60) + "\"; " +
                       (!is_known ? "these names identify no frames"
                        : info    ? "no static transform connects them"
                                  : "no CameraInfo for " + second_->name) +

@@ -14,6 +14,8 @@
 #include <zstd.h>
 #endif
 
+#include <orbis/core/quote.hpp>
+
 namespace app {
 namespace {
 
@@ -92,9 +94,8 @@ orbis::result<decompressed> decompress(std::string_view method, [[maybe_unused]]
     package = "libbz2-dev";
   }
   if (package.empty())
-    return orbis::fail(
-        orbis::errc::unsupported, where,
-        "the compression \"" + std::string{method.substr(0, 60)} + "\" is not supported; use none, lz4, zstd or bz2");
+    return orbis::fail(orbis::errc::unsupported, where,
+                       "the compression " + orbis::in_quotes(method) + " is not supported; use none, lz4, zstd or bz2");
   return orbis::fail(
       orbis::errc::unsupported, where,
       "is compressed with " + std::string{method} + ", for which this build has no library (" + package + ")");

@@ -11,6 +11,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include <orbis/core/bytes.hpp>
+#include <orbis/core/quote.hpp>
 #include <orbis/io/jpeg.hpp>
 #include <orbis/io/png.hpp>
 
@@ -53,7 +54,8 @@ std::size_t bytes_of(std::string_view encoding) {
 
 result<void> check_pixels(const ros_messages::image& m, const std::string& where) {
   const std::size_t bytes = bytes_of(m.encoding);
-  if (bytes == 0) return fail(errc::unsupported, where, "the encoding " + in_short(m.encoding) + " is not supported");
+  if (bytes == 0)
+    return fail(errc::unsupported, where, "the encoding " + orbis::shortened(m.encoding, 60) + " is not supported");
   if (m.width == 0 || m.height == 0 || m.width > 65536 || m.height > 65536 || m.step < m.width * bytes ||
       m.data.size() < std::size_t{m.step} * m.height)
     return fail(errc::malformed, where, "an image has fewer pixels than its size indicates");
@@ -111,16 +113,16 @@ result<color_image> color_of(const ros_messages::compressed_image& m, const std:
   const bool has_colors = contains(m.format, "compressed bgr") || contains(m.format, "compressed rgb");
   if (m.format.starts_with("bayer_") && !has_colors)
     return fail(errc::unsupported, where,
-                "the encoding " + in_short(m.format) + " of compressed images is not supported");
+                "the encoding " + orbis::shortened(m.format, 60) + " of compressed images is not supported");
   if (orbis::io::is_png(m.data)) return orbis::io::decode_png_color(m.data, where);
   if (orbis::io::is_jpeg(m.data)) return orbis::io::decode_jpeg(m.data, where);
-  return fail(errc::unsupported, where, "is neither PNG nor JPEG (format \"" + in_short(m.format) + "\")");
+  return fail(errc::unsupported, where, "is neither PNG nor JPEG (format \"" + orbis::shortened(m.format, 60) + "\")");
 }
 
 result<depth_image> depth_of(const ros_messages::image& m, const std::string& where) {
   if (auto ok = check_pixels(m, where); !ok) return fail(ok.error());
   if (!is_depth_encoding(m.encoding))
-    return fail(errc::unsupported, where, "is not a depth image: its encoding is " + in_short(m.encoding));
+    return fail(errc::unsupported, where, "is not a depth image: its encoding is " + orbis::shortened(m.encoding, 60));
   const bool in_metres = is_in_metres(m.encoding);
   const std::endian order = m.is_bigendian != 0 ? std::endian::big : std::endian::little;
   depth_image out(static_cast<int>(m.width), static_cast<int>(m.height));
@@ -139,7 +141,7 @@ result<depth_image> depth_of(const ros_messages::compressed_image& m, const std:
   std::string_view bytes = m.data;
   if (!is_depth_encoding(m.format) || contains(m.format, "rvl") || (is_in_metres(m.format) && !has_header))
     return fail(errc::unsupported, where,
-                "compressed depth in the format \"" + in_short(m.format) + "\" is not supported");
+                "compressed depth in the format \"" + orbis::shortened(m.format, 60) + "\" is not supported");
   if (has_header) bytes.remove_prefix(std::min(header, bytes.size()));
   if (!orbis::io::is_png(bytes)) return fail(errc::malformed, where, "a compressed depth image contains no PNG");
   auto out = orbis::io::decode_png_depth(bytes, where);

@@ -26,12 +26,6 @@ inline constexpr double metres_scale = 5000.0;
 /// Returns true if images of this encoding (not format) are supported.
 [[nodiscard]] bool is_known_encoding(std::string_view encoding);
 
-/// A name from a message, shortened for error messages.
-[[nodiscard]] inline std::string in_short(std::string_view name) {
-  constexpr std::size_t most = 60;
-  return name.size() <= most ? std::string{name} : std::string{name.substr(0, most)} + "...";
-}
-
 /// Decodes a grey or colour image, YUV 4:2:2, or a Bayer mosaic, with demosaicing. `where` names the source in errors.
 /// Errors: unsupported (encoding), malformed (too few pixels, damaged).
 [[nodiscard]] orbis::result<orbis::image<orbis::rgb8>> color_of(const ros_messages::image& m, const std::string& where);

@@ -8,6 +8,7 @@
 #include <string_view>
 
 #include <orbis/camera/settings.hpp>
+#include <orbis/core/quote.hpp>
 #include <orbis/core/result.hpp>
 
 namespace orbis::camera {
@@ -40,7 +41,7 @@ inline constexpr std::array<std::string_view, 5> preset_names{"tum_fr1", "tum_fr
 
   std::string known;
   for (const std::string_view n : preset_names) known += (known.empty() ? "" : ", ") + std::string{n};
-  return fail(errc::invalid_argument, "camera preset", "\"" + std::string{name} + "\" is not one of " + known);
+  return fail(errc::invalid_argument, "camera preset", in_quotes(name) + " is not one of " + known);
 }
 
 }  // namespace orbis::camera

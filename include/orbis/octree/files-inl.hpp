@@ -14,6 +14,7 @@
 #include <utility>
 
 #include <orbis/core/file.hpp>
+#include <orbis/core/quote.hpp>
 #include <orbis/octree/detail/files/octomap_readers.hpp>
 #include <orbis/octree/detail/files/octomap_writers.hpp>
 #include <orbis/octree/files.hpp>
@@ -72,8 +73,7 @@ struct octomap_file {
     const char* const end = value.data() + value.size();
     if (word == "data") break;
     if (word == "id") {
-      if (value != "OcTree")
-        return fail(errc::unsupported, where, "holds a tree of type \"" + std::string{value.substr(0, 40)} + "\"");
+      if (value != "OcTree") return fail(errc::unsupported, where, "holds a tree of type " + in_quotes(value));
       has_id = true;
     } else if (word == "size") {
       const auto parsed = std::from_chars(value.data(), end, file.nodes);
@@ -84,7 +84,7 @@ struct octomap_file {
       if (parsed.ec != std::errc{} || parsed.ptr != end || !std::isfinite(file.resolution) || file.resolution <= 0.0)
         return fail(errc::malformed, where, "the resolution is not a positive number");
     } else {
-      return fail(errc::malformed, where, "unknown keyword \"" + std::string{word.substr(0, 40)} + "\" in the header");
+      return fail(errc::malformed, where, "unknown keyword " + in_quotes(word) + " in the header");
     }
   }
   if (!has_id || !has_size || file.resolution <= 0.0)

@@ -15,6 +15,7 @@
 #include <type_traits>
 #include <utility>
 
+#include <orbis/core/quote.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/core/types.hpp>
 #include <orbis/io/bal_problem.hpp>
@@ -43,12 +44,7 @@ class bal_parser {
   void skip_blanks() {
     for (; at_ != end_ && is_blank(*at_); ++at_) line_ += *at_ == '\n' ? 1 : 0;
   }
-  [[nodiscard]] std::string quoted_field() const {
-    std::string text{"\""};
-    for (const char* c = at_; c != end_ && !is_blank(*c) && c - at_ != 40; ++c)
-      text += *c >= ' ' && *c < '\x7f' ? *c : '?';
-    return text + "\"";
-  }
+  [[nodiscard]] std::string field_in_quotes() const { return in_quotes({at_, std::find_if(at_, end_, is_blank)}); }
 
   /// Reads the next number. `what` and `of`: kind and index of the object that it belongs to, for errors.
   template <class T>
@@ -60,10 +56,10 @@ class bal_parser {
     if (*first == '+' && end_ - first > 1 && first[1] != '-') ++first;
     const auto [last, failure] = std::from_chars(first, end_, value);
     if (failure != std::errc{} || (last != end_ && !is_blank(*last)))
-      return reject(named() + " has " + quoted_field() +
+      return reject(named() + " has " + field_in_quotes() +
                     (std::is_integral_v<T> ? ", which is not an index" : ", which is not a number"));
     if constexpr (std::is_floating_point_v<T>)
-      if (!std::isfinite(value)) return reject(named() + " has " + quoted_field() + ", which is not finite");
+      if (!std::isfinite(value)) return reject(named() + " has " + field_in_quotes() + ", which is not finite");
     at_ = last;
     return true;
   }
@@ -79,7 +75,7 @@ class bal_parser {
       const auto [last, failure] = std::from_chars(at_, end_, count);
       if (failure != std::errc{} || (last != end_ && !is_blank(*last)))
         return reject("the file must begin with the numbers of cameras, points and observations" +
-                      (at_ == end_ ? std::string{} : ", not with " + quoted_field()));
+                      (at_ == end_ ? std::string{} : ", not with " + field_in_quotes()));
       at_ = last;
     }
     // A number takes at least a blank and a digit: allocate only for numbers that can follow.
@@ -124,7 +120,7 @@ class bal_parser {
 
   bool ends() {
     skip_blanks();
-    return at_ == end_ || reject("the file continues after the last point: " + quoted_field());
+    return at_ == end_ || reject("the file continues after the last point: " + field_in_quotes());
   }
 
   const std::filesystem::path& where_;

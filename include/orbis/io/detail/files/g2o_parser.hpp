@@ -13,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include <orbis/core/quote.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/core/se3.hpp>
 #include <orbis/core/so3.hpp>
@@ -48,11 +49,6 @@ class g2o_parser {
     code_ = code;
     return false;
   }
-  [[nodiscard]] static std::string quoted(std::string_view field) {
-    std::string text{"\""};
-    for (const char c : field.substr(0, 40)) text += c >= ' ' && c < '\x7f' ? c : '?';
-    return text + "\"";
-  }
 
   bool read_line(std::string_view line) {
     const std::string_view tag = next_field(line);
@@ -60,7 +56,7 @@ class g2o_parser {
     if (tag == "EDGE_SE3:QUAT") return read_edge(line);
     if (tag == "FIX") return read_fix(line);
     if (tag.starts_with("PARAMS_")) return true;  // of sensors; the supported edges use none
-    return reject(quoted(tag) + " is not one of VERTEX_SE3:QUAT, EDGE_SE3:QUAT, FIX", errc::unsupported);
+    return reject(in_quotes(tag) + " is not one of VERTEX_SE3:QUAT, EDGE_SE3:QUAT, FIX", errc::unsupported);
   }
 
   bool read_vertex(std::string_view line) {
@@ -101,13 +97,13 @@ class g2o_parser {
   bool read_id(std::string_view& line, std::int64_t& id) {
     const std::string_view field = next_field(line);
     if (field.empty()) return reject("the id of a vertex is missing");
-    return parse_number(field, id) || reject(quoted(field) + " is not the id of a vertex");
+    return parse_number(field, id) || reject(in_quotes(field) + " is not the id of a vertex");
   }
   bool read_number(std::string_view& line, double& value, const char* expected) {
     const std::string_view field = next_field(line);
     if (field.empty()) return reject(std::string{"the line ends early: "} + expected);
-    if (!parse_number(field, value)) return reject(quoted(field) + " is not a number");
-    return std::isfinite(value) || reject(quoted(field) + " is not a finite number");
+    if (!parse_number(field, value)) return reject(in_quotes(field) + " is not a number");
+    return std::isfinite(value) || reject(in_quotes(field) + " is not a finite number");
   }
   bool read_pose(std::string_view& line, se3& pose) {
     double v[7];
@@ -120,7 +116,7 @@ class g2o_parser {
   }
   bool ends(std::string_view line) {
     const std::string_view rest = next_field(line);
-    return rest.empty() || reject("the line continues after its last number: " + quoted(rest));
+    return rest.empty() || reject("the line continues after its last number: " + in_quotes(rest));
   }
 
   void resolve() {

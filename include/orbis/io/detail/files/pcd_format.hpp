@@ -16,6 +16,7 @@
 #include <vector>
 
 #include <orbis/core/bytes.hpp>
+#include <orbis/core/quote.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/io/cloud_fields.hpp>
 #include <orbis/io/detail/files/cloud_columns.hpp>
@@ -62,7 +63,7 @@ inline void parse_viewpoint(std::string_view line, pcd_header& header) {
   std::array<double, 7> read{};
   for (double& v : read)
     if (!parse_number(next_field(line), v) || !std::isfinite(v)) {
-      header.note = "VIEWPOINT " + text.substr(0, 100) + " is not seven numbers: left out";
+      header.note = "VIEWPOINT " + orbis::shortened(text) + " is not seven numbers: left out";
       return;
     }
   const auto is_zero = [&](std::size_t from, std::size_t to) {
@@ -72,7 +73,7 @@ inline void parse_viewpoint(std::string_view line, pcd_header& header) {
   if (is_zero(0, 3) && is_zero(4, 7)) return;
   header.viewpoint = read;
   header.note =
-      "VIEWPOINT " + text.substr(0, 200) +
+      "VIEWPOINT " + orbis::shortened(text) +
       " is not applied: the points are taken as they are. This is right if it is the place of the sensor and the "
       "points are in the world; if it is the transform from the points to the world, apply it first";
 }

@@ -11,6 +11,7 @@
 
 #include <orbis/core/file.hpp>
 #include <orbis/core/jacobi.hpp>
+#include <orbis/core/quote.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/core/se3.hpp>
 #include <orbis/io/detail/text.hpp>
@@ -30,7 +31,7 @@ namespace orbis::io::detail {
       if (count == 16)
         problem = "more than 16 numbers in a pose";
       else if (!parse_number(field, m[count]))
-        problem = "\"" + std::string{field.substr(0, 40)} + "\" is not a number";
+        problem = in_quotes(field) + " is not a number";
       else if (!std::isfinite(m[count++]))
         problem = "a pose with NaN or infinity";
       if (!problem.empty()) return false;

@@ -15,6 +15,7 @@
 #include <utility>
 #include <vector>
 
+#include <orbis/core/quote.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/core/se3.hpp>
 #include <orbis/core/trajectory.hpp>
@@ -56,7 +57,7 @@ struct pose_lines {
     if (at == columns.end()) continue;
     double& value = v[static_cast<std::size_t>(at - columns.begin())];
     if (field.empty()) return eight;
-    if (!parse_number(field, value)) return "\"" + std::string{field.substr(0, 40)} + "\" is not a number";
+    if (!parse_number(field, value)) return in_quotes(field) + " is not a number";
     lost = lost || !std::isfinite(value);
     ++found;
   }

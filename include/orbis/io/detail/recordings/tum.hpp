@@ -20,6 +20,7 @@
 
 #include <orbis/camera/presets.hpp>
 #include <orbis/core/file.hpp>
+#include <orbis/core/quote.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/core/trajectory.hpp>
 #include <orbis/io/detail/recordings/recording_folder.hpp>
@@ -65,7 +66,7 @@ template <class Entry, class Parse>
 [[nodiscard]] result<std::vector<Entry>> parse_list(std::string_view text, const std::filesystem::path& list,
                                                     const std::string& form, Parse&& parse,
                                                     std::vector<std::string>& notes) {
-  constexpr std::size_t most_noted = 10, most_quoted = 60;
+  constexpr std::size_t most_noted = 10;
   const auto is_letter = [](char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'); };
   std::vector<Entry> entries;
   bool heading = false;
@@ -77,10 +78,9 @@ template <class Entry, class Parse>
       return true;
     }
     if (entries.empty() && skipped == 0 && !heading && is_letter(line.front())) return heading = true;
-    const std::string quoted = "\"" + std::string{line.substr(0, most_quoted)} +
-                               (line.size() > most_quoted ? "...\"" : "\"") + " is not " + form;
-    if (skipped++ == 0) first_skipped = quoted, first_line = number;
-    if (skipped <= most_noted) notes.push_back(at_line(list, number) + ": skipped, " + quoted);
+    const std::string why = in_quotes(line) + " is not " + form;
+    if (skipped++ == 0) first_skipped = why, first_line = number;
+    if (skipped <= most_noted) notes.push_back(at_line(list, number) + ": skipped, " + why);
     return true;
   });
   if (skipped > most_noted)

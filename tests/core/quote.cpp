@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <string>
+
+#include <orbis/core/quote.hpp>
+
+#include "support/catch.hpp"
+
+using namespace orbis;
+
+TEST_CASE("quotations are short, in one line, and end between characters") {
+  CHECK(in_quotes("") == "\"\"");
+  CHECK(in_quotes("a word") == "\"a word\"");
+  CHECK(in_quotes("a\nb\x7f\tc") == "\"a?b??c\"");
+  CHECK(in_quotes("\x01\x02\xff") == "\"???\"");  // not UTF-8
+  CHECK(in_quotes("K\xC3\xBC"
+               "che") ==
+        "\"K\xC3\xBC"
+        "che\"");
+  const std::string long_text(2000, 'x');
+  CHECK(in_quotes(long_text) == "\"" + std::string(60, 'x') + "...\"");
+  CHECK(shortened(long_text) == std::string(200, 'x') + "...");
+  CHECK(shortened(std::string(200, 'x')) == std::string(200, 'x'));
+  CHECK(shortened("abc\xC3\xBC", 4) == "abc...");  // not half of a character
+  CHECK(shortened("\xC3\xBC", 1) == "...");
+  CHECK(shortened_path("/a/b") == "/a/b");
+  CHECK(shortened_path(long_text + "/a.txt:7", 10) == "...xx/a.txt:7");
+  CHECK(shortened_path("abc\xC3\xBC"
+                       "def",
+                       4) == "...def");
+}
