@@ -8,6 +8,7 @@
 #include <CLI/CLI.hpp>
 
 #include <orbis/camera.hpp>
+#include <orbis/core/quote.hpp>
 #include <orbis/io.hpp>
 #include <orbis/octree.hpp>
 
@@ -22,9 +23,11 @@ orbis::result<orbis::camera::camera_settings> camera_named(const std::string& s,
   if (s.find(',') == s.npos) return orbis::camera::preset(s) ? orbis::camera::preset(s) : orbis::io::read_camera(s);
   orbis::camera::intrinsics k{width, height, 0, 0, 0, 0};
   char rest = 0;
-  if (std::sscanf(s.c_str(), "%lf,%lf,%lf,%lf%c", &k.fx, &k.fy, &k.cx, &k.cy, &rest) != 4 || !is_valid(k))
-    return orbis::fail(orbis::errc::invalid_argument, "--camera", "\"" + s + "\" is not fx,fy,cx,cy in pixels");
-  return orbis::camera::camera_settings{.model = orbis::camera::pinhole{k}};
+  if (std::sscanf(s.c_str(), "%lf,%lf,%lf,%lf%c", &k.fx, &k.fy, &k.cx, &k.cy, &rest) != 4)
+    return orbis::fail(orbis::errc::invalid_argument, "--camera", orbis::in_quotes(s) + " is not fx,fy,cx,cy in pixels");
+  const auto checked = orbis::camera::plausible(k, "--camera");
+  if (!checked) return orbis::fail(checked.error());
+  return orbis::camera::camera_settings{.model = orbis::camera::pinhole{*checked}};
 }
 
 int run(int argc, char** argv) {
@@ -47,11 +50,12 @@ int run(int argc, char** argv) {
   for (const std::string& read : {input, camera_name})
     if (examples::is_same_file(output, read)) return report_error(1, examples::overwrite_message(output, read));
   const auto depth = orbis::io::read_depth(input);
-  if (!depth) return report_error(2, depth.error().to_string());
+  if (!depth) return report_error(2, examples::describe(depth.error()));
   const auto camera = camera_named(camera_name, depth->width(), depth->height());
-  if (!camera) return report_error(camera.error().where == "--camera" ? 1 : 2, camera.error().to_string());
+  if (!camera) return report_error(camera.error().where == "--camera" ? 1 : 2, examples::describe(camera.error()));
   if (camera->model.width() != depth->width() || camera->model.height() != depth->height())
-    return report_error(2, camera_name + ": the image size of the camera differs from that of " + input);
+    return report_error(2, orbis::shortened_path(camera_name) + ": the image size of the camera differs from that of " +
+                               orbis::shortened_path(input));
   const double units = scale > 0.0 ? scale : camera->depth_scale;
   const auto voxels =
       examples::voxels_of_depth(camera->model.k(), [&](std::size_t i) { return depth->pixels()[i] / units; });
@@ -63,8 +67,8 @@ int run(int argc, char** argv) {
   orbis::octree::occupancy_octree<> map{resolution};
   const orbis::camera::depth_view metres{*depth, units};
   const auto scan = map.integrate(metres, camera->model, orbis::se3{orbis::so3{q}, orbis::vec3{p.data()}});
-  if (scan.used == 0) return report_error(2, input + ": no depth within the bounds of the map");
-  if (const auto done = write_bt(map, output); !done) return report_error(2, done.error().to_string());
+  if (scan.used == 0) return report_error(2, orbis::shortened_path(input) + ": no depth within the bounds of the map");
+  if (const auto done = write_bt(map, output); !done) return report_error(2, examples::describe(done.error()));
   return 0;
 }
 

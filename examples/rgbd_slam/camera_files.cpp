@@ -14,8 +14,10 @@
 
 #include <opencv2/core.hpp>
 
+#include <orbis/camera/plausible.hpp>
 #include <orbis/camera/presets.hpp>
 #include <orbis/core/file.hpp>
+#include <orbis/core/quote.hpp>
 #include <orbis/io/camera_file.hpp>
 
 #include "settings.hpp"
@@ -101,15 +103,6 @@ std::optional<focal_and_center> of_matrix(const std::array<double, 9>& m) {
   return std::nullopt;
 }
 
-/// The intrinsics of an image, whose size may be unknown (0). Errors: malformed.
-result<orbis::camera::intrinsics> checked(const focal_and_center& f, int width, int height, const std::string& where) {
-  if (!(f[0] > 0.0 && f[1] > 0.0 && f[0] < 1e9 && f[1] < 1e9 && std::abs(f[2]) < 1e9 && std::abs(f[3]) < 1e9))
-    return fail(errc::malformed, where, "the focal lengths must be above zero, and the principal point finite");
-  if (f[0] > 5.0 * f[1] || f[1] > 5.0 * f[0])
-    return fail(errc::malformed, where, "the two focal lengths differ by more than a factor of 5");
-  return orbis::camera::intrinsics{width, height, f[0], f[1], f[2], f[3]};
-}
-
 std::string lower_case(std::string text) {
   for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
   return text;
@@ -138,7 +131,7 @@ result<orbis::camera::any_camera> model_of(const orbis::camera::intrinsics& k, c
         orbis::camera::radial_tangential{k, {d[0], d[1], d[2], d[3], d[4], d[5], d[6], d[7]}}};
   }
   return fail(errc::unsupported, where,
-              "distortion model \"" + name.substr(0, 60) + "\" with " + std::to_string(d.size()) +
+              "distortion model " + orbis::in_quotes(name) + " with " + std::to_string(d.size()) +
                   " numbers is not supported: write a camera.toml");
 }
 
@@ -171,7 +164,8 @@ result<camera_file> camera_of(const named_values& values, const std::filesystem:
       f[i] = *named[i];
     }
   }
-  const auto k = checked(f, static_cast<int>(width), static_cast<int>(height), where);
+  const auto k =
+      orbis::camera::plausible({static_cast<int>(width), static_cast<int>(height), f[0], f[1], f[2], f[3]}, where);
   if (!k) return fail(k.error());
   auto d = values.numbers({"distortion_coefficients", "D", "d", "coeffs", "distortion"});
   for (const char* const prefix : {"Camera.", "Camera1."}) {
@@ -209,7 +203,8 @@ result<camera_file> read_matrix(const std::string& text, const std::filesystem::
   }
   if (!f)
     return fail(errc::malformed, path.string(), "is neither a camera matrix, fx 0 cx 0 fy cy 0 0 1, nor fx fy cx cy");
-  const auto k = checked(*f, 0, 0, path.string());
+  const auto& [fx, fy, cx, cy] = *f;
+  const auto k = orbis::camera::plausible({0, 0, fx, fy, cx, cy}, path.string());
   if (!k) return fail(k.error());
   camera_file file;
   file.path = path;
@@ -247,7 +242,7 @@ result<camera_file> read_camera_file(const std::filesystem::path& path) {
     if (!root.isMap()) return fail(errc::malformed, path.string(), "is neither JSON nor YAML with named values");
     return camera_of(named_values{root}, path);
   } catch (const cv::Exception& e) {
-    return fail(errc::malformed, path.string(), "is not valid JSON or YAML: " + e.err.substr(0, 100));
+    return fail(errc::malformed, path.string(), "is not valid JSON or YAML: " + orbis::shortened(e.err));
   }
 }
 

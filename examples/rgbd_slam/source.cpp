@@ -9,6 +9,7 @@
 #include <mutex>
 #include <utility>
 
+#include <orbis/camera/plausible.hpp>
 #include <orbis/camera/stereo_frame.hpp>
 #include <orbis/eval/orientations.hpp>
 #include <orbis/io/image.hpp>
@@ -80,7 +81,9 @@ auto open_with_camera(const settings& s, Options options, Open&& open, std::opti
     orbis::camera::intrinsics k = file->camera.model.k();
     k.width = first->width();
     k.height = first->height();
-    file->camera.model = orbis::camera::pinhole{k};
+    const auto checked = orbis::camera::plausible(k, path.string());
+    if (!checked) return fail(checked.error());
+    file->camera.model = orbis::camera::pinhole{*checked};
   }
   found = *std::move(file);
   options.camera = found->camera;

@@ -7,6 +7,7 @@
 /// | `model.hpp` | the concept `camera_model` |
 /// | `intrinsics.hpp` | image size and camera matrix |
 /// | `pinhole.hpp, radial_tangential.hpp, kannala_brandt.hpp` | the camera models |
+/// | `plausible.hpp` | bounds of camera parameters from files |
 /// | `any.hpp` | a camera whose model is only known at run time |
 /// | `parameters.hpp` | parameters of a camera and derivatives with respect to them, for calibration |
 /// | `presets.hpp, settings.hpp` | cameras of common public recordings; the contents of `camera.toml` |
@@ -30,6 +31,7 @@
 #include <orbis/camera/mono_frame.hpp>
 #include <orbis/camera/parameters.hpp>
 #include <orbis/camera/pinhole.hpp>
+#include <orbis/camera/plausible.hpp>
 #include <orbis/camera/presets.hpp>
 #include <orbis/camera/radial_tangential.hpp>
 #include <orbis/camera/rays.hpp>

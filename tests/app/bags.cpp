@@ -19,6 +19,7 @@
 
 #include "inputs/bag_file.hpp"
 #include "inputs/file_recording.hpp"
+#include "inputs/ros_messages.hpp"
 #include "io/recordings.hpp"
 #include "support/catch.hpp"
 
@@ -80,6 +81,26 @@ std::vector<std::filesystem::path> all_bags() {
 }
 
 }  // namespace
+
+TEST_CASE("A camera of a bag that cannot have made its images is refused") {
+  app::ros_messages::camera_info info{};
+  info.width = 160;
+  info.height = 120;
+  info.distortion_model = "plumb_bob";
+  const auto with_focal = [&](double f) {
+    info.K = {f, 0, 80, 0, f, 60, 0, 0, 1};
+    info.P = {f, 0, 80, 0, 0, f, 60, 0, 0, 0, 1, 0};
+  };
+  for (const bool is_rectified : {false, true}) {
+    with_focal(130.0);
+    CHECK(app::ros_messages::camera_of(info, is_rectified, "a.bag"));
+    with_focal(0.000001);
+    CHECK_THAT(message_of(app::ros_messages::camera_of(info, is_rectified, "a.bag")),
+               Contains("a.bag: fx = 1e-06 is too short"));
+    with_focal(0.0);
+    CHECK_THAT(message_of(app::ros_messages::camera_of(info, is_rectified, "a.bag")), Contains("calibrated?"));
+  }
+}
 
 TEST_CASE("bags of all containers and compressions have the same frames") {
   const auto [name, frames, begin] = GENERATE(table<const char*, std::size_t, double>({

@@ -102,6 +102,9 @@ TEST_CASE("files that are no cameras are refused in one sentence") {
         std::tuple{"a.json",
                    std::string{R"({"width": 6, "height": 4, "fx": 1, "fy": 1, "cx": 1, "cy": 1, "coeffs": [1, 2]})"},
                    "distortion model"},
+        std::tuple{"a.json",
+                   std::string{R"({"width": 160, "height": 120, "fx": 0.000001, "fy": 0.000001, "cx": 80, "cy": 60})"},
+                   "fx = 1e-06 is too short"},
         std::tuple{"a.txt", std::string{"1 0 2\n0 1 2\n"}, "camera matrix"}}) {
     const auto file = app::read_camera_file(folder.write(name, text));
     INFO(text);

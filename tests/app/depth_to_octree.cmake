@@ -29,6 +29,7 @@ fails(1 "--pose" ${depth} no.bt --pose 0 0 0 0 0 0 0)
 fails(1 "--pose" ${depth} no.bt --pose nan 0 0 0 0 0 1)
 fails(1 "--camera" ${depth} no.bt --camera 1,2,3)
 fails(1 "--camera" ${depth} no.bt --camera -1,2,3,4)
+fails(1 "--camera: fx = 1e-06 is too short a focal length for images of 320 x 240" ${depth} no.bt --camera 0.000001,0.000001,160,120)
 fails(1 "--resolution" ${depth} no.bt --resolution 0)
 fails(1 "--resolution" ${depth} no.bt --resolution nan)
 fails(1 "--scale" ${depth} no.bt --scale -1)
@@ -44,6 +45,18 @@ fails(2 "none.toml: no such file" ${depth} no.bt --camera none.toml)
 file(WRITE ${WORK}/other.toml "model = \"pinhole\"\nwidth = 640\nheight = 480\nfx = 500\nfy = 500\ncx = 320\ncy = 240\n")
 fails(2 "other.toml: .*size" ${depth} no.bt --camera other.toml)
 fails(2 "no/such/folder" ${depth} no/such/folder/map.bt)
+# A full disk, with the words of the system; long arguments are quoted in part.
+execute_process(COMMAND bash -c "trap '' XFSZ; ulimit -f 1; exec \"$@\"" limited ${APP} ${depth} no.bt --resolution 0.02
+                WORKING_DIRECTORY ${WORK} RESULT_VARIABLE result ERROR_VARIABLE err)
+check(result EQUAL 2)
+check(err STREQUAL "depth_to_octree: no.bt: cannot be written: File too large\n")
+check(NOT EXISTS ${WORK}/no.bt)
+string(REPEAT "1 2, " 400 long)
+foreach(arguments "no.bt;--camera;${long}x" "no.bt;--pose;${long}" "no.bt;${long}" "no.bt;--resolution;${long}" "${long}/no.bt")
+  app(1|2 ${depth} ${arguments})
+  string(LENGTH "${err}" said)
+  check(said LESS 400)
+endforeach()
 
 file(WRITE ${WORK}/misspelt.toml "model = \"pinhole\"\nwidth = 320\nheight = 240\nfx = 262.5\nfy = 262.5\ncx = 159.5\ncy = 119.5\ndepth_skale = 5000\n")
 fails(2 "misspelt.toml: depth_skale is not a setting" ${depth} no.bt --camera misspelt.toml)
@@ -63,11 +76,11 @@ check(before STREQUAL after)
 file(SHA256 ${WORK}/room/camera.toml after)
 check(camera_before STREQUAL after)
 
-# A camera of which each pixel has metres to itself: said beforehand, and ended where there is no memory for it.
-execute_process(COMMAND bash -c "ulimit -v 400000; exec \"$@\"" limited ${APP} ${depth} no.bt --camera 1,1,1,1 --resolution 0.02
+# A camera of which each pixel has decimetres to itself: said beforehand, and ended where there is no memory for it.
+execute_process(COMMAND bash -c "ulimit -v 400000; exec \"$@\"" limited ${APP} ${depth} no.bt --camera 32,32,160,120 --resolution 0.002
                 WORKING_DIRECTORY ${WORK} RESULT_VARIABLE result ERROR_VARIABLE err)
 check(result EQUAL 2)
-if(NOT err MATCHES "^depth_to_octree: voxels of 20 mm: [^\n]* billion of them, [^\n]* GB. this takes a long time\ndepth_to_octree: out of memory\n$")
+if(NOT err MATCHES "^depth_to_octree: voxels of 2 mm: [^\n]* billion of them, [^\n]* GB. this takes a long time\ndepth_to_octree: out of memory\n$")
   message(FATAL_ERROR "depth_to_octree said\n${err}")
 endif()
 check(NOT EXISTS ${WORK}/no.bt)

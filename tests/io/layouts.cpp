@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <functional>
 #include <map>
+#include <regex>
 #include <string>
 #include <vector>
 
@@ -182,4 +183,22 @@ TEST_CASE("every layout with a file missing, misnamed, empty or of another forma
         CHECK((says || lists));
       }
   }
+}
+
+TEST_CASE("every file with a camera is refused if that cannot have made the images") {
+  std::size_t cameras = 0;
+  for (const layout& l : layouts())
+    for (const auto& [name, bytes] : l.all) {
+      const std::string wrong = std::regex_replace(bytes, std::regex{"\\b7\\b(\\.0)?"}, "0.001");
+      if (name.ends_with(".png") || name.ends_with(".jpg") || wrong == bytes) continue;
+      const temporary_folder folder;
+      for (const auto& [path, content] : l.all) folder.write(path, path == name ? wrong : content);
+      INFO(l.name << ", " << name << ": " << wrong);
+      CHECK_THAT(failure(l.kind, folder.path()),
+                 Contains(std::filesystem::path{name}.filename().string() + ": fx = 0.001 is too short"));
+      const bool is_left = l.kind == sensor::two && name.find("cam1") == std::string::npos;
+      if (is_left) CHECK_THAT(failure(sensor::one, folder.path()), Contains("fx = 0.001 is too short"));
+      ++cameras;
+    }
+  CHECK(cameras == 11);
 }

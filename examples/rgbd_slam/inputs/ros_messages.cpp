@@ -4,6 +4,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include <orbis/camera/plausible.hpp>
+#include <orbis/core/quote.hpp>
+
 #include "inputs/ros_images.hpp"
 
 namespace app::ros_messages {
@@ -89,12 +92,15 @@ result<orbis::camera::any_camera> camera_of(const camera_info& info, bool is_rec
   if (info.width == 0 || info.height == 0 || info.width > 65536 || info.height > 65536)
     return fail(errc::malformed, where, "has a camera without image size: is the camera calibrated?");
   const auto width = static_cast<int>(info.width), height = static_cast<int>(info.height);
-  const orbis::camera::intrinsics k =
+  const orbis::camera::intrinsics read =
       is_rectified && info.P[0] > 0.0
           ? orbis::camera::intrinsics{width, height, info.P[0], info.P[5], info.P[2], info.P[6]}
           : orbis::camera::intrinsics{width, height, info.K[0], info.K[4], info.K[2], info.K[5]};
-  if (!orbis::camera::is_valid(k))
+  if (read.fx == 0.0 && read.fy == 0.0)
     return fail(errc::malformed, where, "has no camera matrix: is the camera calibrated?");
+  const auto checked = orbis::camera::plausible(read, where);
+  if (!checked) return fail(checked.error());
+  const orbis::camera::intrinsics& k = *checked;
   const auto& d = info.D;
   if (!std::all_of(d.begin(), d.end(), [](double v) { return std::isfinite(v); }))
     return fail(errc::malformed, where, "has a distortion that is not finite");
@@ -111,7 +117,7 @@ result<orbis::camera::any_camera> camera_of(const camera_info& info, bool is_rec
     return orbis::camera::any_camera{
         orbis::camera::radial_tangential{k, {at(0), at(1), at(2), at(3), at(4), at(5), at(6), at(7)}}};
   return fail(errc::unsupported, where,
-              "distortion model \"" + in_short(model) + "\" with " + std::to_string(d.size()) +
+              "distortion model \"" + orbis::shortened(model, 60) + "\" with " + std::to_string(d.size()) +
                   " numbers is not supported, only plumb_bob, rational_polynomial and equidistant; specify a camera");
 }
 

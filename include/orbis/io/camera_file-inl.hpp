@@ -19,9 +19,11 @@
 
 #include <orbis/camera/kannala_brandt.hpp>
 #include <orbis/camera/pinhole.hpp>
+#include <orbis/camera/plausible.hpp>
 #include <orbis/camera/radial_tangential.hpp>
 #include <orbis/core/file.hpp>
 #include <orbis/core/inline.hpp>
+#include <orbis/core/quote.hpp>
 #include <orbis/io/camera_file.hpp>
 #include <orbis/io/toml.hpp>
 
@@ -86,7 +88,7 @@ class camera_fields {
       if (std::find(known.begin(), known.end(), key.str()) != known.end()) continue;
       std::string names;
       for (const std::string_view name : known) names += (names.empty() ? "" : ", ") + std::string{name};
-      reject(std::string{key.str()}.c_str(), "is not a setting of a camera; the settings are " + names);
+      reject(shortened(key.str(), 60).c_str(), "is not a setting of a camera; the settings are " + names);
     }
   }
   void reject(const char* name, const std::string& why) {
@@ -108,7 +110,7 @@ ORBIS_INLINE result<camera::camera_settings> parse_camera(std::string_view text,
   const toml::table& table = *parsed;
   detail::camera_fields fields{table, where.string()};
   const std::string model = fields.text("model");
-  const camera::intrinsics k{
+  const camera::intrinsics read{
       .width = fields.size("width"),
       .height = fields.size("height"),
       .fx = fields.positive("fx"),
@@ -132,11 +134,15 @@ ORBIS_INLINE result<camera::camera_settings> parse_camera(std::string_view text,
   }
   if (table.contains("baseline")) settings.baseline = fields.positive("baseline");
   if (fields.failure()) return fail(*fields.failure());
+  const auto checked = camera::plausible(read, where.string());
+  if (!checked) return fail(checked.error());
+  const camera::intrinsics& k = *checked;
 
   const auto list = [&](std::size_t i) { return i < d.size() ? d[i] : 0.0; };
   const auto wrong_length = [&](const char* wanted) {
-    return fail(errc::malformed, where.string(),
-                "distortion has " + std::to_string(d.size()) + " values, the model " + model + " takes " + wanted);
+    return fail(
+        errc::malformed, where.string(),
+        "distortion has " + std::to_string(d.size()) + " values, the model " + in_quotes(model) + " takes " + wanted);
   };
   if (model == "pinhole") {
     if (std::any_of(d.begin(), d.end(), [](double v) { return v != 0.0; })) return wrong_length("none");
@@ -150,7 +156,7 @@ ORBIS_INLINE result<camera::camera_settings> parse_camera(std::string_view text,
     settings.model = camera::kannala_brandt{k, {list(0), list(1), list(2), list(3)}};
   } else {
     return fail(errc::unsupported, where.string(),
-                "model \"" + model + "\" is not one of pinhole, radtan, kannala_brandt");
+                "model " + in_quotes(model) + " is not one of pinhole, radtan, kannala_brandt");
   }
   return settings;
 }

@@ -20,7 +20,9 @@
 #include <vector>
 
 #include <orbis/camera/any.hpp>
+#include <orbis/camera/plausible.hpp>
 #include <orbis/core/file.hpp>
+#include <orbis/core/quote.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/core/se3.hpp>
 #include <orbis/core/trajectory.hpp>
@@ -58,13 +60,12 @@ struct asl_camera {
     if (!*read) return fail(read->error());
   const auto is_size = [](double v) { return v >= 1.0 && v <= 1e5 && v == std::floor(v); };
   if (!is_size((*size)[0]) || !is_size((*size)[1])) return reject("resolution must be two whole numbers up to 100000");
-  for (const std::size_t i : {0U, 1U})
-    if (!((*f)[i] > 0.0 && (*f)[i] < 1e9 && std::abs((*f)[i + 2]) < 1e9))
-      return reject("intrinsics must be two focal lengths above zero and the principal point");
-  const camera::intrinsics k{
-      static_cast<int>((*size)[0]), static_cast<int>((*size)[1]), (*f)[0], (*f)[1], (*f)[2], (*f)[3]};
+  const auto checked = camera::plausible(
+      {static_cast<int>((*size)[0]), static_cast<int>((*size)[1]), (*f)[0], (*f)[1], (*f)[2], (*f)[3]}, where.string());
+  if (!checked) return fail(checked.error());
+  const camera::intrinsics& k = *checked;
   if (*model != "pinhole")
-    return fail(errc::unsupported, where.string(), "camera_model \"" + *model + "\" is not pinhole");
+    return fail(errc::unsupported, where.string(), "camera_model " + in_quotes(*model) + " is not pinhole");
   const auto lens = [&]() -> result<camera::any_camera> {
     const std::vector<double>& c = *d;
     if (*distortion == "radial-tangential" || *distortion == "radtan") {
@@ -77,7 +78,7 @@ struct asl_camera {
     }
     if (*distortion == "none") return camera::any_camera{camera::pinhole{k}};
     return fail(errc::unsupported, where.string(),
-                "distortion_model \"" + *distortion + "\" is not one of radial-tangential, equidistant, none");
+                "distortion_model " + in_quotes(*distortion) + " is not one of radial-tangential, equidistant, none");
   }();
   if (!lens) return fail(lens.error());
   std::string matrix = yaml->text("T_BS.data").value();

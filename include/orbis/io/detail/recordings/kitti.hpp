@@ -19,6 +19,7 @@
 #include <vector>
 
 #include <orbis/camera/pinhole.hpp>
+#include <orbis/camera/plausible.hpp>
 #include <orbis/core/file.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/core/se3.hpp>
@@ -52,8 +53,8 @@ struct kitti_calibration {
   se3 T_first_left;  ///< pose of the left camera in the frame of camera 0
 };
 
-/// Parses the projection matrix `P<camera>:` of `calib.txt`, row by row. Errors: malformed (missing, not a matrix, or a
-/// focal length that is not above zero).
+/// Parses the projection matrix `P<camera>:` of `calib.txt`, row by row. Errors: malformed (missing, not a matrix, not
+/// that of a camera).
 [[nodiscard]] inline result<std::array<double, 12>> parse_kitti_projection(std::string_view text, int camera,
                                                                            const std::filesystem::path& where) {
   const std::string wanted = "P" + std::to_string(camera);
@@ -68,8 +69,7 @@ struct kitti_calibration {
   if (bad_line != 0) return fail(errc::malformed, at_line(where, bad_line), "a projection matrix has 12 numbers");
   if (!found) return fail(errc::malformed, where.string(), wanted + " is missing");
   const auto& p = *found;
-  if (!(p[0] > 0.0 && p[5] > 0.0 && p[0] < 1e9 && p[5] < 1e9 && std::abs(p[2]) < 1e9 && std::abs(p[6]) < 1e9))
-    return fail(errc::malformed, where.string(), "a focal length must be above zero");
+  if (const auto k = camera::plausible({0, 0, p[0], p[5], p[2], p[6]}, where.string()); !k) return fail(k.error());
   return p;
 }
 
@@ -228,7 +228,10 @@ inline void add_kitti_frame(std::size_t n, const std::vector<double>& times,
   if (const auto ok = sort_kitti_frames({left, right}, times->size(), images); !ok) return fail(ok.error());
   const auto first = read_color(images.frames.front().color);
   if (!first) return fail(first.error());
-  const camera::pinhole camera{first->width(), first->height(), k->fx, k->fy, k->cx, k->cy};
+  const auto checked =
+      camera::plausible({first->width(), first->height(), k->fx, k->fy, k->cx, k->cy}, (folder / "calib.txt").string());
+  if (!checked) return fail(checked.error());
+  const camera::pinhole camera{*checked};
   index.cameras = {camera, camera, se3{so3{}, vec3{k->baseline, 0.0, 0.0}}};
   index.fps = 10.0;
   return index;

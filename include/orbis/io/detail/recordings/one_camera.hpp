@@ -15,6 +15,7 @@
 #include <vector>
 
 #include <orbis/camera/pinhole.hpp>
+#include <orbis/camera/plausible.hpp>
 #include <orbis/camera/settings.hpp>
 #include <orbis/core/file.hpp>
 #include <orbis/core/result.hpp>
@@ -127,8 +128,9 @@ inline constexpr double mono_pose_distance = 0.020;
   if (const auto ok = sort_kitti_frames({images}, times->size(), index); !ok) return fail(ok.error());
   const auto first = read_color(index.frames.front().color);
   if (!first) return fail(first.error());
-  index.camera = camera::camera_settings{
-      .model = camera::pinhole{first->width(), first->height(), p[0], p[5], p[2], p[6]}, .fps = 10.0};
+  const auto k = camera::plausible({first->width(), first->height(), p[0], p[5], p[2], p[6]}, index.files[0].string());
+  if (!k) return fail(k.error());
+  index.camera = camera::camera_settings{.model = camera::pinhole{*k}, .fps = 10.0};
   return index;
 }
 

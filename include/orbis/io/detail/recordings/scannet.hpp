@@ -16,6 +16,7 @@
 #include <utility>
 
 #include <orbis/camera/pinhole.hpp>
+#include <orbis/camera/plausible.hpp>
 #include <orbis/camera/settings.hpp>
 #include <orbis/core/file.hpp>
 #include <orbis/core/result.hpp>
@@ -86,7 +87,10 @@ namespace orbis::io::detail {
     const auto k = read_camera_matrix(file);
     if (!k) return fail(k.error());
     index.files.push_back(file);
-    return camera::pinhole{width, height, (*k)(0, 0), (*k)(1, 1), (*k)(0, 2), (*k)(1, 2)};
+    const auto checked =
+        camera::plausible({width, height, (*k)(0, 0), (*k)(1, 1), (*k)(0, 2), (*k)(1, 2)}, file.string());
+    if (!checked) return fail(checked.error());
+    return camera::pinhole{*checked};
   };
   const auto place_of = [&](const char* what) -> result<se3> {
     const auto file = scannet_file(folder, what);

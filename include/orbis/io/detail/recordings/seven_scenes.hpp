@@ -17,6 +17,7 @@
 #include <utility>
 #include <vector>
 
+#include <orbis/camera/plausible.hpp>
 #include <orbis/camera/settings.hpp>
 #include <orbis/core/file.hpp>
 #include <orbis/core/result.hpp>
@@ -163,10 +164,10 @@ inline std::vector<std::filesystem::path> seven_scenes_sequences(const std::file
     index.files.push_back(intrinsics);
     const auto first = read_depth(index.frames.front().depth);
     if (!first) return fail(first.error());
-    index.camera = camera::camera_settings{
-        .model = camera::pinhole{first->width(), first->height(), (*k)(0, 0), (*k)(1, 1), (*k)(0, 2), (*k)(1, 2)},
-        .depth_scale = 1000.0,
-        .fps = 30.0};
+    const auto checked = camera::plausible(
+        {first->width(), first->height(), (*k)(0, 0), (*k)(1, 1), (*k)(0, 2), (*k)(1, 2)}, intrinsics.string());
+    if (!checked) return fail(checked.error());
+    index.camera = camera::camera_settings{.model = camera::pinhole{*checked}, .depth_scale = 1000.0, .fps = 30.0};
   }
   return index;
 }

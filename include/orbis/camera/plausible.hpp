@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Bounds of camera parameters that come from files and messages.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <string>
+#include <utility>
+
+#include <orbis/camera/intrinsics.hpp>
+#include <orbis/core/result.hpp>
+
+namespace orbis::camera {
+
+/// Returns `k` if it can be a camera. All readers of cameras call it, so that work on an image is bounded: a focal
+/// length near zero would make each pixel as wide as a room. With an image size, every pixel is seen at a slope of at
+/// most 10 (84 degrees) from the optical axis along each image axis, and the focal lengths are at most 1000 times the
+/// larger side. Without a size (0) only the numbers are checked: both focal lengths are positive, below 1e9 and differ
+/// by at most a factor of 5; the principal point is below 1e9. Errors: malformed at `where`, with the parameter and the
+/// reason.
+[[nodiscard]] inline result<intrinsics> plausible(const intrinsics& k, std::string where) {
+  constexpr double largest = 1e9, most_slope = 10.0, most_focal = 1000.0, most_ratio = 5.0;
+  const auto reject = [&](const char* name, double value, const std::string& why) {
+    char text[64];
+    std::snprintf(text, sizeof text, "%s = %.6g ", name, value);
+    return fail(errc::malformed, std::move(where), text + why);
+  };
+  if (k.width < 0 || k.height < 0) return reject("size", std::min(k.width, k.height), "is negative");
+  for (const auto& [name, f] : {std::pair{"fx", k.fx}, std::pair{"fy", k.fy}})
+    if (!(f > 0.0 && f < largest)) return reject(name, f, "is not a focal length in pixels: it must be above zero");
+  for (const auto& [name, c] : {std::pair{"cx", k.cx}, std::pair{"cy", k.cy}})
+    if (!(std::abs(c) < largest)) return reject(name, c, "is not a coordinate of the principal point in pixels");
+  if (k.fx > most_ratio * k.fy || k.fy > most_ratio * k.fx)
+    return reject("fy", k.fy, "differs from fx by more than a factor of 5: are the focal lengths in pixels?");
+  if (k.width == 0 || k.height == 0) return k;
+
+  const std::string images = "images of " + std::to_string(k.width) + " x " + std::to_string(k.height) + " pixels";
+  struct axis {
+    const char *f_name, *c_name;
+    double f, c, size;
+  };
+  for (const axis& a : {axis{"fx", "cx", k.fx, k.cx, static_cast<double>(k.width)},
+                        axis{"fy", "cy", k.fy, k.cy, static_cast<double>(k.height)}}) {
+    if (a.f > most_focal * std::max(k.width, k.height))
+      return reject(a.f_name, a.f, "is too long a focal length for " + images + ": is it in pixels?");
+    if (0.5 * a.size > most_slope * a.f)
+      return reject(a.f_name, a.f, "is too short a focal length for " + images + ": is it in pixels?");
+    if (std::max(a.c, a.size - a.c) > most_slope * a.f)
+      return reject(a.c_name, a.c,
+                    "is too far from the middle of " + images + " with " + a.f_name + " = " + std::to_string(a.f));
+  }
+  return k;
+}
+
+}  // namespace orbis::camera
