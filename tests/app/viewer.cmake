@@ -22,7 +22,7 @@ else()
 endif()
 check(NOT EXISTS ${WORK}/out)
 if(NOT HAS_WEB)
-  app_fails(1 "--viewer web: this program was built without it.*libcpp-httplib-dev" demo --out out --viewer web)
+  app_fails(1 "--viewer web: this program was built without it.*ORBIS_VIEWER=ON" demo --out out --viewer web)
   return()
 endif()
 

@@ -25,14 +25,13 @@
 
 #include "support/catch.hpp"
 #include "viewer/backend.hpp"
-#include "viewer/bounded_threads.hpp"
 #include "viewer/call_thread.hpp"
 #include "viewer/scene_builder.hpp"
 #include "viewer/viewer_thread.hpp"
 #include "viewer/web_messages.hpp"
 #include "voxel_colors.hpp"
 
-#ifdef RGBD_SLAM_WEB
+#ifdef HAS_HTTPLIB
 #include <httplib.h>  // after Eigen: it brings a macro, _res
 #endif
 #ifdef __linux__
@@ -427,56 +426,6 @@ TEST_CASE("Tracking never waits for who looks at the scene") {
 
 namespace {
 
-// What cpp-httplib has had so far.
-struct old_queue {
-  virtual ~old_queue() = default;
-  virtual void enqueue(std::function<void()> job) = 0;
-  virtual void shutdown() = 0;
-};
-struct new_queue {
-  virtual ~new_queue() = default;
-  virtual bool enqueue(std::function<void()> job) = 0;
-  virtual void shutdown() = 0;
-};
-
-/// Gives a job to the queue; whether it was taken.
-bool give(old_queue& queue, std::function<void()> job) { return queue.enqueue(std::move(job)), true; }
-bool give(new_queue& queue, std::function<void()> job) { return queue.enqueue(std::move(job)); }
-
-}  // namespace
-
-TEMPLATE_TEST_CASE("The server's threads do every job, and an exception in one ends none of them", "", old_queue,
-                   new_queue) {
-  std::mutex mutex;
-  std::vector<std::string> failures;
-  std::atomic<int> jobs_done{0};
-  {
-    bounded_threads<TestType> queue{3, 2, [&](std::exception_ptr e) {
-                                      const std::lock_guard lock{mutex};
-                                      try {
-                                        std::rethrow_exception(std::move(e));
-                                      } catch (const std::exception& what) {
-                                        failures.emplace_back(what.what());
-                                      }
-                                    }};
-    for (int i = 0; i != 50; ++i)
-      CHECK(give(queue, [&, i] {
-        if (i % 10 == 3) throw std::runtime_error{"job " + std::to_string(i)};
-        ++jobs_done;
-      }));
-    queue.shutdown();
-    CHECK(jobs_done == 45);
-  }
-  std::sort(failures.begin(), failures.end());
-  CHECK(failures == std::vector<std::string>{"job 13", "job 23", "job 3", "job 33", "job 43"});
-  // A server that ends by an exception does not call shutdown.
-  {
-    const bounded_threads<TestType> queue{2, 2, [](const std::exception_ptr&) {}};
-  }
-}
-
-namespace {
-
 /// Does what it is told to when it draws.
 class told_backend final : public viewer_backend {
  public:
@@ -666,7 +615,7 @@ TEST_CASE("Frames can be shown while the viewer hangs in a drawing") {
   CHECK(comes_true([&] { return last == 199; }));
 }
 
-#ifdef RGBD_SLAM_WEB
+#ifdef HAS_HTTPLIB
 
 namespace {
 

@@ -14,10 +14,9 @@ bool has_viewer(const std::string& name) {
 }
 
 std::string missing_viewer_message(const std::string& name) {
-  const bool is_window = name == "window";
-  return "--viewer " + name + ": this program was built without it; install " +
-         (is_window ? "libglfw3-dev, libimgui-dev and libgl-dev" : "libcpp-httplib-dev and pkg-config") +
-         ", configure and build again";
+  return "--viewer " + name + ": this program was built without it; " +
+         (name == "window" ? "install libglfw3-dev, libimgui-dev and libgl-dev, configure and build again"
+                           : "configure with -DORBIS_VIEWER=ON and build again");
 }
 
 #ifndef RGBD_SLAM_WINDOW

@@ -11,43 +11,21 @@
 #include <mutex>
 #include <optional>
 #include <random>
-#include <stdexcept>
 #include <string>
-#include <thread>
 #include <utility>
 #include <vector>
 
 #include "viewer/backend.hpp"
-#include "viewer/bounded_threads.hpp"
+#include "viewer/http_server.hpp"
 #include "viewer/viewer_page.hpp"
 #include "viewer/web_messages.hpp"
-
-// After Eigen, which uses a name (_res) that resolv.h, included here, defines as a macro.
-#include <httplib.h>
 
 namespace app {
 namespace {
 
-constexpr std::size_t server_threads = 8;
-constexpr std::size_t waiting_connections = 8;
-constexpr std::size_t requests_per_connection = 20;  // then other connections get a thread
-
-/// Returns true if the Host of a request is this machine. A foreign page whose name resolves to 127.0.0.1 (DNS
-/// rebinding) sends that name. The port may differ, as with a tunnel.
-bool is_local(const httplib::Request& request) {
-  if (request.get_header_value_count("Host") != 1) return false;
-  std::string host = request.get_header_value("Host");
-  if (const std::size_t colon = host.rfind(':'); colon != std::string::npos) {
-    if (host.find_first_not_of("0123456789", colon + 1) != std::string::npos) return false;
-    host.resize(colon);
-  }
-  return host == "127.0.0.1" || host == "localhost";
-}
-
 /// The number after `since=`; 0 without it, empty if it is not a number.
-std::optional<std::uint64_t> since_of(const httplib::Request& request) {
-  if (!request.has_param("since")) return 0;
-  const std::string text = request.get_param_value("since");
+std::optional<std::uint64_t> since_of(const http_request& request) {
+  const std::string_view text = query_value(request.query, "since").value_or("0");
   std::uint64_t value = 0;
   const auto [end, failure] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (failure != std::errc{} || end != text.data() + text.size()) return std::nullopt;
@@ -56,73 +34,53 @@ std::optional<std::uint64_t> since_of(const httplib::Request& request) {
 
 class web_backend final : public viewer_backend {
  public:
-  web_backend() : session_{std::random_device{}() & 0x7fffffffU} { set_up(); }
+  web_backend()
+      : session_{std::random_device{}() & 0x7fffffffU},
+        server_{[this](const http_request& request) { return answer(request); },
+                [this](std::exception_ptr e) { note(std::move(e)); },
+                "Cache-Control: no-store\r\n"
+                "X-Content-Type-Options: nosniff\r\n"
+                "X-Frame-Options: DENY\r\n"
+                "Cross-Origin-Resource-Policy: same-origin\r\n"
+                "Referrer-Policy: no-referrer\r\n"
+                "Content-Security-Policy: default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
+                "connect-src 'self'; img-src blob:; base-uri 'none'; form-action 'none'\r\n"} {}
   web_backend(const web_backend&) = delete;
   web_backend& operator=(const web_backend&) = delete;
-  ~web_backend() override {
-    server_.stop();
-    if (thread_.joinable()) thread_.join();
-  }
 
-  [[nodiscard]] bool listen(unsigned port) {
-    if (port == 0) {
-      const int found = server_.bind_to_any_port(address);
-      if (found <= 0) return false;
-      port_ = static_cast<unsigned>(found);
-    } else {
-      if (!server_.bind_to_port(address, static_cast<int>(port))) return false;
-      port_ = port;
-    }
-    thread_ = std::thread{[this] { serve(); }};
-    while (!server_.is_running() && !has_ended_)  // `stop` has no effect before that
-      std::this_thread::sleep_for(std::chrono::milliseconds{1});
-    return true;
-  }
+  [[nodiscard]] bool listen(unsigned port) { return server_.listen(port); }
 
   [[nodiscard]] bool draw(const viewer_scene& scene) override;
   [[nodiscard]] std::string where() const override {
-    return "http://" + std::string{address} + ":" + std::to_string(port_) + "/";
+    return "http://" + std::string{http_server::address} + ":" + std::to_string(server_.port()) + "/";
   }
   [[nodiscard]] std::chrono::milliseconds interval() const override { return std::chrono::milliseconds{50}; }
 
  private:
   using bytes = std::shared_ptr<const std::string>;
-  /// A frame whose image is compressed to JPEG once, on request.
+  /// A frame whose image is compressed to JPEG once.
   struct published_frame {
     shown_frame frame;
-    std::once_flag once;
-    std::string features_and_jpeg;
+    bytes features_and_jpeg;  // made on request; belongs to the server's thread
   };
   struct published_block {
     std::uint64_t revision;
     bytes message;
   };
-  static constexpr const char* address = "127.0.0.1";
 
-  void set_up();
-  void serve() {
-    try {
-      if (!server_.listen_after_bind())
-        throw std::runtime_error{"the viewer's server does not accept any more connections"};
-    } catch (...) {
-      note(std::current_exception());
-    }
-    has_ended_ = true;
-  }
-  /// Stores the first exception of a server thread for `draw`.
+  [[nodiscard]] http_answer answer(const http_request& request);
+  /// Stores the first exception of the server's thread for `draw`.
   void note(std::exception_ptr failure) {
     const std::lock_guard lock{mutex_};
     if (!failure_) failure_ = std::move(failure);
   }
-  void give_frame(std::uint64_t since, httplib::Response& response);
-  void give_graph(std::uint64_t since, httplib::Response& response);
-  void give_voxels(std::uint64_t since, httplib::Response& response);
+  [[nodiscard]] http_answer frame_since(std::uint64_t since);
+  [[nodiscard]] http_answer graph_since(std::uint64_t since);
+  [[nodiscard]] http_answer voxels_since(std::uint64_t since);
 
+  static constexpr const char* binary = "application/octet-stream";
   const std::uint64_t session_;
-  unsigned port_ = 0;
-  httplib::Server server_;
-  std::thread thread_;
-  std::atomic<bool> has_ended_{false};
+  const bytes page_ = std::make_shared<const std::string>(viewer_page);
 
   std::mutex mutex_;  // guards the members below
   std::exception_ptr failure_;
@@ -132,68 +90,16 @@ class web_backend final : public viewer_backend {
   std::uint64_t graph_revision_ = 0;
   shown_voxels voxels_;  // without its blocks
   std::map<block_index, published_block> blocks_;
+  http_server server_;  // last member: its thread uses the others
 };
 
-void web_backend::set_up() {
-  server_.new_task_queue = [this] {
-    return new bounded_threads<httplib::TaskQueue>{server_threads, waiting_connections,
-                                                   [this](std::exception_ptr e) { note(std::move(e)); }};
-  };
-  // Replaces the library's default, which allows two servers on one port.
-  server_.set_socket_options([](socket_t socket) {
-    const int yes = 1;
-    ::setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
-  });
-  server_.set_tcp_nodelay(true);
-  server_.set_keep_alive_max_count(requests_per_connection);
-  server_.set_keep_alive_timeout(2);
-  server_.set_read_timeout(2);
-  server_.set_write_timeout(5);
-  server_.set_payload_max_length(0);
-  server_.set_default_headers({{"Cache-Control", "no-store"},
-                               {"X-Content-Type-Options", "nosniff"},
-                               {"X-Frame-Options", "DENY"},
-                               {"Cross-Origin-Resource-Policy", "same-origin"},
-                               {"Referrer-Policy", "no-referrer"},
-                               {"Content-Security-Policy",
-                                "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
-                                "connect-src 'self'; img-src blob:; base-uri 'none'; form-action 'none'"}});
-  server_.set_pre_routing_handler([](const httplib::Request& request, httplib::Response& response) {
-    // The library would send all requested ranges together, thousands of times the size of the whole file. The answer
-    // has no body, because the library would cut that as well.
-    if (request.has_header("Range")) {
-      response.status = 416;
-      response.set_header("Connection", "close");
-      return httplib::Server::HandlerResponse::Handled;
-    }
-    if (!is_local(request)) {
-      response.status = 403;
-      response.set_header("Connection", "close");
-      response.set_content("only for this machine\n", "text/plain");
-      return httplib::Server::HandlerResponse::Handled;
-    }
-    if (request.method != "GET") {
-      response.status = 405;
-      response.set_header("Allow", "GET");
-      response.set_header("Connection", "close");  // the body of the request is not read
-      response.set_content("only GET\n", "text/plain");
-      return httplib::Server::HandlerResponse::Handled;
-    }
-    return httplib::Server::HandlerResponse::Unhandled;
-  });
-  server_.Get("/", [](const httplib::Request&, httplib::Response& response) {
-    response.set_content(viewer_page, "text/html; charset=utf-8");
-  });
-  const auto give = [this](const char* path, void (web_backend::*answer)(std::uint64_t, httplib::Response&)) {
-    server_.Get(path, [this, answer](const httplib::Request& request, httplib::Response& response) {
-      if (const auto since = since_of(request)) return (this->*answer)(*since, response);
-      response.status = 400;
-      response.set_content("since: not a number\n", "text/plain");
-    });
-  };
-  give("/frame", &web_backend::give_frame);
-  give("/graph", &web_backend::give_graph);
-  give("/voxels", &web_backend::give_voxels);
+http_answer web_backend::answer(const http_request& request) {
+  const std::string& path = request.path;
+  if (path == "/") return {.type = "text/html; charset=utf-8", .body = {page_}};
+  if (path != "/frame" && path != "/graph" && path != "/voxels") return text_answer(404, "no such page\n");
+  const auto since = since_of(request);
+  if (!since) return text_answer(400, "since: not a number\n");
+  return path == "/frame" ? frame_since(*since) : path == "/graph" ? graph_since(*since) : voxels_since(*since);
 }
 
 bool web_backend::draw(const viewer_scene& scene) {
@@ -228,7 +134,7 @@ bool web_backend::draw(const viewer_scene& scene) {
   return true;
 }
 
-void web_backend::give_frame(std::uint64_t since, httplib::Response& response) {
+http_answer web_backend::frame_since(std::uint64_t since) {
   std::string state;
   std::shared_ptr<published_frame> frame;
   {
@@ -238,39 +144,28 @@ void web_backend::give_frame(std::uint64_t since, httplib::Response& response) {
   }
   // frames are counted from 1; 0: the client has none
   if (frame && frame->frame.number + 1 == since) frame.reset();
-  if (frame)
-    std::call_once(frame->once, [&] { frame->features_and_jpeg = frame_message({}, &frame->frame).substr(4); });
+  if (frame && !frame->features_and_jpeg)
+    frame->features_and_jpeg = std::make_shared<const std::string>(frame_message({}, &frame->frame).substr(4));
   std::string message = frame_message(state, nullptr);
-  if (frame) message.replace(message.size() - 4, 4, frame->features_and_jpeg);
-  response.set_content(std::move(message), "application/octet-stream");
+  if (frame) message.resize(message.size() - 4);
+  http_answer answer{.type = binary, .body = {std::make_shared<const std::string>(std::move(message))}};
+  if (frame) answer.body.push_back(frame->features_and_jpeg);
+  return answer;
 }
 
-void web_backend::give_graph(std::uint64_t since, httplib::Response& response) {
-  bytes graph;
-  {
-    const std::lock_guard lock{mutex_};
-    if (graph_revision_ == since)
-      response.status = 204;
-    else
-      graph = graph_;
-  }
-  if (graph) response.set_content(*graph, "application/octet-stream");
+http_answer web_backend::graph_since(std::uint64_t since) {
+  const std::lock_guard lock{mutex_};
+  if (graph_revision_ == since) return {.status = 204};
+  return {.type = binary, .body = {graph_}};
 }
 
-void web_backend::give_voxels(std::uint64_t since, httplib::Response& response) {
-  std::string message;
-  std::vector<bytes> blocks;
-  {
-    const std::lock_guard lock{mutex_};
-    for (const auto& [index, block] : blocks_)
-      if (block.revision > since) blocks.push_back(block.message);
-    message = voxel_header(voxels_, blocks.size());
-  }
-  std::size_t size = message.size();
-  for (const bytes& b : blocks) size += b->size();
-  message.reserve(size);
-  for (const bytes& b : blocks) message += *b;
-  response.set_content(std::move(message), "application/octet-stream");
+http_answer web_backend::voxels_since(std::uint64_t since) {
+  http_answer answer{.type = binary, .body = {nullptr}};
+  const std::lock_guard lock{mutex_};
+  for (const auto& [index, block] : blocks_)
+    if (block.revision > since) answer.body.push_back(block.message);
+  answer.body.front() = std::make_shared<const std::string>(voxel_header(voxels_, answer.body.size() - 1));
+  return answer;
 }
 
 }  // namespace
