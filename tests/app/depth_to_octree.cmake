@@ -77,10 +77,10 @@ file(SHA256 ${WORK}/room/camera.toml after)
 check(camera_before STREQUAL after)
 
 # A camera of which each pixel has decimetres to itself: said beforehand, and ended where there is no memory for it.
-execute_process(COMMAND bash -c "ulimit -v 400000; exec \"$@\"" limited ${APP} ${depth} no.bt --camera 32,32,160,120 --resolution 0.002
+execute_process(COMMAND bash -c "ulimit -v 400000; exec \"$@\"" limited ${APP} ${depth} no.bt --camera 32,32,160,120 --resolution 0.015
                 WORKING_DIRECTORY ${WORK} RESULT_VARIABLE result ERROR_VARIABLE err)
 check(result EQUAL 2)
-if(NOT err MATCHES "^depth_to_octree: voxels of 2 mm: [^\n]* billion of them, [^\n]* GB. this takes a long time\ndepth_to_octree: out of memory\n$")
+if(NOT err MATCHES "^depth_to_octree: voxels of 15 mm: [^\n]* billion of them, [^\n]* GB. this takes a long time\ndepth_to_octree: out of memory\n$")
   message(FATAL_ERROR "depth_to_octree said\n${err}")
 endif()
 check(NOT EXISTS ${WORK}/no.bt)
