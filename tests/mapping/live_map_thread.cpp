@@ -431,6 +431,27 @@ TEST_CASE("An exception on a live map's thread ends it in order") {
   CHECK_FALSE(fine.failure());
 }
 
+TEST_CASE("A request to stop waits for nothing, ends the waiting, and the thread ends after its step") {
+  const auto scene = test::wall_scene(3);
+  std::promise<void> begun, go;
+  std::shared_future<void> wait_for_go = go.get_future().share();
+  listeners hear{.prepare = [&](std::uint64_t frame, mapping::depth_use, image_view<std::uint16_t>) {
+    if (frame != 0) return;
+    begun.set_value();
+    wait_for_go.wait();
+  }};
+  live map{scene.camera, {.map = {.resolution = 0.05}}, hear};
+  for (std::size_t i = 0; i != 3; ++i) CHECK(add(map, scene, i));
+  auto waiting = std::async(std::launch::async, [&] { map.wait(); });
+  begun.get_future().wait();
+  map.request_stop();  // neither this nor the next two could end if they waited for the step
+  waiting.get();
+  CHECK_FALSE(add(map, scene, 2));
+  go.set_value();
+  CHECK(map.stop().size() == 1);
+  CHECK_FALSE(map.failure());
+}
+
 TEST_CASE("Poses told while a live map is busy are those of the last call") {
   const auto scene = test::wall_scene(3);
   std::promise<void> begun, go;

@@ -154,14 +154,19 @@ class live_map_thread {
     push({.kind = job::finish});
     wait_until_idle();
   }
-  /// Ends the thread, and returns the map to the caller; drops waiting requests. After a failure the map may only be
-  /// destroyed: a step was interrupted. Must not be called by callbacks.
-  map_type& stop() {
+  /// Requests that the thread ends after its running step; waiting calls return. Does not wait; call `stop` later. May
+  /// be called from any thread.
+  void request_stop() {
     {
       const std::lock_guard lock{mutex_};
       ends_ = true;
     }
     changed_.notify_all();
+  }
+  /// Ends the thread, and returns the map to the caller; drops waiting requests. After a failure the map may only be
+  /// destroyed: a step was interrupted. Must not be called by callbacks.
+  map_type& stop() {
+    request_stop();
     if (thread_.joinable()) thread_.join();
     moving_.reset();  // up to 24 images are no longer needed
     const std::lock_guard lock{mutex_};

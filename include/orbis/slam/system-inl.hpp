@@ -210,6 +210,9 @@ ORBIS_SLAM_SYSTEM_TEMPLATE
 void ORBIS_SLAM_SYSTEM::wait() const { back_end_->wait(); }
 
 ORBIS_SLAM_SYSTEM_TEMPLATE
+void ORBIS_SLAM_SYSTEM::stop() noexcept { back_end_->stop(); }
+
+ORBIS_SLAM_SYSTEM_TEMPLATE
 orbis::trajectory ORBIS_SLAM_SYSTEM::trajectory() const {
   return shared_.locked([&] { return front_end_->log().trajectory(shared_.atlas, shared_.atlas.active_id()); });
 }

@@ -148,6 +148,10 @@ class system {
 
   /// Waits until the threads have nothing to do.
   void wait() const;
+  /// Requests that mapping ends soon, so that a program can end: running adjustments end early, and neither waiting nor
+  /// later keyframes are mapped or compared for loops. Then `wait` returns soon, and all results so far can be read.
+  /// May be called from any thread. Cannot be undone.
+  void stop() noexcept;
 
   /// Returns the poses of the frames that were tracked in the active map: all, or those within
   /// `options::trajectory_frames`. Frames follow later corrections of their keyframe. O(frames).

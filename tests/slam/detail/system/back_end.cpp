@@ -60,6 +60,20 @@ TEST_CASE("A back end that ends does not wait for what is in its queue") {
   CHECK(test::validate(s.shared.atlas.active()));
 }
 
+TEST_CASE("A back end that is stopped works on nothing more, and can be waited for") {
+  for (const bool threads : {false, true}) {
+    scene s{threads};
+    const double before = s.world.errors(s.shared.atlas.active())[0];
+    slam::detail::back_end<camera::any_camera, features::binary_descriptor<256>, bow_places> back_end{s.shared};
+    back_end.stop();
+    for (std::uint32_t k = 0; k != 64; ++k) back_end.process({0, k});
+    back_end.wait();
+    CHECK(s.shared.loops_closed == 0);
+    CHECK(s.world.errors(s.shared.atlas.active())[0] == before);
+    CHECK(test::validate(s.shared.atlas.active()));
+  }
+}
+
 TEST_CASE("Where loop closing takes long, keyframes wait for mapping, not in a queue behind it") {
   scene s{true};
   std::atomic<bool> may_end{false};

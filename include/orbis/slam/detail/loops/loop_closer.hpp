@@ -39,6 +39,7 @@ class loop_closer {
   bool close(map_keyframe k) {
     if (!shared_.settings.places.enabled) return false;
     for (map_keyframe& candidate : candidates_of(k)) {
+      if (stopped_) return false;
       correction_timing timing;
       const auto taken = locked(timing, [&] { return take(k, candidate); });
       if (!taken || taken->connected) continue;

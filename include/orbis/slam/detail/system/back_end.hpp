@@ -4,6 +4,7 @@
 #pragma once
 
 #include <algorithm>
+#include <atomic>
 #include <concepts>
 #include <condition_variable>
 #include <cstddef>
@@ -141,11 +142,13 @@ class back_end {
     if (!shared.settings.threads.enabled) return;
     global_ = std::make_unique<worker<map_id>>([this](map_id m) { closer_.adjust_globally(m); });
     loops_ = std::make_unique<worker<map_keyframe>>([this](map_keyframe k) {
-      if (closer_.close(k)) global_->push_once(shared_.locked([&] { return shared_.atlas.current(k).map; }));
+      if (!stopped_ && closer_.close(k))
+        global_->push_once(shared_.locked([&] { return shared_.atlas.current(k).map; }));
     });
     mapping_ = std::make_unique<worker<map_keyframe>>([this](map_keyframe k) {
+      if (stopped_) return;
       // If frames wait for mapping, the load of the machine affects only the time, not the map.
-      mapper_.process(k, [this] { return !shared_.settings.threads.wait && mapping_->waiting() != 0; });
+      mapper_.process(k, [this] { return stopped_ || (!shared_.settings.threads.wait && mapping_->waiting() != 0); });
       loops_->wait_for_room(most_waiting());
       loops_->push(k);
     });
@@ -154,7 +157,7 @@ class back_end {
   back_end& operator=(const back_end&) = delete;
   /// Waits for the running jobs and discards the others.
   ~back_end() {
-    closer_.stop();
+    stop();
     // Each worker pushes jobs to the next one and queries its own queue: none is destroyed until all have stopped.
     if (mapping_) mapping_->stop();
     if (loops_) loops_->stop();
@@ -164,8 +167,15 @@ class back_end {
   /// Processes a keyframe or, with threads, adds it to the queue. Must be called without a lock held.
   void process(map_keyframe k) {
     if (mapping_) return mapping_->push(k);
-    mapper_.process(k, [] { return false; });
-    if (closer_.close(k)) closer_.adjust_globally(shared_.atlas.current(k).map);
+    if (stopped_) return;
+    mapper_.process(k, [this] { return stopped_.load(); });
+    if (!stopped_ && closer_.close(k)) closer_.adjust_globally(shared_.atlas.current(k).map);
+  }
+  /// Requests that the work ends soon: adjustments end early, waiting and later keyframes are not processed. May be
+  /// called from any thread.
+  void stop() noexcept {
+    stopped_ = true;
+    closer_.stop();
   }
   /// Returns true if the limit of waiting keyframes is reached and no more keyframes should be made.
   [[nodiscard]] bool is_full() const { return mapping_ && mapping_->waiting() >= most_waiting(); }
@@ -186,6 +196,7 @@ class back_end {
   }
 
   shared_state<Camera, D, Places>& shared_;
+  std::atomic<bool> stopped_{false};
   local_mapper<Camera, D, Places> mapper_;
   loop_closer<Camera, D, Places> closer_;
   std::unique_ptr<worker<map_id>> global_;  ///< null without threads, like the others
