@@ -42,14 +42,14 @@ std::optional<focal_doubt> find_doubt(std::span<const orbis::slam::calibrated_pa
 }
 
 std::optional<focal_doubt> find_doubt(const orbis::slam::map& map, const orbis::camera::any_camera& camera,
-                                      const orbis::slam::options& options) {
+                                      const orbis::slam::options& options, const orbis::progress& go_on) {
   constexpr std::size_t few = 8;  // keyframes
   if (map.keyframes().size() < few) return std::nullopt;
   const orbis::slam::calibration_options small{.max_keyframes = 60};
-  const auto as_given = orbis::slam::calibrate(map, orbis::slam::make_rig(camera, options), small);
+  const auto as_given = orbis::slam::calibrate(map, orbis::slam::make_rig(camera, options), small, go_on);
   auto doubt = as_given ? find_doubt(as_given->parameters) : std::nullopt;
   if (!doubt || camera.get_if<orbis::camera::pinhole>() == nullptr) return doubt;
-  const auto lens = compare_lens(map, camera, *as_given, options, small);
+  const auto lens = compare_lens(map, camera, *as_given, options, small, go_on);
   if (!lens || !lens->is_determined || lens->lens_rms < clearly * lens->pinhole_rms) return std::nullopt;
   doubt->is_sure = !lens->has_distortion();
   return doubt;
@@ -60,9 +60,9 @@ bool lens_comparison::has_distortion() const { return is_determined && lens_rms 
 std::optional<lens_comparison> compare_lens(const orbis::slam::map& map, const orbis::camera::any_camera& camera,
                                             const orbis::slam::calibration_summary& as_pinhole,
                                             const orbis::slam::options& options,
-                                            const orbis::slam::calibration_options& how) {
+                                            const orbis::slam::calibration_options& how, const orbis::progress& go_on) {
   if (camera.get_if<orbis::camera::pinhole>() == nullptr) return std::nullopt;
-  const auto bent = orbis::slam::calibrate(map, orbis::slam::make_rig(with_lens(camera), options), how);
+  const auto bent = orbis::slam::calibrate(map, orbis::slam::make_rig(with_lens(camera), options), how, go_on);
   if (!bent) return std::nullopt;
   return lens_comparison{find_focal(as_pinhole.parameters)->after, find_focal(bent->parameters)->after,
                          as_pinhole.final_rms, bent->final_rms, bent->is_complete()};

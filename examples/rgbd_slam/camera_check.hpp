@@ -8,6 +8,7 @@
 #include <string>
 
 #include <orbis/camera/any.hpp>
+#include <orbis/core/execution.hpp>
 #include <orbis/slam/calibration.hpp>
 #include <orbis/slam/map.hpp>
 #include <orbis/slam/options.hpp>
@@ -37,10 +38,12 @@ struct lens_comparison {
 [[nodiscard]] std::optional<focal_doubt> find_doubt(std::span<const orbis::slam::calibrated_parameter> found);
 /// The doubt that follows from a map made with the camera. A wrong focal length scales the distances between poses by a
 /// few percent, but so does distortion that a pinhole does not model: empty if distortion fits the images clearly
-/// better, or if they are inconclusive. Runs one or two small self-calibrations, in a few tenths of a second.
+/// better, or if they are inconclusive. Runs one or two small self-calibrations, in a few tenths of a second; empty if
+/// `go_on` cancels one.
 [[nodiscard]] std::optional<focal_doubt> find_doubt(const orbis::slam::map& map,
                                                     const orbis::camera::any_camera& camera,
-                                                    const orbis::slam::options& options);
+                                                    const orbis::slam::options& options,
+                                                    const orbis::progress& go_on = {});
 /// Returns true if a calibration found a clearly different focal length, even if other parameters were held.
 [[nodiscard]] bool has_other_focal_length(std::span<const orbis::slam::calibrated_parameter> found);
 /// Compares the pinhole calibration of a map, done with the options `how`, with one that includes distortion. Empty if
@@ -49,7 +52,8 @@ struct lens_comparison {
                                                           const orbis::camera::any_camera& camera,
                                                           const orbis::slam::calibration_summary& as_pinhole,
                                                           const orbis::slam::options& options,
-                                                          const orbis::slam::calibration_options& how);
+                                                          const orbis::slam::calibration_options& how,
+                                                          const orbis::progress& go_on = {});
 /// The warning for the user.
 [[nodiscard]] std::string describe(const focal_doubt& doubt);
 /// The warning for the user. @pre lens.has_distortion() or !lens.is_determined

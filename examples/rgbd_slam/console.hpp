@@ -13,6 +13,8 @@
 #include <orbis/core/execution.hpp>
 #include <orbis/core/result.hpp>
 
+#include "interrupts.hpp"
+
 namespace spdlog {
 class logger;
 }
@@ -35,11 +37,11 @@ class console {
   /// Seconds since the start of the program.
   [[nodiscard]] double total() const;
 
-  /// Returns a progress callback for a library call in this stage.
+  /// Returns a progress callback for a library call in this stage. It cancels work that was given up.
   [[nodiscard]] auto progress() {
     return [this](std::size_t done, std::size_t total) {
       advance(done, total);
-      return true;
+      return !interrupts::is_given_up();
     };
   }
 

@@ -5,7 +5,9 @@
 #include <chrono>
 #include <csignal>
 #include <cstdio>
+#include <cstdlib>
 #include <mutex>
+#include <optional>
 #include <thread>
 #include <utility>
 
@@ -14,10 +16,19 @@
 namespace app::interrupts {
 namespace {
 
+using clock = std::chrono::steady_clock;
+
+/// From SIGTERM or SIGHUP to the end of work that it finds waiting.
+constexpr std::chrono::seconds patience{5};
+
 struct state {
-  std::mutex mutex;  // guards clean_up and notice
-  std::function<void()> clean_up;
+  std::mutex mutex;  // guards the members below, except the atomic ones
+  std::function<void()> clean_up, on_stop;
   std::string notice;
+  int first = 0;  // the first signal after keep_results
+  clock::time_point first_at{};
+  bool is_dispensable = false;
+  std::optional<clock::time_point> give_up_at;
   std::atomic<bool> keeps_results{false};
   std::atomic<bool> stop_requested{false};
 };
@@ -51,20 +62,20 @@ sigset_t watched() {
   // `timeout` sends its signal to its child and then to the whole group: the same signal twice within a tenth of a
   // second counts once.
   constexpr std::chrono::milliseconds together{100};
-  std::chrono::steady_clock::time_point first_at{};
-  int first = 0;
   for (;;) {
     int signal = 0;
     if (sigwait(&set, &signal) != 0) continue;
     state& s = shared();
     const std::lock_guard lock{s.mutex};
-    const auto now = std::chrono::steady_clock::now();
-    if (s.stop_requested && signal == first && now - first_at < together) continue;
+    const auto now = clock::now();
+    if (s.stop_requested && signal == s.first && now - s.first_at < together) continue;
     if (s.keeps_results && !s.stop_requested.exchange(true)) {
-      first = signal;
-      first_at = now;
+      s.first = signal;
+      s.first_at = now;
+      if (s.is_dispensable) s.give_up_at = now;
       std::fputs(s.notice.c_str(), stderr);
       std::fflush(stderr);
+      if (s.on_stop) s.on_stop();
       continue;
     }
     if (s.clean_up) s.clean_up();
@@ -82,15 +93,45 @@ void start() {
   std::thread{[set] { wait_for_signals(set); }}.detach();
 }
 
-void keep_results(std::string notice) {
+void keep_results(std::string notice, std::function<void()> on_stop) {
   state& s = shared();
   const std::lock_guard lock{s.mutex};
   s.notice = std::move(notice);
+  s.on_stop = std::move(on_stop);
   s.keeps_results = true;
+}
+
+void forget_stop() {
+  state& s = shared();
+  const std::lock_guard lock{s.mutex};
+  s.on_stop = {};
 }
 
 void discard_results() { shared().keeps_results = false; }
 bool stop_requested() { return shared().stop_requested; }
+
+void begin_dispensable(std::string notice) {
+  state& s = shared();
+  const std::lock_guard lock{s.mutex};
+  s.notice = std::move(notice);
+  s.is_dispensable = true;
+  if (s.stop_requested && s.first != SIGINT) s.give_up_at = s.first_at + patience;
+}
+
+bool is_given_up() {
+  if (!stop_requested()) return false;
+  state& s = shared();
+  const std::lock_guard lock{s.mutex};
+  return s.give_up_at && clock::now() >= *s.give_up_at;
+}
+
+void end_program(int code) {
+  std::fflush(nullptr);
+  state& s = shared();
+  const std::lock_guard lock{s.mutex};
+  if (s.clean_up) s.clean_up();
+  std::_Exit(code);
+}
 
 void set_clean_up(std::function<void()> clean_up) {
   state& s = shared();

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <utility>
 
+#include "interrupts.hpp"
 #include "priority.hpp"
 
 namespace app {
@@ -61,7 +62,10 @@ std::vector<live_mapping::made> live_mapping::inserted() const {
 }
 
 bool live_mapping::poll(poses& now, bool always) {
-  if (!where_(inserted(), now, always)) return false;
+  {
+    const std::lock_guard lock{where_mutex_};
+    if (!where_ || !where_(inserted(), now, always)) return false;
+  }
   if (!now.removed.empty()) {
     const std::lock_guard lock{mutex_};
     std::erase_if(made_, [&](const made& k) {
@@ -102,8 +106,18 @@ void live_mapping::add_frame(std::size_t frame, std::uint64_t reference, const o
 }
 
 live_results live_mapping::so_far() const {
-  const std::lock_guard lock{results_mutex_};
-  return results_;
+  const orbis::mapping::live_map_counters counters = live_.counters();
+  live_results results;
+  {
+    const std::lock_guard lock{results_mutex_};
+    results = results_;
+  }
+  results.dropped = counters.dropped_keyframes;
+  results.frames = counters.frames;
+  results.dropped_frames = counters.dropped_frames;
+  results.refused_frames = counters.refused_frames;
+  results.stopped = live_.failure();
+  return results;
 }
 
 bool live_mapping::occupied_since(std::optional<std::uint64_t>& seen, std::vector<voxel>& cubes) const {
@@ -112,21 +126,24 @@ bool live_mapping::occupied_since(std::optional<std::uint64_t>& seen, std::vecto
   seen = newest->revision;
   cubes.clear();
   newest->map.for_each_leaf([&](const live_octree::octree_type::leaf& leaf) {
-    if (leaf.occupied) cubes.push_back({leaf.center.cast<float>(), static_cast<float>(leaf.size)});
+    if (leaf.occupied && !interrupts::stop_requested())
+      cubes.push_back({leaf.center.cast<float>(), static_cast<float>(leaf.size)});
   });
   return true;
 }
 
-void live_mapping::stop() {
-  live_.wait();
-  live_.stop();
-  const orbis::mapping::live_map_counters counters = live_.counters();
-  const std::lock_guard lock{results_mutex_};  // the viewer may read the results
-  results_.dropped = counters.dropped_keyframes;
-  results_.frames = counters.frames;
-  results_.dropped_frames = counters.dropped_frames;
-  results_.refused_frames = counters.refused_frames;
-  results_.stopped = live_.failure();
+void live_mapping::leave() {
+  {
+    const std::lock_guard lock{where_mutex_};
+    where_ = {};
+  }
+  live_.request_stop();
+}
+
+live_octree* live_mapping::stop() {
+  leave();
+  live_octree& map = live_.stop();
+  return live_.failure() ? nullptr : &map;
 }
 
 std::vector<std::string> live_notes(const live_results& live) {

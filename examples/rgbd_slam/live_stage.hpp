@@ -60,8 +60,11 @@ class live_mapping {
     const auto k = std::find_if(made_.rbegin(), made_.rend(), is_wanted);
     return k == made_.rend() ? std::nullopt : std::optional{k->frame};
   }
-  /// Waits until the map corresponds to the current poses, and ends its thread.
-  void stop();
+  /// Waits until the map corresponds to the current poses, or `leave` is called.
+  void wait() { live_.wait(); }
+  /// Calls `where` no more, and lets the thread end after its running step. Does not wait for that step. May be called
+  /// from any thread.
+  void leave();
 
   /// The measurements so far. May be called from any thread.
   [[nodiscard]] live_results so_far() const;
@@ -69,17 +72,16 @@ class live_mapping {
   /// it is still the revision `seen`. May be called from any thread; does not wait for the map. O(leaves).
   [[nodiscard]] bool occupied_since(std::optional<std::uint64_t>& seen, std::vector<voxel>& cubes) const;
 
-  /// The measurements. @pre stopped
-  [[nodiscard]] const live_results& measured() const { return results_; }
-  /// The map; null if it failed. @pre stopped
-  [[nodiscard]] live_octree* map() { return results_.stopped ? nullptr : &live_.stop(); }
+  /// Ends the thread, which may take as long as its running step. Returns the map; null if it failed.
+  [[nodiscard]] live_octree* stop();
 
  private:
   [[nodiscard]] std::vector<made> inserted() const;
   [[nodiscard]] bool poll(poses& now, bool always);
   void note(const orbis::mapping::insertion_event& e);
 
-  find_poses where_;
+  std::mutex where_mutex_;
+  find_poses where_;  // guarded by where_mutex_
   double depth_scale_;
   bool waits_;  // with one thread, callers wait for the map
   orbis::camera::ray_table rays_;
@@ -89,7 +91,7 @@ class live_mapping {
   std::vector<made> made_;  // guarded by mutex_
   std::atomic<std::size_t> newest_{0};
   mutable std::mutex results_mutex_;
-  live_results results_;  // written by the map's thread; guarded by results_mutex_ until `stop`
+  live_results results_;  // written by the map's thread; guarded by results_mutex_
   orbis::mapping::live_map_thread<live_octree::octree_type, orbis::camera::any_camera, live_depths>
       live_;  // destroyed first
 };

@@ -21,7 +21,10 @@ using orbis::result;
 namespace {
 
 /// Lists the files of this run and those that remain from earlier runs. `coming`: files that are not written yet.
-void list_files(results& r, const result_files& files, const file_names& coming, console& console) {
+void list_files(results& r, const result_files& files, file_names coming, console& console) {
+  std::error_code ignored;
+  for (std::filesystem::directory_iterator it{r.folder, ignored}, end; !ignored && it != end; it.increment(ignored))
+    coming.push_back(it->path().filename().string());
   r.files = files.made(coming);
   r.files_of_earlier_runs = files.of_earlier_runs(r.files);
   if (r.files_of_earlier_runs.empty()) return;
@@ -99,7 +102,8 @@ result<void> write_camera_used(const frame_source& source, const shutter_results
   return orbis::io::write_camera(folder / "camera_used.toml", with_shutter(source.camera, shutter));
 }
 
-result<void> write_report_files(results& r, const orbis::trajectory& cameras, result_files& files, console& console) {
+result<void> write_report_files(results& r, const orbis::trajectory& cameras, const result_files& files,
+                                console& console) {
   console.stage("report");
   std::vector<orbis::vec3f> points;
   if (r.map) {
@@ -114,7 +118,6 @@ result<void> write_report_files(results& r, const orbis::trajectory& cameras, re
   if (auto done = write_report(r, frame); !done) return done;
   r.wall_s = console.total();
   if (auto done = write_summary(r); !done) return done;
-  if (auto done = files.put_in_place(); !done) return done;
   console.finish("pictures, report.html, summary.json");
   return {};
 }

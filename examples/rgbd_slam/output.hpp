@@ -22,9 +22,9 @@ namespace app {
 /// Writes camera_used.toml: the camera and the shutter that the run used.
 [[nodiscard]] orbis::result<void> write_camera_used(const frame_source& source, const shutter_results& shutter,
                                                     const std::filesystem::path& folder);
-/// Writes pictures, report.html and summary.json, and moves all files into place.
-[[nodiscard]] orbis::result<void> write_report_files(results& r, const orbis::trajectory& cameras, result_files& files,
-                                                     console& console);
+/// Writes pictures, report.html and summary.json.
+[[nodiscard]] orbis::result<void> write_report_files(results& r, const orbis::trajectory& cameras,
+                                                     const result_files& files, console& console);
 /// The error of a run in which no frame could start tracking.
 [[nodiscard]] orbis::error explain_no_start(const results& r, const settings& s);
 /// Ends a run in which no frame was tracked: writes summary.json, prints `why`, returns `code` (or bad_input if writing

@@ -1,13 +1,17 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // The commands run, demo and live. `run_slam` is the pipeline; the other files of this folder contain one step each.
+#include <filesystem>
+#include <new>
 #include <optional>
 #include <string>
+#include <system_error>
 #include <utility>
 
 #include "accuracy.hpp"
 #include "camera_stage.hpp"
 #include "commands.hpp"
+#include "dispensable.hpp"
 #include "interrupts.hpp"
 #include "map_stage.hpp"
 #include "navigation.hpp"
@@ -31,7 +35,7 @@ void add_tracking(results& r, const tracked_frames& tracked, const frame_source&
                   console& console) {
   const auto warn = [&](std::string note) { console.warn(r.warnings.emplace_back(std::move(note))); };
   if (tracked.live) {
-    r.live = tracked.live->measured();
+    r.live = tracked.live->so_far();
     for (std::string& note : live_notes(*r.live)) warn(std::move(note));
   }
   if (tracked.stopped) r.warnings.push_back(explain_stop(tracked, source).to_string());
@@ -55,31 +59,92 @@ exit_code end_untracked(results& r, const tracked_frames& tracked, const frame_s
                          files, console);
 }
 
-/// Builds cloud, octree, floor map and path from the keyframes, and writes them.
+/// Builds cloud, octree, floor map and path from the keyframes, and writes them into `r.folder`.
 orbis::result<void> build_map(results& r, const tracked_frames& tracked, const frame_source& source, const settings& s,
-                              const result_files& files, viewer& viewer, console& console) {
-  live_octree* const live = tracked.live ? tracked.live->map() : nullptr;
+                              const std::filesystem::path& floor_map, console& console) {
+  live_octree* const live = tracked.live ? tracked.live->stop() : nullptr;
   auto map = map_frames(tracked.keyframes, source, live, s, console);
   if (!map) return orbis::fail(map.error());
-  auto navigation = navigate(map->octree, r.slam->keyframes, s, files.folder(), files.floor_map(), console);
+  auto navigation = navigate(map->octree, r.slam->keyframes, s, r.folder, floor_map, console);
   if (!navigation) return orbis::fail(navigation.error());
   r.navigation = *std::move(navigation);
   if (r.navigation->unsaved) r.warnings.push_back(r.navigation->unsaved->to_string());
-  auto written = write_map(*std::move(map), s, files.folder(), console);
+  auto written = write_map(*std::move(map), s, r.folder, console);
   if (!written) return orbis::fail(written.error());
   r.map = *std::move(written);
   if (live != nullptr) r.map->insert_ms = r.live->insert_ms;  // measured during tracking, not in the final pass
-  viewer.show_map(r.map->voxels);
   return {};
 }
 
+/// Completes the results: the map, if there are keyframes, the evaluation and the report.
+orbis::result<void> complete(results& r, const tracked_frames& tracked, const frame_source& source, const settings& s,
+                             const result_files& files, viewer& viewer, console& console) {
+  if (tracked.keyframes.size() != 0) {
+    if (auto done = build_map(r, tracked, source, s, files.floor_map(), console); !done) return done;
+    if (!interrupts::is_given_up()) viewer.show_map(r.map->voxels);
+  }
+  compare_with_truth(r, source, console);
+  return write_report_files(r, r.slam->keyframes, files, console);
+}
+
+/// The results without a map.
+struct incomplete {
+  bool is_running;   ///< a thread still works on the map
+  orbis::error why;  ///< cancelled by the user, or out of memory
+};
+
+/// Completes the results and moves their files to the others. If the user gives the map up, or it does not fit in
+/// memory, completes them without it. Other errors are those of `complete`.
+orbis::result<std::optional<incomplete>> complete_or_give_up(results& r, tracked_frames& tracked,
+                                                             const frame_source& source, const settings& s,
+                                                             result_files& files, viewer& viewer, console& console) {
+  interrupts::begin_dispensable(
+      s.quiet ? ""
+              : "\nrgbd_slam: stopping; the map is given up, the other results are written. Interrupt again to stop "
+                "immediately and leave the folder unchanged\n");
+  using orbis::errc;
+  // All that is made here belongs to the other thread, so that it can be left alone.
+  results whole = r;
+  whole.folder = r.folder / "map";
+  std::error_code ec;
+  std::filesystem::create_directory(whole.folder, ec);
+  if (ec) return orbis::fail(errc::write_failed, r.out.string(), "cannot create files in it: " + ec.message());
+  auto done = run_dispensable([&, whole, console]() mutable -> orbis::result<results> {
+    try {
+      if (auto made = complete(whole, tracked, source, s, files, viewer, console); !made)
+        return orbis::fail(made.error());
+      return std::move(whole);
+    } catch (const std::bad_alloc&) {
+      return orbis::fail(errc::exception, {}, "out of memory");
+    }
+  });
+  if (done && *done) {
+    r = **std::move(done);
+    if (auto moved = files.take_from(std::exchange(r.folder, files.folder())); !moved)
+      return orbis::fail(moved.error());
+    return std::nullopt;
+  }
+  incomplete without{.is_running = !done, .why = done ? done->error() : orbis::error{errc::cancelled, {}, {}}};
+  if (without.why.code != errc::cancelled && without.why.code != errc::exception) return orbis::fail(without.why);
+  if (!without.is_running) tracked.live.reset();  // its memory
+  without.why.where = s.out.string();
+  without.why.message = (without.why.code == errc::cancelled ? "interrupted by the user" : without.why.message) +
+                        "; the map is missing, the other results were written";
+  console.warn(r.warnings.emplace_back(without.why.message));
+  compare_with_truth(r, source, console);
+  if (auto written = write_report_files(r, r.slam->keyframes, files, console); !written)
+    return orbis::fail(written.error());
+  return without;
+}
+
 /// The exit code of a run that wrote its results; reports the error that limits them, if there is one.
-exit_code end_tracked(const results& r, const tracked_frames& tracked, const frame_source& source, const settings& s,
-                      bool was_interrupted, console& console) {
+exit_code end_tracked(const results& r, const tracked_frames& tracked, const std::optional<incomplete>& without,
+                      const frame_source& source, const settings& s, bool was_interrupted, console& console) {
   if (tracked.stopped) return console.error(explain_stop(tracked, source)), bad_input;
   if (tracked.unsaved) return console.error(*tracked.unsaved), bad_input;
   if (r.navigation && r.navigation->unsaved) return console.error(*r.navigation->unsaved), bad_input;
   if (was_interrupted) return interrupted;
+  if (without) return console.error(without->why), bad_input;
   if (tracked.missed_map) return console.error(explain_miss(tracked, s)), never_tracked;
   return done;
 }
@@ -106,7 +171,7 @@ exit_code run_slam(const settings& s, console& console) {
   results r = begin_results(s, source->title, &*source, files->folder());
 
   // Track all frames.
-  const auto tracked = track(*source, shutter, s, files->landmark_map(), files->folder() / spill_name, *shown, console);
+  auto tracked = track(*source, shutter, s, files->landmark_map(), files->folder() / spill_name, *shown, console);
   if (!tracked) return give_up(tracked.error());
   if (source->rest) source->rest();
   if (tracked->stopped && tracked->slam.frames == 0) return give_up(*tracked->stopped);
@@ -115,17 +180,16 @@ exit_code run_slam(const settings& s, console& console) {
   if (auto done = write_trajectories(*r.slam, files->folder()); !done) return give_up(done.error());
   if (auto done = write_camera_used(*source, shutter, files->folder()); !done) return give_up(done.error());
 
-  // Build the map from the keyframes.
-  if (tracked->keyframes.size() != 0)
-    if (auto done = build_map(r, *tracked, *source, s, *files, *shown, console); !done) return give_up(done.error());
-
-  // Evaluate, and write the report.
-  compare_with_truth(r, *source, console);
-  if (auto done = write_report_files(r, r.slam->keyframes, *files, console); !done) return give_up(done.error());
+  // Build the map from the keyframes, evaluate, and write the report.
+  const auto without = complete_or_give_up(r, *tracked, *source, s, *files, *shown, console);
+  if (!without) return give_up(without.error());
+  if (auto done = files->put_in_place(); !done) return give_up(done.error());
   print_results(r, console);
   const bool was_interrupted = interrupts::stop_requested();
+  if (*without && (*without)->is_running)
+    interrupts::end_program(end_tracked(r, *tracked, *without, *source, s, was_interrupted, console));
   shown->finish(s, console);
-  return end_tracked(r, *tracked, *source, s, was_interrupted, console);
+  return end_tracked(r, *tracked, *without, *source, s, was_interrupted, console);
 }
 
 }  // namespace app

@@ -251,6 +251,16 @@ file_names result_files::of_earlier_runs(const file_names& made) const {
   return names;
 }
 
+result<void> result_files::take_from(const fs::path& made) {
+  std::error_code ec;
+  for (fs::directory_iterator it{made, ec}, end; !ec && it != end; it.increment(ec)) {
+    fs::rename(it->path(), folder() / it->path().filename(), ec);
+    if (ec) break;
+  }
+  if (ec) return orbis::fail(orbis::errc::write_failed, out_.string(), "cannot move the new files: " + ec.message());
+  return {};
+}
+
 result<void> result_files::put_in_place() {
   std::vector<staged_folder*> folders;
   for (staged_folder& f : folders_) folders.push_back(&f);

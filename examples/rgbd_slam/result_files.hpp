@@ -72,6 +72,8 @@ class result_files {
   /// The files of earlier runs that will stay in the output folder.
   [[nodiscard]] file_names of_earlier_runs(const file_names& made) const;
 
+  /// Moves the files of `folder` into the output folder's new files. Errors: write_failed.
+  [[nodiscard]] orbis::result<void> take_from(const std::filesystem::path& folder);
   /// Replaces the old files by the new ones: all, or none if this fails. Errors: write_failed.
   [[nodiscard]] orbis::result<void> put_in_place();
 

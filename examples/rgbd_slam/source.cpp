@@ -493,25 +493,33 @@ frame_source make_synthetic(const settings& s) {
 }
 
 /// Adds a note if voxels are so small that a frame takes seconds, and fails if one frame alone may fill the memory. The
-/// estimate uses the first frame; if later frames fill the memory, the program ends (`limit_memory`).
+/// estimate is that of the largest of a few frames; if all frames together fill the memory, the run gives up the map.
 result<void> check_resolution(frame_source& source, const settings& s) {
   const orbis::camera::intrinsics& k = source.camera.model.k();
   if (source.frames == 0 || source.is_monocular() || source.is_live) return {};  // live frames cannot be read twice
   if (!examples::voxels_of_depth(k, [&](std::size_t) { return source.depth_limit(s); }).takes_long(s.resolution))
     return {};
-  auto first = source.frame(0);
-  if (!first) return {};  // tracking reports the error
-  source.complete(*first);
-  const auto pixels = first->depth.pixels();
-  const auto voxels = examples::voxels_of_depth(k, [&](std::size_t i) {
-    const double z = pixels[i] / first->depth_scale;
-    return z > source.depth_limit(s) ? 0.0 : z;
-  });
-  if (!voxels.takes_long(s.resolution)) return {};
-  const std::string text = voxels.describe(s.resolution, "the first frame alone");
-  if (voxels.is_too_large(s.resolution, examples::free_memory()))
-    return fail(orbis::errc::invalid_argument, "--resolution", text + ", too many");
-  source.notes.push_back(text + "; this takes a long time");
+  const std::size_t samples = std::min<std::size_t>(4, source.frames);
+  std::string of_largest;
+  double most = 0.0;
+  for (std::size_t sample = 0; sample != samples; ++sample) {
+    const std::size_t i = sample * source.frames / samples;
+    auto frame = source.frame(i);
+    if (!frame) break;  // tracking reports the error
+    source.complete(*frame);
+    const auto pixels = frame->depth.pixels();
+    const auto voxels = examples::voxels_of_depth(k, [&](std::size_t p) {
+      const double z = pixels[p] / frame->depth_scale;
+      return z > source.depth_limit(s) ? 0.0 : z;
+    });
+    if (!voxels.takes_long(s.resolution) || voxels.voxels(s.resolution) <= most) continue;
+    const std::string name = i == 0 ? "the first frame" : "frame " + std::to_string(i + 1);
+    of_largest = voxels.describe(s.resolution, name + " alone");
+    most = voxels.voxels(s.resolution);
+    if (voxels.is_too_large(s.resolution, examples::free_memory()))
+      return fail(orbis::errc::invalid_argument, "--resolution", of_largest + ", too many");
+  }
+  if (!of_largest.empty()) source.notes.push_back(of_largest + "; this takes a long time");
   return {};
 }
 

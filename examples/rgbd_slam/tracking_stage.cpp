@@ -3,8 +3,12 @@
 
 #include <algorithm>
 #include <chrono>
+#include <new>
+#include <optional>
 #include <string>
+#include <system_error>
 #include <thread>
+#include <type_traits>
 #include <unordered_map>
 #include <utility>
 #include <vector>
@@ -218,6 +222,22 @@ scene_sources sources_of(const slam_system& slam, const live_mapping* live) {
   return sources;
 }
 
+/// Returns `make()`, which starts threads of the run. If the system provides too few, those of the viewer end first.
+template <class Make>
+std::invoke_result_t<const Make&> with_threads(viewer& viewer, console& console, const Make& make) {
+  try {
+    return make();
+  } catch (const std::system_error&) {
+    if (!viewer.give_way(console)) throw;
+  }
+  for (int attempt = 0; attempt != 50; ++attempt) try {  // the system counts threads for a moment after their end
+      return make();
+    } catch (const std::system_error&) {
+      std::this_thread::sleep_for(std::chrono::milliseconds{2});
+    }
+  return make();
+}
+
 /// Copies trajectories, keyframe poses and counters to `out`.
 void collect(const slam_system& slam, tracked_frames& out) {
   out.slam.trajectory = slam.trajectory();
@@ -263,7 +283,7 @@ orbis::result<tracked_frames> track(const frame_source& source, const shutter_re
   console.stage("tracking");
   orbis::slam::options options = options_for(source, s);
   options.shutter = shutter.shutter;
-  slam_system slam{source.camera.model, options};
+  slam_system slam = with_threads(viewer, console, [&] { return slam_system{source.camera.model, options}; });
   if (!s.load_map.empty())
     if (auto loaded = slam.load_map(s.load_map); !loaded) return orbis::fail(loaded.error());
   const map_id first_map = slam.active_map();
@@ -277,20 +297,38 @@ orbis::result<tracked_frames> track(const frame_source& source, const shutter_re
                      .camera_doubt = {}};
   out.slam.sensor = source.sensor;
   if (s.live_map && !s.localize_only && !source.is_monocular())
-    out.live = std::make_unique<live_mapping>(source, s, out.keyframes.depths(), poses_of(slam));
-  const viewer::connection connection{viewer, sources_of(slam, out.live.get())};  // destroyed before its sources
+    out.live = with_threads(viewer, console, [&] {
+      return std::make_unique<live_mapping>(source, s, out.keyframes.depths(), poses_of(slam));
+    });
+  std::optional<viewer::connection> connection{std::in_place, viewer, sources_of(slam, out.live.get())};
   interrupts::keep_results(s.quiet
                                ? ""
                                : "\nrgbd_slam: stopping; the results so far are mapped and written. Interrupt again to "
-                                 "stop immediately and leave the folder unchanged\n");
+                                 "stop immediately and leave the folder unchanged\n",
+                           [&slam, live = out.live.get()] {
+                             slam.stop();
+                             if (live != nullptr) live->leave();
+                           });
+  struct forget_stop {
+    ~forget_stop() { interrupts::forget_stop(); }
+  };
+  std::optional<forget_stop> stops_slam{std::in_place};  // destroyed before what it stops
   upright_worlds worlds{source, s};
   slam.listen({.keyframe_made = [&out](const orbis::slam::keyframe_event& made) {
     ++out.slam.keyframes_made;
     out.slam.lost_frames.remove(made.frame);  // the first of the two frames that initialise a map without depth
   }});
-  track_frames(slam, source, s, worlds, out, viewer, console);
-  slam.wait();
-  if (out.live) out.live->stop();
+  try {
+    track_frames(slam, source, s, worlds, out, viewer, console);
+    slam.wait();
+    if (out.live) out.live->wait();
+  } catch (const std::bad_alloc&) {
+    out.stopped = {orbis::errc::exception, s.out.string(), "out of memory"};
+  }
+  stops_slam.reset();
+  if (out.live) out.live->leave();
+  connection.reset();
+  if (out.stopped && out.stopped->code == orbis::errc::exception) out.live.reset();  // the largest part of the memory
 
   // The results describe the loaded map if the camera was found in it, otherwise the map with the most frames.
   const map_id begun = slam.inspect([&](const orbis::slam::atlas& maps) { return maps.current({first_map, 0}).map; });
@@ -303,9 +341,11 @@ orbis::result<tracked_frames> track(const frame_source& source, const shutter_re
   out.slam.exposure = slam.exposure();
   const auto& k = source.camera.model.k();
   out.slam.intrinsics = {source.camera_is_refined ? "refined" : "given", k.fx, k.fy, k.cx, k.cy};
-  if (source.sensor == orbis::slam::sensor_kind::rgbd && s.load_map.empty())
+  if (source.sensor == orbis::slam::sensor_kind::rgbd && s.load_map.empty() && !interrupts::stop_requested()) {
+    const auto go_on = [](std::size_t, std::size_t) { return !interrupts::stop_requested(); };
     out.camera_doubt = slam.inspect(
-        [&](const orbis::slam::atlas& maps) { return find_doubt(maps.active(), source.camera.model, options); });
+        [&](const orbis::slam::atlas& maps) { return find_doubt(maps.active(), source.camera.model, options, go_on); });
+  }
   if (goes_on)
     out.world = {"loaded map", {}};
   else if (!out.slam.trajectory.empty())

@@ -26,16 +26,16 @@ struct tracked_frames {
   slam_results slam;
   std::optional<world_results> world;       ///< world frame of the poses
   posed_frames keyframes;                   ///< with images, for the map
-  std::unique_ptr<live_mapping> live;       ///< the live map, if requested; stopped
+  std::unique_ptr<live_mapping> live;       ///< the live map, if requested; it may be in its last step
   std::optional<orbis::error> stopped;      ///< the error that ended the reading of frames early
   std::optional<orbis::error> unsaved;      ///< the error of saving the landmark map
   std::optional<focal_doubt> camera_doubt;  ///< evidence that the focal length is wrong
   bool missed_map = false;                  ///< the camera was never found in the loaded map
 };
 
-/// Tracks the frames of the source up to the first unreadable one or Ctrl-C. Errors: a map that cannot be loaded.
-/// `viewer` shows the progress. `landmark_map`: file for the landmark map, if the settings ask for it.
-/// `spill_file`: see posed_frames.
+/// Tracks the frames of the source up to the first unreadable one, Ctrl-C, or a lack of memory. Errors: a map that
+/// cannot be loaded. `viewer` shows the progress. `landmark_map`: file for the landmark map, if the settings ask for
+/// it. `spill_file`: see posed_frames.
 [[nodiscard]] orbis::result<tracked_frames> track(const frame_source& source, const shutter_results& shutter,
                                                   const settings& s, const std::filesystem::path& landmark_map,
                                                   const std::filesystem::path& spill_file, viewer& viewer,

@@ -25,6 +25,7 @@ orbis::result<viewer> viewer::open(const settings& s, const frame_source& source
   const auto where = made.thread_->start([&s] { return s.viewer == "web" ? open_web(s.viewer_port) : open_window(); });
   if (!where) return orbis::fail(where.error());
   made.report_error(console);
+  if (!made.thread_->is_open()) return viewer{nullptr};  // without threads that are of no more use
   if (!where->empty()) {
     console.stage("viewer");
     console.finish(*where);
@@ -38,6 +39,13 @@ viewer::connection::connection(viewer& v, scene_sources sources) : viewer_{v} {
 
 viewer::connection::~connection() {
   if (viewer_.thread_) viewer_.thread_->disconnect();
+}
+
+bool viewer::give_way(console& console) {
+  if (!thread_ || !thread_->is_open()) return false;
+  thread_.reset();
+  console.warn("the system provides too few threads for the run and the viewer; the run continues without the viewer");
+  return true;
 }
 
 void viewer::show_map(const std::vector<voxel>& voxels) {

@@ -44,6 +44,8 @@ class viewer {
     viewer& viewer_;
   };
 
+  /// Closes the viewer and warns that its threads are needed elsewhere. Returns false if none is open.
+  bool give_way(console& console);
   /// Shows the final map.
   void show_map(const std::vector<voxel>& voxels);
   /// Prints the error that ended the viewer, once.

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// Work that the user can give up at any moment.
+#pragma once
+
+#include <chrono>
+#include <exception>
+#include <future>
+#include <memory>
+#include <optional>
+#include <system_error>
+#include <thread>
+#include <type_traits>
+#include <utility>
+
+#include "interrupts.hpp"
+
+namespace app {
+
+/// Calls `work()` on another thread. Returns its result, or rethrows its exception; returns nothing if the work was
+/// given up (`interrupts::is_given_up`) and does not end by itself within a moment. It is then still running: all that
+/// it refers to must outlive it, and the program must end by `interrupts::end_program`. If no thread can be created,
+/// calls `work` on this one.
+template <class Work>
+[[nodiscard]] std::optional<std::invoke_result_t<Work&>> run_dispensable(Work work) {
+  constexpr std::chrono::milliseconds poll_interval{20}, moment{500};
+  struct job {
+    Work work;
+    std::promise<std::invoke_result_t<Work&>> result{};
+  };
+  const auto shared = std::make_shared<job>(job{std::move(work)});
+  auto result = shared->result.get_future();
+  std::thread worker;
+  try {
+    worker = std::thread{[shared] {
+      try {
+        shared->result.set_value(shared->work());
+      } catch (...) {
+        shared->result.set_exception(std::current_exception());
+      }
+    }};
+  } catch (const std::system_error&) {
+    return shared->work();
+  }
+  const auto is_ready = [&](auto time) { return result.wait_for(time) == std::future_status::ready; };
+  while (!is_ready(poll_interval))
+    if (interrupts::is_given_up()) {
+      if (is_ready(moment)) break;
+      worker.detach();
+      return std::nullopt;
+    }
+  worker.join();
+  return result.get();
+}
+
+}  // namespace app

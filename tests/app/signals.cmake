@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: BSD-3-Clause
+#
+# Signals during each stage, and too little memory for a map: the run ends soon, and nothing that was reached is lost.
+include(${CMAKE_CURRENT_LIST_DIR}/support.cmake)
+
+# Starts a run, and sends it the signal a while after its log matches `pattern`. Sets `code`, its exit code, `seconds`
+# from the signal to its end, and `err`.
+function(interrupt signal pattern delay)  # arguments of the run
+  execute_process(COMMAND bash -c "
+    : >run.log  # there before it is read
+    '${APP}' \"$@\" 2>run.log &
+    run=$!
+    trap 'kill -9 $run 2>/dev/null || true' EXIT
+    for i in $(seq 6000); do
+      grep -q '${pattern}' run.log && break
+      kill -0 $run 2>/dev/null || break
+      sleep 0.01
+    done
+    sleep ${delay}
+    start=$(date +%s%N)
+    kill -${signal} $run
+    wait $run
+    code=$?
+    trap - EXIT
+    echo \"$code;$((($(date +%s%N) - start) / 1000000000))\"" run ${ARGN}
+    WORKING_DIRECTORY ${WORK} OUTPUT_VARIABLE ended OUTPUT_STRIP_TRAILING_WHITESPACE)
+  list(POP_BACK ended last)
+  list(POP_BACK ended first)
+  string(REGEX REPLACE ".*\n" "" first "${first}")
+  file(READ ${WORK}/run.log log)
+  message(STATUS "${signal} at ${pattern}: exit code ${first} after ${last} s")
+  set(code ${first} PARENT_SCOPE)
+  set(seconds ${last} PARENT_SCOPE)
+  set(err "${log}" PARENT_SCOPE)
+endfunction()
+
+# The map alone takes far longer than the time limits here.
+set(fine demo --plain --frames 30 --width 320 --resolution 0.004 --filter none)
+
+foreach(signal TERM INT)
+  interrupt(${signal} "^tracking  .*keyframes" 0.3 ${fine} --batch-map --out ${signal})
+  check(code EQUAL 130)
+  check(seconds LESS 5)
+  check(err MATCHES "the map is given up")
+  check(err MATCHES "the map is missing, the other results were written")
+  must_exist(${WORK}/${signal} trajectory.txt keyframes.txt camera_used.toml summary.json report.html)
+  must_not_be_half_written(${WORK}/${signal})
+  check(NOT EXISTS ${WORK}/${signal}/map.bt)
+  summary(tracked ${WORK}/${signal} tracked)
+  check(tracked EQUAL 30)
+endforeach()
+
+# While frames are tracked, SIGTERM ends the reading, and leaves the map a few seconds. The live map is far behind.
+interrupt(TERM "^tracking  .*fps" 0 demo --plain --frames 100000 --width 320 --resolution 0.004 --filter none --out live)
+check(code EQUAL 130)
+check(seconds LESS 12)
+must_exist(${WORK}/live trajectory.txt summary.json report.html)
+must_not_be_half_written(${WORK}/live)
+
+# Too little memory for the map.
+execute_process(COMMAND bash -c "ulimit -v 200000 && \"${APP}\" --help" RESULT_VARIABLE result OUTPUT_QUIET ERROR_QUIET)
+if(result EQUAL 0)
+  foreach(how "" --batch-map)
+    execute_process(COMMAND bash -c "ulimit -v 900000; exec \"$@\"" limited ${APP} ${fine} ${how} --out small${how}
+                    WORKING_DIRECTORY ${WORK} RESULT_VARIABLE code OUTPUT_QUIET ERROR_VARIABLE err)
+    check(code EQUAL 2)
+    check(err MATCHES "rgbd_slam: small[^\n]*: out of memory[^\n]*the map is missing[^\n]*\n$")
+    must_exist(${WORK}/small${how} trajectory.txt summary.json report.html)
+    must_not_be_half_written(${WORK}/small${how})
+    check(NOT EXISTS ${WORK}/small${how}/map.bt)
+  endforeach()
+endif()
