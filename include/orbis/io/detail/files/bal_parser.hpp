@@ -3,6 +3,7 @@
 /// Parser of the text format of "Bundle Adjustment in the Large".
 #pragma once
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <cstddef>
