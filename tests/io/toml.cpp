@@ -28,6 +28,19 @@ TEST_CASE("what is no TOML is refused with its place and ends no program") {
     CHECK(message("a = 1\n " + head + "\nb = 1") == "f.toml: not TOML: a table without a name");
 }
 
+TEST_CASE("a date is followed by a time or by the end of the value") {
+  for (const char* text :
+       {"d = 1979-05-27", "d = 1979-05-27\n", "d = 1979-05-27 # day", "d = [1979-05-27,1979-05-28 ]",
+        "d = 1979-05-27T07:32:00", "d = 1979-05-27 07:32:00", "d = \"1979-05-27T[\"", "# 1979-05-27T["}) {
+    INFO(text);
+    CHECK(io::parse_toml(text));
+  }
+  for (const char* text : {"d = 1979-05-27T", "d = 1979-05-27T[7:32:00.5", "d = 1979-05-27t\n", "d = 1979-05-27 x"}) {
+    INFO(text);
+    CHECK(io::parse_toml(text, "a.toml").error().where.starts_with("a.toml"));
+  }
+}
+
 TEST_CASE("letters beyond ASCII stand in strings and comments only") {
   const auto message = [](const std::string& text) { return io::parse_toml(text, "f.toml").error().to_string(); };
   for (const std::string bad : {R"(ä = 1)", "a\xef\xbb\x81 = 1", R"(a = ä)", "a = 1 \xc2\xa0", R"(a = '#' ä)",

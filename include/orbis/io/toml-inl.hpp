@@ -38,13 +38,28 @@ namespace detail {
   return true;
 }
 
-/// Returns true if all characters outside strings and comments are ASCII, as TOML requires: toml++ 3.3 mishandles some
-/// other characters when it tests for blanks.
-[[nodiscard]] inline bool is_ascii_outside_strings(std::string_view text) noexcept {
+/// Returns true if `text`, which follows a date, can follow one: a time, or the end of the value.
+[[nodiscard]] constexpr bool may_follow_date(std::string_view text) noexcept {
+  if (text.empty() || std::string_view{"Tt "}.find(text[0]) == std::string_view::npos) return true;
+  const char next = text.size() > 1 ? text[1] : '\n';
+  return (next >= '0' && next <= '9') ||
+         (text[0] == ' ' && std::string_view{" \t\r\n#,]}"}.find(next) != std::string_view::npos);
+}
+
+/// The reason why toml++ 3.3 would mishandle text outside strings and comments; null if it does not. TOML requires
+/// ASCII there, but some other characters are taken for blanks; a date with "T" and no time is undefined behaviour.
+[[nodiscard]] inline const char* find_mishandled(std::string_view text) noexcept {
+  static constexpr std::string_view date = "dddd-dd-dd";
+  const auto is_date = [](std::string_view word) {
+    return std::equal(word.begin(), word.end(), date.begin(), date.end(),
+                      [](char c, char form) { return form == 'd' ? c >= '0' && c <= '9' : c == form; });
+  };
   if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
   for (std::size_t i = 0; i < text.size();) {
     const char c = text[i];
-    if (static_cast<unsigned char>(c) >= 0x80) return false;
+    if (static_cast<unsigned char>(c) >= 0x80) return "characters beyond ASCII need quotes";
+    if (is_date(text.substr(i, date.size())) && !may_follow_date(text.substr(i + date.size())))
+      return "a date is followed by neither a time nor the end of the value";
     if (c == '#') {
       i = std::min(text.find_first_of("\n\v\f\r", i), text.size());
       continue;
@@ -68,7 +83,7 @@ namespace detail {
       }
     }
   }
-  return true;
+  return nullptr;
 }
 
 }  // namespace detail
@@ -78,7 +93,8 @@ ORBIS_INLINE result<toml::table> parse_toml(std::string_view text, const std::fi
   if (text.size() > max_toml_bytes) return reject("is too large for a settings file");
   if (!is_utf8(text)) return reject("not TOML: not UTF-8");
   if (!detail::has_keys_in_heads(text)) return reject("not TOML: a table without a name");
-  if (!detail::is_ascii_outside_strings(text)) return reject("not TOML: characters beyond ASCII need quotes");
+  if (const char* const why = detail::find_mishandled(text))
+    return fail(errc::malformed, where.string(), std::string{"not TOML: "} + why);
   try {
     return toml::parse(text, std::string_view{});
   } catch (const toml::parse_error& e) {
