@@ -494,6 +494,7 @@ class session {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  orbis::fuzz::accept();  // any bytes mean something
   constexpr window windows[] = {{5, 5, {}},
                                 {16, 5, {32768, 32768 - 32, 32768}},
                                 {6, 6, {}},

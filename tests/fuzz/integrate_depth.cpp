@@ -143,6 +143,7 @@ octree::integration_summary with_view(const image<float>& depth, bool in_millime
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  orbis::fuzz::accept();  // any bytes mean something
   constexpr double resolutions[] = {0.05, 0.1, 0.02, 1.0, 1.0 / 3.0, 1e-3, 64.0, 0.013};
   constexpr int depths[] = {16, 21, 8, 5};
   source from{{data, size}};

@@ -161,6 +161,7 @@ void check_reader(std::span<const std::byte> bytes, Read&& read) {
     require(!e.message.empty() && e.to_string().size() < 300, "the reason is given, and short");
     return;
   }
+  accept();
   check_map(**got);
 }
 

@@ -39,6 +39,7 @@ void check(std::string bytes) {
       if (++count > 1000) return;
       const auto message = (*bag)->read(m, app::whole_message);
       if (!message) continue;
+      fuzz::accept();
       const auto part = (*bag)->read(m, 16);
       fuzz::require(part && *part == message->substr(0, 16), "a part of a message is its beginning");
     }

@@ -42,6 +42,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     fuzz::require(problem.error().where.starts_with("fuzz.txt:"), "an error says where");
     return 0;
   }
+  fuzz::accept();
   for (const io::bal_observation& o : problem->observations) {
     fuzz::require(o.camera < problem->cameras.size() && o.point < problem->points.size(), "indices are in range");
     const auto pixel = io::project_bal(problem->cameras[o.camera], problem->points[o.point]);

@@ -19,6 +19,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const std::size_t peak = fuzz::peak_bytes_of([&] { got.emplace(io::parse_camera(text, "fuzz.toml")); });
   fuzz::require(peak <= 65536 + 2048 * size, "memory in proportion to the file");
   if (*got) {
+    fuzz::accept();
     const camera::intrinsics& k = (*got)->model.k();
     fuzz::require(k.width > 0 && k.height > 0 && k.fx > 0.0 && k.fy > 0.0, "an image has a size and a focal length");
     fuzz::require(std::isfinite(k.fx + k.fy + k.cx + k.cy), "intrinsics are numbers");

@@ -111,6 +111,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   std::variant<app::settings, app::exit_code> got;
   const std::string said = complaint_of([&] { got = app::read_command_line(count, arguments.data()); });
   if (const auto* const s = std::get_if<app::settings>(&got)) {
+    fuzz::accept();
     fuzz::require(said.empty(), "there is nothing to complain about");
     check(*s);
   } else {

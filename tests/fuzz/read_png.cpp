@@ -47,6 +47,7 @@ void check(std::string_view bytes, Decode&& decode) {
     fuzz::require(!e.message.empty() && e.to_string().size() < 300, "the reason is given, and short");
     return;
   }
+  fuzz::accept();
   const image<Pixel>& pixels = **got;
   fuzz::require(!pixels.empty(), "an image has pixels");
   if (pixels.pixels().size() > 65536) return;  // it takes long

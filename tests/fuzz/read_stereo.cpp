@@ -27,6 +27,8 @@ auto checked(std::string_view text, Parse&& parse) {
   if (!*got) {
     fuzz::require(got->error().where.starts_with("fuzz.txt"), "an error says where");
     fuzz::require(!got->error().message.empty(), "an error says why");
+  } else {
+    fuzz::accept();
   }
   return *std::move(got);
 }

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// replay_<target> CORPUS [MUTATIONS]: runs a fuzz target, with any compiler and always the same way, on
-// a file, or on every file of a folder and then on mutations of them. If it ends badly, the input is
-// left in failed_input.
+// replay_<target> CORPUS [MUTATIONS]: runs a fuzz target, with any compiler and always the same way, on a file, or on
+// every file of a folder and then on mutations of them: three of four of files that the reader accepts, as damage to a
+// refused file is mostly refused for the same reason. If it ends badly, the input is left in failed_input.
 #include <algorithm>
 #include <array>
 #include <csignal>
@@ -45,10 +45,12 @@ void run(std::string input) {
 /// Changes a few things of the kind that damage, truncation and malice change.
 class mutator {
  public:
-  mutator(std::uint64_t seed, const std::vector<std::string>& corpus) : random_{seed}, corpus_{corpus} {}
+  /// `accepted`: those of the corpus that are read without an error.
+  mutator(std::uint64_t seed, const std::vector<std::string>& corpus, const std::vector<std::string>& accepted)
+      : random_{seed}, corpus_{corpus}, accepted_{accepted} {}
 
   [[nodiscard]] std::string next() {
-    std::string s = any_of_corpus();
+    std::string s = any_of(random_.below(4) == 0 ? corpus_ : accepted_);
     for (std::uint32_t n = 1 + random_.below(6); n != 0; --n) change(s);
     s.resize(std::min(s.size(), longest));
     return s;
@@ -57,7 +59,9 @@ class mutator {
  private:
   [[nodiscard]] std::size_t at(const std::string& s) { return random_.below(static_cast<std::uint32_t>(s.size())); }
   [[nodiscard]] char byte() { return static_cast<char>(random_.below(256)); }
-  [[nodiscard]] const std::string& any_of_corpus() { return corpus_[random_.below(count_)]; }
+  [[nodiscard]] const std::string& any_of(const std::vector<std::string>& files) {
+    return files[random_.below(static_cast<std::uint32_t>(files.size()))];
+  }
   [[nodiscard]] std::string piece_of(const std::string& s) {
     const std::size_t begin = s.empty() ? 0 : at(s);
     return s.substr(begin, 1 + random_.below(32));
@@ -79,7 +83,7 @@ class mutator {
       case 4: s.erase(at(s), 1 + random_.below(16)); break;
       case 5: s.resize(at(s)); break;
       case 6: s.insert(at(s), piece_of(s)); break;
-      case 7: s.insert(at(s), piece_of(any_of_corpus())); break;
+      case 7: s.insert(at(s), piece_of(any_of(corpus_))); break;
       default: {  // a number becomes another one
         const auto digit = s.find_first_of("0123456789", at(s));
         if (digit == std::string::npos) break;
@@ -91,7 +95,7 @@ class mutator {
 
   orbis::random_bits random_;
   const std::vector<std::string>& corpus_;
-  std::uint32_t count_ = static_cast<std::uint32_t>(corpus_.size());
+  const std::vector<std::string>& accepted_;
 };
 
 }  // namespace
@@ -111,14 +115,16 @@ int main(int argc, char** argv) {
     files.emplace_back(argv[1]);
   }
   std::sort(files.begin(), files.end());  // folders list in any order
-  std::vector<std::string> corpus;
+  std::vector<std::string> corpus, accepted;
   for (const fs::path& file : files) {
     auto bytes = orbis::read_file(file);
     if (!bytes) {
       std::fprintf(stderr, "%s\n", bytes.error().to_string().c_str());
       return 1;
     }
+    const std::size_t before = orbis::fuzz::accepted;
     run(*bytes);
+    if (orbis::fuzz::accepted != before) accepted.push_back(*bytes);
     corpus.push_back(*std::move(bytes));
   }
   if (corpus.empty()) {
@@ -126,8 +132,12 @@ int main(int argc, char** argv) {
     return 1;
   }
   const int mutations = argc == 3 ? std::atoi(argv[2]) : 0;
-  mutator mutate{1, corpus};
+  if (accepted.empty() && mutations != 0) {
+    std::fprintf(stderr, "%s: none of the inputs is accepted\n", argv[1]);
+    return 1;
+  }
+  mutator mutate{1, corpus, accepted};
   for (int i = 0; i != mutations; ++i) run(mutate.next());
-  std::printf("%zu inputs, %d mutations\n", corpus.size(), mutations);
+  std::printf("%zu inputs, %zu of them accepted, %d mutations\n", corpus.size(), accepted.size(), mutations);
   return 0;
 }

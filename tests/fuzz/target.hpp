@@ -24,6 +24,10 @@ inline void require(bool holds, const char* what) {
   std::abort();
 }
 
+/// The number of inputs, or parts of them, that were read without an error; `accept` counts one.
+inline std::size_t accepted = 0;
+inline void accept() { ++accepted; }
+
 /// Bytes that `operator new` has handed out on this thread and not got back, and their maximum since
 /// it was last reset (allocations.cpp).
 struct allocation_counts {
