@@ -41,6 +41,20 @@ TEST_CASE("a date is followed by a time or by the end of the value") {
   }
 }
 
+TEST_CASE("a backslash escapes only characters of ASCII") {
+  for (const char* text :
+       {"a = \"\"\"x\\\xef\xbb\xbb\"\"\"", "a = \"\"\"x\\ \n \xef\xbb\xbb\"\"\"", "a = \"\\\xc3\xa4\""})
+    CHECK_FALSE(io::parse_toml(text).has_value());
+  CHECK(io::parse_toml("a = \"\"\"x\\ \n y\xc3\xa4\"\"\"").value()["a"].value<std::string>() == "xy\xc3\xa4");
+}
+
+TEST_CASE("brackets match") {
+  for (const char* text : {"a = [[1], {b = [2]}]", "[[a]]\n[a.b]", "a = '}'", "# ]", "a = \"[{\""})
+    CHECK(io::parse_toml(text));
+  for (const char* text : {"a = [}]1[]]", "a = }", "a = [{b = 1]}", "]", "a = [1", "a = [{}"})
+    CHECK_FALSE(io::parse_toml(text).has_value());
+}
+
 TEST_CASE("letters beyond ASCII stand in strings and comments only") {
   const auto message = [](const std::string& text) { return io::parse_toml(text, "f.toml").error().to_string(); };
   for (const std::string bad : {R"(ä = 1)", "a\xef\xbb\x81 = 1", R"(a = ä)", "a = 1 \xc2\xa0", R"(a = '#' ä)",

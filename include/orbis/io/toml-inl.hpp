@@ -4,6 +4,8 @@
 #pragma once
 
 #include <algorithm>
+#include <string>
+#include <string_view>
 
 #include <orbis/core/file.hpp>
 #include <orbis/core/inline.hpp>
@@ -46,17 +48,24 @@ namespace detail {
          (text[0] == ' ' && std::string_view{" \t\r\n#,]}"}.find(next) != std::string_view::npos);
 }
 
-/// The reason why toml++ 3.3 would mishandle text outside strings and comments; null if it does not. TOML requires
-/// ASCII there, but some other characters are taken for blanks; a date with "T" and no time is undefined behaviour.
-[[nodiscard]] inline const char* find_mishandled(std::string_view text) noexcept {
+/// The reason why toml++ 3.3 would mishandle the text; null if it does not. Outside strings and comments, TOML requires
+/// ASCII, but some other characters are taken for blanks. Undefined behaviour are a date with "T" and no time, a
+/// list closed by "}", and, in strings, a backslash before a character beyond ASCII.
+[[nodiscard]] inline const char* find_mishandled(std::string_view text) {
   static constexpr std::string_view date = "dddd-dd-dd";
   const auto is_date = [](std::string_view word) {
     return std::equal(word.begin(), word.end(), date.begin(), date.end(),
                       [](char c, char form) { return form == 'd' ? c >= '0' && c <= '9' : c == form; });
   };
   if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
+  std::string open;  // brackets
   for (std::size_t i = 0; i < text.size();) {
     const char c = text[i];
+    if (c == '[' || c == '{') open += c;
+    if (c == ']' || c == '}') {
+      if (open.empty() || open.back() != (c == ']' ? '[' : '{')) return "a bracket that does not match";
+      open.pop_back();
+    }
     if (static_cast<unsigned char>(c) >= 0x80) return "characters beyond ASCII need quotes";
     if (is_date(text.substr(i, date.size())) && !may_follow_date(text.substr(i + date.size())))
       return "a date is followed by neither a time nor the end of the value";
@@ -73,6 +82,9 @@ namespace detail {
     for (i += has_lines ? 3 : 1; i < text.size(); ++i) {
       if (c == '"' && text[i] == '\\') {
         ++i;  // any escaped character
+        const std::size_t next = std::min(text.find_first_not_of(" \t\r\n", i), text.size());
+        if (next != text.size() && static_cast<unsigned char>(text[next]) >= 0x80)
+          return "a backslash before a character beyond ASCII";
       } else if (!has_lines && text[i] == '\n') {
         break;  // an error; toml++ stops there too
       } else if (text[i] == c && (!has_lines || text.substr(i).starts_with(three))) {
