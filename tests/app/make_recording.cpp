@@ -1,8 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// make_recording FOLDER FRAMES WIDTH [READ_OUT_MS|- [K1]]: a synthetic recording as a folder in TUM's format; with a
-// read-out, by a hand that shakes; with K1, through a lens whose distortion camera.toml does not know of.
+// make_recording FOLDER FRAMES WIDTH [READ_OUT_MS|- [K1 [BLIND]]]: a synthetic recording as a folder in TUM's format;
+// with a read-out, by a hand that shakes; with K1, through a lens whose distortion camera.toml does not know of; the
+// first BLIND frames without depth.
+#include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
@@ -38,7 +42,7 @@ orbis::image<T> bent(const orbis::image<T>& straight, const orbis::camera::intri
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc < 4 || argc > 6) return 1;
+  if (argc < 4 || argc > 7) return 1;
   const std::filesystem::path folder = argv[1];
   const int width = std::atoi(argv[3]);
   orbis::io::synthetic_options options{
@@ -49,6 +53,7 @@ int main(int argc, char** argv) {
     options.sensor.shutter.color_read_out = options.sensor.shutter.depth_read_out = 0.001 * std::atof(argv[4]);
   }
   const double k1 = argc > 5 ? std::atof(argv[5]) : 0.0;
+  const std::size_t blind = argc > 6 ? static_cast<std::size_t>(std::atoi(argv[6])) : 0;
   const orbis::io::synthetic_recording recording{options};
   const auto settings = recording.camera();
   const auto& k = settings.model.k();
@@ -62,6 +67,7 @@ int main(int argc, char** argv) {
       frame.color = bent(frame.color, k, k1);
       frame.depth = bent(frame.depth, k, k1);
     }
+    if (i < blind) std::ranges::fill(frame.depth.pixels(), std::uint16_t{0});
     char name[64];
     std::snprintf(name, sizeof name, "%06zu.png", i);
     if (!orbis::io::write_png(folder / "rgb" / name, frame.color.view()) ||
