@@ -48,6 +48,14 @@ TEST_CASE("a backslash escapes only characters of ASCII") {
   CHECK(io::parse_toml("a = \"\"\"x\\ \n y\xc3\xa4\"\"\"").value()["a"].value<std::string>() == "xy\xc3\xa4");
 }
 
+TEST_CASE("strings begin where a key or a value does") {
+  for (const char* text : {"a = 0'b\xef\xb5\xbf.", "a = 0.'b\xef\xb5\xbf", "a = 1\"\"", "a\"b\" = 1"})
+    CHECK_FALSE(io::parse_toml(text).has_value());
+  for (const char* text :
+       {"'a' = 'b'", "a.'b'.\"c\" = [\"d\",'e']", "a = {'b' = \"c\"}", "a = \"\"", "a = \"\"\"\"\"\""})
+    CHECK(io::parse_toml(text));
+}
+
 TEST_CASE("brackets match") {
   for (const char* text : {"a = [[1], {b = [2]}]", "[[a]]\n[a.b]", "a = '}'", "# ]", "a = \"[{\""})
     CHECK(io::parse_toml(text));

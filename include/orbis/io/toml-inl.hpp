@@ -50,7 +50,7 @@ namespace detail {
 
 /// The reason why toml++ 3.3 would mishandle the text; null if it does not. Outside strings and comments, TOML requires
 /// ASCII, but some other characters are taken for blanks. Undefined behaviour are a date with "T" and no time, a
-/// list closed by "}", and, in strings, a backslash before a character beyond ASCII.
+/// list closed by "}", and, in strings or after a quotation mark within a word, some characters beyond ASCII.
 [[nodiscard]] inline const char* find_mishandled(std::string_view text) {
   static constexpr std::string_view date = "dddd-dd-dd";
   const auto is_date = [](std::string_view word) {
@@ -77,6 +77,11 @@ namespace detail {
       ++i;
       continue;
     }
+    const char before = i == 0 ? '\n' : text[i - 1];
+    const std::string_view line = text.substr(0, i).substr(text.substr(0, i).find_last_of('\n') + 1);
+    if (std::string_view{" \t\r\n=[{,.\"'"}.find(before) == std::string_view::npos ||
+        (before == '.' && line.find('=') != std::string_view::npos))
+      return "a quotation mark within a word";
     const std::string_view three = c == '"' ? "\"\"\"" : "'''";
     const bool has_lines = text.substr(i).starts_with(three);
     for (i += has_lines ? 3 : 1; i < text.size(); ++i) {
