@@ -29,7 +29,8 @@ namespace orbis::camera {
   };
   if (k.width < 0 || k.height < 0) return reject("size", std::min(k.width, k.height), "is negative");
   for (const auto& [name, f] : {std::pair{"fx", k.fx}, std::pair{"fy", k.fy}})
-    if (!(f > 0.0 && f < largest)) return reject(name, f, "is not a focal length in pixels: it must be above zero");
+    if (!(f > 0.0 && f < largest))
+      return reject(name, f, "is not a focal length: focal lengths above zero, in pixels, are needed");
   for (const auto& [name, c] : {std::pair{"cx", k.cx}, std::pair{"cy", k.cy}})
     if (!(std::abs(c) < largest)) return reject(name, c, "is not a coordinate of the principal point in pixels");
   if (k.fx > most_ratio * k.fy || k.fy > most_ratio * k.fx)
