@@ -24,7 +24,8 @@ orbis::result<orbis::camera::camera_settings> camera_named(const std::string& s,
   orbis::camera::intrinsics k{width, height, 0, 0, 0, 0};
   char rest = 0;
   if (std::sscanf(s.c_str(), "%lf,%lf,%lf,%lf%c", &k.fx, &k.fy, &k.cx, &k.cy, &rest) != 4)
-    return orbis::fail(orbis::errc::invalid_argument, "--camera", orbis::in_quotes(s) + " is not fx,fy,cx,cy in pixels");
+    return orbis::fail(orbis::errc::invalid_argument, "--camera",
+                       orbis::in_quotes(s) + " is not fx,fy,cx,cy in pixels");
   const auto checked = orbis::camera::plausible(k, "--camera");
   if (!checked) return orbis::fail(checked.error());
   return orbis::camera::camera_settings{.model = orbis::camera::pinhole{*checked}};

@@ -13,7 +13,7 @@ TEST_CASE("quotations are short, in one line, and end between characters") {
   CHECK(in_quotes("a\nb\x7f\tc") == "\"a?b??c\"");
   CHECK(in_quotes("\x01\x02\xff") == "\"???\"");  // not UTF-8
   CHECK(in_quotes("K\xC3\xBC"
-               "che") ==
+                  "che") ==
         "\"K\xC3\xBC"
         "che\"");
   const std::string long_text(2000, 'x');
