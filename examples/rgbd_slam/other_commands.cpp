@@ -65,7 +65,7 @@ orbis::result<posed_frames> frames_with_poses(const frame_source& source, const 
   for (std::size_t i = 0; frames.has_next(); ++i) {
     auto frame = frames.next();
     if (!frame) return orbis::fail(frame.error());
-    const double depth_delay = clock.update(frame->depth_timestamp.value_or(frame->timestamp) - frame->timestamp);
+    const double depth_delay = clock.update(frame->timestamp, frame->depth_timestamp);
     if (frame->T_world_camera) {
       source.complete(*frame);
       if (posed.size() == 0) {

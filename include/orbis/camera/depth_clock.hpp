@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <optional>
 
 namespace orbis::camera {
 
@@ -12,15 +14,19 @@ namespace orbis::camera {
 /// slowly against each other; the stamps of a host vary in addition by the intervals at which it polls them.
 class depth_clock {
  public:
-  /// Adds the difference of a frame, seconds; returns the smoothed one. A jump is taken over at once: colour images are
-  /// paired with the depth images of the next interval. Smoothed differences that do not matter are zero.
-  [[nodiscard]] double update(double difference) {
-    constexpr double longest = 0.1, jump = 0.012, least = 0.0005;  // seconds
+  /// Adds the time stamps of a frame, seconds; returns the smoothed difference, depth minus colour. It is zero below
+  /// 0.5 ms, which does not matter. A jump of more than 8 ms is taken over at once: colour images are paired with the
+  /// depth images of another interval. Without a time stamp of the depth image, or if it differs by more than 0.1 s,
+  /// the difference remains the same.
+  [[nodiscard]] double update(double timestamp, std::optional<double> depth_timestamp) {
+    constexpr double longest = 0.1, jump = 0.008, least = 0.0005;  // seconds
     constexpr double memory = 30.0;                                // frames
-    if (!(std::abs(difference) <= longest)) return 0.0;
-    if (!(std::abs(difference - smoothed_) <= jump)) count_ = 0.0;
-    count_ = std::min(count_ + 1.0, memory);
-    smoothed_ += (difference - smoothed_) / count_;
+    const double difference = depth_timestamp.value_or(std::numeric_limits<double>::quiet_NaN()) - timestamp;
+    if (std::abs(difference) <= longest) {
+      if (!(std::abs(difference - smoothed_) <= jump)) count_ = 0.0;
+      count_ = std::min(count_ + 1.0, memory);
+      smoothed_ += (difference - smoothed_) / count_;
+    }
     return std::abs(smoothed_) < least ? 0.0 : smoothed_;
   }
 

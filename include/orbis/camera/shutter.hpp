@@ -15,7 +15,8 @@ namespace orbis::camera {
 struct shutter {
   double color_read_out = 0.0;  ///< from the first row to the end of the last one, seconds
   double depth_read_out = 0.0;  ///< the same for the depth image
-  double depth_delay = 0.0;     ///< from the middle of the colour image to that of the depth image, seconds
+  double depth_delay = 0.0;  ///< from the middle of the colour image to that of the depth image, seconds; if both have
+                             ///< time stamps, in addition to their difference
 
   /// Returns true if all rows of both images are taken at the same time.
   [[nodiscard]] constexpr bool is_global() const noexcept {

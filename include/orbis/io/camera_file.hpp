@@ -16,7 +16,7 @@
 ///   baseline = 0.075      # metres, optional
 ///   read_out_ms = 30.0    # of a rolling shutter, top row first, optional; 0: a global shutter
 ///   depth_read_out_ms = 30.0  # of the depth image, if it differs
-///   depth_delay_ms = 0.0  # from the middle of the colour image to that of the depth image, if known
+///   depth_delay_ms = 0.0  # from the colour image to the depth image, in addition to their time stamps, if known
 /// @endcode
 #pragma once
 

@@ -83,7 +83,7 @@ struct basic_frame {
   /// The keypoints as read with a rolling shutter; the other members are for the frame's time. Empty with a global
   /// shutter.
   std::vector<keypoint_as_read> as_read;
-  camera::shutter shutter{};   ///< assumed for the frame, with the delay of its own depth image
+  camera::shutter shutter{};   ///< assumed for the frame; its depth image delay is that of this frame
   vec6 twist = zeros<vec6>();  ///< motion of the camera in its own frame during read-out, per second, translation first
 
   /// The number of features.

@@ -69,7 +69,7 @@ track_result ORBIS_SLAM_SYSTEM::track(double timestamp, image_view<const rgb8> c
   front_end_->patches().set_image({});
   if (!are_usable(timestamp, color, depth)) return track_frame(timestamp, {}, {}, clock);
   frame_type f = measure_rgbd(shared_.rig, extract_, color, depth, image_);
-  f.shutter.depth_delay = depth_clock_.update(depth_timestamp.value_or(timestamp) - timestamp);
+  if (shared_.rig.scale_is_known) f.shutter.depth_delay = depth_clock_.update(timestamp, depth_timestamp);
   front_end_->depth().set_depth(depth);
   detail::frame_image pixels{&image_.pyramid};
   if (shared_.rig.scale_is_known)
@@ -90,7 +90,9 @@ const Measure&, const camera_rig<Camera>&,
   detail::stopwatch clock;
   front_end_->depth().clear_depth();
   front_end_->patches().set_image({});
-  return track_frame(timestamp, std::isfinite(timestamp) ? measure(shared_.rig, extract_) : frame_type{}, {}, clock);
+  frame_type f = std::isfinite(timestamp) ? measure(shared_.rig, extract_) : frame_type{};
+  f.shutter.depth_delay = 0.0;  // depth is of the frame's time
+  return track_frame(timestamp, std::move(f), {}, clock);
 }
 
 ORBIS_SLAM_SYSTEM_TEMPLATE

@@ -39,7 +39,7 @@ enum class track_state {
 struct track_timings {
   double features_ms = 0.0;  ///< feature extraction and depth
   double tracking_ms = 0.0;  ///< estimation of the pose
-  double mapping_ms = 0.0;   ///< creation of a keyframe and, without threads, all of mapping
+  double mapping_ms = 0.0;   ///< keyframe, second localisation of early frames and, without threads, all of mapping
 };
 
 /// The result of tracking one frame.
@@ -52,7 +52,7 @@ struct track_result {
   /// Motion of the camera in its own frame while the frame was taken with a rolling shutter: per second, translation
   /// first. Zero if unknown. Argument of `camera::shutter_correction`.
   vec6 twist = zeros<vec6>();
-  /// Shutter assumed for the frame: given or estimated, with the delay of the frame's own depth image.
+  /// Shutter assumed for the frame: given or estimated, with the depth image delay of this frame.
   camera::shutter shutter{};
   track_timings timings;
   [[nodiscard]] bool tracked() const noexcept { return T_world_camera.has_value(); }

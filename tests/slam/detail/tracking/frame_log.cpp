@@ -67,6 +67,12 @@ TEST_CASE("The pose of a frame can be corrected, and its motion is the mean of b
   CHECK((log.pose(3, maps)->inverse() * corrected).log().norm() < 1e-9);
   CHECK((log.trajectory(maps, map)[2].T_world_camera.inverse() * corrected).log().norm() < 1e-9);
   CHECK(log.reference(3) == slam::map_keyframe{map, 0});
+
+  const slam::map_id other = maps.create();
+  test::add_random_keyframe(random, maps.active(), 30, 20);
+  log.add({0.5, {other, 0}, {}});
+  CHECK(log.motion(3, maps));
+  CHECK_FALSE(log.motion(4, maps));  // its neighbours are in different worlds
 }
 
 TEST_CASE("A log names the keyframes that its frames hang on, also after their map was merged") {

@@ -163,7 +163,7 @@ class shutter_estimator {
   /// Returns the current estimate. The threshold for keeping an assumed value is lower than for adopting a new one.
   /// O(keyframes).
   [[nodiscard]] shutter_estimate estimate(const camera::shutter& assumed = {}) const {
-    constexpr std::size_t enough = 5;
+    constexpr std::size_t enough = 8;
     shutter_estimate result;
     if (blocks_.size() < enough) return result;
     shutter_equations sum;
@@ -194,7 +194,7 @@ class shutter_estimator {
       result.delay_deviation = std::sqrt(std::max(0.0, covariance(1, 1)));
     }
     const auto holds = [](double value, double deviation, double before, double least, double most) {
-      const double sigmas = before == 0.0 ? 4.0 : 2.5;
+      const double sigmas = before == 0.0 ? 5.0 : 2.5;
       return std::abs(value) > sigmas * deviation && std::abs(value) >= least && std::abs(value) <= most;
     };
     // A shorter read-out has no relevant effect, and no camera needs longer for an image.

@@ -107,17 +107,17 @@ class shutter_observer {
     views_.emplace_back(id, pending_);
   }
 
-  /// Revises the estimate each time the observation time has grown by a third, and discards the measurements made with
+  /// Revises the estimate each time the observation time has grown by half, and discards the measurements made with
   /// the previous shutter: the equations are linear only around the assumed values, and the gates of tracking have
   /// favoured them. Slopes of depth are noisy, and their squares too large, so a step towards the delay is about half
   /// as long as it should be: several steps are needed.
   [[nodiscard]] std::optional<camera::shutter> decide(const camera::shutter& assumed) {
-    constexpr double first = 1.0, often = 0.5, same = 0.001;  // seconds
+    constexpr double first = 2.0, often = 0.5, same = 0.001;  // seconds
     if (watched_ - looked_ < often) return std::nullopt;
     looked_ = watched_;
     const shutter_estimate now = estimator_.estimate(assumed);
     estimate_ = best(now);
-    if (watched_ < std::max(first, 1.3 * decided_) || !std::isfinite(now.read_out_deviation)) return std::nullopt;
+    if (watched_ < std::max(first, 1.5 * decided_) || !std::isfinite(now.read_out_deviation)) return std::nullopt;
     decided_ = watched_;
     const camera::shutter& next = estimate_.shutter;
     const double change = std::max(std::abs(next.color_read_out - assumed.color_read_out),

@@ -57,17 +57,19 @@ class frame_log {
     return maps.at(k.map).pose_of(k.keyframe) * scaled(f.T_reference_camera, maps.at(k.map).scale_of(k.keyframe));
   }
   /// Returns the motion of the camera at a frame, in its own frame, per second, translation first: the mean from the
-  /// frame before it to the one after it. Empty if they are not kept, or not close in time.
+  /// frame before it to the one after it. Empty unless both are kept, are in one map, and are close in time.
   template <feature_descriptor D>
   [[nodiscard]] std::optional<vec6> motion(std::size_t number, const basic_atlas<D>& maps) const {
-    const auto before = pose(number - 1, maps), after = pose(number + 1, maps);
+    const auto before = number == 0 ? std::nullopt : pose(number - 1, maps), after = pose(number + 1, maps);
     if (!before || !after) return std::nullopt;
+    const logged_frame &a = frames_[number - 1 - first_number_], &b = frames_[number + 1 - first_number_];
     constexpr double longest = 0.25;  // seconds
-    const double interval =
-        frames_[number + 1 - first_number_].timestamp - frames_[number - 1 - first_number_].timestamp;
-    return interval < longest ? std::optional<vec6>((before->inverse() * *after).log() / interval) : std::nullopt;
+    const double interval = b.timestamp - a.timestamp;
+    const bool are_close =
+        interval > 0.0 && interval < longest && maps.current(a.reference).map == maps.current(b.reference).map;
+    return are_close ? std::optional<vec6>((before->inverse() * *after).log() / interval) : std::nullopt;
   }
-  /// Corrects the pose of a kept frame. @pre `pose` has a value
+  /// Corrects the pose of a frame. @pre pose(number, maps)
   template <feature_descriptor D>
   void set_pose(std::size_t number, const se3& T_world_camera, const basic_atlas<D>& maps) {
     logged_frame& f = frames_[number - first_number_];

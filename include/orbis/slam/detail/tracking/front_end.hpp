@@ -245,13 +245,12 @@ class front_end {
       depth_.keep(*made, se3{}, f.twist, f.shutter);
     else if (depth_.needs_surface(maps, f.T_world_camera))
       depth_.keep(last_reference_, T_reference_last_, f.twist, f.shutter);
-    if (begins_map()) young_.begin_map();
-    if (made)
-      young_.count_keyframe();
-    else if (state_ == track_state::tracking && !f.held_by_depth && moving_.size() == 0)
+    if (begins_map()) young_.begin_map(maps.active_id());
+    if (made) young_.count_keyframe(made->map);
+    if (!made && state_ == track_state::tracking && !f.held_by_depth && moving_.size() == 0)
       young_.add(f, depth_quadratic_, log_);
     last_ = std::move(f);
-    young_.localize_oldest(log_, maps);
+    if (!made) young_.localize_oldest(log_, maps);
   }
   /// If the trajectory is limited, limits the erased keyframes that the active map remembers: to the reference
   /// keyframes of the frames in the trajectory, and the latest ones. O(1), except O(frames + n log n) for every
@@ -418,8 +417,8 @@ class front_end {
     const bool with_depth = depth_.find_surfaces(maps, f.T_world_camera) && options_.depth_term.enabled;
     twist_prior prior;
     if (!f.as_read.empty() && is_next && f.timestamp > last_.timestamp)
-      prior =
-          twist_prior::after({last_.T_world_camera, last_.twist}, f.timestamp - last_.timestamp, motion_.is_known());
+      prior = twist_prior::after({last_.T_world_camera, last_.twist}, f.timestamp - last_.timestamp,
+                                 motion_.is_known() && !last_.as_read.empty());
     const auto expected_twist = [&] {
       return prior.T_world_before ? prior.expected(f.T_world_camera.inverse()) : f.twist;
     };
@@ -508,9 +507,11 @@ class front_end {
     constexpr double better = 0.15;
     if (!aligned || aligned->seen.share() < seen.share() + better) return inliers;
     before_recheck_ = f;
+    const auto quadratic_before = depth_quadratic_;
     if (const std::size_t there = track_from_depth(f, maps, *aligned, is_frozen, follow_rows); there > 0) return there;
     if (localize_by_depth(f, *aligned)) return 0;
     std::swap(f, before_recheck_);
+    depth_quadratic_ = quadratic_before;
     return inliers;
   }
   /// Sets the pose from depth alone. Returns false if the alignment is uncertain, or leaves a direction of the pose

@@ -64,13 +64,15 @@ class patch_tracker {
     for (int y = 0; y != from.height(); ++y) std::ranges::copy(from.row(y), to.view().row(y).begin());
     return to;
   }
+
   /// The exposure time, given or estimated, seconds.
   [[nodiscard]] double exposure() const noexcept { return options_.exposure.value_or(estimation_.exposure()); }
 
   /// Moves the keypoints that observe landmarks to where their patches are in the image, and sets `f.deviations`.
   /// `twist`: the motion of the camera in its own frame, per second. Returns false, and leaves `f.deviations` empty, if
-  /// no patch is found. O(features). @pre is_ready()
-  [[nodiscard]] bool align(basic_frame<D>& f, const basic_map<D>& m, const vec6& twist) {
+  /// no patch is found. `estimates`: the frame contributes to the estimate of the exposure. O(features).
+  /// @pre is_ready()
+  [[nodiscard]] bool align(basic_frame<D>& f, const basic_map<D>& m, const vec6& twist, bool estimates = true) {
     const double seconds = exposure();
     const se3 T_camera_world = f.T_world_camera.inverse();
     f.deviations.assign(f.size(), 1.0F);
@@ -87,7 +89,7 @@ class patch_tracker {
       const auto view = view_of(f, i, l, T_camera_world, motion);
       if (!view) continue;
       constexpr std::size_t every = 32;  // patch: a fraction of the time of the alignment
-      if (!options_.exposure && shows_exposure(l.patch, *view) && moving++ % every == 0)
+      if (estimates && !options_.exposure && shows_exposure(l.patch, *view) && moving++ % every == 0)
         compare_exposures(l.patch, *view);
       const auto found = match(l.patch, *view, seconds);
       if (!found || found->correlation < options_.min_correlation) continue;
@@ -101,9 +103,10 @@ class patch_tracker {
   }
 
   /// Aligns the patches of a frame and refines its pose. Returns the number of landmarks left; empty if no patch is
-  /// found. @pre is_ready()
-  [[nodiscard]] std::optional<std::size_t> refine(basic_frame<D>& f, const basic_map<D>& m, const vec6& twist) {
-    if (!align(f, m, twist)) return std::nullopt;
+  /// found. `estimates`: see `align`. @pre is_ready()
+  [[nodiscard]] std::optional<std::size_t> refine(basic_frame<D>& f, const basic_map<D>& m, const vec6& twist,
+                                                  bool estimates = true) {
+    if (!align(f, m, twist, estimates)) return std::nullopt;
     const std::size_t left = refine_on_landmarks(f, m, rig_);
     move_back(f, left == 0);
     return left;

@@ -3,6 +3,7 @@
 /// The second localisation of the first frames of a map.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <deque>
@@ -39,37 +40,43 @@ class young_frames {
                patch_tracker<Camera, D>& patches)
       : rig_{rig}, options_{settings}, tracker_{track}, patches_{patches}, nothing_moves_{rig, settings} {}
 
+  young_frames(const young_frames&) = delete;  // it refers to parts of its owner
+  young_frames& operator=(const young_frames&) = delete;
+
   /// Starts with the frames of a new map.
-  void begin_map() {
+  void begin_map(map_id map) {
     waiting_.clear();
     count_ = 0;
+    map_ = map;
   }
-  /// Counts a keyframe.
-  void count_keyframe() { ++keyframes_; }
+  /// Counts a keyframe of a map.
+  void count_keyframe(map_id map) { keyframes_ += map == map_; }
 
-  /// Adds the last frame of the log, with its image, if it is one of the first frames of a map. `depth`: the cost of
-  /// its pose by depth, if any.
+  /// Adds the last frame of the log, with its image, if it is one of the first frames of the map, and not too many
+  /// wait. `depth`: the cost of its pose by depth, if any.
   void add(const basic_frame<D>& f, const std::optional<pose_quadratic>& depth, const frame_log& log) {
-    if (count_ == most || !patches_.is_ready()) return;
+    const std::size_t number = log.end_number() - 1;
+    if (count_ == most || !patches_.is_ready() || log.reference(number).map != map_) return;
     ++count_;
-    waiting_.push_back({f, patches_.copy_image(), depth, log.end_number() - 1, keyframes_});
+    const auto width = static_cast<std::size_t>(rig_.camera().width());
+    if ((waiting_.size() + 1) * width * static_cast<std::size_t>(rig_.camera().height()) > most_pixels) return;
+    const auto landmarks = std::count_if(f.landmarks.begin(), f.landmarks.end(), [](auto l) { return l != no_id; });
+    waiting_.push_back({f, patches_.copy_image(), depth, number, keyframes_, static_cast<std::size_t>(landmarks)});
   }
 
-  /// If enough keyframes have followed the oldest frame, or too many frames wait, localises it again in the current
-  /// map, corrects its pose in the log, and forgets the frame. A few milliseconds.
+  /// If enough keyframes have followed the oldest frame, localises it again in the current map, corrects its pose in
+  /// the log, and forgets the frame. A few milliseconds.
   void localize_oldest(frame_log& log, const basic_atlas<D>& maps) {
     if (waiting_.empty()) return;
     young_frame& oldest = waiting_.front();
-    const std::size_t pixels =
-        static_cast<std::size_t>(oldest.grey.width()) * static_cast<std::size_t>(oldest.grey.height());
-    if (oldest.keyframes + enough > keyframes_ && waiting_.size() * pixels < most_pixels) return;
+    if (oldest.keyframes + enough > keyframes_) return;
     if (const auto pose = localize(oldest, log, maps)) log.set_pose(oldest.number, *pose, maps);
     waiting_.pop_front();
   }
 
  private:
   static constexpr std::size_t most = 100;                ///< frames of a map
-  static constexpr std::size_t most_pixels = 20'000'000;  ///< of the frames that wait
+  static constexpr std::size_t most_pixels = 20'000'000;  ///< of the frames that wait: 65 of 640x480
   static constexpr std::size_t enough = 5;                ///< keyframes
 
   struct young_frame {
@@ -78,6 +85,7 @@ class young_frames {
     std::optional<pose_quadratic> depth;
     std::size_t number;     ///< in the log
     std::size_t keyframes;  ///< made before it
+    std::size_t landmarks;  ///< observed at first
   };
 
   /// Returns the new pose; empty if the frame is not localised.
@@ -98,17 +106,17 @@ class young_frames {
     const auto motion = log.motion(young.number, maps);
     if (motion) move_to_frame_time(f, rig_, f.shutter, *motion, [&](std::size_t i) { return landmark_depth(f, i, m); });
     const auto ignore = [](landmark_id) {};
-    if (tracker_.on_local_map(f, m, nearest, options_.search_radius, nothing_moves_, ignore, ignore) <
-        options_.min_inliers)
+    const std::size_t least = std::max(options_.min_inliers, young.landmarks / 2);
+    if (tracker_.on_local_map(f, m, nearest, options_.search_radius, nothing_moves_, ignore, ignore) < least)
       return std::nullopt;
     pyramid_.build(std::as_const(young.grey).view(), rig_.scales.levels(), rig_.scales.factor(), 1);
     patches_.set_image({&pyramid_});
-    const auto left = patches_.refine(f, m, motion.value_or(f.twist));
+    const auto left = patches_.refine(f, m, motion.value_or(f.twist), false);
     patches_.set_image({});
-    if (left && *left < options_.min_inliers) return std::nullopt;
+    if (left && *left < least) return std::nullopt;
 
     constexpr double deviation = 0.05;  // of the mean motion of two intervals, metres or radians per second
-    const bool moves = motion && !f.as_read.empty() && !f.shutter.is_global();
+    const bool moves = motion && !f.shutter.is_global();
     find_row_observations(f, m, rig_, rows_);
     return refine_moving_pose(
                std::span<const row_observation>(rows_), rig_.model, {f.T_world_camera, f.twist},
@@ -123,7 +131,8 @@ class young_frames {
   patch_tracker<Camera, D>& patches_;
   moving_features<Camera, D, Matchers> nothing_moves_;
   std::deque<young_frame> waiting_;
-  std::size_t count_ = most;  ///< added since the map began; the frames in a loaded map are not young
+  map_id map_ = no_id;        ///< the last map that began
+  std::size_t count_ = most;  ///< frames of that map so far
   std::size_t keyframes_ = 0;
   features::image_pyramid pyramid_;    ///< reused working memory
   std::vector<row_observation> rows_;  ///< reused working memory
