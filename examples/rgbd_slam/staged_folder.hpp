@@ -7,8 +7,9 @@
 ///   1. all data is synced to the disk, and the suffix `.ready` is added to the name of the hidden folder;
 ///   2. a child process in a separate session renames the files, and finishes even if this program is killed;
 ///   3. if the machine stops in between, the next program that writes into the folder finishes first (`finish`).
-/// Only files with the given names are moved; the hidden folder lists them, so that any program can finish. No other file in the folder is changed, and only hidden folders of ended processes are
-/// deleted. Processes that write into the same folder wait for each other by `flock`.
+/// Only files with the given names are moved; the hidden folder lists them, so that any program can finish. No other
+/// file in the folder is changed, and only hidden folders of ended processes are deleted. Processes that write into the
+/// same folder wait for each other by `flock`.
 #pragma once
 
 #include <filesystem>
