@@ -19,13 +19,15 @@ namespace examples {
   constexpr std::size_t longest = 200;
   std::string all;
   std::size_t length = 0;
-  for (const char c : text) {
-    const bool is_control = static_cast<unsigned char>(c) < 0x20 || c == 0x7f;
-    length = is_control || c == ' ' ? 0 : length + 1;
+  while (!text.empty()) {
+    const std::size_t control = orbis::control_bytes(text);
+    const char c = control == 0 ? text.front() : ' ';
+    length = c == ' ' ? 0 : length + 1;
     if (length <= longest)
-      all += is_control ? ' ' : c;
+      all += c;
     else if (length == longest + 1)
       all += "...";
+    text.remove_prefix(control == 0 ? 1 : control);
   }
   return all;
 }

@@ -12,6 +12,9 @@ TEST_CASE("quotations are short, in one line, and end between characters") {
   CHECK(in_quotes("a word") == "\"a word\"");
   CHECK(in_quotes("a\nb\x7f\tc") == "\"a?b??c\"");
   CHECK(in_quotes("\x01\x02\xff") == "\"???\"");  // not UTF-8
+  CHECK(in_quotes("\u0080\u009f\u00a0") == "\"??\u00a0\"");
+  CHECK(in_quotes("\u2027\u2028\u2029\u202a\u202e\u202f") == "\"\u2027????\u202f\"");
+  CHECK(in_quotes("\u2065\u2066\u2069\u206a") == "\"\u2065??\u206a\"");
   CHECK(in_quotes("K\xC3\xBC"
                   "che") ==
         "\"K\xC3\xBC"

@@ -11,18 +11,36 @@
 
 namespace orbis {
 
+/// The number of bytes of the character at the beginning of `text`, in UTF-8, if it controls a terminal or the layout
+/// of text: C0 and C1 controls, DEL, separators of lines and paragraphs, and changes of the writing direction; else 0.
+[[nodiscard]] constexpr std::size_t control_bytes(std::string_view text) noexcept {
+  const auto is = [&](std::size_t i, unsigned first, unsigned last) {
+    return i < text.size() && static_cast<unsigned char>(text[i]) >= first &&
+           static_cast<unsigned char>(text[i]) <= last;
+  };
+  if (is(0, 0x00, 0x1f) || is(0, 0x7f, 0x7f)) return 1;
+  if (is(0, 0xc2, 0xc2) && is(1, 0x80, 0x9f)) return 2;                // U+0080 ... U+009F
+  const bool is_control = (is(1, 0x80, 0x80) && is(2, 0xa8, 0xae)) ||  // U+2028 ... U+202E
+                          (is(1, 0x81, 0x81) && is(2, 0xa6, 0xa9));    // U+2066 ... U+2069
+  return is(0, 0xe2, 0xe2) && is_control ? 3 : 0;
+}
+
 /// The text with at most `most` bytes of it, and "..." in place of the rest. Does not cut UTF-8 characters; "?"
-/// replaces control characters and, if the text is not UTF-8, all bytes that are not ASCII.
+/// replaces control characters (`control_bytes`) and, if the text is not UTF-8, all bytes that are not ASCII.
 [[nodiscard]] inline std::string shortened(std::string_view text, std::size_t most = 200) {
   const auto is_inside = [&](std::size_t i) { return (static_cast<unsigned char>(text[i]) & 0xc0U) == 0x80U; };
   std::size_t end = text.size();
   if (end > most)
     for (end = most; end != 0 && is_inside(end);) --end;
-  std::string out{text.substr(0, end)};
-  const bool is_text = is_utf8(out);
-  for (char& c : out)
-    if (const auto byte = static_cast<unsigned char>(c); byte < 0x20 || byte == 0x7f || (byte > 0x7f && !is_text))
-      c = '?';
+  const std::string_view part = text.substr(0, end);
+  const bool is_text = is_utf8(part);
+  std::string out;
+  for (std::size_t i = 0; i != part.size();) {
+    const std::size_t control =
+        !is_text && static_cast<unsigned char>(part[i]) > 0x7f ? 1 : control_bytes(part.substr(i));
+    out += control == 0 ? part[i] : '?';
+    i += control == 0 ? 1 : control;
+  }
   return end == text.size() ? out : out + "...";
 }
 
