@@ -15,8 +15,9 @@
 namespace orbis::camera {
 
 /// Returns `k` if it can be a camera. All readers of cameras call it, so that work on an image is bounded: a focal
-/// length near zero would make each pixel as wide as a room. With an image size, every pixel is seen at a slope of at
-/// most 10 (84 degrees) from the optical axis along each image axis, and the focal lengths are at most 1000 times the
+/// length near zero would make each pixel as wide as a room. With an image size, every pixel is at most 10 focal
+/// lengths from the principal point along each image axis (of a pinhole camera: seen at up to 84 degrees from the
+/// optical axis; other models map this distance to other angles), and the focal lengths are at most 1000 times the
 /// larger side. Without a size (0) only the numbers are checked: both focal lengths are positive, below 1e9 and differ
 /// by at most a factor of 5; the principal point is below 1e9. Errors: malformed at `where`, with the parameter and the
 /// reason.
