@@ -492,9 +492,9 @@ std::variant<settings, exit_code> read_command_line(int argc, char** argv) {
 
   const auto is_asked_for = [&](const CLI::App* command) { return command->get_name() == argv[1]; };
   if (argc > 1 && argv[1][0] != '-' && cli.get_subcommands(is_asked_for).empty())
-    return report_error("no command " + orbis::in_quotes(argv[1]) +
-                            "; use run, live, demo, eval, map, plan, calibrate or benchmark",
-                        bad_usage);
+    return report_error(
+        "no command " + orbis::in_quotes(argv[1]) + "; use run, live, demo, eval, map, plan, calibrate or benchmark",
+        bad_usage);
   try {
     cli.parse(argc, argv);
   } catch (const CLI::CallForHelp&) {
