@@ -122,13 +122,15 @@ live_results live_mapping::so_far() const {
 
 bool live_mapping::occupied_since(std::optional<std::uint64_t>& seen, std::vector<voxel>& cubes) const {
   const auto newest = live_.latest();
-  if (seen == newest->revision) return false;
-  seen = newest->revision;
-  cubes.clear();
+  if (seen == newest->revision || interrupts::stop_requested()) return false;
+  std::vector<voxel> occupied;
   newest->map.for_each_leaf([&](const live_octree::octree_type::leaf& leaf) {
     if (leaf.occupied && !interrupts::stop_requested())
-      cubes.push_back({leaf.center.cast<float>(), static_cast<float>(leaf.size)});
+      occupied.push_back({leaf.center.cast<float>(), static_cast<float>(leaf.size)});
   });
+  if (interrupts::stop_requested()) return false;
+  seen = newest->revision;
+  cubes = std::move(occupied);
   return true;
 }
 

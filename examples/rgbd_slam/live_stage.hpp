@@ -68,8 +68,9 @@ class live_mapping {
 
   /// The measurements so far. May be called from any thread.
   [[nodiscard]] live_results so_far() const;
-  /// Fills in the occupied leaves of the newest map, without colours, and sets `seen` to its revision. Returns false if
-  /// it is still the revision `seen`. May be called from any thread; does not wait for the map. O(leaves).
+  /// Fills in the occupied leaves of the newest map, without colours, and sets `seen` to its revision. Returns false,
+  /// and changes nothing, if it is still the revision `seen`, or a signal has asked the run to stop. May be called from
+  /// any thread; does not wait for the map. O(leaves).
   [[nodiscard]] bool occupied_since(std::optional<std::uint64_t>& seen, std::vector<voxel>& cubes) const;
 
   /// Ends the thread, which may take as long as its running step. Returns the map; null if it failed.
