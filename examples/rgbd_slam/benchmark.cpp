@@ -188,8 +188,9 @@ class runner {
 
     std::unique_lock lock{mutex_};
     out_ = out;
+    const pid_t parent = ::getpid();
     process_ = ::fork();
-    if (process_ == 0) become(argv.data(), log.c_str());
+    if (process_ == 0) become(argv.data(), log.c_str(), parent);
     if (process_ < 0) throw std::system_error{errno, std::generic_category(), "fork"};
     const pid_t process = process_;
     lock.unlock();
@@ -211,6 +212,8 @@ class runner {
       const auto text = orbis::read_file(out / "summary.json");
       o.summary = text ? json::parse(*text, nullptr, false) : json{};
       if (!o.summary.is_object()) o.failure = "summary.json cannot be read";
+    } else if (WIFEXITED(status) && WEXITSTATUS(status) == not_started) {
+      o.failure = "cannot be started";
     } else {
       o.failure = WIFSIGNALED(status) ? std::string{"ended by "} + ::strsignal(WTERMSIG(status)) : last_error(log);
     }
@@ -218,16 +221,21 @@ class runner {
   }
 
  private:
-  /// The rest of the child process. Makes system calls only.
-  [[noreturn]] static void become(char** argv, const char* log) {
+  static constexpr int not_started = 127;  // exit code
+
+  /// The rest of the child process of `parent`. Makes system calls only.
+  [[noreturn]] static void become(char** argv, const char* log, [[maybe_unused]] pid_t parent) {
 #ifdef __linux__
     ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+    if (::getppid() != parent) ::_exit(not_started);  // it ended before
 #endif
     const int file = ::open(log, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
+    if (file < 0) ::_exit(not_started);
+    if (file <= STDERR_FILENO) ::fcntl(file, F_SETFD, 0);  // where dup2 may have no effect
     ::dup2(file, STDOUT_FILENO);
     ::dup2(file, STDERR_FILENO);
     ::execv("/proc/self/exe", argv);
-    ::_exit(127);
+    ::_exit(not_started);
   }
 
   /// Waits until a process has ended, and leaves it to be reaped.
