@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cctype>
 #include <cerrno>
+#include <cstdint>
 #include <optional>
 #include <system_error>
 #include <utility>
@@ -130,6 +131,8 @@ class http_server::connection {
   [[nodiscard]] int socket() const { return socket_; }
   [[nodiscard]] short events() const { return state_ == state::sends ? POLLOUT : POLLIN; }
   [[nodiscard]] clock::time_point deadline() const { return deadline_; }
+  /// Returns true between requests.
+  [[nodiscard]] bool is_idle() const { return state_ == state::reads && received_.empty(); }
 
   /// Reads or writes as far as possible without waiting. Returns false if the connection ends.
   [[nodiscard]] bool advance() {
@@ -200,7 +203,8 @@ class http_server::connection {
     parts_.insert(parts_.end(), answer.body.begin(), answer.body.end());
     part_ = sent_ = 0;
     state_ = state::sends;
-    wait(of_.limits_.sending + std::chrono::milliseconds{size / of_.limits_.bytes_per_millisecond});
+    last_ = clock::now() + of_.limits_.sending + std::chrono::milliseconds{size / of_.limits_.bytes_per_millisecond};
+    wait(of_.limits_.sending);
     return send();
   }
   bool send() {
@@ -211,6 +215,7 @@ class http_server::connection {
       if (count < 0) return would_block();
       sent_ += static_cast<std::size_t>(count);
       all += static_cast<std::size_t>(count);
+      deadline_ = std::min(last_, clock::now() + of_.limits_.sending);
       if (sent_ == part.size()) ++part_, sent_ = 0;
     }
     if (part_ != parts_.size()) return true;
@@ -225,7 +230,8 @@ class http_server::connection {
   const http_server& of_;
   state state_ = state::reads;
   clock::time_point deadline_;
-  std::string received_;  // of the next requests
+  clock::time_point last_{};  // deadline of the whole answer
+  std::string received_;      // of the next requests
   std::vector<std::shared_ptr<const std::string>> parts_;
   std::size_t part_ = 0, sent_ = 0;  // bytes of that part
   bool closes_ = false;              // after this answer
@@ -276,10 +282,28 @@ void http_server::accept_one(std::vector<std::unique_ptr<connection>>& open) {
     if (!would_block()) accepts_again_ = clock::now() + std::chrono::milliseconds{100};  // no descriptors, no memory
     return;
   }
+  std::unique_ptr<connection> made;
+  try {
+    made = std::make_unique<connection>(socket, *this);
+  } catch (...) {
+    ::close(socket);
+    throw;
+  }
   make_private(socket);
-  const int yes = 1;
+  const int yes = 1, buffer = 128 << 10;  // small, so that a slow client's progress is seen often
   ::setsockopt(socket, IPPROTO_TCP, TCP_NODELAY, &yes, sizeof yes);
-  open.push_back(std::make_unique<connection>(socket, *this));
+  ::setsockopt(socket, SOL_SOCKET, SO_SNDBUF, &buffer, sizeof buffer);
+  open.push_back(std::move(made));
+}
+
+bool http_server::make_room(std::vector<std::unique_ptr<connection>>& open) const {
+  if (open.size() < limits_.connections) return true;
+  auto oldest = open.end();
+  for (auto c = open.begin(); c != open.end(); ++c)
+    if ((*c)->is_idle() && (oldest == open.end() || (*c)->deadline() < (*oldest)->deadline())) oldest = c;
+  if (oldest == open.end()) return false;
+  open.erase(oldest);
+  return true;
 }
 
 void http_server::serve() {
@@ -287,7 +311,9 @@ void http_server::serve() {
   std::vector<pollfd> watched;
   for (;;) {
     const auto now = clock::now();
-    const bool accepts = open.size() < limits_.connections && now >= accepts_again_;
+    const auto is_idle = [](const auto& c) { return c->is_idle(); };
+    const bool may_have_room = open.size() < limits_.connections || std::ranges::any_of(open, is_idle);
+    const bool accepts = may_have_room && now >= accepts_again_;
     watched.assign({{wake_[0], POLLIN, 0}, {accepts ? listener_ : -1, POLLIN, 0}});
     auto next = accepts ? now + std::chrono::hours{1} : now + std::chrono::milliseconds{100};
     for (const auto& c : open) {
@@ -306,7 +332,7 @@ void http_server::serve() {
       if (!goes_on || open[i]->deadline() <= later) open[i].reset();
     }
     std::erase(open, nullptr);
-    if (watched[1].revents != 0) accept_one(open);
+    if (watched[1].revents != 0 && make_room(open)) accept_one(open);
   }
 }
 

@@ -35,10 +35,10 @@ struct http_answer {
 /// Limits of what clients can take. No client can extend a time by sending or reading slowly.
 struct http_limits {
   std::size_t header_bytes = std::size_t{16} << 10U;  ///< of a request
-  std::size_t connections = 32;                       ///< at a time; more wait in the system's bounded queue
-  std::chrono::milliseconds silence{2000};            ///< of a connection between requests
-  std::chrono::milliseconds request{2000};            ///< from the first byte of a request to the last
-  std::chrono::milliseconds sending{5000};            ///< of an answer, and more for its size:
+  std::size_t connections = 32;  ///< at a time; another one replaces one between requests, or waits in a bounded queue
+  std::chrono::milliseconds silence{2000};  ///< of a connection between requests
+  std::chrono::milliseconds request{2000};  ///< from the first byte of a request to the last
+  std::chrono::milliseconds sending{5000};  ///< of an answer without progress; of the whole, plus its size divided by
   std::size_t bytes_per_millisecond = 64;
   std::chrono::milliseconds closing{500};  ///< in which a client can read the last answer
 };
@@ -66,6 +66,8 @@ class http_server {
   class connection;
 
   void serve();
+  /// Ensures that a place is free, if necessary by closing the connection that has waited longest between requests.
+  bool make_room(std::vector<std::unique_ptr<connection>>& open) const;
   void accept_one(std::vector<std::unique_ptr<connection>>& open);
 
   const std::function<http_answer(const http_request&)> answer_;
