@@ -23,21 +23,27 @@ console::console(bool quiet) : quiet_{quiet}, terminal_{::isatty(STDERR_FILENO) 
   log_->flush_on(spdlog::level::info);
 }
 
+console console::for_dispensable() const {
+  console made{*this};
+  made.is_dispensable_ = true;
+  return made;
+}
+
 double console::elapsed() const { return std::chrono::duration<double>(clock::now() - stage_start_).count(); }
 double console::total() const { return std::chrono::duration<double>(clock::now() - program_start_).count(); }
 
 void console::stage(std::string_view name) {
   stage_ = name;
   stage_start_ = last_shown_ = clock::now();
-  if (terminal_ && !quiet_) {
+  if (terminal_ && !quiet_ && !is_silent()) {
     std::fprintf(stderr, "\r\033[2K%-10s ...", stage_.c_str());
     std::fflush(stderr);
-    bar_shown_ = true;
+    *bar_shown_ = true;
   }
 }
 
 void console::advance(std::size_t done, std::size_t total, const std::string& note) {
-  if (quiet_ || total == 0) return;
+  if (quiet_ || total == 0 || is_silent()) return;
   const auto now = clock::now();
   const double since = std::chrono::duration<double>(now - last_shown_).count();
   if (since < (terminal_ ? 0.1 : 10.0)) return;
@@ -56,20 +62,23 @@ void console::advance(std::size_t done, std::size_t total, const std::string& no
   std::fprintf(stderr, "\r\033[2K%-10s [%s%s] %s", stage_.c_str(), std::string(full, '#').c_str(),
                std::string(cells - full, '.').c_str(), tail.c_str());
   std::fflush(stderr);
-  bar_shown_ = true;
+  *bar_shown_ = true;
 }
 
 void console::finish(const std::string& outcome) {
+  if (is_silent()) return;
   clear_bar();
   log_->info("{:<10} {:<72} {:6.1f} s", stage_, one_line(outcome), elapsed());
 }
 
 void console::warn(const std::string& message) {
+  if (is_silent()) return;
   clear_bar();
   log_->warn("rgbd_slam: warning: {}", one_line(message));
 }
 
 void console::error(const orbis::error& e) {
+  if (is_silent()) return;
   clear_bar();
   std::string text = orbis::shortened_path(e.where) + (e.where.empty() ? "" : ": ");
   for (std::size_t begin = 0; begin <= e.message.size();) {  // a message may have several lines
@@ -86,10 +95,9 @@ bool console::print(const std::string& line) {
 }
 
 void console::clear_bar() {
-  if (!bar_shown_) return;
+  if (!bar_shown_->exchange(false)) return;
   std::fputs("\r\033[2K", stderr);
   std::fflush(stderr);
-  bar_shown_ = false;
 }
 
 }  // namespace app

@@ -4,6 +4,7 @@
 /// else to stderr.
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <cstddef>
 #include <memory>
@@ -21,10 +22,13 @@ class logger;
 
 namespace app {
 
+/// Copies share the terminal line of the progress bar.
 class console {
  public:
   using clock = std::chrono::steady_clock;
   explicit console(bool quiet);
+  /// A console for work that may be given up. It prints nothing from then on.
+  [[nodiscard]] console for_dispensable() const;
 
   /// Begins a stage and ends the previous one.
   void stage(std::string_view name);
@@ -53,12 +57,14 @@ class console {
   [[nodiscard]] bool quiet() const { return quiet_; }
 
  private:
+  [[nodiscard]] bool is_silent() const { return is_dispensable_ && interrupts::is_given_up(); }
   void clear_bar();
 
   std::shared_ptr<spdlog::logger> log_;
   bool quiet_;
   bool terminal_;
-  bool bar_shown_ = false;
+  bool is_dispensable_ = false;
+  std::shared_ptr<std::atomic<bool>> bar_shown_ = std::make_shared<std::atomic<bool>>(false);
   std::string stage_;
   clock::time_point program_start_ = clock::now();
   clock::time_point stage_start_ = program_start_;

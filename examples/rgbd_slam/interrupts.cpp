@@ -107,7 +107,6 @@ void forget_stop() {
   s.on_stop = {};
 }
 
-void discard_results() { shared().keeps_results = false; }
 bool stop_requested() { return shared().stop_requested; }
 
 void begin_dispensable(std::string notice) {
@@ -123,6 +122,14 @@ bool is_given_up() {
   state& s = shared();
   const std::lock_guard lock{s.mutex};
   return s.give_up_at && clock::now() >= *s.give_up_at;
+}
+
+bool end_dispensable() {
+  state& s = shared();
+  const std::lock_guard lock{s.mutex};
+  s.notice.clear();
+  s.is_dispensable = false;
+  return s.stop_requested;
 }
 
 void end_program(int code) {

@@ -24,8 +24,6 @@ void start();
 void keep_results(std::string notice, std::function<void()> on_stop = {});
 /// Removes `on_stop`. Returns when no call of it is running.
 void forget_stop();
-/// Makes the next signal end the program again.
-void discard_results();
 /// Returns true if a signal arrived after `keep_results`.
 [[nodiscard]] bool stop_requested();
 
@@ -33,6 +31,8 @@ void discard_results();
 void begin_dispensable(std::string notice);
 /// Returns true if that work must be given up.
 [[nodiscard]] bool is_given_up();
+/// Ends that time. Returns `stop_requested`; a first signal from now on has no effect, as the rest takes moments.
+bool end_dispensable();
 /// Removes the temporary files and ends the program, although threads are running.
 [[noreturn]] void end_program(int code);
 
