@@ -258,7 +258,8 @@ exit_code map_without_slam(const settings& s, console& console) {
   auto written = write_map(std::move(found->map), s, files->folder(), console);
   if (!written) return give_up(written.error());
   found->r.map = *std::move(written);
-  if (auto done = write_report_files(found->r, found->cameras, *files, console); !done) return give_up(done.error());
+  if (auto done = write_report_files(found->r, found->cameras, files->lists(), console); !done)
+    return give_up(done.error());
   if (auto done = files->put_in_place(); !done) return give_up(done.error());
   print_results(found->r, console);
   return unsaved ? give_up(*unsaved) : done;

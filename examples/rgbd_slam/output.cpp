@@ -2,6 +2,7 @@
 #include "output.hpp"
 
 #include <cstdio>
+#include <utility>
 
 #include <orbis/io/camera_file.hpp>
 #include <orbis/io/trajectory_file.hpp>
@@ -21,13 +22,13 @@ using orbis::result;
 namespace {
 
 /// Lists the files of this run and those that remain from earlier runs. `coming`: files that are not written yet.
-void list_files(results& r, const result_files& files, file_names coming, console& console) {
+void list_files(results& r, const file_lists& files, file_names coming, console& console) {
   std::error_code ignored;
   for (std::filesystem::directory_iterator it{r.folder, ignored}, end; !ignored && it != end; it.increment(ignored))
     coming.push_back(it->path().filename().string());
   r.files = files.made(coming);
-  r.files_of_earlier_runs = files.of_earlier_runs(r.files);
-  if (r.files_of_earlier_runs.empty()) return;
+  const auto known = std::exchange(r.files_of_earlier_runs, files.of_earlier_runs(r.files));
+  if (r.files_of_earlier_runs == known) return;
   std::string names;
   for (const std::string& name : r.files_of_earlier_runs) names += (names.empty() ? "" : ", ") + name;
   console.warn(r.warnings.emplace_back("unchanged files of an earlier run: " + names));
@@ -102,7 +103,7 @@ result<void> write_camera_used(const frame_source& source, const shutter_results
   return orbis::io::write_camera(folder / "camera_used.toml", with_shutter(source.camera, shutter));
 }
 
-result<void> write_report_files(results& r, const orbis::trajectory& cameras, const result_files& files,
+result<void> write_report_files(results& r, const orbis::trajectory& cameras, const file_lists& files,
                                 console& console) {
   console.stage("report");
   std::vector<orbis::vec3f> points;
@@ -122,6 +123,12 @@ result<void> write_report_files(results& r, const orbis::trajectory& cameras, co
   return {};
 }
 
+result<void> write_summary_only(results& r, const file_lists& files, console& console) {
+  list_files(r, files, {"summary.json"}, console);
+  r.wall_s = console.total();
+  return write_summary(r);
+}
+
 orbis::error explain_no_start(const results& r, const settings& s) {
   const std::string frames = std::to_string(r.slam->frames) + " frames ";
   return {orbis::errc::no_data, s.what == command::run ? s.input.string() : r.title,
@@ -131,9 +138,7 @@ orbis::error explain_no_start(const results& r, const settings& s) {
 }
 
 exit_code report_no_start(results& r, const orbis::error& why, exit_code code, result_files& files, console& console) {
-  list_files(r, files, {"summary.json"}, console);
-  r.wall_s = console.total();
-  auto done = write_summary(r);
+  auto done = write_summary_only(r, files.lists(), console);
   if (done) done = files.put_in_place();
   if (!done) return console.error(done.error()), bad_input;
   console.error(why);

@@ -24,7 +24,9 @@ namespace app {
                                                     const std::filesystem::path& folder);
 /// Writes pictures, report.html and summary.json.
 [[nodiscard]] orbis::result<void> write_report_files(results& r, const orbis::trajectory& cameras,
-                                                     const result_files& files, console& console);
+                                                     const file_lists& files, console& console);
+/// Writes summary.json only.
+[[nodiscard]] orbis::result<void> write_summary_only(results& r, const file_lists& files, console& console);
 /// The error of a run in which no frame could start tracking.
 [[nodiscard]] orbis::error explain_no_start(const results& r, const settings& s);
 /// Ends a run in which no frame was tracked: writes summary.json, prints `why`, returns `code` (or bad_input if writing

@@ -1,13 +1,16 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // The commands run, demo and live. `run_slam` is the pipeline; the other files of this folder contain one step each.
+#include <algorithm>
+#include <cstdio>
+#include <exception>
 #include <filesystem>
 #include <new>
 #include <optional>
 #include <string>
-#include <system_error>
 #include <utility>
 
+#include "../common/memory.hpp"
 #include "accuracy.hpp"
 #include "camera_stage.hpp"
 #include "commands.hpp"
@@ -62,7 +65,14 @@ exit_code end_untracked(results& r, const tracked_frames& tracked, const frame_s
 /// Builds cloud, octree, floor map and path from the keyframes, and writes them into `r.folder`.
 orbis::result<void> build_map(results& r, const tracked_frames& tracked, const frame_source& source, const settings& s,
                               const std::filesystem::path& floor_map, console& console) {
-  live_octree* const live = tracked.live ? tracked.live->stop() : nullptr;
+  live_octree* live = nullptr;
+  if (tracked.live) {
+    live = tracked.live->stop();
+    const auto known = live_notes(*std::exchange(r.live, tracked.live->so_far()));
+    for (std::string& note : live_notes(*r.live))  // of the map's last step
+      if (std::find(known.begin(), known.end(), note) == known.end())
+        console.warn(r.warnings.emplace_back(std::move(note)));
+  }
   auto map = map_frames(tracked.keyframes, source, live, s, console);
   if (!map) return orbis::fail(map.error());
   auto navigation = navigate(map->octree, r.slam->keyframes, s, r.folder, floor_map, console);
@@ -76,77 +86,117 @@ orbis::result<void> build_map(results& r, const tracked_frames& tracked, const f
   return {};
 }
 
-/// Completes the results: the map, if there are keyframes, the evaluation and the report.
+/// Completes the results: the map, if there are keyframes, the evaluation and the report. Creates files in `r.folder`
+/// and at `floor_map`.
 orbis::result<void> complete(results& r, const tracked_frames& tracked, const frame_source& source, const settings& s,
-                             const result_files& files, viewer& viewer, console& console) {
+                             const file_lists& files, const std::filesystem::path& floor_map, viewer& viewer,
+                             console& console) {
   if (tracked.keyframes.size() != 0) {
-    if (auto done = build_map(r, tracked, source, s, files.floor_map(), console); !done) return done;
+    if (auto done = build_map(r, tracked, source, s, floor_map, console); !done) return done;
     if (!interrupts::is_given_up()) viewer.show_map(r.map->voxels);
   }
   compare_with_truth(r, source, console);
   return write_report_files(r, r.slam->keyframes, files, console);
 }
 
-/// The results without a map.
-struct incomplete {
-  bool is_running;   ///< a thread still works on the map
-  orbis::error why;  ///< cancelled by the user, or out of memory
+/// The end of `complete_or_give_up`.
+struct completion {
+  bool was_interrupted;                ///< by the user, during tracking or since
+  std::optional<orbis::error> no_map;  ///< the results are without map: cancelled by the user, or out of memory
+  bool is_running = false;             ///< a thread still works on the map
 };
 
 /// Completes the results and moves their files to the others. If the user gives the map up, or it does not fit in
-/// memory, completes them without it. Other errors are those of `complete`.
-orbis::result<std::optional<incomplete>> complete_or_give_up(results& r, tracked_frames& tracked,
-                                                             const frame_source& source, const settings& s,
-                                                             result_files& files, viewer& viewer, console& console) {
+/// memory, leaves them as they are. Other errors are those of `complete`; no thread is then running.
+orbis::result<completion> complete_or_give_up(results& r, const tracked_frames& tracked, const frame_source& source,
+                                              const settings& s, result_files& files, viewer& viewer,
+                                              console& console) {
+  using orbis::errc;
+  if (auto begun = files.begin_optional(); !begun) return orbis::fail(begun.error());
   interrupts::begin_dispensable(
       s.quiet ? ""
               : "\nrgbd_slam: stopping; the map is given up, the other results are written. Interrupt again to stop "
                 "immediately and leave the folder unchanged\n");
-  using orbis::errc;
-  // All that is made here belongs to the other thread, so that it can be left alone.
+  // All that changes belongs to the other thread, so that it can be left alone.
   results whole = r;
-  whole.folder = r.folder / "map";
-  std::error_code ec;
-  std::filesystem::create_directory(whole.folder, ec);
-  if (ec) return orbis::fail(errc::write_failed, r.out.string(), "cannot create files in it: " + ec.message());
-  auto done = run_dispensable([&, whole, console]() mutable -> orbis::result<results> {
+  whole.folder = files.optional_folder();
+  auto done = run_dispensable([&tracked, &source, &s, &viewer, whole = std::move(whole), lists = files.lists(),
+                               floor_map = files.optional_floor_map(),
+                               console = console.for_dispensable()]() mutable -> orbis::result<results> {
     try {
-      if (auto made = complete(whole, tracked, source, s, files, viewer, console); !made)
+      if (auto made = complete(whole, tracked, source, s, lists, floor_map, viewer, console); !made)
         return orbis::fail(made.error());
       return std::move(whole);
     } catch (const std::bad_alloc&) {
       return orbis::fail(errc::exception, {}, "out of memory");
     }
   });
-  if (done && *done) {
-    r = **std::move(done);
-    if (auto moved = files.take_from(std::exchange(r.folder, files.folder())); !moved)
-      return orbis::fail(moved.error());
-    return std::nullopt;
+  completion end{.was_interrupted = interrupts::end_dispensable(), .no_map = {}};
+  if (!done) {  // nothing here may throw
+    end.no_map = orbis::error{errc::cancelled, {}, {}};
+    end.is_running = true;
+    return end;
   }
-  incomplete without{.is_running = !done, .why = done ? done->error() : orbis::error{errc::cancelled, {}, {}}};
-  if (without.why.code != errc::cancelled && without.why.code != errc::exception) return orbis::fail(without.why);
-  if (!without.is_running) tracked.live.reset();  // its memory
-  without.why.where = s.out.string();
-  without.why.message = (without.why.code == errc::cancelled ? "interrupted by the user" : without.why.message) +
-                        "; the map is missing, the other results were written";
-  console.warn(r.warnings.emplace_back(without.why.message));
-  compare_with_truth(r, source, console);
-  if (auto written = write_report_files(r, r.slam->keyframes, files, console); !written)
-    return orbis::fail(written.error());
-  return without;
+  if (!*done) {
+    if (done->error().code != errc::cancelled && done->error().code != errc::exception)
+      return orbis::fail(done->error());
+    end.no_map = done->error();
+    return end;
+  }
+  r = **std::move(done);
+  r.folder = files.folder();
+  if (auto moved = files.take_optional(); !moved) return orbis::fail(moved.error());
+  return end;
+}
+
+/// Evaluates a run without map, and writes its report. If that fails, writes the summary only, if possible, so that it
+/// describes the other files. Errors: write_failed; out of memory.
+orbis::result<void> report_without_map(results& r, const frame_source& source, const file_lists& files,
+                                       console& console) {
+  const auto guarded = [&](const auto& work) -> orbis::result<void> {
+    try {
+      return work();
+    } catch (const std::exception& e) {
+      return orbis::fail(orbis::errc::exception, r.out.string(), examples::describe_exception(e));
+    }
+  };
+  auto written = guarded([&] {
+    compare_with_truth(r, source, console);
+    return write_report_files(r, r.slam->keyframes, files, console);
+  });
+  if (!written) static_cast<void>(guarded([&] { return write_summary_only(r, files, console); }));
+  return written;
 }
 
 /// The exit code of a run that wrote its results; reports the error that limits them, if there is one.
-exit_code end_tracked(const results& r, const tracked_frames& tracked, const std::optional<incomplete>& without,
-                      const frame_source& source, const settings& s, bool was_interrupted, console& console) {
+exit_code end_tracked(const results& r, const tracked_frames& tracked, const completion& end,
+                      const frame_source& source, const settings& s, console& console) {
   if (tracked.stopped) return console.error(explain_stop(tracked, source)), bad_input;
   if (tracked.unsaved) return console.error(*tracked.unsaved), bad_input;
   if (r.navigation && r.navigation->unsaved) return console.error(*r.navigation->unsaved), bad_input;
-  if (was_interrupted) return interrupted;
-  if (without) return console.error(without->why), bad_input;
+  if (end.was_interrupted) return interrupted;
+  if (end.no_map) return console.error(*end.no_map), bad_input;
   if (tracked.missed_map) return console.error(explain_miss(tracked, s)), never_tracked;
   return done;
+}
+
+/// Writes the report if the map is missing, moves all files into place, and prints the results. Returns the exit code.
+exit_code finish_run(results& r, const tracked_frames& tracked, completion& end, const frame_source& source,
+                     const settings& s, result_files& files, viewer& viewer, console& console) {
+  orbis::result<void> reported;
+  if (end.no_map) {
+    end.no_map->where = s.out.string();
+    end.no_map->message =
+        (end.no_map->code == orbis::errc::cancelled ? "interrupted by the user" : end.no_map->message) +
+        "; the map is missing, the other results were written";
+    console.warn(r.warnings.emplace_back(end.no_map->message));
+    reported = report_without_map(r, source, files.lists(), console);
+  }
+  if (auto done = files.put_in_place(); !done) return console.error(done.error()), bad_input;
+  if (!reported) return console.error(reported.error()), bad_input;
+  print_results(r, console);
+  if (!end.is_running) viewer.finish(s, console);
+  return end_tracked(r, tracked, end, source, s, console);
 }
 
 }  // namespace
@@ -181,15 +231,21 @@ exit_code run_slam(const settings& s, console& console) {
   if (auto done = write_camera_used(*source, shutter, files->folder()); !done) return give_up(done.error());
 
   // Build the map from the keyframes, evaluate, and write the report.
-  const auto without = complete_or_give_up(r, *tracked, *source, s, *files, *shown, console);
-  if (!without) return give_up(without.error());
-  if (auto done = files->put_in_place(); !done) return give_up(done.error());
-  print_results(r, console);
-  const bool was_interrupted = interrupts::stop_requested();
-  if (*without && (*without)->is_running)
-    interrupts::end_program(end_tracked(r, *tracked, *without, *source, s, was_interrupted, console));
-  shown->finish(s, console);
-  return end_tracked(r, *tracked, *without, *source, s, was_interrupted, console);
+  auto end = complete_or_give_up(r, *tracked, *source, s, *files, *shown, console);
+  if (!end) return give_up(end.error());
+  if (!end->is_running) {
+    if (end->no_map) tracked->live.reset();  // its memory
+    return finish_run(r, *tracked, *end, *source, s, *files, *shown, console);
+  }
+  // The thread uses the objects of this function, which must not return.
+  exit_code code = bad_input;
+  try {
+    code = finish_run(r, *tracked, *end, *source, s, *files, *shown, console);
+  } catch (const std::exception& e) {
+    std::fprintf(stderr, "rgbd_slam: %s\n", e.what());  // takes no memory
+  } catch (...) {
+  }
+  interrupts::end_program(code);
 }
 
 }  // namespace app

@@ -235,15 +235,14 @@ result_files::~result_files() {
   hidden().paths.clear();
 }
 
-file_names result_files::made(const file_names& coming) const {
-  const file_names there = folders_.front().made();
+file_names file_lists::made(const file_names& coming) const {
   file_names names;
   for (std::string& name : all_names())
-    if (is_among(name, there) || is_among(name, coming)) names.push_back(std::move(name));
+    if (is_there(folder_ / name) || is_among(name, coming)) names.push_back(std::move(name));
   return names;
 }
 
-file_names result_files::of_earlier_runs(const file_names& made) const {
+file_names file_lists::of_earlier_runs(const file_names& made) const {
   file_names names = recorded(out_);
   std::erase_if(names, [&](const std::string& name) {
     return is_among(name, made) || !is_among(name, all_names()) || !is_there(out_ / name);
@@ -251,13 +250,24 @@ file_names result_files::of_earlier_runs(const file_names& made) const {
   return names;
 }
 
-result<void> result_files::take_from(const fs::path& made) {
+result<void> result_files::begin_optional() {
   std::error_code ec;
-  for (fs::directory_iterator it{made, ec}, end; !ec && it != end; it.increment(ec)) {
-    fs::rename(it->path(), folder() / it->path().filename(), ec);
-    if (ec) break;
+  for (const staged_folder& f : folders_)
+    if (fs::create_directory(f.path() / optional_name, ec); ec)
+      return orbis::fail(orbis::errc::write_failed, out_.string(), "cannot create files in it: " + ec.message());
+  return {};
+}
+
+result<void> result_files::take_optional() {
+  std::error_code ec;
+  for (const staged_folder& f : folders_) {
+    file_names names;  // first, as the folder changes
+    for (fs::directory_iterator it{f.path() / optional_name, ec}, end; !ec && it != end; it.increment(ec))
+      names.push_back(it->path().filename().string());
+    for (std::size_t i = 0; !ec && i != names.size(); ++i)
+      fs::rename(f.path() / optional_name / names[i], f.path() / names[i], ec);
+    if (ec) return orbis::fail(orbis::errc::write_failed, out_.string(), "cannot move the new files: " + ec.message());
   }
-  if (ec) return orbis::fail(orbis::errc::write_failed, out_.string(), "cannot move the new files: " + ec.message());
   return {};
 }
 

@@ -11,6 +11,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <orbis/core/result.hpp>
@@ -50,6 +51,21 @@ void finish_earlier_run(const settings& s);
 /// creating it, so that the error is reported before the work. Errors: write_failed.
 [[nodiscard]] std::optional<orbis::error> find_unwritable(const settings& s);
 
+/// Finds the files of the output folder `out`, which are created in `folder`.
+class file_lists {
+ public:
+  file_lists(std::filesystem::path out, std::filesystem::path folder)
+      : out_{std::move(out)}, folder_{std::move(folder)} {}
+
+  /// The files of this run: those created so far, and those of `coming`.
+  [[nodiscard]] file_names made(const file_names& coming) const;
+  /// The files of earlier runs that will stay in the output folder.
+  [[nodiscard]] file_names of_earlier_runs(const file_names& made) const;
+
+ private:
+  std::filesystem::path out_, folder_;
+};
+
 class result_files {
  public:
   /// Creates the folders and checks that files can be created in them. Errors: write_failed.
@@ -63,22 +79,26 @@ class result_files {
   /// The path at which the landmark map is created. @pre the settings ask for one
   [[nodiscard]] std::filesystem::path landmark_map() const { return folders_[map_folder_].path() / map_name_; }
   /// The path at which the floor map is created, next to its image; empty if the settings ask for none.
-  [[nodiscard]] std::filesystem::path floor_map() const {
-    return floor_name_.empty() ? std::filesystem::path{} : folders_[floor_folder_].path() / floor_name_;
-  }
+  [[nodiscard]] std::filesystem::path floor_map() const { return floor_map_in({}); }
+  [[nodiscard]] file_lists lists() const { return {out_, folder()}; }
 
-  /// The files of the output folder: those created so far, and those of `coming`.
-  [[nodiscard]] file_names made(const file_names& coming) const;
-  /// The files of earlier runs that will stay in the output folder.
-  [[nodiscard]] file_names of_earlier_runs(const file_names& made) const;
-
-  /// Moves the files of `folder` into the output folder's new files. Errors: write_failed.
-  [[nodiscard]] orbis::result<void> take_from(const std::filesystem::path& folder);
+  /// Creates the folders of files that are added by `take_optional`, or not at all. Errors: write_failed.
+  [[nodiscard]] orbis::result<void> begin_optional();
+  /// As `folder` and `floor_map`, for these files.
+  [[nodiscard]] std::filesystem::path optional_folder() const { return folder() / optional_name; }
+  [[nodiscard]] std::filesystem::path optional_floor_map() const { return floor_map_in(optional_name); }
+  /// Moves them to the others. Errors: write_failed.
+  [[nodiscard]] orbis::result<void> take_optional();
   /// Replaces the old files by the new ones: all, or none if this fails. Errors: write_failed.
   [[nodiscard]] orbis::result<void> put_in_place();
 
  private:
+  static constexpr const char* optional_name = ".optional";
+
   result_files() = default;
+  [[nodiscard]] std::filesystem::path floor_map_in(const std::filesystem::path& part) const {
+    return floor_name_.empty() ? std::filesystem::path{} : folders_[floor_folder_].path() / part / floor_name_;
+  }
 
   std::filesystem::path out_;
   std::string map_name_, floor_name_;

@@ -4,11 +4,12 @@
 include(${CMAKE_CURRENT_LIST_DIR}/support.cmake)
 
 # Starts a run, and sends it the signal a while after its log matches `pattern`. Sets `code`, its exit code, `seconds`
-# from the signal to its end, and `err`.
+# from the signal to its end, and `err`. `environment`: variables of the run. `before_signal`: shell commands that run
+# before the signal.
 function(interrupt signal pattern delay)  # arguments of the run
   execute_process(COMMAND bash -c "
     : >run.log  # there before it is read
-    '${APP}' \"$@\" 2>run.log &
+    ${environment} '${APP}' \"$@\" 2>run.log &
     run=$!
     trap 'kill -9 $run 2>/dev/null || true' EXIT
     for i in $(seq 6000); do
@@ -17,6 +18,7 @@ function(interrupt signal pattern delay)  # arguments of the run
       sleep 0.01
     done
     sleep ${delay}
+    ${before_signal}
     start=$(date +%s%N)
     kill -${signal} $run
     wait $run
@@ -38,7 +40,8 @@ endfunction()
 set(fine demo --plain --frames 30 --width 320 --resolution 0.004 --filter none)
 
 foreach(signal TERM INT)
-  interrupt(${signal} "^tracking  .*keyframes" 0.3 ${fine} --batch-map --out ${signal})
+  interrupt(${signal} "^tracking  .*keyframes" 0.3 ${fine} --batch-map --out ${signal}
+            --floor-map floor_${signal}/floor.yaml)
   check(code EQUAL 130)
   check(seconds LESS 5)
   check(err MATCHES "the map is given up")
@@ -46,9 +49,31 @@ foreach(signal TERM INT)
   must_exist(${WORK}/${signal} trajectory.txt keyframes.txt camera_used.toml summary.json report.html)
   must_not_be_half_written(${WORK}/${signal})
   check(NOT EXISTS ${WORK}/${signal}/map.bt)
+  file(GLOB floor LIST_DIRECTORIES true ${WORK}/floor_${signal}/* ${WORK}/floor_${signal}/.*)
+  check(NOT floor)
   summary(tracked ${WORK}/${signal} tracked)
   check(tracked EQUAL 30)
 endforeach()
+
+# The map is given up, and then the report cannot be written: the trajectories are kept.
+set(before_signal "(cd no_report/.rgbd_slam-* && mkdir report.html)")
+interrupt(INT "^tracking  .*keyframes" 0.3 ${fine} --batch-map --out no_report)
+set(before_signal "")
+check(code EQUAL 2)
+check(seconds LESS 5)
+check(err MATCHES "rgbd_slam: [^\n]*report.html[^\n]*\n$")
+must_exist(${WORK}/no_report trajectory.txt keyframes.txt camera_used.toml summary.json)
+must_not_be_half_written(${WORK}/no_report)
+
+# A full disk for the depth images of keyframes.
+set(environment "LD_PRELOAD='${FULL_DISK}' ASAN_OPTIONS=verify_asan_link_order=0")
+interrupt(INT "^tracking  .*keyframes" 0.3 ${fine} --batch-map --depth-memory 0 --out full)
+set(environment "")
+check(code EQUAL 130)
+check(seconds LESS 5)
+check(err MATCHES "the map is given up")
+must_exist(${WORK}/full trajectory.txt summary.json report.html)
+must_not_be_half_written(${WORK}/full)
 
 # While frames are tracked, SIGTERM ends the reading, and leaves the map a few seconds. The live map is far behind.
 interrupt(TERM "^tracking  .*fps" 0 demo --plain --frames 100000 --width 320 --resolution 0.004 --filter none --out live)
