@@ -32,15 +32,16 @@ struct http_answer {
 
 [[nodiscard]] http_answer text_answer(int status, std::string text);
 
-/// Limits of what clients can take. No client can extend a time by sending or reading slowly.
+/// Limits of what clients can take. No client can extend a time by sending slowly, nor that of a whole answer by
+/// reading slowly.
 struct http_limits {
   std::size_t header_bytes = std::size_t{16} << 10U;  ///< of a request
   std::size_t connections = 32;  ///< at a time; another one replaces one between requests, or waits in a bounded queue
   std::chrono::milliseconds silence{2000};  ///< of a connection between requests
   std::chrono::milliseconds request{2000};  ///< from the first byte of a request to the last
-  std::chrono::milliseconds sending{5000};  ///< of an answer without progress; of the whole, plus its size divided by
-  std::size_t bytes_per_millisecond = 64;
-  std::chrono::milliseconds closing{500};  ///< in which a client can read the last answer
+  std::chrono::milliseconds sending{5000};  ///< in which a client must read some of an answer
+  std::size_t bytes_per_millisecond = 64;   ///< at which it must read a whole answer, after `sending`
+  std::chrono::milliseconds closing{500};   ///< in which a client can read the last answer
 };
 
 /// Serves 127.0.0.1 on one thread. It rejects requests that name another host (a foreign page whose name resolves to
