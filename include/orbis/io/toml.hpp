@@ -20,9 +20,8 @@ inline constexpr std::size_t max_toml_bytes = 16384;
 
 /// Parses `text` as a table. `where` names the source in errors. Errors: malformed, with the line if known (not TOML;
 /// more than `max_toml_bytes`; a list of lists over several lines, whose lines could be table headers).
-/// Limitations, for the safety of toml++: refuses two forms of valid TOML, keys with quotes after a dot in inline
-/// tables
-/// (`x = {a."b" = 1}`), and bare keys that contain a date with "T" or a blank, but no time, after it
+/// Limitations, for the safety of toml++: refuses two forms of valid TOML: keys with quotes after a dot in inline
+/// tables (`x = {a."b" = 1}`), and bare keys that contain a date with "T" or a blank, but no time, after it
 /// (`2024-01-01Tx = 1`, `2024-01-01 = 1`).
 [[nodiscard]] result<toml::table> parse_toml(std::string_view text, const std::filesystem::path& where = {});
 
