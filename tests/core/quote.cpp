@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <cstddef>
 #include <string>
 
 #include <orbis/core/quote.hpp>
@@ -20,8 +21,11 @@ TEST_CASE("quotations are short, in one line, and end between characters") {
         "\"K\xC3\xBC"
         "che\"");
   const std::string long_text(2000, 'x');
-  CHECK(in_quotes(long_text) == "\"" + std::string(60, 'x') + "...\"");
-  CHECK(shortened(long_text) == std::string(200, 'x') + "...");
+  const auto begins = [&](const std::string& text, std::size_t length, const std::string& end) {
+    return text.size() == length + end.size() && text.starts_with(long_text.substr(0, length)) && text.ends_with(end);
+  };
+  CHECK(begins(in_quotes(long_text).substr(1), 60, "...\""));
+  CHECK(begins(shortened(long_text), 200, "..."));
   CHECK(shortened(std::string(200, 'x')) == std::string(200, 'x'));
   CHECK(shortened("abc\xC3\xBC", 4) == "abc...");  // not half of a character
   CHECK(shortened("\xC3\xBC", 1) == "...");
