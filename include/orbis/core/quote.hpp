@@ -25,13 +25,21 @@ namespace orbis {
   return is(0, 0xe2, 0xe2) && is_control ? 3 : 0;
 }
 
+namespace detail {
+
+/// Returns true if the byte continues a character in UTF-8.
+[[nodiscard]] constexpr bool continues_character(char byte) noexcept {
+  return (static_cast<unsigned char>(byte) & 0xc0U) == 0x80U;
+}
+
+}  // namespace detail
+
 /// The text with at most `most` bytes of it, and "..." in place of the rest. Does not cut UTF-8 characters; "?"
 /// replaces control characters (`control_bytes`) and, if the text is not UTF-8, all bytes that are not ASCII.
 [[nodiscard]] inline std::string shortened(std::string_view text, std::size_t most = 200) {
-  const auto is_inside = [&](std::size_t i) { return (static_cast<unsigned char>(text[i]) & 0xc0U) == 0x80U; };
   std::size_t end = text.size();
   if (end > most)
-    for (end = most; end != 0 && is_inside(end);) --end;
+    for (end = most; end != 0 && detail::continues_character(text[end]);) --end;
   const std::string_view part = text.substr(0, end);
   const bool is_text = is_utf8(part);
   std::string out;
@@ -48,7 +56,7 @@ namespace orbis {
 [[nodiscard]] inline std::string shortened_path(std::string_view path, std::size_t most = 200) {
   if (path.size() <= most) return shortened(path, most);
   std::size_t begin = path.size() - most;
-  while (begin != path.size() && (static_cast<unsigned char>(path[begin]) & 0xc0U) == 0x80U) ++begin;
+  while (begin != path.size() && detail::continues_character(path[begin])) ++begin;
   return "..." + shortened(path.substr(begin), most);
 }
 

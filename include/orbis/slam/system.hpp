@@ -154,8 +154,8 @@ class system {
   void stop() noexcept;
 
   /// Returns the poses of the frames that were tracked in the active map: all, or those within
-  /// `options::trajectory_frames`. Frames follow later corrections of their keyframe, and
-  /// the first 100 frames of a map are localised again when five keyframes have followed. O(frames).
+  /// `options::trajectory_frames`. Frames follow later corrections of their keyframe, and the first 100 frames of a map
+  /// are localised again when five keyframes have followed. O(frames).
   [[nodiscard]] orbis::trajectory trajectory() const;
   /// As above, for another map; empty if there is no such map, or none of its frames is left.
   [[nodiscard]] orbis::trajectory trajectory(map_id map) const;

@@ -47,14 +47,18 @@ class frame_log {
   [[nodiscard]] const map_keyframe& reference(std::size_t number) const {
     return frames_[number - first_number_].reference;
   }
-  /// Returns the current pose of a frame in the map of its reference; empty if one of them is not kept.
+  /// Returns the current pose of a frame in the map of its reference; empty if that is not kept.
   template <feature_descriptor D>
-  [[nodiscard]] std::optional<se3> pose(std::size_t number, const basic_atlas<D>& maps) const {
-    if (number < first_number_ || number >= end_number()) return std::nullopt;
-    const logged_frame& f = frames_[number - first_number_];
+  [[nodiscard]] static std::optional<se3> pose_of(const logged_frame& f, const basic_atlas<D>& maps) {
     const map_keyframe k = maps.current(f.reference);
     if (!maps.contains(k.map) || !maps.at(k.map).remembers(k.keyframe)) return std::nullopt;
     return maps.at(k.map).pose_of(k.keyframe) * scaled(f.T_reference_camera, maps.at(k.map).scale_of(k.keyframe));
+  }
+  /// Returns the current pose of the frame with a number, as above; empty if the frame is not kept, either.
+  template <feature_descriptor D>
+  [[nodiscard]] std::optional<se3> pose(std::size_t number, const basic_atlas<D>& maps) const {
+    const bool is_kept = number >= first_number_ && number < end_number();
+    return is_kept ? pose_of(frames_[number - first_number_], maps) : std::nullopt;
   }
   /// Returns the motion of the camera at a frame, in its own frame, per second, translation first: the mean from the
   /// frame before it to the one after it. Empty unless both are kept, are in one map, and are close in time.
@@ -84,10 +88,8 @@ class frame_log {
   [[nodiscard]] orbis::trajectory trajectory(const basic_atlas<D>& maps, map_id map) const {
     orbis::trajectory all;
     for (const logged_frame& f : frames_) {
-      const map_keyframe k = maps.current(f.reference);
-      if (k.map == map && maps.contains(map))
-        all.push_back({f.timestamp, maps.at(map).pose_of(k.keyframe) *
-                                        scaled(f.T_reference_camera, maps.at(map).scale_of(k.keyframe))});
+      if (maps.current(f.reference).map != map) continue;
+      if (const auto T_world_camera = pose_of(f, maps)) all.push_back({f.timestamp, *T_world_camera});
     }
     return all;
   }

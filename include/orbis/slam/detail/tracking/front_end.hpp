@@ -103,10 +103,8 @@ class front_end {
   [[nodiscard]] double last_timestamp() const noexcept { return last_.timestamp; }
   /// The current pose of the last tracked frame; it follows later corrections of its keyframe.
   [[nodiscard]] se3 last_pose(const atlas_type& maps) const {
-    const map_keyframe k = maps.current(last_reference_);
-    return maps.contains(k.map) && maps.at(k.map).remembers(k.keyframe)
-               ? maps.at(k.map).pose_of(k.keyframe) * scaled(T_reference_last_, maps.at(k.map).scale_of(k.keyframe))
-               : last_.T_world_camera;
+    return frame_log::pose_of({last_.timestamp, last_reference_, T_reference_last_}, maps)
+        .value_or(last_.T_world_camera);
   }
   /// The motion during read-out of the last tracked frame; zero with a global shutter.
   [[nodiscard]] vec6 last_twist() const { return last_.shutter.is_global() ? vec6(zeros<vec6>()) : last_.twist; }

@@ -59,10 +59,9 @@ class patch_tracker {
 
   /// Returns a copy of the image. @pre is_ready()
   [[nodiscard]] image<std::uint8_t> copy_image() const {
-    const auto from = (*image_.levels)[0];
-    image<std::uint8_t> to(from.width(), from.height());
-    for (int y = 0; y != from.height(); ++y) std::ranges::copy(from.row(y), to.view().row(y).begin());
-    return to;
+    image<std::uint8_t> copy;
+    copy_pixels((*image_.levels)[0], copy);
+    return copy;
   }
 
   /// The exposure time, given or estimated, seconds.
