@@ -89,10 +89,12 @@ TEST_CASE("Distortion does not make up for a focal length that is held") {
   if (!found.camera) CHECK(found.camera.error().code == errc::degenerate);
 }
 
-TEST_CASE("Some of the keyframes do if there are too many") {
-  const auto found = calibrate(room().camera().model, room().size(), 1.0, 1, {.max_keyframes = 12});
+TEST_CASE("Some of the keyframes and landmarks do if there are too many") {
+  const auto found =
+      calibrate(room().camera().model, room().size(), 1.0, 1, {.max_keyframes = 12, .max_landmarks = 250});
   REQUIRE(found.camera);
   CHECK(found.camera->keyframes == 12);
+  CHECK(found.camera->landmarks == 250);
   CHECK(std::abs(found.camera->camera.k().fx / room().camera().model.k().fx - 1.0) < 0.02);
 }
 

@@ -41,22 +41,27 @@ template <feature_descriptor D>
 /// Returns the participating keyframes, and the landmarks that two of them observe.
 template <feature_descriptor D, class Camera>
 [[nodiscard]] bundle_snapshot calibration_problem_of(const basic_map<D>& m, const camera_rig<Camera>& rig,
-                                                     std::size_t max_keyframes) {
+                                                     const calibration_options& options) {
   bundle_snapshot s;
   std::unordered_map<std::uint32_t, std::uint32_t> index;  // by keyframe
-  const std::size_t first = first_to_take(m, max_keyframes);
+  const std::size_t first = first_to_take(m, options.max_keyframes);
   std::size_t number = 0;
   for (const auto& k : m.keyframes()) {
     const std::size_t i = number++;
-    if (i < first || i - first >= max_keyframes) continue;
+    if (i < first || i - first >= options.max_keyframes) continue;
     index.emplace(k.id.value(), static_cast<std::uint32_t>(s.keyframes.size()));
     s.add_keyframe(k.id, k.T_world_camera, false);
   }
+  const auto index_of = [&](keyframe_id k) {
+    const auto i = index.find(k.value());
+    return i != index.end() ? i->second : no_id;
+  };
+  std::vector<landmark_id> shared;
   for (const auto& l : m.landmarks())
-    s.add_shared_landmark(m, l, rig, [&](keyframe_id k) {
-      const auto i = index.find(k.value());
-      return i != index.end() ? i->second : no_id;
-    });
+    if (is_shared(l, index_of)) shared.push_back(l.id);
+  const std::size_t count = std::min(shared.size(), options.max_landmarks);
+  for (std::size_t i = 0; i != count; ++i)
+    s.add_landmark(m, m.landmark_at(shared[i * shared.size() / count]), rig, index_of);
   return s;
 }
 
@@ -158,7 +163,7 @@ result<calibration<Camera>> calibrate(const basic_map<D>& m, const camera_rig<Ca
                                       const calibration_options& options, const progress& callback) {
   camera_rig<Camera> loose = rig;  // bf determines how many pixels a depth error counts as
   loose.model.bf *= std::sqrt(options.depth_weight);
-  const detail::bundle_snapshot problem = detail::calibration_problem_of(m, loose, options.max_keyframes);
+  const detail::bundle_snapshot problem = detail::calibration_problem_of(m, loose, options);
   if constexpr (std::same_as<Camera, camera::any_camera>) {
     return rig.camera().visit([&](const auto& model) -> result<calibration<Camera>> {
       auto found = detail::calibrate_model(model, problem, loose.model.bf, options, callback);

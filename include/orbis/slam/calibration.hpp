@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <concepts>
 #include <cstddef>
+#include <limits>
 #include <string_view>
 #include <vector>
 
@@ -36,6 +37,9 @@ struct calibration_options {
   /// Maximum number of consecutive keyframes, taken where there are most observations; the cost is cubic in their
   /// number.
   std::size_t max_keyframes = 300;
+  /// Maximum number of landmarks, taken at regular intervals of those that two keyframes observe; the cost is linear in
+  /// their number, and the deviations fall with its square root.
+  std::size_t max_landmarks = std::numeric_limits<std::size_t>::max();
 };
 
 /// Result for one parameter.

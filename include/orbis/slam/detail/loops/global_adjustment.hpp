@@ -90,8 +90,10 @@ template <feature_descriptor D>
 template <feature_descriptor D, camera::camera_model Camera>
 void take_landmarks(snapshot& s, const basic_map<D>& m, const camera_rig<Camera>& rig, std::size_t count) {
   const auto next = [&](landmark_id from) { return std::min(m.next_landmark(from), s.end_landmark); };
+  const auto index_of = [&](keyframe_id k) { return s.index_of(k); };
   for (s.next_landmark = next(s.next_landmark); s.has_more() && count != 0; --count) {
-    s.add_shared_landmark(m, m.landmark_at(s.next_landmark), rig, [&](keyframe_id k) { return s.index_of(k); });
+    const auto& l = m.landmark_at(s.next_landmark);
+    if (is_shared(l, index_of)) s.add_landmark(m, l, rig, index_of);
     s.next_landmark = next(s.next_landmark + 1);
   }
 }

@@ -70,14 +70,14 @@ struct bundle_snapshot {
       sources.push_back(seen);
     }
   }
-  /// As above, but only if there are at least two such observations.
-  template <feature_descriptor D, camera::camera_model Camera, class IndexOf>
-  void add_shared_landmark(const basic_map<D>& m, const basic_landmark<D>& l, const camera_rig<Camera>& rig,
-                           IndexOf&& index_of) {
-    const auto takes_part = [&](const observation& by) { return index_of(by.keyframe) != no_id; };
-    if (std::count_if(l.observations.begin(), l.observations.end(), takes_part) >= 2) add_landmark(m, l, rig, index_of);
-  }
 };
+
+/// Returns true if at least two keyframes for which `index_of(id)` returns an index observe a landmark.
+template <feature_descriptor D, class IndexOf>
+[[nodiscard]] bool is_shared(const basic_landmark<D>& l, const IndexOf& index_of) {
+  const auto takes_part = [&](const observation& by) { return index_of(by.keyframe) != no_id; };
+  return std::count_if(l.observations.begin(), l.observations.end(), takes_part) >= 2;
+}
 
 /// Erases an observation if it still exists, and returns true if it did. A landmark whose position is no longer
 /// determined (one observation, without depth) is removed.
