@@ -227,9 +227,9 @@ struct options {
   std::size_t local_keyframes = 40;  ///< maximum number of keyframes whose landmarks are searched for in a frame
   camera::shutter shutter{};         ///< exposure times of the rows of the images; the default is a global shutter
   /// Estimates the shutter from the frames, starting from `shutter`, and applies significant changes during tracking:
-  /// after two seconds, and each time the observation time has grown by half. The existing map is not changed. It costs
-  /// a few milliseconds per frame. For recordings: estimate from the first seconds (`system::estimated_shutter`), then
-  /// restart with the result.
+  /// after two seconds, and each time the observation time has grown by half. The existing map is not changed, nor are
+  /// the first frames of a map localised again. It costs a few milliseconds per frame. For recordings: estimate from
+  /// the first seconds (`system::estimated_shutter`), then restart with the result.
   bool estimates_shutter = false;
   keyframe_options keyframes{};
   adjustment_options adjustment{};

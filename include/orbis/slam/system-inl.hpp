@@ -136,41 +136,33 @@ track_result ORBIS_SLAM_SYSTEM::track_frame(double timestamp, frame_type f, cons
   f.index = front_end_->counters().frames;
   clock.lap(result.timings.features_ms);
   if (options_.threads.wait) back_end_->wait_for_room();
-  const row_follower stay = [](frame_type&, const frame_motion&) {};
-  const std::optional<map_keyframe> made = localize(std::move(f), follow ? follow : stay, result, clock);
-  if (made) {
-    if (const auto& first = front_end_->first_keyframe()) dispatch_keyframe(*first);
-    dispatch_keyframe(*made);
+  const auto outcome = shared_.locked([&] {
+    const bool is_frozen = localization_only_;
+    return front_end_->track({
+        .frame = f,
+        .maps = shared_.atlas,
+        .is_frozen = is_frozen,
+        .may_grow = !is_frozen && !back_end_->is_full(),
+        .follow_rows = follow ? follow : [](frame_type&, const frame_motion&) {},
+        .find_similar =
+            [&](const auto& features, std::size_t count) {
+              return shared_.similar(shared_.places.describe(features), count, [](map_keyframe) { return false; });
+            },
+        .drop_map =
+            [&](map_id m) {  // unless mapping uses it; then the map is kept
+              if (const auto edit = shared_.try_edit()) shared_.remove_map(m);
+            },
+        .localized = [&] { clock.lap(result.timings.tracking_ms); },
+    });
+  });
+  result.inliers = outcome.inliers;
+  if (outcome.made) {
+    if (outcome.first) dispatch_keyframe(*outcome.first);
+    dispatch_keyframe(*outcome.made);
   }
-  report(result, made);
+  report(result, outcome.made);
   clock.lap(result.timings.mapping_ms);
   return result;
-}
-
-ORBIS_SLAM_SYSTEM_TEMPLATE
-std::optional<map_keyframe> ORBIS_SLAM_SYSTEM::localize(frame_type f, const row_follower& follow, track_result& result,
-                                                        detail::stopwatch& clock) {
-  const auto lock = shared_.lock();
-  atlas_type& maps = shared_.atlas;
-  const bool is_frozen = localization_only_;
-  const auto similar = [this](const auto& features, std::size_t count) {
-    return shared_.similar(shared_.places.describe(features), count, [](map_keyframe) { return false; });
-  };
-  const auto drop = [this](map_id m) {  // unless mapping uses it; then the map is kept
-    if (const auto edit = shared_.try_edit()) shared_.remove_map(m);
-  };
-  front_end_->sync_with_map(maps);
-  result.inliers = front_end_->localize(f, maps, is_frozen, follow, similar, drop);
-  clock.lap(result.timings.tracking_ms);
-  std::optional<map_keyframe> made;
-  if (front_end_->is_tracking()) {
-    front_end_->update_reference(f, maps);
-    const bool may_grow = front_end_->begins_map() || (!is_frozen && !back_end_->is_full());
-    if (may_grow && front_end_->needs_keyframe(f, result.inliers, maps)) made = front_end_->make_keyframe(f, maps);
-  }
-  front_end_->finish(std::move(f), maps, made);
-  if (!is_frozen) front_end_->forget_erased(maps);
-  return made;
 }
 
 ORBIS_SLAM_SYSTEM_TEMPLATE

@@ -217,9 +217,6 @@ class system {
   }
   /// Tracks a measured frame; the frame has no features if its images could not be used.
   track_result track_frame(double timestamp, frame_type f, const row_follower& follow, detail::stopwatch& clock);
-  /// Localises a frame and turns it into a keyframe if required. Records the time of localisation with `clock`.
-  std::optional<map_keyframe> localize(frame_type f, const row_follower& follow, track_result& result,
-                                       detail::stopwatch& clock);
   /// Passes a new keyframe to the callbacks and the back end.
   void dispatch_keyframe(map_keyframe k);
   /// Fills in the result of a frame, and reports a change of state.

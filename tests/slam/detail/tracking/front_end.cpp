@@ -45,21 +45,18 @@ struct scene {
 
   std::size_t feed(slam::frame f) {
     f.index = frames++;
-    front_end.sync_with_map(maps);
-    const std::size_t inliers = front_end.localize(
-        f, maps, is_frozen, [](slam::frame&, const slam::frame_motion&) {},
-        [&](const auto&, std::size_t) { return similar; },
-        [&](slam::map_id m) {
-          maps.remove(m);
-          dropped.push_back(m);
-        });
-    std::optional<slam::map_keyframe> made;
-    if (inliers > 0) {
-      front_end.update_reference(f, maps);
-      if (!is_frozen && front_end.needs_keyframe(f, inliers, maps)) made = front_end.make_keyframe(f, maps);
-    }
-    front_end.finish(std::move(f), maps, made);
-    return inliers;
+    return front_end
+        .track({.frame = f,
+                .maps = maps,
+                .is_frozen = is_frozen,
+                .follow_rows = [](slam::frame&, const slam::frame_motion&) {},
+                .find_similar = [&](const auto&, std::size_t) { return similar; },
+                .drop_map =
+                    [&](slam::map_id m) {
+                      maps.remove(m);
+                      dropped.push_back(m);
+                    }})
+        .inliers;
   }
   std::size_t see(std::uint32_t step) { return feed(world.look(step, se3{})); }
   std::size_t see_nothing(double timestamp) {
@@ -147,16 +144,6 @@ TEST_CASE("A frozen map does not change, and none is begun") {
     CHECK(s.maps.active().landmark_at(l.id).visible == l.visible);
     CHECK(s.maps.active().landmark_at(l.id).found == l.found);
   }
-}
-
-TEST_CASE("Whether a keyframe is needed may be asked any number of times") {
-  scene s;
-  for (std::uint32_t i = 0; i < 4; ++i) s.see(i);
-  slam::frame f = s.world.look(4, s.world.truth(4));
-  const auto& asked = std::as_const(s.front_end);
-  const bool first = asked.needs_keyframe(f, 100, s.maps);
-  for (int i = 0; i < 3; ++i) CHECK(asked.needs_keyframe(f, 100, s.maps) == first);
-  CHECK(s.see(4) > 30);
 }
 
 TEST_CASE("Tracking goes on when the map was merged, moved and culled between two frames") {
@@ -357,7 +344,7 @@ TEST_CASE("A frame and a surface that hang on a keyframe that was forgotten harm
   REQUIRE(m.has_keyframe(other));
   REQUIRE_FALSE(m.remembers(gone));
   CHECK(s.front_end.last_pose(s.maps).to_matrix() == before.to_matrix());
-  s.front_end.sync_with_map(s.maps);
+  CHECK(s.see(2) > 30);
 
   slam::detail::surface_memory memory(4);
   std::vector<slam::detail::placed_surface> around;

@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// @file
+/// The data that the steps of tracking share.
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include <orbis/camera/model.hpp>
+#include <orbis/camera/shutter.hpp>
+#include <orbis/core/se3.hpp>
+#include <orbis/slam/atlas.hpp>
+#include <orbis/slam/camera_rig.hpp>
+#include <orbis/slam/detail/depth/depth_tracker.hpp>
+#include <orbis/slam/detail/dynamics/moving_features.hpp>
+#include <orbis/slam/detail/shutter/motion_refinement.hpp>
+#include <orbis/slam/detail/shutter/shutter_observer.hpp>
+#include <orbis/slam/detail/tracking/frame_log.hpp>
+#include <orbis/slam/detail/tracking/motion_model.hpp>
+#include <orbis/slam/detail/tracking/patch_tracker.hpp>
+#include <orbis/slam/detail/tracking/tracker.hpp>
+#include <orbis/slam/ids.hpp>
+#include <orbis/slam/matchers.hpp>
+#include <orbis/slam/measure.hpp>
+#include <orbis/slam/options.hpp>
+#include <orbis/slam/track_result.hpp>
+
+namespace orbis::slam::detail {
+
+/// A frame to localise, and its environment.
+template <feature_descriptor D>
+struct tracking_task {
+  basic_frame<D>& frame;
+  basic_atlas<D>& maps;
+  bool is_frozen = false;  ///< the maps are not changed, and no map is begun
+  bool may_grow = true;    ///< keyframes may be added to a map that exists
+  /// Sets the measurements of a rolling shutter's rows (`as_read`), given the motion.
+  std::function<void(basic_frame<D>&, const frame_motion&)> follow_rows;
+  /// Returns the ids of the `count` keyframes with the most similar appearance.
+  std::function<std::vector<map_keyframe>(const decltype(basic_frame<D>::features)&, std::size_t count)> find_similar;
+  /// Called for a map with few keyframes when another one becomes active.
+  std::function<void(map_id)> drop_map;
+  /// Called when the pose is estimated, before a keyframe is made. May be empty.
+  std::function<void()> localized;
+
+  [[nodiscard]] basic_map<D>& map() const { return maps.active(); }
+};
+
+/// The tools of tracking and its memory between frames: the last frame, its reference keyframe and the motion.
+template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers>
+struct tracking_context {
+  using camera_type = Camera;
+  using descriptor_type = D;
+  using frame_type = basic_frame<D>;
+  using atlas_type = basic_atlas<D>;
+  using task = tracking_task<D>;
+
+  tracking_context(const camera_rig<Camera>& used, const options& given)
+      : rig{used},
+        settings{given},
+        search{used, given},
+        moving{used, given},
+        depth{used, given.depth_term},
+        patches{used, given.patches} {
+    if (given.estimates_shutter) observer.emplace();
+  }
+  tracking_context(const tracking_context&) = delete;  // its parts refer to each other
+  tracking_context& operator=(const tracking_context&) = delete;
+
+  const camera_rig<Camera>& rig;
+  const options& settings;
+  tracker<Camera, D, Matchers> search;
+  moving_features<Camera, D, Matchers> moving;
+  depth_tracker<Camera> depth;
+  patch_tracker<Camera, D> patches;
+  std::optional<shutter_observer> observer;  ///< empty unless the shutter is estimated
+
+  track_state state = track_state::not_started;
+  map_keyframe reference;  ///< the keyframe with which the current frame shares most landmarks
+  frame_type last;         ///< the last frame that was tracked
+  motion_model motion;
+  std::optional<keyframe_id> first_patches;       ///< the first keyframe of the map, until its motion is known
+  std::optional<pose_quadratic> depth_quadratic;  ///< the depth term of the last refined frame
+
+  [[nodiscard]] bool is_tracking() const noexcept {
+    return state == track_state::tracking || state == track_state::relocalized;
+  }
+  /// Returns the map that contains the last frame; only then can a pose be predicted from it.
+  [[nodiscard]] map_id last_map(const atlas_type& maps) const { return maps.current(last_reference_).map; }
+  [[nodiscard]] const map_keyframe& last_reference() const noexcept { return last_reference_; }
+  [[nodiscard]] const se3& T_reference_last() const noexcept { return T_reference_last_; }
+  /// The current pose of the last frame; it follows later corrections of its keyframe.
+  [[nodiscard]] se3 last_pose(const atlas_type& maps) const {
+    return frame_log::pose_of({last.timestamp, last_reference_, T_reference_last_}, maps).value_or(last.T_world_camera);
+  }
+
+  /// Predicts `T_world_camera` of a frame by constant velocity.
+  [[nodiscard]] se3 predict(const frame_type& f) const {
+    return motion.predict({last.timestamp, last.T_world_camera}, f.timestamp);
+  }
+  /// Returns the motion of a frame, per second: that since the last frame, extrapolated by half of its change (see
+  /// `twist_prior`). Empty if the last frame is not the one before, or the pose has jumped.
+  [[nodiscard]] std::optional<vec6> motion_to(const frame_type& f) const {
+    constexpr double fastest = 5.0, fastest_turn = 10.0;  // metres and radians per second
+    if (state != track_state::tracking || last.size() == 0 || last.index + 1 != f.index) return std::nullopt;
+    const vec6 mean = motion_between(last, f);
+    if (!(norm(head<3>(mean)) < fastest && norm(tail<3>(mean)) < fastest_turn)) return std::nullopt;
+    return motion.is_known() ? vec6(mean + 0.5 * (mean - motion.twist())) : mean;
+  }
+
+  /// Updates ids and poses kept from the last frame to the state of the maps, which may have been merged, corrected and
+  /// culled since.
+  void follow_maps(const atlas_type& maps) {
+    const map_keyframe now = maps.current(reference);
+    if (now.map != reference.map)
+      for (landmark_id& l : last.landmarks)
+        if (l != no_id) l = maps.current(reference.map, l);
+    reference = now;
+    if (!maps.contains(now.map)) return;
+    last.T_world_camera = last_pose(maps);
+    const map_keyframe k = maps.current(last_reference_);
+    if (k.map == now.map && maps.at(now.map).remembers(k.keyframe)) {
+      const double scale = maps.at(now.map).scale_of(k.keyframe);
+      const double grown = scale / std::exchange(last_scale_, scale);
+      motion.scale_by(grown);
+      set_block(last.twist, 0, 0, head<3>(last.twist) * grown);
+    }
+    reference.keyframe = maps.at(now.map).replacement_of(now.keyframe);
+  }
+
+  /// Stores a tracked frame relative to the reference, before it becomes `last`; updates the motion.
+  void refer_last_to_reference(const frame_type& f, const atlas_type& maps) {
+    if (last.index + 1 == f.index && state == track_state::tracking && last.size() != 0)
+      motion.set({last.timestamp, last.T_world_camera}, {f.timestamp, f.T_world_camera});
+    last_reference_ = reference;
+    const basic_keyframe<D>& k = maps.active().at(reference.keyframe);
+    last_scale_ = k.scale;
+    T_reference_last_ = scaled(k.T_world_camera.inverse() * f.T_world_camera, 1.0 / k.scale);
+  }
+
+ private:
+  map_keyframe last_reference_;  ///< the reference of the last frame ...
+  double last_scale_ = 1.0;      ///< ... the scale of that keyframe at the last update ...
+  se3 T_reference_last_;         ///< ... and the frame's pose relative to it, translation divided by its scale
+};
+
+}  // namespace orbis::slam::detail
