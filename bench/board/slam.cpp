@@ -38,7 +38,7 @@ void orbis::slam::detail::local_mapper<camera_type, descriptor, orbis::slam::bag
     snapshot_ = shared_.locked([&] { return local_adjustment::take(m, k, shared_.rig, o, std::move(snapshot_)); });
     if (snapshot_.empty()) return;
     const auto go_on = [&](std::size_t, std::size_t) { return !stop_requested(); };
-    solution_ = solver_.solve(snapshot_, local_adjustment::schedule_of(o), go_on, std::move(solution_));
+    solution_ = solver_.solve(snapshot_, local_adjustment::make_schedule(o), go_on, std::move(solution_));
     shared_.locked([&] { local_adjustment::apply(m, snapshot_, solution_); });
   });
 }
@@ -85,7 +85,7 @@ int main(int argc, char** argv) {
       poses.clear();
       slam.inspect([&](const slam::atlas& maps) {
         for (const slam::keyframe_id k : made)
-          if (maps.active().has_keyframe(k)) poses.push_back({k.value(), maps.active().pose_of(k)});
+          if (maps.active().has_keyframe(k)) poses.push_back({k.value(), maps.active().pose(k)});
       });
       map.set_poses(poses);
       static_cast<void>(map.correct(seq));

@@ -12,10 +12,10 @@
 
 namespace orbis::optimize {
 
-template result<alignment_estimate<se3>> detail::alignment_of(std::span<const vec3>, std::span<const vec3>,
-                                                              const alignment_options&);
-template result<alignment_estimate<sim3>> detail::alignment_of(std::span<const vec3>, std::span<const vec3>,
+template result<alignment_estimate<se3>> detail::align_vectors(std::span<const vec3>, std::span<const vec3>,
                                                                const alignment_options&);
+template result<alignment_estimate<sim3>> detail::align_vectors(std::span<const vec3>, std::span<const vec3>,
+                                                                const alignment_options&);
 template triangulation detail::triangulate_all(std::span<const se3>, std::span<const vec3>,
                                                const triangulation_options&);
 template result<homography_estimate> estimate_homography(std::span<const vec2>, std::span<const vec2>,

@@ -26,7 +26,7 @@ namespace examples {
 }
 
 /// The median of the finite points along each axis, which outliers do not move. Zero if there are none.
-[[nodiscard]] inline orbis::vec3 middle_of(const std::vector<orbis::vec3f>& points) {
+[[nodiscard]] inline orbis::vec3 median_point(const std::vector<orbis::vec3f>& points) {
   orbis::vec3 middle = orbis::vec3::Zero();
   std::vector<float> along;
   for (const int axis : {0, 1, 2}) {
@@ -50,7 +50,7 @@ struct cloud_near_origin {
 [[nodiscard]] inline orbis::result<cloud_near_origin> read_near_origin(const std::filesystem::path& path) {
   auto read = orbis::io::read_cloud_with_fields(path);
   if (!read) return orbis::fail(read.error());
-  const orbis::vec3 origin = nearby_origin(middle_of(read->cloud.points));
+  const orbis::vec3 origin = nearby_origin(median_point(read->cloud.points));
   if (!origin.isZero()) {
     read = orbis::io::read_cloud_with_fields(path, origin);
     if (!read) return orbis::fail(read.error());

@@ -43,7 +43,7 @@ int run(int argc, char** argv) {
   auto eye = xyz.empty() ? std::nullopt : std::optional{orbis::vec3{xyz.data()}};
   if (eye ? !eye->allFinite() : filter == "range-statistical")
     return report_error(1, "--origin: needs a finite position");
-  const auto format = orbis::io::cloud_format_of(output);
+  const auto format = orbis::io::cloud_format_by_extension(output);
   if (!format) return report_error(1, output + ": must end in .ply or .pcd");
   if (examples::is_same_file(output, input)) return report_error(1, examples::overwrite_message(output, input));
   auto found = examples::read_near_origin(input);  // written in the original coordinates
@@ -52,7 +52,8 @@ int run(int argc, char** argv) {
   const auto in_file = read.cloud.size();
   if (eye) *eye -= origin;
   if (voxel > 0) {
-    if (!read.fields.empty()) read.notes.push_back("left out, because of --voxel: " + orbis::io::names_of(read.fields));
+    if (!read.fields.empty())
+      read.notes.push_back("left out, because of --voxel: " + orbis::io::field_names(read.fields));
     read.fields.clear();
     read.cloud = voxel_grid(read.cloud, {.size = voxel});
   }

@@ -105,7 +105,7 @@ template <std::ranges::contiguous_range Edges>
     rotations[v] = vertices[v].rotation();
     if (columns[v].values == before[v].values) continue;
     const orbis::mat3 relaxed = columns[v].values.reshaped(3, 3);
-    auto [left, sizes, right] = orbis::singular_values_of<3>(relaxed);
+    auto [left, sizes, right] = orbis::svd<3>(relaxed);
     if (!(sizes[1] > 1e-9 * sizes[0])) {
       done.status = optimize::pose_graph_status::singular;
       done.where = v;

@@ -77,7 +77,7 @@ void find_recordings(const fs::path& path, std::set<fs::path>& seen, std::vector
 }
 
 /// The recordings of the settings. Errors: not_found, no_data.
-orbis::result<std::vector<found_recording>> recordings_of(const settings& s) {
+orbis::result<std::vector<found_recording>> chosen_recordings(const settings& s) {
   std::vector<found_recording> all;
   std::set<fs::path> seen;
   std::set<std::string> names;
@@ -124,7 +124,7 @@ constexpr std::array<published_figures, 7> published = {{
 }};
 
 /// The published figures for a recording, by its name: "fr1_desk", "rgbd_dataset_freiburg1_desk", "fr3_office".
-const published_figures* figures_of(const fs::path& recording) {
+const published_figures* find_figures(const fs::path& recording) {
   std::string name = fs::weakly_canonical(recording).filename().string();
   if (name.ends_with(".bag")) name.resize(name.size() - 4);
   std::transform(name.begin(), name.end(), name.begin(), [](unsigned char c) { return std::tolower(c); });
@@ -284,7 +284,7 @@ orbis::result<fs::path> make_temporary_folder() {
   return orbis::fail(orbis::errc::write_failed, name, std::generic_category().message(errno));
 }
 
-std::vector<run_mode> modes_of(const settings& s) {
+std::vector<run_mode> run_modes(const settings& s) {
   std::vector<run_mode> modes{{"deterministic", true, 0}};
   if (s.quick) return modes;
   modes.push_back({"threads", false, 0});
@@ -364,7 +364,7 @@ table published_table(const std::vector<row>& rows) {
   table t{{"ATE mm", "this run"}};
   t.front().insert(t.front().end(), systems.begin(), systems.end());
   for (const row& r : rows) {
-    const published_figures* known = figures_of(r.recording->path);
+    const published_figures* known = find_figures(r.recording->path);
     if (known == nullptr || !r.mode->deterministic) continue;
     auto& line = t.emplace_back(std::vector{r.recording->name, cell("%.1f", r.result.number("/ate_rmse_m"), 1e3)});
     for (const double mm : known->ate_mm) line.push_back(mm != 0.0 ? text("%.0f", mm) : "-");
@@ -417,7 +417,7 @@ std::string as_json(const std::vector<row>& rows) {
     j["peak_mb"] = r.result.peak_mb;
     j["summary"] = r.result.summary;
     json& others = j["published_ate_rmse_m"];
-    if (const published_figures* known = figures_of(r.recording->path))
+    if (const published_figures* known = find_figures(r.recording->path))
       for (std::size_t i = 0; i != systems.size(); ++i)
         others[systems[i]] = known->ate_mm[i] != 0.0 ? json(1e-3 * known->ate_mm[i]) : json{};
   }
@@ -427,12 +427,12 @@ std::string as_json(const std::vector<row>& rows) {
 }  // namespace
 
 exit_code benchmark(const settings& s, console& console) {
-  const auto recordings = recordings_of(s);
+  const auto recordings = chosen_recordings(s);
   if (!recordings) return console.error(recordings.error()), bad_input;
   auto temporary = make_temporary_folder();
   if (!temporary) return console.error(temporary.error()), bad_input;
   runner runs{*std::move(temporary)};
-  const std::vector<run_mode> modes = modes_of(s);
+  const std::vector<run_mode> modes = run_modes(s);
 
   std::vector<row> rows;
   bool any_failed = false;

@@ -32,7 +32,7 @@ constexpr double most_scale_deviation = 0.005;  // relative standard deviation o
 /// The depth scale by the ground-truth poses of the recording; empty if they do not determine it.
 std::optional<calibrated_parameter> find_depth_scale(const frame_source& source, const orbis::trajectory& found) {
   if (source.ground_truth.empty()) return std::nullopt;
-  const auto scale = orbis::eval::scale_of(found, source.ground_truth);
+  const auto scale = orbis::eval::estimate_scale(found, source.ground_truth);
   if (!scale) return std::nullopt;
   const double before = source.camera.depth_scale, deviation = scale->deviation / scale->scale;
   const bool is_vague = !(deviation <= most_scale_deviation);
@@ -40,7 +40,7 @@ std::optional<calibrated_parameter> find_depth_scale(const frame_source& source,
                               deviation * before / scale->scale, is_vague};
 }
 
-std::string line_of(const calibrated_parameter& p) {
+std::string parameter_line(const calibrated_parameter& p) {
   const int digits = std::max(std::abs(p.before), std::abs(p.after)) < 10.0 ? 5 : 2;
   char text[160];
   if (p.is_held && p.deviation > 0.0 && std::isfinite(p.deviation))
@@ -99,10 +99,10 @@ exit_code calibrate(const settings& s, console& console) {
   if (!is_settled(found->last, 3.0)) console.warn("the parameters have not converged: do not rely on them");
 
   bool printed = console.print("parameter           given        found    deviation");
-  for (const calibrated_parameter& p : found->parameters) printed = console.print(line_of(p)) && printed;
+  for (const calibrated_parameter& p : found->parameters) printed = console.print(parameter_line(p)) && printed;
   const auto depth_scale = find_depth_scale(*source, found->trajectory);
   if (depth_scale) camera.depth_scale = depth_scale->after;
-  printed = console.print(depth_scale ? line_of(*depth_scale)
+  printed = console.print(depth_scale ? parameter_line(*depth_scale)
                                       : "depth_scale: not determined by images alone; it needs poses in metres "
                                         "(groundtruth.txt)") &&
             printed;

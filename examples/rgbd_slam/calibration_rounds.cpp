@@ -66,7 +66,7 @@ orbis::result<refined> refine(const any_camera& model, const frame_source& sourc
 /// The parameters of a camera by their names.
 using parameter_table = std::map<std::string_view, double>;
 
-parameter_table table_of(const any_camera& camera) {
+parameter_table make_table(const any_camera& camera) {
   return camera.visit([](const auto& model) {
     using of_model = orbis::camera::parameters_of<std::remove_cvref_t<decltype(model)>>;
     const auto values = of_model::get(model);
@@ -108,7 +108,7 @@ bool is_settled(const calibration& c, double deviations) {
 orbis::result<calibration_rounds> calibrate_by(const frame_source& source, const settings& s,
                                                const orbis::camera::shutter& shutter, const any_camera& given,
                                                const calibration_limits& limits, console& console) {
-  const parameter_table given_values = table_of(given);
+  const parameter_table given_values = make_table(given);
   any_camera camera = given;
   calibration_rounds rounds;
   for (int round = 1; round <= limits.most_rounds && !(round > 1 && is_last_round(rounds.last)); ++round) {

@@ -108,8 +108,8 @@ std::string lower_case(std::string text) {
   return text;
 }
 
-result<orbis::camera::any_camera> model_of(const orbis::camera::intrinsics& k, const std::string& name,
-                                           std::vector<double> d, const std::string& where) {
+result<orbis::camera::any_camera> make_model(const orbis::camera::intrinsics& k, const std::string& name,
+                                             std::vector<double> d, const std::string& where) {
   if (std::all_of(d.begin(), d.end(), [](double v) { return v == 0.0; }))
     return orbis::camera::any_camera{orbis::camera::pinhole{k}};
   if (!std::all_of(d.begin(), d.end(), [](double v) { return std::isfinite(v); }))
@@ -135,7 +135,7 @@ result<orbis::camera::any_camera> model_of(const orbis::camera::intrinsics& k, c
                   " numbers is not supported: write a camera.toml");
 }
 
-result<camera_file> camera_of(const named_values& values, const std::filesystem::path& path) {
+result<camera_file> parse_camera(const named_values& values, const std::filesystem::path& path) {
   const std::string where = path.string();
   camera_file file;
   file.path = path;
@@ -174,7 +174,7 @@ result<camera_file> camera_of(const named_values& values, const std::filesystem:
       orb.push_back(values.number({(prefix + std::string{name}).c_str()}).value_or(0.0));
     if (d.empty() && values.number({(prefix + std::string{"k1"}).c_str()})) d = orb;
   }
-  auto model = model_of(*k, values.text({"distortion_model", "model", "Camera.type"}), d, where);
+  auto model = make_model(*k, values.text({"distortion_model", "model", "Camera.type"}), d, where);
   if (!model) return fail(model.error());
   file.camera.model = *model;
   if (const auto scale =
@@ -240,7 +240,7 @@ result<camera_file> read_camera_file(const std::filesystem::path& path) {
     const cv::FileStorage storage{*text, cv::FileStorage::READ | cv::FileStorage::MEMORY};
     const cv::FileNode root = storage.root();
     if (!root.isMap()) return fail(errc::malformed, path.string(), "is neither JSON nor YAML with named values");
-    return camera_of(named_values{root}, path);
+    return parse_camera(named_values{root}, path);
   } catch (const cv::Exception& e) {
     return fail(errc::malformed, path.string(), "is not valid JSON or YAML: " + orbis::shortened(e.err));
   }

@@ -383,7 +383,7 @@ void set_profile_defaults(const CLI::App& cmd, settings& s) {
 }
 
 /// Parses "x,y,z"; empty if the text is something else.
-std::optional<orbis::vec3> vector_of(const std::string& text) {
+std::optional<orbis::vec3> parse_vector(const std::string& text) {
   orbis::vec3 p;
   char rest = 0;
   if (std::sscanf(text.c_str(), "%lf,%lf,%lf%c", &p.x(), &p.y(), &p.z(), &rest) != 3 || !p.allFinite())
@@ -517,18 +517,18 @@ std::variant<settings, exit_code> read_command_line(int argc, char** argv) {
     if (const auto failed = read_config(*chosen, s.config.string())) return *failed;
   set_profile_defaults(*chosen, s);
   if (!origin.empty()) {
-    s.origin = vector_of(origin);
+    s.origin = parse_vector(origin);
     if (!s.origin) return report_error("--origin: " + orbis::in_quotes(origin) + " is not x,y,z in metres", bad_usage);
   }
   for (const auto& [text, name, p] : {std::tuple{&from, "--from", &s.from}, {&to, "--to", &s.to}}) {
     if (chosen != way) break;
-    const auto point = vector_of(*text);
+    const auto point = parse_vector(*text);
     if (!point)
       return report_error(std::string{name} + ": " + orbis::in_quotes(*text) + " is not x,y,z in metres", bad_usage);
     *p = *point;
   }
   if (!gravity.empty()) {
-    s.gravity = vector_of(gravity);
+    s.gravity = parse_vector(gravity);
     if (!s.gravity || s.gravity->isZero())
       return report_error("--gravity: " + orbis::in_quotes(gravity) + " is not a direction x,y,z", bad_usage);
   }

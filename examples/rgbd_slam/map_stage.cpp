@@ -49,7 +49,7 @@ tree occupied_only(const std::vector<vec3f>& points, double resolution) {
   return map;
 }
 
-tree_numbers numbers_of(const tree& map, std::uintmax_t bytes) {
+tree_numbers count_leaves(const tree& map, std::uintmax_t bytes) {
   const auto n = map.counts();
   return {n.leaves, n.occupied_leaves, n.free_leaves, bytes};
 }
@@ -67,7 +67,7 @@ std::vector<voxel> occupied_voxels(const tree& map, const orbis::point_cloud& cl
   map.for_each_leaf([&](const tree::leaf& leaf) {
     if (!leaf.occupied) return;
     voxel v{leaf.center.cast<float>(), static_cast<float>(leaf.size), no_color};
-    if (const auto color = colors.color_of(v)) v.color = *color;
+    if (const auto color = colors.mean_color(v)) v.color = *color;
     out.push_back(v);
   });
   return out;
@@ -142,7 +142,9 @@ result<map_results> write_map(built_map map, const settings& s, const std::files
     bytes = std::filesystem::file_size(path, ignored);
     return {};
   };
-  const auto bt_of = [](const tree& t) { return [&t](const auto& path) { return orbis::octree::write_bt(t, path); }; };
+  const auto bt_writer = [](const tree& t) {
+    return [&t](const auto& path) { return orbis::octree::write_bt(t, path); };
+  };
   std::uintmax_t bt_bytes = 0, bt_bytes_unfiltered = 0;
   result<void> done = write(
       "cloud.ply", [&](const auto& path) { return orbis::io::write_ply(path, map.cloud); }, m.cloud_bytes);
@@ -150,8 +152,8 @@ result<map_results> write_map(built_map map, const settings& s, const std::files
     done = write(
         "cloud_filtered.ply", [&](const auto& path) { return orbis::io::write_ply(path, map.cloud, map.inliers); },
         m.filtered_bytes);
-  if (done) done = write("map_unfiltered.bt", bt_of(*map.unfiltered_octree), bt_bytes_unfiltered);
-  if (done) done = write("map.bt", bt_of(map.octree), bt_bytes);
+  if (done) done = write("map_unfiltered.bt", bt_writer(*map.unfiltered_octree), bt_bytes_unfiltered);
+  if (done) done = write("map.bt", bt_writer(map.octree), bt_bytes);
   if (done)
     done = write(
         "map.ot", [&](const auto& path) { return orbis::octree::write_ot(map.octree, path); }, m.ot_bytes);
@@ -160,8 +162,8 @@ result<map_results> write_map(built_map map, const settings& s, const std::files
   m.filter_mode = to_string(map.filter.mode);
   m.filter_reason = describe(map.moving) + map.filter.reason;
   m.resolution = s.resolution;
-  m.unfiltered = numbers_of(*map.unfiltered_octree, bt_bytes_unfiltered);
-  m.filtered = numbers_of(map.octree, bt_bytes);
+  m.unfiltered = count_leaves(*map.unfiltered_octree, bt_bytes_unfiltered);
+  m.filtered = count_leaves(map.octree, bt_bytes);
   m.insert_ms = std::move(map.insert_ms);
   m.voxels_unfiltered = occupied_voxels(*map.unfiltered_octree, map.cloud);
   m.voxels = occupied_voxels(map.octree, map.cloud, &map.inliers);

@@ -53,7 +53,7 @@ struct window {
 };
 
 /// The window of the floor map, or of all known space.
-window window_of(const navigation_picture& what) {
+window find_window(const navigation_picture& what) {
   if (what.floor != nullptr) {
     const auto& f = *what.floor;
     return {f.origin, f.origin + f.resolution * vec2(f.states.width(), f.states.height())};
@@ -101,7 +101,7 @@ orbis::image<rgb8> draw_slice(const navigation_picture& what, const window& w, i
 
 orbis::result<void> write_navigation_picture(const navigation_picture& what, const std::filesystem::path& path) {
   cv::setNumThreads(0);
-  const window w = window_of(what);
+  const window w = find_window(what);
   const vec2 size = (w.high - w.low).cwiseMax(1e-3);
   const int panels = (what.floor != nullptr ? 1 : 0) + (what.field != nullptr ? 1 : 0);
   constexpr double left = 80, top = 130, most_across = 640, most_down = 620, gap = 100;

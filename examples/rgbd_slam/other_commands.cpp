@@ -146,7 +146,7 @@ orbis::result<mapped> map_cloud_file(const settings& s, const std::filesystem::p
   auto found = examples::read_near_origin(s.input);
   if (!found) return orbis::fail(found.error());
   auto& [read, origin] = *found;
-  if (!read.fields.empty()) read.notes.push_back("not used: " + orbis::io::names_of(read.fields));
+  if (!read.fields.empty()) read.notes.push_back("not used: " + orbis::io::field_names(read.fields));
   read.fields.clear();
   orbis::point_cloud& cloud = read.cloud;
   const std::size_t in_file = cloud.size();
@@ -243,7 +243,7 @@ exit_code map_without_slam(const settings& s, console& console) {
       return give_up({orbis::errc::unsupported, s.input.string(), "a monocular recording cannot produce a map"});
     recording = *std::move(source);
   }
-  const auto inputs = inputs_of(s, recording ? recording->files : std::vector<std::filesystem::path>{});
+  const auto inputs = input_files(s, recording ? recording->files : std::vector<std::filesystem::path>{});
   if (const auto conflict = find_overwritten(s, inputs)) return console.error(*conflict), bad_usage;
   auto files = result_files::begin(s);
   if (!files) return give_up(files.error());

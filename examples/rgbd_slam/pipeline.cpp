@@ -28,7 +28,8 @@ namespace {
 
 /// Ends the run if it would overwrite a file that it must not replace, or cannot write its results.
 std::optional<exit_code> check_outputs(const frame_source& source, const settings& s, console& console) {
-  if (const auto conflict = find_overwritten(s, inputs_of(s, source.files))) return console.error(*conflict), bad_usage;
+  if (const auto conflict = find_overwritten(s, input_files(s, source.files)))
+    return console.error(*conflict), bad_usage;
   if (const auto unwritable = find_unwritable(s)) return console.error(*unwritable), bad_input;
   return std::nullopt;
 }

@@ -232,7 +232,7 @@ json script_data(const results& r, const view_frame& frame) {
 // -- the page's static parts -------------------------------------------------------------------------
 
 /// The unit of lengths.
-std::string unit_of(const results& r) { return r.slam ? r.slam->unit() : "metres"; }
+std::string length_unit(const results& r) { return r.slam ? r.slam->unit() : "metres"; }
 
 std::string card(const std::string& value, const std::string& what) {
   return "<div class=\"card\"><b>" + escaped(value) + "</b><span>" + escaped(what) + "</span></div>\n";
@@ -248,7 +248,7 @@ std::string header(const results& r) {
   }
   if (r.against_truth) h += card(text("%.1f mm", 1e3 * r.against_truth->ate_rmse_m), "trajectory error (ATE RMSE)");
   if (r.map && r.map->error_m) h += card(text("%.1f mm", 1e3 * *r.map->error_m), "map error (RMS to the surface)");
-  if (r.slam) h += card(text("%.1f ms", spread_of(r.slam->tracking_ms).median), "median time to track a frame");
+  if (r.slam) h += card(text("%.1f ms", measure_spread(r.slam->tracking_ms).median), "median time to track a frame");
   if (r.map) {
     h += card(count_text(r.map->filtered.leaves), "leaves in the octree");
     h += card(bytes_text(r.map->filtered.bt_bytes), "map on disk");
@@ -347,7 +347,7 @@ std::string tables(const results& r, const view_frame& frame) {
   }
   auto setup = r.setup;
   if (r.world) setup.emplace_back("world", world_text(*r.world));
-  const std::string note = view_frame_note(frame, unit_of(r));
+  const std::string note = view_frame_note(frame, length_unit(r));
   setup.emplace_back("pictures", (note.empty() ? "in the world frame of the files" : note) + "; T_view_world " +
                                      view_frame_text(frame));
   return t + "<h2>Input and settings</h2>\n" + text_table(setup);
@@ -355,7 +355,7 @@ std::string tables(const results& r, const view_frame& frame) {
 
 std::string time_table(const std::vector<double>& values) {
   if (values.empty()) return "<p class=\"soft\">Not measured: no scans were inserted.</p>";
-  const spread s = spread_of(values);
+  const spread s = measure_spread(values);
   return text(
       "<table><tr><th></th><th>median</th><th>95 %%</th><th>mean</th><th>max</th></tr>"
       "<tr><td>ms</td><td>%.2f</td><td>%.2f</td><td>%.2f</td><td>%.2f</td></tr></table>",
@@ -404,13 +404,13 @@ orbis::result<void> write_report(const results& r, const view_frame& frame) {
   choose(page, "map", r.map.has_value());
   choose(page, "slam", path);
   choose(page, "truth", r.against_truth.has_value());
-  const std::string note = view_frame_note(frame, unit_of(r));
+  const std::string note = view_frame_note(frame, length_unit(r));
   const auto picture = orbis::read_file(r.folder / "map.png");
   const std::string html = filled(page, {{"title", escaped(r.title)},
                                          {"header", header(r)},
                                          {"frame_note", note.empty() ? "" : "The view is " + note + "."},
                                          {"picture", picture ? "data:image/png;base64," + base64(*picture) : "data:,"},
-                                         {"unit", unit_of(r)},
+                                         {"unit", length_unit(r)},
                                          {"profile_height", r.against_truth ? "185" : "420"},
                                          {"tables", tables(r, frame)},
                                          {"tracking_table", r.slam ? time_table(r.slam->tracking_ms) : ""},

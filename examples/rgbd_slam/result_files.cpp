@@ -63,7 +63,7 @@ file_names recorded(const fs::path& folder) {
   return names;
 }
 
-fs::path folder_of(const fs::path& file) { return file.has_parent_path() ? file.parent_path() : fs::path{"."}; }
+fs::path parent_folder(const fs::path& file) { return file.has_parent_path() ? file.parent_path() : fs::path{"."}; }
 
 bool are_one_file(const fs::path& a, const fs::path& b) {
   std::error_code ignored;
@@ -71,7 +71,7 @@ bool are_one_file(const fs::path& a, const fs::path& b) {
 }
 
 using identity = std::pair<dev_t, ino_t>;
-std::optional<identity> identity_of(const fs::path& path) {
+std::optional<identity> find_identity(const fs::path& path) {
   struct stat status {};
   if (::stat(path.c_str(), &status) != 0) return std::nullopt;
   return identity{status.st_dev, status.st_ino};
@@ -108,7 +108,7 @@ file_names result_names(const settings& s) {
   return names;
 }
 
-std::vector<fs::path> inputs_of(const settings& s, std::vector<fs::path> source_files) {
+std::vector<fs::path> input_files(const settings& s, std::vector<fs::path> source_files) {
   std::vector<fs::path> inputs = std::move(source_files);
   inputs.push_back(s.input);
   inputs.push_back(s.config);
@@ -120,10 +120,10 @@ std::optional<orbis::error> find_overwritten(const std::vector<fs::path>& target
                                              const std::vector<fs::path>& inputs) {
   std::vector<std::pair<identity, fs::path>> there;
   for (const fs::path& target : targets)
-    if (const auto id = identity_of(target)) there.emplace_back(*id, target);
+    if (const auto id = find_identity(target)) there.emplace_back(*id, target);
   if (there.empty()) return std::nullopt;
   for (const fs::path& input : inputs) {
-    const auto id = identity_of(input);
+    const auto id = find_identity(input);
     for (const auto& [of_target, target] : there)
       if (id == of_target)
         return orbis::error{
@@ -136,7 +136,7 @@ std::optional<orbis::error> find_overwritten(const std::vector<fs::path>& target
 void finish_earlier_run(const settings& s) {
   staged_folder::finish(s.out);
   for (const fs::path& file : {s.save_map, s.floor_map})
-    if (!file.empty()) staged_folder::finish(folder_of(file));
+    if (!file.empty()) staged_folder::finish(parent_folder(file));
 }
 
 std::optional<orbis::error> find_overwritten(const settings& s, const std::vector<fs::path>& inputs) {
@@ -163,10 +163,10 @@ std::optional<orbis::error> find_overwritten(const settings& s, const std::vecto
 std::optional<orbis::error> find_unwritable(const settings& s) {
   std::vector<fs::path> folders{s.out};
   for (const fs::path& file : {s.save_map, s.floor_map})
-    if (!file.empty()) folders.push_back(folder_of(file));
+    if (!file.empty()) folders.push_back(parent_folder(file));
   for (const fs::path& folder : folders) {
     fs::path there = folder;
-    while (!is_there(there) && there.has_relative_path()) there = folder_of(there);
+    while (!is_there(there) && there.has_relative_path()) there = parent_folder(there);
     const std::string text = (there / "").string();  // must be a folder
     if (::access(text.c_str(), W_OK | X_OK) == 0) continue;
     const int why = errno;
@@ -190,7 +190,7 @@ result<result_files> result_files::begin(const settings& s) {
   std::error_code ec;
   // Adds a file that may be outside the output folder. `others`: all files that are created with it.
   const auto add = [&](const fs::path& file, const file_names& others, std::size_t& index) -> result<void> {
-    const fs::path folder = folder_of(file);
+    const fs::path folder = parent_folder(file);
     for (const fs::path& f : {s.out, folder})
       if (fs::create_directories(f, ec); ec)
         return orbis::fail(orbis::errc::write_failed, f.string(), "cannot be created: " + ec.message());

@@ -37,8 +37,8 @@ inline constexpr std::size_t most_maps = 9;
 void finish_earlier_run(const settings& s);
 
 /// All files that the run reads; `source_files`: those of the recording.
-[[nodiscard]] std::vector<std::filesystem::path> inputs_of(const settings& s,
-                                                           std::vector<std::filesystem::path> source_files);
+[[nodiscard]] std::vector<std::filesystem::path> input_files(const settings& s,
+                                                             std::vector<std::filesystem::path> source_files);
 /// Returns an error if one of the files `targets` is one of `inputs`, also by a link. Names may be empty.
 [[nodiscard]] std::optional<orbis::error> find_overwritten(const std::vector<std::filesystem::path>& targets,
                                                            const std::vector<std::filesystem::path>& inputs);

@@ -26,7 +26,7 @@ namespace app {
 struct spread {
   double median, p95, mean;
 };
-[[nodiscard]] spread spread_of(std::vector<double> values);
+[[nodiscard]] spread measure_spread(std::vector<double> values);
 
 /// An occupied cube of the map.
 struct voxel {

@@ -40,9 +40,10 @@ class sheet {
   /// `align`: 0: the text begins at `p`; 0.5: it is centred at `p`; 1: it ends at `p`.
   void text(const std::string& what, const orbis::vec2& p, const cv::Scalar& color = ink, double size = 13.0,
             double align = 0.0, bool bold = false) {
-    const cv::Point from(static_cast<int>((p.x() - align * width_of(what, size, bold)) * zoom),
+    const cv::Point from(static_cast<int>((p.x() - align * text_width(what, size, bold)) * zoom),
                          static_cast<int>(p.y() * zoom));
-    cv::putText(pixels_, what, from, cv::FONT_HERSHEY_SIMPLEX, scale_of(size), color, thickness_of(bold), cv::LINE_AA);
+    cv::putText(pixels_, what, from, cv::FONT_HERSHEY_SIMPLEX, font_scale(size), color, font_thickness(bold),
+                cv::LINE_AA);
   }
   /// Draws a legend entry that begins at `p`; returns the beginning of the next one.
   orbis::vec2 legend(const orbis::vec2& p, const cv::Scalar& color, const std::string& meaning) {
@@ -51,7 +52,7 @@ class sheet {
     dot(middle, faint, radius + 0.5);  // a rim, for colours that are almost white
     dot(middle, color, radius);
     text(meaning, p + orbis::vec2(to_text, 0.0), ink, size);
-    return p + orbis::vec2(to_text + width_of(meaning, size) + apart, 0.0);
+    return p + orbis::vec2(to_text + text_width(meaning, size) + apart, 0.0);
   }
   void paste(const orbis::image<orbis::rgb8>& picture, int x, int y) {
     const cv::Mat from(picture.height(), picture.width(), CV_8UC3,
@@ -67,11 +68,12 @@ class sheet {
   }
 
  private:
-  static double scale_of(double size) { return size * zoom / 30.0; }
-  static int thickness_of(bool bold) { return bold ? 3 : 2; }
-  static double width_of(const std::string& what, double size, bool bold = false) {
+  static double font_scale(double size) { return size * zoom / 30.0; }
+  static int font_thickness(bool bold) { return bold ? 3 : 2; }
+  static double text_width(const std::string& what, double size, bool bold = false) {
     int below = 0;
-    const cv::Size extent = cv::getTextSize(what, cv::FONT_HERSHEY_SIMPLEX, scale_of(size), thickness_of(bold), &below);
+    const cv::Size extent =
+        cv::getTextSize(what, cv::FONT_HERSHEY_SIMPLEX, font_scale(size), font_thickness(bold), &below);
     return static_cast<double>(extent.width) / zoom;
   }
   static cv::Point at(const orbis::vec2& p) {  // with four fractional bits

@@ -345,7 +345,7 @@ result<frame_source> open_file(const settings& s) {
 
 /// The sensor of the settings, or else the one that the folder's files indicate. A folder with depth and a second
 /// camera counts as RGB-D.
-sensor_kind sensor_of(const settings& s) {
+sensor_kind choose_sensor(const settings& s) {
   if (const auto wanted = wanted_sensor(s)) return *wanted;
   if (s.format == "images") return sensor_kind::monocular;
   if (s.format == "kitti" || s.format == "asl" || s.format == "pairs") return sensor_kind::stereo;
@@ -370,7 +370,7 @@ result<std::unique_ptr<camera_device>> open_device(const settings& s) {
   options.camera = *camera;
   std::error_code ignored;
   if (std::filesystem::is_directory(s.input, ignored)) {
-    options.sensor = sensor_of(s);
+    options.sensor = choose_sensor(s);
     return open_playback(options);
   }
   const bool is_number = !options.name.empty() && options.name.find_first_not_of("0123456789") == std::string::npos;
@@ -606,7 +606,7 @@ result<frame_source> open_source(const settings& s, console& console) {
       return result<frame_source>{fail(orbis::errc::invalid_argument, s.topics.empty() ? "--truth-topic" : "--topics",
                                        "needs a ROS bag; " + s.input.string() + " is none")};
     if (bag || std::filesystem::is_regular_file(s.input, ignored)) return open_file(s);
-    switch (sensor_of(s)) {
+    switch (choose_sensor(s)) {
       case sensor_kind::stereo: return open_stereo_recording(s);
       case sensor_kind::monocular: return open_mono_recording(s);
       default: return open_recording(s);

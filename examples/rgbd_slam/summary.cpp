@@ -32,7 +32,7 @@ json or_null(const std::optional<T>& value) {
 
 }  // namespace
 
-spread spread_of(std::vector<double> values) {
+spread measure_spread(std::vector<double> values) {
   constexpr double nan = std::numeric_limits<double>::quiet_NaN();
   if (values.empty()) return {nan, nan, nan};
   std::sort(values.begin(), values.end());
@@ -65,8 +65,8 @@ std::string summary_json(const results& r) {
   j["loops_closed"] = s ? json(s->loops_closed) : null;
   j["maps_merged"] = s ? json(s->maps_merged) : null;
   j["keyframes_culled"] = s ? json(s->keyframes_culled) : null;
-  const spread tracking = spread_of(s ? s->tracking_ms : std::vector<double>{});
-  const spread in_slam = spread_of(s ? s->slam_ms : std::vector<double>{});
+  const spread tracking = measure_spread(s ? s->tracking_ms : std::vector<double>{});
+  const spread in_slam = measure_spread(s ? s->slam_ms : std::vector<double>{});
   j["tracking_ms"] = {
       {"median", tracking.median}, {"p95", tracking.p95}, {"mean", tracking.mean}, {"p95_in_slam", in_slam.p95}};
   j["wall_s"] = r.wall_s;
@@ -109,7 +109,7 @@ std::string summary_json(const results& r) {
                 {"points_filtered", m ? json(m->kept.size()) : null},
                 {"bytes", m ? json(m->cloud_bytes) : null},
                 {"bytes_filtered", m ? json(m->filtered_bytes) : null}};
-  const spread insertion = spread_of(m ? m->insert_ms : std::vector<double>{});
+  const spread insertion = measure_spread(m ? m->insert_ms : std::vector<double>{});
   j["octree"] = {{"resolution_m", m ? json(m->resolution) : null},
                  {"leaves_unfiltered", m ? json(m->unfiltered.leaves) : null},
                  {"leaves", m ? json(m->filtered.leaves) : null},
@@ -120,10 +120,10 @@ std::string summary_json(const results& r) {
                  {"ot_bytes", m ? json(m->ot_bytes) : null},
                  {"insert_ms_per_frame", {{"median", insertion.median}, {"p95", insertion.p95}}}};
   const auto& l = r.live;
-  const spread live_insertion = spread_of(l ? l->insert_ms : std::vector<double>{});
-  const spread delay = spread_of(l ? l->delay_ms : std::vector<double>{});
-  const spread frame_delay = spread_of(l ? l->frame_delay_ms : std::vector<double>{});
-  const spread correction = spread_of(l ? l->correction_ms : std::vector<double>{});
+  const spread live_insertion = measure_spread(l ? l->insert_ms : std::vector<double>{});
+  const spread delay = measure_spread(l ? l->delay_ms : std::vector<double>{});
+  const spread frame_delay = measure_spread(l ? l->frame_delay_ms : std::vector<double>{});
+  const spread correction = measure_spread(l ? l->correction_ms : std::vector<double>{});
   const auto largest = [&](const std::vector<double>& ms) {
     return ms.empty() ? null : json(*std::max_element(ms.begin(), ms.end()));
   };

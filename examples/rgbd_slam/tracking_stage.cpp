@@ -152,11 +152,11 @@ void track_frames(slam_system& slam, const frame_source& source, const settings&
 std::optional<se3> present_pose(const orbis::slam::atlas& maps, const orbis::slam::map_keyframe& made) {
   const orbis::slam::map_keyframe now = maps.current(made);
   if (now.map != maps.active_id() || !maps.active().remembers(now.keyframe)) return std::nullopt;
-  return maps.active().pose_of(now.keyframe);
+  return maps.active().pose(now.keyframe);
 }
 
 /// The function by which the live map reads the poses of its keyframes.
-live_mapping::find_poses poses_of(const slam_system& slam) {
+live_mapping::find_poses make_pose_reader(const slam_system& slam) {
   return [&slam, seen = orbis::slam::pose_revision{.map = orbis::slam::no_id}](
              const std::vector<live_mapping::made>& keyframes, live_mapping::poses& poses, bool always) mutable {
     return slam.inspect([&](const orbis::slam::atlas& maps) {
@@ -175,7 +175,7 @@ live_mapping::find_poses poses_of(const slam_system& slam) {
 
 /// The function by which the viewer reads the keyframes and their graph: edges of the spanning tree, loop edges, and
 /// edges between keyframes that share many landmarks. All covisibility edges together would hide each other.
-auto graph_of(const slam_system& slam) {
+auto make_graph_reader(const slam_system& slam) {
   return [&slam, seen = orbis::slam::pose_revision{.map = orbis::slam::no_id}](slam_graph& graph, bool always) mutable {
     constexpr std::uint32_t many_shared = 100;
     return slam.inspect([&](const orbis::slam::atlas& maps) {
@@ -186,7 +186,7 @@ auto graph_of(const slam_system& slam) {
       for (const auto& asked : graph.asked) {
         const auto pose = present_pose(maps, asked);
         graph.poses.push_back(pose ? std::optional<orbis::sim3>{{pose->rotation(), pose->translation(),
-                                                                 map.scale_of(maps.current(asked).keyframe)}}
+                                                                 map.scale(maps.current(asked).keyframe)}}
                                    : std::nullopt);
       }
       graph.keyframes.clear();
@@ -212,8 +212,8 @@ auto graph_of(const slam_system& slam) {
 }
 
 /// The viewer's data sources during tracking. `live` may be null.
-scene_sources sources_of(const slam_system& slam, const live_mapping* live) {
-  scene_sources sources{.graph = graph_of(slam)};
+scene_sources make_sources(const slam_system& slam, const live_mapping* live) {
+  scene_sources sources{.graph = make_graph_reader(slam)};
   if (live == nullptr) return sources;
   sources.voxels = [live, seen = std::optional<std::uint64_t>{}](std::vector<voxel>& cubes) mutable {
     return live->occupied_since(seen, cubes);
@@ -298,9 +298,9 @@ orbis::result<tracked_frames> track(const frame_source& source, const shutter_re
   out.slam.sensor = source.sensor;
   if (s.live_map && !s.localize_only && !source.is_monocular())
     out.live = with_threads(viewer, console, [&] {
-      return std::make_unique<live_mapping>(source, s, out.keyframes.depths(), poses_of(slam));
+      return std::make_unique<live_mapping>(source, s, out.keyframes.depths(), make_pose_reader(slam));
     });
-  std::optional<viewer::connection> connection{std::in_place, viewer, sources_of(slam, out.live.get())};
+  std::optional<viewer::connection> connection{std::in_place, viewer, make_sources(slam, out.live.get())};
   interrupts::keep_results(s.quiet
                                ? ""
                                : "\nrgbd_slam: stopping; the results so far are mapped and written. Interrupt again to "

@@ -28,7 +28,7 @@ class voxel_colors {
   void remove(const orbis::vec3f& point, orbis::rgb8 color);
   /// The mean colour of the points in a cube of whole voxels; if there are none, of the points in the neighbouring
   /// voxels; empty if there are none either.
-  [[nodiscard]] std::optional<orbis::rgb8> color_of(const voxel& cube) const;
+  [[nodiscard]] std::optional<orbis::rgb8> mean_color(const voxel& cube) const;
   /// The number of voxels with points.
   [[nodiscard]] std::size_t size() const { return index_.size(); }
   /// Bytes on the heap.

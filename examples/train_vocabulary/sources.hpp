@@ -32,8 +32,9 @@ struct view {
 };
 
 /// The view of a frame.
-[[nodiscard]] inline view view_of(const orbis::features::orb_extractor& extract, const orbis::camera::rgbd_frame& frame,
-                                  const orbis::camera::camera_settings& camera, std::size_t place) {
+[[nodiscard]] inline view make_view(const orbis::features::orb_extractor& extract,
+                                    const orbis::camera::rgbd_frame& frame,
+                                    const orbis::camera::camera_settings& camera, std::size_t place) {
   view v{.place = place, .T_world_camera = frame.T_world_camera.value_or(orbis::se3{})};
   const auto depth = frame.depth_metres();
   constexpr int step = 32;
@@ -99,7 +100,7 @@ struct tour {
       for (orbis::rgb8& c : frame.color.pixels())
         c = {static_cast<std::uint8_t>(c.r * 3 / 4), static_cast<std::uint8_t>(c.g * 3 / 4),
              static_cast<std::uint8_t>(c.b * 3 / 4)};
-    seen.views[i] = view_of(extract, frame, seen.camera, place);
+    seen.views[i] = make_view(extract, frame, seen.camera, place);
   });
   return seen;
 }
@@ -114,7 +115,7 @@ struct tour {
   for (std::size_t i = 0; i < recording->size(); i += stride) {
     const auto frame = recording->frame(i);
     if (!frame) return orbis::fail(frame.error());
-    seen.views.push_back(view_of(extract, *frame, seen.camera, place));
+    seen.views.push_back(make_view(extract, *frame, seen.camera, place));
   }
   return seen;
 }

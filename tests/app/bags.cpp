@@ -93,12 +93,12 @@ TEST_CASE("A camera of a bag that cannot have made its images is refused") {
   };
   for (const bool is_rectified : {false, true}) {
     with_focal(130.0);
-    CHECK(app::ros_messages::camera_of(info, is_rectified, "a.bag"));
+    CHECK(app::ros_messages::make_camera(info, is_rectified, "a.bag"));
     with_focal(0.000001);
-    CHECK_THAT(message_of(app::ros_messages::camera_of(info, is_rectified, "a.bag")),
+    CHECK_THAT(message_of(app::ros_messages::make_camera(info, is_rectified, "a.bag")),
                Contains("a.bag: fx = 1e-06 is too short"));
     with_focal(0.0);
-    CHECK_THAT(message_of(app::ros_messages::camera_of(info, is_rectified, "a.bag")), Contains("calibrated?"));
+    CHECK_THAT(message_of(app::ros_messages::make_camera(info, is_rectified, "a.bag")), Contains("calibrated?"));
   }
 }
 

@@ -449,7 +449,7 @@ TEST_CASE("a message of ROS 2 in big-endian order is read") {
   const auto m = app::ros_messages::parse<app::ros_messages::image>(bytes, app::message_encoding::cdr, "a").value();
   CHECK(m.header.stamp == 5'000'000'007);
   CHECK(m.header.frame_id == "camera");
-  const auto depth = app::depth_of(m, "a").value();
+  const auto depth = app::decode_depth(m, "a").value();
   CHECK(depth(0, 0) == 1000);
   CHECK(depth(2, 0) == 1002);
   CHECK(depth(2, 1) == 1005);
@@ -458,10 +458,10 @@ TEST_CASE("a message of ROS 2 in big-endian order is read") {
 TEST_CASE("big-endian depth and colours of four channels have the right values") {
   using app::ros_messages::image;
   const std::string metres{"\x3f\xc0\0\0", 4};  // 1.5
-  CHECK(app::depth_of(image{{}, 1, 1, "32FC1", 1, 4, metres}, "a").value()(0, 0) == 7500);
+  CHECK(app::decode_depth(image{{}, 1, 1, "32FC1", 1, 4, metres}, "a").value()(0, 0) == 7500);
   const std::string pixels{"\1\2\3\xff\4\5\6\0", 8};
   const auto color = [&](const char* encoding) {
-    return app::color_of(image{{}, 1, 2, encoding, 0, 8, pixels}, "a").value();
+    return app::decode_color(image{{}, 1, 2, encoding, 0, 8, pixels}, "a").value();
   };
   CHECK(color("rgba8")(0, 0) == rgb8{1, 2, 3});
   CHECK(color("rgba8")(1, 0) == rgb8{4, 5, 6});

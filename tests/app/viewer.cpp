@@ -287,15 +287,15 @@ TEST_CASE("The colour of a voxel is the mean of its points, what is taken out le
   colors.add({0.06F, 0.05F, 0.05F}, {200, 50, 0});
   const voxel here{{0.05F, 0.05F, 0.05F}, 0.1F}, beside{{0.15F, 0.05F, 0.05F}, 0.1F}, far{{0.35F, 0.05F, 0.05F}, 0.1F},
       large{{0.2F, 0.2F, 0.2F}, 0.4F};
-  CHECK(colors.color_of(here) == rgb8{150, 25, 0});
-  CHECK(colors.color_of(beside) == rgb8{150, 25, 0});
-  CHECK_FALSE(colors.color_of(far));
-  CHECK(colors.color_of(large) == rgb8{150, 25, 0});
+  CHECK(colors.mean_color(here) == rgb8{150, 25, 0});
+  CHECK(colors.mean_color(beside) == rgb8{150, 25, 0});
+  CHECK_FALSE(colors.mean_color(far));
+  CHECK(colors.mean_color(large) == rgb8{150, 25, 0});
   colors.remove({0.05F, 0.05F, 0.05F}, {100, 0, 0});
-  CHECK(colors.color_of(here) == rgb8{200, 50, 0});
+  CHECK(colors.mean_color(here) == rgb8{200, 50, 0});
   colors.remove({0.06F, 0.05F, 0.05F}, {200, 50, 0});
-  CHECK_FALSE(colors.color_of(here));
-  CHECK_FALSE(colors.color_of({{1e9F, 0.0F, 0.0F}, 0.1F}));
+  CHECK_FALSE(colors.mean_color(here));
+  CHECK_FALSE(colors.mean_color({{1e9F, 0.0F, 0.0F}, 0.1F}));
   colors.add({std::nanf(""), 0.0F, 0.0F}, {1, 1, 1});
 }
 
@@ -313,7 +313,7 @@ TEST_CASE("What voxels without points took is used again") {
   }
   CHECK(colors.size() == 100);
   CHECK(colors.memory_bytes() <= 2 * memory);
-  CHECK(colors.color_of({at_step(9999), 0.1F}) == rgb8{1, 2, 3});
+  CHECK(colors.mean_color({at_step(9999), 0.1F}) == rgb8{1, 2, 3});
 }
 
 namespace {

@@ -11,8 +11,8 @@ TEST_CASE("chains have names") {
   orbis::cloud::density_step density;
   density.mode = filter_mode::range_log_statistical;
   CHECK(to_string(filter_chain{density, orbis::cloud::cluster_options{}}) == "range-log-statistical+cluster");
-  CHECK(mode_of(orbis::cloud::ray_step{}) == filter_mode::ray_evidence);
-  CHECK(mode_of(orbis::cloud::isolation_step{}) == filter_mode::isolation);
-  CHECK(mode_of(orbis::cloud::statistical_options{}) == filter_mode::statistical);
-  CHECK(mode_of(orbis::cloud::radius_options{}) == filter_mode::radius);
+  CHECK(step_mode(orbis::cloud::ray_step{}) == filter_mode::ray_evidence);
+  CHECK(step_mode(orbis::cloud::isolation_step{}) == filter_mode::isolation);
+  CHECK(step_mode(orbis::cloud::statistical_options{}) == filter_mode::statistical);
+  CHECK(step_mode(orbis::cloud::radius_options{}) == filter_mode::radius);
 }

@@ -49,7 +49,7 @@ void add_uniform(orbis::test::points& cloud, std::size_t n, std::uint64_t seed) 
 }
 
 bool has_step(const orbis::cloud::filter_chain& chain, filter_mode mode) {
-  return std::any_of(chain.begin(), chain.end(), [&](const auto& step) { return mode_of(step) == mode; });
+  return std::any_of(chain.begin(), chain.end(), [&](const auto& step) { return step_mode(step) == mode; });
 }
 
 std::vector<double> thresholds(const orbis::cloud::filter_choice& choice) {

@@ -27,14 +27,14 @@ TEST_CASE("samples of a view lie on a grid over its image and know their tile") 
   view_samples samples;
   samples.add(camera, view);
   REQUIRE(samples.points().size() == 400 - 3);
-  REQUIRE(samples.tile_of().size() == 400 - 3);
+  REQUIRE(samples.tiles_by_point().size() == 400 - 3);
   std::size_t wrong = 0;
   for (std::size_t i = 0; i != samples.points().size(); ++i) {
     const orbis::vec3 seen = samples.points()[i].cast<double>() - orbis::vec3{0.5, 0, 1};
     const auto pixel = camera.project(seen);
     REQUIRE(pixel);
     const auto tile = static_cast<std::uint32_t>(pixel->y() / 15) * 4 + static_cast<std::uint32_t>(pixel->x() / 20);
-    wrong += seen.z() != 2.0 || samples.tile_of()[i] != tile ? 1 : 0;
+    wrong += seen.z() != 2.0 || samples.tiles_by_point()[i] != tile ? 1 : 0;
   }
   CHECK(wrong == 0);
 
@@ -46,7 +46,7 @@ TEST_CASE("samples of a view lie on a grid over its image and know their tile") 
   samples.add(camera, view);
   CHECK(samples.views() == 4);
   CHECK(samples.points().size() == 2 * (400 - 3));
-  CHECK(samples.tile_of()[400 - 3] == 3 * 16 + samples.tile_of()[0]);
+  CHECK(samples.tiles_by_point()[400 - 3] == 3 * 16 + samples.tiles_by_point()[0]);
 }
 
 TEST_CASE("samples of a view may be more than its pixels") {
@@ -57,6 +57,6 @@ TEST_CASE("samples of a view may be more than its pixels") {
     view_samples samples{{}, across};
     samples.add(camera, view);
     CHECK(samples.points().size() == static_cast<std::size_t>(across * across));
-    CHECK(*std::max_element(samples.tile_of().begin(), samples.tile_of().end()) < 16);
+    CHECK(*std::max_element(samples.tiles_by_point().begin(), samples.tiles_by_point().end()) < 16);
   }
 }

@@ -44,7 +44,7 @@ static_assert(!bit_string_range_of<std::vector<four_words>, 512> && !bit_string_
 
 TEST_CASE("the words of a bit string are its bytes, and its distance is the number of different bits") {
   const four_words x{1, 2, 3, ~std::uint64_t{0}}, y{1, 0, 0, 0};
-  CHECK(words_of(x) == bit_words<256>{1, 2, 3, ~std::uint64_t{0}});
-  CHECK(hamming_distance(words_of(x), words_of(x)) == 0);
-  CHECK(hamming_distance(words_of(x), words_of(y)) == 1 + 2 + 64);
+  CHECK(as_words(x) == bit_words<256>{1, 2, 3, ~std::uint64_t{0}});
+  CHECK(hamming_distance(as_words(x), as_words(x)) == 0);
+  CHECK(hamming_distance(as_words(x), as_words(y)) == 1 + 2 + 64);
 }

@@ -54,7 +54,7 @@ void check_singular(const MatrixXd& m, const MatrixXd& u, const VectorXd& values
 }
 template <int N>
 void check_singular(const MatrixXd& m) {
-  const auto s = singular_values_of<N>(matrix<N, N>(m));
+  const auto s = svd<N>(matrix<N, N>(m));
   check_singular(m, s.u, s.values, s.v);
 }
 

@@ -55,9 +55,9 @@ void check_sizes(random_bits& random) {
   CHECK(near(Eigen::MatrixXd(d), Eigen::MatrixXd(y)));
   CHECK(std::abs(squared_norm(a) - x.squaredNorm()) < 1e-12);
   CHECK(std::abs(norm(a) - x.norm()) < 1e-12);
-  CHECK(std::abs(sum_of(a) - x.sum()) < 1e-12);
-  CHECK(smallest_of(a) == x.minCoeff());
-  CHECK(largest_of(a) == x.maxCoeff());
+  CHECK(std::abs(sum(a) - x.sum()) < 1e-12);
+  CHECK(min_entry(a) == x.minCoeff());
+  CHECK(max_entry(a) == x.maxCoeff());
   CHECK(largest_magnitude(a) == x.cwiseAbs().maxCoeff());
   CHECK(near(Eigen::MatrixXd(column_of(a, K - 1)), Eigen::MatrixXd(x.col(K - 1)), 0.0));
   CHECK(near(Eigen::MatrixXd(row_of(a, R - 1)), Eigen::MatrixXd(x.row(R - 1).transpose()), 0.0));

@@ -26,14 +26,14 @@ trajectory walk(std::size_t poses, double scale, double noise, std::uint64_t see
 
 TEST_CASE("The scale of a trajectory is found with its deviation") {
   const trajectory truth = walk(300, 1.0, 0.0, 1);
-  const auto exact = eval::scale_of(walk(300, 0.8, 0.0, 1), truth);
+  const auto exact = eval::estimate_scale(walk(300, 0.8, 0.0, 1), truth);
   REQUIRE(exact);
   CHECK(exact->scale == Approx(1.25));
   CHECK(exact->deviation < 1e-9);
   CHECK(exact->pairs == 300);
   double squared = 0.0;
   for (std::uint64_t seed = 0; seed != 40; ++seed) {
-    const auto noisy = eval::scale_of(walk(300, 1.0, 0.01, seed), truth);
+    const auto noisy = eval::estimate_scale(walk(300, 1.0, 0.01, seed), truth);
     REQUIRE(noisy);
     squared += (noisy->scale - 1.0) * (noisy->scale - 1.0) / (noisy->deviation * noisy->deviation) / 40.0;
   }
@@ -42,10 +42,10 @@ TEST_CASE("The scale of a trajectory is found with its deviation") {
 }
 
 TEST_CASE("The scale of a short trajectory has no deviation, and that of none is an error") {
-  const auto few = eval::scale_of(walk(20, 0.5, 0.0, 1), walk(20, 1.0, 0.0, 1));
+  const auto few = eval::estimate_scale(walk(20, 0.5, 0.0, 1), walk(20, 1.0, 0.0, 1));
   REQUIRE(few);
   CHECK(few->scale == Approx(2.0));
   CHECK(std::isinf(few->deviation));
-  CHECK_FALSE(eval::scale_of({}, walk(20, 1.0, 0.0, 1)));
-  CHECK_FALSE(eval::scale_of(walk(20, 0.0, 0.0, 1), walk(20, 1.0, 0.0, 1)));
+  CHECK_FALSE(eval::estimate_scale({}, walk(20, 1.0, 0.0, 1)));
+  CHECK_FALSE(eval::estimate_scale(walk(20, 0.0, 0.0, 1), walk(20, 1.0, 0.0, 1)));
 }

@@ -78,7 +78,7 @@ TEST_CASE("matching along lines equals a search through all trains with the dist
     };
     const auto expected = test::naive_candidates(q, t, may);
     if (trains == 400) CHECK(expected.size() > 50);
-    CHECK(test::candidates_of(epipolar(hamming{}, rule), view_of(q), view_of(t), {.reverse = true}, geometry) ==
+    CHECK(test::candidates_of(epipolar(hamming{}, rule), as_view(q), as_view(t), {.reverse = true}, geometry) ==
           expected);
   }
 }

@@ -27,10 +27,10 @@ class fundamental_geometry {
       : fundamental_geometry{transposed(inverse(K_train)) * essential(T_train_query) * inverse(K_query)} {}
 
   [[nodiscard]] std::optional<features::epipolar_line> line(std::size_t, const features::keypoint& k) const noexcept {
-    return features::line_of(F_ * vec3{k.x, k.y, 1.0});
+    return features::to_line(F_ * vec3{k.x, k.y, 1.0});
   }
   [[nodiscard]] vec2f point(std::size_t, const features::keypoint& k) const noexcept { return {k.x, k.y}; }
-  [[nodiscard]] std::optional<vec2f> epipole() const noexcept { return features::pixel_of(epipole_); }
+  [[nodiscard]] std::optional<vec2f> epipole() const noexcept { return features::to_pixel(epipole_); }
   [[nodiscard]] const mat3& matrix() const noexcept { return F_; }
 
   /// `[t]x R`: `r_train^T E r_query = 0` for the rays of matching keypoints.

@@ -52,7 +52,7 @@ TEST_CASE("the predicted level is that of the ratio of distances, rounded up") {
 TEST_CASE("a window grows with the level and the angle, and there is none out of range") {
   const projection_rule rule{};
   const projection p{100.0F, 50.0F, 2.1F, 1.0F, 1.0F, 2.0F * 1.2F * 1.2F};
-  const window w = window_of(p, rule);
+  const window w = search_window(p, rule);
   CHECK(w.x == 100.0F);
   CHECK(w.y == 50.0F);
   CHECK(w.radius == Approx(4.0 * 1.44));
@@ -61,7 +61,7 @@ TEST_CASE("a window grows with the level and the angle, and there is none out of
   const auto with = [&](auto change) {
     projection changed = p;
     change(changed);
-    return window_of(changed, rule);
+    return search_window(changed, rule);
   };
   CHECK(with([](projection& x) { x.cosine = 0.9F; }).radius == Approx(1.6 * 4.0 * 1.44));
   CHECK(with([](projection& x) { x.cosine = 0.49F; }).radius < 0.0F);
@@ -106,8 +106,8 @@ TEST_CASE("projected matching equals a search through all trains with every rule
   const auto source = projected(hamming{}, rule);
   const search_needs reverse{.reverse = true};
   CHECK(expected.size() > 50);
-  CHECK(test::candidates_of(source, view_of(q), view_of(t), reverse, points, project) == expected);
-  CHECK(test::candidates_of(source, view_of(q), view_of(t), reverse, points, project,
+  CHECK(test::candidates_of(source, as_view(q), as_view(t), reverse, points, project) == expected);
+  CHECK(test::candidates_of(source, as_view(q), as_view(t), reverse, points, project,
                             keypoint_grid{t.keypoints, 33.0F}) == expected);
 }
 

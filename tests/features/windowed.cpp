@@ -89,7 +89,7 @@ TEST_CASE("windowed matching equals a search through all trains with the windows
          static_cast<float>(random.uniform(-5.0, 90.0)), static_cast<int>(random.below(5)), 6};
 
   const auto source = windowed(hamming{});
-  const auto found = test::candidates_of(source, view_of(q), view_of(t), {.reverse = true}, windows);
+  const auto found = test::candidates_of(source, as_view(q), as_view(t), {.reverse = true}, windows);
 
   std::vector<candidate> expected;
   for (std::uint32_t i = 0; i != q.size(); ++i) {

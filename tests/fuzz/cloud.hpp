@@ -44,7 +44,7 @@ inline void check_fields(const io::cloud_with_fields& read, const point_cloud& c
   require(read.cloud.colors == cloud.colors && read.cloud.size() == cloud.size(), "fields do not change the cloud");
   std::set<std::string> names;
   for (const io::cloud_field& field : read.fields) {
-    require(field.bytes.size() == cloud.size() * field.count * io::detail::size_of(field.type),
+    require(field.bytes.size() == cloud.size() * field.count * io::detail::byte_size(field.type),
             "numbers of all points");
     require(!field.name.empty() && names.insert(field.name).second, "fields have different names");
   }

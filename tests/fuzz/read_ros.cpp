@@ -59,15 +59,15 @@ template <class Message>
 void check_images(std::string_view bytes, app::message_encoding encoding, std::size_t most_bytes) {
   const auto m = message_of<Message>(bytes, encoding);
   if (!m) return;
-  check_image([&] { return app::color_of(*m, "fuzz.bag"); }, most_bytes);
-  check_image([&] { return app::depth_of(*m, "fuzz.bag"); }, most_bytes);
+  check_image([&] { return app::decode_color(*m, "fuzz.bag"); }, most_bytes);
+  check_image([&] { return app::decode_depth(*m, "fuzz.bag"); }, most_bytes);
 }
 
 void check_camera(std::string_view bytes, app::message_encoding encoding) {
   const auto m = message_of<ros::camera_info>(bytes, encoding);
   if (!m) return;
   for (const bool rectified : {false, true}) {
-    const auto read = ros::camera_of(*m, rectified, "fuzz.bag");
+    const auto read = ros::make_camera(*m, rectified, "fuzz.bag");
     if (!read) {
       check_error(read.error());
       continue;

@@ -67,7 +67,7 @@ bool meets(const map_type& map, const fcl_shape& shape, occupancy unknown) {
       for (std::uint32_t x = keys->low.x; x <= keys->high.x; ++x) {
         const occupancy state = map.state(octree::voxel_key{x, y, z});
         if (state == occupancy::occupied || (state == occupancy::unknown && unknown == occupancy::occupied))
-          found = found || touches(shape, octree::cube_of(map.grid(), {x, y, z}, 0));
+          found = found || touches(shape, octree::node_cube(map.grid(), {x, y, z}, 0));
       }
   return found;
 }

@@ -123,16 +123,16 @@ TEST_CASE("a PCL cloud's sensor origin is known where somebody said it") {
 
 TEST_CASE("an organised PCL cloud is an image in place") {
   auto theirs = interop::to_pcl(some_cloud(12));
-  CHECK_FALSE(interop::image_of(theirs));
+  CHECK_FALSE(interop::as_image(theirs));
   theirs.width = 4;
   theirs.height = 3;
-  const auto image = interop::image_of(theirs).value();
+  const auto image = interop::as_image(theirs).value();
   CHECK((image.width() == 4 && image.height() == 3 && image.data() == theirs.points.data()));
   CHECK(&image(1, 2) == &theirs.at(1, 2));
   theirs.width = 5;  // says more than there is
-  const auto refused = interop::image_of(theirs);
+  const auto refused = interop::as_image(theirs);
   REQUIRE_FALSE(refused);
   CHECK(refused.error().message == "is not organised: 12 points, 5x3");
-  CHECK(interop::image_of(pcl::PointCloud<pcl::PointXYZ>{})->empty());
+  CHECK(interop::as_image(pcl::PointCloud<pcl::PointXYZ>{})->empty());
 }
 #endif

@@ -368,7 +368,7 @@ TEST_CASE("coordinates may have names in upper case, but names in lower case com
     t.columns.push_back(column_of("x", scalar_type::float32, {8, 9}));
     const auto read = parse(t, f);
     CHECK(read.cloud.points.at(1) == orbis::vec3f(9, 1.25F, 1.25F));
-    CHECK(io::names_of(read.fields) == "X");
+    CHECK(io::field_names(read.fields) == "X");
   }
 }
 
@@ -380,14 +380,14 @@ TEST_CASE("what a cloud leaves out is noted") {
   const auto ply = parse(t, formats[0]);
   CHECK(ply.notes ==
         std::vector<std::string>{"left out: 2 of element sensor, list neighbors, 1 of element face, another x"});
-  CHECK(io::names_of(ply.fields) == "intensity");
+  CHECK(io::field_names(ply.fields) == "intensity");
 
   const std::string words =
       "FIELDS x y z label n\nSIZE 4 4 4 4 4\nTYPE F F F F F\nWIDTH 2\nDATA ascii\n1 2 3 4 5\n6 7 8 wall 9\n";
   const auto read = io::parse_pcd_with_fields(words).value();
   CHECK(read.cloud.points.at(1).z() == 8.0F);
   CHECK(read.notes == std::vector<std::string>{"left out: label (no number in line 7)"});
-  CHECK(io::names_of(read.fields) == "n");
+  CHECK(io::field_names(read.fields) == "n");
 
   t = {.points = 1, .columns = coordinates(1)};
   CHECK(parse(t, formats[3]).notes.empty());
@@ -398,7 +398,7 @@ TEST_CASE("what a cloud leaves out is noted") {
     const auto read = parse(t, f);
     CHECK_FALSE(read.cloud.has_colors());
     CHECK(has_note(read, "no colours: green is missing"));
-    CHECK(io::names_of(read.fields) == "red, gren, blue");
+    CHECK(io::field_names(read.fields) == "red, gren, blue");
     table packed = t;
     packed.columns.push_back(column_of("rgb", scalar_type::uint32, {0x010203}));
     CHECK(parse(packed, f).cloud.colors == std::vector<rgb8>{{1, 2, 3}});
@@ -538,7 +538,7 @@ TEST_CASE("the properties of a PLY have different names") {
   const std::vector<std::uint32_t> all{0};
   REQUIRE(io::write_cloud(folder / "a.ply", parse(t, formats[4]), all));
   const auto read = io::read_cloud_with_fields(folder / "a.ply").value();
-  CHECK(io::names_of(read.fields) == "f_1, f_2, f_0, f_2_0, f_2_1");
+  CHECK(io::field_names(read.fields) == "f_1, f_2, f_0, f_2_0, f_2_1");
   for (std::size_t k = 0; k != 5; ++k) CHECK(numbers(read.fields.at(k)) == std::vector{static_cast<double>(k + 1)});
 }
 

@@ -42,7 +42,7 @@ TEST_CASE("the extension of a path is the format of a cloud, in upper and lower 
   }
   CHECK(io::read_cloud(folder.write("b.PCD", "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH 1\nDATA ascii\n1 2 3\n")));
   for (const char* name : {"a.xyz", "a", ".ply", "a.plyx"}) {
-    CHECK_FALSE(io::cloud_format_of(folder / name));
+    CHECK_FALSE(io::cloud_format_by_extension(folder / name));
     CHECK(io::write_cloud(folder / name, cloud, all).error().code == orbis::errc::invalid_argument);
     CHECK_FALSE(std::filesystem::exists(folder / name));
   }

@@ -152,7 +152,7 @@ TEST_CASE("A path over a floor is as cheap as Dijkstra's, free, and at the floor
       for (const auto* p : {&grid, &path}) {
         CHECK(flat(p->points.front()) == flat(start));
         CHECK(flat(p->points.back()) == flat(goal));
-        CHECK(p->cost == Approx(nav::cost_of(view, p->points)));
+        CHECK(p->cost == Approx(nav::path_cost(view, p->points)));
         for (std::size_t j = 0; j != p->points.size(); ++j) {
           CHECK(p->points[j].z() == Approx(0.01 * (*map.cell(p->points[j]))[0]).margin(1e-6));
           if (j == 0) continue;
@@ -224,7 +224,7 @@ TEST_CASE("A path over a cost map") {
   CHECK(highest(near) < nav::floor_cost::inscribed);
   CHECK(highest(far) < highest(near));
   CHECK(far.length > near.length);
-  CHECK(far.cost < nav::cost_of(wary, near.points));
+  CHECK(far.cost < nav::path_cost(wary, near.points));
   CHECK(near.cost == Approx(near.length));
 }
 
@@ -254,8 +254,8 @@ TEST_CASE("What a long way to the corner of a floor costs is asked of its cells 
     for (int i = 0; i != 5; ++i) {
       const vec3 p = corner + map.resolution * vec3{random.uniform(0.0, 20000.0), random.uniform(0.0, 3.0), 0.0};
       const double length = (p - corner).norm();
-      CHECK(nav::cost_of(view, {p, corner}) == Approx(length).epsilon(1e-12));
-      CHECK(nav::cost_of(view, {corner, p}) == Approx(length).epsilon(1e-12));
+      CHECK(nav::path_cost(view, {p, corner}) == Approx(length).epsilon(1e-12));
+      CHECK(nav::path_cost(view, {corner, p}) == Approx(length).epsilon(1e-12));
     }
     CHECK(view.outside == 0);
   }

@@ -192,7 +192,7 @@ TEST_CASE("A path over the voxels is as short as Dijkstra's, and shortening keep
       CHECK(grid.length == Approx(expected).epsilon(1e-12));
       CHECK(grid.points.back() == goal);
       CHECK(path.points.back() == goal);
-      CHECK(path.length == Approx(nav::length_of(path.points)));
+      CHECK(path.length == Approx(nav::path_length(path.points)));
       CHECK(path.length >= (goal - start).norm() - 1e-12);
       bent += path.points.size() > 2 ? 1 : 0;
     }
@@ -428,7 +428,7 @@ TEST_CASE("A path that keeps its distance is as cheap as Dijkstra's, and shorten
         CHECK(p->points.front() == start);
         CHECK(p->points.back() == goal);
         CHECK(p->cost >= p->length * (1.0 - 1e-9));
-        CHECK(p->cost == Approx(nav::cost_of(view, p->points)));
+        CHECK(p->cost == Approx(nav::path_cost(view, p->points)));
         for (std::size_t j = 1; j < p->points.size(); ++j)
           CHECK(is_free(map, p->points[j - 1], p->points[j], radius, unknown));
       }
@@ -534,7 +534,7 @@ TEST_CASE("A path keeps away from a wall if that is worth the way") {
   REQUIRE(direct.status == path_status::found);
   REQUIRE(wide.status == path_status::found);
   CHECK(wide.length > direct.length);
-  CHECK(wide.cost < nav::cost_of(wary, direct.points));
+  CHECK(wide.cost < nav::path_cost(wary, direct.points));
   CHECK(nearest(direct) < 0.25);
   CHECK(nearest(wide) > 0.25);
 }
@@ -609,13 +609,13 @@ TEST_CASE("Shortening ends after as many checks as it may do") {
       nav::shorten_path(view, points, checks);
       CHECK(view.asked <= checks);
       bounded += checks == 30 && view.asked == checks ? 1 : 0;
-      CHECK(nav::length_of(points) <= grid.length + 1e-12);
+      CHECK(nav::path_length(points) <= grid.length + 1e-12);
       CHECK(points.front() == grid.points.front());
       CHECK(points.back() == grid.points.back());
       for (std::size_t j = 1; j < points.size(); ++j)
         CHECK(is_free(map, points[j - 1], points[j], 0.12, occupancy::occupied));
-      shorter += checks == 2000 && nav::length_of(points) < before - 1e-6 ? 1 : 0;
-      before = nav::length_of(points);
+      shorter += checks == 2000 && nav::path_length(points) < before - 1e-6 ? 1 : 0;
+      before = nav::path_length(points);
     }
   }
   CHECK(bounded > 10);

@@ -118,7 +118,7 @@ TEST_CASE("Changes away from the path never lead to a new one, a wall across it 
     CHECK(path.points.front() == position);
     CHECK(path.points.back() == vec3{5.0, 1.5, 0.5});
     CHECK(path.length <= first.length + 1e-9);
-    CHECK(path.length == Approx(nav::length_of(path.points)));
+    CHECK(path.length == Approx(nav::path_length(path.points)));
   }
   CHECK(planner.planned() == 1);
   CHECK(position.x() > 1.8);
@@ -248,7 +248,7 @@ TEST_CASE("A robot on the floor plans again only when a new floor map touches it
     CHECK(path.points.front() == vec3{position.x(), position.y(), 0.2F});
     CHECK(path.points.back() == goal);
     CHECK(path.length <= first.length + 1e-9);
-    CHECK(path.length == Approx(nav::length_of(path.points)));
+    CHECK(path.length == Approx(nav::path_length(path.points)));
   }
   CHECK(planner.planned() == 1);
   CHECK(position.x() > 1.8);

@@ -138,7 +138,7 @@ TEST_CASE("What shapes sweep is what they touch at some moment") {
 TEST_CASE("Balls cover a shape, and smaller ones lie in it") {
   random_bits random{32};
   const auto check = [&](const auto& shape) {
-    const nav::ball_cover cover = cover_of(shape);
+    const nav::ball_cover cover = covering_balls(shape);
     REQUIRE(cover.count >= 1);
     CHECK(cover.count < 50);  // also of what is thin: each is looked at on each step
     CHECK(cover.inner > 0.0);

@@ -32,7 +32,7 @@ struct pendulum {
 [[nodiscard]] octree::capsule swept(const pendulum& s, const vec3& a, const vec3& b) {
   return {a - s.length * vec3::UnitZ(), b - s.length * vec3::UnitZ(), s.radius};
 }
-[[nodiscard]] nav::ball_cover cover_of(const pendulum& s) { return {-s.length, 0.0, 1, s.radius, s.radius}; }
+[[nodiscard]] nav::ball_cover covering_balls(const pendulum& s) { return {-s.length, 0.0, 1, s.radius, s.radius}; }
 static_assert(nav::robot_shape<pendulum>);
 static_assert(nav::inflatable_space<nav::planning_view<octree::occupancy_octree<>, pendulum>>);
 static_assert(nav::inflatable_space<nav::floor_view>);
@@ -134,7 +134,7 @@ void check(const View& view, const std::vector<vec3>& points, const nav::motion_
   CHECK(top_acceleration <= limits.acceleration * (1.0 + 1e-9));
   CHECK(jump <= limits.acceleration * dt * (1.0 + 1e-6) + 1e-12);        // velocity is the integral of what is bounded
   CHECK(slope <= limits.acceleration * dt * dt * (1.0 + 1e-6) + 1e-12);  // and position the integral of velocity
-  CHECK(length <= nav::length_of(points) + 1e-9);
+  CHECK(length <= nav::path_length(points) + 1e-9);
 }
 
 }  // namespace
@@ -351,7 +351,7 @@ TEST_CASE("Legs that are next to nothing, or nothing, leave a trajectory within 
     CHECK(top_acceleration <= limits.acceleration * (1.0 + 1e-9));
     CHECK(jump <= 1e-9 * limits.speed);
     CHECK(slope <= 1e-14);
-    CHECK(length <= nav::length_of(points) + 1e-12);
+    CHECK(length <= nav::path_length(points) + 1e-12);
   }
   CHECK(moving > 1000);
   CHECK(rounded > 1000);

@@ -78,7 +78,7 @@ TEST_CASE("A view's gain is the number of unknown voxels that its rays meet, by 
             for (auto ky = keys->low.y; ky <= keys->high.y; ++ky)
               for (auto kx = keys->low.x; kx <= keys->high.x; ++kx) {
                 const voxel_key k{kx, ky, kz};
-                const auto in = inside(octree::cube_of(grid, k, 0), origin, ray);
+                const auto in = inside(octree::node_cube(grid, k, 0), origin, ray);
                 if (!in) continue;
                 const auto state = map.state(grid.center(k));
                 if (state == octree::occupancy::occupied) end = std::min(end, in->first);

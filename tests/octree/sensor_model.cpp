@@ -62,19 +62,19 @@ TEST_CASE("A value beyond its bound stays until an observation pulls it back") {
 
 TEST_CASE("Probability and log-odds are each other's inverse") {
   for (double p = 0.01; p < 1.0; p += 0.01) {
-    CHECK(probability_of(static_cast<double>(log_odds_of(p))) == Approx(p).epsilon(1e-6));
+    CHECK(to_probability(static_cast<double>(to_log_odds(p))) == Approx(p).epsilon(1e-6));
   }
-  CHECK(log_odds_of(0.5) == 0.0F);
+  CHECK(to_log_odds(0.5) == 0.0F);
 }
 
 TEST_CASE("The compiler works out the log-odds of a probability that the running program does") {
-  constexpr float compiled[] = {log_odds_of(0.7),  log_odds_of(0.4),   log_odds_of(0.1192), log_odds_of(0.971),
-                                log_odds_of(0.5),  log_odds_of(0.001), log_odds_of(0.49),   log_odds_of(0.51),
-                                log_odds_of(0.97), log_odds_of(0.12),  log_odds_of(0.85),   log_odds_of(0.9999)};
+  constexpr float compiled[] = {to_log_odds(0.7),  to_log_odds(0.4),   to_log_odds(0.1192), to_log_odds(0.971),
+                                to_log_odds(0.5),  to_log_odds(0.001), to_log_odds(0.49),   to_log_odds(0.51),
+                                to_log_odds(0.97), to_log_odds(0.12),  to_log_odds(0.85),   to_log_odds(0.9999)};
   const double probabilities[] = {0.7, 0.4, 0.1192, 0.971, 0.5, 0.001, 0.49, 0.51, 0.97, 0.12, 0.85, 0.9999};
   for (std::size_t i = 0; i != std::size(compiled); ++i) {
     volatile double p = probabilities[i];  // keeps the compiler from working this one out too
-    CHECK(compiled[i] == log_odds_of(p));
+    CHECK(compiled[i] == to_log_odds(p));
   }
 }
 
@@ -90,11 +90,11 @@ TEMPLATE_TEST_CASE("The model of OctoMap's probabilities is the default model in
 
 TEST_CASE("A model from probabilities has their log-odds") {
   using M = sensor_model_from<cautious>;
-  CHECK(M::hit == log_odds_of(0.55));
-  CHECK(M::miss == log_odds_of(0.48));
-  CHECK(M::clamp_min == log_odds_of(0.01));
-  CHECK(M::clamp_max == log_odds_of(0.99));
-  CHECK(M::occupancy_threshold == log_odds_of(0.65));
+  CHECK(M::hit == to_log_odds(0.55));
+  CHECK(M::miss == to_log_odds(0.48));
+  CHECK(M::clamp_min == to_log_odds(0.01));
+  CHECK(M::clamp_max == to_log_odds(0.99));
+  CHECK(M::occupancy_threshold == to_log_odds(0.65));
 }
 
 TEMPLATE_TEST_CASE("The largest free value is free and the next one is occupied", "", log_odds<>,

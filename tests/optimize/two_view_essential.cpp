@@ -58,7 +58,7 @@ TEST_CASE("An essential matrix decomposes into the pose it was made of and three
     const se3 truth(test::random_pose(random).rotation(), test::random_vector(random, 1.0).normalized());
     double nearest = 10.0;
     const double sign = trial % 2 == 0 ? 3.0 : -0.2;  // the scale does not matter
-    for (const se3& pose : optimize::detail::decompose_essential(sign * optimize::detail::essential_of(truth)))
+    for (const se3& pose : optimize::detail::decompose_essential(sign * optimize::detail::essential_matrix(truth)))
       nearest = std::min(nearest, (pose.to_matrix() - truth.to_matrix()).norm());
     CHECK(nearest < 1e-12);
   }

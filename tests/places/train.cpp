@@ -35,7 +35,7 @@ TEST_CASE("the weight of a word is the logarithm of how rare it is among the ima
   const auto words = train(seq, images, {.branching = 8, .depth = 3}).value();
   std::vector<std::set<std::size_t>> with(words.size());
   for (std::size_t i = 0; i != images.size(); ++i)
-    for (const auto& d : images[i]) with[words.word_of(d)].insert(i);
+    for (const auto& d : images[i]) with[words.find_word(d)].insert(i);
   for (std::uint32_t w = 0; w != words.size(); ++w) {
     REQUIRE_FALSE(with[w].empty());  // each is the nearest of what it was made of
     CHECK(words.weight(w) == Approx(std::log(50.0 / static_cast<double>(with[w].size()))).margin(1e-6));
@@ -53,7 +53,7 @@ TEST_CASE("what is clearly apart becomes words of its own") {
     const auto prototype = test::random_descriptor(kinds);
     random_bits random{static_cast<std::uint64_t>(thing)};
     for (int i = 0; i != 20; ++i, ++all)
-      same += words.word_of(test::noisy(prototype, 3, random)) == words.word_of(prototype) ? 1 : 0;
+      same += words.find_word(test::noisy(prototype, 3, random)) == words.find_word(prototype) ? 1 : 0;
   }
   CHECK(same * 10 > all * 8);
   CHECK_FALSE(words.transform(again[0]).empty());
@@ -73,12 +73,12 @@ TEST_CASE("training on what teaches nothing says so, or ends early") {
   const auto d = test::random_descriptor(random);
   const auto same = train(seq, std::vector<image>{{d, d, d}, {d}}, {.branching = 3, .depth = 5}).value();
   CHECK(same.size() == 1);  // the root is the only word
-  CHECK(same.word_of(d) == 0);
+  CHECK(same.find_word(d) == 0);
   CHECK(same.transform(image{d}).empty());  // it is in every image and tells nothing
   const auto e = test::random_descriptor(random);
   const auto two = train(seq, std::vector<image>{{d, d, e}, {d}}, {.branching = 3, .depth = 5}).value();
   CHECK(two.size() == 2);
-  CHECK(two.word_of(d) != two.word_of(e));
+  CHECK(two.find_word(d) != two.find_word(e));
 }
 
 TEST_CASE("training reports how far it is, and stops when asked to") {

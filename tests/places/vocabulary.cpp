@@ -71,11 +71,11 @@ TEST_CASE("leaves above the deepest level are words") {
   CHECK(words.branching() == 3);
   for (const simd::level level : simd::available_levels()) {
     const simd::level_limit limit{level};
-    CHECK(words.word_of(std::uint64_t{0x1}) == 0);
-    CHECK(words.word_of(~std::uint64_t{0x1}) == 1);
-    CHECK(words.word_of(std::uint64_t{0x1f}) == 2);
-    CHECK(words.word_of(std::uint64_t{0xf1}) == 3);
-    CHECK(words.word_of(std::uint64_t{0x77}) == 2);  // as near to one as to the other: the first
+    CHECK(words.find_word(std::uint64_t{0x1}) == 0);
+    CHECK(words.find_word(~std::uint64_t{0x1}) == 1);
+    CHECK(words.find_word(std::uint64_t{0x1f}) == 2);
+    CHECK(words.find_word(std::uint64_t{0xf1}) == 3);
+    CHECK(words.find_word(std::uint64_t{0x77}) == 2);  // as near to one as to the other: the first
   }
   check_transform(words, test::make_images<64>(1, 200, 3)[0]);
 }
@@ -109,7 +109,7 @@ TEST_CASE("weights count as their kind says") {
     const bool counted = kind == weighting::tf_idf || kind == weighting::tf;
     std::map<std::uint32_t, float> expected;
     for (const auto& d : image) {
-      const std::uint32_t word = words.word_of(d);
+      const std::uint32_t word = words.find_word(d);
       if (!rarity) CHECK(words.weight(word) == 1.0F);
       expected[word] = counted ? expected[word] + words.weight(word) : words.weight(word);
     }

@@ -82,7 +82,7 @@ global_adjustment::report adjust_map(slam::basic_map<D>& m, const slam::camera_r
   const global_adjustment::snapshot s = take_map(m, rig);
   if (s.empty()) return {};
   bundle_solver<Camera> solver{rig.model, global_adjustment::loss};
-  const bundle_solution solved = solver.solve(s, global_adjustment::schedule_of({}));
+  const bundle_solution solved = solver.solve(s, global_adjustment::make_schedule({}));
   return solved.usable ? apply_adjustment(m, s, solved) : global_adjustment::report{};
 }
 

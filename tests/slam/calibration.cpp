@@ -65,7 +65,7 @@ TEST_CASE("Wrong focal lengths and a wrong depth scale are found by a round thro
   CHECK(c.parameters[0].deviation > 0.0);
   CHECK(c.parameters[0].deviation < 0.005 * k.fx);
   CHECK(c.final_rms <= c.initial_rms);
-  const auto scale = eval::scale_of(found.poses, room().ground_truth());
+  const auto scale = eval::estimate_scale(found.poses, room().ground_truth());
   REQUIRE(scale);
   INFO(scale->scale << " +- " << scale->deviation);
   CHECK(std::abs(scale->scale / 1.02 - 1.0) < 0.015);  // a small camera: its trajectory is no better

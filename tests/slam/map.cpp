@@ -42,33 +42,33 @@ TEST_CASE("Where corrections change the scale, erased keyframes and what hangs o
   const se3 T_old = m.at(2).T_world_camera;
   m.move_keyframe(2, sim3(so3{}, vec3(1, 0, 0), 2.0));
   CHECK((m.at(2).T_world_camera.translation() - (2.0 * T_old.translation() + vec3(1, 0, 0))).norm() < 1e-12);
-  CHECK(m.scale_of(2) == 2.0);
+  CHECK(m.scale(2) == 2.0);
   m.move_keyframe(4, sim3(so3{}, vec3(0, 0, 0), 0.25));
   // Erased, one after the other: poses stay, scales stay.
   const se3 at_4 = m.at(4).T_world_camera, at_2 = m.at(2).T_world_camera;
   m.erase_keyframe(4);
   m.erase_keyframe(2);
-  CHECK((m.pose_of(4).inverse() * at_4).log().norm() < 1e-9);
-  CHECK((m.pose_of(2).inverse() * at_2).log().norm() < 1e-9);
-  CHECK(m.scale_of(4) == Approx(0.25));
-  CHECK(m.scale_of(2) == Approx(2.0));
+  CHECK((m.pose(4).inverse() * at_4).log().norm() < 1e-9);
+  CHECK((m.pose(2).inverse() * at_2).log().norm() < 1e-9);
+  CHECK(m.scale(4) == Approx(0.25));
+  CHECK(m.scale(2) == Approx(2.0));
   // All is moved alike: as if nothing had been erased.
   const sim3 all(so3::exp(vec3(0.3, -0.2, 0.1)), vec3(1, 2, 3), 3.0);
   m.transform(all);
-  CHECK((m.pose_of(4).translation() - all * at_4.translation()).norm() < 1e-9);
-  CHECK((m.pose_of(2).translation() - all * at_2.translation()).norm() < 1e-9);
-  CHECK(m.scale_of(4) == Approx(0.75));
-  CHECK(m.scale_of(2) == Approx(6.0));
+  CHECK((m.pose(4).translation() - all * at_4.translation()).norm() < 1e-9);
+  CHECK((m.pose(2).translation() - all * at_2.translation()).norm() < 1e-9);
+  CHECK(m.scale(4) == Approx(0.75));
+  CHECK(m.scale(2) == Approx(6.0));
   // Of a map without keyframes as well, and as a part of another one.
-  const se3 before_4 = m.pose_of(4);
+  const se3 before_4 = m.pose(4);
   for (slam::keyframe_id k = 0; k != m.keyframe_end(); ++k)
     if (m.has_keyframe(k)) m.erase_keyframe(k);
-  CHECK((m.pose_of(4).inverse() * before_4).log().norm() < 1e-9);
+  CHECK((m.pose(4).inverse() * before_4).log().norm() < 1e-9);
   slam::map other(8, 1.2);
   test::add_random_keyframe(random, other, 30, 20);
   const auto offsets = other.append(std::move(m), all, {0, slam::no_id});
-  CHECK((other.pose_of(4 + offsets.keyframes).translation() - all * before_4.translation()).norm() < 1e-9);
-  CHECK(other.scale_of(4 + offsets.keyframes) == Approx(2.25));
+  CHECK((other.pose(4 + offsets.keyframes).translation() - all * before_4.translation()).norm() < 1e-9);
+  CHECK(other.scale(4 + offsets.keyframes) == Approx(2.25));
 }
 
 TEST_CASE("Erased keyframes are forgotten but for those that are asked for, the latest, and what they lead to") {
@@ -95,8 +95,8 @@ TEST_CASE("Erased keyframes are forgotten but for those that are asked for, the 
       CHECK((k == next) == m.remembers(k));
       if (k == next) next = m.next_remembered(k + 1);
       if (!m.remembers(k)) continue;
-      CHECK((m.pose_of(k).inverse() * before.pose_of(k)).log().norm() == 0.0);
-      CHECK(m.replacement_of(k) == before.replacement_of(k));
+      CHECK((m.pose(k).inverse() * before.pose(k)).log().norm() == 0.0);
+      CHECK(m.replacement(k) == before.replacement(k));
       if (m.has_keyframe(k)) continue;
       ++remembered;
       late += before.content().erasures - before.content().erased.at(k).number <= 10 ? 1U : 0U;
@@ -115,10 +115,10 @@ TEST_CASE("Erased keyframes are forgotten but for those that are asked for, the 
     other.forget_erased({}, 0);
     CHECK(other.content().erased.empty());
     const std::size_t both = m.content().forgotten + other.content().forgotten;
-    const se3 T = m.pose_of(erased[50]);
+    const se3 T = m.pose(erased[50]);
     m.append(std::move(other), sim3{}, {m.tree().root(), other.tree().root()});
     CHECK(m.content().forgotten == both);
-    CHECK((m.pose_of(erased[50]).inverse() * T).log().norm() < 1e-12);
+    CHECK((m.pose(erased[50]).inverse() * T).log().norm() < 1e-12);
     REQUIRE(fault_of(m) == "");
     m.forget_erased({}, 0);
     CHECK(m.content().erased.empty());
@@ -136,7 +136,7 @@ TEST_CASE("Keyframes that share landmarks come most shared first") {
   auto query = random_frame(random, 40, 2);
   for (std::uint32_t i = 0; i < 25; ++i) query.landmarks[i] = m.at(1).landmarks[i];
 
-  const auto order = m.observers_of(query.landmarks);
+  const auto order = m.observers(query.landmarks);
   REQUIRE(order.size() == 2);
   CHECK(order[0] == slam::covisible{1, 25});
   CHECK(order[1] == slam::covisible{0, 10});
@@ -195,12 +195,12 @@ TEST_CASE("A fused landmark leads to what it became, and frames that show it joi
   CHECK(m.covisibility().shared(first, second) == 0);
   m.fuse(a, b);
   CHECK(m.covisibility().shared(first, second) == 1);
-  CHECK(m.replacement_of(a) == b);
+  CHECK(m.replacement(a) == b);
   CHECK(m.at(first).landmarks[0] == b);
   CHECK(m.landmark_at(b).visible == 3);
   CHECK(m.landmark_at(b).found == 2);
   m.fuse(b, c);  // the second keyframe sees both: its keypoint 0 shows nothing now
-  CHECK(m.replacement_of(a) == c);
+  CHECK(m.replacement(a) == c);
   CHECK(m.at(second).landmarks[0] == slam::no_id);
   CHECK(m.landmark_at(c).observations == std::vector<slam::observation>{{first, 0}, {second, 1}});
 
@@ -210,7 +210,7 @@ TEST_CASE("A fused landmark leads to what it became, and frames that show it joi
   CHECK(m.at(third).landmarks[3] == c);
   CHECK(m.covisibility().shared(first, third) == 1);
   m.remove_landmark(c);
-  CHECK(m.replacement_of(a) == slam::no_id);
+  CHECK(m.replacement(a) == slam::no_id);
   CHECK(fault_of(m) == "");
 }
 
@@ -252,22 +252,22 @@ TEST_CASE("An erased keyframe leaves its landmarks to others, its children to it
   CHECK(m.has_landmark(shared));
   CHECK_FALSE(m.has_landmark(own));
   CHECK(m.tree().parent(2) == 0);
-  CHECK(m.replacement_of(slam::keyframe_id{1}) == 0);
-  CHECK((m.pose_of(1).inverse() * before).log().norm() < 1e-12);
+  CHECK(m.replacement(slam::keyframe_id{1}) == 0);
+  CHECK((m.pose(1).inverse() * before).log().norm() < 1e-12);
 
   const se3 moved = test::random_motion(random);
   m.set_pose(0, moved * m.at(0).T_world_camera);
-  CHECK((m.pose_of(1).inverse() * (moved * before)).log().norm() < 1e-12);
+  CHECK((m.pose(1).inverse() * (moved * before)).log().norm() < 1e-12);
   m.erase_keyframe(0);  // the root; the replacement of the replacement
-  CHECK(m.replacement_of(slam::keyframe_id{1}) == 2);
+  CHECK(m.replacement(slam::keyframe_id{1}) == 2);
   CHECK(m.tree().root() == 2);
-  CHECK((m.pose_of(1).inverse() * (moved * before)).log().norm() < 1e-12);
+  CHECK((m.pose(1).inverse() * (moved * before)).log().norm() < 1e-12);
   m.erase_keyframe(2);
-  CHECK(m.replacement_of(slam::keyframe_id{1}) == slam::no_id);
+  CHECK(m.replacement(slam::keyframe_id{1}) == slam::no_id);
   CHECK(m.landmark_count() == 0);
-  CHECK((m.pose_of(1).inverse() * (moved * before)).log().norm() < 1e-12);
+  CHECK((m.pose(1).inverse() * (moved * before)).log().norm() < 1e-12);
   m.transform(sim3(moved));
-  CHECK((m.pose_of(1).inverse() * (moved * moved * before)).log().norm() < 1e-12);
+  CHECK((m.pose(1).inverse() * (moved * moved * before)).log().norm() < 1e-12);
   CHECK(slam::detail::insert_keyframe(m, random_frame(random, 5, 3), {}) == 3);
   CHECK(m.tree().root() == 3);
   CHECK(fault_of(m) == "");
@@ -306,12 +306,12 @@ TEST_CASE("A map absorbs another, which hangs on it where the caller says") {
     CHECK(a.landmark_count() == a_before.landmark_count() + b_before.landmark_count());
     CHECK(a.tree().parent(from + offsets.keyframes) == into);
     for (slam::keyframe_id k = 0; k != b_before.keyframe_end(); ++k)
-      REQUIRE((a.pose_of(k + offsets.keyframes).inverse() * (T * b_before.pose_of(k))).log().norm() < 1e-9);
+      REQUIRE((a.pose(k + offsets.keyframes).inverse() * (T * b_before.pose(k))).log().norm() < 1e-9);
     for (slam::keyframe_id k = 0; k != a_before.keyframe_end(); ++k)
-      REQUIRE((a.pose_of(k).inverse() * a_before.pose_of(k)).log().norm() == 0.0);
+      REQUIRE((a.pose(k).inverse() * a_before.pose(k)).log().norm() == 0.0);
     for (slam::landmark_id l = 0; l != b_before.landmark_end(); ++l) {
-      const auto now = b_before.replacement_of(l);
-      REQUIRE(a.replacement_of(l + offsets.landmarks) == (now == slam::no_id ? now : now + offsets.landmarks));
+      const auto now = b_before.replacement(l);
+      REQUIRE(a.replacement(l + offsets.landmarks) == (now == slam::no_id ? now : now + offsets.landmarks));
       if (!b_before.has_landmark(l)) continue;
       const auto& moved = a.landmark_at(l + offsets.landmarks);
       REQUIRE((moved.position - T * b_before.landmark_at(l).position).norm() < 1e-9);

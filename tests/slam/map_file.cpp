@@ -207,8 +207,8 @@ TEST_CASE("Erased landmarks take few bytes of a file, in version 2 eight each") 
     if (m.has_landmark(id)) {
       slam::detail::put_landmark(land, m.landmark_at(id));
     } else {
-      ++(m.replacement_of(id) == slam::no_id ? gone : replaced);
-      slam::detail::put(land, std::uint32_t{0}, m.replacement_of(id).value());
+      ++(m.replacement(id) == slam::no_id ? gone : replaced);
+      slam::detail::put(land, std::uint32_t{0}, m.replacement(id).value());
     }
   CHECK(gone > 10);
   CHECK(replaced > 10);
@@ -229,7 +229,7 @@ TEST_CASE("Keyframes that were forgotten are runs of ids, which versions before 
     if (!m.has_keyframe(k)) kept = k;
   REQUIRE(kept != slam::no_id);
   const std::size_t before = slam::map_bytes(m).size();
-  const se3 T = m.pose_of(kept);
+  const se3 T = m.pose(kept);
   m.forget_erased(std::vector{kept}, 3);
   REQUIRE(m.content().forgotten > 50);
   const std::string bytes = slam::map_bytes(m);
@@ -241,7 +241,7 @@ TEST_CASE("Keyframes that were forgotten are runs of ids, which versions before 
   CHECK(slam::map_bytes(*again) == bytes);
   CHECK(again->keyframe_end() == m.keyframe_end());
   CHECK(again->content().forgotten == m.content().forgotten);
-  CHECK((again->pose_of(kept).inverse() * T).log().norm() < 1e-9);
+  CHECK((again->pose(kept).inverse() * T).log().norm() < 1e-9);
   for (slam::keyframe_id k = 0; k != m.keyframe_end(); ++k) REQUIRE(again->remembers(k) == m.remembers(k));
 
   // However many there are, they cost nothing.
@@ -297,9 +297,9 @@ TEST_CASE("Corrections of the scale are in the lengths that a file holds") {
   m.transform(sim3(so3{}, vec3(1, 2, 3), 2.5));
   const auto again = parsed(slam::map_bytes(m));
   REQUIRE(again.has_value());
-  CHECK((again->pose_of(gone).translation() - m.pose_of(gone).translation()).norm() < 1e-9);
-  CHECK(again->scale_of(gone) == 1.0);
-  CHECK(m.scale_of(gone) == 2.5);
+  CHECK((again->pose(gone).translation() - m.pose(gone).translation()).norm() < 1e-9);
+  CHECK(again->scale(gone) == 1.0);
+  CHECK(m.scale(gone) == 2.5);
 }
 
 TEST_CASE("Maps go to files and come back") {

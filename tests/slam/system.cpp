@@ -138,7 +138,7 @@ TEST_CASE("Whoever shows the last frame gets its features, which of them are tra
     const se3 pose = slam.inspect([&](const slam::atlas& maps) {
       const auto now = maps.current(shown->reference);
       CHECK((!r.keyframe || now == slam::map_keyframe{r.map, *r.keyframe}));
-      return maps.at(now.map).pose_of(now.keyframe) * shown->T_reference_camera;
+      return maps.at(now.map).pose(now.keyframe) * shown->T_reference_camera;
     });
     CHECK((pose.inverse() * *r.T_world_camera).log().norm() < 1e-12);
   }

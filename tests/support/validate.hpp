@@ -164,13 +164,13 @@ class map_check {
   /// What was erased leads to what is there.
   [[nodiscard]] result<void> lineage() const {
     for (slam::keyframe_id id = m_.next_remembered(0); id != m_.keyframe_end(); id = m_.next_remembered(id + 1)) {
-      const slam::keyframe_id replacement = m_.replacement_of(id);
+      const slam::keyframe_id replacement = m_.replacement(id);
       if (replacement != slam::no_id && !m_.has_keyframe(replacement))
         return wrong_keyframe(id, "became one that is not there");
       if (m_.has_keyframe(id)) continue;
       const slam::keyframe_id next = m_.content().erased.at(id).replacement;
       if (next != slam::no_id && !m_.remembers(next)) return wrong_keyframe(id, "became one that is forgotten");
-      if (!is_finite(m_.pose_of(id))) return wrong_keyframe(id, "was at no finite place");
+      if (!is_finite(m_.pose(id))) return wrong_keyframe(id, "was at no finite place");
     }
     const std::size_t known = m_.content().erased.size() + m_.content().forgotten + m_.keyframes().size();
     if (known > m_.keyframe_end().value())
@@ -179,7 +179,7 @@ class map_check {
       return fail(errc::malformed, "keyframes", "are gone, and where they were is not known");
     const auto& all = m_.landmarks();
     for (slam::landmark_id id = all.next_known_id(0); id != m_.landmark_end(); id = all.next_known_id(id + 1))
-      if (const slam::landmark_id now = m_.replacement_of(id); now != slam::no_id && !m_.has_landmark(now))
+      if (const slam::landmark_id now = m_.replacement(id); now != slam::no_id && !m_.has_landmark(now))
         return wrong_landmark(id, "became one that is not there");
     return {};
   }

@@ -52,7 +52,7 @@ std::string in_words(double number) {
 }
 
 /// "1 image of /camera is", "2 images of /camera are".
-std::string count_of(std::size_t n, const std::string& what, const std::string& from) {
+std::string counted(std::size_t n, const std::string& what, const std::string& from) {
   return std::to_string(n) + " " + what + (n == 1 ? " of " : "s of ") + from + (n == 1 ? " is" : " are");
 }
 
@@ -335,7 +335,7 @@ class bag_recording final : public file_recording {
     for (topic* t : {first_, second_}) {
       if (t == nullptr) continue;
       if (t->unread != 0)
-        notes.push_back(count_of(t->unread, "image", t->name) + " omitted, as damaged or cut off: " + t->reason);
+        notes.push_back(counted(t->unread, "image", t->name) + " omitted, as damaged or cut off: " + t->reason);
       // A time of zero is that of a simulation that begins there, or there is no time in the header.
       std::int64_t least = std::numeric_limits<std::int64_t>::max();
       for (const entry& e : entries)
@@ -357,11 +357,11 @@ class bag_recording final : public file_recording {
         order.emplace_back(has_time ? e.time : e.message->time, *e.message);
       }
       if (later != 0)
-        notes.push_back(count_of(later, "image", t->name) +
+        notes.push_back(counted(later, "image", t->name) +
                         " omitted, as the times in the headers fall back by more than 1 s after the first " +
                         std::to_string(order.size()));
       if (const std::size_t repeated = sort_by_time(order, &std::pair<std::int64_t, bag_message>::first); repeated != 0)
-        notes.push_back(count_of(repeated, "image", t->name) + " omitted, as the time is that of another one");
+        notes.push_back(counted(repeated, "image", t->name) + " omitted, as the time is that of another one");
       t->messages.clear();
       for (const auto& [when, message] : order) {
         t->times.push_back(seconds(when));
@@ -378,7 +378,7 @@ class bag_recording final : public file_recording {
     }
     frames_ = orbis::associate(first_->times, second_->times, sensor == sensor_kind::rgbd ? 0.020 : 0.005);
     if (const std::size_t unpaired = first_->times.size() - frames_.size(); unpaired != 0)
-      notes.push_back(count_of(unpaired, "image", first_->name) + " omitted, as no image of " + second_->name +
+      notes.push_back(counted(unpaired, "image", first_->name) + " omitted, as no image of " + second_->name +
                       " has the same time");
   }
 
@@ -394,7 +394,7 @@ class bag_recording final : public file_recording {
     return nullptr;
   }
   /// The first `CameraInfo` of the camera of `of` that can be read; empty if there is none.
-  [[nodiscard]] std::optional<ros_messages::camera_info> info_of(const topic& of) const {
+  [[nodiscard]] std::optional<ros_messages::camera_info> read_camera_info(const topic& of) const {
     if (const bag_topic* t = info_topic(of))
       for (const bag_message& m : t->messages)
         if (const auto bytes = read(m))
@@ -432,11 +432,11 @@ class bag_recording final : public file_recording {
                           in_words(camera.depth_scale));
       return {};
     }
-    const auto info = info_of(*first_);
+    const auto info = read_camera_info(*first_);
     if (!info)
       return fail(errc::invalid_argument, path_,
                   "unknown camera: there is no sensor_msgs/CameraInfo for " + first_->name + "; specify a camera");
-    auto model = ros_messages::camera_of(*info, first_->is_rectified(), where(*first_));
+    auto model = ros_messages::make_camera(*info, first_->is_rectified(), where(*first_));
     if (!model) return fail(model.error());
     camera = {.model = *std::move(model), .depth_scale = in_metres ? metres_scale : 1000.0, .fps = rate()};
     if (sensor == sensor_kind::rgbd && !in_metres && second_->name.ends_with("/image/data")) {
@@ -447,9 +447,9 @@ class bag_recording final : public file_recording {
     }
     if (sensor != sensor_kind::stereo) return {};
 
-    const auto other = info_of(*second_);
+    const auto other = read_camera_info(*second_);
     if (!other) return fail(errc::invalid_argument, path_, "there is no sensor_msgs/CameraInfo for " + second_->name);
-    const auto right = ros_messages::camera_of(*other, second_->is_rectified(), where(*second_));
+    const auto right = ros_messages::make_camera(*other, second_->is_rectified(), where(*second_));
     if (!right) return fail(right.error());
     // P of the right camera is that of the left one, shifted along x; R rotates the rays of a camera to rectified ones.
     const double baseline = other->P[0] > 0.0 ? (info->P[3] - other->P[3]) / other->P[0] : 0.0;
@@ -526,7 +526,7 @@ class bag_recording final : public file_recording {
   /// to be of one frame and size.
   result<void> register_depth() {
     const bool same_frame = has_same_frame(*first_, *second_);
-    const auto info = info_of(*second_);
+    const auto info = read_camera_info(*second_);
     const bool same_size = !info || (static_cast<int>(info->width) == camera.model.width() &&
                                      static_cast<int>(info->height) == camera.model.height());
     if (same_frame && same_size) return {};
@@ -544,7 +544,7 @@ class bag_recording final : public file_recording {
       notes.push_back("depth is used as if it were registered to colour, but may not be" + unregistered_);
       return {};
     }
-    const auto model = ros_messages::camera_of(*info, second_->is_rectified(), where(*second_));
+    const auto model = ros_messages::make_camera(*info, second_->is_rectified(), where(*second_));
     if (!model) return fail(model.error());
     registration_.emplace(*model, camera.model, *T_color_depth);
     images_of += same_frame ? " (registered by the cameras)" : " (registered by tf)";
@@ -590,7 +590,7 @@ class bag_recording final : public file_recording {
       pose = std::move(one);
       ground_truth.push_back({seconds(pose.header.stamp != 0 ? pose.header.stamp : m.time), pose.T_parent_child});
     }
-    if (unread != 0) notes.push_back(count_of(unread, "pose", from.name) + " damaged and omitted");
+    if (unread != 0) notes.push_back(counted(unread, "pose", from.name) + " damaged and omitted");
     sort_by_time(ground_truth, &orbis::stamped_pose::timestamp);
     const std::string camera_frame = first_->frame_id;
     truth_of = from.name + " (" + (has_child ? pose.child_frame_id : "body") + " in " + pose.header.frame_id + ")";
@@ -675,11 +675,11 @@ class bag_recording final : public file_recording {
   }
   [[nodiscard]] result<color_image> read_color(const topic& of, std::size_t i) const {
     const auto& k = straight_ ? (&of == first_ ? raw_left_.k() : raw_right_.k()) : camera.model.k();
-    return sized(decoded(of, i, [](const auto& m, const std::string& from) { return color_of(m, from); }), k.width,
+    return sized(decoded(of, i, [](const auto& m, const std::string& from) { return decode_color(m, from); }), k.width,
                  k.height, of);
   }
   [[nodiscard]] result<depth_image> read_depth(std::size_t i) const {
-    auto depth = decoded(*second_, i, [](const auto& m, const std::string& from) { return depth_of(m, from); });
+    auto depth = decoded(*second_, i, [](const auto& m, const std::string& from) { return decode_depth(m, from); });
     if (registration_) return sized(std::move(depth), registration_->width(), registration_->height(), *second_);
     return sized(std::move(depth), camera.model.width(), camera.model.height(), *second_);
   }

@@ -13,7 +13,7 @@
 namespace app {
 
 /// Converts an 8-bit image, BGR or grey. Errors: unsupported.
-[[nodiscard]] inline orbis::result<orbis::image<orbis::rgb8>> rgb_of(const cv::Mat& image, const std::string& where) {
+[[nodiscard]] inline orbis::result<orbis::image<orbis::rgb8>> to_rgb(const cv::Mat& image, const std::string& where) {
   if (image.empty() || image.depth() != CV_8U || (image.channels() != 3 && image.channels() != 1))
     return orbis::fail(orbis::errc::unsupported, where, "an image is neither 8-bit colour nor 8-bit grey");
   orbis::image<orbis::rgb8> out(image.cols, image.rows);

@@ -31,7 +31,7 @@ std::string reason() {
 
 /// The mode of a stream with this pixel format: of the given width, or else the largest up to it or 640x480, at the
 /// highest rate.
-std::optional<openni::VideoMode> mode_of(const openni::SensorInfo& info, openni::PixelFormat format, int width) {
+std::optional<openni::VideoMode> find_mode(const openni::SensorInfo& info, openni::PixelFormat format, int width) {
   std::optional<openni::VideoMode> best;
   const auto& modes = info.getSupportedVideoModes();
   for (int i = 0; i != modes.getSize(); ++i) {
@@ -104,14 +104,14 @@ class openni_camera final : public camera_device {
     const double time = seconds(frame);
     auto both = pairs_.add(ready == 0 ? stream::color : stream::depth, std::move(frame), time);
     if (!both) return std::optional<source_frame>{};
-    return frame_of(*both);
+    return make_frame(*both);
   }
 
  private:
   result<void> start(openni::VideoStream& stream, openni::SensorType type, openni::PixelFormat format, int width,
                      const std::string& what) {
     const openni::SensorInfo* info = device_.getSensorInfo(type);
-    const auto mode = info != nullptr ? mode_of(*info, format, width) : std::nullopt;
+    const auto mode = info != nullptr ? find_mode(*info, format, width) : std::nullopt;
     if (!mode) return fail(errc::unsupported, name, "has no " + what + " images in a supported format");
     if (stream.create(device_, type) != openni::STATUS_OK) return fail(errc::unreadable, name, reason());
     if (!device_.isFile()) stream.setVideoMode(*mode);
@@ -145,7 +145,7 @@ class openni_camera final : public camera_device {
     return {};
   }
 
-  [[nodiscard]] result<std::optional<source_frame>> frame_of(
+  [[nodiscard]] result<std::optional<source_frame>> make_frame(
       const frame_pairs<openni::VideoFrameRef>::pair& both) const {
     const int width = camera.model.width(), height = camera.model.height();
     for (const auto* f : {&both.color, &both.depth})

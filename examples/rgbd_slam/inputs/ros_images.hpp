@@ -28,16 +28,17 @@ inline constexpr double metres_scale = 5000.0;
 
 /// Decodes a grey or colour image, YUV 4:2:2, or a Bayer mosaic, with demosaicing. `where` names the source in errors.
 /// Errors: unsupported (encoding), malformed (too few pixels, damaged).
-[[nodiscard]] orbis::result<orbis::image<orbis::rgb8>> color_of(const ros_messages::image& m, const std::string& where);
-[[nodiscard]] orbis::result<orbis::image<orbis::rgb8>> color_of(const ros_messages::compressed_image& m,
-                                                                const std::string& where);
+[[nodiscard]] orbis::result<orbis::image<orbis::rgb8>> decode_color(const ros_messages::image& m,
+                                                                    const std::string& where);
+[[nodiscard]] orbis::result<orbis::image<orbis::rgb8>> decode_color(const ros_messages::compressed_image& m,
+                                                                    const std::string& where);
 
 /// Decodes a depth image; depth in metres is stored with `metres_scale`, integers are unchanged. Errors: as above.
-[[nodiscard]] orbis::result<orbis::image<std::uint16_t>> depth_of(const ros_messages::image& m,
-                                                                  const std::string& where);
+[[nodiscard]] orbis::result<orbis::image<std::uint16_t>> decode_depth(const ros_messages::image& m,
+                                                                      const std::string& where);
 /// As above, from a PNG. "compressedDepth" has a header of 12 bytes with the two quantisation parameters of depth in
 /// metres.
-[[nodiscard]] orbis::result<orbis::image<std::uint16_t>> depth_of(const ros_messages::compressed_image& m,
-                                                                  const std::string& where);
+[[nodiscard]] orbis::result<orbis::image<std::uint16_t>> decode_depth(const ros_messages::compressed_image& m,
+                                                                      const std::string& where);
 
 }  // namespace app

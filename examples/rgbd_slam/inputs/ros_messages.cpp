@@ -88,7 +88,7 @@ void read_pose(message_reader& in, transform& m, bool has_child) {
   m.T_parent_child = read_rigid(in);
 }
 
-result<orbis::camera::any_camera> camera_of(const camera_info& info, bool is_rectified, const std::string& where) {
+result<orbis::camera::any_camera> make_camera(const camera_info& info, bool is_rectified, const std::string& where) {
   if (info.width == 0 || info.height == 0 || info.width > 65536 || info.height > 65536)
     return fail(errc::malformed, where, "has a camera without image size: is the camera calibrated?");
   const auto width = static_cast<int>(info.width), height = static_cast<int>(info.height);

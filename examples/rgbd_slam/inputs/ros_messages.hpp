@@ -82,7 +82,7 @@ template <class Message>
 
 /// The camera of a message. `is_rectified`: the images are rectified, so that the matrix P applies. Errors: malformed
 /// (no size, no camera matrix), unsupported (distortion model).
-[[nodiscard]] orbis::result<orbis::camera::any_camera> camera_of(const camera_info& info, bool is_rectified,
-                                                                 const std::string& where);
+[[nodiscard]] orbis::result<orbis::camera::any_camera> make_camera(const camera_info& info, bool is_rectified,
+                                                                   const std::string& where);
 
 }  // namespace app::ros_messages

@@ -28,7 +28,7 @@ T number(std::string_view fields, std::string_view name) {
   return message_reader{field(fields, name), message_encoding::ros1}.number<T>();
 }
 
-std::int64_t time_of(message_reader& in) {
+std::int64_t read_time(message_reader& in) {
   const std::int64_t seconds = in.number<std::uint32_t>();
   return seconds * 1'000'000'000 + in.number<std::uint32_t>();
 }
@@ -93,7 +93,7 @@ class rosbag1_file final : public chunked_bag {
     if (code == message) {
       r.what = bag_record::kind::message;
       message_reader time{field(fields, "time"), message_encoding::ros1};
-      r.time = time_of(time);
+      r.time = read_time(time);
     }
     if (code == chunk) {
       r.what = bag_record::kind::chunk;
@@ -121,7 +121,7 @@ class rosbag1_file final : public chunked_bag {
     message_reader in{bytes, message_encoding::ros1};
     std::vector<bag_message> messages(bytes.size() / 12);
     for (bag_message& m : messages) {
-      m.time = time_of(in);
+      m.time = read_time(in);
       m.at = in.number<std::uint32_t>();
     }
     return messages;

@@ -61,7 +61,7 @@ class video_recording final : public file_recording {
     cv::Mat image;
     if (!reader_.retrieve(image))
       return fail(errc::malformed, path_.string(), "frame " + std::to_string(i) + " cannot be decoded");
-    auto converted = rgb_of(image, path_.string());
+    auto converted = to_rgb(image, path_.string());
     if (!converted) return converted;
     if (auto fits = check_camera(camera, sensor, converted->width(), converted->height(), path_.string()); !fits)
       return fail(fits.error());

@@ -25,10 +25,10 @@ class video_camera final : public camera_device {
   /// V4L2 itself waits for a frame, for at most ten seconds.
   result<std::optional<source_frame>> next(std::chrono::milliseconds) override {
     if (!reader_.grab()) return fail(errc::unreadable, name, "delivers no more images; it may be disconnected");
-    const double time = opened_at_ + seconds_of<std::chrono::steady_clock>() - opened_;
+    const double time = opened_at_ + seconds_now<std::chrono::steady_clock>() - opened_;
     cv::Mat image;
     if (!reader_.retrieve(image)) return std::optional<source_frame>{};  // damaged in transfer
-    auto converted = rgb_of(image, name);
+    auto converted = to_rgb(image, name);
     if (!converted) return fail(converted.error());
     if (auto fits = check_camera(camera, sensor, converted->width(), converted->height(), name); !fits)
       return fail(fits.error());
@@ -41,16 +41,16 @@ class video_camera final : public camera_device {
 
  private:
   template <class Clock>
-  [[nodiscard]] static double seconds_of() {
+  [[nodiscard]] static double seconds_now() {
     return std::chrono::duration<double>{Clock::now().time_since_epoch()}.count();
   }
 
   cv::VideoCapture reader_;
   // The time of day, continued steadily even if the system clock is set.
-  double opened_at_ = seconds_of<std::chrono::system_clock>(), opened_ = seconds_of<std::chrono::steady_clock>();
+  double opened_at_ = seconds_now<std::chrono::system_clock>(), opened_ = seconds_now<std::chrono::steady_clock>();
 };
 
-result<std::unique_ptr<camera_device>> video_camera_of(const device_options& options) {
+result<std::unique_ptr<camera_device>> make_video_camera(const device_options& options) {
   cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);  // errors are reported here
   const std::string name = options.name.empty() ? "/dev/video0" : options.name;
   if (options.sensor == orbis::slam::sensor_kind::rgbd)
@@ -78,5 +78,5 @@ result<std::unique_ptr<camera_device>> video_camera_of(const device_options& opt
 
 void rgbd_slam_open_video_camera(const app::device_options& options,
                                  orbis::result<std::unique_ptr<app::camera_device>>& opened) {
-  opened = app::video_camera_of(options);
+  opened = app::make_video_camera(options);
 }

@@ -28,7 +28,7 @@ constexpr int send_flags = MSG_NOSIGNAL;
 constexpr int send_flags = 0;
 #endif
 
-const char* reason_of(int status) {
+const char* reason_phrase(int status) {
   switch (status) {
     case 200: return "OK";
     case 204: return "No Content";
@@ -194,7 +194,7 @@ class http_server::connection {
     std::size_t size = 0;
     for (const auto& part : answer.body) size += part->size();
     std::string head =
-        "HTTP/1.1 " + std::to_string(answer.status) + " " + reason_of(answer.status) + "\r\n" + of_.headers_;
+        "HTTP/1.1 " + std::to_string(answer.status) + " " + reason_phrase(answer.status) + "\r\n" + of_.headers_;
     if (answer.status == 405) head += "Allow: GET\r\n";
     if (answer.status != 204) head += "Content-Length: " + std::to_string(size) + "\r\n";
     if (size != 0) head += "Content-Type: " + answer.type + "\r\n";

@@ -16,7 +16,9 @@ constexpr std::size_t recent_frames = 300;       // for the percentile of the tr
 constexpr std::size_t keyframes_at_a_time = 64;  // moved per update after a correction
 constexpr int color_tolerance = 12;              // smaller colour changes of a voxel are not shown
 
-std::uint64_t name_of(orbis::slam::map_keyframe k) { return std::uint64_t{k.map.value()} << 32U | k.keyframe.value(); }
+std::uint64_t packed_id(orbis::slam::map_keyframe k) {
+  return std::uint64_t{k.map.value()} << 32U | k.keyframe.value();
+}
 
 /// The displacement of points two metres in front of the camera, metres.
 double motion(const se3& from, const se3& to) {
@@ -73,7 +75,7 @@ scene_builder::~scene_builder() { std::unique_ptr<mailbox>{box_.load()}.reset();
 
 // -- tracking thread
 
-std::vector<scene_builder::sample> scene_builder::samples_of(const viewer_frame& frame) const {
+std::vector<scene_builder::sample> scene_builder::take_samples(const viewer_frame& frame) const {
   std::vector<sample> samples;
   const int width = std::min({frame.color.width(), frame.depth.width(), rays_.width()});
   const int height = std::min({frame.color.height(), frame.depth.height(), rays_.height()});
@@ -93,7 +95,7 @@ void scene_builder::push(viewer_frame frame) {
   std::unique_ptr<mailbox> mail{box_.exchange(nullptr)};
   if (!mail) mail = std::make_unique<mailbox>();
   if (frame.keyframe && takes_colors_ && mail->samples <= max_samples_ / 8) {
-    auto& [keyframe, samples] = mail->keyframes.emplace_back(*frame.keyframe, samples_of(frame));
+    auto& [keyframe, samples] = mail->keyframes.emplace_back(*frame.keyframe, take_samples(frame));
     mail->samples += samples.size();
   }
   if (frame.tracked) {
@@ -115,7 +117,7 @@ void scene_builder::push(viewer_frame frame) {
 // -- viewer thread
 
 std::size_t scene_builder::index_of(orbis::slam::map_keyframe k) {
-  const auto [at, is_new] = asked_.try_emplace(name_of(k), graph_.asked.size());
+  const auto [at, is_new] = asked_.try_emplace(packed_id(k), graph_.asked.size());
   if (is_new) {
     graph_.asked.push_back(k);
     graph_asked_more_ = true;
@@ -246,7 +248,7 @@ void scene_builder::update_voxels(const scene_sources& sources, bool at_once) {
   if (colors_wait_) colors_wait_ = !move_colors(at_once ? colored_.size() : keyframes_at_a_time);
   if (!has_new && !std::exchange(colors_changed_, false)) return;
   colors_changed_ = false;
-  for (voxel& v : cubes_) v.color = colors_.color_of(v).value_or(no_color);
+  for (voxel& v : cubes_) v.color = colors_.mean_color(v).value_or(no_color);
   show_cubes();
 }
 

@@ -140,7 +140,7 @@ class scene_builder {
     }
   };
 
-  [[nodiscard]] std::vector<sample> samples_of(const viewer_frame& frame) const;
+  [[nodiscard]] std::vector<sample> take_samples(const viewer_frame& frame) const;
   [[nodiscard]] std::size_t index_of(orbis::slam::map_keyframe k);
   const viewer_scene& update(const scene_sources& sources, bool at_once);
   void read_mailbox();

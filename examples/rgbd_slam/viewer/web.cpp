@@ -24,7 +24,7 @@ namespace app {
 namespace {
 
 /// The number after `since=`; 0 without it, empty if it is not a number.
-std::optional<std::uint64_t> since_of(const http_request& request) {
+std::optional<std::uint64_t> parse_since(const http_request& request) {
   const std::string_view text = query_value(request.query, "since").value_or("0");
   std::uint64_t value = 0;
   const auto [end, failure] = std::from_chars(text.data(), text.data() + text.size(), value);
@@ -97,7 +97,7 @@ http_answer web_backend::answer(const http_request& request) {
   const std::string& path = request.path;
   if (path == "/") return {.type = "text/html; charset=utf-8", .body = {page_}};
   if (path != "/frame" && path != "/graph" && path != "/voxels") return text_answer(404, "no such page\n");
-  const auto since = since_of(request);
+  const auto since = parse_since(request);
   if (!since) return text_answer(400, "since: not a number\n");
   return path == "/frame" ? frame_since(*since) : path == "/graph" ? graph_since(*since) : voxels_since(*since);
 }

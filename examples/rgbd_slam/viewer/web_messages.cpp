@@ -26,7 +26,7 @@ void append(std::string& bytes, T value) {
 
 void append_count(std::string& bytes, std::size_t count) { append(bytes, static_cast<std::uint32_t>(count)); }
 
-nlohmann::json matrix_of(const orbis::se3& T) {
+nlohmann::json to_json(const orbis::se3& T) {
   nlohmann::json rows = nlohmann::json::array();
   const auto m = T.to_matrix();
   for (int r = 0; r != 3; ++r)
@@ -65,7 +65,7 @@ std::string state_json(const viewer_scene& scene, std::uint64_t session) {
                       {"height", f->image->height()},
                       {"features", f->features.size()},
                       {"tracked", tracked}};
-    if (f->T_world_camera) state["frame"]["T_world_camera"] = matrix_of(*f->T_world_camera);
+    if (f->T_world_camera) state["frame"]["T_world_camera"] = to_json(*f->T_world_camera);
   }
   return state.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);  // a title may be invalid UTF-8
 }

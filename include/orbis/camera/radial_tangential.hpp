@@ -52,7 +52,7 @@ class radial_tangential {
   /// The pixel of a point in the camera frame (metres); empty for z <= 0, outside the domain, and for NaN.
   [[nodiscard]] std::optional<vec2> project(const vec3& p) const {
     if (!(p.z() > 0.0)) return std::nullopt;
-    return pixel_of({p.x() / p.z(), p.y() / p.z()});
+    return to_pixel({p.x() / p.z(), p.y() / p.z()});
   }
   /// The pixel of the point, and its derivative with respect to the point. If there is no pixel, `jacobian` is
   /// unchanged.
@@ -104,7 +104,7 @@ class radial_tangential {
     return std::nullopt;
   }
 
-  [[nodiscard]] std::optional<vec2> pixel_of(const vec2& m) const {
+  [[nodiscard]] std::optional<vec2> to_pixel(const vec2& m) const {
     if (!(m.x() * m.x() + m.y() * m.y() < domain_)) return std::nullopt;
     const vec2 d = distort(m);
     const vec2 pixel{k_.fx * d.x() + k_.cx, k_.fy * d.y() + k_.cy};

@@ -53,7 +53,7 @@ template <class T>
 struct stored_depth<depth_view<T>> : std::type_identity<T> {};
 
 /// Inverse of a depth in metres; 0 if there is no depth or its inverse is not finite.
-[[nodiscard]] inline float inverse_depth_of(float metres) noexcept {
+[[nodiscard]] inline float inverse_depth(float metres) noexcept {
   const float inverse = metres > 0.0F ? 1.0F / metres : 0.0F;
   return inverse <= std::numeric_limits<float>::max() ? inverse : 0.0F;
 }
@@ -140,13 +140,13 @@ class shutter_correction {
     to_row_.assign(camera_, time, twist);
     std::ranges::fill(surface_, 0.0F);
     const auto stride = static_cast<std::int32_t>(color.stride());
-    const auto pixels_of = simd::kernel<detail::nearest_pixels_kernel, detail::nearest_pixels_kernel::signature>();
+    const auto nearest_pixels = simd::kernel<detail::nearest_pixels_kernel, detail::nearest_pixels_kernel::signature>();
     for (int y = 0; y != height; ++y) {
       for (int x = 0; x != width; ++x) metres_[static_cast<std::size_t>(x)] = corrected(x, y);
       for (std::size_t x = 0; x != static_cast<std::size_t>(width); ++x)
-        surface_[x] = detail::inverse_depth_of(metres_[x]);
+        surface_[x] = detail::inverse_depth(metres_[x]);
       to_row_.evaluate(camera_, y, surface_, warped_);
-      pixels_of({index_.size(), width, height, stride, warped_.x.data(), warped_.y.data(), index_.data()});
+      nearest_pixels({index_.size(), width, height, stride, warped_.x.data(), warped_.y.data(), index_.data()});
       const auto row = out.row(y);
       for (std::size_t x = 0; x != row.size(); ++x) row[x] = index_[x] < 0 ? rgb8{} : color.data()[index_[x]];
     }
@@ -189,14 +189,14 @@ class shutter_correction {
     }
     std::ranges::fill(nearest_.pixels(), no_depth);
     std::ranges::fill(surface_, 0.0F);
-    const auto pixels_of = simd::kernel<detail::nearest_pixels_kernel, detail::nearest_pixels_kernel::signature>();
+    const auto nearest_pixels = simd::kernel<detail::nearest_pixels_kernel, detail::nearest_pixels_kernel::signature>();
     for (int y = 0; y != height; ++y) {
       for (int x = 0; x != width; ++x) metres_[static_cast<std::size_t>(x)] = depth(x, y);
       for (std::size_t x = 0; x != static_cast<std::size_t>(width); ++x)
-        surface_[x] = detail::inverse_depth_of(metres_[x]);
+        surface_[x] = detail::inverse_depth(metres_[x]);
       std::copy_n(surface_.begin(), width, &inverse_(1, y + 1));
       to_frame_.evaluate(camera_, y, surface_, warped_);
-      pixels_of({index_.size(), width, height, width, warped_.x.data(), warped_.y.data(), index_.data()});
+      nearest_pixels({index_.size(), width, height, width, warped_.x.data(), warped_.y.data(), index_.data()});
       for (std::size_t x = 0; x != static_cast<std::size_t>(width); ++x) {
         const float moved = metres_[x] * warped_.ratio[x];
         if (index_[x] < 0 || !(moved > 0.0F) || surface_[x] == 0.0F) continue;
@@ -210,10 +210,10 @@ class shutter_correction {
   void find_surfaces(int y) {
     const auto row = std::as_const(nearest_).row(y);
     for (std::size_t x = 0; x != row.size(); ++x)
-      surface_[x] = row[x] < no_depth ? detail::inverse_depth_of(row[x]) : 0.0F;
+      surface_[x] = row[x] < no_depth ? detail::inverse_depth(row[x]) : 0.0F;
     const auto between = [](float a, float b) {
       const bool is_one = a < no_depth && b < no_depth && std::abs(a - b) <= detail::same_surface * std::min(a, b);
-      return is_one ? detail::inverse_depth_of(0.5F * (a + b)) : 0.0F;
+      return is_one ? detail::inverse_depth(0.5F * (a + b)) : 0.0F;
     };
     const bool has_both = y > 0 && y + 1 < nearest_.height();
     for (std::size_t x = 0; x != row.size(); ++x) {

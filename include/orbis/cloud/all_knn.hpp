@@ -53,7 +53,7 @@ template <execution_policy Policy>
 template <execution_policy Policy, point_range Points>
 [[nodiscard]] neighbor_table all_knn(const Policy& policy, const Points& points, std::size_t k) {
   assert(k > 0);
-  return detail::find_all_knn(detail::threads_of(policy), detail::viewed_points{points}, k);
+  return detail::find_all_knn(detail::as_parallel(policy), detail::viewed_points{points}, k);
 }
 
 /// Computes for each point the mean distance in metres to its `k` nearest other points, or to all others if there are
@@ -67,7 +67,7 @@ template <execution_policy Policy, point_range Points>
 template <execution_policy Policy, point_range Points>
 [[nodiscard]] std::vector<float> all_mean_knn_distance(const Policy& policy, const Points& points, std::size_t k) {
   assert(k > 0);
-  return detail::find_mean_distances(detail::threads_of(policy), detail::viewed_points{points}, k);
+  return detail::find_mean_distances(detail::as_parallel(policy), detail::viewed_points{points}, k);
 }
 
 }  // namespace orbis::cloud

@@ -46,7 +46,7 @@ void visit_near(const leaf_hierarchy& tree, const knn_kernels& kernels, const st
     std::array<float, leaf_width> distance;
     if (next.level == 0) {
       std::uint32_t within = kernels.distances(tree.leaves[next.index], q, bound, distance.data());
-      within &= (1U << tree.size_of(next.index)) - 1;
+      within &= (1U << tree.leaf_size(next.index)) - 1;
       for (; within != 0; within &= within - 1) {
         const auto n = static_cast<std::size_t>(std::countr_zero(within));
         if (!sink.add(static_cast<std::uint32_t>(next.index * leaf_width + n), distance[n])) return;

@@ -56,7 +56,7 @@ template <execution_policy Policy, point_range Points>
 [[nodiscard]] cluster_result cluster_filter(const Policy& policy, const Points& points,
                                             const cluster_options& options = {}) {
   assert(options.neighbors > 0);
-  return detail::filter_clusters(detail::threads_of(policy), detail::viewed_points{points}, options);
+  return detail::filter_clusters(detail::as_parallel(policy), detail::viewed_points{points}, options);
 }
 
 /// Returns the indices, ascending, of all points except those in a small component of the neighbour graph far from

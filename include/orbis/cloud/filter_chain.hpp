@@ -99,7 +99,7 @@ using filter_step =
 /// share one pass over the neighbours of the points present before the first of them.
 using filter_chain = std::vector<filter_step>;
 
-[[nodiscard]] inline filter_mode mode_of(const filter_step& step) noexcept {
+[[nodiscard]] inline filter_mode step_mode(const filter_step& step) noexcept {
   return std::visit(
       [](const auto& s) {
         using S = std::remove_cvref_t<decltype(s)>;
@@ -128,7 +128,7 @@ using filter_chain = std::vector<filter_step>;
   std::string out;
   for (const filter_step& step : chain) {
     if (!out.empty()) out += '+';
-    out += to_string(mode_of(step));
+    out += to_string(step_mode(step));
   }
   return out;
 }

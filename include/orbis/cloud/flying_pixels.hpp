@@ -86,7 +86,7 @@ struct depth_row_reader {
   void (*read)(const void* depth, int y, int width, float* out) = nullptr;
 };
 template <camera::depth_source Depth>
-[[nodiscard]] depth_row_reader reader_of(const Depth& depth) noexcept {
+[[nodiscard]] depth_row_reader make_row_reader(const Depth& depth) noexcept {
   return {&depth, [](const void* from, int y, int width, float* out) {
             const Depth& image = *static_cast<const Depth*>(from);
             for (int x = 0; x != width; ++x) out[x] = image(x, y);
@@ -109,7 +109,7 @@ flying_pixel_count remove_flying_pixels(const Policy& policy, const Depth& depth
                                         const flying_pixel_options& options, flying_pixel_workspace& workspace) {
   assert(out.width() == depth.width() && out.height() == depth.height());
   assert(options.reach >= 1 && options.reach <= 8);
-  return detail::read_without_flying_pixels(detail::threads_of(policy), detail::reader_of(depth), out, options,
+  return detail::read_without_flying_pixels(detail::as_parallel(policy), detail::make_row_reader(depth), out, options,
                                             workspace);
 }
 

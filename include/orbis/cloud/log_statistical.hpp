@@ -55,7 +55,7 @@ template <execution_policy Policy, point_range Points>
 [[nodiscard]] log_statistical_result log_statistical_filter(const Policy& policy, const Points& points,
                                                             const log_statistical_options& options = {}) {
   assert(options.neighbors > 0);
-  return detail::filter_by_logarithm(detail::threads_of(policy), detail::viewed_points{points}, options);
+  return detail::filter_by_logarithm(detail::as_parallel(policy), detail::viewed_points{points}, options);
 }
 
 /// Returns the indices, ascending, of the points whose mean distance to their `neighbors` nearest neighbours is at most

@@ -35,7 +35,7 @@ class crowd_search {
   /// Calls `f(i, has_enough)` for the points of one leaf.
   template <class F>
   void visit_leaf(std::size_t l, F&& f) {
-    const std::size_t size = tree_->size_of(l);
+    const std::size_t size = tree_->leaf_size(l);
     const box3 box = tree_->levels[0][l / leaf_width].child(l % leaf_width);
     // No two points of a box are further apart than its corners, also after rounding.
     const bool all_near = squared_distance(box.low, box.high) <= bound_;
@@ -70,7 +70,7 @@ class crowd_search {
   [[nodiscard]] std::size_t within(std::size_t l, const std::array<float, 3>& q) const {
     std::array<float, leaf_width> distance;
     const std::uint32_t mask = kernels_.distances(tree_->leaves[l], q, bound_, distance.data());
-    const std::uint32_t there = (1U << tree_->size_of(l)) - 1;  // masks padding if the bound is infinite
+    const std::uint32_t there = (1U << tree_->leaf_size(l)) - 1;  // masks padding if the bound is infinite
     return static_cast<std::size_t>(std::popcount(mask & there));
   }
 

@@ -38,7 +38,7 @@ template <execution_policy Policy, point_range Points>
 [[nodiscard]] std::vector<std::uint32_t> radius_inliers(const Policy& policy, const Points& points,
                                                         const radius_options& options = {}) {
   assert(options.radius >= 0);
-  return detail::find_radius_inliers(detail::threads_of(policy), detail::viewed_points{points}, options);
+  return detail::find_radius_inliers(detail::as_parallel(policy), detail::viewed_points{points}, options);
 }
 
 }  // namespace orbis::cloud

@@ -45,7 +45,7 @@ template <execution_policy Policy>
   });
   for (std::size_t b = 0; b < count; b += point_blocks::group_size) {
     const std::size_t end = std::min(count, b + point_blocks::group_size);
-    out.groups.push_back(hull_of(std::span{out.blocks}.subspan(b, end - b)));
+    out.groups.push_back(enclosing_box(std::span{out.blocks}.subspan(b, end - b)));
   }
   return out;
 }

@@ -104,7 +104,7 @@ template <execution_policy Policy, point_range Points, posed_depth_range Views, 
 automatic_result filter_automatically(const Policy& policy, const Points& points, const Views& views,
                                       const Camera& camera, const select_options& options, progress on_progress) {
   assert(options.neighbors > 0);
-  const auto& threads = detail::threads_of(policy);
+  const auto& threads = detail::as_parallel(policy);
   const detail::viewed_points all{points};
   const detail::known_ranges ranges{threads, points, options};
   return detail::with_model(camera, [&](const auto& model) {

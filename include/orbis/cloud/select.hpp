@@ -93,7 +93,7 @@ template <execution_policy Policy, point_range Points>
 [[nodiscard]] automatic_result filter_automatically(const Policy& policy, const Points& points,
                                                     const select_options& options = {}) {
   assert(options.neighbors > 0);
-  const auto& threads = detail::threads_of(policy);
+  const auto& threads = detail::as_parallel(policy);
   return detail::choose_and_filter(threads, detail::viewed_points{points},
                                    detail::known_ranges{threads, points, options}.all, options, {});
 }

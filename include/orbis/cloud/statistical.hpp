@@ -71,7 +71,7 @@ template <execution_policy Policy, point_range Points>
 [[nodiscard]] statistical_result statistical_filter(const Policy& policy, const Points& points,
                                                     const statistical_options& options = {}) {
   assert(options.neighbors > 0);
-  return detail::filter_statistically(detail::threads_of(policy), detail::viewed_points{points}, options);
+  return detail::filter_statistically(detail::as_parallel(policy), detail::viewed_points{points}, options);
 }
 
 /// Returns the indices, ascending, of the points whose mean distance to their `neighbors` nearest neighbours is at most
@@ -141,7 +141,7 @@ template <execution_policy Policy, point_range Points>
                                                                 const sensor_origins& origins,
                                                                 const range_statistical_options& options = {}) {
   assert(options.neighbors > 0);
-  return detail::filter_by_range(detail::threads_of(policy), detail::viewed_points{points},
+  return detail::filter_by_range(detail::as_parallel(policy), detail::viewed_points{points},
                                  sensor_ranges(policy, points, origins), options);
 }
 

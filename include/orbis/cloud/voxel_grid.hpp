@@ -47,7 +47,7 @@ template <execution_policy Policy, point_range Points>
 [[nodiscard]] point_cloud voxel_grid(const Policy& policy, const Points& points, std::span<const rgb8> colors,
                                      const voxel_grid_options& options = {}) {
   assert(colors.empty() || colors.size() == std::ranges::size(points));
-  return detail::find_centroids(detail::threads_of(policy),
+  return detail::find_centroids(detail::as_parallel(policy),
                                 detail::basic_viewed_points<detail::voxel_scalar<Points>>{points}.view(), colors,
                                 options.size);
 }

@@ -48,7 +48,7 @@ requires(Bits > 0 && Bits % 64 == 0 && Bits < 65536) using bit_words = std::arra
 
 /// The bits of a string as words.
 template <bit_string D>
-[[nodiscard]] constexpr bit_words<bits_of<D>> words_of(const D& string) noexcept {
+[[nodiscard]] constexpr bit_words<bits_of<D>> as_words(const D& string) noexcept {
   return std::bit_cast<bit_words<bits_of<D>>>(string);
 }
 

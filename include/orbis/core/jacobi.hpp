@@ -106,7 +106,7 @@ template <int N>
 
 /// Singular value decomposition of any finite square matrix, including singular ones. O(N^3) per sweep, a few sweeps.
 template <int N>
-[[nodiscard]] singular_decomposition<N> singular_values_of(const matrix<N, N>& m) {
+[[nodiscard]] singular_decomposition<N> svd(const matrix<N, N>& m) {
   constexpr double epsilon = std::numeric_limits<double>::epsilon();
   singular_decomposition<N> out;
   matrix<N, N>& u = out.u;  // the columns of m, rotated until they are orthogonal
@@ -188,7 +188,7 @@ template <int N>
   if (volume < 0.0) return fail(errc::degenerate, "rotation matrix", "is a reflection: its determinant is negative");
   if (!(volume > 16.0 * std::numeric_limits<double>::epsilon()))
     return fail(errc::degenerate, "rotation matrix", "is singular");
-  const auto [u, values, v] = singular_values_of<3>(m);
+  const auto [u, values, v] = svd<3>(m);
   return so3{u * transposed(v)};
 }
 

@@ -27,9 +27,9 @@ template <int N, class S>
   using square = matrix<N, N, S>;
   S largest = S(0);  // sum of the magnitudes in a column
   for (int c = 0; c != N; ++c) {
-    const S sum = sum_of(magnitudes(column_of(a, c)));
-    if (!std::isfinite(sum)) return filled<square>(std::numeric_limits<S>::quiet_NaN());
-    largest = std::max(largest, sum);
+    const S total = sum(magnitudes(column_of(a, c)));
+    if (!std::isfinite(total)) return filled<square>(std::numeric_limits<S>::quiet_NaN());
+    largest = std::max(largest, total);
   }
   int doublings = 0;
   for (S n = largest; n > S(0.5); n /= S(2)) ++doublings;

@@ -29,7 +29,7 @@
 /// | --- | --- |
 /// | core/simd/level.hpp | the processor's instruction sets; a limit on them for tests |
 /// | core/simd/dispatch.hpp | targets; `kernel`: selects the code for the best target |
-/// | core/simd/mask.hpp | `mask`, `bits`, `any`, `all`, `number_of` |
+/// | core/simd/mask.hpp | `mask`, `bits`, `any`, `all`, `popcount` |
 /// | core/simd/vec.hpp | `vec`: memory, arithmetic, comparisons, `select`, `min`, `max`, bits, shifts |
 /// | core/simd/math.hpp | `abs`, `sqrt`, `floor`, approximate roots, sums over lanes |
 /// | core/simd/convert.hpp | conversions between number types, wider and narrower |

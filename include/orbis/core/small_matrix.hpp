@@ -362,7 +362,7 @@ requires(R > 0) inline void change_diagonal(Eigen::Matrix<S, R, R, O, R, R>& m, 
 }
 /// The entries on the diagonal of a square matrix.
 template <class S, int R, int O>
-requires(R > 0) [[nodiscard]] inline matrix<R, 1, S> diagonal_of(const Eigen::Matrix<S, R, R, O, R, R>& m) {
+requires(R > 0) [[nodiscard]] inline matrix<R, 1, S> diagonal(const Eigen::Matrix<S, R, R, O, R, R>& m) {
   matrix<R, 1, S> out;
   for (int r = 0; r < R; ++r) out.data()[r] = m.data()[r * R + r];
   return out;
@@ -402,20 +402,20 @@ requires(R > 0 && C > 0) [[nodiscard]] inline bool all_finite(const Eigen::Matri
   return finite;
 }
 template <class S, int R, int C, int O>
-requires(R > 0 && C > 0) [[nodiscard]] inline S sum_of(const Eigen::Matrix<S, R, C, O, R, C>& a) {
+requires(R > 0 && C > 0) [[nodiscard]] inline S sum(const Eigen::Matrix<S, R, C, O, R, C>& a) {
   S sum = a.data()[0];
   for (int i = 1; i < R * C; ++i) sum += a.data()[i];
   return sum;
 }
 template <class S, int R, int C, int O>
-requires(R > 0 && C > 0) [[nodiscard]] inline S smallest_of(const Eigen::Matrix<S, R, C, O, R, C>& a) {
+requires(R > 0 && C > 0) [[nodiscard]] inline S min_entry(const Eigen::Matrix<S, R, C, O, R, C>& a) {
   S least = a.data()[0];
   for (int i = 1; i < R * C; ++i)
     if (a.data()[i] < least) least = a.data()[i];
   return least;
 }
 template <class S, int R, int C, int O>
-requires(R > 0 && C > 0) [[nodiscard]] inline S largest_of(const Eigen::Matrix<S, R, C, O, R, C>& a) {
+requires(R > 0 && C > 0) [[nodiscard]] inline S max_entry(const Eigen::Matrix<S, R, C, O, R, C>& a) {
   S most = a.data()[0];
   for (int i = 1; i < R * C; ++i)
     if (a.data()[i] > most) most = a.data()[i];

@@ -49,11 +49,11 @@ class basic_so3 {
     return r;
   }
   /// From a matrix that is a rotation up to rounding. For matrices with larger errors use `nearest_rotation`.
-  explicit basic_so3(const matrix<3, 3, S>& r) : basic_so3(quaternion_of(r)) {}
+  explicit basic_so3(const matrix<3, 3, S>& r) : basic_so3(to_quaternion(r)) {}
 
   /// The rotation by `|phi|` radians about `phi`.
   [[nodiscard]] static basic_so3 exp(const tangent& phi) {
-    const S theta2 = square_of(phi.x(), phi.y(), phi.z());
+    const S theta2 = sum_of_squares(phi.x(), phi.y(), phi.z());
     S real, factor;  // cos(theta / 2), sin(theta / 2) / theta
     if (theta2 < small) {
       real = S(1) - theta2 / S(8);
@@ -68,7 +68,7 @@ class basic_so3 {
 
   /// The rotation vector, of norm at most pi.
   [[nodiscard]] tangent log() const {
-    const S n2 = square_of(q_.x(), q_.y(), q_.z());
+    const S n2 = sum_of_squares(q_.x(), q_.y(), q_.z());
     const S w = q_.w();
     S factor;
     if (n2 < small) {
@@ -125,7 +125,7 @@ class basic_so3 {
 
   /// `exp(phi + delta) ~ exp(left_jacobian(phi) * delta) * exp(phi)`.
   [[nodiscard]] static matrix<3, 3, S> left_jacobian(const tangent& phi) {
-    const S theta2 = square_of(phi.x(), phi.y(), phi.z());
+    const S theta2 = sum_of_squares(phi.x(), phi.y(), phi.z());
     S a, b;  // (1 - cos t) / t^2, (t - sin t) / t^3
     if (theta2 < small) {
       a = S(0.5) - theta2 / S(24);
@@ -139,7 +139,7 @@ class basic_so3 {
     return polynomial_of_hat(phi, a, b);
   }
   [[nodiscard]] static matrix<3, 3, S> left_jacobian_inverse(const tangent& phi) {
-    const S theta2 = square_of(phi.x(), phi.y(), phi.z());
+    const S theta2 = sum_of_squares(phi.x(), phi.y(), phi.z());
     S c;  // 1 / t^2 - (1 + cos t) / (2 t sin t)
     if (theta2 < small) {
       c = S(1) / S(12) + theta2 / S(720);
@@ -160,7 +160,7 @@ class basic_so3 {
   static constexpr S small = std::same_as<S, float> ? S(1e-4) : S(1e-8);
 
   // Written out, to spare every includer the cost of expression templates.
-  [[nodiscard]] static S square_of(S x, S y, S z) { return x * x + y * y + z * z; }
+  [[nodiscard]] static S sum_of_squares(S x, S y, S z) { return x * x + y * y + z * z; }
   [[nodiscard]] static quaternion unit(S x, S y, S z, S w) {
     const S square = (x * x + z * z) + (y * y + w * w);
     if (!(square > S(0))) return quaternion(w, x, y, z);
@@ -168,7 +168,7 @@ class basic_so3 {
     return quaternion(w / norm, x / norm, y / norm, z / norm);
   }
   /// Source: K. Shoemake, "Animating rotation with quaternion curves", SIGGRAPH 1985, appendix I.
-  [[nodiscard]] static quaternion quaternion_of(const matrix<3, 3, S>& m) {
+  [[nodiscard]] static quaternion to_quaternion(const matrix<3, 3, S>& m) {
     const S trace = m(0, 0) + (m(1, 1) + m(2, 2));
     if (trace > S(0)) {
       const S root = std::sqrt(trace + S(1)), scale = S(0.5) / root;

@@ -88,7 +88,7 @@ struct alignment {
   }
   if (!all_finite(covariance) || !std::isfinite(variance_e) || !std::isfinite(variance_r))
     return fail(errc::degenerate, where, "a position is not finite");
-  auto [u, s, v] = singular_values_of<3>(covariance);
+  auto [u, s, v] = svd<3>(covariance);
   if (!(s[1] > 1e-9 * std::sqrt(variance_e * variance_r)) || !(s[1] > 0.0))
     return fail(errc::degenerate, where,
                 "all positions are collinear: the rotation about their line is not determined");

@@ -27,8 +27,8 @@ struct trajectory_scale {
 /// n).
 /// Source: B. Efron, "The jackknife, the bootstrap and other resampling plans", SIAM 1982.
 /// @pre both are sorted by time
-[[nodiscard]] inline result<trajectory_scale> scale_of(const trajectory& estimate, const trajectory& reference,
-                                                       double max_time_difference = 0.02) {
+[[nodiscard]] inline result<trajectory_scale> estimate_scale(const trajectory& estimate, const trajectory& reference,
+                                                             double max_time_difference = 0.02) {
   constexpr std::size_t parts = 10;
   const auto pairs = pair_poses(estimate, reference, max_time_difference);
   const auto whole = align(pairs, true);

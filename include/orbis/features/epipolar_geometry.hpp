@@ -35,7 +35,7 @@ concept epipolar_geometry = requires(const G& geometry, std::size_t i, const key
 };
 
 /// The line of a homogeneous vector, empty if it is degenerate.
-[[nodiscard]] inline std::optional<epipolar_line> line_of(const vec3& l) noexcept {
+[[nodiscard]] inline std::optional<epipolar_line> to_line(const vec3& l) noexcept {
   const double norm = std::hypot(l.x(), l.y());
   if (!(norm > 0.0) || !std::isfinite(norm) || !std::isfinite(l.z())) return std::nullopt;
   return epipolar_line{static_cast<float>(l.x() / norm), static_cast<float>(l.y() / norm),
@@ -43,7 +43,7 @@ concept epipolar_geometry = requires(const G& geometry, std::size_t i, const key
 }
 
 /// The pixel of a homogeneous vector, empty if it is at infinity.
-[[nodiscard]] inline std::optional<vec2f> pixel_of(const vec3& p) noexcept {
+[[nodiscard]] inline std::optional<vec2f> to_pixel(const vec3& p) noexcept {
   if (!(std::abs(p.z()) > 1e-12 * norm(p))) return std::nullopt;
   return vec2f{static_cast<float>(p.x() / p.z()), static_cast<float>(p.y() / p.z())};
 }
@@ -66,7 +66,7 @@ class ray_geometry {
 
   [[nodiscard]] std::optional<epipolar_line> line(std::size_t i, const keypoint&) const noexcept {
     const vec3 l = E_ * query_rays_[i];
-    return line_of({l.x(), l.y(), focal_ * l.z()});
+    return to_line({l.x(), l.y(), focal_ * l.z()});
   }
   [[nodiscard]] vec2f point(std::size_t i, const keypoint&) const noexcept {
     const vec3& r = train_rays_[i];
@@ -74,7 +74,7 @@ class ray_geometry {
     return {static_cast<float>(focal_ * r.x() / r.z()), static_cast<float>(focal_ * r.y() / r.z())};
   }
   [[nodiscard]] std::optional<vec2f> epipole() const noexcept {
-    return pixel_of({focal_ * centre_.x(), focal_ * centre_.y(), centre_.z()});
+    return to_pixel({focal_ * centre_.x(), focal_ * centre_.y(), centre_.z()});
   }
 
  private:

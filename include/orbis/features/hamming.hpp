@@ -24,7 +24,7 @@ concept descriptor_distance = std::regular_invocable<const F&, const Descriptor&
 struct hamming {
   template <bit_string Descriptor>
   [[nodiscard]] constexpr std::uint32_t operator()(const Descriptor& a, const Descriptor& b) const noexcept {
-    return hamming_distance(words_of(a), words_of(b));
+    return hamming_distance(as_words(a), as_words(b));
   }
 };
 static_assert(descriptor_distance<hamming, binary_descriptor<256>>);

@@ -47,25 +47,25 @@ struct feature_view {
 
 /// Views any valid argument of a matcher: `basic_features`, a `feature_view`, a contiguous range of descriptors.
 template <class Descriptor>
-[[nodiscard]] feature_view<Descriptor> view_of(const basic_features<Descriptor>& f) noexcept {
+[[nodiscard]] feature_view<Descriptor> as_view(const basic_features<Descriptor>& f) noexcept {
   return {f.keypoints, f.descriptors};
 }
 template <class Descriptor>
-[[nodiscard]] constexpr feature_view<Descriptor> view_of(const feature_view<Descriptor>& view) noexcept {
+[[nodiscard]] constexpr feature_view<Descriptor> as_view(const feature_view<Descriptor>& view) noexcept {
   return view;
 }
 template <std::ranges::contiguous_range Range>
 requires std::ranges::sized_range<Range>
-[[nodiscard]] constexpr feature_view<std::ranges::range_value_t<Range>> view_of(const Range& descriptors) noexcept {
+[[nodiscard]] constexpr feature_view<std::ranges::range_value_t<Range>> as_view(const Range& descriptors) noexcept {
   return {{}, {std::ranges::data(descriptors), std::ranges::size(descriptors)}};
 }
 template <class T>
 concept describable = requires(const T& x) {
-  view_of(x);
+  as_view(x);
 };
 template <describable T>
 using descriptor_of =
-    std::remove_const_t<typename decltype(decltype(view_of(std::declval<const T&>()))::descriptors)::element_type>;
+    std::remove_const_t<typename decltype(decltype(as_view(std::declval<const T&>()))::descriptors)::element_type>;
 
 /// Requirements of the stages after a source beyond the nearest neighbour.
 struct search_needs {
@@ -129,7 +129,7 @@ concept match_stage = (match_predicate<S> || match_filter<S>)&&!match_source<S>;
 
 /// The requirements of a stage.
 template <match_stage S>
-[[nodiscard]] constexpr search_needs needs_of() noexcept {
+[[nodiscard]] constexpr search_needs stage_needs() noexcept {
   if constexpr (requires {
                   { S::needs } -> std::convertible_to<search_needs>;
                 }) {

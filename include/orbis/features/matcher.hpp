@@ -36,7 +36,7 @@ namespace orbis::features {
 template <match_source Source, match_stage... Stages>
 class match_chain {
  public:
-  static constexpr search_needs needs = (search_needs{} | ... | needs_of<Stages>());
+  static constexpr search_needs needs = (search_needs{} | ... | stage_needs<Stages>());
 
   constexpr match_chain(Source source, std::tuple<Stages...> stages) : source_{source}, stages_{std::move(stages)} {}
 
@@ -68,8 +68,8 @@ class match_chain {
       searches<Source, descriptor_of<Queries>, Where...>
   void match_into(std::vector<match>& matches, workspace& memory, const Queries& queries, const Trains& trains,
                   const Where&... where) const {
-    const auto q = view_of(queries);
-    const auto t = view_of(trains);
+    const auto q = as_view(queries);
+    const auto t = as_view(trains);
     if constexpr (needs.keypoints) {
       assert(q.keypoints.size() == q.descriptors.size() && t.keypoints.size() == t.descriptors.size());
     }

@@ -54,7 +54,7 @@ struct projection_rule {
 /// The search window of a point; its radius is negative if the point should not be visible: out of its range of
 /// distances, viewed from too different a direction, or with non-finite values. The radius grows with the predicted
 /// level. A point of unknown range (`max_distance` infinite) is searched at all levels.
-[[nodiscard]] inline window window_of(const projection& p, const projection_rule& rule) noexcept {
+[[nodiscard]] inline window search_window(const projection& p, const projection_rule& rule) noexcept {
   const float most = p.max_distance * (1.0F + rule.range_tolerance);
   const float least = p.min_distance * (1.0F - rule.range_tolerance);
   if (!std::isfinite(p.x) || !std::isfinite(p.y) || !(p.distance > 0.0F && p.distance >= least && p.distance <= most) ||
@@ -83,7 +83,7 @@ void predict_windows(std::vector<window>& windows, const Points& points, const P
   windows.reserve(std::ranges::size(points));
   for (auto&& point : points) {
     const std::optional<projection> p = project(point);
-    windows.push_back(p ? window_of(*p, rule) : window{});
+    windows.push_back(p ? search_window(*p, rule) : window{});
   }
 }
 }  // namespace detail

@@ -164,7 +164,7 @@ class stereo_matcher {
     columns.assign(left.size(), std::numeric_limits<float>::quiet_NaN());
     if (left.empty() || right.empty() || left_pyramid.empty()) return;
     const int height = left_pyramid[0].height();
-    scales_of(memory, left_pyramid);
+    fill_scales(memory, left_pyramid);
     sort_by_row(memory, right.keypoints, height);
     const auto list = [&](std::size_t q, auto&& add) { list_band(options, memory, height, left.keypoints[q], add); };
     detail::search_among(distance_, memory.candidates, memory.search, feature_view<D>{left.keypoints, left.descriptors},
@@ -184,12 +184,12 @@ class stereo_matcher {
     for (const match_found& m : memory.found) columns[m.query] = m.column;
   }
 
-  static void scales_of(workspace& memory, const image_pyramid& pyramid) {
+  static void fill_scales(workspace& memory, const image_pyramid& pyramid) {
     memory.scales.clear();
     for (std::size_t level = 0; level != pyramid.size(); ++level)
       memory.scales.push_back(static_cast<double>(pyramid[0].width()) / pyramid[level].width());
   }
-  [[nodiscard]] static int row_of(float y, int height) noexcept {  // clamps rows outside the image
+  [[nodiscard]] static int clamped_row(float y, int height) noexcept {  // clamps rows outside the image
     return static_cast<int>(std::clamp(std::floor(y + 0.5F), 0.0F, static_cast<float>(height - 1)));
   }
 
@@ -197,11 +197,11 @@ class stereo_matcher {
   static void sort_by_row(workspace& memory, std::span<const keypoint> right, int height) {
     std::vector<std::uint32_t>& first = memory.first_in_row;
     first.assign(static_cast<std::size_t>(height) + 1, 0);
-    for (const keypoint& k : right) ++first[static_cast<std::size_t>(row_of(k.y, height))];
+    for (const keypoint& k : right) ++first[static_cast<std::size_t>(clamped_row(k.y, height))];
     for (std::size_t row = 1; row != first.size(); ++row) first[row] += first[row - 1];
     memory.rows.resize(right.size());
     for (std::size_t i = right.size(); i-- != 0;)
-      memory.rows[--first[static_cast<std::size_t>(row_of(right[i].y, height))]] = {
+      memory.rows[--first[static_cast<std::size_t>(clamped_row(right[i].y, height))]] = {
           right[i].x, right[i].y, right[i].octave, static_cast<std::uint32_t>(i)};
   }
 
@@ -210,18 +210,18 @@ class stereo_matcher {
   static void list_band(const stereo_options& options, const workspace& memory, int height, const keypoint& k,
                         Add&& add) {
     if (k.octave < 0 || static_cast<std::size_t>(k.octave) >= memory.scales.size() || !std::isfinite(k.x + k.y)) return;
-    const auto scale_of = [&](int octave) {
+    const auto octave_scale = [&](int octave) {
       return static_cast<float>(memory.scales[std::min(static_cast<std::size_t>(octave), memory.scales.size() - 1)]);
     };
-    const float widest = options.rows * scale_of(k.octave + options.octaves) + 0.5F;
-    const int from = row_of(k.y - widest, height), to = row_of(k.y + widest, height);
-    const float slack = static_cast<float>(options.slide) * scale_of(k.octave);
+    const float widest = options.rows * octave_scale(k.octave + options.octaves) + 0.5F;
+    const int from = clamped_row(k.y - widest, height), to = clamped_row(k.y + widest, height);
+    const float slack = static_cast<float>(options.slide) * octave_scale(k.octave);
     const float least = k.x - options.max_disparity - slack, most = k.x - options.min_disparity + slack;
     const right_place* const first = memory.rows.data() + memory.first_in_row[static_cast<std::size_t>(from)];
     const right_place* const end = memory.rows.data() + memory.first_in_row[static_cast<std::size_t>(to) + 1];
     for (const right_place* r = first; r != end; ++r)
       if (r->x >= least && r->x <= most && std::abs(r->octave - k.octave) <= options.octaves &&
-          std::abs(r->y - k.y) <= options.rows * scale_of(std::max(r->octave, k.octave)))
+          std::abs(r->y - k.y) <= options.rows * octave_scale(std::max(r->octave, k.octave)))
         add(r->index);
   }
 

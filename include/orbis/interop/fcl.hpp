@@ -46,10 +46,10 @@ class fcl_shape {
   /// @pre geometry != nullptr; a finite pose
   template <class Geometry>
   fcl_shape(std::shared_ptr<Geometry> geometry, const se3& T_world_geometry)
-      : object_{std::move(geometry), transform_of(T_world_geometry)} {}
+      : object_{std::move(geometry), to_fcl_transform(T_world_geometry)} {}
 
   void set_pose(const se3& T_world_geometry) {
-    object_.setTransform(transform_of(T_world_geometry));
+    object_.setTransform(to_fcl_transform(T_world_geometry));
     object_.computeAABB();
   }
   [[nodiscard]] const fcl::CollisionObjectd& object() const noexcept { return object_; }
@@ -68,7 +68,7 @@ class fcl_shape {
   }
 
  private:
-  [[nodiscard]] static fcl::Transform3d transform_of(const se3& T) {
+  [[nodiscard]] static fcl::Transform3d to_fcl_transform(const se3& T) {
     fcl::Transform3d out = fcl::Transform3d::Identity();
     out.linear() = T.rotation_matrix();
     out.translation() = T.translation();

@@ -57,7 +57,7 @@ template <point_like P>
 /// The points of an organised cloud as an image, in place. Errors: unsupported, if the cloud is not organised. An empty
 /// cloud gives an empty view.
 template <point_like P>
-[[nodiscard]] result<image_view<const P>> image_of(const pcl::PointCloud<P>& cloud) {
+[[nodiscard]] result<image_view<const P>> as_image(const pcl::PointCloud<P>& cloud) {
   if (cloud.empty()) return image_view<const P>{};
   if (!cloud.isOrganized() || cloud.size() != std::size_t{cloud.width} * cloud.height)
     return fail(errc::unsupported, "pcl::PointCloud",

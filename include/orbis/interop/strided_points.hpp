@@ -40,7 +40,7 @@ class strided_points {
 
     [[nodiscard]] constexpr value_type operator*() const noexcept { return (*this)[0]; }
     [[nodiscard]] constexpr value_type operator[](difference_type n) const noexcept {
-      const S* const p = x_of(at_ + n);
+      const S* const p = x_at(at_ + n);
       return {p[0], p[layout_.coordinate_stride], p[2 * layout_.coordinate_stride]};
     }
     constexpr iterator& operator+=(difference_type n) noexcept {
@@ -78,7 +78,7 @@ class strided_points {
     constexpr iterator(const S* data, const point_layout& layout, std::ptrdiff_t at) noexcept
         : data_{data}, layout_{layout}, at_{at} {}
 
-    [[nodiscard]] constexpr const S* x_of(std::ptrdiff_t i) const noexcept {
+    [[nodiscard]] constexpr const S* x_at(std::ptrdiff_t i) const noexcept {
       if (layout_.row_length == 0) return data_ + i * layout_.point_stride;
       const auto length = static_cast<std::ptrdiff_t>(layout_.row_length);
       return data_ + i / length * layout_.row_stride + i % length * layout_.point_stride;

@@ -46,7 +46,7 @@ namespace detail {
 }  // namespace detail
 
 /// The names of fields for a message: the first twelve, separated by commas, and the number of others.
-[[nodiscard]] inline std::string names_of(const std::vector<cloud_field>& fields) {
+[[nodiscard]] inline std::string field_names(const std::vector<cloud_field>& fields) {
   std::vector<std::string> names;
   for (const cloud_field& field : fields) names.push_back(field.name);
   return detail::joined(names);

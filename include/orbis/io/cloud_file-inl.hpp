@@ -16,7 +16,7 @@
 
 namespace orbis::io {
 
-ORBIS_INLINE std::optional<cloud_format> cloud_format_of(const std::filesystem::path& path) {
+ORBIS_INLINE std::optional<cloud_format> cloud_format_by_extension(const std::filesystem::path& path) {
   const std::string extension = path.extension().string();
   const auto is = [&](std::string_view known) { return std::ranges::equal(extension, known, {}, detail::lower_case); };
   return is(".ply") ? std::optional{cloud_format::ply} : is(".pcd") ? std::optional{cloud_format::pcd} : std::nullopt;
@@ -27,7 +27,7 @@ namespace detail {
 inline result<cloud_format> detect_cloud_format(std::string_view bytes, const std::filesystem::path& path) {
   if (bytes.starts_with("ply\n") || bytes.starts_with("ply\r")) return cloud_format::ply;
   if (bytes.starts_with("# .PCD") || bytes.starts_with("VERSION ")) return cloud_format::pcd;
-  if (const auto format = cloud_format_of(path)) return *format;
+  if (const auto format = cloud_format_by_extension(path)) return *format;
   return fail(errc::unsupported, path.string(), "is neither a PLY nor a PCD file");
 }
 
@@ -53,7 +53,7 @@ ORBIS_INLINE result<cloud_with_fields> read_cloud_with_fields(const std::filesys
 
 ORBIS_INLINE result<void> write_cloud(const std::filesystem::path& path, const cloud_with_fields& cloud,
                                       std::span<const std::uint32_t> indices, const vec3& origin) {
-  const auto format = cloud_format_of(path);
+  const auto format = cloud_format_by_extension(path);
   if (!format) return fail(errc::invalid_argument, path.string(), "must end in .ply or .pcd");
   return *format == cloud_format::pcd ? write_pcd(path, cloud, indices, origin)
                                       : write_ply(path, cloud, indices, {.origin = origin});

@@ -44,9 +44,9 @@ ORBIS_INLINE result<image<rgb8>> mono_recording::color(std::size_t i) const {
 ORBIS_INLINE mono_format detect_mono_format(const std::filesystem::path& folder) {
   if (!detail::asl_camera_folder(folder).empty()) return mono_format::asl;
   if (detail::is_kitti_camera(folder)) return mono_format::kitti;
-  if (!detail::image_list_of(folder).empty()) return mono_format::tum;
+  if (!detail::find_image_list(folder).empty()) return mono_format::tum;
   if (detect_format(folder) != recording_format::automatic) return mono_format::rgbd;
-  if (!detail::image_folder_of(folder).empty()) return mono_format::images;
+  if (!detail::find_image_folder(folder).empty()) return mono_format::images;
   return mono_format::automatic;
 }
 

@@ -57,7 +57,7 @@ result<void> write_indexed_pcd(const std::filesystem::path& path, const point_cl
   std::string names = "FIELDS", sizes = "SIZE", types = "TYPE", counts = "COUNT", place, columns;
   const auto add_field = [&](const std::string& name, scalar_type type, std::size_t count) {
     names += ' ' + name;
-    sizes += ' ' + std::to_string(size_of(type));
+    sizes += ' ' + std::to_string(byte_size(type));
     types += is_floating(type)                                                             ? " F"
              : with_type(type, [](auto zero) { return std::is_signed_v<decltype(zero)>; }) ? " I"
                                                                                            : " U";
@@ -76,7 +76,7 @@ result<void> write_indexed_pcd(const std::filesystem::path& path, const point_cl
     append_little_endian(columns, packed_rgb(cloud.colors[at(i)]));
   for (const cloud_field& field : fields) {
     add_field(field.name, field.type, field.count);
-    const std::size_t size = size_of(field.type) * field.count;
+    const std::size_t size = byte_size(field.type) * field.count;
     for (std::size_t i = 0; i != n; ++i) columns.append(field.bytes, at(i) * size, size);
   }
   for (const double v : viewpoint) {

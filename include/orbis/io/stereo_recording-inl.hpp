@@ -87,7 +87,7 @@ namespace detail {
     if (!files) return fail(files.error());
     lists[i] = *std::move(files);
     if (!list.empty()) images.files.push_back(list);
-    have_whole_times = have_whole_times && !list.empty() && are_whole(times_of(lists[i]));
+    have_whole_times = have_whole_times && !list.empty() && are_whole(timestamps(lists[i]));
   }
   if (auto paired = pair_images(lists[0], lists[1], folder, max_time_difference, images); !paired)
     return fail(paired.error());

@@ -39,7 +39,7 @@ struct recorded_room;
 
 /// A policy with the same number of threads. The rendered images do not depend on it.
 template <execution_policy Policy>
-[[nodiscard]] parallel_policy threads_of(const Policy& policy) {
+[[nodiscard]] parallel_policy as_parallel(const Policy& policy) {
   if constexpr (std::is_same_v<Policy, parallel_policy>)
     return policy;
   else
@@ -98,7 +98,7 @@ class synthetic_recording {
   /// Frame `i` as measured by the sensor, rendered on the policy's threads. Errors: as `frame`.
   template <execution_policy Policy>
   [[nodiscard]] result<camera::rgbd_frame> render(const Policy& policy, std::size_t i) const {
-    return render_on(detail::synthetic::threads_of(policy), i);
+    return render_on(detail::synthetic::as_parallel(policy), i);
   }
 
   /// Frame `i` of a stereo camera, whose left camera is `camera()` and whose right one is `stereo_camera().baseline` to
@@ -106,14 +106,14 @@ class synthetic_recording {
   [[nodiscard]] result<camera::stereo_frame> stereo_frame(std::size_t i) const;
   template <execution_policy Policy>
   [[nodiscard]] result<camera::stereo_frame> render_stereo(const Policy& policy, std::size_t i) const {
-    return render_stereo_on(detail::synthetic::threads_of(policy), i);
+    return render_stereo_on(detail::synthetic::as_parallel(policy), i);
   }
 
   /// Colour, depth (metres) and angles of frame `i` without sensor errors. Errors: invalid_argument if there is no
   /// frame `i`.
   template <execution_policy Policy>
   [[nodiscard]] result<detail::synthetic::exact_view> exact(const Policy& policy, std::size_t i) const {
-    return exact_on(detail::synthetic::threads_of(policy), i);
+    return exact_on(detail::synthetic::as_parallel(policy), i);
   }
 
   /// Exact depth image of a camera of any model at any pose in the room: depths in metres along its axis; 0 where a

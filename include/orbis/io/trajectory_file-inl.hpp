@@ -30,7 +30,7 @@ ORBIS_INLINE result<trajectory> parse_trajectory(std::string_view text, const st
     std::array<double, 8> v{};
     bool lost = false;
     problem = detail::parse_pose_numbers(line, ' ', false, v, lost);
-    const auto pose = problem.empty() && !lost ? detail::pose_of(v, false) : std::nullopt;
+    const auto pose = problem.empty() && !lost ? detail::make_pose(v, false) : std::nullopt;
     if (problem.empty() && !pose)
       problem = lost ? "a pose with NaN or infinity" : "the quaternion is zero or too large";
     if (!pose) return problem_line = number, false;

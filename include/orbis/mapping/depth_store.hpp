@@ -84,7 +84,7 @@ class depth_store {
                       size_text(e.width, e.height));
     assert(is_part_of_image(e, depth));
     bytes_of_masks_ -= at->second.zeros.size();
-    at->second.zeros = detail::zeros_of(depth);
+    at->second.zeros = detail::encode_zeros(depth);
     bytes_of_masks_ += at->second.zeros.size();
     return {};
   }
@@ -140,7 +140,7 @@ class depth_store {
     int width = 0, height = 0;
     std::vector<std::byte> in_memory;  // empty once it is spilled
     std::optional<detail::spill_file::record> spilled{};
-    std::vector<std::byte> zeros{};  // see detail::zeros_of; empty: no pixel is removed
+    std::vector<std::byte> zeros{};  // see detail::encode_zeros; empty: no pixel is removed
     alignas(8) mutable std::uint64_t last_use = 0;
   };
   struct use {

@@ -179,17 +179,18 @@ class live_map {
         worker& w = workers_[i];
         const entry& k = *find(group[i]);
         w.edited = w.depth;
-        remove_pixels(next + i, view_of(k, w.depth), w.edited.view());
+        remove_pixels(next + i, make_view(k, w.depth), w.edited.view());
         if (k.wanted)
-          w.marker.mark(how, history_.grid(), view_of(k, w.edited), camera_, *k.wanted, options_.integration, w.voxels);
+          w.marker.mark(how, history_.grid(), make_view(k, w.edited), camera_, *k.wanted, options_.integration,
+                        w.voxels);
       };
       if (auto read = read_and_work(policy, group, edit); !read) return read;
       for (std::size_t i = 0; i != count; ++i) {
         worker& w = workers_[i];
         entry& k = *find(group[i]);
-        if (k.used) drop_frames_of(k.frame);
+        if (k.used) drop_frames(k.frame);
         k.filtered = true;
-        k.reach = std::min(detail::largest_depth(view_of(k, w.edited)), options_.integration.max_range);
+        k.reach = std::min(detail::largest_depth(make_view(k, w.edited)), options_.integration.max_range);
         set_waiting(k, false);
         k.used = k.wanted;
         if (k.used) history_.set(k.frame, w.voxels);
@@ -388,7 +389,7 @@ class live_map {
     assert(depth.width() == camera_.width() && depth.height() == camera_.height());
     std::erase_if(frames_, [&](const transient& t) { return t.frame == frame; });  // it becomes a keyframe
     entry& k = make(frame);
-    if (k.used) drop_frames_of(frame);
+    if (k.used) drop_frames(frame);
     k.filtered = what == completeness::filtered;
     k.scale = depth.scale();
     k.min_depth = depth.min_depth();
@@ -439,7 +440,7 @@ class live_map {
     set_waiting(k, false);
     if (!k.used) return;
     k.used.reset();
-    drop_frames_of(k.frame);
+    drop_frames(k.frame);
     history_.remove(k.frame);
   }
   void want(entry& k, const std::optional<se3>& pose) {
@@ -475,12 +476,12 @@ class live_map {
     const auto mark = [&](const auto& how, std::size_t i) {
       worker& w = workers_[i];
       const entry& k = *find(group_[i]);
-      w.marker.mark(how, history_.grid(), view_of(k, w.depth), camera_, *k.wanted, options_.integration, w.voxels);
+      w.marker.mark(how, history_.grid(), make_view(k, w.depth), camera_, *k.wanted, options_.integration, w.voxels);
     };
     if (auto read = read_and_work(policy, group_, mark); !read) return read;
     for (std::size_t i = 0; i != count; ++i) {
       entry& k = *find(queue_[next + i].frame);
-      drop_frames_of(k.frame);
+      drop_frames(k.frame);
       history_.set(k.frame, workers_[i].voxels);
       k.used = k.wanted;
       set_waiting(k, false);
@@ -514,7 +515,7 @@ class live_map {
     }
     return {};
   }
-  [[nodiscard]] static depth_view view_of(const entry& k, const image<std::uint16_t>& pixels) {
+  [[nodiscard]] static depth_view make_view(const entry& k, const image<std::uint16_t>& pixels) {
     return depth_view{pixels.view(), k.scale, k.min_depth, k.max_depth};
   }
   /// Drops the oldest frames between keyframes.
@@ -523,7 +524,7 @@ class live_map {
     for (std::size_t i = 0; i != count; ++i) history_.remove(frames_[i].frame);
     frames_.erase(frames_.begin(), frames_.begin() + static_cast<std::ptrdiff_t>(count));
   }
-  void drop_frames_of(std::uint64_t keyframe) {
+  void drop_frames(std::uint64_t keyframe) {
     std::erase_if(frames_, [&](const transient& t) {
       if (t.keyframe == keyframe) history_.remove(t.frame);
       return t.keyframe == keyframe;

@@ -195,7 +195,7 @@ class live_map_thread {
     }
     changed_.notify_all();
   }
-  [[nodiscard]] static depth_use use_of(const job& j) noexcept {
+  [[nodiscard]] static depth_use intended_use(const job& j) noexcept {
     return j.kind == job::keyframe ? depth_use::keyframe : depth_use::frame;
   }
   bool add_scan(job j, const depth_view& depth) {
@@ -203,7 +203,7 @@ class live_map_thread {
     j.scale = depth.scale();
     j.min_depth = depth.min_depth();
     j.max_depth = depth.max_depth();
-    j.pixels = copy_of(depth.pixels());
+    j.pixels = recycled_copy(depth.pixels());
     std::optional<job> dropped;
     bool added = false;
     {
@@ -228,11 +228,11 @@ class live_map_thread {
       }
     }
     changed_.notify_all();
-    if (dropped && listeners_.overflowed) listeners_.overflowed({dropped->frame, use_of(*dropped)});
+    if (dropped && listeners_.overflowed) listeners_.overflowed({dropped->frame, intended_use(*dropped)});
     return added;
   }
   /// A copy, in recycled memory if available.
-  [[nodiscard]] image<std::uint16_t> copy_of(image_view<const std::uint16_t> pixels) {
+  [[nodiscard]] image<std::uint16_t> recycled_copy(image_view<const std::uint16_t> pixels) {
     image<std::uint16_t> copy;
     {
       const std::lock_guard lock{mutex_};
@@ -315,7 +315,7 @@ class live_map_thread {
   }
   void work_on(job& j, std::size_t waiting) {
     const auto start = clock::now();
-    if (j.has_image() && listeners_.prepare) listeners_.prepare(j.frame, use_of(j), j.pixels.view());
+    if (j.has_image() && listeners_.prepare) listeners_.prepare(j.frame, intended_use(j), j.pixels.view());
     const depth_view depth{j.pixels.view(), j.scale, j.min_depth, j.max_depth};
     bool inserted = false;
     switch (j.kind) {

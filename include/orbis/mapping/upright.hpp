@@ -37,7 +37,7 @@ struct found_up {
 };
 
 /// Weight of a normal at an angle of sine `off`; 1 at 0, and 0 at `reach` and above (Tukey's biweight).
-[[nodiscard]] inline double fit_of(double off, double reach) noexcept {
+[[nodiscard]] inline double biweight(double off, double reach) noexcept {
   const double t = off / reach;
   const double u = 1.0 - t * t;
   return u > 0 ? u * u : 0.0;
@@ -51,10 +51,10 @@ struct up_ballot {
   up_ballot(std::span<const vec3> normals, const vec3& up, double reach) {
     for (const vec3& n : normals) {
       const double c = dot(n, up);
-      if (const double w = fit_of(c, reach); w > 0) {
+      if (const double w = biweight(c, reach); w > 0) {
         across += w;
         spread += w * n * transposed(n);
-      } else if (const double v = fit_of(norm(cross(n, up)), reach); v > 0) {
+      } else if (const double v = biweight(norm(cross(n, up)), reach); v > 0) {
         along += v;
         spread -= v * n * transposed(n);
       }
@@ -72,7 +72,7 @@ struct up_ballot {
     for (const vec3& n : normals) {
       const double c = dot(n, up), along = c * c;
       // Floors and tables are observed from above. Weight 0.5 for walls, which fit many directions.
-      sum += 0.5 * fit_of(c, reach) + (c > 0 ? 1.0 : 0.5) * fit_of(std::sqrt(std::max(0.0, 1.0 - along)), reach);
+      sum += 0.5 * biweight(c, reach) + (c > 0 ? 1.0 : 0.5) * biweight(std::sqrt(std::max(0.0, 1.0 - along)), reach);
     }
     return sum * up.y() * up.y();
   };

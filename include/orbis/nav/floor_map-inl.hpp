@@ -323,7 +323,7 @@ result<floor_map> make_floor_map(const Map& map, const ground_robot& robot, cons
 
   floor_map out;
   out.resolution = cell;
-  out.origin = head<2>(octree::cube_of(grid, columns->low(), 0).min);
+  out.origin = head<2>(octree::node_cube(grid, columns->low(), 0).min);
   out.floor = *floor;
   out.states = image<floor_state>(columns->width(), columns->height());
   out.heights = image<float>(columns->width(), columns->height(), std::numeric_limits<float>::quiet_NaN());

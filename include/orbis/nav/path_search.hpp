@@ -83,7 +83,7 @@ struct found_path {
 };
 
 /// The length of a polyline, in the unit of its points.
-[[nodiscard]] inline double length_of(const std::vector<vec3>& points) noexcept {
+[[nodiscard]] inline double path_length(const std::vector<vec3>& points) noexcept {
   double sum = 0.0;
   for (std::size_t i = 1; i < points.size(); ++i) sum += norm(points[i] - points[i - 1]);
   return sum;
@@ -92,15 +92,15 @@ struct found_path {
 /// Cost of a polyline, see planning_options. O(cells on the polyline), or O(points) if the space is uniform.
 /// @pre the points lie in the space
 template <planning_space Space>
-[[nodiscard]] double cost_of(const Space& space, const std::vector<vec3>& points) {
+[[nodiscard]] double path_cost(const Space& space, const std::vector<vec3>& points) {
   double sum = 0.0;
   for (std::size_t i = 1; i < points.size(); ++i)
-    sum += detail::cost_of(space, space.placed(points[i - 1]), space.placed(points[i]));
+    sum += detail::segment_cost(space, space.placed(points[i - 1]), space.placed(points[i]));
   return sum;
 }
 
 /// Makes a path cheaper while the robot fits: removes unnecessary points and cuts corners. Both ends stay. The result
-/// never costs more (see cost_of) and, in a uniform space, is never longer; each of its segments is free
+/// never costs more (see path_cost) and, in a uniform space, is never longer; each of its segments is free
 /// (`space.is_free`). Ends after `max_checks` segments have been checked, or when little is gained. O(max_checks)
 /// checks of segments and, if the space is not uniform, O(max_checks) costs of the path between the ends of a segment.
 /// @pre each segment of `points` is free
@@ -112,7 +112,7 @@ void shorten_path(const Space& space, std::vector<vec3>& points, std::size_t max
     return space.is_free(a, b);
   };
   const auto cost = [&](const vec3& a, const vec3& b) {
-    return detail::cost_of(space, space.placed(a), space.placed(b));
+    return detail::segment_cost(space, space.placed(a), space.placed(b));
   };
   // True if the segment from a point to a later one is free and costs no more than the path between them.
   const auto is_shortcut = [&](std::size_t i, std::size_t j) {
@@ -137,7 +137,7 @@ void shorten_path(const Space& space, std::vector<vec3>& points, std::size_t max
   }
   if (points.size() > 2) points.resize(last + 2);
   for (int round = 0; round != 4 && max_checks != 0; ++round) {
-    const double before = cost_of(space, points);
+    const double before = path_cost(space, points);
     for (std::size_t i = 0; i + 2 < points.size(); ++i) {
       std::size_t farthest = points.size() - 1;
       while (farthest > i + 1 && !is_shortcut(i, farthest)) --farthest;
@@ -159,7 +159,7 @@ void shorten_path(const Space& space, std::vector<vec3>& points, std::size_t max
       points.insert(points.begin() + static_cast<std::ptrdiff_t>(i) + 1, on(b, c, low));
       ++i;
     }
-    if (cost_of(space, points) > before - 1e-3 * space.resolution()) return;
+    if (path_cost(space, points) > before - 1e-3 * space.resolution()) return;
   }
 }
 
@@ -168,7 +168,7 @@ namespace detail {
 /// Returns true if the cost of the free segment equals its length, so that no path is cheaper.
 template <planning_space Space>
 [[nodiscard]] bool costs_its_length(const Space& space, const vec3& a, const vec3& b) {
-  return space.is_uniform() || cost_of(space, a, b) <= norm(b - a) * (1.0 + 1e-9);
+  return space.is_uniform() || segment_cost(space, a, b) <= norm(b - a) * (1.0 + 1e-9);
 }
 
 /// Searches over cell centres from a free start to a finite goal or, if none of `exits` can be reached and `or_near` is
@@ -259,9 +259,9 @@ template <planning_space Space>
     if (is_inside && !is_free) out.status = path_status::goal_blocked;
     if (options.shorten) shorten_path(space, out.points, options.max_checks);
   }
-  out.cost = cost_of(space, out.points);
+  out.cost = path_cost(space, out.points);
   for (vec3& p : out.points) p = space.on_ground(p);
-  out.length = length_of(out.points);
+  out.length = path_length(out.points);
   return out;
 }
 

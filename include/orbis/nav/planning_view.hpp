@@ -66,7 +66,7 @@ class octant_overlap_search {
   static constexpr int octant_level = 2;
 
   [[nodiscard]] bool touches_cube(const octree::voxel_key& k, int level) const {
-    return touches(shape_, octree::cube_of(grid_, k, level));
+    return touches(shape_, octree::node_cube(grid_, k, level));
   }
   [[nodiscard]] bool is_met(const octree::key_box& keys, const octree::voxel_key& k, int level) {
     if (!keys.overlaps(k, level) || !touches_cube(k, level)) return false;
@@ -127,7 +127,7 @@ class planning_view {
   /// @pre the preconditions of the shape and the options; the field belongs to the map, is up to date, and contains
   /// distances to obstacles (not `inside`)
   planning_view(const Map& map, const distance_field& field, const Shape& shape, const planning_options& options = {})
-      : map_{&map}, field_{&field}, shape_{shape}, cover_{cover_of(shape)}, options_{options} {
+      : map_{&map}, field_{&field}, shape_{shape}, cover_{covering_balls(shape)}, options_{options} {
     assert(cover_.inner > 0.0 && map_access<Map>::grid(map) == field.grid() && !field.options().inside);
     assert(options.clearance_weight >= 0.0 && options.preferred_clearance > 0.0 && options.unknown_cost >= 1.0);
   }

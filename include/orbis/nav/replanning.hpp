@@ -118,7 +118,7 @@ class path_monitor {
     for (std::size_t i = 0; i != is_suspect_.size(); ++i)
       sweeps_.push_back(bounds_of(swept(space.shape(), points_[i], points_[i + 1])));
     log.for_each_since(since, [&](const octree::voxel_key& k, std::uint64_t) {
-      const octree::bounding_box octant = octree::cube_of(space.grid(), k, 2);
+      const octree::bounding_box octant = octree::node_cube(space.grid(), k, 2);
       for (std::size_t i = 0; i != is_suspect_.size(); ++i)
         if (!is_suspect_[i] && touches(sweeps_[i], octant) &&
             touches(swept(space.shape(), points_[i], points_[i + 1]), octant))
@@ -151,8 +151,8 @@ class replanner {
       if (!monitor_.first_blocked(space)) {
         path_.points = monitor_.points();
         for (vec3& p : path_.points) p = space.on_ground(p);
-        path_.length = length_of(path_.points);
-        path_.cost = cost_of(space, path_.points);
+        path_.length = path_length(path_.points);
+        path_.cost = path_cost(space, path_.points);
         return path_;
       }
     } else if (planned_ != 0 && position == position_ && !has_changed(space)) {
@@ -178,7 +178,7 @@ class replanner {
     image<float> squared{};
     friend bool operator==(const floor_obstacles&, const floor_obstacles&) = default;
   };
-  [[nodiscard]] static floor_obstacles obstacles_of(const floor_view& floor) {
+  [[nodiscard]] static floor_obstacles make_obstacles(const floor_view& floor) {
     return {floor.resolution(), floor.map().origin, floor.squared_distances()};
   }
   /// Returns true if the map may have changed since the last path search.
@@ -190,7 +190,7 @@ class replanner {
       tried_.follow(
           space.map(), [&](const octree::change_log&, std::uint64_t) { changed = true; }, [&] { changed = true; });
     } else if constexpr (std::derived_from<Space, floor_view>) {
-      changed = !(obstacles_of(space) == tried_floor_);
+      changed = !(make_obstacles(space) == tried_floor_);
     }
     return changed;
   }
@@ -199,7 +199,7 @@ class replanner {
     if constexpr (detail::follows_changes<Space>)
       tried_.mark_read(space.map());
     else if constexpr (std::derived_from<Space, floor_view>)
-      tried_floor_ = path_.status == path_status::found ? floor_obstacles{} : obstacles_of(space);
+      tried_floor_ = path_.status == path_status::found ? floor_obstacles{} : make_obstacles(space);
   }
 
   vec3 goal_;

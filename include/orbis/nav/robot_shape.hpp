@@ -91,29 +91,29 @@ struct ball_cover {
 
 namespace detail {
 /// Number of balls that cover an object of this height (metres): at most a few dozen, however thin it is.
-[[nodiscard]] inline int pieces_of(double height, double radius) noexcept {
+[[nodiscard]] inline int ball_count(double height, double radius) noexcept {
   return static_cast<int>(std::ceil(std::min(height / radius, 40.0)));
 }
 }  // namespace detail
 
-[[nodiscard]] inline ball_cover cover_of(const ball& s) { return {0.0, 0.0, 1, s.radius, s.radius}; }
-[[nodiscard]] inline ball_cover cover_of(const vertical_capsule& s) {
-  const int pieces = detail::pieces_of(s.high - s.low, s.radius);
+[[nodiscard]] inline ball_cover covering_balls(const ball& s) { return {0.0, 0.0, 1, s.radius, s.radius}; }
+[[nodiscard]] inline ball_cover covering_balls(const vertical_capsule& s) {
+  const int pieces = detail::ball_count(s.high - s.low, s.radius);
   const double spacing = pieces == 0 ? 0.0 : (s.high - s.low) / pieces;
   return {s.low, spacing, pieces + 1, std::hypot(s.radius, spacing / 2), s.radius};
 }
-[[nodiscard]] inline ball_cover cover_of(const vertical_cylinder& s) {
-  const int pieces = detail::pieces_of(s.high - s.low, s.radius);
+[[nodiscard]] inline ball_cover covering_balls(const vertical_cylinder& s) {
+  const int pieces = detail::ball_count(s.high - s.low, s.radius);
   const double spacing = (s.high - s.low) / pieces;
   return {s.low + spacing / 2, spacing, pieces, std::hypot(s.radius, spacing / 2), std::min(s.radius, spacing / 2)};
 }
 
 /// A robot that keeps its attitude: `swept(shape, a, b)` is the volume that it sweeps on a straight segment, for
-/// `octree::overlaps`, and `cover_of(shape)` returns balls that avoid most of these tests.
+/// `octree::overlaps`, and `covering_balls(shape)` returns balls that avoid most of these tests.
 template <class S>
 concept robot_shape = std::copyable<S> && requires(const S& shape, const vec3& p) {
   { swept(shape, p, p) } -> octree::overlap_shape;
-  { cover_of(shape) } -> std::same_as<ball_cover>;
+  { covering_balls(shape) } -> std::same_as<ball_cover>;
 };
 
 namespace detail {
@@ -128,7 +128,7 @@ namespace detail {
 /// For any other shape: a capsule around the balls that cover it.
 template <robot_shape Shape>
 [[nodiscard]] vertical_capsule grown(const Shape& s, double by) {
-  const ball_cover c = cover_of(s);
+  const ball_cover c = covering_balls(s);
   return {c.outer + by, c.low, c.low + (c.count - 1) * c.spacing};
 }
 }  // namespace detail

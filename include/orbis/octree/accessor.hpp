@@ -82,7 +82,7 @@ concept octree_map = sensor_model<typename M::model> && requires(const M& map) {
 /// Converts a stored value to a probability; empty for an empty value.
 template <sensor_model Model>
 [[nodiscard]] std::optional<double> probability_at(std::optional<typename Model::value_type> v) noexcept {
-  return v ? std::optional{probability_of(*v)} : std::nullopt;
+  return v ? std::optional{to_probability(*v)} : std::nullopt;
 }
 
 /// Queries of a map at points or voxels near each other: along a ray, on a surface, in a scan. A place near the

@@ -147,7 +147,7 @@ struct bounding_box {
 };
 
 /// Cube of the node at `level` whose lowest voxel is `k`, metres.
-[[nodiscard]] inline bounding_box cube_of(const voxel_grid& grid, const voxel_key& k, int level) {
+[[nodiscard]] inline bounding_box node_cube(const voxel_grid& grid, const voxel_key& k, int level) {
   const double half = grid.cells() / 2, cells = node_cells(level);
   const vec3 low{static_cast<double>(k.x) - half, static_cast<double>(k.y) - half, static_cast<double>(k.z) - half};
   return {low * grid.resolution(), shifted(low, cells) * grid.resolution()};

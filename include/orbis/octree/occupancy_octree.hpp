@@ -208,7 +208,7 @@ class occupancy_octree {
   template <std::invocable<const leaf&> Evict>
   std::size_t evict_outside(const bounding_box& box, Evict&& evict) {
     const auto is_outside = [&](std::uint64_t name) {
-      const bounding_box cube = cube_of(grid_, detail::named_key(name), detail::named_level(name));
+      const bounding_box cube = node_cube(grid_, detail::named_key(name), detail::named_level(name));
       return any_greater(cube.min, box.max) || any_greater(box.min, cube.max);
     };
     std::vector<std::uint64_t> bricks, large;
@@ -221,7 +221,7 @@ class occupancy_octree {
     for (const auto& part : parts) note_brick(part.key, part.level);
     detail::merge_parts(parts, tree_depth());
     detail::visit_parts(store_, parts, tree_depth(),
-                        [&](const voxel_key& key, int level, value_type v) { evict(leaf_of(key, level, v)); });
+                        [&](const voxel_key& key, int level, value_type v) { evict(make_leaf(key, level, v)); });
     store_.erase_bricks(bricks);
     store_.erase_large(large);
     return bricks.size() + large.size();
@@ -290,7 +290,7 @@ class occupancy_octree {
   template <std::invocable<const leaf&> Visit>
   void for_each_leaf(Visit&& visit) const {
     detail::visit_leaves(store_, tree_depth(),
-                         [&](const voxel_key& key, int level, value_type v) { visit(leaf_of(key, level, v)); });
+                         [&](const voxel_key& key, int level, value_type v) { visit(make_leaf(key, level, v)); });
   }
   /// Counts the nodes of the pruned octree. O(bricks + octants that are not uniform), as are the four functions below.
   [[nodiscard]] octree_counts counts() const;
@@ -345,7 +345,7 @@ class occupancy_octree {
     }
   };
 
-  [[nodiscard]] leaf leaf_of(const voxel_key& key, int level, value_type v) const {
+  [[nodiscard]] leaf make_leaf(const voxel_key& key, int level, value_type v) const {
     return {key, tree_depth() - level, grid_.center(key, level), grid_.node_size(level), v, is_occupied<Model>(v)};
   }
   /// Stores a changed octant, and removes its brick if all its voxels are unknown.

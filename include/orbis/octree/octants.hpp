@@ -25,12 +25,12 @@ struct octant_states {
 namespace detail {
 
 template <sensor_model Model>
-[[nodiscard]] octant_states states_of(const brick_store<typename Model::value_type>& store,
-                                      const brick<typename Model::value_type>& b, std::uint32_t octant) {
+[[nodiscard]] octant_states make_states(const brick_store<typename Model::value_type>& store,
+                                        const brick<typename Model::value_type>& b, std::uint32_t octant) {
   return {store.known(b, octant), store.voxels_where(b, octant, is_occupied<Model>)};
 }
 template <sensor_model Model>
-[[nodiscard]] octant_states states_of(typename Model::value_type v) {
+[[nodiscard]] octant_states make_states(typename Model::value_type v) {
   const std::uint64_t all = ~std::uint64_t{0};
   return {all, is_occupied<Model>(v) ? all : 0};
 }
@@ -52,9 +52,9 @@ class octant_reader {
       chunk_ = store_->find_chunk(k);
     }
     const auto* const b = chunk_ == nullptr ? nullptr : store_->find(*chunk_, detail::place_in_chunk(k));
-    if (b != nullptr) return detail::states_of<model>(*store_, *b, detail::place_in_brick(k) >> 6U);
+    if (b != nullptr) return detail::make_states<model>(*store_, *b, detail::place_in_brick(k) >> 6U);
     const auto* const v = store_->find_large_value(k);
-    return v != nullptr ? detail::states_of<model>(*v) : octant_states{};
+    return v != nullptr ? detail::make_states<model>(*v) : octant_states{};
   }
 
  private:
@@ -85,13 +85,13 @@ void for_each_octant(const Map& map, const key_box& box, Visit&& visit) {
       for (std::uint32_t i = 0; i != 8; ++i)
         if (const voxel_key k = child_key(low, i, node_cells(detail::octant_level));
             ((b->uniform | b->dense) >> i & 1U) != 0 && box.overlaps(k, detail::octant_level))
-          visit(k, detail::octant_level, detail::states_of<model>(store, *b, i));
+          visit(k, detail::octant_level, detail::make_states<model>(store, *b, i));
     }
   });
   store.for_each_large([&](std::uint64_t name, typename model::value_type v) {
     const voxel_key low = detail::named_key(name);
     if (const int level = detail::named_level(name); box.overlaps(low, level))
-      visit(low, level, detail::states_of<model>(v));
+      visit(low, level, detail::make_states<model>(v));
   });
 }
 

@@ -88,9 +88,9 @@ namespace detail {
   // Point of the segment nearest to the centre of the box: its start, its end, or between.
   const double share = product <= 0.0 ? 0.0 : product >= squares ? 1.0 : product / squares;
   const double apart = squared_norm(from - share * along);
-  const double outside = (c.radius + 1.7320508075688773 * largest_of(half)) * (1.0 + 1e-9);
+  const double outside = (c.radius + 1.7320508075688773 * max_entry(half)) * (1.0 + 1e-9);
   if (apart > outside * outside) return false;
-  const double inside = (c.radius + smallest_of(half)) * (1.0 - 1e-9);
+  const double inside = (c.radius + min_entry(half)) * (1.0 - 1e-9);
   if (apart < inside * inside) return true;
   // That point of the segment may be near enough to the box; otherwise the plane through the nearest point of the box,
   // perpendicular to the line between the two, may separate both ends from the box. For a ball one of both holds, up to
@@ -149,7 +149,7 @@ class overlap_search {
   }
 
  private:
-  [[nodiscard]] bool meets(const voxel_key& k, int level) const { return touches(shape_, cube_of(grid_, k, level)); }
+  [[nodiscard]] bool meets(const voxel_key& k, int level) const { return touches(shape_, node_cube(grid_, k, level)); }
 
   [[nodiscard]] static double chunks_in(const key_box& keys) noexcept {
     const auto along = [](std::uint32_t a, std::uint32_t b) { return (b >> chunk_level) - (a >> chunk_level) + 1.0; };

@@ -77,7 +77,7 @@ bool store_replayed(brick_store<T>& store, std::uint64_t name, const replayed_br
   return b.is_known();
 }
 
-[[nodiscard]] inline unsigned octants_of(const scan::part& p) noexcept { return p.free | p.occupied | p.full; }
+[[nodiscard]] inline unsigned observed_octants(const scan::part& p) noexcept { return p.free | p.occupied | p.full; }
 /// Mask of the octants of a brick for which the observations of two scans differ.
 [[nodiscard]] inline unsigned different_octants(const scan& a, const scan::part& in_a, const scan& b,
                                                 const scan::part& in_b) noexcept {
@@ -164,7 +164,7 @@ std::uint32_t scan_history<Octree>::make_scan(std::uint64_t frame) {
 }
 
 template <replayable_octree Octree>
-auto scan_history<Octree>::place_of(std::vector<detail::brick_use>& uses, std::uint64_t frame) const noexcept
+auto scan_history<Octree>::find_place(std::vector<detail::brick_use>& uses, std::uint64_t frame) const noexcept
     -> std::vector<detail::brick_use>::iterator {
   if (uses.empty() || scans_[uses.back().scan].frame < frame) return uses.end();
   return std::lower_bound(uses.begin(), uses.end(), frame,
@@ -177,18 +177,18 @@ void scan_history<Octree>::change_uses(std::uint32_t number, const scan& after) 
   const auto old_parts = s.voxels.parts(), new_parts = after.parts();
   std::size_t i = 0;
   const auto drop = [&](const scan::part& p) {
-    const std::uint32_t brick = uses_.number_of(p.name);
+    const std::uint32_t brick = uses_.find_or_add(p.name);
     auto& uses = uses_[brick].uses;
-    uses.erase(place_of(uses, s.frame));
-    uses_.mark_stale(brick, detail::octants_of(p));
+    uses.erase(find_place(uses, s.frame));
+    uses_.mark_stale(brick, detail::observed_octants(p));
   };
   fresh_.clear();
   for (std::uint32_t j = 0; j != new_parts.size(); ++j) {
     const scan::part& p = new_parts[j];
     for (; i != old_parts.size() && old_parts[i].name < p.name; ++i) drop(old_parts[i]);
-    const std::uint32_t brick = uses_.number_of(p.name);
+    const std::uint32_t brick = uses_.find_or_add(p.name);
     auto& uses = uses_[brick].uses;
-    const auto at = place_of(uses, s.frame);
+    const auto at = find_place(uses, s.frame);
     if (i != old_parts.size() && old_parts[i].name == p.name) {
       at->part = j;
       uses_.mark_stale(brick, detail::different_octants(s.voxels, old_parts[i], after, p));
@@ -198,7 +198,7 @@ void scan_history<Octree>::change_uses(std::uint32_t number, const scan& after) 
       fresh_.push_back(j);
     } else {
       uses.insert(at, {number, j});
-      uses_.mark_stale(brick, detail::octants_of(p));
+      uses_.mark_stale(brick, detail::observed_octants(p));
     }
   }
   for (; i != old_parts.size(); ++i) drop(old_parts[i]);

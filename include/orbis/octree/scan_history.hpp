@@ -158,8 +158,8 @@ class scan_history {
   /// Returns the number of the scan of `frame`; creates one if needed.
   [[nodiscard]] std::uint32_t make_scan(std::uint64_t frame);
   /// Position (existing or for insertion) of the scan of `frame` among those that use a brick.
-  [[nodiscard]] std::vector<detail::brick_use>::iterator place_of(std::vector<detail::brick_use>& uses,
-                                                                  std::uint64_t frame) const noexcept;
+  [[nodiscard]] std::vector<detail::brick_use>::iterator find_place(std::vector<detail::brick_use>& uses,
+                                                                    std::uint64_t frame) const noexcept;
   /// Updates the bricks' lists of scans from the old voxels of scan `number` to `after`. If the scan is the newest of a
   /// brick, apply_fresh handles the brick; otherwise octants become stale.
   void change_uses(std::uint32_t number, const scan& after);

@@ -49,12 +49,12 @@ namespace orbis::octree {
 enum class occupancy { unknown, free, occupied };
 
 /// Log-odds of a probability in (0, 1).
-[[nodiscard]] constexpr float log_odds_of(double probability) noexcept {
+[[nodiscard]] constexpr float to_log_odds(double probability) noexcept {
   const double odds = probability / (1.0 - probability);
   return static_cast<float>(std::is_constant_evaluated() ? detail::constexpr_log(odds) : std::log(odds));
 }
 /// Probability for the given log-odds.
-[[nodiscard]] inline double probability_of(double log_odds) noexcept { return 1.0 - 1.0 / (1.0 + std::exp(log_odds)); }
+[[nodiscard]] inline double to_probability(double log_odds) noexcept { return 1.0 - 1.0 / (1.0 + std::exp(log_odds)); }
 
 // -- requirements of a sensor model, as separate concepts for specific compiler messages
 

@@ -66,9 +66,9 @@ class alignment_estimator {
         with_scale);
     if (!found || !(found->scale() > 0.0)) return std::nullopt;
     if constexpr (with_scale)
-      return made_of(*found);
+      return make_model(*found);
     else
-      return made_of(se3(found->rotation(), found->translation()));
+      return make_model(se3(found->rotation(), found->translation()));
   }
   [[nodiscard]] one_or_none<model> fit(const std::array<std::uint32_t, 3>& sample) const { return {fit_to(sample)}; }
   [[nodiscard]] std::optional<model> refine(const model&, std::span<const std::uint32_t> inliers) const {
@@ -94,7 +94,7 @@ class alignment_estimator {
   }
 
  private:
-  [[nodiscard]] static model made_of(const Transform& t) {
+  [[nodiscard]] static model make_model(const Transform& t) {
     const auto matrix = t.to_matrix();
     model m{t, {}};
     for (int row = 0; row != 3; ++row)
@@ -140,8 +140,8 @@ ORBIS_INLINE error alignment_error(std::size_t not_finite, std::size_t n) {
 }
 
 template <class Transform>
-result<alignment_estimate<Transform>> alignment_of(std::span<const vec3> from, std::span<const vec3> to,
-                                                   const alignment_options& options) {
+result<alignment_estimate<Transform>> align_vectors(std::span<const vec3> from, std::span<const vec3> to,
+                                                    const alignment_options& options) {
   constexpr const char* where = "alignment";
   using estimator_type = detail::alignment_estimator<Transform>;
   const std::size_t n = from.size();
@@ -149,7 +149,7 @@ result<alignment_estimate<Transform>> alignment_of(std::span<const vec3> from, s
   if (!options.deviations.empty() && options.deviations.size() != n)
     return fail(errc::invalid_argument, where, "the number of deviations differs from the number of pairs");
   const ransac_options asked = detail::ransac_part(options);
-  if (const char* const fault = detail::fault_of(asked)) return fail(errc::invalid_argument, where, fault);
+  if (const char* const fault = detail::find_fault(asked)) return fail(errc::invalid_argument, where, fault);
   if (n < 3) return fail(errc::no_data, where, "fewer than three pairs of points");
   const auto weight_of = [&](std::size_t i) {
     return options.deviations.empty() ? 1.0 : 1.0 / (options.deviations[i] * options.deviations[i]);

@@ -64,7 +64,7 @@ template <point_range From, point_range To>
     for (int k = 0; k != 3; ++k) a[k] = p[k], b[k] = q[k];
     return weights.empty() ? 1.0 : weights[i];
   };
-  if (const auto found = align_by_moments(moments_of(n, pair), n, with_scale)) return *found;
+  if (const auto found = align_by_moments(compute_moments(n, pair), n, with_scale)) return *found;
   std::size_t i = 0;
   while (i != n && all_finite(read_point(from, i)) && all_finite(read_point(to, i))) ++i;
   return fail(alignment_error(i, n));
@@ -72,8 +72,8 @@ template <point_range From, point_range To>
 
 /// `estimate_alignment` for lists of vectors.
 template <class Transform>
-[[nodiscard]] result<alignment_estimate<Transform>> alignment_of(std::span<const vec3> from, std::span<const vec3> to,
-                                                                 const alignment_options& options);
+[[nodiscard]] result<alignment_estimate<Transform>> align_vectors(std::span<const vec3> from, std::span<const vec3> to,
+                                                                  const alignment_options& options);
 
 }  // namespace detail
 
@@ -127,7 +127,7 @@ template <class Transform = se3, point_range From, point_range To>
 requires(std::same_as<Transform, se3> || std::same_as<Transform, sim3>)
     [[nodiscard]] result<alignment_estimate<Transform>> estimate_alignment(const From& from, const To& to,
                                                                            const alignment_options& options = {}) {
-  return detail::alignment_of<Transform>(detail::read_points(from), detail::read_points(to), options);
+  return detail::align_vectors<Transform>(detail::read_points(from), detail::read_points(to), options);
 }
 
 }  // namespace orbis::optimize

@@ -22,7 +22,7 @@ result<pose_estimate> estimate_pose(std::span<const vec3> points_world, std::spa
   const std::size_t n = points_world.size();
   if (n != pixels.size()) return fail(errc::invalid_argument, where, "the lists of points and pixels differ in length");
   ransac_options asked = detail::ransac_part(options);
-  if (const char* const fault = detail::fault_of(asked)) return fail(errc::invalid_argument, where, fault);
+  if (const char* const fault = detail::find_fault(asked)) return fail(errc::invalid_argument, where, fault);
   asked.min_inliers = 0;  // inliers are counted at the end, with the exact camera model
   if (n < 3) return fail(errc::no_data, where, "fewer than three matches");
 

@@ -75,7 +75,7 @@ struct quaternion_between {
   static constexpr int dimension = 6;
 
   [[nodiscard]] static vec6 residual(const se3& T_world_a, const se3& T_world_b, const se3& T_a_b) {
-    return residual_of(T_a_b.inverse() * (T_world_a.inverse() * T_world_b));
+    return se3_residual(T_a_b.inverse() * (T_world_a.inverse() * T_world_b));
   }
   [[nodiscard]] static vec6 linearize(const se3& T_world_a, const se3& T_world_b, const se3& T_a_b, mat6& by_a,
                                       mat6& by_b) {
@@ -98,11 +98,11 @@ struct quaternion_between {
         by_a(3 + i, k) = 0.0;
         by_a(3 + i, 3 + k) = by_turn(i, k) - real * back(i, k);
       }
-    return residual_of(d);
+    return se3_residual(d);
   }
 
  private:
-  [[nodiscard]] static vec6 residual_of(const se3& d) {
+  [[nodiscard]] static vec6 se3_residual(const se3& d) {
     const auto& q = d.rotation().unit_quaternion();
     const vec3& t = d.translation();
     const double sign = q.w() < 0.0 ? -1.0 : 1.0;

@@ -204,7 +204,7 @@ class ransac_run {
 
   /// Scores a candidate; returns true if it is the new best.
   bool propose(const model& candidate) {
-    const double score = score_of(candidate);
+    const double score = score_model(candidate);
     if (!(score < best_score_)) return false;
     adopt(candidate, score);
     return true;
@@ -246,7 +246,7 @@ class ransac_run {
   }
 
   /// Scores a candidate; infinite if the sequential test stopped the scoring.
-  [[nodiscard]] double score_of(const model& candidate) {
+  [[nodiscard]] double score_model(const model& candidate) {
     const std::size_t n = estimator_.size();
     double score = 0.0;
     std::size_t inliers = 0, seen = 0;
@@ -325,7 +325,7 @@ template <class Options>
 }
 
 /// The reason why the options are invalid; null if they are valid.
-[[nodiscard]] inline const char* fault_of(const ransac_options& options) noexcept {
+[[nodiscard]] inline const char* find_fault(const ransac_options& options) noexcept {
   if (!(options.threshold > 0.0) || !std::isfinite(options.threshold))
     return "the threshold must be positive and finite";
   if (!(options.confidence > 0.0 && options.confidence < 1.0)) return "the confidence must be between 0 and 1";
@@ -369,7 +369,7 @@ template <model_estimator E>
 [[nodiscard]] result<ransac_estimate<typename E::model>> ransac(const E& estimator, const ransac_options& options,
                                                                 ransac_workspace& workspace) {
   constexpr const char* where = "ransac";
-  if (const char* const fault = detail::fault_of(options)) return fail(errc::invalid_argument, where, fault);
+  if (const char* const fault = detail::find_fault(options)) return fail(errc::invalid_argument, where, fault);
   const std::size_t n = estimator.size();
   if (n < E::sample_size) return fail(errc::no_data, where, "fewer data than one sample needs");
 

@@ -43,7 +43,7 @@ result<self_calibrated<Camera>> self_calibrate(const Camera& start, std::span<se
   found.observations = problem.observations();
   found.outliers = problem.outliers();
   found.final_rms = problem.rms();
-  found.initial_rms = problem.rms_of(start, poses, points);
+  found.initial_rms = problem.residual_rms(start, poses, points);
   problem.write(poses, points);
   return found;
 }

@@ -15,7 +15,7 @@ namespace orbis::optimize {
 
 namespace detail {
 
-ORBIS_INLINE mat3 essential_of(const se3& T_second_first) {
+ORBIS_INLINE mat3 essential_matrix(const se3& T_second_first) {
   return hat<double>(T_second_first.translation()) * T_second_first.rotation_matrix();
 }
 
@@ -147,7 +147,7 @@ ORBIS_INLINE triangulation triangulate(const se3& T_world_first, const vec3& fir
   out.parallax = detail::angle_between_directions(T_second_first.rotation() * first, second);
   out.status = triangulation_status::no_parallax;
   if (!(out.parallax >= options.min_parallax)) return out;
-  detail::intersect_rays(detail::essential_of(T_second_first), first, second);
+  detail::intersect_rays(detail::essential_matrix(T_second_first), first, second);
   // In the second camera: t + depth_1 u = depth_2 v.
   const vec3 u = T_second_first.rotation() * first;
   const vec3& t = T_second_first.translation();

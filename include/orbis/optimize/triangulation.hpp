@@ -59,7 +59,7 @@ namespace detail {
 }
 
 /// The matrix E with `second^T E first = 0` for rays of one point: translation x rotation of `T_second_first`.
-[[nodiscard]] mat3 essential_of(const se3& T_second_first);
+[[nodiscard]] mat3 essential_matrix(const se3& T_second_first);
 
 /// `triangulate` for any number of rays.
 template <class S>

@@ -84,7 +84,7 @@ result<homography_estimate> estimate_homography(std::span<const vec2> first, std
   const std::size_t n = first.size();
   if (n != second.size()) return fail(errc::invalid_argument, where, "the lists of pixels differ in length");
   ransac_options asked = detail::ransac_part(options);
-  if (const char* const fault = detail::fault_of(asked)) return fail(errc::invalid_argument, where, fault);
+  if (const char* const fault = detail::find_fault(asked)) return fail(errc::invalid_argument, where, fault);
   if (n < 4) return fail(errc::no_data, where, "fewer than four matches");
   std::vector<typename estimator_type::match> matches;
   matches.reserve(n);

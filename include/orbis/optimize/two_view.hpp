@@ -69,7 +69,7 @@ template <camera::camera_model Camera>
   const std::size_t n = first_pixels.size();
   if (n != second_pixels.size()) return fail(errc::invalid_argument, where, "the lists of pixels differ in length");
   const ransac_options asked = detail::ransac_part(options);
-  if (const char* const fault = detail::fault_of(asked)) return fail(errc::invalid_argument, where, fault);
+  if (const char* const fault = detail::find_fault(asked)) return fail(errc::invalid_argument, where, fault);
   if (n < 5) return fail(errc::no_data, where, "fewer than five matches");
   const std::vector<detail::image_match> matches =
       detail::read_matches(first_pixels, second_pixels, camera, options.seed);

@@ -126,7 +126,7 @@ class vocabulary_trainer {
     tree.resize(static_cast<std::uint32_t>(child_counts_.size()));
     tree.weights_are = options_.weighting;
     std::ranges::copy(centres_, tree.descriptors.values().begin());
-    for (const auto& [node, part] : leaves_) tree.weights.push_back(weight_of(part));  // by ascending node
+    for (const auto& [node, part] : leaves_) tree.weights.push_back(word_weight(part));  // by ascending node
     while (!child_counts_.empty() && child_counts_.back() == 0) child_counts_.pop_back();
     if (std::string problem = connect_tree(tree, child_counts_); !problem.empty())
       return fail(errc::degenerate, "", std::move(problem));
@@ -135,7 +135,7 @@ class vocabulary_trainer {
 
   /// The logarithm of the number of images divided by the number of images that contain the word: K. Sparck Jones, "A
   /// statistical interpretation of term specificity and its application in retrieval", 1972.
-  [[nodiscard]] float weight_of(const segment& leaf) const {
+  [[nodiscard]] float word_weight(const segment& leaf) const {
     if (options_.weighting == weighting::tf || options_.weighting == weighting::binary) return 1.0F;
     std::size_t with = 0;
     for (std::size_t i = leaf.begin; i != leaf.end; ++i)

@@ -64,7 +64,7 @@ template <execution_policy Policy, training_images Images>
   detail::training_data<8 * sizeof(descriptor)> data;
   for (const auto& image : images) {
     for (const auto& d : image) {
-      data.descriptors.push_back(words_of(d));
+      data.descriptors.push_back(as_words(d));
       data.images.push_back(data.image_count);
     }
     ++data.image_count;

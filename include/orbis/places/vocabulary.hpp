@@ -64,7 +64,7 @@ class basic_vocabulary {
 
   /// The word of a descriptor. @pre !empty()
   template <bit_string D>
-  requires(8 * sizeof(D) == Bits) [[nodiscard]] std::uint32_t word_of(const D& descriptor) const noexcept {
+  requires(8 * sizeof(D) == Bits) [[nodiscard]] std::uint32_t find_word(const D& descriptor) const noexcept {
     assert(!empty());
     return word_of_bytes(reinterpret_cast<const std::byte*>(&descriptor));
   }

@@ -86,7 +86,7 @@ class basic_atlas {
     return offsets;
   }
   /// Returns the current id of a keyframe, after mergers of its map. The keyframe may have been erased since (see
-  /// `basic_map::replacement_of`). The id of a removed map does not change. O(mergers).
+  /// `basic_map::replacement`). The id of a removed map does not change. O(mergers).
   [[nodiscard]] map_keyframe current(map_keyframe k) const {
     for (auto to = merged_.find(k.map); to != merged_.end(); to = merged_.find(k.map))
       k = {to->second.into, k.keyframe + to->second.offsets.keyframes};

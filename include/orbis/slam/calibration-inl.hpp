@@ -40,8 +40,8 @@ template <feature_descriptor D>
 
 /// Returns the participating keyframes, and the landmarks that two of them observe.
 template <feature_descriptor D, class Camera>
-[[nodiscard]] bundle_snapshot calibration_problem_of(const basic_map<D>& m, const camera_rig<Camera>& rig,
-                                                     const calibration_options& options) {
+[[nodiscard]] bundle_snapshot make_calibration_problem(const basic_map<D>& m, const camera_rig<Camera>& rig,
+                                                       const calibration_options& options) {
   bundle_snapshot s;
   std::unordered_map<std::uint32_t, std::uint32_t> index;  // by keyframe
   const std::size_t first = first_to_take(m, options.max_keyframes);
@@ -87,7 +87,7 @@ template <camera::parametric_camera Camera>
 
 /// Returns the largest displacement of a pixel by one standard deviation of the given parameters, pixels.
 template <camera::parametric_camera Camera, class Covariance>
-[[nodiscard]] double effect_of(const Camera& camera, const Covariance& covariance, std::uint32_t parameters) {
+[[nodiscard]] double max_pixel_deviation(const Camera& camera, const Covariance& covariance, std::uint32_t parameters) {
   constexpr int count = camera::parameters_of<Camera>::count, steps = 8;
   double largest = 0.0;
   for (int i = 0; i <= steps; ++i)
@@ -128,7 +128,7 @@ template <camera::parametric_camera Camera>
     if (tried && by_patches) tried->covariance *= patch_correlation * patch_correlation;
     const auto is_vague = [&](std::uint32_t group) {
       return (free & group) != 0 &&
-             (!tried || effect_of(tried->camera, tried->covariance, free & group) > options.max_effect);
+             (!tried || max_pixel_deviation(tried->camera, tried->covariance, free & group) > options.max_effect);
     };
     if (std::none_of(groups.begin(), groups.end(), is_vague)) {
       found = *std::move(tried);
@@ -163,7 +163,7 @@ result<calibration<Camera>> calibrate(const basic_map<D>& m, const camera_rig<Ca
                                       const calibration_options& options, const progress& callback) {
   camera_rig<Camera> loose = rig;  // bf determines how many pixels a depth error counts as
   loose.model.bf *= std::sqrt(options.depth_weight);
-  const detail::bundle_snapshot problem = detail::calibration_problem_of(m, loose, options);
+  const detail::bundle_snapshot problem = detail::make_calibration_problem(m, loose, options);
   if constexpr (std::same_as<Camera, camera::any_camera>) {
     return rig.camera().visit([&](const auto& model) -> result<calibration<Camera>> {
       auto found = detail::calibrate_model(model, problem, loose.model.bf, options, callback);

@@ -56,7 +56,7 @@ basic_map<D>::basic_map(detail::map_content<D> content)
 }
 
 template <feature_descriptor D>
-se3 basic_map<D>::pose_of(keyframe_id id) const {
+se3 basic_map<D>::pose(keyframe_id id) const {
   se3 T_below_camera;
   while (!has_keyframe(id)) {
     const detail::erased_keyframe& e = content_.erased.at(id);
@@ -68,7 +68,7 @@ se3 basic_map<D>::pose_of(keyframe_id id) const {
 }
 
 template <feature_descriptor D>
-double basic_map<D>::scale_of(keyframe_id id) const {
+double basic_map<D>::scale(keyframe_id id) const {
   double scale = 1.0;
   while (!has_keyframe(id)) {
     const detail::erased_keyframe& e = content_.erased.at(id);
@@ -129,7 +129,7 @@ keyframe_id basic_map<D>::add_keyframe(frame_type f) {
   const std::vector<landmark_id> seen = std::exchange(f.landmarks, std::vector<landmark_id>(f.features.size(), no_id));
   const keyframe_id id = content_.keyframes.add({std::move(f), keyframe_end()});
   for (std::uint32_t i = 0; i < seen.size(); ++i)
-    if (const landmark_id l = replacement_of(seen[i]); l != no_id) attach(l, id, i);
+    if (const landmark_id l = replacement(seen[i]); l != no_id) attach(l, id, i);
   count_covisible(at(id), no_id);
   const keyframe_id strongest = covisibility_.strongest(id).keyframe;
   content_.tree.add(id, strongest != no_id ? strongest : before);
@@ -265,7 +265,7 @@ id_offsets basic_map<D>::append(basic_map&& other, const sim3& T_this_other, con
 }
 
 template <feature_descriptor D>
-std::vector<covisible> basic_map<D>::observers_of(const std::vector<landmark_id>& landmarks) const {
+std::vector<covisible> basic_map<D>::observers(const std::vector<landmark_id>& landmarks) const {
   detail::counter<keyframe_id> observed;
   for (const landmark_id l : landmarks)
     if (has_landmark(l))

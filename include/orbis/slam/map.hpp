@@ -90,14 +90,10 @@ class basic_map {
 
   /// Returns the current landmark for `id`: itself if it exists, otherwise the one it was fused into; `no_id` if it was
   /// removed, or erased so long ago that 2^18 landmarks or more have been added since.
-  [[nodiscard]] landmark_id replacement_of(landmark_id id) const noexcept {
-    return content_.landmarks.replacement_of(id);
-  }
+  [[nodiscard]] landmark_id replacement(landmark_id id) const noexcept { return content_.landmarks.replacement(id); }
   /// Returns the current keyframe for `id`: itself if it exists, otherwise its nearest existing ancestor in the
   /// spanning tree; `no_id` if no keyframe is left, or it was forgotten and the map comes from a file.
-  [[nodiscard]] keyframe_id replacement_of(keyframe_id id) const noexcept {
-    return content_.keyframes.replacement_of(id);
-  }
+  [[nodiscard]] keyframe_id replacement(keyframe_id id) const noexcept { return content_.keyframes.replacement(id); }
   /// Number of changes of poses and of additions and erasures of keyframes: if it is unchanged, so are the keyframes
   /// and their poses.
   [[nodiscard]] std::uint64_t pose_changes() const noexcept { return pose_changes_; }
@@ -106,9 +102,9 @@ class basic_map {
   /// Returns the first id >= `id` that the map remembers; `keyframe_end()` if there is none.
   [[nodiscard]] keyframe_id next_remembered(keyframe_id id) const;
   /// Returns `T_world_camera` of a keyframe. An erased keyframe moves with its replacement. @pre remembers(id)
-  [[nodiscard]] se3 pose_of(keyframe_id id) const;
+  [[nodiscard]] se3 pose(keyframe_id id) const;
   /// Returns `basic_keyframe::scale`, also of an erased keyframe. @pre remembers(id)
-  [[nodiscard]] double scale_of(keyframe_id id) const;
+  [[nodiscard]] double scale(keyframe_id id) const;
 
   [[nodiscard]] const covisibility_graph& covisibility() const noexcept { return covisibility_; }
   [[nodiscard]] const spanning_tree& tree() const noexcept { return content_.tree; }
@@ -133,7 +129,7 @@ class basic_map {
     of_keyframe.resize(at(id).size(), 1.0F);
     of_keyframe[feature] = static_cast<float>(deviation);
   }
-  /// Moves a keyframe by `T_new_old`, a motion in the world, whose scale enters `scale_of`. @pre has_keyframe(id)
+  /// Moves a keyframe by `T_new_old`, a motion in the world, whose scale enters `scale`. @pre has_keyframe(id)
   void move_keyframe(keyframe_id id, const sim3& T_new_old) {
     set_pose(id, moved(T_new_old, at(id).T_world_camera));
     content_.keyframes[id].scale *= T_new_old.scale();
@@ -155,7 +151,7 @@ class basic_map {
   /// O(observations of its landmarks).
   keyframe_id add_keyframe(frame_type f);
   /// Erases a keyframe with its observations, and the landmarks that no other keyframe observes. Its children in the
-  /// spanning tree get other parents. `pose_of` still gives its pose. @pre has_keyframe(id)
+  /// spanning tree get other parents. `pose` still gives its pose. @pre has_keyframe(id)
   void erase_keyframe(keyframe_id id);
   /// Forgets the poses of erased keyframes, except those of `keep`, the `latest` ones, and their replacements. Each
   /// remembered keyframe takes about 130 bytes. Let n be the number of erased keyframes remembered before: O((n + keep)
@@ -199,7 +195,7 @@ class basic_map {
 
   /// Returns the keyframes that observe any of the given landmarks, with the number of landmarks observed: most first;
   /// if equal, the older first. O(observations of these landmarks).
-  [[nodiscard]] std::vector<covisible> observers_of(const std::vector<landmark_id>& landmarks) const;
+  [[nodiscard]] std::vector<covisible> observers(const std::vector<landmark_id>& landmarks) const;
 
  private:
   /// Returns a pose after a motion in the world.

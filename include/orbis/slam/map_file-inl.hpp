@@ -74,7 +74,7 @@ inline void put_landmark(std::string& to, const landmark& l) {
         put(to, gone_keyframe);
         const erased_keyframe& e = m.content().erased.at(id);
         put(to, e.replacement.value());
-        const double scale = e.replacement == no_id ? 1.0 : m.scale_of(e.replacement);
+        const double scale = e.replacement == no_id ? 1.0 : m.scale(e.replacement);
         put_pose(to, scaled(e.T_replacement_camera, scale));  // the scales of a map that is read are 1
       }
     }
@@ -91,7 +91,7 @@ inline void put_landmark(std::string& to, const landmark& l) {
       for (const landmark& l : m.landmarks()) put_landmark(to, l);
       return;
     }
-    const auto is_gone = [&m](landmark_id id) { return m.replacement_of(id) == no_id; };
+    const auto is_gone = [&m](landmark_id id) { return m.replacement(id) == no_id; };
     for (landmark_id id = 0; id != m.landmark_end();) {
       // Erased ids: by pages where the map has forgotten them, one by one where it still has an entry.
       landmark_id next = m.landmarks().next_known_id(id);
@@ -101,7 +101,7 @@ inline void put_landmark(std::string& to, const landmark& l) {
       if (m.has_landmark(next))
         put_landmark(to, m.landmark_at(next));
       else
-        put(to, std::uint32_t{0}, m.replacement_of(next).value());
+        put(to, std::uint32_t{0}, m.replacement(next).value());
       id = next + 1;
     }
   });

@@ -52,8 +52,8 @@ namespace detail {
 
 /// Creates a frame of features with rays, before their depth is measured. Features whose pixel has no ray get NaN.
 template <camera::camera_model Camera, feature_descriptor D>
-[[nodiscard]] basic_frame<D> frame_of(const camera_rig<Camera>& rig, features::basic_features<D> features,
-                                      sensor_kind sensor) {
+[[nodiscard]] basic_frame<D> make_frame(const camera_rig<Camera>& rig, features::basic_features<D> features,
+                                        sensor_kind sensor) {
   basic_frame<D> f;
   f.sensor = sensor;
   f.features = std::move(features);
@@ -70,7 +70,7 @@ template <camera::camera_model Camera, feature_descriptor D>
 }
 
 /// Converts a colour image to grey, in `to`, of which it returns a view.
-[[nodiscard]] inline image_view<const std::uint8_t> grey_of(image_view<const rgb8> color, image<std::uint8_t>& to) {
+[[nodiscard]] inline image_view<const std::uint8_t> to_grey(image_view<const rgb8> color, image<std::uint8_t>& to) {
   if (to.width() != color.width() || to.height() != color.height())
     to = image<std::uint8_t>(color.width(), color.height());
   features::luma(color, to.view());
@@ -106,7 +106,7 @@ struct image_memory {
   [[nodiscard]] auto extract_with(const Extractor& extract, image_view<const rgb8> color) {
     if constexpr (features::pyramid_extractor<Extractor>) {
       decltype(extract(color)) found;
-      extract.into(found, pyramid, detail::grey_of(color, grey));
+      extract.into(found, pyramid, detail::to_grey(color, grey));
       return found;
     } else {
       return extract(color);
@@ -121,7 +121,7 @@ template <camera::camera_model Camera, feature_extractor Extractor, camera::dept
                                                                    const Extractor& extract,
                                                                    image_view<const rgb8> color, const Depth& depth,
                                                                    image_memory& memory) {
-  auto f = detail::frame_of(rig, memory.extract_with(extract, color), sensor_kind::rgbd);
+  auto f = detail::make_frame(rig, memory.extract_with(extract, color), sensor_kind::rgbd);
   for (std::size_t i = 0; i < f.size(); ++i) {
     const auto& k = f.features.keypoints[i];
     if (!std::isnan(f.rays[i].x())) f.depth[i] = static_cast<float>(detail::usable_depth(rig, depth, k.x, k.y));
@@ -173,7 +173,7 @@ template <camera::camera_model Camera, feature_descriptor D, class Pixels>
 [[nodiscard]] basic_frame<D> match_stereo(const camera_rig<Camera>& rig, stereo_memory& memory,
                                           features::basic_features<D> left, const Pixels& left_pixels,
                                           const features::basic_features<D>& right, const Pixels& right_pixels) {
-  auto f = frame_of(rig, std::move(left), sensor_kind::stereo);
+  auto f = make_frame(rig, std::move(left), sensor_kind::stereo);
   const double bf = rig.model.bf;
   const std::vector<float>& columns = memory.columns;
   memory.match.into(memory.columns, f.features, left_pixels, right, right_pixels,
@@ -217,8 +217,8 @@ template <camera::camera_model Camera, feature_extractor Extractor>
                                                                      image_view<const rgb8> left,
                                                                      image_view<const rgb8> right,
                                                                      stereo_memory& memory) {
-  const auto grey_left = detail::grey_of(left, memory.grey_left),
-             grey_right = detail::grey_of(right, memory.grey_right);
+  const auto grey_left = detail::to_grey(left, memory.grey_left),
+             grey_right = detail::to_grey(right, memory.grey_right);
   if constexpr (grey_extractor<Extractor>)
     return measure_stereo(rig, extract, grey_left, grey_right, memory);
   else
@@ -231,7 +231,7 @@ requires std::invocable<const Extractor&, image_view<const Pixel>>
 [[nodiscard]] basic_frame<descriptor_of_t<Extractor>> measure_monocular(const camera_rig<Camera>& rig,
                                                                         const Extractor& extract,
                                                                         image_view<const Pixel> picture) {
-  return detail::frame_of(rig, extract(picture), sensor_kind::monocular);
+  return detail::make_frame(rig, extract(picture), sensor_kind::monocular);
 }
 
 }  // namespace orbis::slam

@@ -168,7 +168,7 @@ track_result ORBIS_SLAM_SYSTEM::track_frame(double timestamp, frame_type f, cons
 ORBIS_SLAM_SYSTEM_TEMPLATE
 void ORBIS_SLAM_SYSTEM::dispatch_keyframe(map_keyframe k) {
   if (const auto& callback = shared_.callbacks.keyframe_made)  // its map may have been merged into another one since
-    callback(shared_.locked([&] { return shared_.event_of(shared_.atlas.current(k)); }));
+    callback(shared_.locked([&] { return shared_.make_event(shared_.atlas.current(k)); }));
   back_end_->process(k);
 }
 

@@ -28,7 +28,7 @@ struct masks {
       *out++ = any(a);
       *out++ = none(a);
       *out++ = all(a);
-      *out++ = number_of(a);
+      *out++ = popcount(a);
     }
     for (std::size_t n = 0; n <= N; ++n) *out++ = bits(M::first(n));
   }

@@ -215,7 +215,7 @@ ORBIS_BEGIN_UNFUSED
 /// What becomes of each grey value `time` seconds after the first frame. The factor is
 /// lowest * (highest / lowest)^u, to a few per cent, where `u` is even in [0, 1).
 [[nodiscard]] inline std::array<std::uint8_t, 256> exposure_curve(const exposure_options& o, double time) noexcept {
-  const std::uint64_t word = noise_word(o.seed, 0x67616966ULL, static_cast<std::uint64_t>(floor_of(time / o.hold)));
+  const std::uint64_t word = noise_word(o.seed, 0x67616966ULL, static_cast<std::uint64_t>(floor_to_int(time / o.hold)));
   const double u = upper_fraction(word), ratio = std::sqrt(o.highest / o.lowest);
   // Between the ends and their geometric mean, piece by piece.
   const double gain =

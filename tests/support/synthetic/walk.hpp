@@ -93,7 +93,7 @@ class walk {
       return options_.jitter * amplitude *
              (smooth_noise(seed_, stream, 3.0 * time) + 0.4 * smooth_noise(seed_, stream + 50, 9.0 * time));
     };
-    const triple here = place(along - length_ * static_cast<double>(floor_of(lap)));
+    const triple here = place(along - length_ * static_cast<double>(floor_to_int(lap)));
     const double ahead = heading(along);  // turns more evenly than the way itself
     const double aside = sway(0.06, 5, 0.15) + sway(0.02, 13, 0.4);
     camera_pose pose;
@@ -149,7 +149,7 @@ class walk {
       return x < length ? 0.5 * x * x / length : x - 0.5 * length;
     };
     double turned = heading_ - round_;  // by the round before the first
-    const auto last = floor_of((along + reach) / length_);
+    const auto last = floor_to_int((along + reach) / length_);
     for (std::int64_t lap = -1; lap <= last; ++lap)
       for (const piece& p : pieces_) {
         if (p.turn == 0.0) continue;

@@ -22,7 +22,7 @@ namespace orbis::cloud::detail {
 
 /// Converts any policy to the one for which algorithms are compiled; the result is the same for all policies.
 template <execution_policy Policy>
-[[nodiscard]] parallel_policy threads_of(const Policy& policy) noexcept(noexcept(policy.threads())) {
+[[nodiscard]] parallel_policy as_parallel(const Policy& policy) noexcept(noexcept(policy.threads())) {
   if constexpr (std::same_as<Policy, parallel_policy>)
     return policy;
   else

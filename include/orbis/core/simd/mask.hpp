@@ -185,7 +185,7 @@ template <target Target>
 }
 /// Number of lanes that are set.
 template <std::size_t Size, std::size_t N, class Target>
-[[nodiscard]] ORBIS_ALWAYS_INLINE std::uint32_t number_of(const mask<Size, N, Target>& m) noexcept {
+[[nodiscard]] ORBIS_ALWAYS_INLINE std::uint32_t popcount(const mask<Size, N, Target>& m) noexcept {
   return ones<Target>(bits(m));
 }
 

@@ -141,12 +141,12 @@ ORBIS_ALWAYS_INLINE std::size_t compress_store(T* to, const vec<T, N, Target>& a
     V out;
     detail::compress_64(out.v, a.v, m.v);
     out.store(to);
-    return number_of(m);
+    return popcount(m);
   } else if constexpr (bytes == 32 && sizeof(T) >= 4) {
     V out;
     detail::compress_32(out.v, a.v, bits(m));
     out.store(to);
-    return number_of(m);
+    return popcount(m);
 #endif
   } else {
     std::array<T, N> value;

@@ -77,7 +77,7 @@ template <class Tree, octree::octomap_model Model, class FinishLeaf>
     tree_builder<Tree, FinishLeaf>{built, file.data() + nodes, finish_leaf}.build(built.begin(), 0, map.tree_depth());
   auto tree = std::make_unique<Tree>(map.resolution());
   tree->swapContent(built);
-  const auto probability = [](float log_odds) { return octree::probability_of(static_cast<double>(log_odds)); };
+  const auto probability = [](float log_odds) { return octree::to_probability(static_cast<double>(log_odds)); };
   tree->setProbHit(probability(Model::hit));
   tree->setProbMiss(probability(Model::miss));
   tree->setClampingThresMin(probability(Model::clamp_min));

@@ -33,7 +33,7 @@ inline constexpr time_unit time_units[] = {
 /// The unit of a time stamp by the digits before its decimal point: times since 1970 have 10 digits in seconds, 13 in
 /// milliseconds, 16 in microseconds and 19 in nanoseconds (from 2001 to 2286). Seconds for any other number of digits,
 /// and for leading zeros.
-[[nodiscard]] constexpr time_unit unit_of(std::string_view stamp) noexcept {
+[[nodiscard]] constexpr time_unit detect_unit(std::string_view stamp) noexcept {
   const std::size_t digits = std::min(stamp.find_first_not_of("0123456789"), stamp.size());
   if (stamp.starts_with('0') || (digits != stamp.size() && stamp[digits] != '.'))  // a sign, or an exponent
     return time_units[0];
@@ -45,13 +45,13 @@ inline constexpr time_unit time_units[] = {
   }
 }
 
-/// Parses a time stamp in `unit`, by default that of its digits (`unit_of`). Returns seconds; empty if it is not a
+/// Parses a time stamp in `unit`, by default that of its digits (`detect_unit`). Returns seconds; empty if it is not a
 /// finite number.
 [[nodiscard]] inline std::optional<double> parse_time_stamp(std::string_view stamp,
                                                             std::optional<time_unit> unit = {}) noexcept {
   double t = 0.0;
   if (!parse_number(stamp, t) || !std::isfinite(t)) return std::nullopt;
-  return t * unit.value_or(unit_of(stamp)).seconds;
+  return t * unit.value_or(detect_unit(stamp)).seconds;
 }
 
 /// A time in seconds for messages, with at most 6 decimals.

@@ -27,7 +27,7 @@ TEST_CASE("every finite point is in one leaf, within the boxes above it, or is a
       bool in_place = true;
       bool in_boxes = true;
       for (std::size_t l = 0; l != tree.leaves.size(); ++l) {
-        for (std::size_t i = 0; i != tree.size_of(l); ++i) {
+        for (std::size_t i = 0; i != tree.leaf_size(l); ++i) {
           const std::uint32_t member = tree.members[l * leaf_width + i];
           ++seen[member];
           std::size_t child = l;

@@ -315,7 +315,7 @@ TEST_CASE("boxes and leaves are measured alike by all instruction sets") {
     constexpr std::size_t stride = 400;
     const std::uint32_t own = near.leaves[near.count / 2];
     const point_row& points_of_leaf = tree.leaves[own];
-    const std::size_t first = 3, last = tree.size_of(own) - 2;
+    const std::size_t first = 3, last = tree.leaf_size(own) - 2;
     std::vector<float> rows(leaf_width * stride, -1.0F);
     std::array<std::uint32_t, leaf_width> counts{};
     kernels.near_points_of_each(tree.leaves.data(), near, points_of_leaf, first, last, 0.2F, scratch.data(),

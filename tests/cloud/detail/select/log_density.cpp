@@ -41,7 +41,7 @@ TEST_CASE("scales of a normal distribution are its standard deviation") {
   orbis::random_bits random{2};
   std::vector<float> values;
   for (int i = 0; i != 20'000; ++i) values.push_back(static_cast<float>(3.0 + 0.2 * random.normal()));
-  const auto b = orbis::cloud::detail::bulk_of(values);
+  const auto b = orbis::cloud::detail::fit_bulk(values);
   CHECK(b.median == Approx(3.0).margin(0.01));
   CHECK(b.left_scale == Approx(0.2).epsilon(0.05));
   CHECK(b.right_scale == Approx(0.2).epsilon(0.05));

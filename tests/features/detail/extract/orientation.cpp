@@ -51,14 +51,14 @@ TEST_CASE("an angle is that of the standard library, from 0 to below 2 pi") {
   for (int i = 0; i != 10000; ++i) {
     const double wanted = 2.0 * pi * i / 10000.0;
     for (const double radius : {1e-3, 1.0, 1e6}) {
-      const float angle = angle_of(radius * std::cos(wanted), radius * std::sin(wanted));
+      const float angle = polar_angle(radius * std::cos(wanted), radius * std::sin(wanted));
       CHECK((angle >= 0.0F && angle < 2.0F * std::numbers::pi_v<float>));
       CHECK(std::abs(std::remainder(static_cast<double>(angle) - wanted, 2.0 * pi)) < 5e-7);
     }
   }
-  CHECK(angle_of(0.0, 0.0) == 0.0F);
-  CHECK(angle_of(5.0, 0.0) == 0.0F);
-  CHECK(angle_of(5.0, -1e-12) < 6.3F);
+  CHECK(polar_angle(0.0, 0.0) == 0.0F);
+  CHECK(polar_angle(5.0, 0.0) == 0.0F);
+  CHECK(polar_angle(5.0, -1e-12) < 6.3F);
 }
 
 TEST_CASE("a turned picture is turned, and a plain one points to the right") {

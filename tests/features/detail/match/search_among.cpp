@@ -57,7 +57,7 @@ void check_search(const std::vector<Descriptor>& queries, const std::vector<Desc
   orbis::features::detail::search_among_workspace memory;
   std::vector<candidate> found{{7, 7, 7}};
   for (const bool reverse : {true, false, true}) {
-    orbis::features::detail::search_among(Distance{}, found, memory, view_of(queries), view_of(trains),
+    orbis::features::detail::search_among(Distance{}, found, memory, as_view(queries), as_view(trains),
                                           {.reverse = reverse}, [&](std::size_t q, const auto& add) {
                                             for (const std::uint32_t t : compared[q]) add(t);
                                           });

@@ -16,9 +16,9 @@ using namespace orbis::io::detail::synthetic;
 using orbis::io::synthetic_path_options;
 
 TEST_CASE("floors and smooth noise are right on both sides of zero") {
-  CHECK(floor_of(1.5) == 1);
-  CHECK(floor_of(-1.5) == -2);
-  CHECK(floor_of(-2.0) == -2);
+  CHECK(floor_to_int(1.5) == 1);
+  CHECK(floor_to_int(-1.5) == -2);
+  CHECK(floor_to_int(-2.0) == -2);
   for (int i = -200; i != 200; ++i) {
     const double a = smooth_noise(3, 4, 0.05 * i), b = smooth_noise(3, 4, 0.05 * (i + 1));
     CHECK(std::abs(a) <= 1.0);

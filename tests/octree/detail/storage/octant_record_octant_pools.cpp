@@ -14,7 +14,7 @@ TEST_CASE("Records of every pool keep what is written, places that are free are 
   std::array<std::uint32_t, octant_pools<float>::plain + 1> record{};
   for (unsigned number = 0; number != record.size(); ++number) {
     record[number] = pools.add(number);
-    CHECK(octant_pools<float>::pool_of(record[number]) == number);
+    CHECK(octant_pools<float>::pool_number(record[number]) == number);
     pools.write(record[number], [&](auto& r) { r.known = 100 + number; });
   }
   for (unsigned number = 0; number != record.size(); ++number)

@@ -48,11 +48,11 @@ TEST_CASE("Moments of weighted pairs are those of repeated pairs") {
   const auto read = [&](std::size_t i, double* a, double* b) {
     for (int k = 0; k != 3; ++k) a[k] = from[i][k], b[k] = to[i][k];
   };
-  const auto weighted = optimize::detail::moments_of(7, [&](std::size_t i, double* a, double* b) {
+  const auto weighted = optimize::detail::compute_moments(7, [&](std::size_t i, double* a, double* b) {
     read(i, a, b);
     return i == 2 ? 3.0 : 1.0;
   });
-  const auto repeated = optimize::detail::moments_of(9, [&](std::size_t i, double* a, double* b) {
+  const auto repeated = optimize::detail::compute_moments(9, [&](std::size_t i, double* a, double* b) {
     read(i < 7 ? i : 2, a, b);
     return 1.0;
   });

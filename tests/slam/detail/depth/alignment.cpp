@@ -44,7 +44,7 @@ struct view {
   }
 };
 
-/// What `equations_of` is the expansion of, where no residual is large.
+/// What `build_equations` is the expansion of, where no residual is large.
 double cost_of(std::span<const plane_observation_of_row> planes, const se3& T_camera_world, const vec6& twist) {
   double sum = 0.0;
   for (const plane_observation_of_row& o : planes) {
@@ -66,7 +66,7 @@ TEST_CASE("The equations of depth are the derivatives of its cost by pose and tw
     return cost_of(std::span(&o, 1), at.T_world_camera.inverse(), at.twist) > 0.5;
   });
   REQUIRE(planes.size() > 200);
-  const depth_equations e = equations_of(planes, at, 1e9, 0.0);
+  const depth_equations e = build_equations(planes, at, 1e9, 0.0);
   CHECK(e.determined == 6);
   const se3 T_camera_world = at.T_world_camera.inverse();
   CHECK(e.term.cost == Catch::Approx(cost_of(planes, T_camera_world, at.twist)));
@@ -89,7 +89,7 @@ TEST_CASE("A wall determines three directions of the pose, with a floor five, an
   const auto determined = [&](const std::vector<test::plane>& planes) {
     const auto seen = view{planes, pose}.planes_at({pose, vec6::Zero()});
     REQUIRE(seen.size() > 200);
-    return equations_of(seen, {pose, vec6::Zero()}, 30.0, 0.002).determined;
+    return build_equations(seen, {pose, vec6::Zero()}, 30.0, 0.002).determined;
   };
   CHECK(determined(test::wall()) == 3);
   CHECK(determined(test::wall_and_floor()) == 5);
@@ -99,9 +99,9 @@ TEST_CASE("A wall determines three directions of the pose, with a floor five, an
 TEST_CASE("What a surface leaves free is left alone") {
   const se3 pose = se3::exp(vector6(0.02, 0.01, -0.02, 0.01, -0.02, 0.0));
   const auto seen = view{test::wall(), pose}.planes_at({se3{}, vec6::Zero()});
-  const depth_equations e = equations_of(seen, {se3{}, vec6::Zero()}, 30.0, 0.002);
+  const depth_equations e = build_equations(seen, {se3{}, vec6::Zero()}, 30.0, 0.002);
   REQUIRE(e.determined == 3);
-  const vec6 step = step_of(e);
+  const vec6 step = solve_step(e);
   const vec6 found = (pose * se3::exp(step)).log();  // what is left, as a motion of the pose
   CHECK(std::abs(found[2]) < 1e-3);
   CHECK(std::abs(found[3]) < 1e-3);
@@ -115,8 +115,8 @@ TEST_CASE("What a surface leaves free is left alone") {
 TEST_CASE("Many points count as no more than they are allowed to") {
   const se3 pose = se3::exp(vector6(0.0, 0.0, -0.01, 0.0, 0.0, 0.0));
   const auto seen = view{test::corner(), pose}.planes_at({se3{}, vec6::Zero()});
-  const auto all = equations_of(seen, {se3{}, vec6::Zero()}, 1e9, 0.002);
-  const auto few = equations_of(seen, {se3{}, vec6::Zero()}, 30.0, 0.002);
+  const auto all = build_equations(seen, {se3{}, vec6::Zero()}, 1e9, 0.002);
+  const auto few = build_equations(seen, {se3{}, vec6::Zero()}, 30.0, 0.002);
   const double share = 30.0 / static_cast<double>(seen.size());
   CHECK((few.term.h - share * all.term.h).norm() < 1e-9 * all.term.h.norm());
   CHECK((few.term.g - share * all.term.g).norm() < 1e-9 * all.term.g.norm());

@@ -55,7 +55,7 @@ struct scene {
       seen.keypoints.push_back(k);
       seen.descriptors.push_back(looks[i]);
     }
-    slam::frame f = slam::detail::frame_of(rig, std::move(seen), slam::sensor_kind::rgbd);
+    slam::frame f = slam::detail::make_frame(rig, std::move(seen), slam::sensor_kind::rgbd);
     for (std::size_t i = 0; i != f.size(); ++i) f.depth[i] = static_cast<float>(points[i].z());
     f.timestamp = time;
     return f;

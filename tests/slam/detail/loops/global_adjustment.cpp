@@ -21,8 +21,8 @@ namespace global = slam::detail::global_adjustment;
 
 slam::detail::bundle_solution solve(const global::snapshot& taken, const slam::camera_rig<camera::any_camera>& rig,
                                     const progress& callback = {}) {
-  return slam::detail::bundle_solver<camera::any_camera>{rig.model, global::loss}.solve(taken, global::schedule_of({}),
-                                                                                        callback);
+  return slam::detail::bundle_solver<camera::any_camera>{rig.model, global::loss}.solve(
+      taken, global::make_schedule({}), callback);
 }
 
 /// A map whose loop was closed, and is still bent.

@@ -126,8 +126,8 @@ TEST_CASE("Without depth maps that meet become one, in world and unit of the old
     CHECK(test::validate(s.m()));
     const auto older = s.shared.atlas.current(of_older), newer = s.shared.atlas.current(of_newer);
     CHECK((s.m().at(older.keyframe).T_world_camera.inverse() * before).log().norm() < 1e-9);
-    CHECK(s.m().scale_of(older.keyframe) == Approx(1.0));
-    CHECK(s.m().scale_of(newer.keyframe) == Approx(1.0 / unit).epsilon(0.01));
+    CHECK(s.m().scale(older.keyframe) == Approx(1.0));
+    CHECK(s.m().scale(newer.keyframe) == Approx(1.0 / unit).epsilon(0.01));
     const double apart = (s.m().at(newer.keyframe).T_world_camera.translation() - before.translation()).norm();
     const vec3 truth = s.world.truth(18).translation() - s.world.truth(3).translation();
     CHECK(apart == Approx(truth.norm()).epsilon(0.02));

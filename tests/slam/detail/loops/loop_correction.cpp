@@ -28,7 +28,7 @@ struct open_ring {
 
 /// How far a keyframe is from where the truth puts it, as seen from keyframe 0.
 [[nodiscard]] double error_of(const open_ring& r, const slam::map& m, slam::keyframe_id k) {
-  return (m.pose_of(k).translation() - r.world.truth(k.value()).translation()).norm();
+  return (m.pose(k).translation() - r.world.truth(k.value()).translation()).norm();
 }
 
 }  // namespace
@@ -95,7 +95,7 @@ TEST_CASE("Where keyframes with a loop edge are erased, the next correction stil
   // All that saw the place from either side but the first few and the last few, which share nothing with each other.
   for (std::uint32_t k = 2; k <= 12; ++k) r.m.erase_keyframe(k);
   for (std::uint32_t k = 92; k <= r.last.value(); ++k) r.m.erase_keyframe(k);
-  const slam::keyframe_id a = r.m.replacement_of(r.match.keyframe), b = r.m.replacement_of(r.match.candidate);
+  const slam::keyframe_id a = r.m.replacement(r.match.keyframe), b = r.m.replacement(r.match.candidate);
   REQUIRE(r.m.tree().loop_edges(a) == std::vector<slam::keyframe_id>{b});
   CHECK(r.m.covisibility().shared(a, b) < 25);
 
@@ -133,12 +133,12 @@ TEST_CASE("Without depth a loop takes out the drift of the scale as well") {
   CHECK(mean < 0.3 * mean_before);
   // An erased keyframe, and what was noted relative to one, follow.
   const auto error_of = [&](slam::keyframe_id k) {
-    return (m.pose_of(k).translation() - world.truth(k.value()).translation()).norm();
+    return (m.pose(k).translation() - world.truth(k.value()).translation()).norm();
   };
   CHECK(error_of(40) < 1.1 * std::max(error_of(39), error_of(41)));
-  CHECK(m.scale_of(40) == Approx(m.scale_of(41)).epsilon(0.01));
-  CHECK(m.scale_of(0) == 1.0);
-  CHECK(m.scale_of(last) == Approx(report.scale));
+  CHECK(m.scale(40) == Approx(m.scale(41)).epsilon(0.01));
+  CHECK(m.scale(0) == 1.0);
+  CHECK(m.scale(last) == Approx(report.scale));
   // Global adjustment takes the rest out, and does not lose the scale.
   test::adjust_map(m, world.rig);
   CHECK(test::fault_of(m) == "");

@@ -111,6 +111,6 @@ TEST_CASE("A map without depth takes on the unit of the one that it becomes a pa
   REQUIRE(report.merged);
   CHECK(test::fault_of(maps.active()) == "");
   CHECK(report.fusion.fused > 100);
-  CHECK(maps.active().scale_of(30) == Approx(1.0 / unit).epsilon(0.01));
+  CHECK(maps.active().scale(30) == Approx(1.0 / unit).epsilon(0.01));
   CHECK(world.errors(maps.active())[0] < 0.03);
 }

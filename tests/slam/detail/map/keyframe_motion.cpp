@@ -32,7 +32,7 @@ TEST_CASE("In another frame of reference every keyframe sees what it saw") {
              before.at(o.keyframe).T_world_camera.inverse() * old.position)
                 .norm() < 1e-9);
   }
-  for (slam::keyframe_id k = 0; k != m.keyframe_end(); ++k) CHECK(distance(m.pose_of(k), T * before.pose_of(k)) < 1e-9);
+  for (slam::keyframe_id k = 0; k != m.keyframe_end(); ++k) CHECK(distance(m.pose(k), T * before.pose(k)) < 1e-9);
   CHECK(test::fault_of(m) == "");
 }
 
@@ -60,7 +60,7 @@ TEST_CASE("All keyframes move, landmarks with the oldest one that observes them,
   for (const auto& k : before.keyframes()) {
     const sim3 expected = motion.at(k.id.value()) * sim3(k.T_world_camera);
     CHECK(distance(all.at(k.id).T_world_camera, se3(expected.rotation(), expected.translation())) < 1e-12);
-    CHECK(all.scale_of(k.id) == motion.at(k.id.value()).scale());
+    CHECK(all.scale(k.id) == motion.at(k.id.value()).scale());
   }
   for (const auto& l : before.landmarks()) {
     const auto oldest = l.observations.front().keyframe;

@@ -15,7 +15,7 @@ TEST_CASE("The window of a landmark contains its keypoint, landmarks out of sigh
   world.walk(m, 0, 20, world.truth(0));
   const auto& k = m.at(19);
   const features::camera_projection project{world.rig.camera(), k.T_world_camera};
-  const auto rule = slam::detail::rule_of(world.rig.scales, 8.0);
+  const auto rule = slam::detail::make_rule(world.rig.scales, 8.0);
   search_list<features::binary_descriptor<256>> list;
   std::size_t observed = 0, contained = 0, hidden = 0;
   for (const auto& l : m.landmarks()) {

@@ -47,7 +47,7 @@ TEST_CASE("The local map is the reference, who shares with the frame, and their 
   CHECK(slam::detail::local_keyframes(m, query, 20, 3) == std::vector<slam::keyframe_id>{20, 9, 10});
   CHECK(slam::detail::local_keyframes(m, query, 20, 1) == std::vector<slam::keyframe_id>{20});
   CHECK(slam::detail::local_landmarks(m, query, 20, 3).size() == 40 + 60);
-  const auto landmarks = slam::detail::landmarks_of(m, {3, 4, 5, 3});
+  const auto landmarks = slam::detail::observed_landmarks(m, {3, 4, 5, 3});
   CHECK(landmarks.size() == 80);
   CHECK(std::is_sorted(landmarks.begin(), landmarks.end()));
 

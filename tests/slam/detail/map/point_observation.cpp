@@ -12,14 +12,14 @@ TEST_CASE("An observation has the pixel, the depth as disparity, and the informa
   test::ring_world world;
   slam::frame f = world.look(3, world.truth(3));
   const vec3 point(1, 2, 3);
-  const auto o = slam::detail::observation_of(world.rig, f, 5, point);
+  const auto o = slam::detail::make_observation(world.rig, f, 5, point);
   CHECK(o.point == point);
   CHECK(o.pixel == f.pixel(5));
   CHECK(o.has_depth());
   CHECK(o.right == Approx(f.pixel(5).x() - 400.0 / static_cast<double>(f.depth[5])));
   CHECK(o.information == world.rig.scales.information(f.features.keypoints[5].octave));
   f.depth[5] = 0.0F;
-  CHECK_FALSE(slam::detail::observation_of(world.rig, f, 5, point).has_depth());
+  CHECK_FALSE(slam::detail::make_observation(world.rig, f, 5, point).has_depth());
 }
 
 TEST_CASE("A keypoint agrees with the point that it observes, and with no other one") {

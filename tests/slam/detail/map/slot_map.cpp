@@ -51,14 +51,14 @@ TEST_CASE("A number leads to what took its place in the end") {
   all.erase(0, 1);
   all.erase(1, 5);
   all.erase(2);
-  CHECK(all.replacement_of(0) == 5);
-  CHECK(all.replacement_of(1) == 5);
-  CHECK(all.replacement_of(2) == no_id);
-  CHECK(all.replacement_of(3) == 3);
-  CHECK(all.replacement_of(6) == no_id);
-  CHECK(all.replacement_of(no_id) == no_id);
+  CHECK(all.replacement(0) == 5);
+  CHECK(all.replacement(1) == 5);
+  CHECK(all.replacement(2) == no_id);
+  CHECK(all.replacement(3) == 3);
+  CHECK(all.replacement(6) == no_id);
+  CHECK(all.replacement(no_id) == no_id);
   all.erase(5);
-  CHECK(all.replacement_of(0) == no_id);
+  CHECK(all.replacement(0) == no_id);
 }
 
 TEST_CASE("A store behaves as a map from numbers after any sequence of operations, appended ones included") {
@@ -82,7 +82,7 @@ TEST_CASE("A store behaves as a map from numbers after any sequence of operation
       REQUIRE(p.tested.contains(id) == p.plain.contains(id));
       std::uint32_t now = id;
       while (now != no_id && !p.plain.contains(now)) now = p.successor.at(now);
-      REQUIRE(p.tested.replacement_of(id) == now);
+      REQUIRE(p.tested.replacement(id) == now);
     }
   };
   for (int step = 0; step != 4000; ++step) {
@@ -132,14 +132,14 @@ TEST_CASE("A store that need not remember forgets what replaced an object long a
     all.add(static_cast<int>(i));
     all.erase(i, 4);
   }
-  CHECK(all.replacement_of(0) == 4);
-  CHECK(all.replacement_of(300) == 4);
+  CHECK(all.replacement(0) == 4);
+  CHECK(all.replacement(300) == 4);
   for (std::uint32_t i = 505; i != 3000; ++i) {
     all.add(static_cast<int>(i));
     all.erase(i);
   }
-  CHECK(all.replacement_of(0) == 4);  // its neighbours are there
-  CHECK(all.replacement_of(300) == no_id);
+  CHECK(all.replacement(0) == 4);  // its neighbours are there
+  CHECK(all.replacement(300) == no_id);
   CHECK(all.size() == 3);
   CHECK(std::vector<int>(all.begin(), all.end()) == std::vector{2, 3, 4});
   CHECK(all.next_id(0) == 2);
@@ -152,7 +152,7 @@ TEST_CASE("A store that need not remember forgets what replaced an object long a
   for (std::uint32_t i = 0; i != 256; ++i) recent.erase(i, 300);
   decltype(all) into;
   into.append(std::move(recent));
-  CHECK(into.replacement_of(0) == 300);
+  CHECK(into.replacement(0) == 300);
   CHECK(into.back() == 4999);
 
   decltype(all) other;
@@ -162,6 +162,6 @@ TEST_CASE("A store that need not remember forgets what replaced an object long a
   CHECK(all.append(std::move(other)) == 3000);
   CHECK(all.end_id() == 3102);
   CHECK(all[3100] == 77);
-  CHECK(all.replacement_of(3101) == 3100);
-  CHECK(all.replacement_of(3050) == no_id);
+  CHECK(all.replacement(3101) == 3100);
+  CHECK(all.replacement(3050) == no_id);
 }

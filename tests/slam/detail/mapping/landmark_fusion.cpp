@@ -66,7 +66,7 @@ TEST_CASE("Landmarks that two keyframes made of the same points become one") {
   slam::detail::insert_keyframe(m, s.look(0.1, 1, 0.3), {});
   REQUIRE(m.landmark_count() == 160);
   REQUIRE(m.covisibility().shared(0, 1) == 0);
-  const auto own = slam::detail::landmarks_of(m, {1});
+  const auto own = slam::detail::observed_landmarks(m, {1});
   const auto counts = slam::detail::fuse_into(m, 0, own, s.rig);
   CHECK(counts.fused > 70);
   CHECK(counts.observed == 0);
@@ -86,7 +86,7 @@ TEST_CASE("A keypoint that shows nothing yet becomes an observation") {
   slam::map m(8, 1.2);
   slam::detail::insert_keyframe(m, s.look(0.0, 0), {});
   m.add_keyframe(s.look(0.1, 1));
-  const auto counts = slam::detail::fuse_into(m, 1, slam::detail::landmarks_of(m, {0}), s.rig);
+  const auto counts = slam::detail::fuse_into(m, 1, slam::detail::observed_landmarks(m, {0}), s.rig);
   CHECK(counts.fused == 0);
   CHECK(counts.observed == 80);
   CHECK(m.covisibility().shared(0, 1) == 80);
@@ -104,7 +104,7 @@ TEST_CASE("What looks different, or is elsewhere, is not fused") {
     other.depth[i] += 0.5F;
   }
   slam::detail::insert_keyframe(m, other, {});
-  slam::detail::fuse_into(m, 0, slam::detail::landmarks_of(m, {1}), s.rig);
+  slam::detail::fuse_into(m, 0, slam::detail::observed_landmarks(m, {1}), s.rig);
   for (std::uint32_t i = 0; i < 80; ++i) CHECK((m.at(0).landmarks[i] == m.at(1).landmarks[i]) == (i >= 40));
 }
 
@@ -117,8 +117,8 @@ TEST_CASE("The landmark that more keyframes see stays") {
   third.landmarks = m.at(1).landmarks;
   slam::detail::insert_keyframe(m, third, {});
   const auto many = m.at(1).landmarks[5], few = m.at(0).landmarks[5];
-  slam::detail::fuse_into(m, 0, slam::detail::landmarks_of(m, {1}), s.rig);
-  CHECK(m.replacement_of(few) == many);
+  slam::detail::fuse_into(m, 0, slam::detail::observed_landmarks(m, {1}), s.rig);
+  CHECK(m.replacement(few) == many);
   CHECK(m.landmark_at(many).observations.size() == 3);
 }
 

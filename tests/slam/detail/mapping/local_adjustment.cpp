@@ -42,7 +42,7 @@ struct adjustment_steps {
     return !taken.empty();
   }
   bool solve(const progress& go_on = {}) {
-    solved = solver->solve(taken, local::schedule_of(options), go_on, std::move(solved));
+    solved = solver->solve(taken, local::make_schedule(options), go_on, std::move(solved));
     return solved.complete;
   }
   void apply(slam::map& m) const { local::apply(m, taken, solved); }

@@ -79,14 +79,14 @@ TEST_CASE("Redundant neighbours go as long as they are redundant, but those that
   CHECK(erased == std::vector<slam::keyframe_id>{1, 2, 3, 4});
   CHECK(m.keyframes().size() == 4);
   CHECK(test::fault_of(m) == "");
-  CHECK(m.replacement_of(slam::keyframe_id{3}) == 0);
+  CHECK(m.replacement(slam::keyframe_id{3}) == 0);
 
   CHECK(slam::detail::cull_keyframes(kept, 7, close_depth, {}, [](slam::keyframe_id k) { return k != 6; }) ==
         std::vector<slam::keyframe_id>{6});
   // Loop edges keep none, and pass to the replacement: one between 2 and 6 is one between 0 and 6.
   looped.add_loop_edge(2, 6);
   CHECK(slam::detail::cull_keyframes(looped, 7, close_depth, {}, keep_none) == erased);
-  CHECK(looped.replacement_of(slam::keyframe_id{2}) == 0);
+  CHECK(looped.replacement(slam::keyframe_id{2}) == 0);
   CHECK(looped.tree().loop_edges(0) == std::vector<slam::keyframe_id>{6});
   CHECK(looped.tree().loop_edges(6) == std::vector<slam::keyframe_id>{0});
   CHECK(test::fault_of(looped) == "");

@@ -77,7 +77,7 @@ slam::shutter_estimate estimate(const camera::shutter& is, double motion, double
       if (!with_depth) forget_changes(to);
       row_view before = from;
       if (!with_depth) forget_changes(before);
-      const auto e = shutter_equations_of(before, to, rig, camera::shutter{});
+      const auto e = build_shutter_equations(before, to, rig, camera::shutter{});
       REQUIRE(e);
       estimator.add(k, *e);
     }
@@ -119,11 +119,11 @@ TEST_CASE("Without depth the read-out alone is found") {
 TEST_CASE("Nothing is said of too few keyframes, and views that share little have no equations") {
   random_bits random{1};
   row_view a = seen(se3{}, random_motion(random, 0.3), {}, 0.3, random), b = a;
-  const auto e = shutter_equations_of(a, b, rig, {});
+  const auto e = build_shutter_equations(a, b, rig, {});
   REQUIRE(e);
   shutter_estimator estimator;
   for (std::uint64_t k = 0; k != 7; ++k) estimator.add(k, *e);
   CHECK(std::isinf(estimator.estimate().read_out_deviation));
   for (std::size_t i = 20; i != b.landmarks.size(); ++i) b.landmarks[i] = slam::no_id;
-  CHECK_FALSE(shutter_equations_of(a, b, rig, {}));
+  CHECK_FALSE(build_shutter_equations(a, b, rig, {}));
 }

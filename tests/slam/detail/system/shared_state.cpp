@@ -26,7 +26,7 @@ struct scene {
 TEST_CASE("The event of a keyframe says what the keyframe is") {
   scene s;
   s.world.walk(s.shared.atlas.active(), 0, 3, s.world.truth(0));
-  const slam::keyframe_event e = s.shared.event_of({0, 2});
+  const slam::keyframe_event e = s.shared.make_event({0, 2});
   CHECK(e.id == slam::map_keyframe{0, 2});
   CHECK(e.frame == 2);
   CHECK(e.timestamp == 1.0);

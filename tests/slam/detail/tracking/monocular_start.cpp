@@ -89,7 +89,7 @@ outcome begin(const Frames& frames) {
   const features::orb_extractor extract(settings.features);
   starter start(rig, settings.start);
   for (std::size_t i = 0; i != frames.size(); ++i) {
-    auto f = slam::detail::frame_of(rig, extract(frames.frame(i).value().color.view()), slam::sensor_kind::monocular);
+    auto f = slam::detail::make_frame(rig, extract(frames.frame(i).value().color.view()), slam::sensor_kind::monocular);
     f.index = i;
     const auto begun = start.process(f);
     if (!begun) continue;
@@ -223,7 +223,7 @@ TEST_CASE("The first frame gives way when little of it is still seen") {
   const features::orb_extractor extract(settings.features);
   starter start(rig, settings.start);
   const auto frame_at = [&](std::size_t i) {
-    auto f = slam::detail::frame_of(rig, extract(frames.frame(i).value().color.view()), slam::sensor_kind::monocular);
+    auto f = slam::detail::make_frame(rig, extract(frames.frame(i).value().color.view()), slam::sensor_kind::monocular);
     f.index = i;
     return f;
   };
@@ -251,7 +251,7 @@ TEST_CASE("Younger frames wait for the time when the first one is out of sight, 
   starter start(rig, settings.start);
   std::size_t oldest = 0, most = 0;
   for (std::size_t i = 0; i != frames.size(); ++i) {
-    auto f = slam::detail::frame_of(rig, extract(frames.frame(i).value().color.view()), slam::sensor_kind::monocular);
+    auto f = slam::detail::make_frame(rig, extract(frames.frame(i).value().color.view()), slam::sensor_kind::monocular);
     f.index = i;
     REQUIRE_FALSE(start.process(f).has_value());
     const auto& waiting = start.candidates();

@@ -281,7 +281,7 @@ class lane_counter {
     if constexpr (Target::needs == simd::level::portable)
       count_ -= select(m, numbers(-1), numbers(0));  // no population count instruction
     else
-      count_ += simd::number_of(m);
+      count_ += simd::popcount(m);
   }
   [[nodiscard]] ORBIS_ALWAYS_INLINE std::size_t total() const noexcept {
     if constexpr (Target::needs == simd::level::portable)

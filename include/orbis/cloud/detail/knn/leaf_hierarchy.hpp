@@ -119,7 +119,7 @@ class leaf_order {
       if (counts(i)) entries_.push_back({0, i});
     }
     spare_.resize(entries_.size());
-    order(threads_of(policy), 0, entries_.size());
+    order(as_parallel(policy), 0, entries_.size());
     std::vector<entry>{}.swap(spare_);
   }
   [[nodiscard]] std::span<const entry> entries() const noexcept { return entries_; }
@@ -154,7 +154,7 @@ class leaf_order {
     }
     // The extreme points are in different cells, so that each level makes progress.
     const double scale = ((1U << bits) - 1) / extent;
-    auto* const keys_of = simd::kernel<fill_curve_keys, void(curve_block&)>();
+    auto* const fill_keys = simd::kernel<fill_curve_keys, void(curve_block&)>();
     for_each_chunk(policy, end - begin, 16 * block, [&](std::size_t from, std::size_t to) {
       curve_block cells{};
       for (std::size_t first = begin + from; first < begin + to; first += block) {
@@ -166,7 +166,7 @@ class leaf_order {
                 static_cast<std::uint32_t>(static_cast<std::int32_t>((double{p[a]} - double{box.low[a]}) * scale));
           }
         }
-        keys_of(cells);
+        fill_keys(cells);
         for (std::size_t i = 0; i != size; ++i) entries_[first + i].key = cells.key[i];
       }
     });
@@ -231,7 +231,7 @@ struct leaf_hierarchy {
   std::size_t finite = 0;                    ///< number of points in the leaves or left out
 
   /// Number of points in a leaf.
-  [[nodiscard]] std::size_t size_of(std::size_t leaf) const noexcept {
+  [[nodiscard]] std::size_t leaf_size(std::size_t leaf) const noexcept {
     return std::min(leaf_width, in_leaves - leaf * leaf_width);
   }
 };
@@ -283,7 +283,7 @@ template <execution_policy Policy>
     point_row& leaf = out.leaves[l];
     box3 box{{inf, inf, inf}, {-inf, -inf, -inf}};
     for (std::size_t a = 0; a != 3; ++a) leaf.axis[a].fill(inf);
-    for (std::size_t i = 0; i != out.size_of(l); ++i) {
+    for (std::size_t i = 0; i != out.leaf_size(l); ++i) {
       const std::array<float, 3> p = order.position(out.members[l * leaf_width + i]);
       for (std::size_t a = 0; a != 3; ++a) {
         leaf.axis[a][i] = p[a];

@@ -74,7 +74,7 @@ void for_each_within(const leaf_hierarchy& tree, const knn_kernels& kernels, con
         continue;
       }
       std::uint32_t within = kernels.distances(tree.leaves[child], q, bound, distance.data());
-      for (const std::size_t size = tree.size_of(child); within != 0; within &= within - 1) {
+      for (const std::size_t size = tree.leaf_size(child); within != 0; within &= within - 1) {
         const auto n = static_cast<std::size_t>(std::countr_zero(within));
         if (n < size && !f(tree.members[child * leaf_width + n], distance[n])) return;
       }
@@ -116,13 +116,13 @@ class nearest_search {
 
   /// Searches for the points of one leaf, then calls `f(i, found, bound)` for the i-th point, in any order. `found`
   /// holds squared distances up to `bound`, including the nearest; fewer than `wanted` if squared distances overflow;
-  /// sixteen times infinity follow. `f` may reorder them, and returns the `wanted`-th smallest. `places_of` returns
+  /// sixteen times infinity follow. `f` may reorder them, and returns the `wanted`-th smallest. `found_places` returns
   /// their places.
   template <class F>
   void visit_leaf(std::size_t l, F&& f) {
     search_leaf(l, [&](std::size_t first, std::size_t last, const box3& box) {
       search_run(l, first, last, box);
-      for (std::size_t i = first; i != last; ++i) largest_[i] = f(i, found_of(i), bounds_[i]);
+      for (std::size_t i = first; i != last; ++i) largest_[i] = f(i, found_distances(i), bounds_[i]);
     });
   }
   /// Like `visit_leaf`, but sums up the nearest distances itself and calls `f(i, found, sum)`. `sum` is meaningless if
@@ -135,14 +135,14 @@ class nearest_search {
       kernels_.sums_of_each(found_.data(), stride_, first, last, counts_.data(), wanted_, bounds_.data(), sums.data());
       for (std::size_t i = first; i != last; ++i) {
         largest_[i] = counts_[i] < wanted_ ? infinity : sums[i].largest_squared;
-        f(i, found_of(i), sums[i]);
+        f(i, found_distances(i), sums[i]);
       }
     });
   }
 
   /// Returns the places in `leaf_hierarchy::members` of the points found for the i-th point of the visited leaf, in the
   /// order of `found`; null if unknown, as for outliers.
-  [[nodiscard]] const std::uint32_t* places_of(std::size_t i) const noexcept {
+  [[nodiscard]] const std::uint32_t* found_places(std::size_t i) const noexcept {
     return has_places_[i] ? places_.data() + i * stride_ : nullptr;
   }
 
@@ -200,13 +200,15 @@ class nearest_search {
     return true;
   }
 
-  [[nodiscard]] std::span<float> found_of(std::size_t i) noexcept { return {found_.data() + i * stride_, counts_[i]}; }
+  [[nodiscard]] std::span<float> found_distances(std::size_t i) noexcept {
+    return {found_.data() + i * stride_, counts_[i]};
+  }
 
   /// Searches for the points of a leaf, run by run of points that share candidates. `f(first, last, box)` searches for
   /// a run with bounding box `box` and sets `largest_`.
   template <class F>
   void search_leaf(std::size_t l, F&& f) {
-    const std::size_t size = tree_->size_of(l);
+    const std::size_t size = tree_->leaf_size(l);
     if (!(usual_ >= 0)) {
       const found_within first = search_alone(l, 0);
       usual_ = first.count < wanted_ ? 0.0F : first.bound;

@@ -58,7 +58,7 @@ class neighbor_graph {
           [&](std::size_t, std::size_t i) { return std::span{found}.subspan(i * width_, width_); },
           [&](std::size_t l) {
             start_[l] = static_cast<std::uint32_t>(words.size());
-            writer.write(std::span{found}.first(tree_.size_of(l) * width_), place_of, words);
+            writer.write(std::span{found}.first(tree_.leaf_size(l) * width_), place_of, words);
           });
       rows_[begin / leaves_at_once].assign(words.begin(), words.end());  // without spare capacity
     });

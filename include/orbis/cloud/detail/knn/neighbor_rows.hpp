@@ -148,7 +148,7 @@ ORBIS_ALWAYS_INLINE float write_found(const leaf_hierarchy& tree, const knn_kern
                                       float bound, std::span<neighbor<float>> row) {
   const std::size_t wanted = row.size() + 1;  // including the point itself
   const std::uint32_t self = tree.members[l * leaf_width + i];
-  if (const std::uint32_t* const places = search.places_of(i)) {
+  if (const std::uint32_t* const places = search.found_places(i)) {
     gathered.assign(found, places, tree.members.data());
     return write_row(gathered, self, row);
   }

@@ -30,7 +30,7 @@ struct point_blocks {
 };
 
 /// Bounding box of several boxes. @pre boxes is not empty
-[[nodiscard]] inline point_blocks::box hull_of(std::span<const point_blocks::box> boxes) {
+[[nodiscard]] inline point_blocks::box enclosing_box(std::span<const point_blocks::box> boxes) {
   point_blocks::box hull = boxes.front();
   for (const point_blocks::box& b : boxes) {
     for (std::size_t a = 0; a != 3; ++a) {

@@ -190,7 +190,7 @@ class view_verdicts {
 
 /// Median of the conflicts of a view with the views not left out; 0 if there are too few. `verdicts`: those that
 /// involve the view.
-[[nodiscard]] inline double conflict_of(std::span<const view_verdict> verdicts, std::span<const char> left_out) {
+[[nodiscard]] inline double median_conflict(std::span<const view_verdict> verdicts, std::span<const char> left_out) {
   std::vector<double> values;
   for (const view_verdict& c : verdicts) {
     if (left_out[c.other] == 0) values.push_back(c.conflict());
@@ -234,7 +234,7 @@ template <execution_policy Policy, posed_depth_range Views, camera::camera_model
     for (const auto& view : views) drawn.add(camera, view);
   const view_samples& asked = samples != nullptr ? *samples : drawn;
   assert(asked.views() == count);
-  const std::span<const std::uint32_t> place = asked.tile_of();  // numbers of view and tile
+  const std::span<const std::uint32_t> place = asked.tiles_by_point();  // numbers of view and tile
 
   std::vector<view_verdicts> verdicts(count);
   ray_evidence_counter<Camera> counter{policy, asked.points(), camera, evidence};
@@ -277,7 +277,7 @@ template <execution_policy Policy, posed_depth_range Views, camera::camera_model
     std::vector<double> trusted;
     std::uint32_t worst = 0;
     for (std::uint32_t v = 0; v != count; ++v) {
-      conflicts[v] = left_out[v] != 0 ? 0 : conflict_of(verdicts[v].kept(), left_out);
+      conflicts[v] = left_out[v] != 0 ? 0 : median_conflict(verdicts[v].kept(), left_out);
       if (left_out[v] == 0) trusted.push_back(conflicts[v]);
       if (conflicts[v] > conflicts[worst]) worst = v;
     }

@@ -31,9 +31,9 @@ struct reference {
 };
 
 /// Width of the bulk used to compare references.
-[[nodiscard]] inline double width_of(const bulk& b) noexcept { return std::max(b.left_scale, 0.5 * b.right_scale); }
+[[nodiscard]] inline double bulk_width(const bulk& b) noexcept { return std::max(b.left_scale, 0.5 * b.right_scale); }
 
-[[nodiscard]] inline std::vector<float> finite_of(std::vector<float> values) {
+[[nodiscard]] inline std::vector<float> finite_values(std::vector<float> values) {
   std::erase_if(values, [](float v) { return !std::isfinite(v); });
   return values;
 }
@@ -41,7 +41,7 @@ struct reference {
 /// Shifts the reference to the bulk's median, and measures the bulk.
 template <execution_policy Policy>
 void center(const Policy& policy, surroundings& around, reference& r) {
-  r.width = bulk_of(finite_of(around.residuals(policy, r.step)));
+  r.width = fit_bulk(finite_values(around.residuals(policy, r.step)));
   (r.step.mode == filter_mode::local_log_statistical ? r.step.offset : r.step.usual.intercept) += r.width.median;
   r.width.median = 0;
 }
@@ -139,7 +139,7 @@ void judge_points(const Policy& policy, surroundings& around, const select_optio
   global.step.neighbors = options.neighbors;
   center(policy, around, global);
   evidence.median_spacing = std::exp(global.step.usual.intercept);
-  evidence.global_scale = width_of(global.width);
+  evidence.global_scale = bulk_width(global.width);
   std::optional<reference> ranged;
   {
     std::vector<float> log_range(around.size());
@@ -151,7 +151,7 @@ void judge_points(const Policy& policy, surroundings& around, const select_optio
       ranged->step.mode = filter_mode::range_log_statistical;
       ranged->step.usual = *line;
       center(policy, around, *ranged);
-      evidence.range_scale = width_of(ranged->width);
+      evidence.range_scale = bulk_width(ranged->width);
     }
   }
   const bool by_range = ranged && ranged->step.usual.slope > 0 && *evidence.range_scale < 0.85 * evidence.global_scale;
@@ -161,7 +161,7 @@ void judge_points(const Policy& policy, surroundings& around, const select_optio
   reference local = usual;
   local.step.mode = filter_mode::local_log_statistical;
   center(policy, around, local);
-  evidence.local_scale = width_of(local.width);
+  evidence.local_scale = bulk_width(local.width);
 
   // Applies a step and returns the share that it removes. Undoes a step that removes too much, because outliers are a
   // minority.

@@ -66,7 +66,7 @@ template <execution_policy Policy>
                                                          std::vector<float> values, int rounds = 4) {
   static constexpr float inf = std::numeric_limits<float>::infinity();  // for values that do not count
   constexpr std::size_t neighbors = smallest_of_columns::most_rows, columns = smallest_of_columns::columns;
-  const auto rank_of = [](std::size_t count) {
+  const auto quantile_rank = [](std::size_t count) {
     return static_cast<std::size_t>(0.35 * static_cast<double>(count - 1) + 0.5);
   };
   static_assert(smallest_of_columns::count == static_cast<std::size_t>(0.35 * (neighbors - 1) + 0.5) + 1);
@@ -97,7 +97,7 @@ template <execution_policy Policy>
           std::size_t count = width;
           if (at(smallest_of_columns::count) == inf)
             for (std::size_t n = 0; n != width; ++n) count -= block.table[n * columns + column] == inf ? 1 : 0;
-          if (count > 0) next[i] = at(rank_of(count));
+          if (count > 0) next[i] = at(quantile_rank(count));
         }
       }
     });

@@ -110,7 +110,7 @@ struct bulk {
   double left_scale = 0;
   double right_scale = 0;
 };
-[[nodiscard]] inline bulk bulk_of(std::vector<float> values) {
+[[nodiscard]] inline bulk fit_bulk(std::vector<float> values) {
   bulk out;
   out.median = quantile(values, 0.5);
   if (values.empty()) return out;

@@ -69,7 +69,7 @@ class source_view_test {
   template <execution_policy Policy>
   source_view_test(const Policy& policy, const point_view& points, const Camera& camera,
                    const ray_evidence_options& options)
-      : counter_{policy, sample_of(points), camera, options} {}
+      : counter_{policy, take_sample(points), camera, options} {}
 
   template <execution_policy Policy, posed_depth View>
   void add(const Policy& policy, const View& view) {
@@ -83,7 +83,7 @@ class source_view_test {
   }
 
  private:
-  [[nodiscard]] static std::vector<std::array<float, 3>> sample_of(const point_view& points) {
+  [[nodiscard]] static std::vector<std::array<float, 3>> take_sample(const point_view& points) {
     constexpr std::size_t most = 4096;
     std::vector<std::array<float, 3>> sample;
     const std::size_t size = points.size();

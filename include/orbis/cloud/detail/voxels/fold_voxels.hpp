@@ -173,7 +173,7 @@ class voxel_parts {
     fold.resize(firsts.count());
     for_each_index(policy, parts(), 8, [&](std::size_t part) {
       for (std::size_t at = starts_[part]; at != starts_[part] + voxels[part]; ++at)
-        fold.put(firsts.number_of(entries_[at].index),
+        fold.put(firsts.voxel_number(entries_[at].index),
                  {std::bit_cast<std::array<float, 3>>(entries_[at].words), Colored ? colors[at] : rgb8{}});
     });
   }
@@ -207,7 +207,7 @@ class voxel_parts {
       for (std::size_t w = 0; w != words_.size(); ++w) before_[w + 1] = before_[w] + count_ones(words_[w]);
     }
     [[nodiscard]] std::size_t count() const noexcept { return before_.back(); }
-    [[nodiscard]] std::uint32_t number_of(std::uint32_t first) const noexcept {
+    [[nodiscard]] std::uint32_t voxel_number(std::uint32_t first) const noexcept {
       const std::uint64_t below = (std::uint64_t{1} << (first % 64)) - 1;
       return before_[first / 64] + count_ones(words_[first / 64] & below);
     }

@@ -52,14 +52,14 @@ class voxel_table {
   /// Prefetches the memory that updates with these hashes will access, if the table is large.
   void expect(std::span<const std::uint32_t> hashes) const noexcept {
     if (slots_.size() < large) return;
-    for (const std::uint32_t hash : hashes) __builtin_prefetch(&slots_[slot_of(hash)]);
-    for (const std::uint32_t hash : hashes) __builtin_prefetch(&rows_[slots_[slot_of(hash)]]);
+    for (const std::uint32_t hash : hashes) __builtin_prefetch(&slots_[first_slot(hash)]);
+    for (const std::uint32_t hash : hashes) __builtin_prefetch(&rows_[slots_[first_slot(hash)]]);
   }
   /// Calls `add(record)` on the record of a key, or on that of a new row with `first`. The record is a copy that is
   /// stored afterwards. @pre hash == mixed_key(key), there is room for one more row
   template <class Add>
   void update(const voxel_key& key, std::uint32_t hash, std::uint32_t first, const Add& add) {
-    std::size_t i = slot_of(hash);
+    std::size_t i = first_slot(hash);
     std::uint32_t known = slots_[i];
     while ((known != 0) & !same_key(rows_[known].key, key)) {
       i = (i + 1) & mask_;
@@ -80,9 +80,9 @@ class voxel_table {
   static constexpr std::size_t fewest = 64, large = std::size_t{1} << 16U;
 
   /// First slot to probe for a hash.
-  [[nodiscard]] std::size_t slot_of(std::uint32_t hash) const noexcept { return (hash * salt_) >> shift_; }
+  [[nodiscard]] std::size_t first_slot(std::uint32_t hash) const noexcept { return (hash * salt_) >> shift_; }
   [[nodiscard]] std::size_t free_slot(std::uint32_t hash) const noexcept {
-    std::size_t i = slot_of(hash);
+    std::size_t i = first_slot(hash);
     while (slots_[i] != 0) i = (i + 1) & mask_;
     return i;
   }

@@ -54,7 +54,7 @@ inline constexpr int band_rows = 64;
 
 /// Position of the maximum of the parabola through three values at -1, 0 and 1. @pre the middle one is the largest, and
 /// not all are equal
-[[nodiscard]] inline float peak_of(int before, int middle, int after) {
+[[nodiscard]] inline float parabola_peak(int before, int middle, int after) {
   return static_cast<float>(before - after) / static_cast<float>(2 * (before - 2 * middle + after));
 }
 
@@ -78,7 +78,7 @@ ORBIS_INLINE void fast9::find_peaks(image_view<const std::uint8_t> image, const 
   const int bottom = std::min(image.height() - circle_radius, area.y + area.height + 1);
   if (area.empty() || left >= right || top >= bottom) return;
   const auto score_row = simd::kernel<fast_scores_kernel, fast_scores_kernel::signature>();
-  const auto peaks_of = simd::kernel<fast_peaks_kernel, fast_peaks_kernel::signature>();
+  const auto peaks_in_row = simd::kernel<fast_peaks_kernel, fast_peaks_kernel::signature>();
   const int count = right - left;
   const auto width = static_cast<std::size_t>(count);
   const std::size_t pitch = width + 2 * row_margin;
@@ -104,7 +104,7 @@ ORBIS_INLINE void fast9::find_peaks(image_view<const std::uint8_t> image, const 
     if (inner < std::max(top, area.y) || inner >= area.y + area.height) continue;
     const std::uint8_t* row = row_of(inner);
     const std::uint8_t* above = row_of(inner + 2);  // the previous slot, cyclically; zero above the first row
-    const std::size_t found = peaks_of(above, row, row_of(y), count, ties, memory.columns.data());
+    const std::size_t found = peaks_in_row(above, row, row_of(y), count, ties, memory.columns.data());
     for (std::size_t i = 0; i != found; ++i) {
       const std::uint32_t column = memory.columns[i];
       const int x = left + static_cast<int>(column);
@@ -112,8 +112,8 @@ ORBIS_INLINE void fast9::find_peaks(image_view<const std::uint8_t> image, const 
       corners.push_back({x, inner, static_cast<float>(row[column] - 1)});
       if (!subpixel) continue;
       const std::uint8_t* here = row + column;  // at column 0, the preceding bytes are row_margin
-      corners.back().dx = peak_of(here[-1], here[0], here[1]);
-      corners.back().dy = peak_of(above[column], here[0], row_of(y)[column]);
+      corners.back().dx = parabola_peak(here[-1], here[0], here[1]);
+      corners.back().dy = parabola_peak(above[column], here[0], row_of(y)[column]);
     }
   }
 }

@@ -90,7 +90,7 @@ struct disc_moments_kernel {
 };
 
 /// The angle of (x, y) in [0, 2 pi), to 1e-7; the same bits with any IEEE double.
-[[nodiscard]] inline float angle_of(double x, double y) noexcept {
+[[nodiscard]] inline float polar_angle(double x, double y) noexcept {
   using std::numbers::pi;
   const double ax = std::abs(x), ay = std::abs(y);
   if (!(ax + ay > 0.0)) return 0.0F;
@@ -118,7 +118,7 @@ ORBIS_INLINE orientation intensity_centroid::operator()(image_view<const std::ui
   if (m.x == 0 && m.y == 0) return {};
   const double mx = m.x, my = m.y;
   const double inverse = 1.0 / std::sqrt(mx * mx + my * my);  // exact before the root: below 2^53
-  return {angle_of(mx, my), static_cast<float>(mx * inverse), static_cast<float>(my * inverse)};
+  return {polar_angle(mx, my), static_cast<float>(mx * inverse), static_cast<float>(my * inverse)};
 }
 
 }  // namespace orbis::features::detail

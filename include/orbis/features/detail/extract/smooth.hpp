@@ -64,11 +64,11 @@ struct smooth_across_kernel {
   static ORBIS_ALWAYS_INLINE void run(const std::array<const std::int16_t*, 7>& rows, int count, std::uint8_t* to) {
     using words = simd::native_vec<std::int16_t, Target>;
     using sums = simd::native_vec<std::uint32_t, Target>;
-    const auto weights_of = [](std::size_t row) ORBIS_INLINE_LAMBDA {
+    const auto row_weights = [](std::size_t row) ORBIS_INLINE_LAMBDA {
       return words::generate([row](std::size_t i)
                                  ORBIS_INLINE_LAMBDA { return row + i % 2 < 7 ? gaussian_weights[row + i % 2] : 0; });
     };
-    const words w01 = weights_of(0), w23 = weights_of(2), w45 = weights_of(4), w6 = weights_of(6);
+    const words w01 = row_weights(0), w23 = row_weights(2), w45 = row_weights(4), w6 = row_weights(6);
     const sums bias(0x8000U * 256 + 0x8000U);  // converts back to unsigned and adds half for rounding
     const auto half_block = [&](int x) ORBIS_INLINE_LAMBDA {
       const auto row = [&](std::size_t i) ORBIS_INLINE_LAMBDA { return words::load(rows[i] + x); };
@@ -122,7 +122,7 @@ inline void smooth(image_view<const std::uint8_t> from, image_view<std::uint8_t>
   const auto padded = (static_cast<std::size_t>(width) + smooth_block - 1) / smooth_block * smooth_block;
   memory.line.resize(std::max(memory.line.size(), padded + 16 + smooth_block));
   memory.sums.resize(std::max(memory.sums.size(), padded * 8));
-  const auto sums_of = [&](int y) { return memory.sums.data() + static_cast<std::size_t>(y & 7) * padded; };
+  const auto row_sums = [&](int y) { return memory.sums.data() + static_cast<std::size_t>(y & 7) * padded; };
   const auto reflected = [](int at, int size) { return at < 0 ? -at : at >= size ? 2 * size - 2 - at : at; };
 
   std::uint8_t* line = memory.line.data() + 16;
@@ -134,10 +134,10 @@ inline void smooth(image_view<const std::uint8_t> from, image_view<std::uint8_t>
         line[-i] = line[i];
         line[width - 1 + i] = line[width - 1 - i];
       }
-      along(line, width, gaussian_weights, sums_of(ready));
+      along(line, width, gaussian_weights, row_sums(ready));
     }
     std::array<const std::int16_t*, 7> rows;
-    for (int i = 0; i != 7; ++i) rows[static_cast<std::size_t>(i)] = sums_of(reflected(y + i - 3, height));
+    for (int i = 0; i != 7; ++i) rows[static_cast<std::size_t>(i)] = row_sums(reflected(y + i - 3, height));
     across(rows, width, to.data() + y * to.stride());
   }
 }

@@ -59,7 +59,7 @@ void make_slice_table(std::span<const D> trains, slice_table<Words>& table) noex
   for (std::size_t begin = 0; begin < trains.size(); begin += 64)
     for (std::size_t w = 0; w != 4; ++w) {
       std::array<std::uint64_t, 64> block{};
-      for (std::size_t i = 0; i != 64 && begin + i != trains.size(); ++i) block[i] = words_of(trains[begin + i])[w];
+      for (std::size_t i = 0; i != 64 && begin + i != trains.size(); ++i) block[i] = as_words(trains[begin + i])[w];
       transpose_bits(block);
       for (std::size_t b = 0; b != 64; ++b) rows[64 * w + b].words[begin / 64] = block[b];
     }

@@ -65,7 +65,7 @@ constexpr std::string_view packed_color_names[] = {"rgb", "rgba"};
 [[nodiscard]] inline cloud_field make_column(std::string name, scalar_type type, std::size_t count, std::size_t points,
                                              bool text) {
   if (text && is_coordinate(name)) type = scalar_type::float64;
-  return {std::move(name), type, count, std::string(points * count * size_of(type), '\0')};
+  return {std::move(name), type, count, std::string(points * count * byte_size(type), '\0')};
 }
 
 /// Stores the number `token` as the `index`-th of the column. If the column's type cannot represent it, the column
@@ -82,7 +82,7 @@ constexpr std::string_view packed_color_names[] = {"rgb", "rgba"};
   if (with_type(column.type, store)) return true;
   double value = 0.0;
   if (column.type == scalar_type::float64 || !parse_number(token, value)) return false;
-  const std::size_t size = size_of(column.type), n = column.bytes.size() / size;
+  const std::size_t size = byte_size(column.type), n = column.bytes.size() / size;
   std::string wide(n * sizeof value, '\0');
   for (std::size_t i = 0; i != index; ++i)
     store_little_endian(wide.data() + i * sizeof value,
@@ -93,7 +93,7 @@ constexpr std::string_view packed_color_names[] = {"rgb", "rgba"};
 }
 
 [[nodiscard]] inline double number_at(const cloud_field& column, std::size_t index) {
-  return load_as_double(column.bytes.data() + index * size_of(column.type), column.type, std::endian::little);
+  return load_as_double(column.bytes.data() + index * byte_size(column.type), column.type, std::endian::little);
 }
 
 inline rgb8 unpacked_rgb(std::uint32_t packed) {
@@ -116,20 +116,20 @@ inline std::string shortened(double value) {
 /// floating-point numbers above 1; cameras give 12 bits. Notes report a range that is not that of the type.
 inline std::vector<rgb8> channel_colors(const std::array<const cloud_field*, 3>& channels, std::size_t size,
                                         std::vector<std::string>& notes) {
-  const auto is_byte = [](scalar_type type) { return size_of(type) == 1; };
+  const auto is_byte = [](scalar_type type) { return byte_size(type) == 1; };
   double most_integer = 0.0, most_floating = 0.0;
   for (const cloud_field* c : channels)
     if (double& most = is_floating(c->type) ? most_floating : most_integer; !is_byte(c->type))
       for (std::size_t i = 0; i != size; ++i)
         if (const double v = number_at(*c, i); std::isfinite(v)) most = std::max(most, v);
-  const auto range_of = [](double most) { return most <= 255.0 ? 255.0 : most <= 4095.0 ? 4095.0 : 65535.0; };
+  const auto full_scale = [](double most) { return most <= 255.0 ? 255.0 : most <= 4095.0 ? 4095.0 : 65535.0; };
   std::vector<rgb8> colors(size);
   constexpr std::uint8_t rgb8::*channel_of[] = {&rgb8::r, &rgb8::g, &rgb8::b};
   std::string last_note;
   for (std::size_t k = 0; k != 3; ++k) {
     const cloud_field& c = *channels[k];
     const double most = is_floating(c.type) ? most_floating : most_integer;
-    const double range = is_byte(c.type) ? 255.0 : is_floating(c.type) && most <= 2.0 ? 1.0 : range_of(most);
+    const double range = is_byte(c.type) ? 255.0 : is_floating(c.type) && most <= 2.0 ? 1.0 : full_scale(most);
     for (std::size_t i = 0; i != size; ++i) {
       double v = number_at(c, i);
       if (c.type == scalar_type::int8 && v < 0.0) v += 256.0;  // bytes declared as signed
@@ -217,7 +217,7 @@ inline result<cloud_with_fields> to_cloud(cloud_columns&& read, const std::strin
   std::string alpha;
   for (std::size_t k = 0; k != std::size(packed_color_names) && !colored; ++k) {
     const cloud_field* column = find(packed_color_names[k]);
-    if (column == nullptr || size_of(column->type) < 4) continue;
+    if (column == nullptr || byte_size(column->type) < 4) continue;
     auto colors = packed_colors(*column, n, read.is_text, alpha, out.notes);
     colored = colors.has_value();
     if (!colored) obstacle = column->name + " holds no packed colours";

@@ -92,7 +92,7 @@ inline result<ply_header> take_ply_header(std::string_view& bytes, const std::st
       ply_property property;
       if (type == "list") {
         property.count = ply_type(next_field(line));
-        if (!property.count || size_of(*property.count) == 8 || *property.count == scalar_type::float32)
+        if (!property.count || byte_size(*property.count) == 8 || *property.count == scalar_type::float32)
           return bad("a list whose length has an invalid type");
         type = next_field(line);
       }
@@ -116,7 +116,7 @@ class ply_body {
   /// Reads a number. Returns false at the end of the data, or if there is no number of that type.
   bool next(scalar_type type, double& value) {
     if (format_ == ply_format::ascii) return parse_number(next_field(left_), value);
-    const std::size_t size = size_of(type);
+    const std::size_t size = byte_size(type);
     if (left_.size() < size) return false;
     value = load_as_double(left_.data(), type, format_ == ply_format::big ? std::endian::big : std::endian::little);
     left_.remove_prefix(size);
@@ -125,7 +125,7 @@ class ply_body {
   /// Reads a number into the column. Returns false like `next`.
   bool store(cloud_field& column, std::size_t index) {
     if (format_ == ply_format::ascii) return store_number(column, index, next_field(left_));
-    const std::size_t size = size_of(column.type);
+    const std::size_t size = byte_size(column.type);
     if (left_.size() < size) return false;
     char* const to = column.bytes.data() + index * size;
     if (format_ == ply_format::big)
@@ -146,7 +146,7 @@ class ply_body {
   /// Minimum number of bytes of a property.
   [[nodiscard]] std::size_t least_size(const ply_property& property) const {
     if (format_ == ply_format::ascii) return 1;
-    return size_of(property.count.value_or(property.type));
+    return byte_size(property.count.value_or(property.type));
   }
 
  private:

@@ -25,7 +25,7 @@ namespace orbis::io::detail {
   line.remove_prefix(std::min(end + 1, line.size()));
   return field;
 }
-[[nodiscard]] inline char separator_of(std::string_view line) {
+[[nodiscard]] inline char find_separator(std::string_view line) {
   return line.find(',') != line.npos ? ',' : line.find(';') != line.npos ? ';' : ' ';
 }
 
@@ -105,7 +105,7 @@ struct column_name {
   header.is_comment = line.starts_with('#');
   while (!line.empty() && (line.front() == '#' || is_blank(line.front()))) line.remove_prefix(1);
   std::vector<column_name> names;
-  for (const char separator : {separator_of(line), ' '}) {  // a comment in words may have a comma
+  for (const char separator : {find_separator(line), ' '}) {  // a comment in words may have a comma
     names = column_names(line, separator);
     for (std::size_t i = 0; i != names.size(); ++i)  // of x, y, z, w, x, y, z the last four
       if (are_components(names, i, "wxyz") && (!header.quaternion || names[*header.quaternion].prefix().empty()))

@@ -65,7 +65,7 @@ struct pose_lines {
 }
 
 /// A pose of numbers; none if the quaternion is zero or too large.
-[[nodiscard]] inline std::optional<se3> pose_of(const std::array<double, 8>& v, bool w_first) {
+[[nodiscard]] inline std::optional<se3> make_pose(const std::array<double, 8>& v, bool w_first) {
   const so3::quaternion q = w_first ? so3::quaternion(v[4], v[5], v[6], v[7]) : so3::quaternion(v[7], v[4], v[5], v[6]);
   if (!(q.norm() > 1e-6) || !std::isfinite(q.norm())) return std::nullopt;
   return se3(so3(q), vec3(v[1], v[2], v[3]));
@@ -73,7 +73,7 @@ struct pose_lines {
 
 /// Returns true if no field of the line is a number, or if the fields are 0, 1, 2, ...: names of columns.
 [[nodiscard]] inline bool has_names(std::string_view line) {
-  const char separator = separator_of(line);
+  const char separator = find_separator(line);
   std::size_t numbers = 0, columns = 0;
   bool in_order = true;
   for (double value = 0.0; !line.empty(); ++columns)
@@ -94,11 +94,11 @@ inline result<pose_lines> parse_pose_lines(std::string_view text, const std::fil
   pose_header header = assumed;
   std::string unknown_names;  // note on a line before the poses
   const auto start = [&](std::string_view line) {
-    const char separator = separator_of(line);
+    const char separator = find_separator(line);
     std::string_view first = line;
     std::size_t fields = 0;
     for (std::string_view rest = line; !rest.empty(); ++fields) (void)next_value(rest, separator);
-    const bool nanoseconds = unit_of(next_value(first, separator)) == time_units[3];
+    const bool nanoseconds = detect_unit(next_value(first, separator)) == time_units[3];
     header.w_first = header.quaternion ? header.w_first : separator == ',' && nanoseconds;
     read.layout = header.w_first                                           ? trajectory_layout::euroc
                   : fields == 12 && separator == ' ' && !header.quaternion ? trajectory_layout::kitti
@@ -125,19 +125,19 @@ inline result<pose_lines> parse_pose_lines(std::string_view text, const std::fil
       if (!matrix) return matrix.error().message;
       pose = *matrix;
     } else {
-      const char separator = separator_of(line);
+      const char separator = find_separator(line);
       std::array<double, 8> v{};
       const bool more = header.w_first || header.columns != usual_columns;
       if (auto why = parse_pose_numbers(line, separator, more, v, lost, header.columns); !why.empty()) return why;
       lost = lost || (v[4] == 0.0 && v[5] == 0.0 && v[6] == 0.0 && v[7] == 0.0);
-      if (!lost) pose = pose_of(v, header.w_first);
+      if (!lost) pose = make_pose(v, header.w_first);
       if (!lost && !pose)
         return header.w_first ? "a pose has a quaternion, w first, which is neither zero nor too large"
                               : "the quaternion is zero or too large";
       std::string_view stamp = next_value(line, separator);
       for (std::size_t column = 0; column != header.columns[0]; ++column) stamp = next_value(line, separator);
       const bool is_whole = stamp.find('.') == stamp.npos;
-      if (read.entries.empty()) read.unit = header.nanoseconds && is_whole ? time_units[3] : unit_of(stamp);
+      if (read.entries.empty()) read.unit = header.nanoseconds && is_whole ? time_units[3] : detect_unit(stamp);
       seconds = v[0] * read.unit.seconds;
     }
     if (!lost)

@@ -32,7 +32,7 @@ constexpr decltype(auto) with_type(scalar_type type, F&& f) {
 }
 
 /// Size of a number, bytes.
-[[nodiscard]] constexpr std::size_t size_of(scalar_type type) noexcept {
+[[nodiscard]] constexpr std::size_t byte_size(scalar_type type) noexcept {
   return with_type(type, [](auto zero) { return sizeof zero; });
 }
 

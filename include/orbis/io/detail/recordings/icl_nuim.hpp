@@ -48,8 +48,9 @@ inline se3 mirrored_y(const se3& pose) {
 /// at 30 frames per second. Errors: as `index_tum` and `index_image_folders`.
 [[nodiscard]] inline result<recording_index> index_icl_nuim(const std::filesystem::path& folder) {
   constexpr double frames_per_second = 30.0, max_time_difference = 0.5 / frames_per_second;
-  auto read = association_list_of(folder).empty() ? index_image_folders(folder, max_time_difference, frames_per_second)
-                                                  : index_tum(folder, max_time_difference, frames_per_second);
+  auto read = find_association_list(folder).empty()
+                  ? index_image_folders(folder, max_time_difference, frames_per_second)
+                  : index_tum(folder, max_time_difference, frames_per_second);
   if (!read) return read;
   recording_index index = *std::move(read);
   if (const auto file = icl_ground_truth(folder); !file.empty()) {

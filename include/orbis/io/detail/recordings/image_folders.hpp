@@ -39,21 +39,21 @@ namespace orbis::io::detail {
 }
 
 /// The folder of colour images in `folder`; empty if there is none.
-[[nodiscard]] inline std::filesystem::path color_folder_of(const std::filesystem::path& folder) {
+[[nodiscard]] inline std::filesystem::path find_color_folder(const std::filesystem::path& folder) {
   for (const char* const name : {"rgb", "color", "colour", "image", "images"})
     if (const auto path = first_folder(folder, {name}); !path.empty() && !images_in(path).empty()) return path;
   return {};
 }
 
 /// The folder of depth images in `folder`, registered ones first; empty if there is none.
-[[nodiscard]] inline std::filesystem::path depth_folder_of(const std::filesystem::path& folder) {
+[[nodiscard]] inline std::filesystem::path find_depth_folder(const std::filesystem::path& folder) {
   return first_folder(
       folder, {"aligned_depth_to_color", "aligned_depth", "depth_aligned", "depth_registered", "depth", "depths"});
 }
 
 /// Returns true if `folder` holds colour images and a folder for depth images.
 [[nodiscard]] inline bool is_image_folders(const std::filesystem::path& folder) {
-  return !color_folder_of(folder).empty() && !depth_folder_of(folder).empty();
+  return !find_color_folder(folder).empty() && !find_depth_folder(folder).empty();
 }
 
 /// Pairs images by equal numbers, by times at most `max_time_difference` seconds apart, or by equal names. Errors:
@@ -82,7 +82,7 @@ namespace orbis::io::detail {
 /// no pair), invalid_argument (names that do not pair), unreadable, malformed (times, ground truth, with their line).
 [[nodiscard]] inline result<recording_index> index_image_folders(const std::filesystem::path& folder,
                                                                  double max_time_difference, double fps) {
-  const auto color_folder = color_folder_of(folder), depth_folder = depth_folder_of(folder);
+  const auto color_folder = find_color_folder(folder), depth_folder = find_depth_folder(folder);
   if (color_folder.empty())
     return fail(errc::not_found, folder.string(),
                 "no PNG or JPEG images in rgb, color, colour, image or images; the folder " + describe_content(folder));

@@ -81,7 +81,7 @@ struct name_number {
   }
   /// Returns true if the number is a time: it has a fraction, or the digits of a time since 1970.
   [[nodiscard]] bool is_time() const {
-    return !fraction.empty() || number.find('.') != std::string_view::npos || !(unit_of(number) == time_units[0]) ||
+    return !fraction.empty() || number.find('.') != std::string_view::npos || !(detect_unit(number) == time_units[0]) ||
            (number.size() == 10 && number.front() != '0');
   }
   /// The time in seconds, or the frame number. `unit`: of the fraction after whole seconds.

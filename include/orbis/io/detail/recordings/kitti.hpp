@@ -35,7 +35,7 @@ namespace orbis::io::detail {
 
 /// The numbers of a line. Empty if there are not exactly `N`, or one is not finite.
 template <std::size_t N>
-[[nodiscard]] std::optional<std::array<double, N>> numbers_of(std::string_view line) {
+[[nodiscard]] std::optional<std::array<double, N>> parse_numbers(std::string_view line) {
   std::array<double, N> all{};
   for (double& value : all)
     if (!parse_number(next_field(line), value) || !std::isfinite(value)) return std::nullopt;
@@ -62,7 +62,7 @@ struct kitti_calibration {
   std::size_t bad_line = 0;
   for_each_line(text, [&](std::string_view line, std::size_t number) {
     if (next_field(line) != wanted + ":") return true;
-    found = numbers_of<12>(line);
+    found = parse_numbers<12>(line);
     if (!found) bad_line = number;
     return found.has_value();
   });

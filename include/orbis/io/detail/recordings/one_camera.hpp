@@ -37,7 +37,7 @@ inline constexpr double mono_pose_distance = 0.020;
 // --- lists in the layout of TUM -----------------------------------------------------------------
 
 /// The list of a camera's images; empty if there is none.
-[[nodiscard]] inline std::filesystem::path image_list_of(const std::filesystem::path& folder) {
+[[nodiscard]] inline std::filesystem::path find_image_list(const std::filesystem::path& folder) {
   return first_present(folder, {"rgb.txt", "left.txt"});
 }
 
@@ -45,7 +45,7 @@ inline constexpr double mono_pose_distance = 0.020;
 /// Errors: not_found, unreadable, no_data, malformed (ground truth, with its line).
 [[nodiscard]] inline result<recording_index> index_image_list(const std::filesystem::path& folder, double fps) {
   recording_index index;
-  auto list = image_list_of(folder);
+  auto list = find_image_list(folder);
   if (list.empty()) list = folder / "rgb.txt";  // to name it in the error
   const auto files = read_image_list(list, index.notes);
   if (!files) return fail(files.error());
@@ -138,7 +138,7 @@ inline constexpr double mono_pose_distance = 0.020;
 
 /// The folder with the images of a plain folder: itself, or the one of the usual names in it that has more images;
 /// empty if there are none.
-[[nodiscard]] inline std::filesystem::path image_folder_of(const std::filesystem::path& folder) {
+[[nodiscard]] inline std::filesystem::path find_image_folder(const std::filesystem::path& folder) {
   std::filesystem::path found;
   std::size_t most = 0;
   for (const auto& path : {folder, folder / "rgb", folder / "color", folder / "colour", folder / "image",
@@ -153,7 +153,7 @@ inline constexpr double mono_pose_distance = 0.020;
 /// malformed (with file and line).
 [[nodiscard]] inline result<recording_index> index_image_folder(const std::filesystem::path& folder, double fps) {
   recording_index index;
-  const auto where = image_folder_of(folder);
+  const auto where = find_image_folder(folder);
   if (where.empty())
     return fail(
         errc::no_data, folder.string(),

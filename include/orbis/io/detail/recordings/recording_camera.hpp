@@ -39,7 +39,7 @@ namespace orbis::io::detail {
 
 /// Notes a time between frames that does not suit a camera of `fps` frames per second.
 inline void note_interval(recording_index& index, double fps) {
-  if (std::string warning = describe_interval(times_of(index.frames), fps); !warning.empty())
+  if (std::string warning = describe_interval(timestamps(index.frames), fps); !warning.empty())
     index.notes.push_back(std::move(warning));
 }
 

@@ -31,7 +31,7 @@ template <class T>
 
 /// The time stamps of entries (files, frames, poses), seconds.
 template <class Entry>
-[[nodiscard]] std::vector<double> times_of(const std::vector<Entry>& entries) {
+[[nodiscard]] std::vector<double> timestamps(const std::vector<Entry>& entries) {
   std::vector<double> times;
   for (const Entry& entry : entries) times.push_back(entry.timestamp);
   return times;

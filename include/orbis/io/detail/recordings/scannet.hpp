@@ -81,7 +81,7 @@ namespace orbis::io::detail {
   if (!first_color) return fail(first_color.error());
   const auto first_depth = read_depth(index.frames.front().depth);
   if (!first_depth) return fail(first_depth.error());
-  const auto camera_of = [&](const char* what, int width, int height) -> result<camera::pinhole> {
+  const auto read_camera = [&](const char* what, int width, int height) -> result<camera::pinhole> {
     auto file = scannet_file(folder, what);
     if (file.empty()) file = folder / "intrinsic" / (std::string{what} + ".txt");  // to name it in the error
     const auto k = read_camera_matrix(file);
@@ -92,17 +92,17 @@ namespace orbis::io::detail {
     if (!checked) return fail(checked.error());
     return camera::pinhole{*checked};
   };
-  const auto place_of = [&](const char* what) -> result<se3> {
+  const auto read_pose = [&](const char* what) -> result<se3> {
     const auto file = scannet_file(folder, what);
     if (file.empty()) return se3{};
     index.files.push_back(file);
     return read_pose_matrix(file);
   };
-  const auto color = camera_of("intrinsic_color", first_color->width(), first_color->height());
+  const auto color = read_camera("intrinsic_color", first_color->width(), first_color->height());
   if (!color) return fail(color.error());
-  const auto depth = camera_of("intrinsic_depth", first_depth->width(), first_depth->height());
+  const auto depth = read_camera("intrinsic_depth", first_depth->width(), first_depth->height());
   if (!depth) return fail(depth.error());
-  const auto T_rig_color = place_of("extrinsic_color"), T_rig_depth = place_of("extrinsic_depth");
+  const auto T_rig_color = read_pose("extrinsic_color"), T_rig_depth = read_pose("extrinsic_depth");
   if (!T_rig_color) return fail(T_rig_color.error());
   if (!T_rig_depth) return fail(T_rig_depth.error());
   index.camera = camera::camera_settings{.model = *depth, .depth_scale = 1000.0, .fps = frames_per_second};

@@ -204,7 +204,7 @@ struct associated_files {
 /// Converts the times of frames from frame numbers to seconds at `fps` frames per second, if they are such numbers, and
 /// notes it.
 inline void convert_frame_numbers(recording_index& index, double fps) {
-  if (!are_frame_numbers(times_of(index.frames))) return;
+  if (!are_frame_numbers(timestamps(index.frames))) return;
   for (recording_entry& frame : index.frames) {
     frame.timestamp /= fps;
     frame.depth_timestamp.reset();
@@ -217,7 +217,7 @@ inline void convert_frame_numbers(recording_index& index, double fps) {
 /// Converts the times of a ground truth from frame numbers to seconds at `fps` frames per second, if they are such
 /// numbers and more frames have a pose then; notes it. @pre the times of the frames are in seconds
 inline void convert_numbered_truth(recording_index& index, double max_distance, double fps) {
-  if (!are_frame_numbers(times_of(index.ground_truth))) return;
+  if (!are_frame_numbers(timestamps(index.ground_truth))) return;
   const auto known = [&](const trajectory& truth) {
     return std::count_if(index.frames.begin(), index.frames.end(), [&](const recording_entry& frame) {
       return interpolate(truth, frame.timestamp, 0.2, max_distance).has_value();
@@ -248,13 +248,13 @@ inline void convert_numbered_truth(recording_index& index, double max_distance, 
 }
 
 /// The list of pairs of colour and depth images in `folder`, under one of its usual names; empty if there is none.
-[[nodiscard]] inline std::filesystem::path association_list_of(const std::filesystem::path& folder) {
+[[nodiscard]] inline std::filesystem::path find_association_list(const std::filesystem::path& folder) {
   return first_present(folder, {"associations.txt", "association.txt", "associated.txt", "associate.txt", "assoc.txt"});
 }
 
 /// Returns true if `folder` looks like a TUM recording.
 [[nodiscard]] inline bool is_tum(const std::filesystem::path& folder) {
-  return present(folder / "rgb.txt") || present(folder / "depth.txt") || !association_list_of(folder).empty();
+  return present(folder / "rgb.txt") || present(folder / "depth.txt") || !find_association_list(folder).empty();
 }
 
 /// Sets the camera of a sequence of the TUM benchmark, which `rgbd_dataset_freiburg1` (2, 3) in the path of `folder`
@@ -287,7 +287,7 @@ inline void guess_tum_camera(const std::filesystem::path& folder, recording_inde
                                                        double max_time_difference = 0.020, double fps = 30.0) {
   recording_index index;
   bool depth_is_whole = true;
-  if (const auto list = association_list_of(folder); !list.empty()) {
+  if (const auto list = find_association_list(folder); !list.empty()) {
     auto frames = read_associations(list, index.notes);
     if (!frames) return fail(frames.error());
     for (associated_files& f : *frames) {
@@ -308,7 +308,7 @@ inline void guess_tum_camera(const std::filesystem::path& folder, recording_inde
     if (!color) return fail(color.error());
     const auto depth = read_image_list(folder / "depth.txt", index.notes);
     if (!depth) return fail(depth.error());
-    const auto times = times_of(*color), depth_times = times_of(*depth);
+    const auto times = timestamps(*color), depth_times = timestamps(*depth);
     depth_is_whole = are_whole(depth_times);
     for (const auto& [c, d] : associate(times, depth_times, max_time_difference))
       index.frames.push_back({times[c], (*color)[c].path, (*depth)[d].path, {}, depth_times[d]});
@@ -336,7 +336,7 @@ inline void guess_tum_camera(const std::filesystem::path& folder, recording_inde
                                               const std::vector<stamped_file>& right,
                                               const std::filesystem::path& where, double max_time_difference,
                                               recording_index& to) {
-  const auto left_times = times_of(left), right_times = times_of(right);
+  const auto left_times = timestamps(left), right_times = timestamps(right);
   for (const auto& [l, r] : associate(left_times, right_times, max_time_difference))
     to.frames.push_back({left_times[l], left[l].path, right[r].path, {}});
   if (to.frames.empty())

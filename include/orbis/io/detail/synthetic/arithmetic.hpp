@@ -58,14 +58,14 @@ struct triple {
 }
 
 /// The largest integer <= `v`, for |v| < 2^31.
-[[nodiscard]] inline std::int64_t floor_of(double v) noexcept {
+[[nodiscard]] inline std::int64_t floor_to_int(double v) noexcept {
   const auto i = static_cast<std::int64_t>(v);
   return static_cast<double>(i) > v ? i - 1 : i;
 }
 
 /// Smooth one-dimensional noise in [-1, 1], with about one oscillation per unit of `t`.
 [[nodiscard]] inline double smooth_noise(std::uint64_t seed, std::uint64_t stream, double t) noexcept {
-  const std::int64_t cell = floor_of(t);
+  const std::int64_t cell = floor_to_int(t);
   const double f = t - static_cast<double>(cell);
   const auto knot = [&](std::int64_t k) {
     return 2.0 * upper_fraction(noise_word(seed, stream, static_cast<std::uint64_t>(k))) - 1.0;

@@ -102,7 +102,7 @@ class camera_path {
     const synthetic_gait_options& gait = options_.gait;
     if (gait.step_rate == 0.0) return {};
     const double steps = gait.step_rate * time + upper_fraction(noise_word(seed_, 100, 0));
-    const std::int64_t step = floor_of(steps);
+    const std::int64_t step = floor_to_int(steps);
     const double since = (steps - static_cast<double>(step)) / gait.step_rate;  // the impact, seconds
     const double fading = std::max(0.0, 1.0 - since / gait.impact_duration);
     const double strength = 0.5 + upper_fraction(noise_word(seed_, 101, static_cast<std::uint64_t>(step)));

@@ -112,7 +112,7 @@ class canvas {
   }
   /// Smooth noise in [-1, 1] with one oscillation per unit of `u` and `v`.
   [[nodiscard]] static float value_noise(std::uint64_t seed, double u, double v) noexcept {
-    const std::int64_t i = floor_of(u), j = floor_of(v);
+    const std::int64_t i = floor_to_int(u), j = floor_to_int(v);
     const auto f = static_cast<float>(u - static_cast<double>(i)), g = static_cast<float>(v - static_cast<double>(j));
     const float a = cell_noise(seed, i, j), b = cell_noise(seed, i + 1, j);
     const float c = cell_noise(seed, i, j + 1), d = cell_noise(seed, i + 1, j + 1);
@@ -132,16 +132,16 @@ class canvas {
     float s = 1.0F + 0.10F * slow;
     switch (m) {
       case material::brick: {
-        const std::int64_t row = floor_of(v / 0.08);
+        const std::int64_t row = floor_to_int(v / 0.08);
         const double shifted = u / 0.24 + ((row & 1) != 0 ? 0.5 : 0.0);
-        const std::int64_t column = floor_of(shifted);
+        const std::int64_t column = floor_to_int(shifted);
         const double a = shifted - static_cast<double>(column), b = v / 0.08 - static_cast<double>(row);
         if (a < 0.04 || b < 0.12) return {tint{1.25F, 1.9F, 2.2F}};
         s *= 0.7F + 0.6F * cell_noise(seed + 1, column, row);
         break;
       }
       case material::tile: {
-        const std::int64_t i = floor_of(u / 0.25), j = floor_of(v / 0.25);
+        const std::int64_t i = floor_to_int(u / 0.25), j = floor_to_int(v / 0.25);
         const double a = u / 0.25 - static_cast<double>(i), b = v / 0.25 - static_cast<double>(j);
         if (a < 0.03 || b < 0.03) return {shade_grey(0.45F)};
         s *= (((i + j) & 1) != 0 ? 0.78F : 1.1F) + 0.25F * cell_noise(seed + 1, i, j);
@@ -151,7 +151,7 @@ class canvas {
       case material::fabric: s *= 1.0F + 0.25F * value_noise(seed + 1, 60.0 * u, 60.0 * v); break;
       case material::books: {
         const double spine = u / 0.035;
-        const std::int64_t i = floor_of(spine);
+        const std::int64_t i = floor_to_int(spine);
         const double a = spine - static_cast<double>(i);
         if (a < 0.08) return {shade_grey(0.2F)};
         const float red = 0.3F + 1.3F * cell_noise(seed + 1, i, 0), green = 0.3F + 1.3F * cell_noise(seed + 2, i, 0),

@@ -49,7 +49,7 @@ class sensor {
   /// Measures the depth of row `y`, in units of 1 / depth_scale metres, 0: none.
   void measure_depth(const exact_view& exact, int y, std::span<std::uint16_t> out) const {
     const int width = exact.depth.width();
-    const std::vector<bool> dark = options_.shadow ? shadow_of(exact.depth.row(y)) : std::vector<bool>{};
+    const std::vector<bool> dark = options_.shadow ? projector_shadow(exact.depth.row(y)) : std::vector<bool>{};
     const std::uint64_t key = noise_word(seed_, 1, static_cast<std::uint64_t>(y)) << 16U;
     for (int x = 0; x != width; ++x) {
       const auto i = static_cast<std::size_t>(x);
@@ -99,7 +99,7 @@ class sensor {
 
   /// Marks pixels that the projector does not light: as seen from the projector, a pixel further to the right in the
   /// row is further to the left.
-  [[nodiscard]] std::vector<bool> shadow_of(std::span<const float> depth) const {
+  [[nodiscard]] std::vector<bool> projector_shadow(std::span<const float> depth) const {
     std::vector<bool> dark(depth.size());
     const double shift = focal_ * options_.baseline;
     double leftmost = 1e30;
@@ -144,7 +144,7 @@ class sensor {
     if (options_.axial_noise != 0.0) z += options_.axial_noise * axial_deviation(z) * normal_from(word);
     if (options_.disparity_step != 0.0 && z > 0.0) {
       const double fb = options_.infrared_focal * options_.baseline;
-      const double steps = static_cast<double>(floor_of(fb / (z * options_.disparity_step) + 0.5));
+      const double steps = static_cast<double>(floor_to_int(fb / (z * options_.disparity_step) + 0.5));
       z = steps > 0.0 ? fb / (steps * options_.disparity_step) : 0.0;
     }
     return z;

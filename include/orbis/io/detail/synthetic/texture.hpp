@@ -144,7 +144,7 @@ class texture_set {
     p.width[0] = repeats ? canvas::texels(across, texel) : c.width();
     p.height[0] = repeats ? canvas::texels(up, texel) : c.height();
     p.texels.clear();  // an earlier painting may have failed
-    p.texels.reserve(channels * texels_of(p.width[0], p.height[0]));
+    p.texels.reserve(channels * texel_count(p.width[0], p.height[0]));
     const bool round = s.kind == shape::sphere || s.kind == shape::cylinder || s.kind == shape::capsule;
     for (int y = 0; y != p.height[0]; ++y)
       for (int x = 0; x != p.width[0]; ++x) {
@@ -176,7 +176,7 @@ class texture_set {
   }
 
   /// Number of texels of a pyramid.
-  [[nodiscard]] static std::size_t texels_of(int width, int height) noexcept {
+  [[nodiscard]] static std::size_t texel_count(int width, int height) noexcept {
     std::size_t all = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
     for (int level = 1; level != most_levels && (width > 1 || height > 1); ++level) {
       width = (width + 1) / 2;

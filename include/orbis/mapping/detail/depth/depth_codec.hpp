@@ -308,7 +308,7 @@ class depth_decoder {
 };
 
 /// The zeros of an image: lengths of alternating runs of other pixels and of zeros, row by row. O(pixels).
-[[nodiscard]] inline std::vector<std::byte> zeros_of(image_view<const std::uint16_t> image) {
+[[nodiscard]] inline std::vector<std::byte> encode_zeros(image_view<const std::uint16_t> image) {
   std::vector<std::uint32_t> runs(1, 0);
   bool is_zero = false;
   for (int y = 0; y != image.height(); ++y)

@@ -48,11 +48,11 @@ class cell_floods {
       is_met = grow(far_, mark::far) || grow(near_, mark::near);
     if (is_met) {
       for (const entry& e : far_) push(e.cell, mark::near);
-      for (const key& seen : seen_far_) mark_of(seen) = mark::near, update_nearest(seen);
+      for (const key& seen : seen_far_) mark_at(seen) = mark::near, update_nearest(seen);
       return true;
     }
     if (far_.empty() || near_.empty()) return false;
-    for (const key& seen : seen_far_) mark_of(seen) = mark::free;
+    for (const key& seen : seen_far_) mark_at(seen) = mark::free;
     return true;
   }
   /// Returns true if `may_reach` is true for one of the cells.
@@ -80,7 +80,7 @@ class cell_floods {
       const double seen = (static_cast<double>(r) + 0.499) * space_.resolution();
       for (; !open.empty() && open.front().first <= seen * seen; open.pop_back()) {
         const key k = open.front().second;
-        if (mark_of(k) == mark::near || (mark_of(k) != mark::far && may_reach(k, max_cells))) return k;
+        if (mark_at(k) == mark::near || (mark_at(k) != mark::far && may_reach(k, max_cells))) return k;
         if (near_.empty()) return nearest_;
         std::pop_heap(open.begin(), open.end(), is_later);
       }
@@ -100,7 +100,7 @@ class cell_floods {
   static constexpr std::uint32_t brick_bits = is_flat ? 6 : 9;
   using brick = std::array<mark, std::size_t{1} << brick_bits>;
 
-  [[nodiscard]] mark& mark_of(const key& k) {
+  [[nodiscard]] mark& mark_at(const key& k) {
     const std::uint64_t name = octree::morton_code(k) >> 9U;
     if (name != last_name_) {
       std::uint32_t i = index_.find(name);
@@ -116,19 +116,19 @@ class cell_floods {
   }
   /// @pre in the space
   [[nodiscard]] bool is_free(const key& k) {
-    mark& m = mark_of(k);
+    mark& m = mark_at(k);
     if (m == mark::none) m = space_.is_free(k) ? mark::free : mark::blocked;
     return m != mark::blocked;
   }
   /// Like `add`. @pre in the space and free
   bool begin(const key& k, mark which) {
-    if (mark_of(k) <= mark::free) mark_of(k) = mark::free;
+    if (mark_at(k) <= mark::free) mark_at(k) = mark::free;
     return add(k, which);
   }
   /// Adds a cell to a flood if it is in none. Returns true if it is in the other one.
   bool add(const key& k, mark which) {
     if (!space_.contains(k) || !is_free(k)) return false;
-    mark& m = mark_of(k);
+    mark& m = mark_at(k);
     if (m != mark::free) return m != which;
     m = which;
     if (which == mark::near)

@@ -75,7 +75,7 @@ template <class Margin>
 ///
 /// J. Amanatides, A. Woo, "A fast voxel traversal algorithm for ray tracing", Eurographics, 1987.
 template <class Space>
-[[nodiscard]] double cost_of(const Space& space, const vec3& a, const vec3& b) {
+[[nodiscard]] double segment_cost(const Space& space, const vec3& a, const vec3& b) {
   const double length = norm(b - a);
   const auto key = space.key(a), end = space.key(b);
   if (space.is_uniform() || length == 0.0 || !key || !end) return length;

@@ -80,13 +80,13 @@ class voxel_search {
     places_ = {start, goal};
     goal_ = space_.clamped(goal);  // a goal outside is replaced by the nearest point of the grid
     exits_ = exits;
-    for (const key& exit : exits_) exit_costs_.push_back(cost_of(space_, space_.center(exit), goal));
+    for (const key& exit : exits_) exit_costs_.push_back(segment_cost(space_, space_.center(exit), goal));
     doors_ = doors(start);
     ends_[0].cost = 0.0;
     ends_[0].is_closed = true;
     for (const key& k : doors_) {
-      const std::uint32_t n = number_of(k);
-      offer(n, from, cost_of(space_, start, space_.center(k)), trust::sure);
+      const std::uint32_t n = find_or_add(k);
+      offer(n, from, segment_cost(space_, start, space_.center(k)), trust::sure);
     }
     return resume(max_expanded);
   }
@@ -171,7 +171,7 @@ class voxel_search {
     const unsigned axes = is_along(direction % 3) + is_along(direction / 3 % 3) + is_along(direction / 9);
     return space_.resolution() * lengths[axes];
   }
-  [[nodiscard]] std::uint32_t number_of(const key& k) {
+  [[nodiscard]] std::uint32_t find_or_add(const key& k) {
     const std::uint64_t name = octree::morton_code(k) >> 9U;
     if (name != last_name_) {
       last_name_ = name;
@@ -185,7 +185,7 @@ class voxel_search {
     }
     return last_brick_ << brick_bits | (is_flat ? 0U : (k.z & 7U) << 6U) | (k.y & 7U) << 3U | (k.x & 7U);
   }
-  [[nodiscard]] key key_of(std::uint32_t number) const {
+  [[nodiscard]] key cell_key(std::uint32_t number) const {
     const key& low = corners_[number >> brick_bits];
     return {low.x + (number & 7U), low.y + (number >> 3U & 7U), is_flat ? low.z : low.z + (number >> 6U & 7U)};
   }
@@ -194,7 +194,7 @@ class voxel_search {
     return (*bricks_[number >> brick_bits])[number & ((1U << brick_bits) - 1)];
   }
   [[nodiscard]] vec3 position(std::uint32_t number) const {
-    return number >= from ? places_[number - from] : space_.center(key_of(number));
+    return number >= from ? places_[number - from] : space_.center(cell_key(number));
   }
   [[nodiscard]] bool is_free(node& n, const key& k) const {
     if (n.free == 0) n.free = space_.is_free(k) ? 2 : 1;
@@ -234,7 +234,7 @@ class voxel_search {
   }
 
   void expand(std::uint32_t number) {
-    const key k = key_of(number);
+    const key k = cell_key(number);
     if (const double away = squared_norm(space_.center(k) - goal_); away < nearest_away_)
       nearest_away_ = away, nearest_ = number;
     node& n = at(number);
@@ -246,7 +246,7 @@ class voxel_search {
     const auto half_cell = [&](node& end, const key& end_key) {
       return is_uniform_ ? 0.0 : 0.5 * space_.resolution() * (density(end, end_key) - 1.0);
     };
-    const double line_begin = above_cost + (any_angle_ && above != from ? half_cell(at(above), key_of(above)) : 0.0);
+    const double line_begin = above_cost + (any_angle_ && above != from ? half_cell(at(above), cell_key(above)) : 0.0);
     const trust known = any_angle_ && !is_uniform_ ? trust::bound : trust::exact;
     for (std::size_t i = 0; i != exits_.size(); ++i)
       if (exits_[i] == k)
@@ -254,7 +254,7 @@ class voxel_search {
     for_each_direction([&](unsigned direction) {
       const key beside = neighbor(k, direction);
       if (!space_.contains(beside)) return;
-      const std::uint32_t other = number_of(beside);
+      const std::uint32_t other = find_or_add(beside);
       node& m = at(other);
       if (m.is_closed || m.free == 1) return;
       if (any_angle_ && !is_uniform_ && m.tried == above) {  // its cost is known: only the step may be new
@@ -285,7 +285,8 @@ class voxel_search {
       return !(is_uniform_ && n.tried == parent) && space_.is_surely_free(a, b);
     };
     if (is_line_free()) {
-      cost = n.known == trust::exact ? n.cost : at(parent).cost + cost_of(space_, position(parent), position(number));
+      cost =
+          n.known == trust::exact ? n.cost : at(parent).cost + segment_cost(space_, position(parent), position(number));
       if (cost <= n.cost) {
         n.known = trust::sure;
         return true;
@@ -302,13 +303,13 @@ class voxel_search {
   /// Index of `parent` among the neighbours (for the goal: among the exits); `none` if it is not one of them.
   [[nodiscard]] unsigned direction_between(std::uint32_t parent, std::uint32_t number) const {
     if (parent == from) return none;
-    const key p = key_of(parent);
+    const key p = cell_key(parent);
     if (number == to) {
       for (unsigned i = 0; i != exits_.size(); ++i)
         if (exits_[i] == p) return i;
       return none;
     }
-    const key k = key_of(number);
+    const key k = cell_key(number);
     const std::uint32_t x = p.x - k.x + 1, y = p.y - k.y + 1, z = p.z - k.z + 1;
     return std::max({x, y, z}) <= 2 ? z * 9 + y * 3 + x : none;
   }
@@ -322,18 +323,18 @@ class voxel_search {
     };
     if (number == to) {
       for (std::size_t i = 0; i != exits_.size(); ++i)
-        if (const std::uint32_t other = number_of(exits_[i]); at(other).is_closed && (n.barred >> i & 1U) == 0)
+        if (const std::uint32_t other = find_or_add(exits_[i]); at(other).is_closed && (n.barred >> i & 1U) == 0)
           consider(other, at(other).cost + exit_costs_[i]);
     } else {
-      const key k = key_of(number);
+      const key k = cell_key(number);
       for_each_direction([&](unsigned direction) {
         const key beside = neighbor(k, direction);
         if ((n.barred >> direction & 1U) != 0 || !space_.contains(beside)) return;
-        const std::uint32_t other = number_of(beside);
+        const std::uint32_t other = find_or_add(beside);
         if (node& m = at(other); m.is_closed) consider(other, m.cost + step_cost(m, beside, n, k, direction));
       });
       if (std::find(doors_.begin(), doors_.end(), k) != doors_.end())
-        consider(from, cost_of(space_, places_[0], space_.center(k)));
+        consider(from, segment_cost(space_, places_[0], space_.center(k)));
     }
     offer(number, best, least, best == from ? trust::sure : trust::exact);  // doors are known to be free
   }

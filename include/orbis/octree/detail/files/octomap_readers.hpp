@@ -57,14 +57,14 @@ class bt_reader : public node_reader {
         if (!read(child, level - 1)) return false;
       } else if (code != 0) {
         ++nodes;
-        store.set_node(child, level - 1, value_of(code));
+        store.set_node(child, level - 1, leaf_value(code));
       }
     }
     return true;
   }
 
  private:
-  [[nodiscard]] static float value_of(unsigned code) noexcept {
+  [[nodiscard]] static float leaf_value(unsigned code) noexcept {
     return code == 2U ? Model::clamp_max : Model::clamp_min;
   }
   [[nodiscard]] bool take(unsigned& codes) noexcept {
@@ -84,7 +84,7 @@ class bt_reader : public node_reader {
         if (!read_octant(b, i)) return false;
       } else if (code != 0) {
         ++nodes;
-        store.make_uniform(b, i, value_of(code));
+        store.make_uniform(b, i, leaf_value(code));
       }
     }
     return true;

@@ -128,12 +128,12 @@ class bt_writer {
     return inner;
   }
   [[nodiscard]] unsigned content(const tree_part<float>& part) {
-    if (part.content == nullptr) return code_of(part.value);
+    if (part.content == nullptr) return leaf_code(part.value);
     out_.room(2 * (1 + 8 + 64));
     open_node node = open();
     for (std::uint32_t i = 0; i != 8; ++i) {
       const brick<float>& b = *part.content;
-      if ((b.uniform >> i & 1U) != 0) node.add(i, code_of(b.value[i]));
+      if ((b.uniform >> i & 1U) != 0) node.add(i, leaf_code(b.value[i]));
       if ((b.dense >> i & 1U) != 0) node.add(i, write_octant(store_.known(b, i), occupied(b, i)));
     }
     return close(brick_level, node);
@@ -143,7 +143,7 @@ class bt_writer {
   static constexpr unsigned free = 1, occupied_leaf = 2, inner = 3;
   static constexpr unsigned free_children = 0x5555, occupied_children = 0xaaaa;
 
-  [[nodiscard]] static unsigned code_of(float value) noexcept {
+  [[nodiscard]] static unsigned leaf_code(float value) noexcept {
     return is_occupied<Model>(value) ? occupied_leaf : free;
   }
   [[nodiscard]] std::uint64_t occupied(const brick<float>& b, std::uint32_t i) const noexcept {

@@ -42,7 +42,7 @@ struct used_brick {
 class brick_uses {
  public:
   /// Returns the number of a brick, adding it if needed; valid until the brick is removed. O(1).
-  [[nodiscard]] std::uint32_t number_of(std::uint64_t name) {
+  [[nodiscard]] std::uint32_t find_or_add(std::uint64_t name) {
     const std::uint32_t found = index_.find(name);
     if (found != hash_index::none) return found;
     std::uint32_t number = 0;

@@ -296,7 +296,7 @@ class brick_store {
   /// Gives octant `i` of `b` its own record in a pool; replaces an existing one.
   void make_record(brick<T>& b, std::uint32_t i, unsigned number) {
     const auto bit = static_cast<std::uint8_t>(1U << i);
-    if ((b.dense & bit) != 0 && octant_pools<T>::pool_of(b.at[i]) == number) return;
+    if ((b.dense & bit) != 0 && octant_pools<T>::pool_number(b.at[i]) == number) return;
     drop_record(b, i);
     b.at[i] = pools_.add(number);
     b.dense |= bit;

@@ -45,7 +45,7 @@ struct octant_leaves {
   std::size_t inner_nodes;  ///< the octant, and its groups of 2x2x2 voxels that are not leaves
 };
 template <class T>
-[[nodiscard]] octant_leaves leaves_of(const octant_view<T>& o) noexcept {
+[[nodiscard]] octant_leaves find_leaves(const octant_view<T>& o) noexcept {
   std::uint64_t large = 0;
   if (o.bits <= max_palette_bits) {  // equal values have equal indices
     std::uint64_t differs = ~o.known;
@@ -110,7 +110,7 @@ std::size_t visit_octant(const voxel_key& key, const octant_view<T>& o, block<T>
     expand_palette(o.value, o.plane, o.bits, scratch);
     value = scratch.value.data();
   }
-  const octant_leaves leaves = leaves_of(o);
+  const octant_leaves leaves = find_leaves(o);
   for (std::uint64_t rest = leaves.first; rest != 0; rest &= rest - 1) {
     const auto i = static_cast<std::uint32_t>(std::countr_zero(rest));
     visit(voxel_in_octant(key, i), static_cast<int>(leaves.large >> i & 1U), value[i]);
@@ -145,7 +145,7 @@ template <sensor_model Model>
     n.occupied_leaves += is_occupied<Model>(v) ? 1 : 0;
   };
   const auto on_octant = [&](const voxel_key&, const brick<T>& b, std::uint32_t i) {
-    const octant_leaves leaves = leaves_of(store.view(b, i));
+    const octant_leaves leaves = find_leaves(store.view(b, i));
     n.leaves += count_ones(leaves.first);
     if (is_occupied<Model>(b.value[i]))
       n.occupied_leaves += count_ones(leaves.first & store.voxels_where(b, i, is_occupied<Model>));

@@ -123,17 +123,17 @@ class octant_pools {
  public:
   static constexpr unsigned plain = max_palette_bits + 1;
 
-  [[nodiscard]] static constexpr unsigned pool_of(std::uint32_t record) noexcept { return record >> 29U; }
+  [[nodiscard]] static constexpr unsigned pool_number(std::uint32_t record) noexcept { return record >> 29U; }
 
   /// Calls `use(record)`.
   template <class Use>
   decltype(auto) read(std::uint32_t record, Use&& use) const {
-    return with_pool(*this, pool_of(record), [&](const auto& p) { return use(p.items[place_of(record)]); });
+    return with_pool(*this, pool_number(record), [&](const auto& p) { return use(p.items[place_in_pool(record)]); });
   }
   /// Calls `use(record&)`, for writing.
   template <class Use>
   void write(std::uint32_t record, Use&& use) {
-    with_pool(*this, pool_of(record), [&](auto& p) { use(p.items.writable(place_of(record))); });
+    with_pool(*this, pool_number(record), [&](auto& p) { use(p.items.writable(place_in_pool(record))); });
   }
   /// Returns an unused record of the pool with this number.
   [[nodiscard]] std::uint32_t add(unsigned number) {
@@ -148,7 +148,7 @@ class octant_pools {
            });
   }
   void erase(std::uint32_t record) {
-    with_pool(*this, pool_of(record), [&](auto& p) { p.free.push_back(place_of(record)); });
+    with_pool(*this, pool_number(record), [&](auto& p) { p.free.push_back(place_in_pool(record)); });
   }
   /// Heap memory in bytes, including memory shared with copies.
   [[nodiscard]] std::size_t memory_bytes() const noexcept {
@@ -166,7 +166,9 @@ class octant_pools {
     std::vector<std::uint32_t> free;
   };
 
-  [[nodiscard]] static constexpr std::uint32_t place_of(std::uint32_t record) noexcept { return record & 0x1fffffffU; }
+  [[nodiscard]] static constexpr std::uint32_t place_in_pool(std::uint32_t record) noexcept {
+    return record & 0x1fffffffU;
+  }
 
   template <class Self, class Use>
   static decltype(auto) with_pool(Self& self, unsigned number, Use&& use) {

@@ -107,7 +107,7 @@ class bundle_equations {
       const std::size_t end = structure_.chunk_begin[chunk + 1].first_point;
       std::fill_n(normal_.data() + point_size * begin, point_size * (end - begin), 0.0);
       for_each_segment(chunk, [&](std::size_t s) {
-        camera_work<R> work = work_of(s, views_, positions_);
+        camera_work<R> work = make_work(s, views_, positions_);
         work.normal = normal_.data();
         if (moves_camera(s)) {
           work.mixed = mixed_.data() + mixed_block_tile::size * structure_.segments[s].first_mixed_tile;
@@ -227,7 +227,7 @@ class bundle_equations {
       for (std::size_t p = structure_.chunk_begin[chunk].first_point; p != end; ++p)
         for (std::size_t i = 0; i != 3; ++i) tried_positions_[4 * p + i] = positions_[4 * p + i] + moves[3 * p + i];
       for_each_segment(chunk, [&](std::size_t s) {
-        segment_cost_[s] = kernels_.cost(work_of(s, tried_views_, tried_positions_), loss_);
+        segment_cost_[s] = kernels_.cost(make_work(s, tried_views_, tried_positions_), loss_);
       });
     });
     return tried_cost_ = sum_of_segments();
@@ -407,7 +407,7 @@ class bundle_equations {
     flags_.resize(information_.size());
     for_each_index(policy, structure_.chunks(), 1, [&](std::size_t chunk) {
       for_each_segment(chunk, [&](std::size_t s) {
-        find_visible(work_of(s, views_, positions_), flags_.data() + 8 * structure_.segments[s].first_tile);
+        find_visible(make_work(s, views_, positions_), flags_.data() + 8 * structure_.segments[s].first_tile);
       });
     });
     for (std::size_t at = 0; at != information_.size(); ++at) {
@@ -434,8 +434,8 @@ class bundle_equations {
     return structure_.unknown[structure_.segments[segment].camera] != bundle_structure::none;
   }
 
-  [[nodiscard]] camera_work<R> work_of(std::size_t s, const std::vector<typename R::view>& views,
-                                       const std::vector<double>& positions) const {
+  [[nodiscard]] camera_work<R> make_work(std::size_t s, const std::vector<typename R::view>& views,
+                                         const std::vector<double>& positions) const {
     const bundle_structure::segment& segment = structure_.segments[s];
     const std::size_t at = 8 * segment.first_tile;
     camera_work<R> work{.residual = residual_, .view = views[segment.camera], .count = segment.count};

@@ -94,7 +94,7 @@ class bundle_structure {
     std::uint32_t first = none, last = none, seen = 0;  ///< of a point, among movable cameras
   };
 
-  [[nodiscard]] std::span<const entry> observations_of(std::size_t source_point) const {
+  [[nodiscard]] std::span<const entry> point_observations(std::size_t source_point) const {
     return std::span{by_point_}.subspan(of_point_[source_point], of_point_[source_point + 1] - of_point_[source_point]);
   }
 
@@ -142,7 +142,7 @@ class bundle_structure {
       if (of_point_[p] == of_point_[p + 1]) continue;
       point_source.push_back(p);
       span_of_cameras& s = spans_[p];
-      for (const entry& o : observations_of(p))
+      for (const entry& o : point_observations(p))
         if (const std::uint32_t u = unknown[o.other]; u != none) {
           s.first = std::min(s.first, u);
           s.last = u;
@@ -167,7 +167,8 @@ class bundle_structure {
   void find_points_alike() {
     is_like_last_.assign(points(), 0);
     for (std::size_t p = 1; p < points(); ++p) {
-      const std::span<const entry> one = observations_of(point_source[p - 1]), other = observations_of(point_source[p]);
+      const std::span<const entry> one = point_observations(point_source[p - 1]),
+                                   other = point_observations(point_source[p]);
       const auto moves = [&](const entry& o) { return unknown[o.other] != none; };
       auto a = one.begin(), b = other.begin();
       for (;; ++a, ++b) {
@@ -198,7 +199,7 @@ class bundle_structure {
       touched_.clear();
       while (end != points() && observations < std::max(enough, enough_of_camera * touched_.size()))
         for (const std::size_t stop = std::min(points(), end + tile); end != stop; ++end)
-          for (const entry& o : observations_of(point_source[end])) {
+          for (const entry& o : point_observations(point_source[end])) {
             if (in_chunk_[o.other]++ == 0) touched_.push_back(o.other);
             ++observations;
           }
@@ -246,7 +247,7 @@ class bundle_structure {
     mixed_place.resize(mixed_unknown.size());
     for (std::size_t p = begin; p != end; ++p) {
       std::size_t number = g.first_mixed + (p - begin);
-      for (const entry& o : observations_of(point_source[p])) {
+      for (const entry& o : point_observations(point_source[p])) {
         const std::size_t place = in_chunk_[o.other]++;
         source[place] = o.observation;
         point[place] = static_cast<std::uint32_t>(p);

@@ -92,14 +92,14 @@ class shared_intrinsics {
   template <class GoOn>
   [[nodiscard]] bool descend(int limit, double relative_tolerance, int& steps, const GoOn& go_on) {
     set_noise();
-    double cost = cost_of(now_), damping = 1e-4;
+    double cost = total_cost(now_), damping = 1e-4;
     for (int taken = 0; taken < limit;) {
       if (!go_on()) return false;
       linearize();
       double gain = -1.0;
       for (; damping < 1e8; damping *= 10.0) {
         const std::optional<estimate> tried = step(damping);
-        gain = tried ? cost - cost_of(*tried) : -1.0;
+        gain = tried ? cost - total_cost(*tried) : -1.0;
         if (!(gain >= 0.0)) continue;
         now_ = *tried;
         damping = std::max(damping * 0.1, 1e-12);
@@ -117,7 +117,7 @@ class shared_intrinsics {
   void update_outliers() {
     constexpr double gates[] = {13.816, 16.266};  // the chi-squared quantiles of 99.9 %, for two and three coordinates
     set_noise();
-    const std::vector<view_type> views = views_of(now_);
+    const std::vector<view_type> views = make_views(now_);
     for (std::size_t k = 0; k != observations_.size(); ++k) {
       const double gate = gates[std::isnan(observations_[k].right) ? 0 : 1] * noise_ * noise_;
       out_[k] = squared(views, now_.points, k) > gate ? out::outlier : out::no;
@@ -126,10 +126,11 @@ class shared_intrinsics {
   }
 
   /// Root mean square of the entries of the whitened residuals.
-  [[nodiscard]] double rms() const { return rms_of(now_.camera, now_.poses, now_.points); }
-  [[nodiscard]] double rms_of(const Camera& camera, std::span<const se3> poses, std::span<const vec3> points) const {
+  [[nodiscard]] double rms() const { return residual_rms(now_.camera, now_.poses, now_.points); }
+  [[nodiscard]] double residual_rms(const Camera& camera, std::span<const se3> poses,
+                                    std::span<const vec3> points) const {
     const estimate e{camera, {poses.begin(), poses.end()}, {points.begin(), points.end()}};
-    const std::vector<view_type> views = views_of(e);
+    const std::vector<view_type> views = make_views(e);
     double sum = 0.0, entries = 0.0;
     for (std::size_t k = 0; k != observations_.size(); ++k) {
       const double s = out_[k] != out::no ? std::numeric_limits<double>::infinity() : squared(views, e.points, k);
@@ -174,7 +175,7 @@ class shared_intrinsics {
 
  private:
   void choose(std::span<const bundle_observation> all) {
-    const std::vector<view_type> views = views_of(now_);
+    const std::vector<view_type> views = make_views(now_);
     std::vector<std::vector<std::uint32_t>> by_point(now_.points.size());
     for (std::size_t k = 0; k != all.size(); ++k) {
       const bundle_observation& o = all[k];
@@ -193,7 +194,7 @@ class shared_intrinsics {
   void set_noise() {
     constexpr double medians[] = {1.386, 2.366};  // of chi-squared, for two and three coordinates
     constexpr double least = 0.01;  // lower limit for noise-free data, so that rounding does not count as noise
-    const std::vector<view_type> views = views_of(now_);
+    const std::vector<view_type> views = make_views(now_);
     std::vector<double> shares;
     for (std::size_t k = 0; k != observations_.size(); ++k)
       if (out_[k] == out::no) {
@@ -212,7 +213,7 @@ class shared_intrinsics {
   void keep_connected() {
     for (out& o : out_)
       if (o == out::alone) o = out::no;
-    views_ = views_of(now_);
+    views_ = make_views(now_);
     row_of_.assign(now_.poses.size(), none);
     parts_.resize(begins_.size() - 1);
     seen_.resize(observations_.size());
@@ -286,7 +287,7 @@ class shared_intrinsics {
     pose_rows_ = static_cast<Eigen::Index>(rows);
   }
 
-  [[nodiscard]] static std::vector<view_type> views_of(const estimate& e) {
+  [[nodiscard]] static std::vector<view_type> make_views(const estimate& e) {
     std::vector<view_type> views;
     views.reserve(e.poses.size());
     for (const se3& pose : e.poses) views.push_back(residual_type::prepare({pose, e.camera}));
@@ -300,8 +301,8 @@ class shared_intrinsics {
       (*r)[2] -= o.depth_weight * (*r)[0];  // the depth alone: bf times the difference of inverse depths
     return r ? o.information * squared_norm(*r) : std::numeric_limits<double>::infinity();
   }
-  [[nodiscard]] double cost_of(const estimate& e) const {
-    const std::vector<view_type> views = views_of(e);
+  [[nodiscard]] double total_cost(const estimate& e) const {
+    const std::vector<view_type> views = make_views(e);
     double sum = 0.0;
     for (std::size_t k = 0; k != observations_.size(); ++k)
       if (out_[k] == out::no) sum += loss_.cost(squared(views, e.points, k));
@@ -406,7 +407,7 @@ class shared_intrinsics {
     small_cholesky<3> factor;
     if (!factor.set(own) || !(factor.factor(0.0) > 0.0)) return false;
     point_.inverse = factor.inverse();
-    if (!(1.0 > 1e-12 * size_of(own) * size_of(point_.inverse))) return false;
+    if (!(1.0 > 1e-12 * one_norm(own) * one_norm(point_.inverse))) return false;
     point_.gradient = part.gradient;
     const vec3 back = point_.inverse * part.gradient;
     point_.theta_point = part.theta_point;
@@ -421,7 +422,7 @@ class shared_intrinsics {
   }
 
   /// The 1-norm: the largest column sum of magnitudes; multiplied by that of the inverse, the condition number.
-  [[nodiscard]] static double size_of(const mat3& m) {
+  [[nodiscard]] static double one_norm(const mat3& m) {
     double most = 0.0;
     for (int c = 0; c != 3; ++c) most = std::max(most, std::abs(m(0, c)) + std::abs(m(1, c)) + std::abs(m(2, c)));
     return most;
@@ -443,7 +444,7 @@ class shared_intrinsics {
 
   /// Linearises all residuals at the current estimate.
   void linearize() {
-    views_ = views_of(now_);
+    views_ = make_views(now_);
     clear(direct_, pose_rows_ + count_);
     for (std::size_t p = 0; p + 1 < begins_.size(); ++p) {
       linearize_point(p);

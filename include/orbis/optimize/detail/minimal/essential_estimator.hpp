@@ -33,7 +33,7 @@ namespace orbis::optimize::detail {
 
 /// The four poses `T_second_first` (translations of length 1) that an essential matrix may represent.
 [[nodiscard]] inline std::array<se3, 4> decompose_essential(const mat3& essential) {
-  auto [u, values, v] = singular_values_of<3>(essential);
+  auto [u, values, v] = svd<3>(essential);
   if (determinant(u) < 0.0) set_column(u, 2, -column_of(u, 2));
   if (determinant(v) < 0.0) set_column(v, 2, -column_of(v, 2));
   mat3 quarter;
@@ -106,7 +106,7 @@ class essential_estimator {
     const auto step = [](const epipolar_motion& m, const epipolar_equations& at) -> std::optional<epipolar_motion> {
       auto [a, g] = at.by_motion(m);
       change_diagonal(a, 1.0 + 1e-9, 0.0);
-      change_diagonal(a, 1.0, 1e-12 * largest_of(diagonal_of(a)));
+      change_diagonal(a, 1.0, 1e-12 * max_entry(diagonal(a)));
       small_cholesky<5> factors;
       if (!factors.set(a) || !(factors.factor(0.0) > 0.0)) return std::nullopt;
       const matrix<5> d = -factors.solve(g);

@@ -36,7 +36,7 @@ namespace orbis::optimize::detail {
     weights[k] = vec3(cross(3, 1, 2), cross(0, 3, 2), cross(0, 1, 3));
     const double area = cross(0, 1, 2);
     const double extent = squared_norm(p[1] - p[0]) + squared_norm(p[2] - p[0]) + squared_norm(p[3] - p[0]);
-    if (!(std::min(std::fabs(area), smallest_of(magnitudes(weights[k]))) > 1e-6 * extent)) return std::nullopt;
+    if (!(std::min(std::fabs(area), min_entry(magnitudes(weights[k]))) > 1e-6 * extent)) return std::nullopt;
     weights[k] /= area;
     for (int i = 0; i != 3; ++i) set_column(bases[k], i, weights[k][i] * homogeneous(p[static_cast<std::size_t>(i)]));
   }
@@ -114,7 +114,7 @@ class homography_estimator {
         {matches_[s[0]].first, matches_[s[1]].first, matches_[s[2]].first, matches_[s[3]].first},
         {matches_[s[0]].second, matches_[s[1]].second, matches_[s[2]].second, matches_[s[3]].second});
     if (!h) return {};
-    return {made_of(*h)};
+    return {make_model(*h)};
   }
 
   [[nodiscard]] double squared_error(const model& m, std::size_t i) const {
@@ -154,14 +154,14 @@ class homography_estimator {
     const auto step = [](const model& m, const homography_equations& e) -> std::optional<model> {
       const auto d = e.step();
       if (!d) return std::nullopt;
-      return made_of(*d * m.forward);
+      return make_model(*d * m.forward);
     };
     return descend(
         start, steps, [&](const model& m) { return sum_up(m, inliers); }, step);
   }
 
  private:
-  [[nodiscard]] static model made_of(const mat3& h) {
+  [[nodiscard]] static model make_model(const mat3& h) {
     model m{h / norm(h), inverse(h)};
     m.backward /= norm(m.backward);
     return m;

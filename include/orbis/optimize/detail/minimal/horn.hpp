@@ -111,7 +111,7 @@ struct best_rotation {
 /// The transform between weighted pairs; empty if the points do not determine a rotation.
 template <class Pair>
 [[nodiscard]] std::optional<sim3> align_pairs(std::size_t n, const Pair& pair, bool with_scale) {
-  return transform_between(moments_of(n, pair), n, with_scale);
+  return transform_between(compute_moments(n, pair), n, with_scale);
 }
 
 }  // namespace orbis::optimize::detail

@@ -19,7 +19,7 @@ struct pair_moments {
 /// Computes the moments of n pairs: `pair(i, a, b)` writes the i-th pair as two arrays of three doubles and returns its
 /// weight. O(n), two passes.
 template <class Pair>
-[[nodiscard]] pair_moments moments_of(std::size_t n, const Pair& pair) {
+[[nodiscard]] pair_moments compute_moments(std::size_t n, const Pair& pair) {
   // Separate sums for even and odd pairs shorten the dependency chain.
   double sums[2][7] = {};
   for (std::size_t i = 0; i != n; ++i) {

@@ -135,7 +135,7 @@ template <class SumUp>
   const auto step = [](const state& s, const pose_equations& e) -> std::optional<state> {
     // A very small damping keeps directions that the matches do not determine unchanged.
     mat6 damped = e.h;
-    change_diagonal(damped, 1.0 + 1e-9, 1e-12 * largest_of(diagonal_of(e.h)));
+    change_diagonal(damped, 1.0 + 1e-9, 1e-12 * max_entry(diagonal(e.h)));
     small_cholesky<6> factors;
     if (!factors.set(damped) || !(factors.factor(0.0) > 0.0)) return std::nullopt;
     const vec6 d = -factors.solve(e.g);
@@ -176,7 +176,7 @@ class pnp_estimator {
     for_each_p3p({matches_.points[s[0]], matches_.points[s[1]], matches_.points[s[2]]},
                  {matches_.rays[s[0]], matches_.rays[s[1]], matches_.rays[s[2]]},
                  [&](const mat3& rotation, const vec3& translation) {
-                   if (all.size != 4) all.models[all.size++] = made_of({rotation, translation});
+                   if (all.size != 4) all.models[all.size++] = make_model({rotation, translation});
                  });
     return all;
   }
@@ -205,10 +205,10 @@ class pnp_estimator {
     const auto pose =
         descend_pose(start.pose, steps, [&](const centred_pose& at, pose_equations& e) { sum_up(groups, at, e); });
     if (!pose) return std::nullopt;
-    return made_of(*pose);
+    return make_model(*pose);
   }
 
-  [[nodiscard]] static model made_of(const centred_pose& pose) {
+  [[nodiscard]] static model make_model(const centred_pose& pose) {
     model m{pose, {}};
     for (int row = 0; row != 3; ++row) {
       for (int column = 0; column != 3; ++column)

@@ -50,7 +50,7 @@ class ray_homography_estimator {
     }
     const auto h = homography_of_four(first, second);
     if (!h) return {};
-    return {made_of(*h, matches_[s[0]].first.direction())};
+    return {make_model(*h, matches_[s[0]].first.direction())};
   }
 
   /// The mean of the errors of both transfers.
@@ -71,7 +71,7 @@ class ray_homography_estimator {
     const auto step = [&](const model& m, const homography_equations& e) -> std::optional<model> {
       const auto d = e.step();
       if (!d) return std::nullopt;
-      return made_of(*d * m.forward, in_front);
+      return make_model(*d * m.forward, in_front);
     };
     return descend(
         start, steps, [&](const model& m) { return sum_up(m, inliers); }, step);
@@ -79,7 +79,7 @@ class ray_homography_estimator {
 
  private:
   /// A model from a homography; empty if it is singular.
-  [[nodiscard]] static std::optional<model> made_of(const mat3& h, const vec3& in_front) {
+  [[nodiscard]] static std::optional<model> make_model(const mat3& h, const vec3& in_front) {
     model m{h / norm(h), inverse(h)};
     if ((m.forward * in_front).z() < 0.0) m.forward = -m.forward;
     m.backward /= norm(m.backward);

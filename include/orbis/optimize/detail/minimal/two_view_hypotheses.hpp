@@ -108,8 +108,8 @@ inline constexpr double least_disparity = 4.0;
   return squared_transfer(rotation * m.first.direction(), m.second);
 }
 
-[[nodiscard]] inline agreement agreement_of(const mat3& rotation, const vec3& t, const mat3& e, const image_match& m,
-                                            double& squared) {
+[[nodiscard]] inline agreement classify_match(const mat3& rotation, const vec3& t, const mat3& e, const image_match& m,
+                                              double& squared) {
   squared = squared_sampson(e, m);
   if (!(squared < 1.5 * line_gate)) return agreement::none;
   if (squared_disparity(rotation, m) < least_disparity * least_disparity) return agreement::far;
@@ -120,18 +120,19 @@ inline constexpr double least_disparity = 4.0;
 }
 
 /// Contribution of a match to the score of a motion.
-[[nodiscard]] inline double score_of(const mat3& rotation, const epipolar_motion& motion, const image_match& m) {
+[[nodiscard]] inline double score_match(const mat3& rotation, const epipolar_motion& motion, const image_match& m) {
   double squared = 0.0;
-  const agreement a = agreement_of(rotation, motion.direction, motion.e, m, squared);
+  const agreement a = classify_match(rotation, motion.direction, motion.e, m, squared);
   return a == agreement::near || a == agreement::far ? 1.5 * line_gate - squared : 0.0;
 }
 
-[[nodiscard]] inline motion_support support_of(const std::vector<image_match>& matches, const epipolar_motion& motion) {
+[[nodiscard]] inline motion_support measure_support(const std::vector<image_match>& matches,
+                                                    const epipolar_motion& motion) {
   motion_support sum;
   const mat3 rotation = motion.rotation.rotation_matrix();
   for (const image_match& m : matches) {
     double squared = 0.0;
-    switch (agreement_of(rotation, motion.direction, motion.e, m, squared)) {
+    switch (classify_match(rotation, motion.direction, motion.e, m, squared)) {
       case agreement::none: continue;
       case agreement::behind: ++sum.behind; continue;
       case agreement::far: ++sum.far; break;
@@ -149,8 +150,8 @@ struct model_scores {
   double homography = 0.0, essential = 0.0;
   [[nodiscard]] double ratio() const { return homography / std::max(1e-300, homography + essential); }
 };
-[[nodiscard]] inline model_scores scores_of(const std::vector<image_match>& matches, const mat3& forward,
-                                            const mat3& backward, const mat3& e) {
+[[nodiscard]] inline model_scores score_models(const std::vector<image_match>& matches, const mat3& forward,
+                                               const mat3& backward, const mat3& e) {
   model_scores sum;
   for (const image_match& m : matches) {
     const vec3 first = m.first.direction(), second = m.second.direction();

@@ -47,7 +47,7 @@ class two_view_search {
     if (!refined) return;
     for (const se3& pose : decompose_essential(refined->e)) {
       const epipolar_motion m(pose.rotation(), pose.translation());
-      all_.push_back({m, support_of(matches_, m)});
+      all_.push_back({m, measure_support(matches_, m)});
     }
   }
   /// Returns true if one motion of a plane explains the plane's matches clearly better than `best`, i.e. if `best`
@@ -95,7 +95,7 @@ class two_view_search {
       const mat3 other = h.motion.rotation.rotation_matrix();
       double sum = 0.0, squares = 0.0;
       for (const Match& m : matches_) {
-        const double more = score_of(rotation, best.motion, m) - score_of(other, h.motion, m);
+        const double more = score_match(rotation, best.motion, m) - score_match(other, h.motion, m);
         sum += more;
         squares += more * more;
       }
@@ -135,7 +135,7 @@ struct two_view_inliers {
     const mat3 rotation = motion.rotation.rotation_matrix();
     for (const Match& m : matches) {
       double squared = 0.0;
-      const agreement a = agreement_of(rotation, motion.direction, motion.e, m, squared);
+      const agreement a = classify_match(rotation, motion.direction, motion.e, m, squared);
       if (a != agreement::far && a != agreement::near) continue;
       all.push_back(&m);
       if (a == agreement::near) near.push_back(&m);
@@ -146,7 +146,7 @@ struct two_view_inliers {
     if (all.empty()) return;
     rms = std::sqrt(rms / static_cast<double>(all.size()));
     // Does not trust residuals far below the given standard deviation.
-    sigma = std::max(0.5, 1.4826 * std::sqrt(median_of(squares)));
+    sigma = std::max(0.5, 1.4826 * std::sqrt(median(squares)));
     estimate_deviations(motion);
   }
 
@@ -202,7 +202,7 @@ struct two_view_inliers {
 
  public:
   /// The median of some values. @pre not empty
-  [[nodiscard]] static double median_of(std::vector<double>& values) {
+  [[nodiscard]] static double median(std::vector<double>& values) {
     const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
     std::nth_element(values.begin(), middle, values.end());
     return *middle;
@@ -257,7 +257,7 @@ result<two_view_reconstruction> reconstruction_of_matches(const std::vector<Matc
   std::vector<epipolar_motion> plane_motions;
   if (plane) {
     const auto& [forward, backward] = plane->model;
-    from_homography = scores_of(matches, forward, backward, essential->model).ratio() > 0.45;
+    from_homography = score_models(matches, forward, backward, essential->model).ratio() > 0.45;
     const vec3 ray = matches[plane->inliers.empty() ? 0 : plane->inliers.front()].first.direction();
     if (const auto motions = decompose_homography(forward, ray))
       for (const plane_motion& m : *motions)
@@ -305,7 +305,7 @@ result<two_view_reconstruction> reconstruction_of_matches(const std::vector<Matc
     angles.push_back(p.parallax);
   }
   two_view_reconstruction out;
-  out.parallax = two_view_inliers<Match>::median_of(angles);
+  out.parallax = two_view_inliers<Match>::median(angles);
   if (!(out.parallax >= options.min_parallax)) return refuse("too little parallax between the rays of a point");
 
   // Only a motion that would be accepted is compared with all others.
@@ -325,7 +325,7 @@ result<two_view_reconstruction> reconstruction_of_matches(const std::vector<Matc
     if (second && 2 * second->inliers.size() > inliers.all.size()) return refuse(shared);
   }
 
-  const double unit = 1.0 / two_view_inliers<Match>::median_of(depths);
+  const double unit = 1.0 / two_view_inliers<Match>::median(depths);
   for (const seen_point& p : found) {
     out.matches.push_back(p.match);
     out.points.push_back(unit * p.position);

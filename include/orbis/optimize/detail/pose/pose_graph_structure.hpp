@@ -120,15 +120,15 @@ class pose_graph_structure {
     touched_.assign(vertex_count, 0);
     for (const auto& e : edges) {
       touched_[e.from] = touched_[e.to] = 1;
-      const std::uint32_t a = root_of(e.from), b = root_of(e.to);
+      const std::uint32_t a = find_root(e.from), b = find_root(e.to);
       root_[std::max(a, b)] = std::min(a, b);  // makes the root the first vertex of its component
     }
     // Marks the components with a fixed vertex.
     anchored_.assign(vertex_count, 0);
     for (std::uint32_t v = 0; v != vertex_count; ++v)
-      if (is_fixed(v)) anchored_[root_of(v)] = 1;
+      if (is_fixed(v)) anchored_[find_root(v)] = 1;
     std::size_t pieces = 0;
-    for (std::uint32_t v = 0; v != vertex_count; ++v) pieces += touched_[v] != 0 && root_of(v) == v ? 1 : 0;
+    for (std::uint32_t v = 0; v != vertex_count; ++v) pieces += touched_[v] != 0 && find_root(v) == v ? 1 : 0;
     const bool hold_first =
         policy == pose_graph_gauge::first_of_each_piece || (policy == pose_graph_gauge::automatic && pieces == 1);
 
@@ -136,7 +136,7 @@ class pose_graph_structure {
     vertices.clear();
     for (std::uint32_t v = 0; v != vertex_count; ++v) {
       if (touched_[v] == 0 || is_fixed(v)) continue;
-      const std::uint32_t root = root_of(v);
+      const std::uint32_t root = find_root(v);
       if (anchored_[root] == 0) {
         if (!hold_first) return {pose_graph_status::no_gauge, v};
         if (root == v) continue;
@@ -147,7 +147,7 @@ class pose_graph_structure {
     return {};
   }
 
-  [[nodiscard]] std::uint32_t root_of(std::uint32_t v) {
+  [[nodiscard]] std::uint32_t find_root(std::uint32_t v) {
     while (root_[v] != v) v = root_[v] = root_[root_[v]];
     return v;
   }

@@ -63,7 +63,7 @@ requires(B >= 1) class block_cholesky {
   };
 
   [[nodiscard]] static std::ptrdiff_t offset(std::size_t k) { return static_cast<std::ptrdiff_t>(width * k); }
-  [[nodiscard]] double* panel_of(std::size_t s) { return values_.data() + panels_[s].begin; }
+  [[nodiscard]] double* panel_data(std::size_t s) { return values_.data() + panels_[s].begin; }
 
   /// The index in `values_` of block (row, column) of the factor, in the order of elimination.
   [[nodiscard]] std::size_t at(std::uint32_t row, std::uint32_t column) const {
@@ -113,12 +113,12 @@ requires(B >= 1) class block_cholesky {
     const supernode& source = symbolic_.supernodes[u.source];
     const supernode& node = symbolic_.supernodes[s];
     const std::span<const std::uint32_t> rows = symbolic_.rows_of(source);
-    const double* const from = panel_of(u.source) + width * source.columns;
+    const double* const from = panel_data(u.source) + width * source.columns;
     for (std::uint32_t j = u.begin; j != u.end; ++j) {
       const double* const a = from + width * j;
       kernels_.product(a, a, panels_[u.source].stride, width * (source.rows - j), width * source.columns,
                        product_.data(), product_stride_);
-      double* const column = panel_of(s) + width * (rows[j] - node.first) * panels_[s].stride;
+      double* const column = panel_data(s) + width * (rows[j] - node.first) * panels_[s].stride;
       for (std::uint32_t i = j; i != source.rows; ++i)
         subtract(product_.data() + width * (i - j), width, column + width * place_of_row_[rows[i]], panels_[s].stride);
     }
@@ -135,10 +135,10 @@ requires(B >= 1) class block_cholesky {
     const supernode& node = symbolic_.supernodes[s];
     const std::size_t stride = panels_[s].stride;
     for (std::size_t c = 0; c != node.columns; ++c) {
-      double* const top = panel_of(s) + width * (c * stride + c);
+      double* const top = panel_data(s) + width * (c * stride + c);
       const std::size_t height = width * (node.columns - c + node.rows);
       if (c != 0) {
-        const double* const a = panel_of(s) + width * c;
+        const double* const a = panel_data(s) + width * c;
         kernels_.product(a, a, stride, height, width * c, product_.data(), product_stride_);
         subtract(product_.data(), height, top, stride);
       }
@@ -178,7 +178,7 @@ requires(B >= 1) class block_cholesky {
     double* const change = product_.data();  // of everything below the current column
     std::fill_n(change, height, 0.0);
     for (std::size_t c = 0; c != node.columns; ++c) {
-      const double* const top = panel_of(s) + width * c * stride;
+      const double* const top = panel_data(s) + width * c * stride;
       double solved[width];
       for (std::size_t j = 0; j != width; ++j) {
         const std::size_t row = width * c + j;
@@ -204,7 +204,7 @@ requires(B >= 1) class block_cholesky {
     for (std::size_t i = 0; i != rows.size(); ++i)
       std::copy_n(ordered_.begin() + offset(rows[i]), B, x + width * (node.columns + i));
     for (std::size_t c = node.columns; c-- != 0;) {
-      const double* const top = panel_of(s) + width * c * stride;
+      const double* const top = panel_data(s) + width * c * stride;
       double sum[width] = {};
       for (std::size_t i = width * (c + 1); i != height; ++i)
         for (std::size_t j = 0; j != width; ++j) sum[j] += rounded_product(top[j * stride + i], x[i]);

@@ -120,8 +120,8 @@ struct depth_equations {
 /// Returns the equations of planes. `points`: maximum number of independent points; larger numbers are down-weighted to
 /// this. `weakest`: minimum mean square of the normals in a direction; below it, the direction counts as free;
 /// rotations are scaled to metres by the mean depth of the points. O(planes).
-[[nodiscard]] inline depth_equations equations_of(std::span<const plane_observation_of_row> planes,
-                                                  const moving_pose& at, double points, double weakest) {
+[[nodiscard]] inline depth_equations build_equations(std::span<const plane_observation_of_row> planes,
+                                                     const moving_pose& at, double points, double weakest) {
   depth_equations e;
   e.term.at = at;
   if (planes.empty()) return e;
@@ -176,7 +176,7 @@ struct depth_equations {
 }
 
 /// Returns the motion of the camera frame that minimises the cost in the determined directions; zero in all others.
-[[nodiscard]] inline vec6 step_of(const depth_equations& e) {
+[[nodiscard]] inline vec6 solve_step(const depth_equations& e) {
   const symmetric_eigen<6> h = eigen_of_symmetric<6>(block<6, 6>(e.term.h, 0, 0));
   vec6 step = zeros<vec6>();
   for (int i = 6 - e.determined; i < 6; ++i)  // the others are zero

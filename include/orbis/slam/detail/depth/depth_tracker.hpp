@@ -53,7 +53,7 @@ class surface_memory {
     for (std::uint32_t i = 0; i != kept_.size(); ++i) {
       const map_keyframe k = maps.current(kept_[i].anchor);
       if (k.map != maps.active_id() || !maps.active().remembers(k.keyframe)) continue;
-      const se3 T = maps.active().pose_of(k.keyframe) * kept_[i].T_anchor_camera;
+      const se3 T = maps.active().pose(k.keyframe) * kept_[i].T_anchor_camera;
       near_.push_back({distance(T, T_world_camera), i, T});
     }
     std::sort(near_.begin(), near_.end(), [](const near& a, const near& b) {
@@ -158,7 +158,7 @@ class depth_tracker {
   [[nodiscard]] std::optional<pose_quadratic> term_at(const moving_pose& at, const camera::shutter& shutter) {
     const association seen = associate<Camera>(samples_, 1, placed_, at, shutter, rig_, close, planes_);
     if (seen.consistent < options_.min_points / 2) return std::nullopt;
-    depth_equations e = equations_of(planes_, at, options_.effective_points, options_.weakest);
+    depth_equations e = build_equations(planes_, at, options_.effective_points, options_.weakest);
     if (e.determined == 0) return std::nullopt;
     if (shutter.is_depth_early()) e.term.hold_twist();  // see `early_depth_twist`
     return e.term;
@@ -232,10 +232,10 @@ class depth_tracker {
     for (int i = 0; i != iterations; ++i) {
       associate<Camera>(samples_, stride, placed_, a.at, shutter, rig_, {.distance = distance, .cosine = 0.7}, planes_);
       if (planes_.size() < 12) break;
-      const depth_equations e = equations_of(planes_, a.at, options_.effective_points, options_.weakest);
+      const depth_equations e = build_equations(planes_, a.at, options_.effective_points, options_.weakest);
       a.determined = e.determined;
       a.least = e.least;
-      const vec6 step = step_of(e);
+      const vec6 step = solve_step(e);
       if (!all_finite(step)) break;
       a.at.T_world_camera = a.at.T_world_camera * se3::exp(-step);
       distance = std::max(0.05, 0.8 * distance);

@@ -123,21 +123,21 @@ class motion_splitter {
   /// Returns the sum of trust, weighted by agreement, times the spread of the agreeing matches.
   [[nodiscard]] double score(const se3& T_world_camera) const {
     const se3 T_camera_world = T_world_camera.inverse();
-    double sum = 0.0, weight = 0.0;
+    double support = 0.0, weight = 0.0;
     vec3 mean = zeros<vec3>(), squares = zeros<vec3>();
     for (std::size_t i = 0; i != observations_.size(); ++i) {
       const double left = 1.0 - error(T_camera_world, i) / error_limit(observations_[i].has_depth());
       if (!(left > 0.0)) continue;
       const double w = std::max(trust_[i], least_trust);
       const vec3& p = observations_[i].point;
-      sum += left * w;
+      support += left * w;
       weight += w;
       mean += w * p;
       squares += w * entrywise_product(p, p);
     }
     if (!(weight > 0.0)) return 0.0;
-    const double variance = sum_of(squares / weight - entrywise_product(mean / weight, mean / weight));
-    return sum * std::sqrt(std::max(variance, 0.0));
+    const double variance = sum(squares / weight - entrywise_product(mean / weight, mean / weight));
+    return support * std::sqrt(std::max(variance, 0.0));
   }
 
   /// Returns 1 for each trusted match.

@@ -141,7 +141,7 @@ class moving_features {
 
   /// Returns true if a landmark must be excluded from the search in the current frame: new landmarks may move.
   [[nodiscard]] bool is_excluded(const basic_map<D>& m, landmark_id id, double now) const {
-    return trusts_old_only_ && trust_of(m, id, now) < enough_trust;
+    return trusts_old_only_ && landmark_trust(m, id, now) < enough_trust;
   }
 
   /// Excludes features around moving ones that are nearer to them than to features that agree with the pose.
@@ -247,8 +247,8 @@ class moving_features {
     std::vector<std::uint8_t> outliers(matches.size(), 1);
     for (const auto& found : matches) {
       const candidate_point& p = list.points[found.query];
-      observations.push_back(observation_of(rig_, f, found.train, p.position));
-      trust.push_back(trust_of(m, p.landmark, f.timestamp));
+      observations.push_back(make_observation(rig_, f, found.train, p.position));
+      trust.push_back(landmark_trust(m, p.landmark, f.timestamp));
     }
     if (!may_hold_two_motions(matches.size(), inliers, options_.moving) &&
         !motion_splitter<Camera>::is_biased_by_motion(observations, trust, rig_.model, f.T_world_camera,
@@ -295,7 +295,7 @@ class moving_features {
   }
 
   /// Returns the confidence that a landmark is static, based on its age.
-  [[nodiscard]] double trust_of(const basic_map<D>& m, landmark_id id, double now) const {
+  [[nodiscard]] double landmark_trust(const basic_map<D>& m, landmark_id id, double now) const {
     if (id == no_id) return 0.0;
     const keyframe_id by = m.landmark_at(id).created;
     if (!m.has_keyframe(by)) return 1.0;

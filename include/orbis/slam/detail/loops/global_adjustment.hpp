@@ -52,7 +52,7 @@ struct snapshot : bundle_snapshot {
   [[nodiscard]] bool has_more() const noexcept { return next_landmark != end_landmark; }
 };
 
-[[nodiscard]] inline bundle_schedule schedule_of(const global_adjustment_options& o) {
+[[nodiscard]] inline bundle_schedule make_schedule(const global_adjustment_options& o) {
   return {
       .robust_iterations = o.robust_iterations, .iterations = o.iterations, .relative_tolerance = o.relative_tolerance};
 }
@@ -100,7 +100,8 @@ void take_landmarks(snapshot& s, const basic_map<D>& m, const camera_rig<Camera>
 
 /// Returns the factor by which a solution scales the lengths in the view of each keyframe: the median over its
 /// landmarks. 1 if lengths are measured. O(observations).
-[[nodiscard]] inline std::vector<double> growth_of(const snapshot& s, const bundle_solution& solved, bool is_measured) {
+[[nodiscard]] inline std::vector<double> length_ratios(const snapshot& s, const bundle_solution& solved,
+                                                       bool is_measured) {
   std::vector<double> growth(s.keyframes.size(), 1.0);
   if (is_measured) return growth;
   std::vector<std::vector<double>> ratios(s.keyframes.size());
@@ -111,7 +112,7 @@ void take_landmarks(snapshot& s, const basic_map<D>& m, const camera_rig<Camera>
     if (solved.outliers[i] == 0 && before > 0.0 && after > 0.0) ratios[pose].push_back(after / before);
   }
   for (std::size_t k = 0; k != growth.size(); ++k)
-    if (!ratios[k].empty()) growth[k] = median_of(ratios[k]);
+    if (!ratios[k].empty()) growth[k] = median(ratios[k]);
   return growth;
 }
 
@@ -121,7 +122,7 @@ template <feature_descriptor D>
 report apply_poses(basic_map<D>& m, const snapshot& s, const bundle_solution& solved) {
   std::vector<sim3> poses;
   poses.reserve(solved.poses.size());
-  const std::vector<double> growth = growth_of(s, solved, m.scale_is_known());
+  const std::vector<double> growth = length_ratios(s, solved, m.scale_is_known());
   for (std::size_t k = 0; k != solved.poses.size(); ++k)
     poses.emplace_back(solved.poses[k].rotation(), solved.poses[k].translation(), growth[k]);
   const keyframe_motions motion = propagate_motion<D>(m, s.keyframes, poses);

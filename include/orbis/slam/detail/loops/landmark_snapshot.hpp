@@ -48,7 +48,7 @@ template <feature_descriptor D>
   std::vector<keyframe_id> around{k};
   for (const covisible& n : m.covisibility().neighbors(k, neighbors)) around.push_back(n.keyframe);
   landmark_snapshot<D> taken{k, m.at(k).T_world_camera, {}, {}};
-  for (const landmark_id id : landmarks_of(m, around)) {
+  for (const landmark_id id : observed_landmarks(m, around)) {
     const auto& l = m.landmark_at(id);
     taken.landmarks.push_back({id, l.position, l.normal, l.min_distance, l.max_distance});
     taken.descriptors.push_back(l.descriptor);
@@ -64,12 +64,12 @@ template <camera::camera_model Camera, feature_descriptor D>
                                                           const se3& T_world_camera, const camera_rig<Camera>& rig,
                                                           double radius, std::uint32_t distance) {
   const features::camera_projection project{rig.camera(), T_world_camera};
-  const features::projection_rule rule = rule_of(rig.scales, radius);
+  const features::projection_rule rule = make_rule(rig.scales, radius);
   std::vector<features::window> windows;
   windows.reserve(known.landmarks.size());
   for (const snapshot_landmark& l : known.landmarks) {
     const auto appears = project(l);
-    windows.push_back(appears ? features::window_of(*appears, rule) : features::window{});
+    windows.push_back(appears ? features::search_window(*appears, rule) : features::window{});
   }
   const auto matcher = features::windowed(distance_of_t<D>{}) | features::max_distance{distance} | features::unique{};
   return matcher(known.descriptors, f.features, std::span<const features::window>(windows), f.grid);

@@ -38,7 +38,7 @@ class loop_closer {
   /// adjusted globally.
   bool close(map_keyframe k) {
     if (!shared_.settings.places.enabled) return false;
-    for (map_keyframe& candidate : candidates_of(k)) {
+    for (map_keyframe& candidate : find_candidates(k)) {
       if (stopped_) return false;
       correction_timing timing;
       const auto taken = locked(timing, [&] { return take(k, candidate); });
@@ -71,7 +71,7 @@ class loop_closer {
     if (s.empty()) return;
     const auto go_on = [&](std::size_t, std::size_t) { return !stopped_ && corrections_ == before; };
     bundle_solver<Camera> solver{shared_.rig.model, global_adjustment::loss};
-    const bundle_solution solved = solver.solve(s, global_adjustment::schedule_of(o), go_on);
+    const bundle_solution solved = solver.solve(s, global_adjustment::make_schedule(o), go_on);
     if (!solved.usable) return;
     {
       const auto edit = shared_.edit();
@@ -121,7 +121,7 @@ class loop_closer {
 
   /// Returns the keyframes with similar appearance; updates `k` to its current id. Within its own map, only keyframes
   /// that share no landmark with it and are at least a few keyframes older.
-  std::vector<map_keyframe> candidates_of(map_keyframe& k) {
+  std::vector<map_keyframe> find_candidates(map_keyframe& k) {
     typename Places::signature bow_vector;
     {
       const auto edit = shared_.edit();  // the keyframe must not be erased meanwhile

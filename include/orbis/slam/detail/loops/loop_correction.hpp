@@ -211,7 +211,7 @@ report apply_poses(basic_map<D>& m, const snapshot<D>& s, const solution& solved
   report done;
   done.iterations = solved.iterations;
   const keyframe_motions motion = propagate_motion<D>(m, s.keyframes, solved.poses);
-  const keyframe_id a = m.replacement_of(s.match.keyframe), b = m.replacement_of(s.match.candidate);
+  const keyframe_id a = m.replacement(s.match.keyframe), b = m.replacement(s.match.candidate);
   if (a == no_id || b == no_id) return done;
   const se3 before = m.at(a).T_world_camera;
   move_all<D>(m, motion);

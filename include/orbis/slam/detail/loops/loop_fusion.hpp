@@ -91,7 +91,7 @@ fusion_counts fuse(basic_map<D>& m, std::span<const pair> pairs, const id_offset
   counter<landmark_id> changed;
   for (const pair& p : pairs) {
     const keyframe_id k = p.keyframe + offsets.keyframes;
-    const landmark_id l = m.replacement_of(p.observed.landmark);
+    const landmark_id l = m.replacement(p.observed.landmark);
     if (!m.has_keyframe(k) || l == no_id || m.landmark_at(l).seen_by(k) != nullptr) continue;
     const landmark_id shown = m.at(k).landmarks[p.observed.feature];
     if (shown == no_id) {

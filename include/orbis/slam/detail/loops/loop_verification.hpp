@@ -146,7 +146,7 @@ template <feature_descriptor D, camera::camera_model Camera>
 }
 
 template <feature_descriptor D, camera::camera_model Camera>
-[[nodiscard]] view<D> view_of(const basic_map<D>& m, keyframe_id id, const camera_rig<Camera>& rig) {
+[[nodiscard]] view<D> make_view(const basic_map<D>& m, keyframe_id id, const camera_rig<Camera>& rig) {
   const auto& k = m.at(id);
   view<D> v;
   v.image = k;
@@ -194,8 +194,8 @@ template <feature_descriptor D, camera::camera_model Camera>
   s.landmarks.keyframe = candidate;
   s.connected = s.same_map && current.covisibility().connected(k, candidate);
   if (s.connected) return s;
-  s.seen = view_of(current, k, rig);
-  s.known = view_of(candidate_map, candidate, rig);
+  s.seen = make_view(current, k, rig);
+  s.known = make_view(candidate_map, candidate, rig);
   s.landmarks = snapshot_around(candidate_map, candidate, o.neighbors);
   const se3 T_camera_world = current.at(k).T_world_camera.inverse();
   for (const covisible& n : current.covisibility().neighbors(k, o.supporters))
@@ -271,7 +271,7 @@ class checker {
     std::vector<double> ratios;
     for (const features::match& m : matches)
       ratios.push_back(s_.known.points[m.train].z() / s_.seen.points[m.query].z());
-    const double ratio = median_of(ratios);  // converts both sides to about the same unit before adding the deviations
+    const double ratio = median(ratios);  // converts both sides to about the same unit before adding the deviations
     const auto known = [&](const view<D>& v, std::uint32_t i) {
       return known_point{v.points[i], v.image.pixel(v.index[i]),
                          rig_.scales.information(v.features.keypoints[i].octave)};
@@ -304,7 +304,7 @@ class checker {
     const auto matches = find_landmarks(s_.landmarks, f, T_world_camera, rig_, radius, options_.landmark_distance);
     std::vector<optimize::pose_observation> observations;
     for (const features::match& m : matches)
-      observations.push_back(observation_of(rig_, f, m.train, s_.landmarks.landmarks[m.query].position));
+      observations.push_back(make_observation(rig_, f, m.train, s_.landmarks.landmarks[m.query].position));
     std::vector<std::uint8_t> outliers(matches.size());
     const auto refined = optimize::refine_pose(std::span<const optimize::pose_observation>(observations), rig_.model,
                                                T_world_camera, std::span<std::uint8_t>(outliers));
@@ -341,11 +341,11 @@ class checker {
       if (here > 0.0 && there > 0.0) ratios.push_back(there / here);
     }
     if (ratios.size() < options_.min_matches || ratios.empty()) return false;
-    found.scale = median_of(ratios);
+    found.scale = median(ratios);
     std::vector<double> off;
     for (const double r : ratios) off.push_back(std::abs(std::log(r / found.scale)));
     constexpr double deviation_by_median = 1.4826;  // of a normal distribution
-    const double deviation = deviation_by_median * median_of(off) / std::sqrt(static_cast<double>(off.size()));
+    const double deviation = deviation_by_median * median(off) / std::sqrt(static_cast<double>(off.size()));
     return deviation <= options_.max_scale_deviation;
   }
 

@@ -40,7 +40,7 @@ struct search_list {
 };
 
 /// Returns the rule for windows of `radius` pixels of a keypoint's level around projections.
-[[nodiscard]] inline features::projection_rule rule_of(const pyramid_scales& scales, double radius) {
+[[nodiscard]] inline features::projection_rule make_rule(const pyramid_scales& scales, double radius) {
   return {.radius = static_cast<float>(radius),
           .levels = scales.levels(),
           .scale_factor = static_cast<float>(scales.factor())};
@@ -64,7 +64,7 @@ bool add_landmark(search_list<D>& list, const features::camera_projection<Camera
                   const features::projection_rule& rule, const basic_landmark<D>& l, landmark_id id) {
   const auto appears = project(l);
   if (!appears) return false;
-  const features::window where = features::window_of(*appears, rule);
+  const features::window where = features::search_window(*appears, rule);
   if (where.radius < 0.0F) return false;
   list.add({l.position, id}, l.descriptor, {}, where);
   return true;

@@ -15,12 +15,12 @@ namespace orbis::slam::detail {
 /// Returns the keyframe that shares the most landmarks with a frame; `otherwise` if none shares any.
 template <feature_descriptor D>
 [[nodiscard]] keyframe_id most_shared(const basic_map<D>& m, const basic_frame<D>& f, keyframe_id otherwise) {
-  const auto order = m.observers_of(f.landmarks);
+  const auto order = m.observers(f.landmarks);
   return order.empty() ? otherwise : order.front().keyframe;
 }
 
 /// Returns the median; changes the order of the values. @pre !values.empty()
-[[nodiscard]] inline double median_of(std::vector<double>& values) {
+[[nodiscard]] inline double median(std::vector<double>& values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
   return *middle;
@@ -34,7 +34,7 @@ template <feature_descriptor D>
   std::vector<double> depths;
   for (const landmark_id l : f.landmarks)
     if (l != no_id && m.has_landmark(l)) depths.push_back((T_camera_world * m.landmark_at(l).position).z());
-  return depths.empty() ? 0.0 : median_of(depths);
+  return depths.empty() ? 0.0 : median(depths);
 }
 
 /// Returns the keyframes around a frame, at most `limit`: the reference, those that share landmarks with the frame
@@ -48,8 +48,8 @@ template <feature_descriptor D>
   const auto take = [&](keyframe_id k) {
     if (k != no_id && around.size() < limit && taken.add(k)) around.push_back(k);
   };
-  take(m.replacement_of(reference));
-  for (const covisible& c : m.observers_of(f.landmarks)) take(c.keyframe);
+  take(m.replacement(reference));
+  for (const covisible& c : m.observers(f.landmarks)) take(c.keyframe);
   constexpr std::size_t nearest = 5, neighbors = 10;
   const std::size_t first = std::min(nearest, around.size());
   for (std::size_t i = 0; i < first && around.size() < limit; ++i) {
@@ -63,7 +63,8 @@ template <feature_descriptor D>
 
 /// Returns the landmarks that these keyframes observe, each once, in ascending order.
 template <feature_descriptor D>
-[[nodiscard]] std::vector<landmark_id> landmarks_of(const basic_map<D>& m, const std::vector<keyframe_id>& keyframes) {
+[[nodiscard]] std::vector<landmark_id> observed_landmarks(const basic_map<D>& m,
+                                                          const std::vector<keyframe_id>& keyframes) {
   counter<landmark_id> seen;
   std::vector<landmark_id> all;
   for (const keyframe_id k : keyframes)
@@ -77,7 +78,7 @@ template <feature_descriptor D>
 template <feature_descriptor D>
 [[nodiscard]] std::vector<landmark_id> local_landmarks(const basic_map<D>& m, const basic_frame<D>& f,
                                                        keyframe_id reference, std::size_t limit) {
-  return landmarks_of(m, local_keyframes(m, f, reference, limit));
+  return observed_landmarks(m, local_keyframes(m, f, reference, limit));
 }
 
 }  // namespace orbis::slam::detail

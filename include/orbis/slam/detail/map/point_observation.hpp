@@ -19,8 +19,8 @@ namespace orbis::slam::detail {
 /// Returns the observation of `point` (world, metres), which may be any point, by keypoint `i` of a frame: the
 /// deviation of the keypoint is a pixel of its level.
 template <camera::camera_model Camera, feature_descriptor D>
-[[nodiscard]] optimize::pose_observation observation_of(const camera_rig<Camera>& rig, const basic_frame<D>& f,
-                                                        std::size_t i, const vec3& point) {
+[[nodiscard]] optimize::pose_observation make_observation(const camera_rig<Camera>& rig, const basic_frame<D>& f,
+                                                          std::size_t i, const vec3& point) {
   optimize::pose_observation o;
   o.point = point;
   o.pixel = f.pixel(i);
@@ -41,7 +41,7 @@ inline void set_deviation(optimize::pose_observation& o, double deviation) {
 template <camera::camera_model Camera, feature_descriptor D>
 [[nodiscard]] optimize::pose_observation landmark_observation(const camera_rig<Camera>& rig, const basic_frame<D>& f,
                                                               std::size_t i, const vec3& position) {
-  optimize::pose_observation o = observation_of(rig, f, i, position);
+  optimize::pose_observation o = make_observation(rig, f, i, position);
   set_deviation(o, f.deviation(i));
   return o;
 }
@@ -56,7 +56,7 @@ template <camera::camera_model Camera, feature_descriptor D>
 template <camera::camera_model Camera, feature_descriptor D>
 [[nodiscard]] bool agrees(const camera_rig<Camera>& rig, const basic_frame<D>& f, const se3& T_camera_world,
                           std::size_t i, const vec3& point) {
-  const optimize::pose_observation o = observation_of(rig, f, i, point);
+  const optimize::pose_observation o = make_observation(rig, f, i, point);
   const auto error = rig.model.residual(T_camera_world * point, o);
   return error && squared_norm(*error) * o.information <= error_limit(o.has_depth());
 }

@@ -91,7 +91,7 @@ class slot_map {
 
   /// Returns `i` itself if its object exists; otherwise its replacement, following the chain of replacements; `no_id`
   /// if there is none, or if it was forgotten. O(replacements).
-  [[nodiscard]] Id replacement_of(Id i) const noexcept {
+  [[nodiscard]] Id replacement(Id i) const noexcept {
     std::uint32_t at = i.value();
     while (at < slots_.size()) {
       const std::uint32_t slot = slots_[at];

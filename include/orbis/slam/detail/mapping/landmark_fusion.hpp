@@ -41,7 +41,7 @@ fusion_counts fuse_into(basic_map<D>& m, keyframe_id id, std::span<const landmar
   const auto& k = m.at(id);
   const se3 T_camera_world = k.T_world_camera.inverse();
   const features::camera_projection project{rig.camera(), k.T_world_camera};
-  const features::projection_rule rule = rule_of(rig.scales, o.radius);
+  const features::projection_rule rule = make_rule(rig.scales, o.radius);
   search_list<D> list;
   for (const landmark_id l : landmarks)
     if (m.has_landmark(l) && m.landmark_at(l).seen_by(id) == nullptr)
@@ -89,9 +89,9 @@ fusion_counts fuse_with_neighbors(basic_map<D>& m, keyframe_id id, const camera_
     all.fused += c.fused;
     all.observed += c.observed;
   };
-  const std::vector<landmark_id> own = landmarks_of(m, {id});
+  const std::vector<landmark_id> own = observed_landmarks(m, {id});
   for (const keyframe_id k : around) add(fuse_into<D>(m, k, own, rig, o));
-  add(fuse_into<D>(m, id, landmarks_of(m, around), rig, o));
+  add(fuse_into<D>(m, id, observed_landmarks(m, around), rig, o));
   return all;
 }
 

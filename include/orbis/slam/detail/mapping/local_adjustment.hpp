@@ -6,7 +6,7 @@
 ///
 /// @code
 ///   snapshot s = take(map, newest, rig, options);                       // reads the map
-///   const bundle_solution solved = solver.solve(s, schedule_of(options), go_on);  // takes a long time
+///   const bundle_solution solved = solver.solve(s, make_schedule(options), go_on);  // takes a long time
 ///   apply(map, s, solved);                                              // changes the map
 /// @endcode
 ///
@@ -48,7 +48,7 @@ struct snapshot : bundle_snapshot {
   }
 };
 
-[[nodiscard]] inline bundle_schedule schedule_of(const adjustment_options& o) {
+[[nodiscard]] inline bundle_schedule make_schedule(const adjustment_options& o) {
   return {.robust_iterations = o.robust_iterations, .iterations = o.iterations, .keep_partial = true};
 }
 
@@ -85,7 +85,7 @@ template <feature_descriptor D, camera::camera_model Camera>
   if (!any_fixed) s.is_fixed.front() = 1;
   if (std::find(s.is_fixed.begin(), s.is_fixed.end(), 0) == s.is_fixed.end()) return s;
 
-  for (const landmark_id l : landmarks_of(m, s.moving))
+  for (const landmark_id l : observed_landmarks(m, s.moving))
     s.add_landmark(m, m.landmark_at(l), rig, [&](keyframe_id k) { return s.index_of(k); });
   return s;
 }
@@ -93,9 +93,9 @@ template <feature_descriptor D, camera::camera_model Camera>
 /// Returns the motion of a keyframe in the world; for one that was added later, that of its nearest ancestor in the
 /// snapshot. Empty if it did not move.
 template <feature_descriptor D>
-[[nodiscard]] std::optional<se3> motion_of(const basic_map<D>& m, keyframe_id k, const snapshot& s,
-                                           const bundle_solution& solved) {
-  k = m.replacement_of(k);
+[[nodiscard]] std::optional<se3> find_motion(const basic_map<D>& m, keyframe_id k, const snapshot& s,
+                                             const bundle_solution& solved) {
+  k = m.replacement(k);
   while (k != no_id && k >= s.end_keyframe) k = m.tree().parent(k);
   if (k == no_id) return std::nullopt;
   const std::size_t i = s.index_of(k);
@@ -113,9 +113,9 @@ void apply(basic_map<D>& m, const snapshot& s, const bundle_solution& solved) {
     if (s.is_fixed[i] == 0 && m.has_keyframe(s.keyframes[i])) m.set_pose(s.keyframes[i], solved.poses[i]);
   for (keyframe_id k = s.end_keyframe; k < m.keyframe_end(); ++k)
     if (m.has_keyframe(k))
-      if (const auto T_new_old = motion_of(m, k, s, solved)) m.set_pose(k, *T_new_old * m.at(k).T_world_camera);
+      if (const auto T_new_old = find_motion(m, k, s, solved)) m.set_pose(k, *T_new_old * m.at(k).T_world_camera);
   for (landmark_id l = m.next_landmark(s.end_landmark); l != m.landmark_end(); l = m.next_landmark(l + 1)) {
-    if (const auto T_new_old = motion_of(m, m.landmark_at(l).created, s, solved)) {
+    if (const auto T_new_old = find_motion(m, m.landmark_at(l).created, s, solved)) {
       m.move_landmark(l, sim3(*T_new_old));
       m.update_landmark(l);
     }

@@ -57,7 +57,7 @@ std::size_t cull_landmarks(basic_map<D>& m, keyframe_id newest, const culling_op
   for (const covisible& n : m.covisibility().neighbors(newest, o.neighborhood))
     if (n.keyframe + (o.age + 1) < newest) around.push_back(n.keyframe);
   std::size_t removed = 0;
-  for (const landmark_id l : landmarks_of(m, around)) {
+  for (const landmark_id l : observed_landmarks(m, around)) {
     if (!is_unreliable(m, m.landmark_at(l), newest, o)) continue;
     m.remove_landmark(l);
     ++removed;
@@ -149,7 +149,7 @@ class local_mapper {
     snapshot_ = shared_.locked([&] { return local_adjustment::take(m, k, shared_.rig, o, std::move(snapshot_)); });
     if (snapshot_.empty()) return;
     const auto go_on = [&](std::size_t, std::size_t) { return !stop_requested(); };
-    solution_ = solver_.solve(snapshot_, local_adjustment::schedule_of(o), go_on, std::move(solution_));
+    solution_ = solver_.solve(snapshot_, local_adjustment::make_schedule(o), go_on, std::move(solution_));
     shared_.locked([&] { local_adjustment::apply(m, snapshot_, solution_); });
   }
   std::vector<keyframe_event> cull(basic_map<D>& m, map_keyframe newest) {
@@ -158,7 +158,7 @@ class local_mapper {
       std::vector<keyframe_event> judged;
       const auto keep = [&](keyframe_id k) {
         if (k > newest.keyframe) return true;
-        judged.push_back(shared_.event_of({newest.map, k}));
+        judged.push_back(shared_.make_event({newest.map, k}));
         return false;
       };
       const double close =

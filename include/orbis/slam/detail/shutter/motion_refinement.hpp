@@ -229,7 +229,7 @@ template <camera::camera_model Camera>
 }
 
 /// Returns the diagonal matrix of the squared deviations times the square of `factor`.
-[[nodiscard]] inline mat6 variances_of(const twist_prior& prior, double factor) {
+[[nodiscard]] inline mat6 prior_covariance(const twist_prior& prior, double factor) {
   const double t = factor * prior.translation_deviation, r = factor * prior.rotation_deviation;
   return diagonal_matrix(stacked(filled<vec3>(t * t), filled<vec3>(r * r)));
 }
@@ -281,11 +281,11 @@ class early_depth_twist {
     if (!prior.T_world_before) return;
     // The prior relates the twist to both poses; the previous pose is not exact either.
     const double by_pose = (1.0 + prior.trend) / prior.interval;
-    const mat6 tie = inverse(variances_of(prior, 1.0) + by_pose * by_pose * former_covariance_);
+    const mat6 tie = inverse(prior_covariance(prior, 1.0) + by_pose * by_pose * former_covariance_);
     const mat6 mixed = h[1] + by_pose * tie;
     const mat6 of_twist = h[2] + tie - transposed(mixed) * inverse(h[0] + by_pose * by_pose * tie) * mixed;
     // From one frame to the next a twist changes by twice the deviation of the prior, which is that from the mean.
-    const mat6 change = variances_of(prior, 2.0);
+    const mat6 change = prior_covariance(prior, 2.0);
     gain_ = change * inverse(change + inverse(of_twist));
   }
 

@@ -62,9 +62,9 @@ struct shutter_equations {
 /// Returns the equations of the points that two views share; empty if there are too few. `shutter`: the one with which
 /// `depth` of the keypoints was read, around which the equations are linear. O(keypoints).
 template <camera::camera_model Camera>
-[[nodiscard]] std::optional<shutter_equations> shutter_equations_of(const row_view& from, const row_view& to,
-                                                                    const camera_rig<Camera>& rig,
-                                                                    const camera::shutter& shutter) {
+[[nodiscard]] std::optional<shutter_equations> build_shutter_equations(const row_view& from, const row_view& to,
+                                                                       const camera_rig<Camera>& rig,
+                                                                       const camera::shutter& shutter) {
   constexpr std::size_t enough = 30;
   constexpr double width = 3.5;  // of Huber's loss: both keypoints have errors
   std::vector<std::pair<landmark_id, std::uint32_t>> seen;

@@ -97,7 +97,7 @@ class shutter_observer {
     for (auto& [id, view] : views_) {
       if (!m.has_keyframe(id.keyframe)) continue;
       view.T_world_camera = m.at(id.keyframe).T_world_camera;
-      if (const auto e = shutter_equations_of(view, pending_, rig, assumed)) estimator_.add(id.keyframe.value(), *e);
+      if (const auto e = build_shutter_equations(view, pending_, rig, assumed)) estimator_.add(id.keyframe.value(), *e);
     }
   }
 

@@ -57,7 +57,7 @@ struct shared_state {
   }
 
   /// @pre atlas.has(k)
-  [[nodiscard]] keyframe_event event_of(map_keyframe k) const {
+  [[nodiscard]] keyframe_event make_event(map_keyframe k) const {
     const auto& frame = atlas.at(k);
     return {k, frame.timestamp, frame.index, frame.T_world_camera};
   }

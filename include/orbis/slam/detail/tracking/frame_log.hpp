@@ -23,7 +23,7 @@ namespace orbis::slam::detail {
 struct logged_frame {
   double timestamp = 0.0;  ///< seconds
   map_keyframe reference;
-  se3 T_reference_camera;  ///< translation divided by the reference's scale (`basic_map::scale_of`)
+  se3 T_reference_camera;  ///< translation divided by the reference's scale (`basic_map::scale`)
 };
 
 class frame_log {
@@ -49,16 +49,16 @@ class frame_log {
   }
   /// Returns the current pose of a frame in the map of its reference; empty if that is not kept.
   template <feature_descriptor D>
-  [[nodiscard]] static std::optional<se3> pose_of(const logged_frame& f, const basic_atlas<D>& maps) {
+  [[nodiscard]] static std::optional<se3> pose(const logged_frame& f, const basic_atlas<D>& maps) {
     const map_keyframe k = maps.current(f.reference);
     if (!maps.contains(k.map) || !maps.at(k.map).remembers(k.keyframe)) return std::nullopt;
-    return maps.at(k.map).pose_of(k.keyframe) * scaled(f.T_reference_camera, maps.at(k.map).scale_of(k.keyframe));
+    return maps.at(k.map).pose(k.keyframe) * scaled(f.T_reference_camera, maps.at(k.map).scale(k.keyframe));
   }
   /// Returns the current pose of the frame with a number, as above; empty if the frame is not kept, either.
   template <feature_descriptor D>
   [[nodiscard]] std::optional<se3> pose(std::size_t number, const basic_atlas<D>& maps) const {
     const bool is_kept = number >= first_number_ && number < end_number();
-    return is_kept ? pose_of(frames_[number - first_number_], maps) : std::nullopt;
+    return is_kept ? pose(frames_[number - first_number_], maps) : std::nullopt;
   }
   /// Returns the motion of the camera at a frame, in its own frame, per second, translation first: the mean from the
   /// frame before it to the one after it. Empty unless both are kept, are in one map, and are close in time.
@@ -79,7 +79,7 @@ class frame_log {
     logged_frame& f = frames_[number - first_number_];
     const map_keyframe k = maps.current(f.reference);
     const basic_map<D>& m = maps.at(k.map);
-    f.T_reference_camera = scaled(m.pose_of(k.keyframe).inverse() * T_world_camera, 1.0 / m.scale_of(k.keyframe));
+    f.T_reference_camera = scaled(m.pose(k.keyframe).inverse() * T_world_camera, 1.0 / m.scale(k.keyframe));
   }
 
   /// Returns the current poses of the kept frames that were tracked in a map, or in one that was merged into it. Empty
@@ -89,7 +89,7 @@ class frame_log {
     orbis::trajectory all;
     for (const logged_frame& f : frames_) {
       if (maps.current(f.reference).map != map) continue;
-      if (const auto T_world_camera = pose_of(f, maps)) all.push_back({f.timestamp, *T_world_camera});
+      if (const auto T_world_camera = pose(f, maps)) all.push_back({f.timestamp, *T_world_camera});
     }
     return all;
   }

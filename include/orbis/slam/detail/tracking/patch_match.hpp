@@ -144,8 +144,8 @@ struct match_patch_kernel {
       sum_xx += gx[y] * gx[y], sum_xy += gx[y] * gy[y], sum_yy += gy[y] * gy[y];
       sum_tt += t[y] * t[y], sum_tx += t[y] * gx[y], sum_ty += t[y] * gy[y];
     }
-    const double xx = sum_of(sum_xx), xy = sum_of(sum_xy), yy = sum_of(sum_yy), tt = sum_of(sum_tt);
-    const double tx = sum_of(sum_tx), ty = sum_of(sum_ty);
+    const double xx = lane_sum(sum_xx), xy = lane_sum(sum_xy), yy = lane_sum(sum_yy), tt = lane_sum(sum_tt);
+    const double tx = lane_sum(sum_tx), ty = lane_sum(sum_ty);
     const double determinant = xx * yy - xy * xy, trace = xx + yy;
     if (!(0.5 * (trace - std::sqrt(std::max(0.0, trace * trace - 4.0 * determinant))) >= weakest)) return false;
 
@@ -178,11 +178,11 @@ struct match_patch_kernel {
         const lanes v = values_here[y] - mean;
         sum_ii += v * v, sum_it += v * t[y], sum_ix += v * gx[y], sum_iy += v * gy[y];
       }
-      const double ii = sum_of(sum_ii);
+      const double ii = lane_sum(sum_ii);
       if (!(ii > 0.0)) return false;
-      found.correlation = sum_of(sum_it) / std::sqrt(ii * tt);
+      found.correlation = lane_sum(sum_it) / std::sqrt(ii * tt);
       const double contrast = std::sqrt(tt / ii);
-      const double bx = contrast * sum_of(sum_ix) - tx, by = contrast * sum_of(sum_iy) - ty;
+      const double bx = contrast * lane_sum(sum_ix) - tx, by = contrast * lane_sum(sum_iy) - ty;
       const vec2 step((yy * bx - xy * by) / determinant, (xx * by - xy * bx) / determinant);
       found.shift = {found.shift.x() - step.x(), found.shift.y() - step.y()};
       if (!(std::abs(found.shift.x()) < around && std::abs(found.shift.y()) < around)) return false;
@@ -193,7 +193,7 @@ struct match_patch_kernel {
 
  private:
   template <class L>
-  static ORBIS_ALWAYS_INLINE double sum_of(const L& v) {
+  static ORBIS_ALWAYS_INLINE double lane_sum(const L& v) {
     return static_cast<double>(simd::sum(v));
   }
   /// Sets `to`, rows `stride` apart, to the image at the pixels of the patch from -(8 + margin) on that `by_patch`

@@ -81,11 +81,11 @@ class patch_tracker {
       if (seconds == 0.0 && f.landmarks[i] == no_id) continue;  // a sharp corner
       const double scale = rig_.scales.scale(f.features.keypoints[i].octave);
       constexpr double far = 1e3;  // metres
-      const vec2 motion = motion_of(f.has_depth(i) ? f.point_camera(i) : vec3(far * f.rays[i]), twist);
+      const vec2 motion = image_motion(f.has_depth(i) ? f.point_camera(i) : vec3(far * f.rays[i]), twist);
       f.deviations[i] = static_cast<float>(corner_deviation(seconds * norm(motion) / scale));
       if (f.landmarks[i] == no_id) continue;
       const basic_landmark<D>& l = m.landmark_at(f.landmarks[i]);
-      const auto view = view_of(f, i, l, T_camera_world, motion);
+      const auto view = predict_view(f, i, l, T_camera_world, motion);
       if (!view) continue;
       constexpr std::size_t every = 32;  // patch: a fraction of the time of the alignment
       if (estimates && !options_.exposure && shows_exposure(l.patch, *view) && moving++ % every == 0)
@@ -207,7 +207,7 @@ class patch_tracker {
             static_cast<double>(rig_.camera().height()) / level.height()};
   }
   /// Returns the motion of a point (camera frame, metres) in the image, pixels per second; 0 if it is out of view.
-  [[nodiscard]] vec2 motion_of(const vec3& point, const vec6& twist) const {
+  [[nodiscard]] vec2 image_motion(const vec3& point, const vec6& twist) const {
     matrix<2, 3> by_point;
     if (!rig_.camera().project(point, by_point)) return zeros<vec2>();
     return by_point * (cross(tail<3>(twist), point) + head<3>(twist));
@@ -223,8 +223,9 @@ class patch_tracker {
 
   /// Returns the expected place of landmark `l`, which keypoint `i` observes. Empty without a patch, if the patch is
   /// out of view, or if it appears at a very different size.
-  [[nodiscard]] std::optional<patch_view> view_of(const basic_frame<D>& f, std::size_t i, const basic_landmark<D>& l,
-                                                  const se3& T_camera_world, const vec2& motion) const {
+  [[nodiscard]] std::optional<patch_view> predict_view(const basic_frame<D>& f, std::size_t i,
+                                                       const basic_landmark<D>& l, const se3& T_camera_world,
+                                                       const vec2& motion) const {
     if (l.patch.pixels == nullptr) return std::nullopt;
     constexpr double arm = 4.0;  // pixels of the patch
     const vec3 point = T_camera_world * l.position;
@@ -302,7 +303,7 @@ class patch_tracker {
   /// Sets the motion of a patch whose landmark is at `point` (camera frame, metres). `size`: of its pixels, pixels of
   /// the image.
   void set_motion(landmark_patch& patch, const vec3& point, const vec2& size, const vec6& twist) const {
-    const vec2 motion = motion_of(point, twist);
+    const vec2 motion = image_motion(point, twist);
     patch.motion = {motion.x() / size.x(), motion.y() / size.y()};
     patch.corner_deviation = corner_deviation(exposure() * norm(patch.motion));
   }

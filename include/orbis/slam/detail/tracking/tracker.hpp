@@ -38,7 +38,8 @@ std::size_t refine_on_matches(basic_frame<D>& f, const search_list<D>& list, std
                               const camera_rig<Camera>& rig) {
   std::vector<optimize::pose_observation> observations;
   observations.reserve(matches.size());
-  for (const auto& m : matches) observations.push_back(observation_of(rig, f, m.train, list.points[m.query].position));
+  for (const auto& m : matches)
+    observations.push_back(make_observation(rig, f, m.train, list.points[m.query].position));
   std::vector<std::uint8_t> outliers(matches.size());
   const auto refined = optimize::refine_pose(std::span<const optimize::pose_observation>(observations), rig.model,
                                              f.T_world_camera, std::span<std::uint8_t>(outliers));
@@ -188,7 +189,7 @@ class tracker {
                            const moving_features<Camera, D, Matchers>& moving, Expected&& expected,
                            Found&& found) const {
     const features::camera_projection project{rig_.camera(), f.T_world_camera};
-    const features::projection_rule rule = rule_of(rig_.scales, radius);
+    const features::projection_rule rule = make_rule(rig_.scales, radius);
     search_list<D> list;
     for (const landmark_id id : local_landmarks(m, f, reference, options_.local_keyframes))
       if (!moving.is_excluded(m, id, f.timestamp) && add_landmark(list, project, rule, m.landmark_at(id), id))
@@ -210,7 +211,7 @@ class tracker {
     search_list<D> list;
     for (std::size_t i = 0; i < last.size(); ++i) {
       candidate_point p;
-      p.landmark = m.replacement_of(last.landmarks[i]);
+      p.landmark = m.replacement(last.landmarks[i]);
       if (p.landmark != no_id)
         p.position = m.landmark_at(p.landmark).position;
       else if (last.has_depth(i))

@@ -93,7 +93,7 @@ struct tracking_context {
   [[nodiscard]] const se3& T_reference_last() const noexcept { return T_reference_last_; }
   /// The current pose of the last frame; it follows later corrections of its keyframe.
   [[nodiscard]] se3 last_pose(const atlas_type& maps) const {
-    return frame_log::pose_of({last.timestamp, last_reference_, T_reference_last_}, maps).value_or(last.T_world_camera);
+    return frame_log::pose({last.timestamp, last_reference_, T_reference_last_}, maps).value_or(last.T_world_camera);
   }
 
   /// Predicts `T_world_camera` of a frame by constant velocity.
@@ -122,12 +122,12 @@ struct tracking_context {
     last.T_world_camera = last_pose(maps);
     const map_keyframe k = maps.current(last_reference_);
     if (k.map == now.map && maps.at(now.map).remembers(k.keyframe)) {
-      const double scale = maps.at(now.map).scale_of(k.keyframe);
+      const double scale = maps.at(now.map).scale(k.keyframe);
       const double grown = scale / std::exchange(last_scale_, scale);
       motion.scale_by(grown);
       set_block(last.twist, 0, 0, head<3>(last.twist) * grown);
     }
-    reference.keyframe = maps.at(now.map).replacement_of(now.keyframe);
+    reference.keyframe = maps.at(now.map).replacement(now.keyframe);
   }
 
   /// Stores a tracked frame relative to the reference, before it becomes `last`; updates the motion.

@@ -94,11 +94,11 @@ class young_frames {
     if (!pose) return std::nullopt;
     const map_keyframe before = log.reference(young.number), reference = maps.current(before);
     const basic_map<D>& m = maps.at(reference.map);
-    const keyframe_id nearest = m.replacement_of(reference.keyframe);
+    const keyframe_id nearest = m.replacement(reference.keyframe);
     if (nearest == no_id) return std::nullopt;
     basic_frame<D>& f = young.frame;
     for (landmark_id& l : f.landmarks)
-      if (l != no_id) l = m.replacement_of(maps.current(before.map, l));
+      if (l != no_id) l = m.replacement(maps.current(before.map, l));
     if (young.depth)
       young.depth->at.T_world_camera = *pose * f.T_world_camera.inverse() * young.depth->at.T_world_camera;
     f.T_world_camera = *pose;

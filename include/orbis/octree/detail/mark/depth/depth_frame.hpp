@@ -78,12 +78,12 @@ struct depth_rays {
   const depth_frame& frame;
   const depth_sensor& sensor;
   const void* ends;
-  ray_endpoint (*end_of)(const void* ends, int u, int v);  ///< end of the ray of a pixel
+  ray_endpoint (*find_endpoint)(const void* ends, int u, int v);  ///< end of the ray of a pixel
 
   /// `end(u, v)` returns the ray_endpoint of a pixel.
   template <class End>
   depth_rays(const depth_frame& f, const depth_sensor& s, const End& end)
-      : frame{f}, sensor{s}, ends{&end}, end_of{[](const void* e, int u, int v) -> ray_endpoint {
+      : frame{f}, sensor{s}, ends{&end}, find_endpoint{[](const void* e, int u, int v) -> ray_endpoint {
           return (*static_cast<const End*>(e))(u, v);
         }} {}
 
@@ -106,11 +106,11 @@ struct depth_rays {
   /// Returns true if the walk of a ray for which `test` was undecided visits the voxel.
   [[nodiscard]] bool visits(std::uint32_t number, const voxel_key& voxel) const {
     const auto [u, v] = frame.ends.pixel(number);
-    return crosses(sensor, end_of(ends, u, v), voxel);
+    return crosses(sensor, find_endpoint(ends, u, v), voxel);
   }
 };
 
-/// Marks the voxels that the rays of a frame cross, see descend_nodes; `bounds`: see view_frame::bounds_of; `end`: see
+/// Marks the voxels that the rays of a frame cross, see descend_nodes; `bounds`: see view_frame::ray_bounds; `end`: see
 /// depth_rays. Returns view_frame::is_on_face: if true, the neighbours of the camera's voxel remain, see first_voxels.
 template <execution_policy Policy, class End, class Saturated>
 [[nodiscard]] bool mark_image(const Policy& policy, depth_frame& frame, const depth_sensor& sensor, float max_z,

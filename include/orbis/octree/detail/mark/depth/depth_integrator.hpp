@@ -75,7 +75,7 @@ class depth_integrator {
     if (sensor.key && ends.leaves) {
       if (!frame_.ends.rays().separable()) frame_.map.fit(frame_.ends.rays());
       frame_.set_scene(sensor);
-      const auto bounds = frame_.bounds_of(sensor, ends.max_z);
+      const auto bounds = frame_.ray_bounds(sensor, ends.max_z);
       if (bounds && frame_.is_dense(ends))
         mark_free(policy, sensor, scan, ends.max_z, *bounds, masks, saturated);
       else
@@ -107,7 +107,7 @@ class depth_integrator {
   void mark_free(const Policy& policy, const depth_sensor& sensor, const depth_scan& scan, float max_z,
                  const std::pair<voxel_key, voxel_key>& bounds, scan_masks& masks, const saturated_voxels& saturated) {
     if (frame_.scene.map != nullptr) walk_outer(sensor, scan, masks);
-    const auto end = [&](int u, int v) { return end_of(sensor, scan, u, v); };
+    const auto end = [&](int u, int v) { return find_endpoint(sensor, scan, u, v); };
     if (mark_image(policy, frame_, sensor, max_z, bounds, end, masks, saturated)) {
       first_voxels around{sensor};
       for_each_end(sensor, scan, [&](const ray_endpoint& e) { around.add(e); });
@@ -121,9 +121,9 @@ class depth_integrator {
   void for_each_end(const depth_sensor& sensor, const depth_scan& scan, Use&& use) const {
     for (int v = 0; v != frame_.ends.rays().height(); ++v)
       for (int u = 0; u != frame_.ends.rays().width(); ++u)
-        if (frame_.ends.z(v)[u] > 0.0F) use(end_of(sensor, scan, u, v));
+        if (frame_.ends.z(v)[u] > 0.0F) use(find_endpoint(sensor, scan, u, v));
   }
-  [[nodiscard]] ray_endpoint end_of(const depth_sensor& sensor, const depth_scan& scan, int u, int v) const {
+  [[nodiscard]] ray_endpoint find_endpoint(const depth_sensor& sensor, const depth_scan& scan, int u, int v) const {
     const auto [x, y] = frame_.ends.rays().at(u, v);
     return sensor.end(x, y, scan.depth(u, v));
   }
@@ -131,7 +131,7 @@ class depth_integrator {
   void walk_outer(const depth_sensor& sensor, const depth_scan& scan, scan_masks& masks) {
     for (const auto& [u, v] : frame_.map.outer()) {
       if (!(frame_.ends.z(v)[u] > 0.0F)) continue;
-      const ray_endpoint e = end_of(sensor, scan, u, v);
+      const ray_endpoint e = find_endpoint(sensor, scan, u, v);
       mark_ray(masks, sensor.grid, sensor.pose.centre, *sensor.key, e.point, e.key);
       frame_.ends.clear(u, v);
     }

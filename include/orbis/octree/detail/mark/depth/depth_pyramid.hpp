@@ -35,7 +35,7 @@ struct chosen_kernel {
 
 /// Combines two vectors of cells.
 template <class Cells>
-[[nodiscard]] ORBIS_ALWAYS_INLINE Cells larger_halves_of(const Cells& a, const Cells& b) noexcept {
+[[nodiscard]] ORBIS_ALWAYS_INLINE Cells max_halves(const Cells& a, const Cells& b) noexcept {
   return simd::bits_as<std::uint32_t>(max(simd::bits_as<std::uint16_t>(a), simd::bits_as<std::uint16_t>(b)));
 }
 
@@ -57,11 +57,12 @@ struct first_cells_kernel {
     for (int i = 0; i < cells; i += n) {
       const words a = word(upper + 2 * i), b = word(upper + 2 * i + n);
       const words c = word(lower + 2 * i), d = word(lower + 2 * i + n);
-      const words left = larger_halves_of(a, c), right = larger_halves_of(b, d);
-      const words any = larger_halves_of(unzip_even(left, right), unzip_odd(left, right));
-      const auto gap_of = [](const words& x, const words& y)
-                              ORBIS_INLINE_LAMBDA { return select((x == 0U) | (y == 0U), words(0xffffU), words(0U)); };
-      const words gap_left = gap_of(a, c), gap_right = gap_of(b, d);
+      const words left = max_halves(a, c), right = max_halves(b, d);
+      const words any = max_halves(unzip_even(left, right), unzip_odd(left, right));
+      const auto gap_mask = [](const words& x, const words& y) ORBIS_INLINE_LAMBDA {
+        return select((x == 0U) | (y == 0U), words(0xffffU), words(0U));
+      };
+      const words gap_left = gap_mask(a, c), gap_right = gap_mask(b, d);
       any.store(some + i);
       (any | unzip_even(gap_left, gap_right) | unzip_odd(gap_left, gap_right)).store(strict + i);
     }
@@ -77,8 +78,8 @@ struct overlap_kernel {
     constexpr int n = static_cast<int>(words::count);
     int i = 0;
     for (; i + n <= count; i += n)
-      larger_halves_of(larger_halves_of(words::load(a + i), words::load(a + i + 1)),
-                       larger_halves_of(words::load(b + i), words::load(b + i + 1)))
+      max_halves(max_halves(words::load(a + i), words::load(a + i + 1)),
+                 max_halves(words::load(b + i), words::load(b + i + 1)))
           .store(out + i);
     for (; i != count; ++i) out[i] = larger_halves(larger_halves(a[i], a[i + 1]), larger_halves(b[i], b[i + 1]));
   }

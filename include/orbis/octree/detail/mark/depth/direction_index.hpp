@@ -182,7 +182,7 @@ class direction_index {
       for (int i = 0; i != width_[0]; ++i) {
         const auto k = static_cast<std::size_t>(j * width_[0] + i);
         const box& b = boxes[k];
-        cells_[k].spacing = b.u1 < 0 ? infinity : spacing_of(rays, i, j, b.u0, b.u1, b.v0, b.v1);
+        cells_[k].spacing = b.u1 < 0 ? infinity : max_spacing(rays, i, j, b.u0, b.u1, b.v0, b.v1);
       }
   }
   /// Maximum distance of a point of cell (i, j), whose rays are all in the given box of pixels, from a ray.
@@ -191,7 +191,7 @@ class direction_index {
   /// above and below, the rectangle's border encloses every point of the cell. Each point is therefore in one of the
   /// triangles between neighbouring rays, and no point of a triangle is farther from its nearest corner than the
   /// longest edge divided by the root of three.
-  [[nodiscard]] float spacing_of(const pixel_rays& rays, int i, int j, int u0, int u1, int v0, int v1) const {
+  [[nodiscard]] float max_spacing(const pixel_rays& rays, int i, int j, int u0, int u1, int v0, int v1) const {
     const float x0 = min_x_ + static_cast<float>(i) / per_x_, x1 = min_x_ + static_cast<float>(i + 1) / per_x_;
     const float y0 = min_y_ + static_cast<float>(j) / per_y_, y1 = min_y_ + static_cast<float>(j + 1) / per_y_;
     const float room_x = 0.001F / per_x_, room_y = 0.001F / per_y_;

@@ -163,10 +163,10 @@ struct find_ends_kernel {
         kz = cells_along(pz, per_metre, half, good) + middle;
       }
       const mask used = good & within;
-      const std::size_t good_count = simd::number_of(good), used_here = simd::number_of(used);
+      const std::size_t good_count = simd::popcount(good), used_here = simd::popcount(used);
       used_count += used_here;
       truncated_count += good_count - used_here;
-      rejected_count += simd::number_of(valid) - good_count;
+      rejected_count += simd::popcount(valid) - good_count;
       leaves = leaves | (good & ((kx != from_x) | (ky != from_y) | (kz != from_z)));
       end_z = select(good, end_z, floats(0.0F));
       max_z = max(max_z, end_z);

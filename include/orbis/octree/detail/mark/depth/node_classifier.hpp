@@ -159,7 +159,7 @@ struct classify_children_kernel {
     floats u0 = cu - du, u1 = cu + du, v0 = cv - dv, v1 = cv + dv;
     std::array<floats, 3> dense_z{floats(s.dense_z[0]), floats(s.dense_z[1]), floats(s.dense_z[2])};
     if (s.map != nullptr) {
-      const integers at = entry_of(*s.map, u - wide, u + wide, v - high, v + high);
+      const integers at = entry_offset(*s.map, u - wide, u + wide, v - high, v + high);
       const float* const entries = &s.map->entries()->least_u;
       u0 += simd::gather(entries, at);
       u1 += simd::gather(entries + 1, at);
@@ -212,8 +212,8 @@ struct classify_children_kernel {
     const auto ends_at = [&](const integers& at) ORBIS_INLINE_LAMBDA {
       return simd::bits_as<std::uint32_t>(simd::gather(reinterpret_cast<const std::int32_t*>(pyramid.data()), at));
     };
-    const auto ends = larger_halves_of(larger_halves_of(ends_at(row0 + i0), ends_at(row0 + i1)),
-                                       larger_halves_of(ends_at(row1 + i0), ends_at(row1 + i1)));
+    const auto ends = max_halves(max_halves(ends_at(row0 + i0), ends_at(row0 + i1)),
+                                 max_halves(ends_at(row1 + i0), ends_at(row1 + i1)));
     const auto depth_of = [](const auto& half)
                               ORBIS_INLINE_LAMBDA { return simd::convert<float>(simd::bits_as<std::int32_t>(half)); };
     const floats farthest = depth_of(ends >> 16), nearest = depth_of((ends & 0xffffU) ^ 0xffffU);
@@ -234,8 +234,8 @@ struct classify_children_kernel {
   }
   /// Offset, in floats, of a map's entries for the rays of a rectangle.
   template <class Floats>
-  static ORBIS_ALWAYS_INLINE auto entry_of(const direction_index& map, const Floats& x0, const Floats& x1,
-                                           const Floats& y0, const Floats& y1) noexcept {
+  static ORBIS_ALWAYS_INLINE auto entry_offset(const direction_index& map, const Floats& x0, const Floats& x1,
+                                               const Floats& y0, const Floats& y1) noexcept {
     const auto cell = [](const Floats& at, float least, float per, std::int32_t count) ORBIS_INLINE_LAMBDA {
       return simd::convert<std::int32_t>(
           min(max((at - least) * per, Floats(0.0F)), Floats(static_cast<float>(count - 1))));

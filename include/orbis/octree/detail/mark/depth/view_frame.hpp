@@ -120,8 +120,8 @@ struct view_frame {
   }
   /// Lowest and highest voxel of a box around all rays; empty if the box is close to the border of the grid, where
   /// walks may end early.
-  [[nodiscard]] std::optional<std::pair<voxel_key, voxel_key>> bounds_of(const depth_sensor& sensor,
-                                                                         float max_z) const {
+  [[nodiscard]] std::optional<std::pair<voxel_key, voxel_key>> ray_bounds(const depth_sensor& sensor,
+                                                                          float max_z) const {
     std::array<std::array<std::uint32_t, 2>, 3> range;
     for (std::size_t i = 0; i != 3; ++i) {
       const double centre = static_cast<double>(sensor.pose.centre[i]);

@@ -161,7 +161,7 @@ class organised_rays {
     const std::uint32_t first = crop(all);
     const depth_sensor sensor{scan.grid, pose_, scan.max_range};
     frame_.set_scene(sensor, ray_error());
-    const auto bounds = frame_.bounds_of(sensor, all.max_z);
+    const auto bounds = frame_.ray_bounds(sensor, all.max_z);
     if (!bounds) return false;
     const auto end_at = [&](int u, int v) { return end_of(numbers_[first + frame_.ends.number(u, v)]); };
     if (mark_image(policy, frame_, sensor, all.max_z, *bounds, end_at, masks, saturated))

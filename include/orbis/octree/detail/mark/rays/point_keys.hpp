@@ -129,7 +129,7 @@ struct find_keys_kernel {
       const integers x = cells_along(floats::load(points.x.data() + i), per_metre, half, inside) + middle;
       const integers y = cells_along(floats::load(points.y.data() + i), per_metre, half, inside) + middle;
       const integers z = cells_along(floats::load(points.z.data() + i), per_metre, half, inside) + middle;
-      inside_count += simd::number_of(inside);
+      inside_count += simd::popcount(inside);
       select(inside, x, none).store(all[0].data() + 16 + i);  // differs from every voxel if outside
       y.store(all[1].data() + 16 + i);
       z.store(all[2].data() + 16 + i);

@@ -149,7 +149,7 @@ class ray_rasterizer {
     if (queue.size() == max_waiting) rasterize(number, masks);
   }
   /// Start voxel of the rays of a kind, relative to the origin's voxel.
-  [[nodiscard]] std::array<std::int32_t, 3> start_of(std::int32_t kind) const noexcept {
+  [[nodiscard]] std::array<std::int32_t, 3> start_voxel(std::int32_t kind) const noexcept {
     const auto down = ray_setup::down(kind);
     std::array<std::int32_t, 3> at{};
     for (std::size_t i = 0; i != 3; ++i) at[i] = down[i] != 0 ? -source_.skipped[1][i] : source_.skipped[0][i];
@@ -157,7 +157,7 @@ class ray_rasterizer {
   }
   /// Marks the cell of a ray in its n-th layer, relative to the start of the ray.
   void mark_cell(std::int32_t kind, std::int32_t n, std::int32_t u, std::int32_t v, scan_masks& masks) const {
-    std::array<std::int32_t, 3> at = start_of(kind);
+    std::array<std::int32_t, 3> at = start_voxel(kind);
     const std::size_t axis = ray_setup::axis(kind);
     at[axis] += (kind & 4) != 0 ? -n : n;
     at[ray_setup::axis_u(axis)] += (kind & 1) != 0 ? -u : u;
@@ -176,7 +176,7 @@ class ray_rasterizer {
     stack_placement place;
     place.axis = kind >> 3U;
     const std::int32_t step = place.step = (kind & 4U) == 0 ? 1 : -1;
-    place.start = start_of(static_cast<std::int32_t>(kind));
+    place.start = start_voxel(static_cast<std::int32_t>(kind));
     for (std::size_t i = 0; i != 3; ++i) place.start[i] += source_.from[i];
     const std::int32_t origin = place.start[place.axis];
 

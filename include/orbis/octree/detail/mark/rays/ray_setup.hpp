@@ -101,16 +101,16 @@ struct set_up_rays_kernel {
     }
     const mask y_main = speed[0] < speed[1];
     const mask z_main = select(y_main, speed[1], speed[0]) < speed[2], x_main = !(y_main | z_main);
-    const auto main_of = [&](const std::array<doubles, 3>& a)
-                             ORBIS_INLINE_LAMBDA { return select(z_main, a[2], select(y_main, a[1], a[0])); };
+    const auto along_main = [&](const std::array<doubles, 3>& a)
+                                ORBIS_INLINE_LAMBDA { return select(z_main, a[2], select(y_main, a[1], a[0])); };
     const auto across_u = [&](const std::array<doubles, 3>& a)
                               ORBIS_INLINE_LAMBDA { return select(x_main, a[1], a[0]); };
     const auto across_v = [&](const std::array<doubles, 3>& a)
                               ORBIS_INLINE_LAMBDA { return select(z_main, a[1], a[2]); };
     const auto chosen = [](const mask& which, const mask& a, const mask& b)
                             ORBIS_INLINE_LAMBDA { return (which & a) | and_not(b, which); };
-    const doubles per_plane = doubles(1.0) / main_of(speed), planes = main_of(expected);
-    const doubles first_plane = main_of(first) - 1.0;
+    const doubles per_plane = doubles(1.0) / along_main(speed), planes = along_main(expected);
+    const doubles first_plane = along_main(first) - 1.0;
     good = good & (planes >= 0.0) & (planes <= double{max_ray_planes});
 
     struct line {

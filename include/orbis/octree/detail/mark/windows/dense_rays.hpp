@@ -120,7 +120,7 @@ class dense_rays {
       if (w.width == 0) continue;
       f.sensor = sensor;
       f.set_window(w, windows_.cell, rays_.window(w));
-      const auto bounds = f.bounds_of(f.sensor, rays_.max_z());
+      const auto bounds = f.ray_bounds(f.sensor, rays_.max_z());
       if (!bounds) return false;
       f.pyramid.build(w.width, w.height, rays_.max_z(),
                       [&](int v) { return f.rays.z + static_cast<std::ptrdiff_t>(v) * w.stride; });
