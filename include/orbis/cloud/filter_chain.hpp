@@ -120,6 +120,9 @@ using filter_chain = std::vector<filter_step>;
       },
       step);
 }
+[[deprecated("use step_mode")]] [[nodiscard]] inline filter_mode mode_of(const filter_step& step) noexcept {
+  return step_mode(step);
+}
 
 /// Returns the names of the steps joined by plus signs, such as "range-log-statistical+cluster"; "none" for an empty
 /// chain.

@@ -99,6 +99,9 @@ class view_samples {
   [[nodiscard]] const std::vector<vec3f>& points() const noexcept { return points_; }
   /// For each point, the number of its view times tiles^2, plus the tile of the image.
   [[nodiscard]] std::span<const std::uint32_t> tiles_by_point() const noexcept { return tile_; }
+  [[deprecated("use tiles_by_point")]] [[nodiscard]] std::span<const std::uint32_t> tile_of() const noexcept {
+    return tile_;
+  }
 
  private:
   [[nodiscard]] std::uint32_t tile_at(int i) const noexcept {

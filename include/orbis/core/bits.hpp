@@ -51,6 +51,10 @@ template <bit_string D>
 [[nodiscard]] constexpr bit_words<bits_of<D>> as_words(const D& string) noexcept {
   return std::bit_cast<bit_words<bits_of<D>>>(string);
 }
+template <bit_string D>
+[[deprecated("use as_words")]] [[nodiscard]] constexpr bit_words<bits_of<D>> words_of(const D& string) noexcept {
+  return as_words(string);
+}
 
 /// Hamming distance: the number of bits in which two strings differ.
 template <std::size_t Words>

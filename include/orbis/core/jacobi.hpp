@@ -191,5 +191,9 @@ template <int N>
   const auto [u, values, v] = svd<3>(m);
   return so3{u * transposed(v)};
 }
+template <int N>
+[[deprecated("use svd")]] [[nodiscard]] singular_decomposition<N> singular_values_of(const matrix<N, N>& m) {
+  return svd<N>(m);
+}
 
 }  // namespace orbis

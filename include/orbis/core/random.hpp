@@ -59,6 +59,10 @@ class random_bits {
     const double step = static_cast<double>(b >> 11U) * 0x1.0p-53 - 0.5;
     return (flips + step) * inverse_deviation;
   }
+  [[deprecated("use normal_from")]] [[nodiscard]] static constexpr double normal_of(std::uint64_t a,
+                                                                                    std::uint64_t b) noexcept {
+    return normal_from(a, b);
+  }
 
  private:
   std::uint64_t state_;

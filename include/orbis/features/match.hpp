@@ -64,6 +64,10 @@ concept describable = requires(const T& x) {
   as_view(x);
 };
 template <describable T>
+[[deprecated("use as_view")]] [[nodiscard]] constexpr auto view_of(const T& x) noexcept {
+  return as_view(x);
+}
+template <describable T>
 using descriptor_of =
     std::remove_const_t<typename decltype(decltype(as_view(std::declval<const T&>()))::descriptors)::element_type>;
 

@@ -66,6 +66,10 @@ struct projection_rule {
   return {p.x, p.y, radius * std::pow(rule.scale_factor, static_cast<float>(octave)), std::max(0, octave - rule.finer),
           std::min(rule.levels - 1, octave + rule.coarser)};
 }
+[[deprecated("use search_window")]] [[nodiscard]] inline window window_of(const projection& p,
+                                                                          const projection_rule& rule) noexcept {
+  return search_window(p, rule);
+}
 
 /// Predicts the projection of a point; empty if it is not visible. See `project_points.hpp` for an implementation with
 /// a camera and its pose.

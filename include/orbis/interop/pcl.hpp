@@ -65,6 +65,10 @@ template <point_like P>
                     std::to_string(cloud.height));
   return image_view<const P>{cloud.points.data(), static_cast<int>(cloud.width), static_cast<int>(cloud.height)};
 }
+template <point_like P>
+[[deprecated("use as_image")]] [[nodiscard]] result<image_view<const P>> image_of(const pcl::PointCloud<P>& cloud) {
+  return as_image(cloud);
+}
 
 /// The points with the given indices, in their order, with all of their fields; header and sensor pose are those of the
 /// cloud. @pre every index < cloud.size()

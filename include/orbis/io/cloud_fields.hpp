@@ -51,5 +51,8 @@ namespace detail {
   for (const cloud_field& field : fields) names.push_back(field.name);
   return detail::joined(names);
 }
+[[deprecated("use field_names")]] [[nodiscard]] inline std::string names_of(const std::vector<cloud_field>& fields) {
+  return field_names(fields);
+}
 
 }  // namespace orbis::io

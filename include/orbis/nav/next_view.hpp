@@ -63,6 +63,10 @@ namespace orbis::nav {
   }
   return places;
 }
+[[deprecated("use viewing_places")]] [[nodiscard]] inline std::vector<vec3> places_of(
+    std::span<const frontier_cluster> clusters, const octree::voxel_grid& grid, double spacing = 0.8) {
+  return viewing_places(clusters, grid, spacing);
+}
 
 struct next_view_options {
   view_gain_options gain{};

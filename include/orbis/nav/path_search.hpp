@@ -88,6 +88,9 @@ struct found_path {
   for (std::size_t i = 1; i < points.size(); ++i) sum += norm(points[i] - points[i - 1]);
   return sum;
 }
+[[deprecated("use path_length")]] [[nodiscard]] inline double length_of(const std::vector<vec3>& points) noexcept {
+  return path_length(points);
+}
 
 /// Cost of a polyline, see planning_options. O(cells on the polyline), or O(points) if the space is uniform.
 /// @pre the points lie in the space
@@ -97,6 +100,10 @@ template <planning_space Space>
   for (std::size_t i = 1; i < points.size(); ++i)
     sum += detail::segment_cost(space, space.placed(points[i - 1]), space.placed(points[i]));
   return sum;
+}
+template <planning_space Space>
+[[deprecated("use path_cost")]] [[nodiscard]] double cost_of(const Space& space, const std::vector<vec3>& points) {
+  return path_cost(space, points);
 }
 
 /// Makes a path cheaper while the robot fits: removes unnecessary points and cuts corners. Both ends stay. The result

@@ -115,6 +115,10 @@ concept robot_shape = std::copyable<S> && requires(const S& shape, const vec3& p
   { swept(shape, p, p) } -> octree::overlap_shape;
   { covering_balls(shape) } -> std::same_as<ball_cover>;
 };
+template <robot_shape S>
+[[deprecated("use covering_balls")]] [[nodiscard]] ball_cover cover_of(const S& shape) {
+  return covering_balls(shape);
+}
 
 namespace detail {
 /// A shape that covers everything within `by` (metres) of another one.

@@ -152,6 +152,10 @@ struct bounding_box {
   const vec3 low{static_cast<double>(k.x) - half, static_cast<double>(k.y) - half, static_cast<double>(k.z) - half};
   return {low * grid.resolution(), shifted(low, cells) * grid.resolution()};
 }
+[[deprecated("use node_cube")]] [[nodiscard]] inline bounding_box cube_of(const voxel_grid& grid, const voxel_key& k,
+                                                                          int level) {
+  return node_cube(grid, k, level);
+}
 
 /// Box of the voxels from `low` to `high`, both included.
 struct key_box {

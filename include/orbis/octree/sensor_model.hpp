@@ -55,6 +55,12 @@ enum class occupancy { unknown, free, occupied };
 }
 /// Probability for the given log-odds.
 [[nodiscard]] inline double to_probability(double log_odds) noexcept { return 1.0 - 1.0 / (1.0 + std::exp(log_odds)); }
+[[deprecated("use to_log_odds")]] [[nodiscard]] constexpr float log_odds_of(double probability) noexcept {
+  return to_log_odds(probability);
+}
+[[deprecated("use to_probability")]] [[nodiscard]] inline double probability_of(double log_odds) noexcept {
+  return to_probability(log_odds);
+}
 
 // -- requirements of a sensor model, as separate concepts for specific compiler messages
 

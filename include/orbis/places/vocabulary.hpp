@@ -68,6 +68,11 @@ class basic_vocabulary {
     assert(!empty());
     return word_of_bytes(reinterpret_cast<const std::byte*>(&descriptor));
   }
+  template <bit_string D>
+  requires(8 * sizeof(D) == Bits) [[deprecated("use find_word")]] [[nodiscard]] std::uint32_t
+      word_of(const D& descriptor) const noexcept {
+    return find_word(descriptor);
+  }
 
   /// Computes the normalised bag of words of an image's descriptors. Allocates nothing after an image with the same
   /// number of descriptors. O(descriptors x depth x branching); safe to call from several threads, each with separate

@@ -94,6 +94,12 @@ class basic_map {
   /// Returns the current keyframe for `id`: itself if it exists, otherwise its nearest existing ancestor in the
   /// spanning tree; `no_id` if no keyframe is left, or it was forgotten and the map comes from a file.
   [[nodiscard]] keyframe_id replacement(keyframe_id id) const noexcept { return content_.keyframes.replacement(id); }
+  [[deprecated("use replacement")]] [[nodiscard]] landmark_id replacement_of(landmark_id id) const noexcept {
+    return replacement(id);
+  }
+  [[deprecated("use replacement")]] [[nodiscard]] keyframe_id replacement_of(keyframe_id id) const noexcept {
+    return replacement(id);
+  }
   /// Number of changes of poses and of additions and erasures of keyframes: if it is unchanged, so are the keyframes
   /// and their poses.
   [[nodiscard]] std::uint64_t pose_changes() const noexcept { return pose_changes_; }
@@ -105,6 +111,8 @@ class basic_map {
   [[nodiscard]] se3 pose(keyframe_id id) const;
   /// Returns `basic_keyframe::scale`, also of an erased keyframe. @pre remembers(id)
   [[nodiscard]] double scale(keyframe_id id) const;
+  [[deprecated("use pose")]] [[nodiscard]] se3 pose_of(keyframe_id id) const { return pose(id); }
+  [[deprecated("use scale")]] [[nodiscard]] double scale_of(keyframe_id id) const { return scale(id); }
 
   [[nodiscard]] const covisibility_graph& covisibility() const noexcept { return covisibility_; }
   [[nodiscard]] const spanning_tree& tree() const noexcept { return content_.tree; }
@@ -196,6 +204,10 @@ class basic_map {
   /// Returns the keyframes that observe any of the given landmarks, with the number of landmarks observed: most first;
   /// if equal, the older first. O(observations of these landmarks).
   [[nodiscard]] std::vector<covisible> observers(const std::vector<landmark_id>& landmarks) const;
+  [[deprecated("use observers")]] [[nodiscard]] std::vector<covisible> observers_of(
+      const std::vector<landmark_id>& landmarks) const {
+    return observers(landmarks);
+  }
 
  private:
   /// Returns a pose after a motion in the world.
