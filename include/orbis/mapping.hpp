@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Mapping: keyframes to dense clouds, filtered clouds and octrees.
+/// Keyframes to dense clouds, filtered clouds and octrees.
 ///
 /// | header | contents |
 /// | --- | --- |

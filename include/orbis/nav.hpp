@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// All of orbis::nav: planning and exploration on a map.
+/// Planning and exploration on a map.
 ///
 /// | header | contents |
 /// | --- | --- |

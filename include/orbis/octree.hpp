@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Everything in orbis::octree: the log-odds occupancy octree.
+/// The log-odds occupancy octree.
 ///
 /// | header | contents |
 /// | --- | --- |
