@@ -100,7 +100,7 @@ void bench_replanning(benchmark::State& state, const std::vector<scan>& scans, d
 void bench_next_view(benchmark::State& state, const std::vector<scan>& scans, double resolution) {
   const world w{scans, resolution};
   const nav::frontiers frontiers{w.m};
-  const auto places = nav::viewing_places(frontiers.clusters({.min_size = 20}), w.m.grid());
+  const auto places = nav::candidate_viewpoints(frontiers.clusters({.min_size = 20}), w.m.grid());
   random_bits random{1};
   const vec3 from = free_place(w, random);
   for (auto _ : state)

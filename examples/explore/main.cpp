@@ -245,7 +245,8 @@ int run(int argc, char** argv) {
       why = "no free space around the robot";
       break;
     }
-    auto places = orbis::nav::viewing_places(robot.frontiers.clusters({.min_size = 10}), robot.map.grid(), spacing);
+    auto places =
+        orbis::nav::candidate_viewpoints(robot.frontiers.clusters({.min_size = 10}), robot.map.grid(), spacing);
     std::erase_if(places, [&](const vec3& p) {
       return std::any_of(done.begin(), done.end(), [&](const vec3& d) { return (p - d).norm() < spacing / 2; });
     });

@@ -284,7 +284,7 @@ orbis::result<fs::path> make_temporary_folder() {
   return orbis::fail(orbis::errc::write_failed, name, std::generic_category().message(errno));
 }
 
-std::vector<run_mode> run_modes(const settings& s) {
+std::vector<run_mode> chosen_modes(const settings& s) {
   std::vector<run_mode> modes{{"deterministic", true, 0}};
   if (s.quick) return modes;
   modes.push_back({"threads", false, 0});
@@ -432,7 +432,7 @@ exit_code benchmark(const settings& s, console& console) {
   auto temporary = make_temporary_folder();
   if (!temporary) return console.error(temporary.error()), bad_input;
   runner runs{*std::move(temporary)};
-  const std::vector<run_mode> modes = run_modes(s);
+  const std::vector<run_mode> modes = chosen_modes(s);
 
   std::vector<row> rows;
   bool any_failed = false;

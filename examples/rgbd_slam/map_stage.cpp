@@ -49,7 +49,7 @@ tree occupied_only(const std::vector<vec3f>& points, double resolution) {
   return map;
 }
 
-tree_numbers count_leaves(const tree& map, std::uintmax_t bytes) {
+tree_numbers describe_tree(const tree& map, std::uintmax_t bytes) {
   const auto n = map.counts();
   return {n.leaves, n.occupied_leaves, n.free_leaves, bytes};
 }
@@ -162,8 +162,8 @@ result<map_results> write_map(built_map map, const settings& s, const std::files
   m.filter_mode = to_string(map.filter.mode);
   m.filter_reason = describe(map.moving) + map.filter.reason;
   m.resolution = s.resolution;
-  m.unfiltered = count_leaves(*map.unfiltered_octree, bt_bytes_unfiltered);
-  m.filtered = count_leaves(map.octree, bt_bytes);
+  m.unfiltered = describe_tree(*map.unfiltered_octree, bt_bytes_unfiltered);
+  m.filtered = describe_tree(map.octree, bt_bytes);
   m.insert_ms = std::move(map.insert_ms);
   m.voxels_unfiltered = occupied_voxels(*map.unfiltered_octree, map.cloud);
   m.voxels = occupied_voxels(map.octree, map.cloud, &map.inliers);

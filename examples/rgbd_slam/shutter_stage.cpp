@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "shutter_stage.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <optional>
@@ -53,7 +54,7 @@ camera_inspection find_shutter(const frame_source& source, const settings& s, bo
   orbis::slam::options options = slam_options(source.camera.model, source.camera.baseline);
   set_profile(s.profile, options);
   options.estimates_shutter = true;
-  options.features.max_features /= 2;  // the estimate is as good
+  options.features.max_features = std::min(options.features.max_features, 500);  // enough for an estimate
   orbis::slam::rgbd_system<decltype(orbis::camera::camera_settings::model)> slam{source.camera.model, options};
   read_ahead frames{source, s.threads != 1};
   std::optional<double> begin;

@@ -55,7 +55,7 @@ void check_sizes(random_bits& random) {
   CHECK(near(Eigen::MatrixXd(d), Eigen::MatrixXd(y)));
   CHECK(std::abs(squared_norm(a) - x.squaredNorm()) < 1e-12);
   CHECK(std::abs(norm(a) - x.norm()) < 1e-12);
-  CHECK(std::abs(sum(a) - x.sum()) < 1e-12);
+  CHECK(std::abs(sum_entries(a) - x.sum()) < 1e-12);
   CHECK(min_entry(a) == x.minCoeff());
   CHECK(max_entry(a) == x.maxCoeff());
   CHECK(largest_magnitude(a) == x.cwiseAbs().maxCoeff());

@@ -437,7 +437,7 @@ TEST_CASE("A robot explores and keeps its path on an OctoMap tree") {
            (between - to).norm() < 0.5);
 
   nav::frontiers frontiers{*tree};
-  const auto places = nav::viewing_places(frontiers.clusters({.min_size = 1}), theirs.grid());
+  const auto places = nav::candidate_viewpoints(frontiers.clusters({.min_size = 1}), theirs.grid());
   REQUIRE(!places.empty());
   const camera::pinhole camera{64, 48, 40.0, 40.0, 31.5, 23.5};
   const nav::next_view_options options{.gain = {.pixel_step = 4}, .min_distance = 0.2};

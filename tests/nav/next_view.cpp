@@ -67,13 +67,13 @@ TEST_CASE("Places of a frontier: means of its voxels in the cubes of a lattice")
   fill(map, {0.0, 0.0, 0.0}, {3.2, 0.8, 0.1}, -1.0F);  // all of it is frontier
   const nav::frontiers f{map};
   REQUIRE(f.size() == 32 * 8);
-  const auto places = nav::viewing_places(f.clusters(), map.grid(), 0.8);
+  const auto places = nav::candidate_viewpoints(f.clusters(), map.grid(), 0.8);
   REQUIRE(places.size() == 4);
   for (std::size_t i = 0; i != 4; ++i)
     CHECK((places[i] - vec3{0.4 + 0.8 * static_cast<double>(i), 0.4, 0.05}).norm() < 1e-9);
   for (const double whole : {100.0, 1e300, std::numeric_limits<double>::infinity()})
-    CHECK(nav::viewing_places(f.clusters(), map.grid(), whole).size() == 1);
-  CHECK(nav::viewing_places({}, map.grid()).empty());
+    CHECK(nav::candidate_viewpoints(f.clusters(), map.grid(), whole).size() == 1);
+  CHECK(nav::candidate_viewpoints({}, map.grid()).empty());
 }
 
 TEST_CASE("A camera that looks at a place has it in its middle, and is level") {
@@ -95,7 +95,7 @@ TEST_CASE("The next best view is the one of the greatest utility, and can be rea
   const camera::pinhole camera{40, 30, 25.0, 25.0, 19.5, 14.5};
   const nav::distance_field field{map, {.reach = 0.6}};
   const nav::planning_view view{map, field, 0.25};
-  const auto places = nav::viewing_places(clusters, map.grid());
+  const auto places = nav::candidate_viewpoints(clusters, map.grid());
   nav::next_view_options options{.gain = {.max_range = 3.0, .pixel_step = 4}, .lambda = 3.0};
   for (const double x : {0.6, 3.4}) {  // ways are dear: the nearer door
     const vec3 position{x, 2.5, 1.0};
@@ -143,7 +143,7 @@ TEST_CASE("Where ways are very dear the nearest view is taken, though its utilit
   const camera::pinhole camera{40, 30, 25.0, 25.0, 19.5, 14.5};
   const nav::distance_field field{map, {.reach = 0.6}};
   const nav::planning_view view{map, field, 0.25};
-  const auto places = nav::viewing_places(nav::frontiers{map}.clusters(), map.grid());
+  const auto places = nav::candidate_viewpoints(nav::frontiers{map}.clusters(), map.grid());
   nav::next_view_options options{.gain = {.max_range = 3.0, .pixel_step = 4}, .lambda = 1e5};
   for (const double x : {0.6, 3.4}) {
     const vec3 position{x, 2.5, 1.0};
@@ -189,7 +189,7 @@ TEST_CASE("What cannot be reached is found out once, and what can be is found al
   REQUIRE(view.is_free(position));
   nav::next_view_options options{.gain = {.max_range = 3.0, .pixel_step = 4}, .max_distance = 1.0, .lambda = 0.0};
   std::vector<vec3> far;
-  for (const vec3& p : nav::viewing_places(f.clusters(), map.grid()))
+  for (const vec3& p : nav::candidate_viewpoints(f.clusters(), map.grid()))
     if (p.y() > 5.0) far.push_back(p);
   REQUIRE(far.size() > 20);
   options.candidates = 1;

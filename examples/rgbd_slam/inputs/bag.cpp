@@ -52,7 +52,7 @@ std::string in_words(double number) {
 }
 
 /// "1 image of /camera is", "2 images of /camera are".
-std::string counted(std::size_t n, const std::string& what, const std::string& from) {
+std::string count_text(std::size_t n, const std::string& what, const std::string& from) {
   return std::to_string(n) + " " + what + (n == 1 ? " of " : "s of ") + from + (n == 1 ? " is" : " are");
 }
 
@@ -335,7 +335,7 @@ class bag_recording final : public file_recording {
     for (topic* t : {first_, second_}) {
       if (t == nullptr) continue;
       if (t->unread != 0)
-        notes.push_back(counted(t->unread, "image", t->name) + " omitted, as damaged or cut off: " + t->reason);
+        notes.push_back(count_text(t->unread, "image", t->name) + " omitted, as damaged or cut off: " + t->reason);
       // A time of zero is that of a simulation that begins there, or there is no time in the header.
       std::int64_t least = std::numeric_limits<std::int64_t>::max();
       for (const entry& e : entries)
@@ -357,11 +357,11 @@ class bag_recording final : public file_recording {
         order.emplace_back(has_time ? e.time : e.message->time, *e.message);
       }
       if (later != 0)
-        notes.push_back(counted(later, "image", t->name) +
+        notes.push_back(count_text(later, "image", t->name) +
                         " omitted, as the times in the headers fall back by more than 1 s after the first " +
                         std::to_string(order.size()));
       if (const std::size_t repeated = sort_by_time(order, &std::pair<std::int64_t, bag_message>::first); repeated != 0)
-        notes.push_back(counted(repeated, "image", t->name) + " omitted, as the time is that of another one");
+        notes.push_back(count_text(repeated, "image", t->name) + " omitted, as the time is that of another one");
       t->messages.clear();
       for (const auto& [when, message] : order) {
         t->times.push_back(seconds(when));
@@ -378,7 +378,7 @@ class bag_recording final : public file_recording {
     }
     frames_ = orbis::associate(first_->times, second_->times, sensor == sensor_kind::rgbd ? 0.020 : 0.005);
     if (const std::size_t unpaired = first_->times.size() - frames_.size(); unpaired != 0)
-      notes.push_back(counted(unpaired, "image", first_->name) + " omitted, as no image of " + second_->name +
+      notes.push_back(count_text(unpaired, "image", first_->name) + " omitted, as no image of " + second_->name +
                       " has the same time");
   }
 
@@ -590,7 +590,7 @@ class bag_recording final : public file_recording {
       pose = std::move(one);
       ground_truth.push_back({seconds(pose.header.stamp != 0 ? pose.header.stamp : m.time), pose.T_parent_child});
     }
-    if (unread != 0) notes.push_back(counted(unread, "pose", from.name) + " damaged and omitted");
+    if (unread != 0) notes.push_back(count_text(unread, "pose", from.name) + " damaged and omitted");
     sort_by_time(ground_truth, &orbis::stamped_pose::timestamp);
     const std::string camera_frame = first_->frame_id;
     truth_of = from.name + " (" + (has_child ? pose.child_frame_id : "body") + " in " + pose.header.frame_id + ")";

@@ -119,7 +119,7 @@ class voxel_measurements {
 /// The mean of the measurements in each voxel. It depends only on the measurements added and not yet removed, not on
 /// their order, the number of threads or the history. About 50 bytes per voxel.
 class voxel_sums {
-  [[nodiscard]] auto brick_keys() const {
+  [[nodiscard]] auto key_by_number() const {
     return [this](std::uint32_t number) -> const detail::voxel_key& { return bricks_[number].key; };
   }
 
@@ -201,7 +201,7 @@ class voxel_sums {
         if (at.brick != brick_ || !asked_) {
           asked_ = true;
           brick_ = at.brick;
-          number_ = of_->sums_->index_.find(brick_, of_->sums_->brick_keys());
+          number_ = of_->sums_->index_.find(brick_, of_->sums_->key_by_number());
         }
         if (number_ == none || !of_->sums_->bricks_[number_].voxels.contains(at.cell)) return std::nullopt;
         return (of_->chosen_[number_][at.cell / 64U] >> (at.cell % 64U) & 1U) != 0;
@@ -292,7 +292,7 @@ class voxel_sums {
   /// Returns the number of the brick with this key; adds the brick if it does not exist.
   std::uint32_t brick_at(const detail::voxel_key& key) {
     const auto number = free_.empty() ? static_cast<std::uint32_t>(bricks_.size()) : free_.back();
-    if (const std::uint32_t found = index_.find_or_insert(key, number, brick_keys()); found != number) return found;
+    if (const std::uint32_t found = index_.find_or_insert(key, number, key_by_number()); found != number) return found;
     if (free_.empty())
       bricks_.emplace_back();
     else
@@ -318,7 +318,7 @@ class voxel_sums {
         if constexpr (Add) {
           number = brick_at(run.brick);
         } else {
-          number = index_.find(run.brick, brick_keys());
+          number = index_.find(run.brick, key_by_number());
           assert(number != none && "removed without having been added");
           if (number == none) continue;
         }
@@ -347,7 +347,7 @@ class voxel_sums {
     if constexpr (!Add) {
       for (const std::uint32_t number : touched_) {
         if (bricks_[number].voxels.size() != 0) continue;
-        index_.erase(bricks_[number].key, brick_keys());
+        index_.erase(bricks_[number].key, key_by_number());
         bricks_[number].voxels = {};
         free_.push_back(number);
       }

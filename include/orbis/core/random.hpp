@@ -48,20 +48,20 @@ class random_bits {
   /// coin flips, smoothed by a uniform number as wide as one of its steps. Uses no libm function.
   [[nodiscard]] constexpr double normal() noexcept {
     const result_type first = (*this)();  // named, since the evaluation order of arguments is unspecified
-    return normal_from(first, (*this)());
+    return gaussian_from(first, (*this)());
   }
 
   /// `normal()` computed from two random words, for counter-based noise.
-  [[nodiscard]] static constexpr double normal_from(std::uint64_t a, std::uint64_t b) noexcept {
+  [[nodiscard]] static constexpr double gaussian_from(std::uint64_t a, std::uint64_t b) noexcept {
     // Binomial(64, 1/2) has variance 16, the uniform of width 1 adds 1/12.
     constexpr double inverse_deviation = 0.24935149047701481;  // 1 / sqrt(16 + 1/12)
     const double flips = static_cast<double>(std::popcount(a)) - 32.0;
     const double step = static_cast<double>(b >> 11U) * 0x1.0p-53 - 0.5;
     return (flips + step) * inverse_deviation;
   }
-  [[deprecated("use normal_from")]] [[nodiscard]] static constexpr double normal_of(std::uint64_t a,
-                                                                                    std::uint64_t b) noexcept {
-    return normal_from(a, b);
+  [[deprecated("use gaussian_from")]] [[nodiscard]] static constexpr double normal_of(std::uint64_t a,
+                                                                                      std::uint64_t b) noexcept {
+    return gaussian_from(a, b);
   }
 
  private:

@@ -27,7 +27,7 @@ template <int N, class S>
   using square = matrix<N, N, S>;
   S largest = S(0);  // sum of the magnitudes in a column
   for (int c = 0; c != N; ++c) {
-    const S total = sum(magnitudes(column_of(a, c)));
+    const S total = sum_entries(magnitudes(column_of(a, c)));
     if (!std::isfinite(total)) return filled<square>(std::numeric_limits<S>::quiet_NaN());
     largest = std::max(largest, total);
   }

@@ -367,10 +367,6 @@ requires(R > 0) [[nodiscard]] inline matrix<R, 1, S> diagonal(const Eigen::Matri
   for (int r = 0; r < R; ++r) out.data()[r] = m.data()[r * R + r];
   return out;
 }
-template <class M>
-[[deprecated("use diagonal")]] [[nodiscard]] inline auto diagonal_of(const M& m) {
-  return diagonal(m);
-}
 /// @}
 
 /// @name Matrices of one value
@@ -406,7 +402,7 @@ requires(R > 0 && C > 0) [[nodiscard]] inline bool all_finite(const Eigen::Matri
   return finite;
 }
 template <class S, int R, int C, int O>
-requires(R > 0 && C > 0) [[nodiscard]] inline S sum(const Eigen::Matrix<S, R, C, O, R, C>& a) {
+requires(R > 0 && C > 0) [[nodiscard]] inline S sum_entries(const Eigen::Matrix<S, R, C, O, R, C>& a) {
   S sum = a.data()[0];
   for (int i = 1; i < R * C; ++i) sum += a.data()[i];
   return sum;
@@ -424,18 +420,6 @@ requires(R > 0 && C > 0) [[nodiscard]] inline S max_entry(const Eigen::Matrix<S,
   for (int i = 1; i < R * C; ++i)
     if (a.data()[i] > most) most = a.data()[i];
   return most;
-}
-template <class M>
-[[deprecated("use sum")]] [[nodiscard]] inline auto sum_of(const M& a) {
-  return sum(a);
-}
-template <class M>
-[[deprecated("use min_entry")]] [[nodiscard]] inline auto smallest_of(const M& a) {
-  return min_entry(a);
-}
-template <class M>
-[[deprecated("use max_entry")]] [[nodiscard]] inline auto largest_of(const M& a) {
-  return max_entry(a);
 }
 /// True if each entry of `a` is at most the corresponding entry of `b`.
 template <class S, int R, int C, int O>

@@ -50,9 +50,5 @@ struct trajectory_scale {
   found.deviation = std::sqrt(squares * static_cast<double>(parts - 1) / static_cast<double>(parts));
   return found;
 }
-[[deprecated("use estimate_scale")]] [[nodiscard]] inline result<trajectory_scale> scale_of(
-    const trajectory& estimate, const trajectory& reference, double max_time_difference = 0.02) {
-  return estimate_scale(estimate, reference, max_time_difference);
-}
 
 }  // namespace orbis::eval

@@ -19,10 +19,6 @@ enum class cloud_format { ply, pcd };
 
 /// The format by the extension of a path, in upper or lower case; none for other extensions.
 [[nodiscard]] std::optional<cloud_format> cloud_format_by_extension(const std::filesystem::path& path);
-[[deprecated("use cloud_format_by_extension")]] [[nodiscard]] inline std::optional<cloud_format> cloud_format_of(
-    const std::filesystem::path& path) {
-  return cloud_format_by_extension(path);
-}
 
 /// Reads a PLY or PCD file, detected by its first bytes or otherwise by its extension. `origin` is subtracted
 /// from the coordinates before they are converted to float: for clouds far from their coordinate origin. Errors:

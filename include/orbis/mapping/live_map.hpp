@@ -188,7 +188,7 @@ class live_map {
       for (std::size_t i = 0; i != count; ++i) {
         worker& w = workers_[i];
         entry& k = *find(group[i]);
-        if (k.used) drop_frames(k.frame);
+        if (k.used) drop_frames_after(k.frame);
         k.filtered = true;
         k.reach = std::min(detail::largest_depth(make_view(k, w.edited)), options_.integration.max_range);
         set_waiting(k, false);
@@ -389,7 +389,7 @@ class live_map {
     assert(depth.width() == camera_.width() && depth.height() == camera_.height());
     std::erase_if(frames_, [&](const transient& t) { return t.frame == frame; });  // it becomes a keyframe
     entry& k = make(frame);
-    if (k.used) drop_frames(frame);
+    if (k.used) drop_frames_after(frame);
     k.filtered = what == completeness::filtered;
     k.scale = depth.scale();
     k.min_depth = depth.min_depth();
@@ -440,7 +440,7 @@ class live_map {
     set_waiting(k, false);
     if (!k.used) return;
     k.used.reset();
-    drop_frames(k.frame);
+    drop_frames_after(k.frame);
     history_.remove(k.frame);
   }
   void want(entry& k, const std::optional<se3>& pose) {
@@ -481,7 +481,7 @@ class live_map {
     if (auto read = read_and_work(policy, group_, mark); !read) return read;
     for (std::size_t i = 0; i != count; ++i) {
       entry& k = *find(queue_[next + i].frame);
-      drop_frames(k.frame);
+      drop_frames_after(k.frame);
       history_.set(k.frame, workers_[i].voxels);
       k.used = k.wanted;
       set_waiting(k, false);
@@ -524,7 +524,7 @@ class live_map {
     for (std::size_t i = 0; i != count; ++i) history_.remove(frames_[i].frame);
     frames_.erase(frames_.begin(), frames_.begin() + static_cast<std::ptrdiff_t>(count));
   }
-  void drop_frames(std::uint64_t keyframe) {
+  void drop_frames_after(std::uint64_t keyframe) {
     std::erase_if(frames_, [&](const transient& t) {
       if (t.keyframe == keyframe) history_.remove(t.frame);
       return t.keyframe == keyframe;

@@ -286,7 +286,7 @@ class distance_field : public metric_distances<squared_distances> {
       if (is_in_cube) in_cubes += volume(level);
       if (mask == (is_in_cube ? ~elsewhere : elsewhere)) return;  // equal to the value where nothing is stored
       if (level >= cube_level && mask == (is_in_cube ? elsewhere : ~elsewhere)) {
-        const std::uint64_t more = voxels_.added_bricks(node);
+        const std::uint64_t more = voxels_.max_added_bricks(node);
         if (!is_in_cube && cubes_.bricks + more > options_.max_bricks) {
           is_complete_ = false;
         } else if (is_first) {

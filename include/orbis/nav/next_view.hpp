@@ -3,7 +3,7 @@
 /// The next best view of an exploring robot.
 ///
 /// @code
-///   const auto places = orbis::nav::viewing_places(frontiers.clusters({.min_size = 20}), map.grid());
+///   const auto places = orbis::nav::candidate_viewpoints(frontiers.clusters({.min_size = 20}), map.grid());
 ///   const auto next = orbis::nav::next_best_view(view, places, camera, position);
 ///   if (next.status == orbis::nav::next_view_status::found) go(next.path.points), look(next.T_world_camera);
 /// @endcode
@@ -40,8 +40,8 @@ namespace orbis::nav {
 /// Returns the places of a frontier to look at (metres): large clusters are split by the cubes of a lattice, and the
 /// mean of each cube's voxels is a place. Larger clusters come first. `spacing`: edge of the cubes, metres, rounded to
 /// a power of two of voxels, at least 4.
-[[nodiscard]] inline std::vector<vec3> viewing_places(std::span<const frontier_cluster> clusters,
-                                                      const octree::voxel_grid& grid, double spacing = 0.8) {
+[[nodiscard]] inline std::vector<vec3> candidate_viewpoints(std::span<const frontier_cluster> clusters,
+                                                            const octree::voxel_grid& grid, double spacing = 0.8) {
   const double levels = std::round(std::log2(std::max(4.0, spacing / grid.resolution())));
   const int level = static_cast<int>(std::clamp(levels, 2.0, static_cast<double>(grid.depth())));
   std::vector<vec3> places;
@@ -63,9 +63,9 @@ namespace orbis::nav {
   }
   return places;
 }
-[[deprecated("use viewing_places")]] [[nodiscard]] inline std::vector<vec3> places_of(
+[[deprecated("use candidate_viewpoints")]] [[nodiscard]] inline std::vector<vec3> places_of(
     std::span<const frontier_cluster> clusters, const octree::voxel_grid& grid, double spacing = 0.8) {
-  return viewing_places(clusters, grid, spacing);
+  return candidate_viewpoints(clusters, grid, spacing);
 }
 
 struct next_view_options {

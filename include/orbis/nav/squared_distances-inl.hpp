@@ -33,7 +33,7 @@ ORBIS_INLINE squared_distances::squared_distances(int reach, std::uint32_t cells
     }
 }
 
-ORBIS_INLINE std::uint64_t squared_distances::added_bricks(const voxel_cube& cube) const noexcept {
+ORBIS_INLINE std::uint64_t squared_distances::max_added_bricks(const voxel_cube& cube) const noexcept {
   const auto volume = [](std::int64_t edge) { return edge <= 0 ? 0 : static_cast<std::uint64_t>(edge * edge * edge); };
   const std::int64_t edge = std::int64_t{octree::node_cells(cube.level)} / 8, reach = bricks_in_reach_;
   return elsewhere_ == 0 ? volume(edge) - volume(edge - 2 * reach) : volume(edge + 2 * reach) - volume(edge);
@@ -165,7 +165,7 @@ ORBIS_INLINE void squared_distances::release_buffers() {
   release(rows_, along_, kept_, stale_plane_, stale_space_, needless_, line_, line_bits_, left_, right_);
 }
 
-ORBIS_INLINE int squared_distances::reach_of_offer(std::uint16_t least) const noexcept {
+ORBIS_INLINE int squared_distances::offer_reach(std::uint16_t least) const noexcept {
   const int left = bound() - least;
   if (left < 0) return -1;
   int r = static_cast<int>(std::sqrt(static_cast<float>(left)));
@@ -324,7 +324,7 @@ ORBIS_INLINE void squared_distances::spread_along_y() {
   // Calls visit(place of a target brick, z in it, squares, the smallest of these) for the slices within reach of the
   // row.
   const auto for_each_target = [&](const along_change& c, auto&& visit) {
-    const int range = reach_of_offer(offer.least);
+    const int range = offer_reach(offer.least);
     const detail::brick_place p = places_[c.brick];
     const int z = static_cast<int>(c.row >> 3U), y = p.y * 8 + static_cast<int>(c.row & 7U);
     for (int by = (y - range) >> 3; by <= (y + range) >> 3; ++by) {
@@ -406,7 +406,7 @@ ORBIS_INLINE void squared_distances::spread_along_z() {
   detail::slice_offer offer;
   // Calls visit(place of a target brick, position of the source relative to its slices, first and last slice in reach).
   const auto for_each_target = [&](const detail::brick_place& p, int z, auto&& visit) {
-    const int range = reach_of_offer(offer.least), at = p.z * 8 + z;
+    const int range = offer_reach(offer.least), at = p.z * 8 + z;
     for (int bz = (at - range) >> 3; bz <= (at + range) >> 3; ++bz)
       visit(detail::brick_place{p.x, p.y, bz}, at - bz * 8, std::max(at - range - bz * 8, 0),
             std::min(at + range - bz * 8, 7));

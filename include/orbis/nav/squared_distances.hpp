@@ -149,11 +149,11 @@ class squared_distances : public squared_distance_view {
   squared_distances(int reach, std::uint32_t cells, bool elsewhere_is_obstacle);
 
   /// Sets these cubes to the opposite of all other space: full of obstacles, or free. Only bricks within reach of their
-  /// faces are stored: outside full cubes, inside free ones (see added_bricks). @pre before the first update; disjoint
-  /// cubes of level 6 or more, in the grid
+  /// faces are stored: outside full cubes, inside free ones (see max_added_bricks). @pre before the first update;
+  /// disjoint cubes of level 6 or more, in the grid
   void begin(std::span<const voxel_cube> cubes);
   /// Maximum number of bricks that one cube alone adds to the field. O(1).
-  [[nodiscard]] std::uint64_t added_bricks(const voxel_cube& cube) const noexcept;
+  [[nodiscard]] std::uint64_t max_added_bricks(const voxel_cube& cube) const noexcept;
   /// Returns true if a node (level 2 or more) is in one of the cubes that the field was initialised with. O(levels).
   [[nodiscard]] bool is_in_cube(const voxel_cube& node) const noexcept {
     return directory_.has_cubes() && directory_.is_in_cube(place_of(node.low), std::max(node.level - 3, 0));
@@ -228,7 +228,7 @@ class squared_distances : public squared_distance_view {
     return squares_.data() + 8 * (distance + squares_pad_);
   }
   /// Maximum distance at which an offer of `least` matters, in voxels; negative if it matters nowhere.
-  [[nodiscard]] int reach_of_offer(std::uint16_t least) const noexcept;
+  [[nodiscard]] int offer_reach(std::uint16_t least) const noexcept;
 
   /// Clears the change lists of the previous update; propagates those of this one through all stages.
   void begin_update();

@@ -38,7 +38,8 @@ struct calibration_options {
   /// number.
   std::size_t max_keyframes = 300;
   /// Maximum number of landmarks, taken at regular intervals of those that two keyframes observe; the cost is linear in
-  /// their number, and the deviations fall with its square root.
+  /// their number. With fewer, the standard deviations of the parameters grow, and more groups of them exceed
+  /// `max_effect`.
   std::size_t max_landmarks = std::numeric_limits<std::size_t>::max();
 };
 

@@ -137,7 +137,7 @@ class basic_map {
     of_keyframe.resize(at(id).size(), 1.0F);
     of_keyframe[feature] = static_cast<float>(deviation);
   }
-  /// Moves a keyframe by `T_new_old`, a motion in the world, whose scale enters `scale`. @pre has_keyframe(id)
+  /// Moves a keyframe by `T_new_old`, a motion in the world, whose scale multiplies `scale(id)`. @pre has_keyframe(id)
   void move_keyframe(keyframe_id id, const sim3& T_new_old) {
     set_pose(id, moved(T_new_old, at(id).T_world_camera));
     content_.keyframes[id].scale *= T_new_old.scale();
@@ -159,7 +159,7 @@ class basic_map {
   /// O(observations of its landmarks).
   keyframe_id add_keyframe(frame_type f);
   /// Erases a keyframe with its observations, and the landmarks that no other keyframe observes. Its children in the
-  /// spanning tree get other parents. `pose` still gives its pose. @pre has_keyframe(id)
+  /// spanning tree get other parents. `pose(id)` still returns its pose. @pre has_keyframe(id)
   void erase_keyframe(keyframe_id id);
   /// Forgets the poses of erased keyframes, except those of `keep`, the `latest` ones, and their replacements. Each
   /// remembered keyframe takes about 130 bytes. Let n be the number of erased keyframes remembered before: O((n + keep)

@@ -137,13 +137,12 @@ track_result ORBIS_SLAM_SYSTEM::track_frame(double timestamp, frame_type f, cons
   clock.lap(result.timings.features_ms);
   if (options_.threads.wait) back_end_->wait_for_room();
   const auto outcome = shared_.locked([&] {
-    const bool is_frozen = localization_only_;
     return front_end_->track({
         .frame = f,
         .maps = shared_.atlas,
-        .is_frozen = is_frozen,
-        .may_grow = !is_frozen && !back_end_->is_full(),
-        .follow_rows = follow ? follow : [](frame_type&, const frame_motion&) {},
+        .is_frozen = localization_only_,
+        .has_room = [&] { return !back_end_->is_full(); },
+        .read_rows = follow ? follow : [](frame_type&, const frame_motion&) {},
         .find_similar =
             [&](const auto& features, std::size_t count) {
               return shared_.similar(shared_.places.describe(features), count, [](map_keyframe) { return false; });

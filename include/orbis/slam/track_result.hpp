@@ -70,7 +70,7 @@ struct tracked_frame {
   /// The keyframe that the frame's pose follows. `atlas::current` returns its current id; with
   /// `options::trajectory_frames` it may be forgotten later (`basic_map::remembers`).
   map_keyframe reference;
-  se3 T_reference_camera;  ///< translation divided by `basic_map::scale` the reference, which is 1 with depth
+  se3 T_reference_camera;  ///< translation divided by `basic_map::scale(reference)`, which is 1 with depth
   std::vector<tracked_feature> features;
   vec6 twist = zeros<vec6>();  ///< see `track_result::twist`
 };

@@ -18,8 +18,8 @@ namespace orbis::places::detail {
 
 /// The Hamming distance: word by word, or in a register that holds a descriptor.
 template <class Target, std::size_t Bits>
-[[nodiscard]] ORBIS_ALWAYS_INLINE std::uint32_t differing_bits(const bit_words<Bits>& a,
-                                                               const bit_words<Bits>& b) noexcept {
+[[nodiscard]] ORBIS_ALWAYS_INLINE std::uint32_t count_differing_bits(const bit_words<Bits>& a,
+                                                                     const bit_words<Bits>& b) noexcept {
   if constexpr (Bits == 256 && Target::bytes == 32) {
     using lanes = simd::vec<std::uint64_t, Bits / 64, Target>;
     return static_cast<std::uint32_t>(simd::sum(count_bits(lanes::load(a.data()) ^ lanes::load(b.data()))));
@@ -38,7 +38,7 @@ template <class Target, std::size_t Bits>
   // Distance and index in one number: the minimum needs no unpredictable branch.
   std::uint32_t best = ~std::uint32_t{0};
   for (std::uint32_t c = 0; c != count; ++c)
-    best = std::min(best, differing_bits<Target, Bits>(query, children[c]) << 16U | c);
+    best = std::min(best, count_differing_bits<Target, Bits>(query, children[c]) << 16U | c);
   return best & 0xffffU;
 }
 

@@ -34,7 +34,7 @@ struct scene {
   slam::detail::front_end<camera::any_camera, descriptor, slam::orb_matchers> front_end{world.rig, options};
   std::vector<slam::map_keyframe> similar;  ///< what place recognition says
   std::vector<slam::map_id> dropped;
-  bool is_frozen = false;
+  bool is_frozen = false, has_room = true;
   std::size_t frames = 0;
 
   explicit scene(const test::ring_options& o = {.steps = 60, .drift = 0.0}, const slam::options& settings = {})
@@ -49,7 +49,8 @@ struct scene {
         .track({.frame = f,
                 .maps = maps,
                 .is_frozen = is_frozen,
-                .follow_rows = [](slam::frame&, const slam::frame_motion&) {},
+                .has_room = [&] { return has_room; },
+                .read_rows = [](slam::frame&, const slam::frame_motion&) {},
                 .find_similar = [&](const auto&, std::size_t) { return similar; },
                 .drop_map =
                     [&](slam::map_id m) {
@@ -144,6 +145,16 @@ TEST_CASE("A frozen map does not change, and none is begun") {
     CHECK(s.maps.active().landmark_at(l.id).visible == l.visible);
     CHECK(s.maps.active().landmark_at(l.id).found == l.found);
   }
+}
+
+TEST_CASE("No keyframe is made while the back end has no room for it, but a map begins") {
+  scene s;
+  s.has_room = false;
+  for (std::uint32_t i = 0; i < 8; ++i) CHECK(s.see(i) > 30);
+  CHECK(s.maps.active().keyframes().size() == 1);
+  s.has_room = true;
+  CHECK(s.see(8) > 30);
+  CHECK(s.maps.active().keyframes().size() == 2);
 }
 
 TEST_CASE("Tracking goes on when the map was merged, moved and culled between two frames") {

@@ -18,7 +18,7 @@ namespace orbis::features::detail {
 
 /// Hamming distance of two strings.
 template <class Target, bit_string D>
-[[nodiscard]] ORBIS_ALWAYS_INLINE std::uint32_t differing_bits(const D& a, const D& b) noexcept {
+[[nodiscard]] ORBIS_ALWAYS_INLINE std::uint32_t count_differing_bits(const D& a, const D& b) noexcept {
   std::uint32_t sum = 0;
 #pragma GCC unroll 8
   for (std::size_t at = 0; at != sizeof(D); at += 8) {
@@ -34,7 +34,8 @@ struct hamming_listed_kernel {
   template <class Target, class D>
   static ORBIS_ALWAYS_INLINE void run(const D& query, std::span<const D> trains, std::span<const std::uint32_t> indices,
                                       std::span<std::uint32_t> distances) {
-    for (std::size_t i = 0; i != indices.size(); ++i) distances[i] = differing_bits<Target>(query, trains[indices[i]]);
+    for (std::size_t i = 0; i != indices.size(); ++i)
+      distances[i] = count_differing_bits<Target>(query, trains[indices[i]]);
   }
 };
 

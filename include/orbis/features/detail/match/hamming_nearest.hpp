@@ -43,7 +43,7 @@ ORBIS_ALWAYS_INLINE void search_pairs(std::span<const D> queries, std::span<cons
     const D query = queries[q];
     std::uint32_t limit = keep.limit(q);
     for (std::size_t t = 0; t != trains.size(); ++t) {
-      const std::uint32_t distance = differing_bits<Target>(query, trains[t]);
+      const std::uint32_t distance = count_differing_bits<Target>(query, trains[t]);
       if (distance < limit) {
         keep.insert(q, static_cast<std::uint32_t>(t), distance);
         limit = keep.limit(q);
@@ -109,7 +109,7 @@ ORBIS_ALWAYS_INLINE void search_slices(std::span<const D> queries, std::span<con
         }
       }
       for_each_bit(below, valid, [&](std::size_t t) ORBIS_INLINE_LAMBDA {
-        const std::uint32_t distance = differing_bits<Target>(queries[q], block[t]);
+        const std::uint32_t distance = count_differing_bits<Target>(queries[q], block[t]);
         if (distance < keep.limit(q)) keep.insert(q, static_cast<std::uint32_t>(begin + t), distance);
       });
       if (reverse.empty()) continue;

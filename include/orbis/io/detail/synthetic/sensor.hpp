@@ -129,19 +129,19 @@ class sensor {
       const double f = lower_fraction(fresh);
       return 1.0 / ((1.0 - f) / static_cast<double>(z) + f / static_cast<double>(other));
     }
-    const double sideways = options_.lateral_noise * normal_from(mix64(fresh));
+    const double sideways = options_.lateral_noise * gaussian_from(mix64(fresh));
     return static_cast<double>(std::abs(sideways) > 0.5 ? other : z);
   }
 
   /// Approximately Gaussian noise with mean 0 and standard deviation 1, accurate up to three sigma: the sum of four
   /// uniform numbers.
-  [[nodiscard]] static double normal_from(std::uint64_t word) noexcept {
+  [[nodiscard]] static double gaussian_from(std::uint64_t word) noexcept {
     const std::uint64_t sum = (word & 0xffffU) + ((word >> 16U) & 0xffffU) + ((word >> 32U) & 0xffffU) + (word >> 48U);
     return (static_cast<double>(sum) - 131070.0) * 2.6428997918226276e-05;  // sqrt(3) / 65536
   }
 
   [[nodiscard]] double perturbed(double z, std::uint64_t word) const noexcept {
-    if (options_.axial_noise != 0.0) z += options_.axial_noise * axial_deviation(z) * normal_from(word);
+    if (options_.axial_noise != 0.0) z += options_.axial_noise * axial_deviation(z) * gaussian_from(word);
     if (options_.disparity_step != 0.0 && z > 0.0) {
       const double fb = options_.infrared_focal * options_.baseline;
       const double steps = static_cast<double>(floor_to_int(fb / (z * options_.disparity_step) + 0.5));

@@ -223,7 +223,7 @@ inline void add_product(cubic& sum, const quadric& a, const linear& b) noexcept 
   std::array<std::array<double, 9>, 5> rows;
   for (std::size_t i = 0; i != 5; ++i) {
     const vec3 a = normalized(vec3(first[i])), b = normalized(vec3(second[i]));
-    if (!std::isfinite(sum(a) + sum(b))) return solutions;
+    if (!std::isfinite(sum_entries(a) + sum_entries(b))) return solutions;
     for (int row = 0; row != 3; ++row)
       for (int column = 0; column != 3; ++column)
         rows[i][static_cast<std::size_t>(3 * row + column)] = b[row] * a[column];

@@ -138,7 +138,8 @@ void for_each_p3p(const std::array<vec3, 3>& points_world, const std::array<vec3
   double a23 = squared_norm(points_world[1] - points_world[2]);
   const double extent = a12 + a13 + a23;
   const double area = squared_norm(normal);
-  if (!(area > 1e-18 * extent * extent) || !std::isfinite(area + sum(y1) + sum(y2) + sum(y3))) return;
+  if (!(area > 1e-18 * extent * extent) || !std::isfinite(area + sum_entries(y1) + sum_entries(y2) + sum_entries(y3)))
+    return;
   a12 /= extent, a13 /= extent, a23 /= extent;
   const double b12 = dot(y1, y2), b13 = dot(y1, y3), b23 = dot(y2, y3);
 
@@ -190,13 +191,13 @@ void for_each_p3p(const std::array<vec3, 3>& points_world, const std::array<vec3
     const double root = -(qb + std::copysign(std::sqrt(std::fmax(0.0, discriminant)), qb));
     for (int k = 0; k != 2; ++k) {
       vec3 l = k == 0 ? vec3(root * u + qa * v) : vec3(qc * u + root * v);  // cu / cv is root / qa, or qc / root
-      if (sum(l) < 0.0) l = -l;
+      if (sum_entries(l) < 0.0) l = -l;
       if (!(min_entry(l) > 0.0)) continue;
       const double measured = 2.0 * (squared_norm(l) - b12 * l(0) * l(1) - b13 * l(0) * l(2) - b23 * l(1) * l(2));
       if (!(measured > 0.0)) continue;
       l *= 1.0 / std::sqrt(measured);
       polish_depths(l, {b12, b13, b23}, {a12, a13, a23});
-      if (!(min_entry(l) > 0.0) || !std::isfinite(sum(l))) continue;
+      if (!(min_entry(l) > 0.0) || !std::isfinite(sum_entries(l))) continue;
       l *= size;
       const vec3 p1 = l(0) * y1, p2 = l(1) * y2, p3 = l(2) * y3;
       const vec3 s12 = p1 - p2, s13 = p1 - p3;

@@ -136,7 +136,7 @@ class motion_splitter {
       squares += w * entrywise_product(p, p);
     }
     if (!(weight > 0.0)) return 0.0;
-    const double variance = sum(squares / weight - entrywise_product(mean / weight, mean / weight));
+    const double variance = sum_entries(squares / weight - entrywise_product(mean / weight, mean / weight));
     return support * std::sqrt(std::max(variance, 0.0));
   }
 

@@ -100,7 +100,7 @@ void take_landmarks(snapshot& s, const basic_map<D>& m, const camera_rig<Camera>
 
 /// Returns the factor by which a solution scales the lengths in the view of each keyframe: the median over its
 /// landmarks. 1 if lengths are measured. O(observations).
-[[nodiscard]] inline std::vector<double> length_ratios(const snapshot& s, const bundle_solution& solved,
+[[nodiscard]] inline std::vector<double> length_scales(const snapshot& s, const bundle_solution& solved,
                                                        bool is_measured) {
   std::vector<double> growth(s.keyframes.size(), 1.0);
   if (is_measured) return growth;
@@ -122,7 +122,7 @@ template <feature_descriptor D>
 report apply_poses(basic_map<D>& m, const snapshot& s, const bundle_solution& solved) {
   std::vector<sim3> poses;
   poses.reserve(solved.poses.size());
-  const std::vector<double> growth = length_ratios(s, solved, m.scale_is_known());
+  const std::vector<double> growth = length_scales(s, solved, m.scale_is_known());
   for (std::size_t k = 0; k != solved.poses.size(); ++k)
     poses.emplace_back(solved.poses[k].rotation(), solved.poses[k].translation(), growth[k]);
   const keyframe_motions motion = propagate_motion<D>(m, s.keyframes, poses);

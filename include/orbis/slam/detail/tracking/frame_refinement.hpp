@@ -29,9 +29,9 @@ class frame_refinement {
 
   /// With a rolling shutter, reads the rows of a frame again and moves its keypoints to its time, by the motion from
   /// the last frame to its current pose.
-  void follow_rows(const task& t) const {
+  void correct_rows(const task& t) const {
     if (t.frame.shutter.is_global()) return;
-    t.follow_rows(t.frame, {t.frame.shutter, motion_between(c_.last, t.frame)});
+    t.read_rows(t.frame, {t.frame.shutter, motion_between(c_.last, t.frame)});
     move_keypoints(t.frame);
   }
   /// With a rolling shutter, moves the keypoints of a frame to its time, by the motion from the last frame to its
@@ -78,7 +78,7 @@ class frame_refinement {
     if (!rolls && with_depth) find_row_observations(f, m, c_.rig, rows_);
     for (int round = 0; round != rounds; ++round) {
       if (rolls) {
-        t.follow_rows(f, {f.shutter, refined.twist});  // depth was read with the previous motion
+        t.read_rows(f, {f.shutter, refined.twist});  // depth was read with the previous motion
         find_row_observations(f, m, c_.rig, rows_);
       }
       if (with_depth) c_.depth_quadratic = c_.depth.term_at(refined, f.shutter);
@@ -93,7 +93,7 @@ class frame_refinement {
     if (f.shutter.is_depth_early()) early_depth_.advance();
     f.T_world_camera = refined.T_world_camera;
     if (c_.observer)
-      shutter_observer::set_changes(f, {f.shutter, rolls ? refined.twist : expected_twist()}, t.follow_rows);
+      shutter_observer::set_changes(f, {f.shutter, rolls ? refined.twist : expected_twist()}, t.read_rows);
     if (!rolls) {
       f.twist = expected_twist();
       return;

@@ -3,6 +3,7 @@
 /// The front end: localises frames in the active map and makes keyframes.
 #pragma once
 
+#include <cassert>
 #include <cstddef>
 #include <limits>
 #include <optional>
@@ -10,6 +11,7 @@
 #include <vector>
 
 #include <orbis/camera/model.hpp>
+#include <orbis/camera/shutter.hpp>
 #include <orbis/core/se3.hpp>
 #include <orbis/slam/atlas.hpp>
 #include <orbis/slam/camera_rig.hpp>
@@ -23,10 +25,12 @@
 #include <orbis/slam/detail/tracking/recovery.hpp>
 #include <orbis/slam/detail/tracking/tracking_context.hpp>
 #include <orbis/slam/detail/tracking/young_frames.hpp>
+#include <orbis/slam/frame.hpp>
 #include <orbis/slam/ids.hpp>
 #include <orbis/slam/matchers.hpp>
 #include <orbis/slam/measure.hpp>
 #include <orbis/slam/options.hpp>
+#include <orbis/slam/shutter_estimate.hpp>
 #include <orbis/slam/track_result.hpp>
 
 namespace orbis::slam::detail {
@@ -99,7 +103,7 @@ class front_end {
   /// Returns the last tracked frame with its features. For the tracking thread; does not read the maps. O(features).
   [[nodiscard]] tracked_frame last_frame() const {
     const frame_type& last = context_.last;
-    tracked_frame shown{context_.last_reference(), context_.T_reference_last(), {}, last_twist()};
+    tracked_frame shown{context_.anchor().reference, context_.anchor().T_reference_camera, {}, last_twist()};
     shown.features.reserve(last.size());
     for (std::size_t i = 0; i != last.size(); ++i) {
       const landmark_id l = last.landmarks[i];
@@ -121,6 +125,7 @@ class front_end {
 
   /// Localises a frame, makes it a keyframe if one is due, and keeps it for the next frame and in the log.
   outcome track(const task& t) {
+    assert(t.has_room && t.read_rows && t.find_similar && t.drop_map);
     context_.follow_maps(t.maps);
     start_.next_frame();
     first_new_ = no_id;
@@ -144,7 +149,7 @@ class front_end {
     if (context_.settings.trajectory_frames == std::numeric_limits<std::size_t>::max()) return;
     if (maps.active().content().erased.size() < most_erased_) return;
     std::vector<keyframe_id> keep = log_.references(maps, maps.active_id());
-    for (const map_keyframe& k : {maps.current(context_.reference), maps.current(context_.last_reference())})
+    for (const map_keyframe& k : {maps.current(context_.reference), maps.current(context_.anchor().reference)})
       if (k.map == maps.active_id()) keep.push_back(k.keyframe);
     maps.active().forget_erased(keep, latest_erased);
     most_erased_ = maps.active().content().erased.size() + latest_erased;
@@ -179,7 +184,7 @@ class front_end {
     auto& moving = context_.moving;
     const se3 predicted = context_.predict(f);
     f.T_world_camera = predicted;
-    refinement_.follow_rows(t);
+    refinement_.correct_rows(t);
     moving.set_last(context_.last.T_world_camera);
     moving.find(f);
     if (context_.search.by_motion(f, t.map(), context_.last, predicted, moving) == 0 &&
@@ -209,7 +214,7 @@ class front_end {
   /// have not localised the camera for some time and a map could begin with the frame.
   [[nodiscard]] bool needs_keyframe(const task& t, std::size_t inliers) const {
     if (start_.begins_map()) return true;
-    if (t.is_frozen || !t.may_grow) return false;
+    if (t.is_frozen || !t.has_room()) return false;
     const options& o = context_.settings;
     if (t.frame.held_by_depth)
       return t.frame.timestamp - held_since_ >= o.keyframes.interval && start_points(t.frame, o) > 0;
@@ -242,21 +247,20 @@ class front_end {
     context_.motion.reset();
     if (context_.observer) observe(f, maps, made);
     if (!is_tracking()) return;
-    context_.refer_last_to_reference(f, maps);
     start_.forget_candidates();
-    const map_keyframe& reference = context_.last_reference();
-    log_.add({f.timestamp, reference, context_.T_reference_last()});
+    const anchored_pose anchor = context_.refer(f, maps);
+    log_.add({f.timestamp, anchor.reference, anchor.T_reference_camera});
     if (!f.held_by_depth || made) held_since_ = f.timestamp;
     if (made)
       context_.depth.keep(*made, se3{}, f.twist, f.shutter);
     else if (context_.depth.needs_surface(maps, f.T_world_camera))
-      context_.depth.keep(reference, context_.T_reference_last(), f.twist, f.shutter);
+      context_.depth.keep(anchor.reference, anchor.T_reference_camera, f.twist, f.shutter);
     if (start_.begins_map()) young_.begin_map(maps.active_id());
     if (made) young_.count_keyframe(made->map);
-    if (!made && !context_.observer && state == track_state::tracking && !f.held_by_depth &&
-        context_.moving.size() == 0)
-      young_.add(f, context_.depth_quadratic, log_);
-    context_.last = std::move(f);
+    // A frame that was tracked while the shutter is estimated has other rows than the map.
+    const bool may_wait = !made && !context_.observer && state == track_state::tracking && !f.held_by_depth;
+    if (may_wait && context_.moving.size() == 0) young_.add(f, context_.depth_quadratic, log_);
+    context_.set_last(std::move(f), anchor);
     if (!made) young_.localize_oldest(log_, maps);
   }
   /// Passes a tracked frame to the shutter observer.

@@ -12,6 +12,7 @@
 #include <orbis/slam/detail/mapping/keyframe_insertion.hpp>
 #include <orbis/slam/detail/tracking/monocular_start.hpp>
 #include <orbis/slam/ids.hpp>
+#include <orbis/slam/map.hpp>
 #include <orbis/slam/measure.hpp>
 #include <orbis/slam/track_result.hpp>
 
@@ -21,7 +22,6 @@ namespace orbis::slam::detail {
 template <class Context>
 class map_start {
   using frame_type = typename Context::frame_type;
-  using atlas_type = typename Context::atlas_type;
   using descriptor = typename Context::descriptor_type;
   using task = typename Context::task;
 

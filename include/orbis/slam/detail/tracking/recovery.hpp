@@ -10,10 +10,12 @@
 #include <vector>
 
 #include <orbis/core/se3.hpp>
+#include <orbis/slam/detail/depth/alignment.hpp>
 #include <orbis/slam/detail/depth/depth_tracker.hpp>
-#include <orbis/slam/detail/mapping/keyframe_insertion.hpp>
 #include <orbis/slam/detail/tracking/frame_refinement.hpp>
 #include <orbis/slam/ids.hpp>
+#include <orbis/slam/measure.hpp>
+#include <orbis/slam/options.hpp>
 #include <orbis/slam/track_result.hpp>
 
 namespace orbis::slam::detail {
@@ -44,7 +46,7 @@ class recovery {
     frame_type& f = t.frame;
     f.T_world_camera = aligned.at.T_world_camera;
     c_.moving.clear();
-    refinement_.follow_rows(t);
+    refinement_.correct_rows(t);
     if (c_.search.by_motion(f, t.map(), c_.last, aligned.at.T_world_camera, c_.moving) == 0)
       f.T_world_camera = aligned.at.T_world_camera;
     const std::size_t inliers = refinement_.match_local_map(t, 3.0 * c_.settings.search_radius);

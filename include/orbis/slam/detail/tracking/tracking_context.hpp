@@ -9,7 +9,6 @@
 #include <vector>
 
 #include <orbis/camera/model.hpp>
-#include <orbis/camera/shutter.hpp>
 #include <orbis/core/se3.hpp>
 #include <orbis/slam/atlas.hpp>
 #include <orbis/slam/camera_rig.hpp>
@@ -21,6 +20,7 @@
 #include <orbis/slam/detail/tracking/motion_model.hpp>
 #include <orbis/slam/detail/tracking/patch_tracker.hpp>
 #include <orbis/slam/detail/tracking/tracker.hpp>
+#include <orbis/slam/frame.hpp>
 #include <orbis/slam/ids.hpp>
 #include <orbis/slam/matchers.hpp>
 #include <orbis/slam/measure.hpp>
@@ -29,23 +29,31 @@
 
 namespace orbis::slam::detail {
 
-/// A frame to localise, and its environment.
+/// A frame to localise, which is changed and finally moved from, and its environment. Only `localized` may be empty.
 template <feature_descriptor D>
 struct tracking_task {
   basic_frame<D>& frame;
   basic_atlas<D>& maps;
   bool is_frozen = false;  ///< the maps are not changed, and no map is begun
-  bool may_grow = true;    ///< keyframes may be added to a map that exists
+  /// Returns true if the back end takes another keyframe of a map that exists.
+  std::function<bool()> has_room;
   /// Sets the measurements of a rolling shutter's rows (`as_read`), given the motion.
-  std::function<void(basic_frame<D>&, const frame_motion&)> follow_rows;
+  std::function<void(basic_frame<D>&, const frame_motion&)> read_rows;
   /// Returns the ids of the `count` keyframes with the most similar appearance.
   std::function<std::vector<map_keyframe>(const decltype(basic_frame<D>::features)&, std::size_t count)> find_similar;
   /// Called for a map with few keyframes when another one becomes active.
   std::function<void(map_id)> drop_map;
-  /// Called when the pose is estimated, before a keyframe is made. May be empty.
+  /// Called when the pose is estimated, before a keyframe is made.
   std::function<void()> localized;
 
   [[nodiscard]] basic_map<D>& map() const { return maps.active(); }
+};
+
+/// A pose relative to a keyframe, with which it moves.
+struct anchored_pose {
+  map_keyframe reference;
+  se3 T_reference_camera;  ///< translation divided by the scale of the reference
+  double scale = 1.0;      ///< of the reference when the pose was last used
 };
 
 /// The tools of tracking and its memory between frames: the last frame, its reference keyframe and the motion.
@@ -87,13 +95,14 @@ struct tracking_context {
   [[nodiscard]] bool is_tracking() const noexcept {
     return state == track_state::tracking || state == track_state::relocalized;
   }
-  /// Returns the map that contains the last frame; only then can a pose be predicted from it.
-  [[nodiscard]] map_id last_map(const atlas_type& maps) const { return maps.current(last_reference_).map; }
-  [[nodiscard]] const map_keyframe& last_reference() const noexcept { return last_reference_; }
-  [[nodiscard]] const se3& T_reference_last() const noexcept { return T_reference_last_; }
+  /// The pose of the last frame.
+  [[nodiscard]] const anchored_pose& anchor() const noexcept { return anchor_; }
+  /// The map that contains the last frame; a pose can be predicted from it only there.
+  [[nodiscard]] map_id last_map(const atlas_type& maps) const { return maps.current(anchor_.reference).map; }
   /// The current pose of the last frame; it follows later corrections of its keyframe.
   [[nodiscard]] se3 last_pose(const atlas_type& maps) const {
-    return frame_log::pose({last.timestamp, last_reference_, T_reference_last_}, maps).value_or(last.T_world_camera);
+    return frame_log::pose({last.timestamp, anchor_.reference, anchor_.T_reference_camera}, maps)
+        .value_or(last.T_world_camera);
   }
 
   /// Predicts `T_world_camera` of a frame by constant velocity.
@@ -120,30 +129,31 @@ struct tracking_context {
     reference = now;
     if (!maps.contains(now.map)) return;
     last.T_world_camera = last_pose(maps);
-    const map_keyframe k = maps.current(last_reference_);
+    const map_keyframe k = maps.current(anchor_.reference);
     if (k.map == now.map && maps.at(now.map).remembers(k.keyframe)) {
       const double scale = maps.at(now.map).scale(k.keyframe);
-      const double grown = scale / std::exchange(last_scale_, scale);
+      const double grown = scale / std::exchange(anchor_.scale, scale);
       motion.scale_by(grown);
       set_block(last.twist, 0, 0, head<3>(last.twist) * grown);
     }
     reference.keyframe = maps.at(now.map).replacement(now.keyframe);
   }
 
-  /// Stores a tracked frame relative to the reference, before it becomes `last`; updates the motion.
-  void refer_last_to_reference(const frame_type& f, const atlas_type& maps) {
+  /// Returns the pose of a tracked frame relative to the reference.
+  [[nodiscard]] anchored_pose refer(const frame_type& f, const atlas_type& maps) const {
+    const basic_keyframe<D>& k = maps.active().at(reference.keyframe);
+    return {reference, scaled(k.T_world_camera.inverse() * f.T_world_camera, 1.0 / k.scale), k.scale};
+  }
+  /// Makes a tracked frame the last one, and updates the motion, which is unknown unless the frame follows the last.
+  void set_last(frame_type&& f, const anchored_pose& anchor) {
     if (last.index + 1 == f.index && state == track_state::tracking && last.size() != 0)
       motion.set({last.timestamp, last.T_world_camera}, {f.timestamp, f.T_world_camera});
-    last_reference_ = reference;
-    const basic_keyframe<D>& k = maps.active().at(reference.keyframe);
-    last_scale_ = k.scale;
-    T_reference_last_ = scaled(k.T_world_camera.inverse() * f.T_world_camera, 1.0 / k.scale);
+    anchor_ = anchor;
+    last = std::move(f);
   }
 
  private:
-  map_keyframe last_reference_;  ///< the reference of the last frame ...
-  double last_scale_ = 1.0;      ///< ... the scale of that keyframe at the last update ...
-  se3 T_reference_last_;         ///< ... and the frame's pose relative to it, translation divided by its scale
+  anchored_pose anchor_;  ///< of `last`
 };
 
 }  // namespace orbis::slam::detail
