@@ -391,13 +391,23 @@ std::optional<orbis::vec3> parse_vector(const std::string& text) {
   return p;
 }
 
-}  // namespace
+/// Commands, options, and the settings that they set.
+struct command_line {
+  command_line();
+  command_line(const command_line&) = delete;  // options refer to members
+  command_line& operator=(const command_line&) = delete;
+  ~command_line() = default;
+  /// As read_command_line; any number of times.
+  [[nodiscard]] std::variant<settings, exit_code> read(int argc, char** argv);
 
-std::variant<settings, exit_code> read_command_line(int argc, char** argv) {
   settings s;
   std::string origin, gravity, from, to;
-
   CLI::App cli{"RGB-D SLAM and mapping: from a recording to a trajectory, a cloud and an octree map", "rgbd_slam"};
+  CLI::App *run = nullptr, *demo = nullptr, *live = nullptr, *eval = nullptr, *map = nullptr, *way = nullptr,
+           *trial = nullptr, *calibration = nullptr;
+};
+
+command_line::command_line() {
   cli.require_subcommand(1);
   cli.footer(
       "Exit codes: 0 success, 1 bad usage, or a failed run (benchmark), 2 unreadable or damaged input (or\n"
@@ -405,7 +415,7 @@ std::variant<settings, exit_code> read_command_line(int argc, char** argv) {
       "loaded map, 4 no path (plan), 5 the motion does not determine the camera (calibrate).\n"
       "An interrupted run keeps its results so far (130).");
 
-  CLI::App* run = cli.add_subcommand(
+  run = cli.add_subcommand(
       "run", "SLAM on a recording (TUM, 7-Scenes, ICL-NUIM, ScanNet; stereo or monocular: KITTI, ASL, images)");
   run->add_option("DATASET", s.input, "folder of the recording, ROS bag (.bag, .mcap, .db3 or folder), or video")
       ->required()
@@ -416,7 +426,7 @@ std::variant<settings, exit_code> read_command_line(int argc, char** argv) {
   add_slam_options(*run, s);
   add_viewer_options(*run, s);
 
-  CLI::App* demo = cli.add_subcommand("demo", "SLAM on a synthetic room made on the fly, with ground truth");
+  demo = cli.add_subcommand("demo", "SLAM on a synthetic room made on the fly, with ground truth");
   add_sensor_option(*demo, s, {"auto", "rgbd", "stereo", "mono"});
   add_frame_options(*demo, s);
   count(*demo, "--width", s.width, "width of the images, pixels; the height is 3/4 of it", 160, 1920)
@@ -434,7 +444,7 @@ std::variant<settings, exit_code> read_command_line(int argc, char** argv) {
   add_slam_options(*demo, s);
   add_viewer_options(*demo, s);
 
-  CLI::App* live = cli.add_subcommand("live", "SLAM with a live camera, until Ctrl-C or until it is disconnected");
+  live = cli.add_subcommand("live", "SLAM with a live camera, until Ctrl-C or until it is disconnected");
   live->add_option(
           "DEVICE", s.input,
           "URI of a depth camera (OpenNI2: Astra, Xtion, PrimeSense) or .oni file; /dev/video0 or 0 for a video "
@@ -448,14 +458,13 @@ std::variant<settings, exit_code> read_command_line(int argc, char** argv) {
   add_viewer_options(*live, s);
   live->footer(build_features());
 
-  CLI::App* eval =
-      cli.add_subcommand("eval", "compare a trajectory with ground truth (TUM, EuRoC or KITTI format): ATE and RPE");
+  eval = cli.add_subcommand("eval", "compare a trajectory with ground truth (TUM, EuRoC or KITTI format): ATE and RPE");
   eval->add_option("TRAJECTORY", s.input, "estimated trajectory")->required()->type_name("");
   eval->add_option("GROUNDTRUTH", s.reference, "reference trajectory")->required()->type_name("");
   eval->add_flag("--json", s.json, "print JSON");
   eval->add_flag("--scale", s.with_scale, "also estimate the scale, for monocular trajectories");
 
-  CLI::App* map = cli.add_subcommand("map", "cloud -> filter -> octree, without SLAM");
+  map = cli.add_subcommand("map", "cloud -> filter -> octree, without SLAM");
   map->add_option("INPUT", s.input, "cloud (.ply, .pcd), or folder of a recording with ground-truth poses")
       ->required()
       ->type_name("");
@@ -468,14 +477,13 @@ std::variant<settings, exit_code> read_command_line(int argc, char** argv) {
   add_frame_options(*map, s);
   add_map_options(*map, s);
 
-  CLI::App* way = cli.add_subcommand("plan", "find the shortest path of a robot in an octree map");
+  way = cli.add_subcommand("plan", "find the shortest path of a robot in an octree map");
   add_plan_options(*way, s, from, to);
 
-  CLI::App* trial = cli.add_subcommand("benchmark", "run all recordings in folders, and print a table of the results");
+  trial = cli.add_subcommand("benchmark", "run all recordings in folders, and print a table of the results");
   add_benchmark_options(*trial, s);
 
-  CLI::App* calibration =
-      cli.add_subcommand("calibrate", "estimate the camera's intrinsics and depth scale from a recording");
+  calibration = cli.add_subcommand("calibrate", "estimate the camera's intrinsics and depth scale from a recording");
   add_calibration_options(*calibration, s);
 
   for (CLI::App* cmd : {run, live, demo, map}) add_robot_options(*cmd, s);
@@ -489,7 +497,11 @@ std::variant<settings, exit_code> read_command_line(int argc, char** argv) {
     cmd->add_option("--config", s.config, "read options from a TOML file, such as resolution = 0.02")
         ->type_name("FILE");
   for (CLI::App* cmd : {run, live, demo, eval, map, way, calibration, trial}) cmd->get_formatter()->column_width(28);
+}
 
+std::variant<settings, exit_code> command_line::read(int argc, char** argv) {
+  s = {};
+  for (std::string* const text : {&origin, &gravity, &from, &to}) text->clear();
   const auto is_asked_for = [&](const CLI::App* command) { return command->get_name() == argv[1]; };
   if (argc > 1 && argv[1][0] != '-' && cli.get_subcommands(is_asked_for).empty())
     return report_error(
@@ -535,5 +547,9 @@ std::variant<settings, exit_code> read_command_line(int argc, char** argv) {
   if (const std::string what = contradiction(s); !what.empty()) return report_error(what, bad_usage);
   return s;
 }
+
+}  // namespace
+
+std::variant<settings, exit_code> read_command_line(int argc, char** argv) { return command_line{}.read(argc, argv); }
 
 }  // namespace app

@@ -4,16 +4,13 @@
 // within its bounds, or one line that says what is wrong.
 #include <algorithm>
 #include <array>
+#include <cstddef>
 #include <cstdint>
-#include <cstdio>
-#include <cstdlib>
-#include <filesystem>
-#include <fstream>
 #include <string>
 #include <string_view>
-#include <system_error>
 #include <variant>
 
+#include <sys/mman.h>
 #include <unistd.h>
 
 // Its source, so that the fuzzer sees into it.
@@ -24,52 +21,48 @@ namespace {
 
 using namespace orbis;
 
-/// A file of this process, gone when the program is.
-class own_file {
+/// A file in memory: on a disk, files take longer to write than to read.
+class memory_file {
  public:
-  own_file() : path_{std::filesystem::temp_directory_path() / ("orbis_fuzz_" + std::to_string(::getpid()) + ".toml")} {}
-  own_file(const own_file&) = delete;
-  own_file& operator=(const own_file&) = delete;
-  ~own_file() {
-    std::error_code ignored;
-    std::filesystem::remove(path_, ignored);
-  }
-  [[nodiscard]] std::string path() const { return path_.string(); }
+  memory_file() : file_{::memfd_create("orbis_fuzz", 0)} { fuzz::require(file_ >= 0, "there is memory for a file"); }
+  memory_file(const memory_file&) = delete;
+  memory_file& operator=(const memory_file&) = delete;
+  ~memory_file() { ::close(file_); }
+  [[nodiscard]] int descriptor() const { return file_; }
+  [[nodiscard]] std::string path() const { return "/proc/self/fd/" + std::to_string(file_); }
   void write(std::string_view bytes) const {
-    std::error_code ignored;
-    std::filesystem::remove(path_, ignored);  // cutting a file short makes some file systems write it out at once
-    std::ofstream out{path_, std::ios::binary};
-    out.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-    fuzz::require(out.good(), "the file can be written");
+    const bool is_written = ::ftruncate(file_, 0) == 0 &&
+                            ::pwrite(file_, bytes.data(), bytes.size(), 0) == static_cast<::ssize_t>(bytes.size());
+    fuzz::require(is_written, "the file can be written");
+  }
+  /// What was written through the descriptor since it was empty.
+  [[nodiscard]] std::string content() const {
+    std::string text(static_cast<std::size_t>(::lseek(file_, 0, SEEK_CUR)), '\0');
+    fuzz::require(::pread(file_, text.data(), text.size(), 0) == static_cast<::ssize_t>(text.size()),
+                  "the file can be read");
+    return text;
   }
 
  private:
-  std::filesystem::path path_;
+  int file_;
 };
 
 /// What `work` writes on the standard error.
 template <class Work>
 [[nodiscard]] std::string complaint_of(Work&& work) {
-  static std::FILE* const file = std::tmpfile();
-  fuzz::require(file != nullptr && ::ftruncate(::fileno(file), 0) == 0, "a temporary file can be written");
-  ::lseek(::fileno(file), 0, SEEK_SET);
-  const int kept = ::dup(STDERR_FILENO);
-  const auto restore = [&] {
-    ::dup2(kept, STDERR_FILENO);
-    ::close(kept);
-  };
-  ::dup2(::fileno(file), STDERR_FILENO);
+  static const memory_file file;
+  static const int kept = ::dup(STDERR_FILENO);
+  fuzz::require(::ftruncate(file.descriptor(), 0) == 0, "a file can be emptied");
+  ::lseek(file.descriptor(), 0, SEEK_SET);
+  ::dup2(file.descriptor(), STDERR_FILENO);
   try {
     work();
   } catch (...) {  // which is to be seen
-    restore();
+    ::dup2(kept, STDERR_FILENO);
     throw;
   }
-  restore();
-  std::string said(static_cast<std::size_t>(::lseek(::fileno(file), 0, SEEK_CUR)), '\0');
-  fuzz::require(::pread(::fileno(file), said.data(), said.size(), 0) == static_cast<::ssize_t>(said.size()),
-                "a temporary file can be read");
-  return said;
+  ::dup2(kept, STDERR_FILENO);
+  return file.content();
 }
 
 template <class List, class T>
@@ -99,7 +92,7 @@ void check(const app::settings& s) {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   if (size == 0) return 0;
-  static const own_file file;
+  static const memory_file file;
   file.write({reinterpret_cast<const char*>(data) + 1, size - 1});
   constexpr std::array commands{"run", "demo", "live", "map"};
   std::array<std::string, 7> words{"rgbd_slam", commands[data[0] % 4U], "--out", "somewhere", "--config", file.path(),
@@ -108,8 +101,10 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   std::transform(words.begin(), words.end(), arguments.begin(), [](std::string& w) { return w.data(); });
   const int count = words[1] == "demo" ? 6 : 7;  // which has no recording
 
+  // Kept: its hundreds of options take a hundred times as long to make as to use.
+  static app::command_line line;
   std::variant<app::settings, app::exit_code> got;
-  const std::string said = complaint_of([&] { got = app::read_command_line(count, arguments.data()); });
+  const std::string said = complaint_of([&] { got = line.read(count, arguments.data()); });
   if (const auto* const s = std::get_if<app::settings>(&got)) {
     fuzz::accept();
     fuzz::require(said.empty(), "there is nothing to complain about");
