@@ -50,7 +50,7 @@ void check(std::string_view bytes, Decode&& decode) {
   fuzz::accept();
   const image<Pixel>& pixels = **got;
   fuzz::require(!pixels.empty(), "an image has pixels");
-  if (pixels.pixels().size() > 65536) return;  // it takes long
+  if (pixels.pixels().size() > 8192) return;  // it takes long
   const auto again = decode(io::encode_png(pixels));
   fuzz::require(again && *again == pixels, "what was read is written and read to the same pixels");
 }
@@ -59,9 +59,11 @@ void check(std::string_view bytes, Decode&& decode) {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::string file{reinterpret_cast<const char*>(data), size};
-  for (const std::string& bytes : {file, with_checksums(file)}) {
+  const auto check_both = [](const std::string& bytes) {
     check<rgb8>(bytes, [](std::string_view b) { return io::decode_png_color(b); });
     check<std::uint16_t>(bytes, [](std::string_view b) { return io::decode_png_depth(b); });
-  }
+  };
+  check_both(file);
+  if (const std::string right = with_checksums(file); right != file) check_both(right);
   return 0;
 }
