@@ -354,7 +354,7 @@ TEST_CASE("A rolling shutter costs little where it is known, and much where it i
 TEST_CASE("Depth that lags or comes early is found to two milliseconds") {
   io::synthetic_options o{.frames = 420, .fps = 30.0, .seed = 3, .width = 320, .height = 240, .frames_around = 400};
   o.path.jitter = 3.0;
-  for (const double delay : {-0.015, -0.008, 0.0, 0.008, 0.015}) {
+  for (const double delay : {-0.015, 0.0, 0.008}) {
     o.sensor.shutter.depth_delay = delay;
     const io::synthetic_recording frames{o};
     slam::options settings;
