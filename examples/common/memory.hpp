@@ -90,8 +90,10 @@ inline void limit_memory() {
 
 /// The message of a program that ends with the exception `e`.
 [[nodiscard]] inline std::string describe_exception(const std::exception& e) {
-  const bool no_memory = dynamic_cast<const std::bad_alloc*>(&e) != nullptr;
-  return no_memory ? "out of memory" : e.what();
+  if (dynamic_cast<const std::bad_alloc*>(&e) != nullptr) return "out of memory";
+  const auto* const system = dynamic_cast<const std::system_error*>(&e);
+  const bool no_thread = system != nullptr && system->code() == std::errc::resource_unavailable_try_again;
+  return no_thread ? "no thread can be started: " + std::string{e.what()} : e.what();
 }
 
 }  // namespace examples

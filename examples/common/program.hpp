@@ -9,6 +9,10 @@
 #include <optional>
 #include <string>
 
+#if __has_include(<fcntl.h>)
+#include <fcntl.h>
+#endif
+
 #include <CLI/CLI.hpp>
 
 #include <orbis/core/quote.hpp>
@@ -30,12 +34,26 @@ namespace examples {
   }
 }
 
+/// Occupies the standard streams that are closed: otherwise the next files that are opened become standard streams, and
+/// messages are written into them. Reading and writing still fail.
+inline void occupy_standard_streams() {
+#if __has_include(<fcntl.h>)
+  for (const int stream : {0, 1, 2})
+    if (::fcntl(stream, F_GETFD) < 0) static_cast<void>(::open("/dev/null", stream == 0 ? O_WRONLY : O_RDONLY));
+#endif
+}
+
 /// Runs `body`, which returns the exit code of the program. The code is 2 if the body throws (memory, threads), or if
-/// standard output cannot be written. A closed pipe does not end the program; memory is limited to what is free.
+/// standard output cannot be written. A closed pipe and the size limit of files do not end the program; memory is
+/// limited to what is free.
 template <class Body>
 [[nodiscard]] int run_program(const char* program, Body&& body) {
+  occupy_standard_streams();
 #ifdef SIGPIPE
   std::signal(SIGPIPE, SIG_IGN);
+#endif
+#ifdef SIGXFSZ
+  std::signal(SIGXFSZ, SIG_IGN);
 #endif
   int code = 2;
   try {

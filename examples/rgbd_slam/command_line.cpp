@@ -419,6 +419,7 @@ command_line::command_line() {
       "run", "SLAM on a recording (TUM, 7-Scenes, ICL-NUIM, ScanNet; stereo or monocular: KITTI, ASL, images)");
   run->add_option("DATASET", s.input, "folder of the recording, ROS bag (.bag, .mcap, .db3 or folder), or video")
       ->required()
+      ->check(not_empty)
       ->type_name("");
   add_recording_options(*run, s);
   add_frame_options(*run, s);
@@ -495,6 +496,7 @@ command_line::command_line() {
         ->type_name("X,Y,Z");
   for (CLI::App* cmd : {run, live, demo, map})
     cmd->add_option("--config", s.config, "read options from a TOML file, such as resolution = 0.02")
+        ->check(not_empty)
         ->type_name("FILE");
   for (CLI::App* cmd : {run, live, demo, eval, map, way, calibration, trial}) cmd->get_formatter()->column_width(28);
 }

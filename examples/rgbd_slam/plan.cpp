@@ -2,13 +2,16 @@
 //
 // Plans a path through a map file for a ball, an upright cylinder, or a robot that drives on the floor.
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <limits>
 #include <optional>
+#include <set>
 #include <span>
 #include <string>
 #include <string_view>
@@ -25,6 +28,7 @@
 #include <orbis/nav/robot_shape.hpp>
 #include <orbis/octree/files.hpp>
 
+#include "../common/memory.hpp"
 #include "commands.hpp"
 #include "formatted_text.hpp"
 #include "navigation.hpp"
@@ -86,6 +90,28 @@ orbis::octree::bounding_box box_to_search(const octree& map, const settings& s) 
     if (map.grid().key(p)) take(p, 0.0);
   const double margin = 1.0 + 2 * s.robot_radius;
   return {(box.min.array() - margin).matrix(), (box.max.array() + margin).matrix()};
+}
+
+/// The memory that the distance field may take, in bytes: that of all blocks of the size of its reach that contain an
+/// obstacle or are next to one. O(leaves).
+double most_field_bytes(const octree& map, double reach) {
+  const auto block_of = [&](double x) { return static_cast<std::int64_t>(std::floor(x / reach)); };
+  std::set<std::array<std::int64_t, 3>> occupied, near;
+  map.for_each_leaf([&](const octree::leaf& leaf) {
+    if (!leaf.occupied) return;
+    std::array<std::int64_t, 3> low{}, high{};
+    for (int i = 0; i != 3; ++i) {
+      low[static_cast<std::size_t>(i)] = block_of(leaf.center[i] - 0.5 * leaf.size);
+      high[static_cast<std::size_t>(i)] = block_of(leaf.center[i] + 0.5 * leaf.size);
+    }
+    for (auto z = low[2]; z <= high[2]; ++z)
+      for (auto y = low[1]; y <= high[1]; ++y)
+        for (auto x = low[0]; x <= high[0]; ++x) occupied.insert({x, y, z});
+  });
+  for (const auto& [x, y, z] : occupied)
+    for (int n = 0; n != 27; ++n) near.insert({x + n % 3 - 1, y + n / 3 % 3 - 1, z + n / 9 - 1});
+  const double edge = reach / map.resolution();
+  return static_cast<double>(near.size()) * edge * edge * edge * sizeof(std::uint16_t);
 }
 
 // -- why there is no path
@@ -235,7 +261,13 @@ exit_code plan(const settings& s, console& console) {
     if (!made) return give_up({made.error().code, s.input.string(), made.error().message});
     floor = *std::move(made);
   } else {
-    field.emplace(*map, nav::distance_field_options{.reach = field_reach(s.robot_radius, cell), .unknown = unknown});
+    const double reach = field_reach(s.robot_radius, cell), most = most_field_bytes(*map, reach);
+    if (const auto memory = examples::free_memory(); memory && most > static_cast<double>(*memory))
+      return give_up({orbis::errc::invalid_argument, s.input.string(),
+                      text("the distances around its obstacles, up to %.2f m in voxels of %g mm, may take %.1f GB, more "
+                           "than there is",
+                           reach, 1000 * cell, 1e-9 * most)});
+    field.emplace(*map, nav::distance_field_options{.reach = reach, .unknown = unknown});
   }
   console.finish(floor ? "floor map" : "distance field");
 

@@ -56,6 +56,28 @@ foreach(name trajectory.txt map.bt report.html summary.json)
   check(EXISTS ${WORK}/piped/${name})
 endforeach()
 file(REMOVE_RECURSE ${WORK}/piped)
+# Closed streams: the files of the run do not become standard streams, into which progress is printed.
+set(same run good --resolution 0.2 --filter none --deterministic --depth-memory 0)
+app(0 ${same} --out open)
+execute_process(COMMAND bash -c "exec \"$@\" <&- >&- 2>&-" closed ${APP} ${same} --out shut WORKING_DIRECTORY ${WORK}
+                RESULT_VARIABLE result)
+check(result EQUAL 2)  # standard output cannot be written
+foreach(name cloud.ply map.bt trajectory.txt)
+  execute_process(COMMAND ${CMAKE_COMMAND} -E compare_files open/${name} shut/${name} WORKING_DIRECTORY ${WORK}
+                  RESULT_VARIABLE differ)
+  check(differ EQUAL 0)
+endforeach()
+file(REMOVE_RECURSE ${WORK}/open ${WORK}/shut)
+# A file that may not grow: one line, and nothing half-written.
+execute_process(COMMAND bash -c "ulimit -f 100; exec \"$@\"" limited ${APP} run good --out out --quiet
+                WORKING_DIRECTORY ${WORK} RESULT_VARIABLE result ERROR_VARIABLE err)
+check(result EQUAL 2)
+check(err MATCHES "^rgbd_slam: [^\n]*File too large\n$")
+check(NOT EXISTS ${WORK}/out/summary.json)
+file(REMOVE_RECURSE ${WORK}/out)
+execute_process(COMMAND bash -c "\"${APP}\" run good --out out --config ''; \"${APP}\" run '' --out out" ERROR_VARIABLE err
+                WORKING_DIRECTORY ${WORK})
+check(err MATCHES "^rgbd_slam: --config: must not be empty[^\n]*\nrgbd_slam: DATASET: must not be empty[^\n]*\n$")
 string(REPEAT "x" 1900 long)
 app(2 run ${long} --out out)
 string(LENGTH "${err}" length)

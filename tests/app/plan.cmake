@@ -152,3 +152,20 @@ check(length LESS 1200)
 file(STRINGS ${WORK}/way.txt lines)
 list(GET lines -1 last)
 check(last MATCHES "^1.900000 -1.600000 0.[01]0")  # on the floor, whatever height was asked for
+
+# Obstacles far apart in a fine map: the distances around them would fill the memory.
+set(points "")
+foreach(i RANGE 9)
+  foreach(j RANGE 9)
+    foreach(k RANGE 9)
+      math(EXPR x "3 * ${i} - 13")
+      math(EXPR y "3 * ${j} - 13")
+      math(EXPR z "3 * ${k} - 13")
+      string(APPEND points "${x} ${y} ${z}\n")
+    endforeach()
+  endforeach()
+endforeach()
+file(WRITE ${WORK}/apart.ply "ply\nformat ascii 1.0\nelement vertex 1000\nproperty float x\nproperty float y\nproperty float z\nend_header\n${points}")
+app(0 map apart.ply --out apart --resolution 0.001 --filter none --quiet)
+app_fails(2 "apart/map.bt: the distances around its obstacles.* GB, more than there is" plan apart/map.bt --from 0,0,1 --to 9,9,1
+          --unknown free)
