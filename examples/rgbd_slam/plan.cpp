@@ -263,10 +263,11 @@ exit_code plan(const settings& s, console& console) {
   } else {
     const double reach = field_reach(s.robot_radius, cell), most = most_field_bytes(*map, reach);
     if (const auto memory = examples::free_memory(); memory && most > static_cast<double>(*memory))
-      return give_up({orbis::errc::invalid_argument, s.input.string(),
-                      text("the distances around its obstacles, up to %.2f m in voxels of %g mm, may take %.1f GB, more "
-                           "than there is",
-                           reach, 1000 * cell, 1e-9 * most)});
+      return give_up(
+          {orbis::errc::invalid_argument, s.input.string(),
+           text("the distances around its obstacles, up to %.2f m in voxels of %g mm, may take %.1f GB, more "
+                "than there is",
+                reach, 1000 * cell, 1e-9 * most)});
     field.emplace(*map, nav::distance_field_options{.reach = reach, .unknown = unknown});
   }
   console.finish(floor ? "floor map" : "distance field");
