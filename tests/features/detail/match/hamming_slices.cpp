@@ -31,9 +31,9 @@ struct slice_kernel {
                                       std::size_t rank, sliced& out) {
     constexpr std::size_t words = slice_words<Target>;
     const auto table = std::make_unique<slice_table<words>>();
-    make_slice_table(trains, *table);
+    make_slice_table<Target>(trains, *table);
     slice_query selected{};
-    make_slice_query(query, selected);
+    make_slice_query<Target>(query, selected);
     slice_distances<words> distances{}, least{};
     slice<words> below{}, again{}, lower{}, valid{};
     slice_count<Target>(*table, selected, limit, distances, below);

@@ -79,11 +79,12 @@ ORBIS_ALWAYS_INLINE void search_slices(std::span<const D> queries, std::span<con
   ();
   tables.resize(1);
   workspace.queries.resize(queries.size());
-  for (std::size_t q = 0; q != queries.size(); ++q) make_slice_query(as_words(queries[q]), workspace.queries[q]);
+  for (std::size_t q = 0; q != queries.size(); ++q)
+    make_slice_query<Target>(as_words(queries[q]), workspace.queries[q]);
   slice_table<Words>& table = tables.front();
   for (std::size_t begin = 0; begin < trains.size(); begin += 64 * Words) {
     const auto block = trains.subspan(begin, std::min<std::size_t>(64 * Words, trains.size() - begin));
-    make_slice_table(block, table);
+    make_slice_table<Target>(block, table);
     slice<Words> valid;
     for (std::size_t t = 0; t != block.size(); ++t) valid.words[t / 64] |= std::uint64_t{1} << (t % 64);
     slice_distances<Words> least;

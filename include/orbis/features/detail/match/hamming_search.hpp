@@ -15,8 +15,7 @@
 
 namespace orbis::features::detail {
 
-inline constexpr std::size_t slice_groups = 88;
-inline constexpr std::size_t slice_rounds = slice_groups / 8;
+inline constexpr std::size_t slice_groups = 128;
 
 /// One bit of each of `64 * Words` trains.
 template <std::size_t Words>
@@ -24,19 +23,17 @@ struct alignas(8 * Words) slice {
   std::array<std::uint64_t, Words> words{};
 };
 
-/// Precomputed counts of a group of three bits, by the pattern of the query's bits.
+/// Precomputed counts of groups of three bits, by the pattern of the query's bits.
 template <std::size_t Words>
-struct slice_group {
-  std::array<slice<Words>, 8> majority;  ///< set if at least two of the three bits differ
-  std::array<slice<Words>, 2> parity;    ///< set if one or three bits differ, by the parity of the pattern
+struct slice_table {
+  std::array<std::array<slice<Words>, 8>, slice_groups> majority;  ///< set if at least two of the three bits differ
+  std::array<slice<Words>, 2> parity;  ///< set if the distance is odd, by the parity of the query
 };
-template <std::size_t Words>
-using slice_table = std::array<slice_group<Words>, slice_groups>;
 
-/// Positions of a query's slices: offsets into the two arrays of each group, in units of a 32nd of a slice.
+/// Positions of a query's slices.
 struct slice_query {
-  std::array<std::uint8_t, slice_groups> majority;
-  std::array<std::uint8_t, slice_groups> parity;
+  std::array<std::uint8_t, slice_groups> majority;  ///< offsets into a group, in units of a 32nd of a slice
+  std::uint64_t parity;
 };
 
 /// Reusable memory of `hamming_nearest`.

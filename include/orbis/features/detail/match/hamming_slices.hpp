@@ -2,24 +2,24 @@
 /// @file
 /// Bit-sliced Hamming distances of one query to 256 or 512 trains at once.
 ///
-/// Trains are stored by bit: a slice holds one bit of 256 trains, or of 512 with 512-bit registers. Three bits of a
-/// query form a group, a pattern from 0 to 7. For each group the query selects two slices from a table: the parity and
-/// the majority of the three differing bits, which together are their count. Full adders sum the counts of all groups
-/// in bit planes, so that one logic instruction processes one train per bit of a register. The table is built once per
-/// block of trains, for all queries. The adders follow Harley and Seal (Mula, Kurz, Lemire, "Faster population counts
-/// using AVX2 instructions", 2018); the selection by groups is the method of four Russians.
+/// Trains are stored by bit: a slice holds one bit of 256 trains, or of 512 with 512-bit registers. A full adder sums
+/// three differing bits to their parity and their majority, which counts two. The parities are summed in turn, so 128
+/// groups of three bits leave 128 majorities and one parity. The three bits of a query, a pattern from 0 to 7, select
+/// the majority of a group from a table, which is built once per block of trains, for all queries. Full adders sum the
+/// majorities in bit planes, so that one logic instruction processes one train per bit of a register. The adders follow
+/// Harley and Seal (Mula, Kurz, Lemire, "Faster population counts using AVX2 instructions", 2018); the selection by
+/// groups is the method of four Russians.
 #pragma once
 
 #include <array>
-#include <bit>
 #include <cstddef>
 #include <cstdint>
-#include <cstring>
 #include <span>
 #include <type_traits>
 
 #include <orbis/core/bits.hpp>
 #include <orbis/core/simd/dispatch.hpp>
+#include <orbis/core/simd/mask.hpp>
 #include <orbis/core/simd/vec.hpp>
 #include <orbis/features/detail/match/hamming_search.hpp>
 
@@ -50,12 +50,30 @@ inline void transpose_bits(std::array<std::uint64_t, 64>& m) noexcept {
   swap_blocks(std::integral_constant<std::size_t, 1>{}, 0x5555555555555555ULL);
 }
 
-/// Group `g` consists of bits `g`, `88 + g` and `176 + g`; the last eight groups lack the third bit, which counts as
-/// zero.
+/// Sets the slices of a group of three bits by the pattern of the query; returns the parity of the three.
+template <std::size_t Words>
+ORBIS_ALWAYS_INLINE slice<Words> make_slice_group(const slice<Words>& a, const slice<Words>& b, const slice<Words>& c,
+                                                  std::array<slice<Words>, 8>& group) noexcept {
+  slice<Words> parity;
+  for (std::size_t w = 0; w != Words; ++w) {
+    parity.words[w] = a.words[w] ^ b.words[w] ^ c.words[w];
+    for (std::size_t p = 0; p != 4; ++p) {
+      const std::uint64_t x = (p & 1U) != 0 ? ~a.words[w] : a.words[w];
+      const std::uint64_t y = (p & 2U) != 0 ? ~b.words[w] : b.words[w];
+      const std::uint64_t majority = (x & y) | ((x ^ y) & c.words[w]);
+      group[p].words[w] = majority;
+      group[7 - p].words[w] = ~majority;  // complement of all three bits
+    }
+  }
+  return parity;
+}
+
+/// Group `g` consists of bits `g`, `64 + g` and `128 + g`; group `64 + g` of bit `192 + g`, the parity of group `g`,
+/// and that of the group before.
 /// @pre at most 64 * Words trains
-template <std::size_t Words, bit_string D>
-void make_slice_table(std::span<const D> trains, slice_table<Words>& table) noexcept {
-  std::array<slice<Words>, 3 * slice_groups> rows{};
+template <class Target, std::size_t Words, bit_string D>
+ORBIS_ALWAYS_INLINE void make_slice_table(std::span<const D> trains, slice_table<Words>& table) noexcept {
+  std::array<slice<Words>, 256> rows{};
   for (std::size_t begin = 0; begin < trains.size(); begin += 64)
     for (std::size_t w = 0; w != 4; ++w) {
       std::array<std::uint64_t, 64> block{};
@@ -63,48 +81,28 @@ void make_slice_table(std::span<const D> trains, slice_table<Words>& table) noex
       transpose_bits(block);
       for (std::size_t b = 0; b != 64; ++b) rows[64 * w + b].words[begin / 64] = block[b];
     }
-  for (std::size_t g = 0; g != slice_groups; ++g)
-    for (std::size_t w = 0; w != Words; ++w) {
-      const std::uint64_t a = rows[g].words[w];
-      const std::uint64_t b = rows[slice_groups + g].words[w];
-      const std::uint64_t c = rows[2 * slice_groups + g].words[w];
-      table[g].parity[0].words[w] = a ^ b ^ c;
-      table[g].parity[1].words[w] = ~(a ^ b ^ c);
-      for (std::size_t p = 0; p != 4; ++p) {
-        const std::uint64_t x = (p & 1U) != 0 ? ~a : a;
-        const std::uint64_t y = (p & 2U) != 0 ? ~b : b;
-        const std::uint64_t majority = (x & y) | ((x ^ y) & c);
-        table[g].majority[p].words[w] = majority;
-        table[g].majority[7 - p].words[w] = ~majority;  // complement of all three bits
-      }
-    }
-}
-
-/// Expands bit `i` of a byte to byte `i` of a word, 0x20 if it is set.
-[[nodiscard]] constexpr std::uint64_t spread_bits(std::uint64_t byte) noexcept {
-  const std::uint64_t each = (byte * 0x0101010101010101ULL) & 0x8040201008040201ULL;
-  return ((each + 0x7f7f7f7f7f7f7f7fULL) & 0x8080808080808080ULL) >> 2U;
-}
-
-/// Stores the bytes of a word, lowest first.
-inline void store_bytes(std::uint8_t* to, std::uint64_t word) noexcept {
-  if constexpr (std::endian::native == std::endian::little) {
-    std::memcpy(to, &word, 8);
-  } else {
-    for (std::size_t k = 0; k != 8; ++k) to[k] = static_cast<std::uint8_t>(word >> (8 * k));
+  slice<Words> total;
+  for (std::size_t g = 0; g != 64; ++g) {
+    const slice<Words> parity = make_slice_group(rows[g], rows[64 + g], rows[128 + g], table.majority[g]);
+    total = make_slice_group(rows[192 + g], parity, total, table.majority[64 + g]);
   }
+  table.parity[0] = total;
+  for (std::size_t w = 0; w != Words; ++w) table.parity[1].words[w] = ~total.words[w];
 }
 
-inline void make_slice_query(const bit_words<256>& query, slice_query& to) noexcept {
-  std::array<std::uint8_t, 40> bytes{};
-  for (std::size_t w = 0; w != 4; ++w) store_bytes(bytes.data() + 8 * w, query[w]);
-  for (std::size_t i = 0; i != slice_rounds; ++i) {
-    const std::uint64_t a = spread_bits(bytes[i]);
-    const std::uint64_t b = spread_bits(bytes[slice_rounds + i]);
-    const std::uint64_t c = spread_bits(bytes[2 * slice_rounds + i]);
-    store_bytes(to.majority.data() + 8 * i, a | (b << 1U) | (c << 2U));
-    store_bytes(to.parity.data() + 8 * i, a ^ b ^ c);
-  }
+/// The patterns of the same groups.
+template <class Target>
+ORBIS_ALWAYS_INLINE void make_slice_query(const bit_words<256>& query, slice_query& to) noexcept {
+  using bytes = simd::vec<std::uint8_t, 64, Target>;
+  const auto spread = [](std::uint64_t bits, std::uint8_t weight) ORBIS_INLINE_LAMBDA {
+    return select(bytes::mask_type::from_bits(bits), bytes(weight), bytes(0));
+  };
+  const std::uint64_t parity = query[0] ^ query[1] ^ query[2];
+  std::uint64_t total = query[3] ^ parity;  // bit i becomes the parity of bits 0 to i
+  for (int shift = 1; shift != 64; shift *= 2) total ^= total << shift;
+  (spread(query[0], 0x20) | spread(query[1], 0x40) | spread(query[2], 0x80)).store(to.majority.data());
+  (spread(query[3], 0x20) | spread(parity, 0x40) | spread(total << 1U, 0x80)).store(to.majority.data() + 64);
+  to.parity = total >> 63U;
 }
 
 /// The number of words of a slice, and the register type for its bits.
@@ -171,58 +169,42 @@ ORBIS_ALWAYS_INLINE void compare_bit(V& below, const V& x, const V& y) noexcept 
   }
 }
 
-/// Computes the distances of a query to the trains of a table, and the trains whose distance is below `limit`. Each
-/// round adds sixteen slices: parities count one, majorities two.
+/// Computes the distances of a query to the trains of a table, and the trains whose distance is below `limit`.
 template <class Target>
 ORBIS_ALWAYS_INLINE void slice_count(const slice_table<slice_words<Target>>& table, const slice_query& query,
                                      std::uint32_t limit, slice_distances<slice_words<Target>>& distances,
                                      slice<slice_words<Target>>& below) noexcept {
   using plane = slice_plane<Target>;
-  using group_type = slice_group<slice_words<Target>>;
   constexpr std::size_t slice_bytes = sizeof(slice<slice_words<Target>>), unit = slice_bytes / 32;
   for (std::size_t part = 0; part != slice_bytes; part += sizeof(plane)) {
-    const plane zero(0);
-    plane one = zero, two = zero, four = zero, eight = zero, s16 = zero;
-    plane c32[slice_rounds];  // summed after the rounds
-    for (std::size_t g = 0; g != slice_groups; g += 8) {
-      const char* const group = reinterpret_cast<const char*>(table.data() + g) + part;
-      const auto parity = [&](std::size_t i) ORBIS_INLINE_LAMBDA {
-        const std::size_t at = i * sizeof(group_type) + sizeof(group_type::majority) + unit * query.parity[g + i];
-        return plane::load(reinterpret_cast<const std::uint64_t*>(group + at));
-      };
+    const plane one = plane::load(&table.parity[query.parity].words[part / 8]);
+    plane two(0), four(0), eight(0), s16(0), c32[slice_groups / 16];
+    for (std::size_t g = 0; g != slice_groups; g += 16) {
+      const char* const group = reinterpret_cast<const char*>(table.majority.data() + g) + part;
       const auto majority = [&](std::size_t i) ORBIS_INLINE_LAMBDA {
-        const std::size_t at = i * sizeof(group_type) + unit * query.majority[g + i];
+        const std::size_t at = i * 8 * slice_bytes + unit * query.majority[g + i];
         return plane::load(reinterpret_cast<const std::uint64_t*>(group + at));
       };
-      plane c2, c4, d4, e4, c8, d8, e8, c16;
-      // Two parities and a majority of each of the first four pairs, then the remaining majorities.
-      full_add(one, c2, parity(0), parity(1));
-      full_add(two, c4, c2, majority(0));
-      full_add(one, c2, parity(2), parity(3));
-      full_add(two, d4, c2, majority(1));
-      full_add(four, c8, c4, d4);
-      full_add(one, c2, parity(4), parity(5));
-      full_add(two, c4, c2, majority(2));
-      full_add(one, c2, parity(6), parity(7));
-      full_add(two, d4, c2, majority(3));
-      full_add(four, d8, c4, d4);
-      full_add(eight, c16, c8, d8);
-      full_add(two, c4, majority(4), majority(5));
-      full_add(two, e4, majority(6), majority(7));
-      full_add(four, e8, c4, e4);
-      half_add(eight, e8);
-      full_add(s16, c32[g / 8], c16, e8);
+      plane c4, d4, c8, d8, c16, d16;
+      const auto add_eight = [&](std::size_t i, plane& c) ORBIS_INLINE_LAMBDA {
+        full_add(two, c4, majority(i), majority(i + 1));
+        full_add(two, d4, majority(i + 2), majority(i + 3));
+        full_add(four, c8, c4, d4);
+        full_add(two, c4, majority(i + 4), majority(i + 5));
+        full_add(two, d4, majority(i + 6), majority(i + 7));
+        full_add(four, d8, c4, d4);
+        full_add(eight, c, c8, d8);
+      };
+      add_eight(0, c16);
+      add_eight(8, d16);
+      full_add(s16, c32[g / 16], c16, d16);
     }
-    plane s32 = zero, s64 = zero, s128 = zero, s256 = zero, c64[6], c128[3], c256, none;
-    for (std::size_t i = 0; i != 5; ++i) full_add(s32, c64[i], c32[2 * i], c32[2 * i + 1]);
-    c64[5] = c32[10];
-    half_add(s32, c64[5]);
-    for (std::size_t i = 0; i != 3; ++i) full_add(s64, c128[i], c64[2 * i], c64[2 * i + 1]);
-    full_add(s128, c256, c128[0], c128[1]);
-    half_add(s128, c128[2]);
-    full_add(s256, none, c256, c128[2]);
+    plane s32(0), s64(0), s128(0), s256, c64[4], c128[2];
+    for (std::size_t i = 0; i != 4; ++i) full_add(s32, c64[i], c32[2 * i], c32[2 * i + 1]);
+    for (std::size_t i = 0; i != 2; ++i) full_add(s64, c128[i], c64[2 * i], c64[2 * i + 1]);
+    full_add(s128, s256, c128[0], c128[1]);
     const std::size_t word = part / 8;
-    plane result = zero;
+    plane result(0);
     const auto keep = [&](const plane& x, std::size_t i) ORBIS_INLINE_LAMBDA {
       compare_bit(result, x, limit_plane<Target>(limit, i));
       x.store(&distances[i].words[word]);
