@@ -72,20 +72,23 @@ struct move {
 /// Moves all files into place, or none; returns 0 or an errno value. Makes system calls only.
 int rename_all(const std::vector<move>& moves) {
   for (std::size_t i = 0; i != moves.size(); ++i) {
-    if (::rename(moves[i].from.c_str(), moves[i].to.c_str()) == 0) continue;
+    const move& next = moves[i];
+    const bool is_there = ::access(next.from.c_str(), F_OK) == 0;
+    // Without a hard link to it, the old file is moved aside.
+    if (next.replaces && !next.has_old && is_there) ::rename(next.to.c_str(), next.old.c_str());
+    if (::rename(next.from.c_str(), next.to.c_str()) == 0) continue;
     const int why = errno;
-    if (why == ENOENT && ::access(moves[i].from.c_str(), F_OK) != 0 && ::access(moves[i].to.c_str(), F_OK) == 0)
+    if (why == ENOENT && !is_there && ::access(next.to.c_str(), F_OK) == 0)
       continue;  // done by a child process that was killed
-    while (i-- != 0)
-      if (const move& m = moves[i]; m.has_old)
+    for (std::size_t done = i + 1; done-- != 0;)
+      if (const move& m = moves[done]; m.replaces)
         ::rename(m.old.c_str(), m.to.c_str());
-      else if (!m.replaces)
+      else if (done != i)
         ::rename(m.to.c_str(), m.from.c_str());
     return why;
   }
   return 0;
 }
-
 /// Runs `rename_all` in a child process, which signals to this process or its end do not affect.
 int rename_all_in_child(const std::vector<move>& moves) {
   sigset_t all, before;
