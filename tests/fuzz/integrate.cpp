@@ -9,6 +9,7 @@
 #include <vector>
 
 #include <orbis/core/execution.hpp>
+#include <orbis/core/thread_pool.hpp>
 
 #include "fuzz/octree.hpp"
 #include "fuzz/source.hpp"
@@ -24,7 +25,8 @@ struct scan {
   octree::integration_options options;
   vec3f origin;
   std::vector<vec3f> points;
-  bool tame = true;  ///< everything is near, so that many copies can be afforded
+  bool tame = true;   ///< everything is near, so that many copies can be afforded
+  bool many = false;  ///< enough copies for several threads
 };
 
 [[nodiscard]] scan next_scan(source& from, double resolution, fuzz::ray_budget& rays) {
@@ -35,6 +37,7 @@ struct scan {
   s.options.mode = (flags & 1U) != 0 ? ray_mode::every_ray : ray_mode::discretized;
   s.options.max_range = ranges[flags >> 1U & 3U] * resolution;
   s.tame = (flags & 8U) == 0;
+  s.many = s.tame && (flags & 192U) == 64U;
   s.origin = from.point(resolution, (flags & 24U) == 24U);
   // Everything in a far corner of OctoMap's grid, and beyond it.
   const vec3f corner = vec3f::Constant((flags & 32U) != 0 ? static_cast<float>(32760.0 * resolution) : 0.0F);
@@ -93,11 +96,15 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   orbis::fuzz::accept();  // any bytes mean something
   constexpr double resolutions[] = {0.05, 0.1, 0.02, 1.0, 0.0123456789, 1.0 / 3.0, 1e-3, 64.0};
   source from{{data, size}};
-  const double resolution = resolutions[from.byte() & 7U];
+  const unsigned first = from.byte();
+  const double resolution = resolutions[first & 7U];
   fuzz::map ours{resolution}, shuffled{resolution};
-  octomap::OcTree theirs{resolution};
+  static octomap::OcTree theirs{0.1};  // as in empty_octomap
+  theirs.clear();
+  theirs.setResolution(resolution);
   bool comparable = true;
-  fuzz::ray_budget rays{32000.0};  // with sanitizers half a second
+  // The larger one is half a second with sanitizers.
+  fuzz::ray_budget rays{(first & 0xF8U) == 0xF8U ? 32000.0 : 1500.0};
   for (int scans = 0; scans != 4 && !from.empty(); ++scans) {
     scan s = next_scan(from, resolution, rays);
     const auto done = ours.integrate(s.points, s.origin, s.options);
@@ -115,9 +122,10 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
 
     // Copies, another order, several threads (which take part from some thousand points on).
     std::reverse(s.points.begin(), s.points.end());
-    const std::size_t once = s.points.size(), copies = s.tame && once != 0 ? 9000 / once : 1;
+    const std::size_t once = s.points.size(), copies = once == 0 ? 1 : s.many ? 9000 / once : s.tame ? 3 : 1;
     for (std::size_t i = once; i < copies * once; ++i) s.points.push_back(s.points[i - once]);
-    const auto again = shuffled.integrate(par.with(3), s.points, s.origin, s.options);
+    static thread_pool threads{3};
+    const auto again = shuffled.integrate(par.on(threads), s.points, s.origin, s.options);
     fuzz::require(again.free == done.free && again.occupied == done.occupied, "copies and order change nothing");
   }
   const std::string file = ot_bytes(ours);

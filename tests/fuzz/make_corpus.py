@@ -124,11 +124,11 @@ def scans():
 
     for i in range(8):  # all resolutions, modes and ranges
         write("integrate", f"near_{i}", bytes([i]) + b"".join(
-            scan(i, [near() for _ in range(40)], near()) for _ in range(3)))
+            scan(i | (64 if n == 1 else 0), [near() for _ in range(40)], near()) for n in range(3)))
     faces = [bytes([8 * x % 256, 8 * y % 256, 8 * z % 256]) for x in (-3, 0, 3) for y in (-3, 0, 3) for z in (-3, 0, 3)]
     for mode in (0, 1):
         write("integrate", f"faces_{mode}", bytes([0]) + scan(mode, faces) + scan(mode, faces, bytes([4, 4, 4])))
-        write("integrate", f"same_again_{mode}", bytes([1]) + 4 * scan(mode, faces))
+        write("integrate", f"same_again_{mode}", bytes([0xF9]) + 4 * scan(mode | 64, faces))
         write("integrate", f"zero_range_{mode}", bytes([1]) + scan(mode | 2, faces))
         inf, nan = float("inf"), float("nan")
         strange = [b"\0" + swap(wild(*v)) for v in ((nan, 0, 0), (inf, -inf, 0), (1e30, 0, 0), (0, -1e6, 1e-45))]
@@ -137,7 +137,7 @@ def scans():
             write("integrate", f"strange_{mode}_{range_}", bytes([0]) + scan(mode | range_ | 8, strange + calm))
         far = [b"\0" + swap(wild(*v)) for v in ((1600, -1600, 1600), (-1638.4, 3, 4), (1638.35, 0, 0), (1638.4, 0, 0))]
         write("integrate", f"far_{mode}", bytes([0]) + scan(mode | 8, far + calm))
-        write("integrate", f"corner_{mode}", bytes([0]) + scan(mode | 32, faces, near()))
+        write("integrate", f"corner_{mode}", bytes([0xF8]) + scan(mode | 32, faces, near()))
         write("integrate", f"no_origin_{mode}", bytes([0]) + scan(mode | 24, calm, swap(wild(nan, 0, 0))))
         write("integrate", f"far_origin_{mode}", bytes([0]) + scan(mode | 24, calm, swap(wild(5e3, 0, 0))))
 
