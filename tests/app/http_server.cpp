@@ -203,6 +203,30 @@ TEST_CASE("The end of the server waits for no client") {
   CHECK(s.time_to_end().count() < 500);
 }
 
+TEST_CASE("The end of the server waits for one answer") {
+  constexpr int answers = 16;
+  constexpr milliseconds each{30};
+  std::atomic<int> answered{0};
+  auto server = std::make_unique<http_server>(
+      [&](const http_request&) {
+        ++answered;
+        std::this_thread::sleep_for(each);
+        return text_answer(200, "late");
+      },
+      [](const std::exception_ptr&) {}, "", http_limits{});
+  REQUIRE(server->listen(0));
+  // Each asks twice before the first answer.
+  std::vector<std::unique_ptr<client>> clients;
+  for (int i = 0; i != answers; ++i) clients.push_back(std::make_unique<client>(server->port()));
+  std::this_thread::sleep_for(milliseconds{50});
+  for (const auto& c : clients) REQUIRE(c->send(std::string{request} + request));
+  // Then it answers all others, without waiting in between.
+  for (int i = 0; i != 1000 && answered < 4; ++i) std::this_thread::sleep_for(milliseconds{1});
+  REQUIRE(answered >= 4);
+  server.reset();
+  CHECK(answered <= answers);  // of twice as many
+}
+
 TEST_CASE("An endless header takes no memory") {
   served s;
   const double before = megabytes_used();

@@ -137,7 +137,7 @@ class http_server::connection {
   /// Reads or writes as far as possible without waiting. Returns false if the connection ends.
   [[nodiscard]] bool advance() {
     if (state_ == state::sends ? !send() : !receive()) return false;
-    while (state_ == state::reads) {
+    while (state_ == state::reads && !of_.ends_) {
       const auto answer = answer_next();
       if (!answer) return true;
       if (!begin(*answer)) return false;
@@ -243,6 +243,7 @@ http_server::http_server(std::function<http_answer(const http_request&)> answer,
     : answer_{std::move(answer)}, failed_{std::move(failed)}, headers_{std::move(headers)}, limits_{limits} {}
 
 http_server::~http_server() {
+  ends_ = true;
   if (wake_[1] >= 0) ::close(wake_[1]);
   if (thread_.joinable()) thread_.join();
   if (wake_[0] >= 0) ::close(wake_[0]);
@@ -328,6 +329,7 @@ void http_server::serve() {
     if (watched[0].revents != 0) return;
     const auto later = clock::now();
     for (std::size_t i = 0; i != open.size(); ++i) {
+      if (ends_) return;  // answers may take long
       const bool goes_on = watched[i + 2].revents == 0 || open[i]->advance();
       if (!goes_on || open[i]->deadline() <= later) open[i].reset();
     }

@@ -3,6 +3,7 @@
 /// The server of the viewer's page: HTTP/1.1, GET only, for browsers on this machine.
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <cstddef>
 #include <exception>
@@ -45,7 +46,8 @@ struct http_limits {
 };
 
 /// Serves 127.0.0.1 on one thread. It rejects requests that name another host (a foreign page whose name resolves to
-/// 127.0.0.1), other methods than GET, and ranges. The destructor closes all connections and waits for no client.
+/// 127.0.0.1), other methods than GET, and ranges. The destructor closes all connections. It waits for no
+/// client, and for at most one answer.
 class http_server {
  public:
   /// `answer` is called on the server's thread for each accepted request; `failed` if it throws, and the connection is
@@ -78,6 +80,7 @@ class http_server {
   unsigned port_ = 0;
   int listener_ = -1;
   int wake_[2] = {-1, -1};  // a pipe, closed at the end
+  std::atomic<bool> ends_{false};
   std::chrono::steady_clock::time_point accepts_again_{};
   std::thread thread_;
 };
