@@ -56,7 +56,8 @@ struct scene {
                     [&](slam::map_id m) {
                       maps.remove(m);
                       dropped.push_back(m);
-                    }})
+                    },
+                .localized = {}})
         .inliers;
   }
   std::size_t see(std::uint32_t step) { return feed(world.look(step, se3{})); }
