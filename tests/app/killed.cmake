@@ -36,3 +36,19 @@ foreach(moved 0 1 4 9)
   app(0 map cloud.ply --out out ${quick})
   must_be_of(three)
 endforeach()
+
+# An error in the middle, without hard links: the earlier results are restored.
+file(GLOB names RELATIVE ${WORK}/out ${WORK}/out/*)
+file(COPY ${WORK}/out/ DESTINATION ${WORK}/before)
+foreach(moved 0 5 11)
+  execute_process(COMMAND ${CMAKE_COMMAND} -E env LD_PRELOAD=${KILLED} ASAN_OPTIONS=verify_asan_link_order=0
+                          ORBIS_TEST_RENAMES=${moved} ORBIS_TEST_NO_LINKS=1 ${APP} run room --out out ${quick} --deterministic
+                  WORKING_DIRECTORY ${WORK} RESULT_VARIABLE result ERROR_VARIABLE err)
+  check(result EQUAL 2)
+  check(err MATCHES "cannot move the new files into place: Input/output error")
+  file(GLOB now RELATIVE ${WORK}/out ${WORK}/out/* ${WORK}/out/.rgbd*)
+  check(now STREQUAL names)
+  foreach(name IN LISTS names)
+    must_equal(out/${name} before/${name})
+  endforeach()
+endforeach()

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// Loaded before a program (LD_PRELOAD): it and its child processes are killed after ORBIS_TEST_RENAMES files have been
-// moved out of a hidden folder *.ready.
+// Loaded before a program (LD_PRELOAD). After ORBIS_TEST_RENAMES files have been moved out of a hidden folder *.ready,
+// the program and its child processes are killed, or, with ORBIS_TEST_NO_LINKS, one rename fails, on a file system
+// without hard links.
+#include <cerrno>
 #include <csignal>
 #include <cstdlib>
 #include <cstring>
@@ -14,6 +16,8 @@ namespace {
 const pid_t program = getpid();
 int renamed = 0;
 
+bool has_no_links() { return std::getenv("ORBIS_TEST_NO_LINKS") != nullptr; }
+
 void kill_all() {
   if (getpid() != program) kill(program, SIGKILL);
   raise(SIGKILL);
@@ -25,8 +29,18 @@ extern "C" int rename(const char* from, const char* to) {
   using function = int(const char*, const char*);
   static auto* const original = reinterpret_cast<function*>(dlsym(RTLD_NEXT, "rename"));
   const char* const allowed = std::getenv("ORBIS_TEST_RENAMES");
-  const bool moves = std::strstr(from, ".ready/") != nullptr;
-  if (allowed == nullptr || !moves) return original(from, to);
-  if (moves && renamed++ == std::atoi(allowed)) kill_all();
-  return original(from, to);
+  const char* const hidden = std::strstr(from, ".ready/");
+  const bool moves = hidden != nullptr && std::strchr(hidden + 7, '/') == nullptr;
+  if (allowed == nullptr || !moves || renamed++ != std::atoi(allowed)) return original(from, to);
+  if (!has_no_links()) kill_all();
+  errno = EIO;
+  return -1;
+}
+
+extern "C" int link(const char* from, const char* to) {
+  using function = int(const char*, const char*);
+  static auto* const original = reinterpret_cast<function*>(dlsym(RTLD_NEXT, "link"));
+  if (!has_no_links()) return original(from, to);
+  errno = EPERM;
+  return -1;
 }
