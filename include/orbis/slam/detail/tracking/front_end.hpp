@@ -265,10 +265,8 @@ class front_end {
   }
   /// Passes a tracked frame to the shutter observer.
   void observe(const frame_type& f, const atlas_type& maps, const std::optional<map_keyframe>& made) {
-    const frame_type& last = context_.last;
-    if (state() != track_state::tracking || last.index + 1 != f.index || last.size() == 0)
-      return context_.observer->interrupt();
-    if (const auto changed = context_.observer->add(last, f, made, maps.active(), context_.rig, shutter_))
+    if (!context_.follows_last(f)) return context_.observer->interrupt();
+    if (const auto changed = context_.observer->add(context_.last, f, made, maps.active(), context_.rig, shutter_))
       shutter_ = *changed;
   }
 

@@ -109,11 +109,15 @@ struct tracking_context {
   [[nodiscard]] se3 predict(const frame_type& f) const {
     return motion.predict({last.timestamp, last.T_world_camera}, f.timestamp);
   }
+  /// Returns true if the frame before `f` was tracked as well, so that the motion between both is that of the camera.
+  [[nodiscard]] bool follows_last(const frame_type& f) const noexcept {
+    return state == track_state::tracking && last.size() != 0 && last.index + 1 == f.index;
+  }
   /// Returns the motion of a frame, per second: that since the last frame, extrapolated by half of its change (see
   /// `twist_prior`). Empty if the last frame is not the one before, or the pose has jumped.
   [[nodiscard]] std::optional<vec6> motion_to(const frame_type& f) const {
     constexpr double fastest = 5.0, fastest_turn = 10.0;  // metres and radians per second
-    if (state != track_state::tracking || last.size() == 0 || last.index + 1 != f.index) return std::nullopt;
+    if (!follows_last(f)) return std::nullopt;
     const vec6 mean = motion_between(last, f);
     if (!(norm(head<3>(mean)) < fastest && norm(tail<3>(mean)) < fastest_turn)) return std::nullopt;
     return motion.is_known() ? vec6(mean + 0.5 * (mean - motion.twist())) : mean;
@@ -146,8 +150,7 @@ struct tracking_context {
   }
   /// Makes a tracked frame the last one, and updates the motion, which is unknown unless the frame follows the last.
   void set_last(frame_type&& f, const anchored_pose& anchor) {
-    if (last.index + 1 == f.index && state == track_state::tracking && last.size() != 0)
-      motion.set({last.timestamp, last.T_world_camera}, {f.timestamp, f.T_world_camera});
+    if (follows_last(f)) motion.set({last.timestamp, last.T_world_camera}, {f.timestamp, f.T_world_camera});
     anchor_ = anchor;
     last = std::move(f);
   }
