@@ -11,6 +11,7 @@
 #include "command_line.hpp"
 #include "commands.hpp"
 #include "interrupts.hpp"
+#include "result_files.hpp"
 
 namespace {
 
@@ -34,6 +35,7 @@ int run(int argc, char** argv) {
   const auto& settings = std::get<app::settings>(parsed);
   app::console console{settings.quiet};
   try {
+    app::finish_earlier_runs(settings);
     switch (settings.what) {
       case app::command::run:
       case app::command::demo:

@@ -233,7 +233,6 @@ exit_code evaluate(const settings& s, console& console) {
 
 exit_code map_without_slam(const settings& s, console& console) {
   const auto give_up = [&](const orbis::error& e) { return console.error(e), bad_input; };
-  finish_earlier_run(s);
   std::error_code ignored;
   std::optional<frame_source> recording;
   if (std::filesystem::is_directory(s.input, ignored)) {

@@ -206,7 +206,6 @@ exit_code run_slam(const settings& s, console& console) {
   const auto give_up = [&](const orbis::error& e) { return console.error(e), bad_input; };
 
   // Open the input.
-  finish_earlier_run(s);
   auto source = open_source(s, console);
   if (!source) return give_up(source.error());
   if (const auto code = check_outputs(*source, s, console)) return *code;

@@ -133,10 +133,10 @@ std::optional<orbis::error> find_overwritten(const std::vector<fs::path>& target
   return std::nullopt;
 }
 
-void finish_earlier_run(const settings& s) {
-  staged_folder::finish(s.out);
-  for (const fs::path& file : {s.save_map, s.floor_map})
-    if (!file.empty()) staged_folder::finish(parent_folder(file));
+void finish_earlier_runs(const settings& s) {
+  std::error_code ignored;
+  for (const fs::path& path : {s.out, s.save_map, s.floor_map, s.input, s.reference, s.load_map, fs::path{s.camera}})
+    if (!path.empty()) staged_folder::finish(fs::is_directory(path, ignored) ? path : parent_folder(path));
 }
 
 std::optional<orbis::error> find_overwritten(const settings& s, const std::vector<fs::path>& inputs) {

@@ -32,9 +32,9 @@ inline constexpr std::size_t most_maps = 9;
 /// The files that the command may write to the output folder.
 [[nodiscard]] file_names result_names(const settings& s);
 
-/// Moves the files of an earlier run into place whose end interrupted that, in all folders that the command writes to.
+/// Moves the files of earlier runs into place whose end interrupted that, in all folders that the command reads or writes.
 /// Call before anything there is read.
-void finish_earlier_run(const settings& s);
+void finish_earlier_runs(const settings& s);
 
 /// All files that the run reads; `source_files`: those of the recording.
 [[nodiscard]] std::vector<std::filesystem::path> input_files(const settings& s,

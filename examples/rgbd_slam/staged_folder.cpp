@@ -36,7 +36,9 @@ descriptor::~descriptor() {
 
 namespace {
 
-constexpr std::string_view prefix = ".rgbd_slam-", ready = ".ready", backup = "old", list = ".names";
+constexpr std::string_view prefix = ".rgbd_slam-", ready = ".ready", backup = "old";
+// Lists in hidden folders: the files to move; in the first folder, the other hidden folders; in those, the first one.
+constexpr std::string_view names_list = ".names", others_list = ".others", first_list = ".first";
 
 auto failure(const fs::path& path, const std::string& what) {
   return orbis::fail(orbis::errc::write_failed, path.string(), what);
@@ -47,19 +49,31 @@ descriptor open_folder(const fs::path& folder) {
   return descriptor{::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)};
 }
 
-/// Locks a folder during its lifetime. No effect on file systems without locks.
-class folder_lock {
+/// Locks folders during its lifetime. No effect on file systems without locks.
+class folder_locks {
  public:
-  explicit folder_lock(int folder) : folder_{folder} {
-    while (::flock(folder_, LOCK_EX) != 0 && errno == EINTR) {
-    }
+  explicit folder_locks(std::vector<int> folders) : folders_{std::move(folders)} {
+    // In the order of their inode numbers, so that two programs never deadlock, and each once.
+    const auto number = [](int folder) {
+      struct stat status {};
+      ::fstat(folder, &status);
+      return std::pair{status.st_dev, status.st_ino};
+    };
+    std::sort(folders_.begin(), folders_.end(), [&](int a, int b) { return number(a) < number(b); });
+    const auto is_same = [&](int a, int b) { return number(a) == number(b); };
+    folders_.erase(std::unique(folders_.begin(), folders_.end(), is_same), folders_.end());
+    for (const int folder : folders_)
+      while (::flock(folder, LOCK_EX) != 0 && errno == EINTR) {
+      }
   }
-  ~folder_lock() { ::flock(folder_, LOCK_UN); }
-  folder_lock(const folder_lock&) = delete;
-  folder_lock& operator=(const folder_lock&) = delete;
+  ~folder_locks() {
+    for (const int folder : folders_) ::flock(folder, LOCK_UN);
+  }
+  folder_locks(const folder_locks&) = delete;
+  folder_locks& operator=(const folder_locks&) = delete;
 
  private:
-  int folder_;
+  std::vector<int> folders_;
 };
 
 /// A file to move into place. Strings, because a child process must not allocate memory.
@@ -126,39 +140,111 @@ std::vector<move> moves_to(const fs::path& folder, const fs::path& from, const s
   return moves;
 }
 
-/// The names of the files that a hidden folder moves into place, each with a zero byte after it.
-std::vector<std::string> listed_in(const fs::path& hidden) {
-  std::string text = orbis::read_file(hidden / list).value_or(std::string{});
-  std::vector<std::string> names;
-  for (std::size_t end = 0; (end = text.find('\0')) != std::string::npos; text.erase(0, end + 1)) {
-    const fs::path name = text.substr(0, end);
-    if (!name.empty() && name == name.filename()) names.push_back(name.string());
-  }
-  return names;
+/// Writes a list of texts, each with a zero byte after it.
+result<void> write_list(const fs::path& path, const std::vector<std::string>& texts) {
+  return orbis::write_file_atomically(path, [&](std::ostream& out) {
+    for (const std::string& text : texts) out << text << '\0';
+  });
+}
+std::vector<std::string> read_list(const fs::path& path) {
+  std::string text = orbis::read_file(path).value_or(std::string{});
+  std::vector<std::string> texts;
+  for (std::size_t end = 0; (end = text.find('\0')) != std::string::npos; text.erase(0, end + 1))
+    texts.push_back(text.substr(0, end));
+  return texts;
 }
 
-/// Finishes or removes the hidden folders of ended processes in `folder`. @pre it is locked
-void clear_leftovers(const fs::path& folder) {
+bool is_hidden_folder(const fs::path& path) {
+  std::error_code ignored;
+  return path.filename().string().starts_with(prefix) && fs::is_directory(fs::symlink_status(path, ignored));
+}
+bool is_ready(const fs::path& hidden) { return hidden.filename().string().ends_with(ready); }
+
+/// The first folder of the transaction that a hidden folder takes part in; empty if there is none.
+fs::path first_of(const fs::path& hidden) {
+  if (is_ready(hidden)) return hidden;
+  const std::vector<std::string> first = read_list(hidden / first_list);
+  return first.size() == 1 && is_ready(first[0]) && is_hidden_folder(first[0]) ? fs::path{first[0]} : fs::path{};
+}
+/// The other hidden folders of a transaction, those that exist.
+std::vector<fs::path> others_of(const fs::path& first) {
+  std::vector<fs::path> others;
+  std::error_code ignored;
+  for (const fs::path path : read_list(first / others_list))
+    if (is_hidden_folder(path) && fs::equivalent(first_of(path), first, ignored)) others.push_back(path);
+  return others;
+}
+
+/// The hidden folders of ended processes in `folder`, without those that cannot be opened.
+std::vector<fs::path> leftovers_in(const fs::path& folder) {
   std::vector<fs::path> found;
   std::error_code ec;
   for (fs::directory_iterator it{folder, ec}, end; !ec && it != end; it.increment(ec))
-    if (it->path().filename().string().starts_with(prefix) && it->symlink_status(ec).type() == fs::file_type::directory)
-      found.push_back(it->path());
-  for (const fs::path& left : found) {
-    const descriptor lock = open_folder(left);
-    if (lock.get() < 0 || ::flock(lock.get(), LOCK_EX | LOCK_NB) != 0) continue;  // of a running process
-    if (left.filename().string().ends_with(ready) && rename_all(moves_to(folder, left, listed_in(left))) != 0) continue;
-    fs::remove_all(left, ec);
+    if (is_hidden_folder(it->path())) found.push_back(it->path());
+  std::erase_if(found, [](const fs::path& hidden) {
+    const descriptor lock = open_folder(hidden);
+    return lock.get() < 0 || ::flock(lock.get(), LOCK_EX | LOCK_NB) != 0;
+  });
+  return found;
+}
+
+/// Finishes the transaction that begins with the hidden folder `first`. Returns false if that is not possible now.
+/// @pre the folders of all its files are locked
+bool finish_transaction(const fs::path& first) {
+  std::vector<fs::path> folders = others_of(first);
+  folders.push_back(first);  // the last to be removed
+  std::vector<move> moves;
+  for (const fs::path& hidden : folders) {
+    std::vector<std::string> names = read_list(hidden / names_list);
+    std::erase_if(names, [](const fs::path& name) { return name.empty() || name != name.filename(); });
+    for (move& m : moves_to(hidden.parent_path(), hidden, names)) moves.push_back(std::move(m));
+  }
+  if (rename_all(moves) != 0) return false;
+  std::error_code ignored;
+  for (const fs::path& hidden : folders) fs::remove_all(hidden, ignored);
+  return true;
+}
+
+/// Finishes or removes the hidden folders of ended processes in `folder`, which is open as `opened`. Locks it and the
+/// folders of the transactions' other files, all at once: if there are more than are locked, starts again with them.
+void clear_leftovers(const fs::path& folder, int opened) {
+  std::vector<fs::path> folders{folder};
+  std::vector<descriptor> descriptors;
+  std::unique_ptr<folder_locks> locks;
+  for (std::size_t locked = 0; locked != folders.size();) {
+    locks.reset();
+    std::vector<int> numbers{opened};
+    descriptors.clear();
+    for (std::size_t i = 1; i != folders.size(); ++i)
+      if (descriptor d = open_folder(folders[i]); d.get() >= 0) {
+        numbers.push_back(d.get());
+        descriptors.push_back(std::move(d));
+      }
+    locked = folders.size();
+    locks = std::make_unique<folder_locks>(std::move(numbers));
+    const auto add = [&](const fs::path& hidden) {
+      if (std::find(folders.begin(), folders.end(), hidden.parent_path()) == folders.end())
+        folders.push_back(hidden.parent_path());
+    };
+    for (const fs::path& left : leftovers_in(folder))
+      if (const fs::path first = first_of(left); !first.empty()) {
+        add(first);
+        for (const fs::path& other : others_of(first)) add(other);
+      }
+  }
+  for (const fs::path& left : leftovers_in(folder)) {
+    const fs::path first = first_of(left);
+    std::error_code ignored;
+    if (first.empty() || finish_transaction(first)) fs::remove_all(left, ignored);
   }
 }
 
 }  // namespace
 
 void staged_folder::finish(const fs::path& folder) {
-  const descriptor opened = open_folder(folder);
-  if (opened.get() < 0) return;
-  const folder_lock lock{opened.get()};
-  clear_leftovers(folder);
+  std::error_code ignored;
+  const fs::path whole = fs::canonical(folder, ignored);
+  if (const descriptor opened = open_folder(whole); opened.get() >= 0) clear_leftovers(whole, opened.get());
 }
 
 result<staged_folder> staged_folder::open(const fs::path& folder, std::vector<std::string> names,
@@ -167,7 +253,7 @@ result<staged_folder> staged_folder::open(const fs::path& folder, std::vector<st
   fs::create_directories(folder, ec);
   if (ec) return failure(folder, "cannot be created: " + ec.message());
   staged_folder made;
-  made.folder_ = fs::absolute(folder, ec);
+  made.folder_ = fs::canonical(folder, ec);
   made.names_ = std::move(names);
   made.folder_lock_ = open_folder(made.folder_);
   if (made.folder_lock_.get() < 0) return failure(folder, "cannot be opened: " + reason(errno));
@@ -175,8 +261,8 @@ result<staged_folder> staged_folder::open(const fs::path& folder, std::vector<st
     if (!may_be_replaced(made.folder_ / name))
       return failure(folder / name, "is not a regular file and is not replaced");
 
-  const folder_lock lock{made.folder_lock_.get()};
-  clear_leftovers(made.folder_);
+  clear_leftovers(made.folder_, made.folder_lock_.get());
+  const folder_locks lock{{made.folder_lock_.get()}};
   std::string name = (made.folder_ / (std::string{prefix} + "XXXXXX")).string();
   const std::lock_guard registers{hidden.mutex};
   hidden.paths.emplace_back();
@@ -202,48 +288,47 @@ void staged_folder::discard() noexcept {
 }
 
 result<void> staged_folder::put_in_place(std::span<staged_folder* const> folders, hidden_folders& hidden) {
-  // In the order of their inode numbers, so that two programs never deadlock.
-  std::vector<staged_folder*> ordered(folders.begin(), folders.end());
-  const auto number = [](const staged_folder* f) {
-    struct stat status {};
-    ::fstat(f->folder_lock_.get(), &status);
-    return std::pair{status.st_dev, status.st_ino};
-  };
-  std::sort(ordered.begin(), ordered.end(), [&](const auto* a, const auto* b) { return number(a) < number(b); });
-  std::vector<std::unique_ptr<folder_lock>> locks;
-  for (const staged_folder* f : ordered) locks.push_back(std::make_unique<folder_lock>(f->folder_lock_.get()));
-
+  std::vector<int> numbers;
+  for (const staged_folder* f : folders) numbers.push_back(f->folder_lock_.get());
+  const folder_locks locks{std::move(numbers)};
   const std::lock_guard stays{hidden.mutex};
+  staged_folder& first = *folders.front();
+  const fs::path marked = first.staging_.string() + std::string{ready};
+  std::vector<std::string> others;
+  for (const staged_folder* f : folders.subspan(1)) others.push_back(f->staging_.string());
+
+  // Prepare all folders.
   std::error_code ec;
-  std::vector<move> moves;
-  for (staged_folder* f : folders) {
+  for (const staged_folder* f : folders) {
     for (const std::string& name : f->made())
       if (!may_be_replaced(f->folder_ / name))
         return failure(f->folder_ / name, "is not a regular file and is not replaced");
-    std::string names;
-    for (const std::string& name : f->names_) (names += name) += '\0';
-    if (auto listed = orbis::write_file_atomically(f->staging_ / list, [&](std::ostream& out) { out << names; });
-        !listed)
-      return listed;
-    const fs::path marked = f->staging_.string() + std::string{ready};
+    auto listed = write_list(f->staging_ / names_list, f->names_);
+    if (listed)
+      listed = f == &first ? write_list(f->staging_ / others_list, others)
+                           : write_list(f->staging_ / first_list, {marked.string()});
+    if (!listed) return listed;
     fs::create_directory(f->staging_ / backup, ec);
     ::fsync(f->staging_lock_.get());
-    fs::rename(f->staging_, marked, ec);
-    if (ec) return failure(f->folder_, "cannot move the new files into place: " + ec.message());
-    std::replace(hidden.paths.begin(), hidden.paths.end(), f->staging_, marked);
-    f->staging_ = marked;
-    for (move& m : moves_to(f->folder_, marked, f->names_)) {
+    ::fsync(f->folder_lock_.get());
+  }
+  // From here on, any program can finish.
+  fs::rename(first.staging_, marked, ec);
+  if (ec) return failure(first.folder_, "cannot move the new files into place: " + ec.message());
+  std::replace(hidden.paths.begin(), hidden.paths.end(), first.staging_, marked);
+  first.staging_ = marked;
+  ::fsync(first.folder_lock_.get());
+
+  std::vector<move> moves;
+  for (const staged_folder* f : folders)
+    for (move& m : moves_to(f->folder_, f->staging_, f->names_)) {
       m.has_old = m.replaces && ::link(m.to.c_str(), m.old.c_str()) == 0;
       moves.push_back(std::move(m));
     }
-    ::fsync(f->folder_lock_.get());
-  }
   const int why = rename_all_in_child(moves);
   if (why != 0) return failure(folders.front()->folder_, "cannot move the new files into place: " + reason(why));
-  for (staged_folder* f : folders) {
-    ::fsync(f->folder_lock_.get());
-    f->discard();
-  }
+  for (const staged_folder* f : folders) ::fsync(f->folder_lock_.get());
+  for (staged_folder* f : folders) f->discard();
   return {};
 }
 

@@ -2,14 +2,15 @@
 /// @file
 /// Replaces a set of files together.
 ///
-/// New files are created in a hidden folder `.rgbd_slam-XXXXXX` inside the target folder. At the end they are renamed
+/// New files are created in hidden folders `.rgbd_slam-XXXXXX` inside their target folders. At the end they are renamed
 /// into place together:
-///   1. all data is synced to the disk, and the suffix `.ready` is added to the name of the hidden folder;
+///   1. all data is synced to the disk, and the suffix `.ready` is added to the name of the first hidden folder;
 ///   2. a child process in a separate session renames the files, and finishes even if this program is killed;
-///   3. if the machine stops in between, the next program that writes into the folder finishes first (`finish`).
-/// Only files with the given names are moved; the hidden folder lists them, so that any program can finish. No other
-/// file in the folder is changed, and only hidden folders of ended processes are deleted. Processes that write into the
-/// same folder wait for each other by `flock`.
+///   3. if the machine stops in between, the next program that reads or writes one of the folders finishes first
+///      (`finish`).
+/// Only files with the given names are moved; the hidden folders list them and each other, so that any program can
+/// finish. No other file in the folders is changed, and only hidden folders of ended processes are deleted. Processes
+/// that write into the same folder wait for each other by `flock`.
 #pragma once
 
 #include <filesystem>

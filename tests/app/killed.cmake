@@ -37,6 +37,29 @@ foreach(moved 0 1 4 9)
   must_be_of(three)
 endforeach()
 
+# Files in other folders belong to the same run; the next command may know one of the folders only.
+set(elsewhere --save-map maps/room.map --floor-map floors/floor.yaml)
+app(0 run room --out all ${quick} --deterministic --save-map all/room.map --floor-map all/floor.yaml)
+foreach(moved 0 7 14)
+  foreach(next "map;cloud.ply;--out;out;${quick}" "eval;out/trajectory.txt;all/trajectory.txt"
+               "run;room;--frames;2;--load-map;maps/room.map;--localize-only;--out;new;${quick}")
+    file(REMOVE_RECURSE ${WORK}/out ${WORK}/maps ${WORK}/floors)
+    run_killed(${moved} run room --out out ${quick} --deterministic ${elsewhere})
+    if(moved EQUAL 7)  # killed again, while it finishes the first run
+      run_killed(3 map cloud.ply --out out ${quick})
+    endif()
+    app(0 ${next})
+    must_be_of(all)
+    must_equal(maps/room.map all/room.map)
+    must_equal(floors/floor.yaml all/floor.yaml)
+    must_equal(floors/floor.pgm all/floor.pgm)
+    file(GLOB hidden ${WORK}/maps/.rgbd_slam-* ${WORK}/floors/.rgbd_slam-*)
+    check(NOT hidden)
+  endforeach()
+endforeach()
+file(REMOVE_RECURSE ${WORK}/out)
+app(0 run room --frames 3 --out out ${quick} --deterministic)
+
 # An error in the middle, without hard links: the earlier results are restored.
 file(GLOB names RELATIVE ${WORK}/out ${WORK}/out/*)
 file(COPY ${WORK}/out/ DESTINATION ${WORK}/before)

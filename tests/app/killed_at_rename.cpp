@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// Loaded before a program (LD_PRELOAD). After ORBIS_TEST_RENAMES files have been moved out of a hidden folder *.ready,
-// the program and its child processes are killed, or, with ORBIS_TEST_NO_LINKS, one rename fails, on a file system
-// without hard links.
+// Loaded before a program (LD_PRELOAD). After ORBIS_TEST_RENAMES files have been moved out of hidden folders, the
+// program and its child processes are killed, or, with ORBIS_TEST_NO_LINKS, one rename fails, on a file system without
+// hard links.
 #include <cerrno>
 #include <csignal>
 #include <cstdlib>
@@ -29,8 +29,9 @@ extern "C" int rename(const char* from, const char* to) {
   using function = int(const char*, const char*);
   static auto* const original = reinterpret_cast<function*>(dlsym(RTLD_NEXT, "rename"));
   const char* const allowed = std::getenv("ORBIS_TEST_RENAMES");
-  const char* const hidden = std::strstr(from, ".ready/");
-  const bool moves = hidden != nullptr && std::strchr(hidden + 7, '/') == nullptr;
+  const char* const hidden = std::strstr(from, "/.rgbd_slam-");
+  const char* const name = hidden == nullptr ? nullptr : std::strchr(hidden + 1, '/');
+  const bool moves = name != nullptr && std::strchr(name + 1, '/') == nullptr && std::strstr(to, "/.rgbd_slam-") == nullptr;
   if (allowed == nullptr || !moves || renamed++ != std::atoi(allowed)) return original(from, to);
   if (!has_no_links()) kill_all();
   errno = EIO;
