@@ -269,6 +269,11 @@ result<staged_folder> staged_folder::open(const fs::path& folder, std::vector<st
   if (::mkdtemp(name.data()) == nullptr) return failure(folder, "cannot create files in it: " + reason(errno));
   made.staging_ = hidden.paths.back() = name;
   made.staging_lock_ = open_folder(made.staging_);
+  if (made.staging_lock_.get() < 0) {
+    const int why = errno;
+    fs::remove(made.staging_, ec);
+    return failure(folder, "cannot create files in it: " + reason(why));
+  }
   ::flock(made.staging_lock_.get(), LOCK_EX);
   return made;
 }
@@ -282,6 +287,7 @@ std::vector<std::string> staged_folder::made() const {
 }
 
 void staged_folder::discard() noexcept {
+  staging_lock_ = {};  // all descriptors may be in use, and removal needs one
   std::error_code ignored;
   if (!staging_.empty()) fs::remove_all(staging_, ignored);
   staging_.clear();
