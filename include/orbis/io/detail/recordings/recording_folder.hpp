@@ -81,10 +81,10 @@ inline result<void> check_first_frame(const recording_index& index, const std::f
   return ending == ".png" || ending == ".jpg" || ending == ".jpeg";
 }
 
-/// Returns true if `path` exists.
+/// Returns true if `path` exists. A link exists even if its target does not, so that the error names it.
 [[nodiscard]] inline bool present(const std::filesystem::path& path) {
   std::error_code ignored;
-  return std::filesystem::exists(path, ignored);
+  return std::filesystem::exists(std::filesystem::symlink_status(path, ignored));
 }
 
 /// The first of these names that exists in `folder`; empty if there is none.
