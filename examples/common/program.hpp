@@ -13,7 +13,7 @@
 #include <fcntl.h>
 #endif
 
-#include <CLI/CLI.hpp>
+#include <CLI/App.hpp>
 
 #include <orbis/core/quote.hpp>
 
@@ -22,6 +22,19 @@
 
 namespace examples {
 
+/// The error of a command line in one line. An unknown option is named before a missing argument, which may be a
+/// consequence.
+[[nodiscard]] inline std::string describe_usage(const CLI::App& cli, const CLI::ParseError& e) {
+  std::string what = e.what();
+  if (dynamic_cast<const CLI::RequiredError*>(&e) != nullptr)
+    for (const std::string& word : cli.remaining(true))
+      if (word.size() > 1 && word.front() == '-') {
+        what = "unknown option " + orbis::in_quotes(word);
+        break;
+      }
+  return orbis::shortened(what) + " (--help shows the usage)";
+}
+
 /// Parses the command line. Returns the exit code if the program ends with it: --help, or wrong usage (1).
 [[nodiscard]] inline std::optional<int> parse(CLI::App& cli, int argc, char** argv) {
   try {
@@ -29,8 +42,7 @@ namespace examples {
     return std::nullopt;
   } catch (const CLI::ParseError& e) {
     if (e.get_exit_code() == 0) return cli.exit(e);
-    return report_error(cli.get_name().c_str(), 1,
-                        orbis::shortened(e.what()) + std::string{" (--help shows the usage)"});
+    return report_error(cli.get_name().c_str(), 1, describe_usage(cli, e));
   }
 }
 

@@ -18,6 +18,7 @@
 #include <orbis/core/quote.hpp>
 #include <orbis/io/toml.hpp>
 
+#include "../common/program.hpp"
 #include "../common/report_error.hpp"
 #include "filters.hpp"
 #include "inputs/camera_device.hpp"
@@ -515,7 +516,7 @@ std::variant<settings, exit_code> command_line::read(int argc, char** argv) {
     std::fputs(cli.help().c_str(), stdout);
     return done;
   } catch (const CLI::ParseError& e) {
-    return report_error(orbis::shortened(e.what()) + " (--help shows the usage)", bad_usage);
+    return report_error(examples::describe_usage(cli, e), bad_usage);
   }
 
   CLI::App* chosen = cli.get_subcommands().front();
