@@ -7,6 +7,8 @@
 #include <algorithm>
 #include <cstddef>
 #include <filesystem>
+#include <limits>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -41,12 +43,35 @@ namespace examples {
   return middle;
 }
 
+/// Replaces points beyond `most` metres by NaN: squares of such distances are not numbers of the type float. Returns
+/// their number.
+inline std::size_t remove_distant(std::vector<orbis::vec3f>& points) {
+  constexpr float most = 1e15F;
+  std::size_t removed = 0;
+  for (orbis::vec3f& p : points)
+    if (orbis::is_finite(p) && !(p.cwiseAbs().maxCoeff() <= most)) {
+      p.setConstant(std::numeric_limits<float>::quiet_NaN());
+      ++removed;
+    }
+  return removed;
+}
+
+/// Returns true if more than half of the points are within 1e-12 metres of the origin, and do not coincide.
+[[nodiscard]] inline bool is_too_small(const std::vector<orbis::vec3f>& points) {
+  constexpr float least = 1e-12F;
+  const auto near = std::count_if(points.begin(), points.end(),
+                                  [](const orbis::vec3f& p) { return p.cwiseAbs().maxCoeff() < least; });
+  const auto zero = std::count_if(points.begin(), points.end(), [](const orbis::vec3f& p) { return p.isZero(0); });
+  return static_cast<std::size_t>(near - zero) > points.size() / 2;
+}
+
 struct cloud_near_origin {
   orbis::io::cloud_with_fields read;  ///< coordinates relative to `origin`
   orbis::vec3 origin;                 ///< in the coordinates of the file; zero if these are small
 };
 
-/// Reads a cloud, relative to its median if that is far from the origin. Errors: those of `io::read_cloud`.
+/// Reads a cloud, relative to its median if that is far from the origin. Errors: those of `io::read_cloud`; unsupported
+/// (the unit of the coordinates cannot be the metre).
 [[nodiscard]] inline orbis::result<cloud_near_origin> read_near_origin(const std::filesystem::path& path) {
   auto read = orbis::io::read_cloud_with_fields(path);
   if (!read) return orbis::fail(read.error());
@@ -55,6 +80,11 @@ struct cloud_near_origin {
     read = orbis::io::read_cloud_with_fields(path, origin);
     if (!read) return orbis::fail(read.error());
   }
+  if (const std::size_t distant = remove_distant(read->cloud.points); distant != 0)
+    read->notes.push_back(std::to_string(distant) + " points are left out, because they are more than 1e15 m away");
+  if (is_too_small(read->cloud.points))
+    return orbis::fail(orbis::errc::unsupported, path.string(),
+                       "most points are less than 1e-12 m from the origin: the coordinates must be metres");
   return cloud_near_origin{*std::move(read), origin};
 }
 
