@@ -37,7 +37,8 @@ function(interrupt signal pattern delay)  # arguments of the run
 endfunction()
 
 # The map alone takes far longer than the time limits here.
-set(fine demo --plain --frames 30 --width 320 --resolution 0.004 --filter none)
+make_recording(${WORK}/room 30 320)
+set(fine run room --resolution 0.004 --filter none)
 
 foreach(signal TERM INT)
   interrupt(${signal} "^tracking  .*keyframes" 0.3 ${fine} --batch-map --out ${signal}
