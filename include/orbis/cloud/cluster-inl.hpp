@@ -119,6 +119,15 @@ class disjoint_sets {
       if (at(a).compare_exchange_strong(expected, b, std::memory_order_relaxed)) return;
     }
   }
+  /// Returns the set of each element; sets are numbered by their smallest elements. `count`: number of sets.
+  [[nodiscard]] std::vector<std::uint32_t> numbered(std::uint32_t& count) && {
+    count = 0;
+    for (std::size_t i = 0; i != parent_.size(); ++i)  // the parent is smaller, and has its number already
+      parent_[i] = parent_[i] == i ? count++ : parent_[parent_[i]];
+    return std::move(parent_);
+  }
+
+ private:
   [[nodiscard]] std::uint32_t root(std::uint32_t i) noexcept {
     for (;;) {
       std::uint32_t up = at(i).load(std::memory_order_relaxed);
@@ -128,8 +137,6 @@ class disjoint_sets {
       i = above;
     }
   }
-
- private:
   [[nodiscard]] std::atomic_ref<std::uint32_t> at(std::uint32_t i) noexcept { return std::atomic_ref{parent_[i]}; }
   std::vector<std::uint32_t> parent_;
 };
@@ -139,18 +146,18 @@ class disjoint_sets {
   return std::min<std::size_t>(200, std::max<std::size_t>(30, points / 250));
 }
 
-/// Connected components of the neighbour graph, identified by their roots (the smallest vertex).
+/// Connected components of the neighbour graph, numbered by their first vertices.
 struct linked_components {
-  disjoint_sets sets;
-  std::vector<std::uint32_t> sizes;  ///< by root
-  std::vector<char> goes;            ///< by root: 1 if the component is removed
-  std::size_t min_size = 0;          ///< the value that was applied
+  std::vector<std::uint32_t> component;  ///< by vertex
+  std::vector<std::uint32_t> sizes;      ///< by component
+  std::vector<char> goes;                ///< by component: 1 if it is removed
+  std::size_t min_size = 0;              ///< the value that was applied
 
-  [[nodiscard]] bool is_small(std::uint32_t i) noexcept { return sizes[sets.root(i)] < min_size; }
+  [[nodiscard]] bool is_small(std::uint32_t i) const noexcept { return sizes[component[i]] < min_size; }
 };
 
 /// Finds the components of a graph and decides which of them to remove. `gone`: by place, nonzero for points to ignore,
-/// or empty. `spacing`: by place, metres. O(links), 9 bytes per vertex.
+/// or empty. `spacing`: by place, metres. O(links), 4 bytes per vertex.
 template <execution_policy Policy>
 [[nodiscard]] linked_components separate(const Policy& policy, const neighbor_graph& graph, std::span<const char> gone,
                                          std::span<const float> spacing, const cluster_options& options) {
@@ -165,16 +172,21 @@ template <execution_policy Policy>
       if (distance <= reach * std::min(spacing[i], spacing[j])) f(j, distance);
     });
   };
-  linked_components out{disjoint_sets{count}, std::vector<std::uint32_t>(count, 0), std::vector<char>(count, 0)};
+  disjoint_sets sets{count};
   for_each_index(policy, count, 2048, [&](std::size_t vertex) {
     const auto i = static_cast<std::uint32_t>(vertex);
-    if (takes_part(i)) for_each_link(i, [&](std::uint32_t j, float) { out.sets.join(i, j); });
+    if (takes_part(i)) for_each_link(i, [&](std::uint32_t j, float) { sets.join(i, j); });
   });
+  linked_components out;
+  std::uint32_t components = 0;
+  out.component = std::move(sets).numbered(components);
+  out.sizes.resize(components);
+  out.goes.resize(components);
   std::size_t present = 0;
   for (std::uint32_t i = 0; i != count; ++i) {
     if (!takes_part(i)) continue;
     ++present;
-    ++out.sizes[out.sets.root(i)];
+    ++out.sizes[out.component[i]];
   }
   out.min_size = smallest_large(options, present);
   std::vector<std::uint32_t> small_ones;
@@ -200,9 +212,9 @@ template <execution_policy Policy>
     const double gap = options.min_gap > 0 ? options.min_gap * local : 0;  // spacings may be infinite
     apart[s] = std::sqrt(main.distance_squared) > gap ? 1 : 0;
   });
-  for (const std::uint32_t i : small_ones) out.goes[out.sets.root(i)] = 1;
+  for (const std::uint32_t i : small_ones) out.goes[out.component[i]] = 1;
   for (std::size_t s = 0; s != small_ones.size(); ++s) {
-    if (apart[s] == 0) out.goes[out.sets.root(small_ones[s])] = 0;  // one point near the surface keeps it all
+    if (apart[s] == 0) out.goes[out.component[small_ones[s]]] = 0;  // one point near the surface keeps it all
   }
   return out;
 }
@@ -210,22 +222,22 @@ template <execution_policy Policy>
 /// Numbers components in the order of their first points. `vertex(i)`: vertex of point `i` of the cloud, negative if it
 /// has none. `stays(i)`: true if a point without a vertex is nevertheless an inlier.
 template <class Vertex, class Stays>
-[[nodiscard]] cluster_result numbered(linked_components found, std::size_t count, const Vertex& vertex,
+[[nodiscard]] cluster_result numbered(const linked_components& found, std::size_t count, const Vertex& vertex,
                                       const Stays& stays) {
   cluster_result out;
   out.min_size = found.min_size;
   out.component.assign(count, cluster_result::none);
-  std::vector<std::uint32_t> number(found.sizes.size(), cluster_result::none);  // by root
+  std::vector<std::uint32_t> number(found.sizes.size(), cluster_result::none);  // by component of the graph
   for (std::size_t i = 0; i != count; ++i) {
     const std::int64_t v = vertex(i);
     if (v < 0) continue;
-    const std::uint32_t root = found.sets.root(static_cast<std::uint32_t>(v));
-    if (number[root] == cluster_result::none) {
-      number[root] = static_cast<std::uint32_t>(out.sizes.size());
-      out.sizes.push_back(found.sizes[root]);
-      out.removed.push_back(found.goes[root]);
+    const std::uint32_t c = found.component[static_cast<std::size_t>(v)];
+    if (number[c] == cluster_result::none) {
+      number[c] = static_cast<std::uint32_t>(out.sizes.size());
+      out.sizes.push_back(found.sizes[c]);
+      out.removed.push_back(found.goes[c]);
     }
-    out.component[i] = number[root];
+    out.component[i] = number[c];
   }
   out.inliers = indices_where(count, [&](std::size_t i) {
     return out.component[i] != cluster_result::none ? out.removed[out.component[i]] == 0 : stays(i);

@@ -63,7 +63,7 @@ struct smallest_of_columns {
 /// @pre values has an entry for each place
 template <execution_policy Policy>
 [[nodiscard]] std::vector<float> smoothed_over_neighbors(const Policy& policy, const neighbor_graph& graph,
-                                                         std::vector<float> values, int rounds = 4) {
+                                                         std::span<const float> values, int rounds = 4) {
   static constexpr float inf = std::numeric_limits<float>::infinity();  // for values that do not count
   constexpr std::size_t neighbors = smallest_of_columns::most_rows, columns = smallest_of_columns::columns;
   const auto quantile_rank = [](std::size_t count) {
@@ -71,7 +71,7 @@ template <execution_policy Policy>
   };
   static_assert(smallest_of_columns::count == static_cast<std::size_t>(0.35 * (neighbors - 1) + 0.5) + 1);
   const std::size_t width = std::min(neighbors, graph.width());
-  if (width == 0) return values;
+  if (width == 0) return {values.begin(), values.end()};
   const auto find_smallest = simd::kernel<smallest_of_columns, smallest_of_columns::signature>();
   const auto as_counted = [](float v) { return std::isfinite(v) ? v : inf; };
   std::vector<float> counted(values.size()), next(values.size());
@@ -104,8 +104,8 @@ template <execution_policy Policy>
     counted.swap(next);
   }
   for (std::size_t i = 0; i != values.size(); ++i)
-    if (std::isfinite(values[i])) values[i] = counted[i];
-  return values;
+    if (!std::isfinite(values[i])) counted[i] = values[i];
+  return counted;
 }
 
 /// Deviation of a point and its neighbours from one plane, in units of their mean distance: the root of the sum of two

@@ -123,9 +123,10 @@ class surroundings {
   /// Returns the log spacing of each point above the usual one; NaN if unknown.
   template <execution_policy Policy>
   [[nodiscard]] std::vector<float> residuals(const Policy& policy, const density_step& step) {
+    const bool is_local = step.mode == filter_mode::local_log_statistical;
+    const auto local = is_local ? local_spacing(policy) : std::span<const float>{};  // first, as it needs memory
     std::vector<float> out(size());
-    if (step.mode == filter_mode::local_log_statistical) {
-      const auto local = local_spacing(policy);
+    if (is_local) {
       for (std::size_t i = 0; i != size(); ++i) out[i] = log_spacing_[i] - local[i] - static_cast<float>(step.offset);
     } else {
       for_each_index(policy, size(), 4096, [&](std::size_t i) { out[i] = log_spacing_[i] - usual(step.usual, i); });
@@ -165,10 +166,10 @@ class surroundings {
 
   template <execution_policy Policy>
   void apply(const Policy& policy, const isolation_step& step) {
-    const auto local = local_spacing(policy);
-    std::vector<float> spacing(size());
+    local_spacing(policy);
+    std::vector<float> spacing = std::exchange(local_, {});  // computed again if needed
     for (std::size_t i = 0; i != size(); ++i) {
-      const float around = local[i] + static_cast<float>(step.offset);
+      const float around = spacing[i] + static_cast<float>(step.offset);
       const float line = usual(step.usual, i);
       const float widest = line > around ? line : around;
       spacing[i] = std::isnan(widest) ? std::numeric_limits<float>::infinity() : std::exp(widest);  // linked by others
@@ -225,9 +226,9 @@ class surroundings {
   template <execution_policy Policy, class CanGo>
   void remove_components(const Policy& policy, std::span<const float> spacing, const cluster_options& options,
                          const CanGo& can_go) {
-    linked_components found = separate(policy, graph_, gone_, spacing, options);
+    const linked_components found = separate(policy, graph_, gone_, spacing, options);
     for (std::uint32_t i = 0; i != size(); ++i) {
-      if (gone_[i] == 0 && found.goes[found.sets.root(i)] != 0 && can_go(i)) gone_[i] = 1;
+      if (gone_[i] == 0 && found.goes[found.component[i]] != 0 && can_go(i)) gone_[i] = 1;
     }
   }
 
