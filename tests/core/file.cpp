@@ -271,18 +271,39 @@ TEST_CASE("processes that write the same file leave one of their files and nothi
 
 TEST_CASE("a temporary file that an ended process left does not stop the next one") {
   const scratch_folder folder;
-  for (int i = 0; i != 4; ++i) {  // the names that this process would use next
-    orbis::detail::temporary_file probe{folder / "x"};
-    REQUIRE(probe.exists());
-    const std::string name = probe.path().filename().string();
-    const auto number = std::stoul(name.substr(name.rfind('-') + 1));
-    std::ofstream{folder / (name.substr(0, name.rfind('-') + 1) + std::to_string(number + 1) + ".part")} << "left";
-  }
-  const std::ptrdiff_t left = folder.files();
+  constexpr int names = 200;  // that this process would use next
+  for (int i = 0; i != names; ++i)
+    std::ofstream{folder / (".orbis-" + std::to_string(::getpid()) + "-" + std::to_string(i) + ".part")} << "left";
   CHECK(write_text(folder / "file", "text"));
   CHECK(read_file(folder / "file").value() == "text");
-  CHECK(folder.files() == left + 1);
+  CHECK(folder.files() == names + 1);
 }
+
+#ifdef O_TMPFILE
+TEST_CASE("a writer that is killed leaves nothing") {
+  const scratch_folder folder;
+  const int probe = ::open(folder.path().c_str(), O_WRONLY | O_TMPFILE, 0600);
+  if (probe < 0) {
+    std::printf("[skipped] the file system has no files without names\n");
+    return;
+  }
+  ::close(probe);
+  REQUIRE(write_text(folder / "file", "old"));
+  const ::pid_t writer = ::fork();
+  if (writer == 0) {
+    static_cast<void>(orbis::write_file_atomically(folder / "file", [](std::ostream& out) {
+      out << "new" << std::flush;
+      ::raise(SIGKILL);
+    }));
+    ::_exit(0);
+  }
+  int status = 0;
+  REQUIRE(::waitpid(writer, &status, 0) == writer);
+  CHECK(WIFSIGNALED(status));
+  CHECK(read_file(folder / "file").value() == "old");
+  CHECK(folder.files() == 1);
+}
+#endif
 
 TEST_CASE("a device or a pipe is not replaced by a file") {
   const scratch_folder folder;

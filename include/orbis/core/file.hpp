@@ -31,28 +31,27 @@ namespace orbis::detail {
 /// A newly created empty file that replaces the target file by one rename; the destructor removes it unless it was
 /// renamed.
 ///
-/// Its name is hidden and unique per process and call, so that concurrent writers of the same file, in one process or
-/// in several, do not conflict.
+/// Where the system supports it (Linux), the file has no name until then, so that nothing remains if the process is
+/// killed. Otherwise its name is hidden. Names are unique per process and call, so that concurrent writers of the same
+/// file, in one process or in several, do not conflict.
 class temporary_file {
  public:
   /// Creates the file in the folder of `target`. If that fails, `exists()` is false and `errno` holds the reason.
-  explicit temporary_file(const std::filesystem::path& target) {
-    static std::atomic<std::uint32_t> calls{0};
-    for (int attempt = 0; attempt != 100; ++attempt) {
-      path_ = target.parent_path() / (".orbis-" + process() + "-" + std::to_string(calls.fetch_add(1)) + ".part");
-      exists_ = create();
-      if (exists_ || errno != EEXIST) return;  // EEXIST: left by an earlier process with the same number
-    }
+  explicit temporary_file(const std::filesystem::path& target) : folder_{target.parent_path()} {
+    if (create_unnamed()) return;
+    do path_ = next_name();
+    while (!(is_named_ = create()) && errno == EEXIST);  // of an earlier process with the same number
   }
   ~temporary_file() {
     close();
     std::error_code ignored;
-    if (exists_) std::filesystem::remove(path_, ignored);
+    if (is_named_) std::filesystem::remove(path_, ignored);
   }
   temporary_file(const temporary_file&) = delete;
   temporary_file& operator=(const temporary_file&) = delete;
 
-  [[nodiscard]] bool exists() const noexcept { return exists_; }
+  [[nodiscard]] bool exists() const noexcept { return is_named_ || is_unnamed_; }
+  /// The path to open the file by, valid until it is renamed.
   [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }
 
   /// Flushes the file to the disk; returns false and sets `errno` if that fails.
@@ -66,11 +65,12 @@ class temporary_file {
 
   /// Renames the file to `target`, replacing it, and flushes the new name to the disk.
   [[nodiscard]] std::error_code rename_to(const std::filesystem::path& target) {
+    if (is_unnamed_ && !give_name()) return {errno, std::generic_category()};
     close();
     std::error_code failure;
     std::filesystem::rename(path_, target, failure);
     if (failure) return failure;
-    exists_ = false;
+    is_named_ = false;
 #ifdef ORBIS_HAS_POSIX_FILES
     // The file is complete and in place: a folder that cannot be synced (e.g. without read permission) is not a
     // failure.
@@ -84,6 +84,32 @@ class temporary_file {
   }
 
  private:
+  [[nodiscard]] std::filesystem::path next_name() const {
+    static std::atomic<std::uint32_t> calls{0};
+    return folder_ / (".orbis-" + process() + "-" + std::to_string(calls.fetch_add(1)) + ".part");
+  }
+#ifdef O_TMPFILE
+  /// Creates a file without a name. Fails where the file system or /proc is missing the means.
+  [[nodiscard]] bool create_unnamed() {
+    file_ = ::open(folder_.empty() ? "." : folder_.c_str(), O_WRONLY | O_TMPFILE | O_CLOEXEC, 0666);
+    if (file_ < 0) return false;
+    path_ = "/proc/self/fd/" + std::to_string(file_);
+    is_unnamed_ = ::access(path_.c_str(), W_OK) == 0;
+    if (!is_unnamed_) close();
+    return is_unnamed_;
+  }
+  [[nodiscard]] bool give_name() {
+    const std::filesystem::path link = std::exchange(path_, {});
+    do path_ = next_name();
+    while (!(is_named_ = ::linkat(AT_FDCWD, link.c_str(), AT_FDCWD, path_.c_str(), AT_SYMLINK_FOLLOW) == 0) &&
+           errno == EEXIST);
+    is_unnamed_ = false;
+    return is_named_;
+  }
+#else
+  [[nodiscard]] static bool create_unnamed() { return false; }
+  [[nodiscard]] static bool give_name() { return false; }
+#endif
 #ifdef ORBIS_HAS_POSIX_FILES
   static std::string process() { return std::to_string(::getpid()); }
   [[nodiscard]] bool create() {
@@ -105,8 +131,9 @@ class temporary_file {
   void close() noexcept {}
 #endif
 
-  std::filesystem::path path_;
-  bool exists_ = false;
+  std::filesystem::path folder_, path_;
+  bool is_named_ = false;    ///< the file exists at path_
+  bool is_unnamed_ = false;  ///< the file exists, without a name
 };
 
 }  // namespace orbis::detail
