@@ -8,6 +8,7 @@
 #include <CLI/CLI.hpp>
 
 #include "../common/program.hpp"
+#include "../common/same_file.hpp"
 #include "adjust.hpp"
 
 int run(int argc, char** argv) {
@@ -32,6 +33,7 @@ int run(int argc, char** argv) {
   cli.add_option("--threads", s.threads, "number of threads; 0: all cores")->capture_default_str();
   cli.add_flag("--json", s.json, "print the summary as JSON");
   if (const auto code = examples::parse(cli, argc, argv)) return *code;
+  if (examples::is_same_file(s.output, s.input)) return report_error(1, examples::overwrite_message(s.output, s.input));
   auto problem = orbis::io::read_bal(std::filesystem::path{s.input});
   if (!problem) return report_error(2, examples::describe(problem.error()));
   return s.loss == "cauchy" || s.loss == "tukey" ? adjust_redescending(s, *problem) : adjust_convex(s, *problem);

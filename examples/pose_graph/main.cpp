@@ -12,6 +12,7 @@
 #include <orbis/optimize/pose_graph-inl.hpp>
 
 #include "../common/program.hpp"
+#include "../common/same_file.hpp"
 #include "chordal.hpp"
 
 namespace optimize = orbis::optimize;
@@ -99,6 +100,7 @@ int run_command(int argc, char** argv) {
   cli.add_flag("--chordal", s.chordal, "initialise from the edges instead of the file's poses");
   cli.add_flag("--json", s.json, "print the summary as JSON");
   if (const auto code = examples::parse(cli, argc, argv)) return *code;
+  if (examples::is_same_file(s.output, s.input)) return report_error(1, examples::overwrite_message(s.output, s.input));
   auto graph = orbis::io::read_g2o(s.input);
   if (!graph) return report_error(2, examples::describe(graph.error()));
   if (s.chordal) {

@@ -34,6 +34,7 @@ fails(1 "--solver" noisy.txt --solver none)
 fails(1 "--tolerance" noisy.txt --tolerance -1)
 fails(1 "--max-iterations" noisy.txt --max-iterations -1)
 fails(1 "--nonsense" noisy.txt --nonsense)
+fails(1 "noisy.txt: is an input" noisy.txt --out ./noisy.txt)
 app(0 --help)
 check(out MATCHES "--solver" AND out MATCHES "--loss")
 

@@ -27,6 +27,7 @@ fails(1 "--width" square.g2o --loss huber --width 0)
 fails(1 "--damping" square.g2o --damping none)
 fails(1 "--max-iterations" square.g2o --max-iterations -1)
 fails(1 "--nonsense" square.g2o --nonsense)
+fails(1 "square.g2o: is an input" square.g2o --output ./square.g2o)
 app(0 --help)
 check(out MATCHES "--chordal" AND out MATCHES "--loss")
 
