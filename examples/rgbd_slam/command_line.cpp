@@ -474,6 +474,7 @@ command_line::command_line() {
          "--origin", origin,
          "position of the sensor in metres: rays from there mark free space; without it, the points are marked "
          "occupied and no space is marked free")
+      ->check(not_empty)
       ->type_name("X,Y,Z");
   add_recording_options(*map, s);
   add_frame_options(*map, s);
@@ -494,6 +495,7 @@ command_line::command_line() {
            "--gravity", gravity,
            "direction of gravity at the first frame, in the camera frame (x right, y down, z forward); without "
            "it, estimated from the depth image")
+        ->check(not_empty)
         ->type_name("X,Y,Z");
   for (CLI::App* cmd : {run, live, demo, map})
     cmd->add_option("--config", s.config, "read options from a TOML file, such as resolution = 0.02")

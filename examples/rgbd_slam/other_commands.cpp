@@ -209,6 +209,8 @@ exit_code evaluate(const settings& s, console& console) {
   if (!estimate) return give_up(estimate.error());
   auto truth = orbis::io::read_trajectory_file(s.reference);
   if (!truth) return give_up(truth.error());
+  for (const auto& [read, path] : {std::pair{&estimate, &s.input}, std::pair{&truth, &s.reference}})
+    if ((*read)->poses.empty()) return give_up({orbis::errc::no_data, path->string(), "contains no poses"});
   std::vector<std::string> warnings = std::move(estimate->notes);
   warnings.insert(warnings.end(), truth->notes.begin(), truth->notes.end());
   if (auto timed = complete_times(s, *estimate, *truth, warnings); !timed) return give_up(timed.error());

@@ -22,6 +22,9 @@ app_fails(2 "bad.txt:2: .*one" eval estimate.txt bad.txt)
 file(WRITE ${WORK}/elsewhen.txt "100 1 1 0 ${identity}\n101 1 1 0 ${identity}\n")
 app_fails(2 "estimate.txt: only 0 poses .* the times are 0 to 3 s and 100 to 101 s" eval estimate.txt elsewhen.txt)
 app_fails(1 "GROUNDTRUTH" eval estimate.txt)
+file(WRITE ${WORK}/none.txt "poses\n")
+app_fails(2 "none.txt: contains no poses" eval none.txt truth.txt)
+app_fails(2 "none.txt: contains no poses" eval estimate.txt none.txt)
 
 # The same ATE whatever the form of the file; what is interpreted or left out is mentioned.
 function(gives text)  # warning...
