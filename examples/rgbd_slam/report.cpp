@@ -25,9 +25,11 @@ using orbis::vec3;
 
 // -- text ------------------------------------------------------------------------------------------
 
+/// Text for the page. Bytes that are not UTF-8, as in names of files, are replaced.
 std::string escaped(std::string_view text) {
+  const std::string quoted = json(text).dump(-1, ' ', false, json::error_handler_t::replace);
   std::string out;
-  for (const char c : text) switch (c) {
+  for (const char c : json::parse(quoted).get<std::string>()) switch (c) {
       case '&': out += "&amp;"; break;
       case '<': out += "&lt;"; break;
       case '>': out += "&gt;"; break;
