@@ -29,7 +29,7 @@
 namespace app {
 
 /// The name of the spill file in the folder of new files. The file is unlinked once it is open.
-inline constexpr const char* spill_name = "depth.spill";
+inline constexpr const char* spill_name = ".rgbd_slam.depths";  // no result may have this name
 
 /// Every second pixel of every second row becomes a point.
 inline constexpr int point_stride = 2;

@@ -198,6 +198,8 @@ result<result_files> result_files::begin(const settings& s) {
     if (index == places.size()) places.push_back({folder, {}});
     file_names& names = places[index].names;
     for (const std::string& name : others) {
+      if (name.starts_with(staged_folder::private_name))
+        return fail(file, std::string{"names that begin with "} + staged_folder::private_name + " are reserved");
       if (is_among(name, names) || (index == 0 && is_among(name, all_names())))
         return fail(file, "another result has this name");
       names.push_back(name);
@@ -253,7 +255,7 @@ file_names file_lists::of_earlier_runs(const file_names& made) const {
 result<void> result_files::begin_optional() {
   std::error_code ec;
   for (const staged_folder& f : folders_)
-    if (fs::create_directory(f.path() / optional_name, ec); ec)
+    if (fs::create_directories(f.path() / optional_name, ec); ec)
       return orbis::fail(orbis::errc::write_failed, out_.string(), "cannot create files in it: " + ec.message());
   return {};
 }

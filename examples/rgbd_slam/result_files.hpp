@@ -93,7 +93,7 @@ class result_files {
   [[nodiscard]] orbis::result<void> put_in_place();
 
  private:
-  static constexpr const char* optional_name = ".optional";
+  static inline const std::filesystem::path optional_name = std::filesystem::path{staged_folder::private_name} / "optional";
 
   result_files() = default;
   [[nodiscard]] std::filesystem::path floor_map_in(const std::filesystem::path& part) const {

@@ -36,9 +36,12 @@ descriptor::~descriptor() {
 
 namespace {
 
-constexpr std::string_view prefix = ".rgbd_slam-", ready = ".ready", backup = "old";
-// Lists in hidden folders: the files to move; in the first folder, the other hidden folders; in those, the first one.
-constexpr std::string_view names_list = ".names", others_list = ".others", first_list = ".first";
+constexpr std::string_view prefix = ".rgbd_slam-", ready = ".ready";
+// In hidden folders, the replaced files, and lists: the files to move; in the first folder, the other hidden folders; in
+// those, the first one.
+const fs::path own = staged_folder::private_name;
+const fs::path backup = own / "replaced", names_list = own / "names", others_list = own / "others",
+               first_list = own / "first";
 
 auto failure(const fs::path& path, const std::string& what) {
   return orbis::fail(orbis::errc::write_failed, path.string(), what);
@@ -309,12 +312,13 @@ result<void> staged_folder::put_in_place(std::span<staged_folder* const> folders
     for (const std::string& name : f->made())
       if (!may_be_replaced(f->folder_ / name))
         return failure(f->folder_ / name, "is not a regular file and is not replaced");
+    if (fs::create_directories(f->staging_ / backup, ec); ec)
+      return failure(f->folder_, "cannot create files in it: " + ec.message());
     auto listed = write_list(f->staging_ / names_list, f->names_);
     if (listed)
       listed = f == &first ? write_list(f->staging_ / others_list, others)
                            : write_list(f->staging_ / first_list, {marked.string()});
     if (!listed) return listed;
-    fs::create_directory(f->staging_ / backup, ec);
     ::fsync(f->staging_lock_.get());
     ::fsync(f->folder_lock_.get());
   }

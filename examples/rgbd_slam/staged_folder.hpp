@@ -8,8 +8,8 @@
 ///   2. a child process in a separate session renames the files, and finishes even if this program is killed;
 ///   3. if the machine stops in between, the next program that reads or writes one of the folders finishes first
 ///      (`finish`).
-/// Only files with the given names are moved; the hidden folders list them and each other, so that any program can
-/// finish. No other file in the folders is changed, and only hidden folders of ended processes are deleted. Processes
+/// Only files with the given names are moved; the hidden folders list them and each other in a folder `private_name`,
+/// so that any program can finish. No other file in the folders is changed, and only hidden folders of ended processes are deleted. Processes
 /// that write into the same folder wait for each other by `flock`.
 #pragma once
 
@@ -45,6 +45,9 @@ struct hidden_folders {
 
 class staged_folder {
  public:
+  /// Begins names that no result may have: those of hidden folders, and of a folder in them for other files than results.
+  static constexpr const char* private_name = ".rgbd_slam";
+
   /// Finishes what ended processes have begun to move into place in `folder`, and removes their other hidden folders.
   /// Call before anything in the folder is read. No effect if the folder does not exist.
   static void finish(const std::filesystem::path& folder);

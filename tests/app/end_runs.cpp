@@ -252,7 +252,8 @@ int main(int argc, char** argv) {
     else
       std::ofstream{out / ".rgbd_slam-000000.ready" / name, std::ios::binary} << bytes;
   std::ofstream{out / ".rgbd_slam-000000.ready" / "other"} << "is none of ours";
-  std::ofstream list{out / ".rgbd_slam-000000.ready" / ".names", std::ios::binary};
+  fs::create_directories(out / ".rgbd_slam-000000.ready" / ".rgbd_slam");
+  std::ofstream list{out / ".rgbd_slam-000000.ready" / ".rgbd_slam" / "names", std::ios::binary};
   for (const auto& [name, bytes] : after) list << name << '\0';
   list.close();
   std::ofstream{work / "none.ply"} << "no cloud";
@@ -325,7 +326,7 @@ int main(int argc, char** argv) {
       std::vector<std::string> spilling = demo("2", "100000");
       spilling.insert(spilling.end(), {"--depth-memory", "0", "--map-every-frame"});
       run endless{spilling};
-      const auto has_spilled = [&] { return endless.nameless("depth.spill") == 1; };
+      const auto has_spilled = [&] { return endless.nameless(".rgbd_slam.depths") == 1; };
       for (int wait = 0; !has_spilled(); ++wait) {
         check(wait < 6000 && !endless.is_over(), "no depth image was spilled");
         std::this_thread::sleep_for(std::chrono::milliseconds{10});

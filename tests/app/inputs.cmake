@@ -102,6 +102,13 @@ file(COPY_FILE ${WORK}/out/room.map ${WORK}/out/map.bt)
 set(kept out/map.bt)
 set(message "out/map.bt: is an input of this run")
 must_stay(run room --out out ${quick} --load-map out/map.bt)
+# Names that hidden folders use are no reason for a loss.
+foreach(name .names .first .others .optional old replaced depth.spill)
+  app(0 run room --out odd ${quick} --save-map odd/${name})
+  app(0 run room --out found ${quick} --load-map odd/${name} --localize-only)
+endforeach()
+app_fails(2 "reserved.map: the map cannot be saved: names that begin with .rgbd_slam are reserved" run room --out odd
+          ${quick} --save-map odd/.rgbd_slam.reserved.map)
 app(0 run room --out grown ${quick} --load-map out/room.map --save-map out/room.map)
 
 # A name of a result that a folder has.
