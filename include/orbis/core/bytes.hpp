@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Bytes of files: numbers in either byte order, a checksum, and a text encoding.
+/// Byte-level tools for files: numbers in either byte order, a checksum, and a text encoding.
 #pragma once
 
 #include <algorithm>
@@ -61,9 +61,8 @@ using crc32c_tables = std::array<std::array<std::uint32_t, 256>, 8>;
 }
 inline constexpr crc32c_tables crc32c_table = make_crc32c_tables();
 
-/// Processes eight bytes at a time by tables: M. Kounavis, F. Berry, "A systematic approach to building high
-/// performance,
-/// software-based, CRC generators", ISCC 2005.
+/// Processes eight bytes at a time with tables. Source: M. Kounavis, F. Berry, "A systematic approach to building high
+/// performance, software-based, CRC generators", ISCC 2005.
 inline std::uint32_t crc32c_portable(const std::byte* at, std::size_t size, std::uint32_t c) noexcept {
   for (; size >= 8; size -= 8, at += 8) {
     std::uint32_t next = 0;
@@ -94,8 +93,8 @@ inline std::uint32_t crc32c_sse42(const std::byte* at, std::size_t size, std::ui
 
 }  // namespace detail
 
-/// The CRC-32C checksum of `bytes`, as in iSCSI; `before` is the checksum of the bytes that precede them. Linear time;
-/// with SSE4.2 eight bytes take one or two cycles.
+/// The CRC-32C checksum of `bytes`, as in iSCSI; `before` is the checksum of the preceding bytes. Linear time; with
+/// SSE4.2, eight bytes take one or two cycles.
 ///
 /// Source: G. Castagnoli, S. Bräuer, M. Herrmann, "Optimization of cyclic redundancy-check codes with 24 and 32 parity
 /// bits", IEEE Transactions on Communications 41, 1993.
@@ -108,7 +107,7 @@ inline std::uint32_t crc32c_sse42(const std::byte* at, std::size_t size, std::ui
 
 namespace detail {
 
-/// The 85 characters starting at '#', except the two that are special in a literal.
+/// The character for a base-85 digit, counting from '#'; two characters that are special in literals are replaced.
 [[nodiscard]] constexpr char base85_character(std::uint32_t digit) noexcept {
   const char c = static_cast<char>('#' + digit);
   return c == '\\' ? 'x' : c == '?' ? 'y' : c;
@@ -122,8 +121,8 @@ inline constexpr auto base85_digits = [] {
 
 }  // namespace detail
 
-/// Appends the bytes that `text` encodes in base 85: five characters for four bytes, first digit first, using only
-/// characters that are safe in a string literal. Returns false if `text` is not such an encoding.
+/// Appends the bytes that `text` encodes in base 85: five characters for four bytes, most significant digit first,
+/// using only characters that are safe in a string literal. Returns false if `text` is not valid.
 [[nodiscard]] inline bool append_base85(std::string& bytes, std::string_view text) {
   if (text.size() % 5 != 0) return false;
   std::size_t to = bytes.size();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A paged copy-on-write array: copies share pages until one of them writes. Copying a map costs one pointer per page,
+/// A paged copy-on-write array: copies share pages until one of them is written to. Copying costs one pointer per page,
 /// and readers keep their copy while the writer continues.
 #pragma once
 
@@ -60,7 +60,7 @@ class cow_pages {
     }
     writable(size_++) = value;
   }
-  /// Resizes the array to `n` values; new ones are value-initialised.
+  /// Resizes the array to `n` values; new values are value-initialised.
   void resize(std::size_t n) {
     while (size_ < n) push_back(T{});
     size_ = n;

@@ -29,14 +29,14 @@ struct sequential_policy {
   [[nodiscard]] static constexpr unsigned threads() noexcept { return 1; }
 };
 
-/// Runs on several threads: the number of hardware threads, or the number passed to `with`. Threads are started for
-/// each loop, or belong to a pool.
+/// Runs on several threads: one per hardware thread by default, or the number passed to `with`. The threads are started
+/// for each loop or come from a pool.
 struct parallel_policy {
   unsigned count = 0;           ///< 0: one thread for each hardware thread
   thread_pool* pool = nullptr;  ///< provides the threads; must outlive the policy
 
   [[nodiscard]] constexpr parallel_policy with(unsigned n) const noexcept { return {n, pool}; }
-  /// Uses the threads of `pool`; all of them if no number is given.
+  /// Uses threads of this pool: all of them unless `with` sets the number.
   [[nodiscard]] constexpr parallel_policy on(thread_pool& threads) const noexcept { return {count, &threads}; }
   [[nodiscard]] unsigned threads() const noexcept {
     if (count == 0 && pool != nullptr) return pool->threads();
@@ -85,7 +85,7 @@ inline void run_on_workers(std::size_t count, std::size_t workers, thread_pool* 
     try {
       for (std::size_t i = 1; i != workers; ++i) others.emplace_back(work);
     } catch (const std::system_error&) {
-      // The system provides no more threads: the existing ones do the work, with the same result.
+      // The system provides no more threads; the existing ones do the work, with the same result.
     }
     work();
   }
@@ -96,8 +96,8 @@ inline void run_on_workers(std::size_t count, std::size_t workers, thread_pool* 
 
 /// Calls `body(begin, end)` on the consecutive chunks `[i * grain, min((i + 1) * grain, count))` of `[0, count)`, on
 /// the policy's threads, in no particular order. An exception thrown by `body` stops the distribution of chunks and is
-/// rethrown on the calling thread. If the system provides fewer threads than the policy requests, those do all of the
-/// work.
+/// rethrown on the calling thread. If the system provides fewer threads than the policy requests, the available threads
+/// do all of the work.
 /// @pre grain > 0
 template <execution_policy Policy, std::invocable<std::size_t, std::size_t> Body>
 void for_each_chunk(const Policy& policy, std::size_t count, std::size_t grain, Body&& body) {
@@ -124,7 +124,8 @@ void for_each_index(const Policy& policy, std::size_t count, std::size_t grain, 
 }
 
 /// A non-owning reference to a callable `bool(std::size_t done, std::size_t total)`, called periodically by
-/// long-running algorithms. It returns true to continue, false to cancel. Default: none.
+/// long-running algorithms. It returns true to continue, false to cancel. A default-constructed object refers to no
+/// callable.
 ///
 /// The callable must outlive the call it is passed to. Algorithms call it from one thread at a time.
 class progress {
@@ -141,7 +142,7 @@ class progress {
           return (*reinterpret_cast<std::remove_reference_t<F>*>(object))(done, total);
         }} {}
 
-  /// Reports `done` of `total`; returns false if the caller requested cancellation.
+  /// Reports that `done` of `total` is complete; returns false if the caller requested cancellation.
   [[nodiscard]] bool operator()(std::size_t done, std::size_t total) const {
     return call_ == nullptr || call_(object_, done, total);
   }

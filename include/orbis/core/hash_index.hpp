@@ -11,9 +11,10 @@
 
 namespace orbis {
 
-/// The common hash table: open addressing with linear probing, at most half full. Erasing shifts the following entries
-/// back, so that a table with as many erasures as insertions does not grow. A default-constructed `Slot` is empty, as
-/// its `is_empty()` reports. Every call takes the hash; its highest bits select the slot.
+/// The hash table underlying the indices below: open addressing with linear probing, at most half full. Erasing shifts
+/// the following entries back, so a table with equal numbers of insertions and erasures does not grow. `is_empty()`
+/// must be true for a default-constructed `Slot`. Every function takes the hash of the key; its highest bits select the
+/// slot.
 ///
 /// Source: D. E. Knuth, "The Art of Computer Programming", vol. 3, 6.4, algorithm R.
 template <class Slot>
@@ -31,14 +32,14 @@ class probe_table {
   }
   ~probe_table() = default;
 
-  /// Returns the slot of this hash for which `matches(slot)` is true, or null. O(1) on average.
+  /// Returns the slot with this hash for which `matches(slot)` is true, or null. O(1) on average.
   template <class Matches>
   [[nodiscard]] const Slot* find(std::uint64_t hash, const Matches& matches) const {
     if (slots_.empty()) return nullptr;
     const Slot& s = slots_[place(hash, matches)];
     return s.is_empty() ? nullptr : &s;
   }
-  /// Returns the slot of this hash for which `matches(slot)` is true, or an empty one, which the caller must fill.
+  /// Returns the slot with this hash for which `matches(slot)` is true, or an empty one, which the caller must fill.
   /// `hash_of(slot)` provides the hashes of other slots when the table grows. O(1) on average.
   template <class Matches, class HashOf>
   [[nodiscard]] Slot& find_or_insert(std::uint64_t hash, const Matches& matches, const HashOf& hash_of) {
@@ -47,7 +48,7 @@ class probe_table {
     used_ += s.is_empty() ? 1 : 0;
     return s;
   }
-  /// Empties the slot of this hash for which `matches(slot)` is true, if any. O(1) on average.
+  /// Empties the slot with this hash for which `matches(slot)` is true, if any. O(1) on average.
   template <class Matches, class HashOf>
   void erase(std::uint64_t hash, const Matches& matches, const HashOf& hash_of) {
     if (slots_.empty()) return;
@@ -63,7 +64,7 @@ class probe_table {
     slots_[gap] = {};
     --used_;
   }
-  /// Releases memory if less than an eighth is used.
+  /// Halves the table if less than an eighth of it is used.
   template <class HashOf>
   void shrink(const HashOf& hash_of) {
     if (slots_.size() > 64 && 8 * used_ < slots_.size()) resize(slots_.size() / 2, hash_of);
@@ -141,8 +142,8 @@ class hash_index {
   probe_table<slot> table_;
 };
 
-/// A map from keys to the positions of the keys in an array of the caller: 4 bytes per slot. `key_of(number)` returns a
-/// key for comparison, and `Hash{}(key)` 64 well-mixed bits.
+/// A map from keys to their positions in the caller's array; 4 bytes per slot. `key_of(position)` returns the key at a
+/// position, and `Hash{}(key)` returns 64 well-mixed bits.
 template <class Key, class Hash>
 class number_index {
  public:
@@ -154,15 +155,15 @@ class number_index {
     const slot* const s = table_.find(Hash{}(key), matches(key, key_of));
     return s == nullptr ? none : s->number;
   }
-  /// The position of `key`; stores `number` if it has none yet. In that case key_of(number) must return `key` from then
-  /// on.
+  /// Returns the position of `key`; stores `number` as its position if `key` is new. From then on, key_of(number) must
+  /// return `key`.
   template <class KeyOf>
   std::uint32_t find_or_insert(const Key& key, std::uint32_t number, const KeyOf& key_of) {
     slot& s = table_.find_or_insert(Hash{}(key), matches(key, key_of), hash_of(key_of));
     if (s.is_empty()) s.number = number;
     return s.number;
   }
-  /// Removes `key` if present; key_of(its number) must still return it.
+  /// Removes `key` if present; key_of(position of `key`) must still return it.
   template <class KeyOf>
   void erase(const Key& key, const KeyOf& key_of) {
     table_.erase(Hash{}(key), matches(key, key_of), hash_of(key_of));

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
 /// Eigenvalues and singular values of small matrices by Jacobi rotations, and the nearest rotation to a matrix.
-/// Accurate to rounding, and much cheaper to compile than a general decomposition.
+/// Accurate to rounding, and compiles much faster than a general decomposition.
 ///
 /// Sources: G. Golub, C. Van Loan, "Matrix computations", 4th edition, 2013, sections 8.5 and 8.6.3;
 /// M. Hestenes, "Inversion of matrices by biorthogonalization and related results", 1958.
@@ -27,7 +27,7 @@ struct symmetric_eigen {
 template <int N>
 struct singular_decomposition {
   matrix<N, N> u;    ///< orthonormal
-  matrix<N> values;  ///< descending, none negative
+  matrix<N> values;  ///< non-negative, in descending order
   matrix<N, N> v;    ///< orthonormal; the matrix is `u * values.asDiagonal() * v.transpose()`
 };
 
@@ -152,7 +152,7 @@ template <int N>
     detail::swap_columns(u, i, most);
     detail::swap_columns(out.v, i, most);
   }
-  // Normalise the columns; replace columns that are only rounding noise by any that are orthogonal to the others.
+  // Normalise the columns; replace columns that are only rounding noise with arbitrary ones orthogonal to the others.
   for (int i = 0; i != N; ++i) {
     const bool made = !(out.values[i] > epsilon * out.values[0]);
     for (int axis = 0; made && axis != N; ++axis) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Access to user-defined point types: by a trait, in place.
+/// In-place access to user-defined point types through a trait.
 ///
 /// Any type with members `x`, `y`, `z` (PCL's points, plain structs) and any type indexable with `p[0], p[1], p[2]`
 /// (Eigen vectors, `std::array`, `float[3]`) works without further code. For other types specialise `point_traits`:
@@ -86,7 +86,7 @@ concept point_like = requires(const std::remove_cvref_t<P>& p) {
   { point_traits<std::remove_cvref_t<P>>::z(p) } -> std::same_as<typename point_traits<std::remove_cvref_t<P>>::scalar>;
 };
 
-/// A sized random-access range of points: a cloud, read in place.
+/// A sized random-access range of points: a cloud that algorithms read without copying it.
 template <class R>
 concept point_range =
     std::ranges::random_access_range<R> && std::ranges::sized_range<R> && point_like<std::ranges::range_value_t<R>>;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Text from files and arguments in messages: short, in one line.
+/// Quotation of text from files and arguments in messages, shortened and on one line.
 #pragma once
 
 #include <cstddef>
@@ -11,8 +11,8 @@
 
 namespace orbis {
 
-/// The number of bytes of the character at the beginning of `text`, in UTF-8, if it controls a terminal or the layout
-/// of text: C0 and C1 controls, DEL, separators of lines and paragraphs, and changes of the writing direction; else 0.
+/// The length in bytes of the UTF-8 character at the beginning of `text` if it controls a terminal or the text layout
+/// (C0 and C1 controls, DEL, line and paragraph separators, changes of writing direction); otherwise 0.
 [[nodiscard]] constexpr std::size_t control_bytes(std::string_view text) noexcept {
   const auto is = [&](std::size_t i, unsigned first, unsigned last) {
     return i < text.size() && static_cast<unsigned char>(text[i]) >= first &&
@@ -27,15 +27,15 @@ namespace orbis {
 
 namespace detail {
 
-/// Returns true if the byte continues a character in UTF-8.
+/// Returns true if the byte is a UTF-8 continuation byte.
 [[nodiscard]] constexpr bool continues_character(char byte) noexcept {
   return (static_cast<unsigned char>(byte) & 0xc0U) == 0x80U;
 }
 
 }  // namespace detail
 
-/// The text with at most `most` bytes of it, and "..." in place of the rest. Does not cut UTF-8 characters; "?"
-/// replaces control characters (`control_bytes`) and, if the text is not UTF-8, all bytes that are not ASCII.
+/// Shortens the text to its first `most` bytes, followed by "...", if it is longer. Does not cut UTF-8 characters; "?"
+/// replaces control characters (`control_bytes`) and, if the text is not UTF-8, all non-ASCII bytes.
 [[nodiscard]] inline std::string shortened(std::string_view text, std::size_t most = 200) {
   std::size_t end = text.size();
   if (end > most)
@@ -52,7 +52,7 @@ namespace detail {
   return end == text.size() ? out : out + "...";
 }
 
-/// The same of a path, whose end says more than its beginning.
+/// Like `shortened`, for a path: keeps its end, which is more informative than its beginning.
 [[nodiscard]] inline std::string shortened_path(std::string_view path, std::size_t most = 200) {
   if (path.size() <= most) return shortened(path, most);
   std::size_t begin = path.size() - most;
@@ -60,7 +60,7 @@ namespace detail {
   return "..." + shortened(path.substr(begin), most);
 }
 
-/// A word or line of a file, or an argument, in quotation marks: at most 60 bytes of it.
+/// Quotes a word or line of a file, or an argument; at most 60 bytes of it.
 [[nodiscard]] inline std::string in_quotes(std::string_view text) { return "\"" + shortened(text, 60) + "\""; }
 
 }  // namespace orbis

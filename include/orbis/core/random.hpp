@@ -12,9 +12,9 @@
 
 namespace orbis {
 
-/// SplitMix64's finaliser: a well-mixed 64-bit hash of `x`. Counter-based noise is `mix64(seed ^ mix64(index))`; it
-/// needs no state and no order.
-/// Source: Steele, Lea, Flood, "Fast splittable pseudorandom number generators", OOPSLA 2014.
+/// SplitMix64's finaliser: a well-mixed 64-bit hash of `x`. Use `mix64(seed ^ mix64(index))` for counter-based noise,
+/// which needs no state and no evaluation order. Source: Steele, Lea, Flood, "Fast splittable pseudorandom number
+/// generators", OOPSLA 2014.
 [[nodiscard]] constexpr std::uint64_t mix64(std::uint64_t x) noexcept {
   x += 0x9e3779b97f4a7c15ULL;
   x = (x ^ (x >> 30U)) * 0xbf58476d1ce4e5b9ULL;
@@ -40,12 +40,12 @@ class random_bits {
   [[nodiscard]] constexpr double uniform() noexcept { return static_cast<double>((*this)() >> 11U) * 0x1.0p-53; }
   /// Uniform in [lo, hi).
   [[nodiscard]] constexpr double uniform(double lo, double hi) noexcept { return lo + (hi - lo) * uniform(); }
-  /// Uniform in [0, n), n > 0, by multiplication (Lemire 2019, without the rejection: bias < n / 2^32).
+  /// Uniform in [0, n), n > 0, by multiplication (Lemire 2019, without rejection: bias < n / 2^32).
   [[nodiscard]] constexpr std::uint32_t below(std::uint32_t n) noexcept {
     return static_cast<std::uint32_t>((((*this)() >> 32U) * n) >> 32U);
   }
   /// Approximately normal with mean 0 and standard deviation 1, accurate out to four sigma: a centred binomial of 64
-  /// coin flips, smoothed by a uniform number as wide as one of its steps. Uses no libm function.
+  /// coin flips, smoothed by adding a uniform random number of width 1. Uses no libm function.
   [[nodiscard]] constexpr double normal() noexcept {
     const result_type first = (*this)();  // named, since the evaluation order of arguments is unspecified
     return gaussian_from(first, (*this)());
@@ -53,7 +53,7 @@ class random_bits {
 
   /// `normal()` computed from two random words, for counter-based noise.
   [[nodiscard]] static constexpr double gaussian_from(std::uint64_t a, std::uint64_t b) noexcept {
-    // Binomial(64, 1/2) has variance 16, the uniform of width 1 adds 1/12.
+    // Binomial(64, 1/2) has variance 16; the uniform number of width 1 adds 1/12.
     constexpr double inverse_deviation = 0.24935149047701481;  // 1 / sqrt(16 + 1/12)
     const double flips = static_cast<double>(std::popcount(a)) - 32.0;
     const double step = static_cast<double>(b >> 11U) * 0x1.0p-53 - 0.5;

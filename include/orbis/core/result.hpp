@@ -91,7 +91,7 @@ class [[nodiscard]] result<void> : public tl::expected<void, orbis::error> {
   }
 };
 
-/// `return fail(errc::malformed, path, "...");` from a function that returns a `result`.
+/// Makes an error to return from a function with a `result`: `return fail(errc::malformed, path, "...");`.
 [[nodiscard]] inline tl::unexpected<error> fail(errc code, std::string where, std::string message) {
   return tl::unexpected<error>(error{code, std::move(where), std::move(message)});
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
 /// Arithmetic that gives the same bits on every machine and under every compiler flag: products that are never fused
-/// with a sum, sines and cosines.
+/// with a sum, and sines and cosines.
 #pragma once
 
 #include <concepts>
@@ -35,7 +35,7 @@ template <std::floating_point S>
 }  // namespace orbis
 
 // Between these two macros, every product and sum is rounded separately, even if the target can fuse them
-// (`-march=native`). Functions between them must not be templates: those would be instantiated elsewhere, under other
+// (`-march=native`). Functions between them must not be templates, which would be instantiated elsewhere, under other
 // options.
 #if defined(__clang__)
 #define ORBIS_BEGIN_UNFUSED _Pragma("float_control(push)") _Pragma("clang fp contract(off)")

@@ -34,8 +34,8 @@
 /// | core/simd/math.hpp | `abs`, `sqrt`, `floor`, approximate roots, sums over lanes |
 /// | core/simd/convert.hpp | conversions between number types, wider and narrower |
 /// | core/simd/memory.hpp | gather and compress |
-/// | core/simd/shuffle.hpp | constant shuffles, interleaving, look-up by lanes |
-/// | core/simd/integer.hpp | saturated sums, averages, sums of products, counts of bits |
+/// | core/simd/shuffle.hpp | constant shuffles, interleaving, table look-up per lane |
+/// | core/simd/integer.hpp | saturated sums, averages, sums of products, bit counts |
 #pragma once
 
 #include <orbis/core/simd/convert.hpp>

@@ -30,7 +30,7 @@ class small_cholesky {
   }
 
   /// Factorises H with its diagonal multiplied by `1 + damping`. Returns the smallest pivot of the scaled matrix: 1 for
-  /// independent unknowns; close to or below the rounding of double, or NaN, if some are not determined.
+  /// independent unknowns; close to or below the rounding error of double, or NaN, if some are not determined.
   [[nodiscard]] double factor(double damping) {
     double least = 1.0 + damping;
     for (int j = 0; j != N; ++j) {
@@ -77,7 +77,8 @@ class small_cholesky {
     return out;
   }
 
-  /// Threshold on the smallest pivot of the undamped matrix; below it some direction is not determined.
+  /// Threshold on the smallest pivot of the undamped matrix; below it, some linear combination of the unknowns is not
+  /// determined.
   static constexpr double determined = 1e-11;
 
  private:

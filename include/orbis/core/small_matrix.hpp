@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Arithmetic of fixed-size Eigen matrices that compiles fast: every operation returns a plain matrix, without Eigen's
+/// Arithmetic on fixed-size Eigen matrices that compiles fast: every operation returns a plain matrix, without Eigen's
 /// expression templates, which take about ten times as long to compile.
 ///
 /// Code in namespace orbis (and after `using namespace orbis`) finds these operators by ordinary lookup. They match
 /// better than Eigen's members, so formulas look the same as with Eigen. A sum or product is then a temporary matrix:
-/// do not store an Eigen expression of it in an `auto` variable, as in `auto t = (a - b).transpose()`. Other code keeps
-/// Eigen's operators. If an operand is an Eigen expression or of dynamic size, Eigen's operator is used.
+/// do not store an Eigen expression that refers to it in an `auto` variable, as in `auto t = (a - b).transpose()`.
+/// Other code keeps Eigen's operators. If an operand is an Eigen expression or of dynamic size, Eigen's operator is
+/// used.
 ///
 /// Sums of products run from the first entry to the last, as in Eigen for vectors of three; in other cases the last
 /// bits may differ from Eigen's results.
@@ -31,11 +32,11 @@ using matrix =
 
 namespace detail {
 
-/// A scalar type that multiplies a matrix of `S` without a narrowing that Eigen rejects.
+/// A scalar type that can multiply a matrix of `S` without a narrowing conversion, which Eigen rejects.
 template <class T, class S>
 concept factor_of = std::same_as<T, S> || std::integral<T>;
 
-/// True if loops are unrolled and functions inlined.
+/// True if loops of this many operations are unrolled and their functions inlined.
 template <int Operations>
 inline constexpr bool is_small = Operations <= 64;
 
@@ -68,7 +69,7 @@ inline void multiply_inline(const S* a, int a_row, int a_column, const S* b, int
 #pragma GCC unroll 12
     for (int r = 0; r < R; ++r) out[c * R + r] = sum_of_products<K>(a + r * a_row, a_column, b + c * b_column, b_row);
 }
-/// The same for larger matrices: not inlined, with rows in the inner loop.
+/// Like `multiply_inline`, for larger matrices: not inlined, with rows in the inner loop.
 template <int R, int K, int C, class S>
 [[gnu::noinline]] void multiply(const S* a, int a_row, int a_column, const S* b, int b_row, int b_column, S* out) {
   for (int c = 0; c < C; ++c) {
@@ -369,7 +370,7 @@ requires(R > 0) [[nodiscard]] inline matrix<R, 1, S> diagonal(const Eigen::Matri
 }
 /// @}
 
-/// @name Matrices of one value
+/// @name Constant matrices
 /// @{
 /// A matrix of type `M` with all entries equal to `value`.
 template <class M>
@@ -454,7 +455,7 @@ requires(R > 0 && C > 0)
   for (int i = 0; i < R * C; ++i) out.data()[i] = std::abs(a.data()[i]);
   return out;
 }
-/// `(x, y, 1)` of a point `(x, y)`.
+/// The homogeneous coordinates `(x, y, 1)` of a point `(x, y)`.
 template <class S, int O>
 [[nodiscard]] inline matrix<3, 1, S> homogeneous(const Eigen::Matrix<S, 2, 1, O, 2, 1>& p) {
   return {p.data()[0], p.data()[1], S(1)};

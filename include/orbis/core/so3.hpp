@@ -39,16 +39,17 @@ class basic_so3 {
 
   /// The identity.
   basic_so3() : q_{S(1), S(0), S(0), S(0)} {}
-  /// From a quaternion of any positive norm; normalises it.
+  /// Constructs a rotation from a quaternion of any positive norm, which is normalised.
   explicit basic_so3(const Eigen::Quaternion<S>& q) : q_{unit(q.x(), q.y(), q.z(), q.w())} {}
   explicit basic_so3(const quaternion& q) : q_{unit(q.x(), q.y(), q.z(), q.w())} {}
-  /// From a quaternion of unit norm up to rounding, stored unchanged: inverse of `unit_quaternion()`, bit for bit.
+  /// Constructs a rotation from a quaternion of unit norm (up to rounding), stored unchanged: the exact inverse of
+  /// `unit_quaternion()`.
   [[nodiscard]] static basic_so3 from_unit_quaternion(const quaternion& q) {
     basic_so3 r;
     r.q_ = q;
     return r;
   }
-  /// From a matrix that is a rotation up to rounding. For matrices with larger errors use `nearest_rotation`.
+  /// Constructs a rotation from a matrix that is a rotation up to rounding. For larger errors, use `nearest_rotation`.
   explicit basic_so3(const matrix<3, 3, S>& r) : basic_so3(to_quaternion(r)) {}
 
   /// The rotation by `|phi|` radians about `phi`.
@@ -156,10 +157,10 @@ class basic_so3 {
   }
 
  private:
-  /// Below this squared angle the series is exact to rounding.
+  /// Below this squared angle, the series is exact to rounding.
   static constexpr S small = std::same_as<S, float> ? S(1e-4) : S(1e-8);
 
-  // Written out, to spare every includer the cost of expression templates.
+  // Written out because expression templates would slow down the compilation of every includer.
   [[nodiscard]] static S sum_of_squares(S x, S y, S z) { return x * x + y * y + z * z; }
   [[nodiscard]] static quaternion unit(S x, S y, S z, S w) {
     const S square = (x * x + z * z) + (y * y + w * w);

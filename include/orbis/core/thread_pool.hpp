@@ -14,19 +14,19 @@
 
 namespace orbis {
 
-/// Threads that serve one loop at a time, first come, first served. Loops that start meanwhile, and nested loops, run
-/// on their callers' threads alone. The caller owns the pool and passes it to policies:
+/// Threads that serve one loop at a time, first come, first served. Nested loops, and loops that start while the pool
+/// is busy, run only on the threads of their callers. The caller owns the pool and passes it to policies:
 /// @code
 ///   orbis::thread_pool pool{4};
 ///   cloud::statistical_filter(orbis::par.on(pool), points);
 /// @endcode
-/// Any number of threads may use it. Threads poll for work for a few microseconds before they sleep. After a fork, the
-/// child process has none of the threads: it may use a pool made before, on the caller's thread alone, but must not
-/// destroy it.
+/// Any number of threads may use the pool. Its threads poll for work for a few microseconds before they sleep. After a
+/// fork, the child process has none of the threads: it may use a pool created before the fork, on the caller's thread
+/// only, but must not destroy it.
 class thread_pool {
  public:
-  /// `threads`: including the caller's, so that one fewer is started; 0: the number of hardware threads. The pool has
-  /// fewer if the system provides fewer, and at most 65536.
+  /// `threads` includes the caller's thread, so one fewer is started; 0 means the number of hardware threads. The pool
+  /// has fewer threads if the system provides fewer, and at most 65536.
   explicit thread_pool(unsigned threads = 0) {
     if (threads == 0) threads = std::thread::hardware_concurrency();
     threads = std::min(threads, static_cast<unsigned>(inside) + 1);
@@ -39,7 +39,7 @@ class thread_pool {
   }
   thread_pool(const thread_pool&) = delete;
   thread_pool& operator=(const thread_pool&) = delete;
-  /// @pre no loop runs on it
+  /// @pre no loop is running on the pool
   ~thread_pool() {
     state_.fetch_or(stopped);
     state_.notify_all();
@@ -70,13 +70,13 @@ class thread_pool {
   }
 
  private:
-  // Bits of the state: the number of helpers inside the job, open for more helpers, stopped, the number of the job.
+  // Bits of the state: the number of helpers inside the job, open for more helpers, stopped, the job number.
   static constexpr std::uint64_t inside = 0xffff, open = std::uint64_t{1} << 16U, stopped = std::uint64_t{1} << 17U,
                                  one_job = std::uint64_t{1} << 18U;
   static constexpr int patience = 2000;  ///< number of polls of the state, about 20 us
 
   void wait_for_work() {
-    std::uint64_t done = 0;  // the last job that this thread has seen
+    std::uint64_t done = 0;  // number of the last job that this thread has seen
     int spins = 0;
     for (;;) {
       std::uint64_t now = state_.load();

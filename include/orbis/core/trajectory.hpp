@@ -17,7 +17,7 @@
 
 namespace orbis {
 
-/// The pose of the camera at a time: `T_world_camera` at `timestamp` seconds.
+/// The camera pose at a time: `T_world_camera` at `timestamp` seconds.
 struct stamped_pose {
   double timestamp = 0.0;
   se3 T_world_camera;
@@ -26,9 +26,9 @@ struct stamped_pose {
 /// Poses sorted by time stamp.
 using trajectory = std::vector<stamped_pose>;
 
-/// The pose at `timestamp` seconds. Between two poses at most `max_gap` seconds apart: interpolates the position
-/// linearly and the rotation along the shortest path; otherwise the nearest pose if it is at most `max_distance`
-/// seconds away, else none. O(log n). @pre `poses` is sorted by time
+/// Returns the pose at `timestamp` seconds. Between two poses at most `max_gap` seconds apart, interpolates the
+/// position linearly and the rotation along the shortest path. Elsewhere, returns the nearest pose if it is at most
+/// `max_distance` seconds away, or empty. O(log n). @pre `poses` is sorted by time
 [[nodiscard]] inline std::optional<se3> interpolate(const trajectory& poses, double timestamp, double max_gap,
                                                     double max_distance) {
   const auto after = std::lower_bound(poses.begin(), poses.end(), timestamp,
@@ -61,9 +61,10 @@ struct index_pair {
   friend bool operator==(const index_pair&, const index_pair&) = default;
 };
 
-/// Pairs the time stamps (seconds) of two sorted lists, nearest pair first. Each is used at most once, and pairs are at
-/// most `max_difference` apart. The pairs are returned in the order of `a`; ties go to the earlier stamp. Only the
-/// `max_candidates` nearest neighbours on either side are considered for each stamp. O(n log n).
+/// Pairs the time stamps (seconds) of two sorted lists, nearest pair first. Each stamp is used at most once, and the
+/// stamps of a pair differ by at most `max_difference`. The pairs are returned in the order of `a`; ties go to the
+/// earlier stamp. Only the `max_candidates` nearest neighbours on either side are considered for each stamp. O(n log
+/// n).
 /// @pre both lists are sorted and free of NaN
 [[nodiscard]] inline std::vector<index_pair> associate(std::span<const double> a, std::span<const double> b,
                                                        double max_difference, std::size_t max_candidates = 8) {
@@ -73,7 +74,7 @@ struct index_pair {
     index_pair pair;
   };
   std::vector<candidate> candidates;
-  std::size_t after = 0;  // the first stamp of b that is not before a[i]
+  std::size_t after = 0;  // index of the first stamp of b that is not before a[i]
   for (std::size_t i = 0; i != a.size(); ++i) {
     while (after != b.size() && b[after] < a[i]) ++after;
     const std::size_t begin = after - std::min(after, max_candidates);

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Short names of fixed-size vectors and matrices whose layout does not depend on compiler flags.
+/// Short names for fixed-size vectors and matrices whose layout does not depend on compiler flags.
 ///
-/// `alignof(Eigen::Vector4d)` is 16 or 32 depending on `-mavx2`; a struct that stores one has two layouts in one
-/// program. Every size that Eigen would align is therefore declared unaligned (`orbis::matrix`).
+/// `alignof(Eigen::Vector4d)` is 16 or 32 depending on `-mavx2`, so a struct that stores one may have two layouts in
+/// one program. Every size that Eigen would align is therefore declared unaligned (`orbis::matrix`).
 #pragma once
 
 #include <type_traits>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Validation of UTF-8, for readers that rely on it.
+/// UTF-8 validation, for file readers that rely on valid text.
 #pragma once
 
 #include <cstddef>

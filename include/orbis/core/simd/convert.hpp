@@ -15,7 +15,7 @@ namespace orbis::simd {
 namespace detail {
 
 #if ORBIS_X86
-/// Widening, for which g++ 12 emits several instructions instead of one. V and U have the same number of lanes.
+/// Widening conversion; g++ 12 would emit several instructions instead of one. V and U have the same number of lanes.
 template <class U, class V>
 ORBIS_ALWAYS_INLINE void widen_16(U& out, const V& v) noexcept {
   using T = element_of<V>;
@@ -130,7 +130,7 @@ template <class U, class T, std::size_t N, target Target>
   }
 }
 
-/// Converts a mask to one for vectors whose numbers have `Size` bytes.
+/// Converts a mask to a mask for vectors of `Size`-byte numbers.
 template <std::size_t Size, std::size_t From, std::size_t N, class Target>
 [[nodiscard]] ORBIS_ALWAYS_INLINE mask<Size, N, Target> mask_as(const mask<From, N, Target>& m) noexcept {
   using out = mask<Size, N, Target>;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Compiles a kernel once for every instruction set and selects one at run time.
+/// Compiles a kernel once for every instruction set and selects a version at run time.
 #pragma once
 
 #include <algorithm>
@@ -13,13 +13,13 @@
 /// Marks a kernel and every function that it calls with vectors: inlined into the function that is compiled for a
 /// target.
 #define ORBIS_ALWAYS_INLINE __attribute__((always_inline)) inline
-/// Follows the parameters of a lambda in a kernel.
+/// Forces inlining of a lambda in a kernel; write it after the parameters.
 #define ORBIS_INLINE_LAMBDA __attribute__((always_inline))
 #define ORBIS_TARGET_POPCNT ORBIS_TARGET("sse4.2,popcnt")
 #define ORBIS_TARGET_AVX2 ORBIS_TARGET("avx2,fma,bmi,bmi2,popcnt")
 #define ORBIS_TARGET_AVX512 ORBIS_TARGET("avx512f,avx512bw,avx512dq,avx512vl,avx2,fma,bmi,bmi2,popcnt")
-/// Marks a function whose products are rounded before they are summed, including all inlined code. Vectors do so
-/// anyway; this covers the scalars next to them.
+/// Marks a function whose products are rounded before they are summed, including all inlined code. Vectors are always
+/// rounded this way; the attribute covers scalars in the same function.
 #if defined(__clang__)
 #define ORBIS_UNFUSED  // clang fuses within one expression only; rounded_product prevents that
 #else
@@ -28,7 +28,7 @@
 
 namespace orbis::simd {
 
-// Targets of compilation: the template argument `Target` of kernels and of `vec`.
+// Compilation targets: the template argument `Target` of kernels and of `vec`.
 
 /// The baseline of the compiler flags: SSE2, NEON.
 struct portable {

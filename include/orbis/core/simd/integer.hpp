@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Functions of integer vectors: saturated sums, averages, sums of products, narrowing in blocks, counts of bits.
+/// Functions on integer vectors: saturated sums, averages, sums of products, narrowing in blocks, bit counts.
 #pragma once
 
 #include <cstddef>
@@ -17,8 +17,8 @@ namespace orbis::simd {
 namespace detail {
 
 #if ORBIS_X86
-// Intrinsics for registers of 16, 32 and 64 bytes, one for bytes and one for wider numbers. SSE2 is the baseline, so 16
-// bytes need no attribute.
+// Intrinsics for registers of 16, 32 and 64 bytes, one for bytes and one for wider numbers. SSE2 is the baseline, so
+// the 16-byte functions need no attribute.
 #define ORBIS_SIMD_BINARY(name, of_bytes, of_words)                                                     \
   template <class Out, class A, class B>                                                                \
   ORBIS_ALWAYS_INLINE void name##_16(Out& out, const A& a, const B& b) noexcept {                       \
@@ -135,7 +135,7 @@ template <detail::small_unsigned T, std::size_t N, target Target>
       [](const auto& x, const auto& y) ORBIS_INLINE_LAMBDA { return (x | y) - ((x ^ y) >> 1); });
 }
 
-/// Lane i is a[2 i] * b[2 i] + a[2 i + 1] * b[2 i + 1]. Vectors of at least 16 bytes.
+/// Lane i is a[2 i] * b[2 i] + a[2 i + 1] * b[2 i + 1]. For vectors of at least 16 bytes.
 template <std::size_t N, target Target>
 [[nodiscard]] ORBIS_ALWAYS_INLINE vec<std::int32_t, N / 2, Target> multiply_add_pairs(
     const vec<std::int16_t, N, Target>& a, const vec<std::int16_t, N, Target>& b) noexcept {
@@ -154,7 +154,8 @@ template <std::size_t N, target Target>
     return low + high;
   }
 }
-/// Lane i is a[2 i] * b[2 i] + a[2 i + 1] * b[2 i + 1]. Vectors of at least 16 bytes. @pre the result fits into 16 bits
+/// Lane i is a[2 i] * b[2 i] + a[2 i + 1] * b[2 i + 1]. For vectors of at least 16 bytes. @pre the result fits into 16
+/// bits
 template <std::size_t N, target Target>
 [[nodiscard]] ORBIS_ALWAYS_INLINE vec<std::int16_t, N / 2, Target> multiply_add_pairs(
     const vec<std::uint8_t, N, Target>& a, const vec<std::int8_t, N, Target>& b) noexcept {
@@ -181,7 +182,7 @@ template <std::size_t N, target Target>
 }
 
 /// Packs each block of 16 bytes: the eight lanes of a, then those of b, each clamped to a byte in [0, 255]. One
-/// instruction. Inverse of zip_low_in_blocks and zip_high_in_blocks. Vectors of at least 16 bytes.
+/// instruction. Inverse of zip_low_in_blocks and zip_high_in_blocks. For vectors of at least 16 bytes.
 template <std::size_t N, target Target>
 [[nodiscard]] ORBIS_ALWAYS_INLINE vec<std::uint8_t, 2 * N, Target> narrow_in_blocks(
     const vec<std::int16_t, N, Target>& a, const vec<std::int16_t, N, Target>& b) noexcept {
@@ -203,8 +204,8 @@ template <std::size_t N, target Target>
   }
 }
 
-/// Number of ones in each lane (W. Mula, N. Kurz, D. Lemire, "Faster population counts using AVX2 instructions", The
-/// Computer Journal 2018). A few instructions per register.
+/// Number of set bits in each lane (W. Mula, N. Kurz, D. Lemire, "Faster population counts using AVX2 instructions",
+/// The Computer Journal 2018). A few instructions per register.
 template <std::size_t N, target Target>
 [[nodiscard]] ORBIS_ALWAYS_INLINE vec<std::uint64_t, N, Target> count_bits(
     const vec<std::uint64_t, N, Target>& a) noexcept {

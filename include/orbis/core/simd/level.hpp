@@ -2,12 +2,12 @@
 /// @file
 /// Detection of the processor's instruction sets, and a limit on them for tests.
 ///
-/// Public interfaces do not name a level: every kernel runs at `simd::best_level()`, and all levels give the same
-/// bits. A test of a component checks that by running the same public call under a `simd::level_limit`:
+/// Public interfaces do not name a level: every kernel runs at `simd::best_level()`, and all levels give the same bits.
+/// A test of a component verifies this by making the same public call under a `simd::level_limit`:
 ///
 /// @code
 ///   for (const simd::level l : simd::available_levels()) {
-///     const simd::level_limit limit{l};  // while it lives, kernels chosen in any thread use at most l
+///     const simd::level_limit limit{l};  // during its lifetime, kernels selected in any thread use at most l
 ///     CHECK(extract(image) == expected);
 ///   }
 /// @endcode

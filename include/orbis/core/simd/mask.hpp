@@ -49,7 +49,7 @@ template <class V>
     for (std::size_t i = 0; i != n / 8; ++i) {
       std::uint64_t word;
       std::memcpy(&word, reinterpret_cast<const char*>(&v) + 8 * i, 8);
-      // A product that moves bit 8 k to 56 + k; all others go elsewhere.
+      // The product moves bit 8 k to 56 + k; all other bits end up elsewhere.
       bits |= static_cast<std::uint32_t>((((word >> 7U) & 0x0101010101010101U) * 0x0102040810204080U) >> 56U)
               << (8 * i);
     }
@@ -70,7 +70,7 @@ struct mask {
   static constexpr bool is_bits = is_native && detail::masks_are_bits<Size * N>;
   using half = mask<Size, N / 2, Target>;
   using word = detail::word_of_bits<N>;
-  using lane = detail::signed_of_size<Size>;  ///< of a native mask that is not a word: -1 if set, else 0
+  using lane = detail::signed_of_size<Size>;  ///< lane of a native mask that is not a bit word: -1 if set, else 0
   using storage =
       std::conditional_t<!is_native, detail::halves<half>, std::conditional_t<is_bits, word, detail::reg<lane, N>>>;
   storage v;
@@ -175,7 +175,7 @@ template <std::size_t Size, std::size_t N, class Target>
   return bits(m) == static_cast<word>(~word{0} >> (8 * sizeof(word) - N));
 }
 
-/// Number of ones in a word, by POPCNT if the target has it.
+/// Number of set bits in a word, with POPCNT if the target has it.
 template <target Target>
 [[nodiscard]] ORBIS_ALWAYS_INLINE std::uint32_t ones(std::uint64_t word) noexcept {
   if constexpr (Target::needs == level::portable)

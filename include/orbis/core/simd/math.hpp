@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Functions of floating-point vectors, and sums over lanes.
+/// Functions on floating-point vectors, and sums over lanes.
 #pragma once
 
 #include <cmath>
@@ -104,9 +104,9 @@ template <class T, std::size_t N, target Target>
   }
 }
 
-/// 1 / sqrt(x) to about two units in the last place, for x > 0 that are neither denormal nor infinite; other lanes are
-/// unspecified. Four steps of Newton's method, each of which squares the error, from an initial guess that halves and
-/// negates the exponent. Many times faster than a root and a division; the same bits on every target.
+/// 1 / sqrt(x) to about two units in the last place, for lanes with x > 0 that are neither denormal nor infinite; other
+/// lanes are unspecified. Four steps of Newton's method, each of which squares the error, from an initial guess that
+/// halves and negates the exponent. Many times faster than a square root and a division; the same bits on every target.
 template <std::size_t N, target Target>
 [[nodiscard]] ORBIS_ALWAYS_INLINE vec<double, N, Target> reciprocal_root(const vec<double, N, Target>& x) noexcept {
   using V = vec<double, N, Target>;
@@ -132,7 +132,7 @@ template <class T, std::size_t N, target Target>
   else
     return sum(a.low() + a.high());
 }
-/// Minimum over the lanes; unspecified between zeros of either sign and for NaN.
+/// Minimum over the lanes; the sign of a zero result, and the result for NaN, are unspecified.
 template <class T, std::size_t N, target Target>
 [[nodiscard]] ORBIS_ALWAYS_INLINE T least(const vec<T, N, Target>& a) noexcept {
   if constexpr (N == 2)
@@ -140,7 +140,7 @@ template <class T, std::size_t N, target Target>
   else
     return least(min(a.low(), a.high()));
 }
-/// Maximum over the lanes; unspecified between zeros of either sign and for NaN.
+/// Maximum over the lanes; the sign of a zero result, and the result for NaN, are unspecified.
 template <class T, std::size_t N, target Target>
 [[nodiscard]] ORBIS_ALWAYS_INLINE T greatest(const vec<T, N, Target>& a) noexcept {
   if constexpr (N == 2)

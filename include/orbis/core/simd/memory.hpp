@@ -24,7 +24,7 @@ inline constexpr std::array<std::uint64_t, 256> set_bits = [] {
   return all;
 }();
 
-/// Eight four-byte numbers, or four eight-byte numbers.
+/// Compresses eight four-byte numbers or four eight-byte numbers.
 template <class V>
 ORBIS_TARGET_AVX2 inline void compress_32(V& out, const V& v, std::uint32_t bits) noexcept {
   if constexpr (sizeof(v[0]) == 8) bits = _pdep_u32(bits, 0x55U) * 3U;
@@ -78,8 +78,8 @@ ORBIS_TARGET_AVX512 inline void gather_64(V& out, const element_of<V>* from, con
 
 }  // namespace detail
 
-/// Lane i is from[at[i]] where m is set, else lane i of `otherwise`, without a read. Uses gather instructions for four-
-/// and eight-byte numbers on AVX2 and AVX-512 (a few cycles per lane); otherwise lane by lane.
+/// Lane i is from[at[i]] where m is set, else lane i of `otherwise`, without reading memory. Uses gather instructions
+/// for four- and eight-byte numbers on AVX2 and AVX-512 (a few cycles per lane); otherwise lane by lane.
 template <class T, std::size_t N, target Target>
 [[nodiscard]] ORBIS_ALWAYS_INLINE vec<T, N, Target> gather(const T* from, const vec<std::int32_t, N, Target>& at,
                                                            const typename vec<T, N, Target>::mask_type& m,
@@ -126,8 +126,8 @@ template <class T, std::size_t N, target Target>
 }
 
 /// Writes the lanes that are set in m contiguously to `to` and returns their number. `to` must have room for N numbers;
-/// those after the written ones are unspecified. One permutation per register for four- and eight-byte numbers on AVX2
-/// and AVX-512; otherwise lane by lane, without branches.
+/// those after the compressed ones are unspecified. One permutation per register for four- and eight-byte numbers on
+/// AVX2 and AVX-512; otherwise lane by lane, without branches.
 template <class T, std::size_t N, target Target>
 ORBIS_ALWAYS_INLINE std::size_t compress_store(T* to, const vec<T, N, Target>& a,
                                                const typename vec<T, N, Target>::mask_type& m) noexcept {

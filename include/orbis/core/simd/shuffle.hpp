@@ -16,7 +16,7 @@ namespace orbis::simd {
 
 namespace detail {
 
-/// Lane i is lane Place(i) of a followed by b. Vectors of one register.
+/// Lane i is lane Place(i) of a followed by b. For vectors of one register.
 template <auto Place, class V>
 [[nodiscard]] ORBIS_ALWAYS_INLINE V shuffle_by(const V& a, const V& b) noexcept {
   V out;
@@ -48,7 +48,7 @@ template <std::size_t Odd, class V>
     return {unzip<Odd>(a.v.low, a.v.high), unzip<Odd>(b.v.low, b.v.high)};
   }
 }
-/// Like zip, within each 16 bytes.
+/// Like zip, within each 16-byte block.
 template <std::size_t Half, class V>
 [[nodiscard]] ORBIS_ALWAYS_INLINE V zip_in_blocks(const V& a, const V& b) noexcept {
   if constexpr (V::is_native) {
@@ -94,7 +94,7 @@ ORBIS_TARGET_AVX512 inline void look_up_bytes_64(V& out, const V& table, const V
 
 }  // namespace detail
 
-/// Lane i is lane I[i] of a followed by b. Vectors of one register; the result may have any number of lanes.
+/// Lane i is lane I[i] of a followed by b. For vectors of one register; the result may have any number of lanes.
 template <std::size_t... I, class T, std::size_t N, target Target>
 [[nodiscard]] ORBIS_ALWAYS_INLINE vec<T, sizeof...(I), Target> shuffle(const vec<T, N, Target>& a,
                                                                        const vec<T, N, Target>& b) noexcept {
@@ -133,16 +133,16 @@ template <class T, std::size_t N, target Target>
   return detail::unzip<1>(a, b);
 }
 
-// Operations within each 16 bytes: one instruction on every target. Use them if the order of 16-byte blocks does not
-// matter, or if narrow_in_blocks restores it. a and b have at least 16 bytes.
+// Operations within each 16-byte block: one instruction on every target. Use them if the order of 16-byte blocks does
+// not matter, or if narrow_in_blocks restores it. a and b have at least 16 bytes.
 
-/// The first eight bytes of each 16 of a and b, interleaved.
+/// The first eight bytes of each 16-byte block of a and b, interleaved.
 template <class T, std::size_t N, target Target>
 [[nodiscard]] ORBIS_ALWAYS_INLINE vec<T, N, Target> zip_low_in_blocks(const vec<T, N, Target>& a,
                                                                       const vec<T, N, Target>& b) noexcept {
   return detail::zip_in_blocks<0>(a, b);
 }
-/// The last eight bytes of each 16 of a and b, interleaved.
+/// The last eight bytes of each 16-byte block of a and b, interleaved.
 template <class T, std::size_t N, target Target>
 [[nodiscard]] ORBIS_ALWAYS_INLINE vec<T, N, Target> zip_high_in_blocks(const vec<T, N, Target>& a,
                                                                        const vec<T, N, Target>& b) noexcept {
@@ -199,8 +199,8 @@ template <class T, std::size_t N, target Target>
   }
 }
 
-/// In each 16 bytes: byte i is byte at[i] % 16 of the same 16 of `table`, or 0 if at[i] >= 128. One instruction with
-/// SSE4.2 and above; otherwise byte by byte.
+/// In each 16-byte block, byte i is byte at[i] % 16 of the same block of `table`, or 0 if at[i] >= 128. One instruction
+/// with SSE4.2 and above; otherwise byte by byte.
 template <std::size_t N, target Target>
 [[nodiscard]] ORBIS_ALWAYS_INLINE vec<std::uint8_t, N, Target> look_up_in_blocks(
     const vec<std::uint8_t, N, Target>& table, const vec<std::uint8_t, N, Target>& at) noexcept {

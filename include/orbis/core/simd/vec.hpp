@@ -2,9 +2,9 @@
 /// @file
 /// `vec<T, N, Target>`: a vector of N numbers with element-wise arithmetic.
 ///
-/// A vector that does not fit into one register of the target is split into halves, so that N is any power of two.
-/// Lanes are rounded according to IEEE 754 and a product is never fused into a sum: all targets give the same bits.
-/// Integers wrap modulo 2^bits.
+/// A vector that does not fit into one register of the target is split into halves, so N may be any power of two. Lanes
+/// are rounded according to IEEE 754, and a product is never fused into a sum: all targets give the same bits. Integers
+/// wrap modulo 2^bits.
 #pragma once
 
 #include <cstddef>
@@ -41,7 +41,7 @@ ORBIS_ALWAYS_INLINE void round_product([[maybe_unused]] V& product) noexcept {
 template <class V, class T>
 ORBIS_ALWAYS_INLINE void broadcast(V& out, T x) noexcept {
 #if ORBIS_X86
-  // g++ 12 fills a wide register lane by lane in a template that has no target, even from a constant.
+  // In a template without a target attribute, g++ 12 fills a wide register lane by lane, even from a constant.
   if constexpr (sizeof(V) == 64)
     broadcast_64(out, x);
   else if constexpr (sizeof(V) == 32)
@@ -89,7 +89,7 @@ struct vec {
   static constexpr bool is_native = N * sizeof(T) <= Target::bytes;  ///< fits into one register
   using native = detail::reg<T, is_native ? N : 2>;
   using storage = std::conditional_t<is_native, native, detail::halves<half>>;
-  /// The unsigned type for signed integers, whose sums do not overflow.
+  /// The unsigned counterpart of a signed integer type, whose sums wrap instead of overflowing.
   using modular = detail::reg<typename detail::modular_of<T>::type, is_native ? N : 2>;
 
   storage v;  ///< the register, or the halves
@@ -122,8 +122,8 @@ struct vec {
       out.v.low = half::load(p), out.v.high = half::load(p + N / 2);
     return out;
   }
-  /// Loads the first n <= N numbers at p, then zeros. Reads only these. Copies through memory unless the numbers
-  /// have four or eight bytes and fill one register of AVX2 or AVX-512.
+  /// Loads the first n <= N numbers at p and sets the other lanes to zero. Reads only n numbers. Copies through memory
+  /// unless the numbers have four or eight bytes and fill one register of AVX2 or AVX-512.
   [[nodiscard]] static ORBIS_ALWAYS_INLINE vec load(const T* p, std::size_t n) noexcept {
 #if ORBIS_X86
     if constexpr (is_native && sizeof(T) >= 4 && sizeof(native) >= 32) {
@@ -145,7 +145,7 @@ struct vec {
     else
       v.low.store(p), v.high.store(p + N / 2);
   }
-  /// Writes only the first n <= N lanes; through memory.
+  /// Writes only the first n <= N lanes, through memory.
   ORBIS_ALWAYS_INLINE void store(T* p, std::size_t n) const noexcept {
     alignas(N * sizeof(T)) T buffer[N];
     store(buffer);
@@ -166,7 +166,7 @@ struct vec {
   [[nodiscard]] static ORBIS_ALWAYS_INLINE vec iota() noexcept {
     return generate([](std::size_t i) ORBIS_INLINE_LAMBDA { return static_cast<T>(i); });
   }
-  /// Lane i; through memory unless i is a constant.
+  /// Lane i; read through memory unless i is a constant.
   [[nodiscard]] ORBIS_ALWAYS_INLINE T operator[](std::size_t i) const noexcept {
     if constexpr (is_native)
       return v[i];

@@ -42,7 +42,7 @@ using word_of_bits = std::conditional_t<
 template <class V>
 using element_of = std::remove_cvref_t<decltype(std::declval<V>()[0])>;
 
-/// Comparisons, in the numbering of the 512-bit instructions.
+/// Comparisons, numbered as in the 512-bit instructions.
 enum class order { equal = 0, less = 1, less_equal = 2, unequal = 4 };
 
 #if ORBIS_X86
@@ -109,7 +109,7 @@ ORBIS_TARGET_AVX2 inline void extremum_32(V& out, const V& a, const V& b) noexce
     out = reinterpret_cast<V>(Max ? _mm256_max_ps(reinterpret_cast<__m256>(b), reinterpret_cast<__m256>(a))
                                   : _mm256_min_ps(reinterpret_cast<__m256>(b), reinterpret_cast<__m256>(a)));
 }
-/// Loads the first n numbers of four or eight bytes at p, then zeros. @pre n <= lanes
+/// Loads the first n numbers of four or eight bytes at p and sets the other lanes to zero. @pre n <= lanes
 template <class V>
 ORBIS_TARGET_AVX2 inline void load_first_32(V& out, const element_of<V>* p, std::size_t n) noexcept {
   if constexpr (sizeof(out[0]) == 8) {
