@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Converts depth images to points.
+/// Conversion of depth images to points.
 #pragma once
 
 #include <cassert>
@@ -36,7 +36,7 @@ struct unprojected_points {
 
 namespace detail {
 
-/// Calls `f(x, y, point)` for the valid pixels of row `y`.
+/// Calls `f(x, y, point)` for each valid pixel in row `y`.
 template <depth_source Depth, std::invocable<int, int, const vec3f&> F>
 void for_each_point_of_row(const Depth& depth, const ray_table& rays, int y, const unproject_options& options, F&& f) {
   for (int x = 0; x < rays.width(); x += options.stride) {
@@ -49,7 +49,8 @@ void for_each_point_of_row(const Depth& depth, const ray_table& rays, int y, con
 
 }  // namespace detail
 
-/// The points of a depth image in the world frame, in pixel order under every policy. O(width * height / stride^2).
+/// Converts a depth image to points in the world frame, in pixel order under every policy. O(width * height /
+/// stride^2).
 /// @pre depth and rays have the same size; options.stride > 0
 template <execution_policy Policy, depth_source Depth>
 [[nodiscard]] unprojected_points unproject_depth(const Policy& policy, const Depth& depth, const ray_table& rays,
@@ -86,8 +87,8 @@ template <execution_policy Policy, depth_source Depth>
   return out;
 }
 
-/// The points of a single depth image; computes the camera's ray table first. For several images of one camera, build
-/// the table once and call the function above. O(pixels).
+/// Converts a single depth image; computes the camera's ray table first. For several images from one camera, build the
+/// table once and call the overload above. O(pixels).
 template <execution_policy Policy, depth_source Depth, camera_model Camera>
 [[nodiscard]] unprojected_points unproject_depth(const Policy& policy, const Depth& depth, const Camera& camera,
                                                  const unproject_options& options = {},

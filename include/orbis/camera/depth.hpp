@@ -23,9 +23,9 @@ concept depth_source = requires(const D& depth, int x, int y) {
   { depth(x, y) } -> std::same_as<float>;
 };
 
-/// A depth image in place. `T` is `std::uint16_t` (value / scale = metres; 0 and 65535 are invalid) or `float` (metres
-/// times scale; NaN, inf, 0 and negative values are invalid). Values outside `[min_depth, max_depth]` metres are also
-/// invalid.
+/// A non-owning view of a depth image. `T` is `std::uint16_t` (value / scale = metres; 0 and 65535 are invalid) or
+/// `float` (metres times scale; NaN, inf, 0 and negative values are invalid). Values outside `[min_depth, max_depth]`
+/// metres are also invalid.
 template <class T>
 requires std::same_as<T, std::uint16_t> || std::same_as<T, float>
 class depth_view {

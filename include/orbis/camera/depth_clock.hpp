@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The times of depth images relative to those of colour images, by their time stamps.
+/// The times of depth images relative to colour images, from their time stamps.
 #pragma once
 
 #include <algorithm>
@@ -10,14 +10,14 @@
 
 namespace orbis::camera {
 
-/// Smooths the difference of the time stamps of a depth image and its colour image. Sensors that run freely drift
-/// slowly against each other; the stamps of a host vary in addition by the intervals at which it polls them.
+/// Smooths the difference between the time stamps of a depth image and its colour image. Free-running sensors drift
+/// slowly relative to each other; time stamps assigned by the host also vary by its polling interval.
 class depth_clock {
  public:
-  /// Adds the time stamps of a frame, seconds; returns the smoothed difference, depth minus colour. It is zero below
-  /// 0.5 ms, which does not matter. A jump of more than 8 ms is taken over at once: colour images are paired with the
-  /// depth images of another interval. Without a time stamp of the depth image, or if it differs by more than 0.1 s,
-  /// the difference remains the same.
+  /// Adds the time stamps of a frame, seconds; returns the smoothed difference, depth minus colour. A difference below
+  /// 0.5 ms is negligible and returned as zero. A jump of more than 8 ms is adopted immediately, because it means that
+  /// colour images are now paired with depth images of another interval. If the depth image has no time stamp, or the
+  /// two differ by more than 0.1 s, the difference is unchanged.
   [[nodiscard]] double update(double timestamp, std::optional<double> depth_timestamp) {
     constexpr double longest = 0.1, jump = 0.008, least = 0.0005;  // seconds
     constexpr double memory = 30.0;                                // frames

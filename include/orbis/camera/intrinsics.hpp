@@ -19,8 +19,8 @@ struct intrinsics {
   friend bool operator==(const intrinsics&, const intrinsics&) = default;
 };
 
-/// Returns true if `k` is valid for a camera model: a non-negative size, positive focal lengths, nothing NaN or
-/// infinite.
+/// Returns true if `k` is valid for a camera model: a non-negative size, positive focal lengths, no NaN or infinite
+/// values.
 [[nodiscard]] inline bool is_valid(const intrinsics& k) noexcept {
   return k.width >= 0 && k.height >= 0 && k.fx > 0.0 && k.fy > 0.0 && std::isfinite(k.fx) && std::isfinite(k.fy) &&
          std::isfinite(k.cx) && std::isfinite(k.cy);

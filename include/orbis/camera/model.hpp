@@ -32,7 +32,8 @@ concept unprojects = requires(const C& camera, const vec2& pixel) {
 
 }  // namespace detail
 
-/// A central projection. Camera frame: x right, y down, z forward, metres. Pixels: centres at integers.
+/// A central projection. In the camera frame, x points right, y down and z forward (metres). Pixel centres are at
+/// integers.
 ///
 /// - `project(p)`: the pixel of a point in the camera frame, empty if there is none (behind the camera, outside the
 /// model's domain). Does not test against the image bounds.
@@ -42,7 +43,8 @@ template <class C>
 concept camera_model =
     detail::has_image_size<C> && detail::projects<C> && detail::projects_with_jacobian<C> && detail::unprojects<C>;
 
-/// Names `C` as `type`. If `C` lacks a member of `camera_model`, the first compiler error names that member.
+/// Provides `C` as `type`. If `C` lacks a member that `camera_model` requires, the first compiler error names that
+/// member.
 template <class C>
 struct checked_camera {
   static_assert(detail::has_image_size<C>, "a camera model needs width() and height(), pixels");

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Parameters of a camera model, and the derivatives of pixels with respect to them: for calibration.
+/// Parameters of a camera model, and derivatives of pixels with respect to them, for calibration.
 #pragma once
 
 #include <array>
@@ -22,10 +22,10 @@ namespace orbis::camera {
 ///
 /// - `count`: the number of parameters;
 /// - `get(camera)`: their values;
-/// - `with(camera, p)`: a camera of the same image size with the parameters `p`, empty if they are invalid (a focal
+/// - `with(camera, p)`: a camera with the same image size and the parameters `p`, empty if they are invalid (a focal
 /// length that is not positive, a NaN);
-/// - `project(camera, point, by_point, by_parameters)`: as `camera.project(point, by_point)`, and the derivative of the
-///   pixel with respect to the parameters (2 x count). Both are unchanged if the result is empty.
+/// - `project(camera, point, by_point, by_parameters)`: like `camera.project(point, by_point)`; also computes the
+///   derivative of the pixel with respect to the parameters (2 x count). Both are unchanged if the result is empty.
 template <class Camera>
 struct parameters_of {};
 
@@ -81,7 +81,7 @@ struct parameters_of<pinhole> {
   }
 };
 
-/// Parameters: fx, fy, cx, cy, then the coefficients in the order of OpenCV: k1, k2, p1, p2, k3, k4, k5, k6.
+/// Parameters: fx, fy, cx, cy, then the coefficients in OpenCV's order: k1, k2, p1, p2, k3, k4, k5, k6.
 template <>
 struct parameters_of<radial_tangential> {
   static constexpr int count = 12;

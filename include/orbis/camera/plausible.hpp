@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Bounds of camera parameters that come from files and messages.
+/// Plausibility bounds of camera parameters from files and messages.
 #pragma once
 
 #include <algorithm>
@@ -14,13 +14,13 @@
 
 namespace orbis::camera {
 
-/// Returns `k` if it can be a camera. All readers of cameras call it, so that work on an image is bounded: a focal
-/// length near zero would make each pixel as wide as a room. With an image size, every pixel is at most 10 focal
-/// lengths from the principal point along each image axis (of a pinhole camera: seen at up to 84 degrees from the
-/// optical axis; other models map this distance to other angles), and the focal lengths are at most 1000 times the
-/// larger side. Without a size (0) only the numbers are checked: both focal lengths are positive, below 1e9 and differ
-/// by at most a factor of 5; the principal point is below 1e9. Errors: malformed at `where`, with the parameter and the
-/// reason.
+/// Returns `k` if its values are plausible for a camera. All functions that read cameras call it to bound the work per
+/// image: with a focal length near zero, each pixel would cover a whole room. With an image size, every pixel is at
+/// most 10 focal lengths from the principal point along each image axis (for a pinhole camera, up to 84 degrees from
+/// the optical axis; other models map this distance to other angles), and the focal lengths are at most 1000 times the
+/// larger side. Without a size (0), only the values are checked: both focal lengths are positive, below 1e9 and differ
+/// by at most a factor of 5; the principal point is below 1e9. Errors: malformed at `where`, naming the parameter and
+/// the reason.
 [[nodiscard]] inline result<intrinsics> plausible(const intrinsics& k, std::string where) {
   constexpr double largest = 1e9, most_slope = 10.0, most_focal = 1000.0, most_ratio = 5.0;
   const auto reject = [&](const char* name, double value, const std::string& why) {
@@ -31,7 +31,7 @@ namespace orbis::camera {
   if (k.width < 0 || k.height < 0) return reject("size", std::min(k.width, k.height), "is negative");
   for (const auto& [name, f] : {std::pair{"fx", k.fx}, std::pair{"fy", k.fy}})
     if (!(f > 0.0 && f < largest))
-      return reject(name, f, "is not a focal length: focal lengths above zero, in pixels, are needed");
+      return reject(name, f, "is not a focal length: focal lengths must be positive, in pixels");
   for (const auto& [name, c] : {std::pair{"cx", k.cx}, std::pair{"cy", k.cy}})
     if (!(std::abs(c) < largest)) return reject(name, c, "is not a coordinate of the principal point in pixels");
   if (k.fx > most_ratio * k.fy || k.fy > most_ratio * k.fx)
@@ -51,7 +51,7 @@ namespace orbis::camera {
       return reject(a.f_name, a.f, "is too short a focal length for " + images + ": is it in pixels?");
     if (std::max(a.c, a.size - a.c) > most_slope * a.f)
       return reject(a.c_name, a.c,
-                    "is too far from the middle of " + images + " with " + a.f_name + " = " + std::to_string(a.f));
+                    "is too far from the centre of " + images + " with " + a.f_name + " = " + std::to_string(a.f));
   }
   return k;
 }

@@ -23,7 +23,7 @@ inline constexpr std::array<std::string_view, 5> preset_names{"tum_fr1", "tum_fr
 /// Sources: J. Sturm et al., "A benchmark for the evaluation of RGB-D SLAM systems", IROS 2012, and its web page on
 /// file formats; A. Handa et al., "A benchmark for RGB-D visual odometry, 3D reconstruction and SLAM", ICRA 2014 (its y
 /// axis points up, hence its negative fy; here y points down). Errors: invalid_argument for an unknown name, with the
-/// list of known ones.
+/// list of valid names.
 [[nodiscard]] inline result<camera_settings> preset(std::string_view name) {
   if (name == "tum_fr1")
     return camera_settings{

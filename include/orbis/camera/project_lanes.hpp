@@ -3,7 +3,7 @@
 /// Projects eight points at a time, in vectors of doubles (`core/simd/vec.hpp`): the inner loop of optimisers.
 ///
 /// `lanes_of<Camera>` exists for every camera model. The library's models have specialisations that give the same bits
-/// on every instruction set; any other model uses eight calls of `project`.
+/// on every instruction set; any other model uses eight calls to `project`.
 #pragma once
 
 #include <array>
@@ -20,14 +20,14 @@
 
 namespace orbis::camera {
 
-/// A vector of doubles for projection: `simd::vec<double, 8, Target>`.
+/// The vector type for projection: `simd::vec<double, 8, Target>`.
 template <class L>
 concept double_lanes = requires(const L& x, const double* p) {
   { L::load(p) } -> std::same_as<L>;
   { x* x + 1.0 / x } -> std::same_as<L>;
   select(x < x, x, x);
 };
-/// Mask type that comparisons of such vectors return.
+/// Type of the mask returned by comparisons of such vectors.
 template <double_lanes L>
 using mask_of = decltype(std::declval<L>() < std::declval<L>());
 
@@ -57,7 +57,7 @@ struct projected_lanes {
   std::array<lane_array, 6> j;
 };
 
-/// Not part of the kernels: these are compiled for instruction sets that might round it differently.
+/// Kept out of the kernels, which are compiled for instruction sets that might round differently.
 template <camera_model Camera>
 [[gnu::noinline]] void project_each(const Camera& camera, const lane_array& x, const lane_array& y, const lane_array& z,
                                     bool with_jacobian, projected_lanes& out) {
@@ -73,8 +73,8 @@ template <camera_model Camera>
   }
 }
 
-/// The angle of (z, r), for z > 0 and r >= 0, not both near the limits of double: halved three times, then evaluated by
-/// its power series.
+/// The angle atan2(r, z) for z > 0 and r >= 0, not both near the limits of double: halves the angle three times, then
+/// evaluates the power series.
 template <double_lanes L>
 [[nodiscard]] ORBIS_ALWAYS_INLINE L angle_off_axis(const L& r, const L& z) {
   L t = r / (z + square_root(r * r + z * z));  // tan(angle / 2), at most 1
@@ -193,7 +193,8 @@ struct lanes_of<kannala_brandt> {
       const L by_z = select(on_axis, L(0.0) - inverse_z * inverse_z, L(0.0) - per_norm);
       const L c = select(on_axis, L(0.0), x * root), t = select(on_axis, L(0.0), y * root);
       const L across = (along - scale) * c;
-      // Along the radius `along`, across it `scale`: their difference times the direction's square.
+      // The radial derivative is `along` and the tangential one `scale`; their difference is multiplied by the squared
+      // direction.
       out.j[0][0] = k.fx * (scale + across * c);
       out.j[0][1] = k.fx * (across * t);
       out.j[0][2] = k.fx * (by_z * x);

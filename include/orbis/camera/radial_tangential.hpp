@@ -29,7 +29,7 @@ namespace orbis::camera {
 /// rays. Points beyond the first fold are outside this model's domain. Satisfies `camera_model`.
 class radial_tangential {
  public:
-  /// Coefficients in OpenCV's order; omitted ones are 0.
+  /// Coefficients in OpenCV's order; omitted coefficients are 0.
   struct coefficients {
     double k1 = 0.0, k2 = 0.0, p1 = 0.0, p2 = 0.0, k3 = 0.0, k4 = 0.0, k5 = 0.0, k6 = 0.0;
     friend bool operator==(const coefficients&, const coefficients&) = default;
@@ -73,7 +73,7 @@ class radial_tangential {
     return pixel;
   }
   /// The ray through a pixel, scaled to z = 1, by Newton's method: starting from the distorted position or, if that
-  /// fails, from the solution of the radial part alone. Empty if there is no ray within the domain, and for NaN.
+  /// fails, from the solution of the radial part only. Empty if there is no ray within the domain, and for NaN.
   [[nodiscard]] std::optional<vec3> unproject(const vec2& pixel) const {
     const vec2 target{(pixel.x() - k_.cx) / k_.fx, (pixel.y() - k_.cy) / k_.fy};
     if (!std::isfinite(target.x()) || !std::isfinite(target.y())) return std::nullopt;
@@ -140,7 +140,7 @@ class radial_tangential {
     return j;
   }
 
-  /// The ray of `target` without tangential distortion, or one on the boundary of the domain.
+  /// The ray that distorts to `target` without tangential distortion, or one on the boundary of the domain.
   [[nodiscard]] vec2 radial_start(const vec2& target) const {
     const double distorted = std::sqrt(target.x() * target.x() + target.y() * target.y());
     if (distorted == 0.0) return target;

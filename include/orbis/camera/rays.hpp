@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The rays of a camera, precomputed for every pixel.
+/// Table with the ray through every pixel of a camera.
 #pragma once
 
 #include <cstddef>
@@ -12,12 +12,12 @@
 
 namespace orbis::camera {
 
-/// Stores for every pixel of a camera the point where its ray meets the plane z = 1, so that un-projecting a depth
-/// costs three multiplications. 8 bytes per pixel.
+/// Stores for every pixel of a camera the point where its ray meets the plane z = 1, so that unprojecting a depth costs
+/// three multiplications. 8 bytes per pixel.
 class ray_table {
  public:
   ray_table() = default;
-  /// O(width * height) un-projections; pixels without a ray get NaN.
+  /// O(width * height) unprojections; pixels without a ray get NaN.
   template <camera_model Camera>
   explicit ray_table(const Camera& camera)
       : rays_{camera.width(), camera.height(), filled<vec2f>(std::numeric_limits<float>::quiet_NaN())} {
@@ -29,7 +29,7 @@ class ray_table {
 
   [[nodiscard]] int width() const noexcept { return rays_.width(); }
   [[nodiscard]] int height() const noexcept { return rays_.height(); }
-  /// x and y of the pixel's ray at z = 1; NaN if it has none. @pre inside the image
+  /// x and y of the ray through the pixel at z = 1; NaN if the pixel has no ray. @pre the pixel is inside the image
   [[nodiscard]] const vec2f& operator()(int x, int y) const noexcept { return rays_(x, y); }
   /// The point at depth `z` metres on the pixel's ray, in the camera frame.
   [[nodiscard]] vec3f at(int x, int y, float z) const noexcept {

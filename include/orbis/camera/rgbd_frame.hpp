@@ -14,8 +14,8 @@ namespace orbis::camera {
 
 /// A colour image and a depth image registered to it (same size, same camera).
 struct rgbd_frame {
-  double timestamp = 0.0;                   ///< of the colour image, seconds
-  std::optional<double> depth_timestamp{};  ///< of the depth image, seconds; empty: unknown
+  double timestamp = 0.0;                   ///< time of the colour image, seconds
+  std::optional<double> depth_timestamp{};  ///< time of the depth image, seconds; empty: unknown
   image<rgb8> color;
   image<std::uint16_t> depth;  ///< stored value / depth_scale = metres; 0 and 65535 invalid
   double depth_scale = 1000.0;

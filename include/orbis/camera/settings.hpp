@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The settings of an RGB-D camera that are needed to use its recordings.
+/// The RGB-D camera settings that are needed to use its recordings.
 #pragma once
 
 #include <optional>
@@ -15,7 +15,7 @@ struct camera_settings {
   any_camera model;
   double depth_scale = 1000.0;               ///< stored depth / depth_scale = metres
   double fps = 30.0;                         ///< frames per second
-  std::optional<double> baseline{};          ///< between infrared projector and camera, metres, if known
+  std::optional<double> baseline{};          ///< distance between infrared projector and camera, metres, if known
   std::optional<camera::shutter> shutter{};  ///< timing of the image rows, if known
 };
 

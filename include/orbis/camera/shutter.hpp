@@ -10,23 +10,23 @@
 namespace orbis::camera {
 
 /// The read-out times of a colour image and of its depth image. A rolling shutter reads the rows sequentially from the
-/// top, evenly over the read-out time; with a read-out of 0 the shutter is global: all rows have the same time. Times
-/// are relative to the time of the frame, which is the middle of the colour image's read-out.
+/// top, evenly over the read-out time; a read-out time of 0 means a global shutter: all rows are read at the same time.
+/// Times are relative to the frame's time, which is the middle of the colour image's read-out.
 struct shutter {
-  double color_read_out = 0.0;  ///< from the first row to the end of the last one, seconds
-  double depth_read_out = 0.0;  ///< the same for the depth image
-  double depth_delay = 0.0;  ///< from the middle of the colour image to that of the depth image, seconds; if both have
-                             ///< time stamps, in addition to their difference
+  double color_read_out = 0.0;  ///< time from the start of the first row to the end of the last, seconds
+  double depth_read_out = 0.0;  ///< read-out time of the depth image, measured in the same way, seconds
+  double depth_delay = 0.0;  ///< from the middle of the colour image to the middle of the depth image, seconds; added
+                             ///< to the difference between their time stamps, if both have one
 
-  /// Returns true if all rows of both images are taken at the same time.
+  /// Returns true if all rows of both images are read at the same time.
   [[nodiscard]] constexpr bool is_global() const noexcept {
     return color_read_out == 0.0 && depth_read_out == 0.0 && depth_delay == 0.0;
   }
-  /// Returns true if each row of the depth image is taken together with the same row of the colour image.
+  /// Returns true if each row of the depth image is read at the same time as the same row of the colour image.
   [[nodiscard]] constexpr bool is_depth_simultaneous() const noexcept {
     return depth_delay == 0.0 && depth_read_out == color_read_out;
   }
-  /// Returns true if the depth image is taken before the time of the frame.
+  /// Returns true if the depth image is taken before the frame's time.
   [[nodiscard]] constexpr bool is_depth_early() const noexcept { return depth_delay < 0.0; }
   /// The time of row `v` (the centre of the top row is 0) of a colour image with `height` rows, seconds.
   [[nodiscard]] constexpr double color_time(double v, int height) const noexcept {
@@ -44,10 +44,10 @@ struct shutter {
 };
 
 /// Maps a point from the camera frame at time `t` to the camera frame at time 0, if the camera moves by a constant
-/// twist: `exp(t * twist) p` to second order; the remainder is below a thousandth of a pixel for the angles of one
-/// read-out (a few hundredths of a radian). `twist`: of the camera in its own frame, per second, translation first. The
-/// point is `p / inverse_scale`, and so is the result: with a ray for `p` and its inverse depth, this covers points at
-/// any distance.
+/// twist: `exp(t * twist) p` to second order; the remainder is below a thousandth of a pixel for the rotation during
+/// one read-out (a few hundredths of a radian). `twist`: twist of the camera in its own frame, per second, translation
+/// first. `p` represents the point `p / inverse_scale`, and the result has the same scale: with a ray for `p` and its
+/// inverse depth for `inverse_scale`, points at any distance are handled.
 [[nodiscard]] inline vec3 moved_by(const vec6& twist, double t, const vec3& p, double inverse_scale = 1.0) {
   const vec3 w(t * twist[3], t * twist[4], t * twist[5]);
   const vec3 v(inverse_scale * (t * twist[0]), inverse_scale * (t * twist[1]), inverse_scale * (t * twist[2]));

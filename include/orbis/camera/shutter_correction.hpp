@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Converts rolling-shutter images to the global-shutter images of the frame's time.
+/// Converts rolling-shutter images to global-shutter images at the frame's time.
 ///
 /// @code
 ///   orbis::camera::shutter_correction<orbis::camera::pinhole> correct{camera};
@@ -10,15 +10,15 @@
 ///   }
 /// @endcode
 ///
-/// During the read-out the camera moves by a constant twist. Each depth is moved to the pixel that observes it at the
-/// frame's time, and the nearest one wins; this determines the surface that a pixel shows. Its depth is then read at
-/// the position where the depth image observed that point of the surface: interpolated linearly in inverse depth, which
-/// is exact on planes, over only those pixels that lie on the surface. Planes thus stay planes, and edges stay between
-/// two pixels.
+/// The camera is assumed to move with a constant twist during the read-out. Each depth is moved to the pixel that
+/// observes it at the frame's time, where the nearest depth wins; this determines the surface that a pixel shows. Its
+/// depth is then read at the position where the depth image observed that point of the surface: interpolated linearly
+/// in inverse depth, which is exact on planes, using only pixels on that surface. Planes therefore stay planar, and
+/// edges stay between two pixels.
 ///
-/// The model of constant velocity during the read-out: J. Hedborg, P.-E. Forssen, M. Felsberg, E. Ringaby, "Rolling
-/// shutter bundle adjustment", CVPR 2012; depth images of a rolling shutter: E. Ringaby, P.-E. Forssen, "Scan
-/// rectification for structured light range sensors with rolling shutters", ICCV 2011.
+/// For the constant-velocity model, see J. Hedborg, P.-E. Forssen, M. Felsberg, E. Ringaby, "Rolling shutter bundle
+/// adjustment", CVPR 2012; for rolling-shutter depth images, see E. Ringaby, P.-E. Forssen, "Scan rectification for
+/// structured light range sensors with rolling shutters", ICCV 2011.
 #pragma once
 
 #include <algorithm>
@@ -65,7 +65,7 @@ struct stored_depth<depth_view<T>> : std::type_identity<T> {};
 template <camera_model Camera>
 class shutter_correction {
  public:
-  /// Allocates the tables of the camera. O(width * height / 256)
+  /// Allocates the tables for the camera. O(width * height / 256)
   explicit shutter_correction(Camera camera)
       : camera_{std::move(camera)},
         to_frame_{camera_, detail::warp_direction::to_frame},
@@ -75,17 +75,17 @@ class shutter_correction {
         index_(to_row_.padded_width()),
         warped_{to_row_.padded_width()} {}
 
-  /// Returns true if images taken during this motion differ from those of a global shutter. `twist`: of the camera in
+  /// Returns true if images taken during this motion differ from global-shutter images. `twist`: twist of the camera in
   /// its own frame, per second, translation first.
   [[nodiscard]] static bool is_needed(const shutter& s, const vec6& twist) noexcept {
     return !s.is_global() && !(twist.array() == 0.0).all();
   }
 
-  /// Computes the depth image of a global shutter at the frame's time. `out` is 0 where nothing was measured, or where
-  /// the measured point is not visible. `T` is the stored type of `depth` if it is a `depth_view` (`out` then has its
-  /// scale), otherwise `float` (metres). Without a motion, or if all its rows are read at the frame's time, `out` has
-  /// the same values. Errors: `invalid_argument` for a twist that is not finite, or turns the camera by more than 0.3
-  /// radians between the frame's time and that of a row; `out` is then unchanged. O(pixels).
+  /// Computes the global-shutter depth image at the frame's time. `out` is 0 where nothing was measured, or where the
+  /// measured point is not visible. `T` is the stored type of `depth` if it is a `depth_view` (`out` then has its
+  /// scale), otherwise `float` (metres). If the camera does not move, or all rows are read at the frame's time, `out`
+  /// equals `depth`. Errors: `invalid_argument` if the twist is not finite, or turns the camera by more than 0.3
+  /// radians between the frame's time and the time of a row; `out` is then unchanged. O(pixels).
   /// @pre the images have the size of the camera and do not overlap
   template <depth_source Depth, class T>
   requires std::same_as<T, typename detail::stored_depth<Depth>::type>
@@ -124,8 +124,8 @@ class shutter_correction {
 
   /// Computes the colour image that belongs to a corrected depth image: each pixel gets the colour read at the position
   /// where its point was observed; a pixel without depth is treated as a point at a large distance; positions outside
-  /// the image are black. Without a motion, or if all rows are read at the frame's time, this is a copy. Errors and
-  /// preconditions as above. O(pixels).
+  /// the image are black. If the camera does not move, or all rows are read at the frame's time, the image is copied.
+  /// Errors and preconditions as for `depth`. O(pixels).
   template <depth_source Depth>
   [[nodiscard]] result<void> color(const shutter& s, const vec6& twist, const Depth& corrected,
                                    image_view<const rgb8> color, image_view<rgb8> out) {
@@ -205,8 +205,8 @@ class shutter_correction {
       }
     }
   }
-  /// Computes the inverse depths of the surfaces that row `y` shows at the frame's time, 0 where there is none. Fills
-  /// the cracks of stretched surfaces: pixels between two pixels of one surface.
+  /// Computes the inverse depths of the surfaces that row `y` shows at the frame's time; 0 where there is no surface.
+  /// Fills cracks in stretched surfaces: pixels between two pixels of one surface.
   void find_surfaces(int y) {
     const auto row = std::as_const(nearest_).row(y);
     for (std::size_t x = 0; x != row.size(); ++x)

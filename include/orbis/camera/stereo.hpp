@@ -5,8 +5,8 @@
 /// @code
 ///   const stereo_rig rig{left_camera, right_camera, T_left_right};
 ///   const rectification straight = rectify(rig).value();
-///   const auto left = straight.left().bilinear(left_image.view()), right =
-///   straight.right().bilinear(right_image.view());
+///   const auto left = straight.left().bilinear(left_image.view());
+///   const auto right = straight.right().bilinear(right_image.view());
 /// @endcode
 #pragma once
 
@@ -26,14 +26,14 @@
 
 namespace orbis::camera {
 
-/// Two rigidly connected cameras that take their images at the same time.
+/// Two rigidly connected cameras that capture images at the same time.
 template <camera_model Left, camera_model Right = Left>
 struct stereo_rig {
   Left left;
   Right right;
   se3 T_left_right;  ///< transforms from the right camera's frame to the left one's, metres
 
-  /// The distance between the two centres, metres.
+  /// The distance between the two camera centres, metres.
   [[nodiscard]] double baseline() const { return norm(T_left_right.translation()); }
 };
 
@@ -42,22 +42,22 @@ stereo_rig(Left, Right, se3) -> stereo_rig<Left, Right>;
 
 /// Options of `rectify`.
 struct rectify_options {
-  int width = 0;                   ///< of the rectified images, pixels; 0: width of the left camera
-  int height = 0;                  ///< of the rectified images, pixels; 0: height of the left camera
-  std::optional<double> focal{};   ///< of the rectified camera, pixels; default: see `rectify`
+  int width = 0;                   ///< width of the rectified images, pixels; 0: width of the left camera
+  int height = 0;                  ///< height of the rectified images, pixels; 0: height of the left camera
+  std::optional<double> focal{};   ///< focal length of the rectified camera, pixels; default: see `rectify`
   double max_magnification = 1.5;  ///< maximum ratio of the default focal length to that at the image centres
 };
 
-/// Maps the images of a stereo rig to those of two identical pinhole cameras at the same positions with parallel
-/// optical axes and x along the baseline. A point has the same row in both images; its column in the right image is
-/// that in the left one minus `camera().k().fx * baseline() / depth`. Build it once (`rectify`), apply it to each pair:
-/// `left().bilinear(image)`. 16 bytes per pixel.
+/// Maps the images of a stereo rig to images of two identical pinhole cameras at the same positions, with parallel
+/// optical axes and x along the baseline. A point is on the same row in both images; its column in the right image is
+/// its column in the left image minus `camera().k().fx * baseline() / depth`. Build it once (`rectify`), apply it to
+/// each pair: `left().bilinear(image)`. 16 bytes per pixel.
 class rectification {
  public:
   /// For images that are already rectified.
   rectification(const pinhole& camera, double baseline) : camera_{camera}, baseline_{baseline} {}
-  /// @pre both have the size of `camera`; `R_left_rectified` rotates rays of the rectified cameras into the left one's
-  /// frame
+  /// @pre both maps have the size of `camera`; `R_left_rectified` rotates rays from the rectified cameras' frame to the
+  /// left camera's frame
   rectification(const pinhole& camera, double baseline, const so3& R_left_rectified, undistortion left,
                 undistortion right)
       : camera_{camera}, baseline_{baseline}, R_left_rectified_{R_left_rectified} {
@@ -66,13 +66,13 @@ class rectification {
 
   /// The camera of both rectified images.
   [[nodiscard]] const pinhole& camera() const noexcept { return camera_; }
-  /// Distance of the camera centres in metres.
+  /// Distance between the camera centres, metres.
   [[nodiscard]] double baseline() const noexcept { return baseline_; }
-  /// Rotation from the rectified left camera's frame to that of the left camera itself; both have the same origin.
+  /// Rotation from the rectified left camera's frame to the original left camera's frame; both have the same origin.
   [[nodiscard]] const so3& R_left_rectified() const noexcept { return R_left_rectified_; }
   /// Returns true if the images are already rectified and need no remapping.
   [[nodiscard]] bool is_identity() const noexcept { return !maps_; }
-  /// Remaps images of the left or of the right camera to rectified images. @pre !is_identity()
+  /// The map from images of the left (right) camera to rectified images. @pre !is_identity()
   [[nodiscard]] const undistortion& left() const { return maps_.value().first; }
   [[nodiscard]] const undistortion& right() const { return maps_.value().second; }
 
@@ -135,7 +135,8 @@ template <camera_model Left, camera_model Right>
     return false;
   const int w = rig.left.width(), h = rig.left.height();
   if (rig.right.width() != w || rig.right.height() != h || w == 0 || h == 0) return false;
-  // Pinhole cameras: rays differ by the same step everywhere, so a few pixels suffice, regardless of the static type.
+  // For pinhole cameras, the ray step is the same everywhere, so testing a few pixels suffices, regardless of the
+  // static type.
   const auto like = [&](const auto& camera, const pinhole& k) {
     for (const double v : {0.0, 0.3, 1.0})
       for (const double u : {0.0, 0.6, 1.0}) {
@@ -154,10 +155,11 @@ template <camera_model Left, camera_model Right>
 
 }  // namespace detail
 
-/// Computes the rectification of a rig of any two camera models. Both cameras are rotated as little as possible: x
+/// Computes the rectification of a rig with any two camera models. Both cameras are rotated as little as possible: x
 /// along the baseline, z close to the mean of both axes. The new camera has one focal length: the smaller of the two
 /// cameras' focal lengths at their image centres, increased by up to `max_magnification` if needed to give every pixel
-/// a source. The image centres are preserved. Rigs that are already rectified give an identity. O(pixels) projections.
+/// a source. The image centres are preserved. For rigs that are already rectified, the result is the identity.
+/// O(pixels) projections.
 ///
 /// After A. Fusiello, E. Trucco, A. Verri, "A compact algorithm for rectification of stereo pairs", Machine Vision and
 /// Applications 12 (2000), which keeps one axis of the left camera instead of the mean of both. Errors:

@@ -10,9 +10,9 @@
 
 namespace orbis::camera {
 
-/// The images of a rectified stereo camera: of the same size and the same pinhole camera; rows correspond.
+/// The images of a rectified stereo camera: same size, same pinhole model, corresponding rows.
 struct stereo_frame {
-  double timestamp = 0.0;  ///< of both images, seconds
+  double timestamp = 0.0;  ///< time of both images, seconds
   image<rgb8> left;
   image<rgb8> right;
   std::optional<se3> T_world_camera;  ///< ground truth of the rectified left camera, if recorded

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Removes lens distortion from images.
+/// Removal of lens distortion from images.
 #pragma once
 
 #include <cassert>
@@ -25,8 +25,8 @@ concept has_intrinsics = camera_model<C> && requires(const C& camera) {
   { camera.k() } -> std::convertible_to<intrinsics>;
 };
 
-/// Remaps images of a camera to those of an ideal pinhole camera at the same position. Build it once, apply it to every
-/// frame. 8 bytes per pixel.
+/// Remaps images of a camera to images of an ideal pinhole camera at the same position. Build it once, apply it to
+/// every frame. 8 bytes per pixel.
 class undistortion {
  public:
   /// For an ideal camera at the position of `camera`, rotated by `R_camera_ideal`. O(pixels of `ideal`) projections.
@@ -42,16 +42,17 @@ class undistortion {
           source_(x, y) = pixel->template cast<float>();
       }
   }
-  /// For the pinhole with the camera's own size and matrix.
+  /// For the pinhole camera with the size and camera matrix of `camera`.
   template <has_intrinsics Camera>
   explicit undistortion(const Camera& camera) : undistortion(camera, pinhole{camera.k()}) {}
 
   [[nodiscard]] int width() const noexcept { return source_.width(); }
   [[nodiscard]] int height() const noexcept { return source_.height(); }
-  /// The position in the distorted image that the ideal one shows at (x, y); NaN if there is none.
+  /// The position in the distorted image that corresponds to pixel (x, y) of the ideal image; NaN if there is none.
   [[nodiscard]] const vec2f& source(int x, int y) const noexcept { return source_(x, y); }
 
-  /// Remaps with bilinear interpolation, for `rgb8` and `std::uint8_t`; `outside` for pixels without a source.
+  /// Remaps with bilinear interpolation, for `rgb8` and `std::uint8_t`; pixels without a source get the value
+  /// `outside`.
   /// @pre the image has the camera's size
   template <class T>
   requires std::same_as<std::remove_const_t<T>, rgb8> || std::same_as<std::remove_const_t<T>, std::uint8_t>
@@ -65,8 +66,8 @@ class undistortion {
     });
   }
 
-  /// Remaps with the nearest pixel, for values that must not be interpolated: labels, and depth (measured along the
-  /// optical axis, so that its value does not change).
+  /// Remaps with nearest-neighbour sampling, for values that must not be interpolated: labels, and depth (measured
+  /// along the optical axis, so that its value does not change).
   /// @pre the image has the camera's size
   template <class T>
   [[nodiscard]] image<std::remove_const_t<T>> nearest(image_view<T> distorted,

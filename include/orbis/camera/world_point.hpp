@@ -29,8 +29,8 @@ struct float_pose {
 };
 
 /// The world point (metres) at depth `z` (metres along the optical axis) on the ray through (x, y, 1) in the camera
-/// frame. Float arithmetic in this order, rounded after every operation, so that every compiler and every instruction
-/// set gives the same bits. The error is less than 1 um within a room. O(1).
+/// frame. Evaluated in float in a fixed order, rounded after every operation, so that every compiler and every
+/// instruction set gives the same bits. The error is less than 1 um for scenes the size of a room. O(1).
 [[nodiscard]] inline std::array<float, 3> world_point(const float_pose& pose, float x, float y, float z) noexcept {
   const float cx = rounded_product(x, z), cy = rounded_product(y, z);
   std::array<float, 3> p;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The interval in which a distortion polynomial is increasing, and its inverse there.
+/// The interval in which a distortion polynomial increases, and its inverse on that interval.
 #pragma once
 
 #include <algorithm>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Correspondence between the pixels of a rolling-shutter image and those of a global-shutter image.
+/// Correspondence between the pixels of a rolling-shutter image and a global-shutter image.
 #pragma once
 
 #include <algorithm>
@@ -41,14 +41,14 @@ struct row_time {
   [[nodiscard]] static row_time between(double first, double second) noexcept { return {first, second - first}; }
 };
 
-/// The pixel that observes a point at another time, and the ratio of the depth at that pixel to the depth at the
-/// original one.
+/// The pixel that observes a point at another time, and the ratio of the point's depth at that pixel to its depth at
+/// the original pixel.
 struct warped_pixel {
   double x = 0.0, y = 0.0, ratio = 0.0;
 };
 
-/// The pixel at the frame's time of the point that row `y` observes at the given inverse depth. `ray`: through the
-/// pixel, at z = 1.
+/// Computes the pixel at the frame's time of the point that row `y` observes at the given inverse depth. `ray`: the ray
+/// through the original pixel, at z = 1.
 template <camera_model Camera>
 [[nodiscard]] std::optional<warped_pixel> warp_to_frame(const Camera& camera, const row_time& time, const vec6& twist,
                                                         const vec3& ray, double y, double inverse_depth) {
@@ -58,8 +58,8 @@ template <camera_model Camera>
   return warped_pixel{pixel->x(), pixel->y(), p.z()};
 }
 
-/// The rolling-shutter pixel of the point that the pixel of `ray` in row `y` observes at the frame's time. Its row, and
-/// hence its time, is found by iteration; empty if the motion is too fast for convergence.
+/// Computes the rolling-shutter pixel of the point that the pixel of `ray` in row `y` observes at the frame's time. Its
+/// row, and hence its time, is found by iteration; empty if the motion is too fast for convergence.
 template <camera_model Camera>
 [[nodiscard]] std::optional<warped_pixel> warp_to_row(const Camera& camera, const row_time& time, const vec6& twist,
                                                       const vec3& ray, double y, double inverse_depth) {
@@ -79,9 +79,9 @@ template <camera_model Camera>
 
 enum class warp_direction { to_frame, to_row };
 
-/// Spacing of the nodes of a `row_warp` in pixels, and number of pixels evaluated at once.
+/// Spacing of the nodes of a `row_warp` in pixels; also the number of pixels evaluated at once.
 inline constexpr int warp_cell = 16;
-/// Parabolas in inverse depth: of the displacement in x, the displacement in y, and the ratio of depths.
+/// Parabolas in inverse depth for the displacement in x, the displacement in y, and the depth ratio.
 using warp_parabolas = std::array<float, 9>;
 
 /// Warped positions of a row of pixels; NaN where undefined. All lengths are whole cells.
@@ -125,14 +125,14 @@ struct warp_row_kernel {
   }
 };
 
-/// One of the two functions above for all pixels of an image. Both are smooth over a few pixels and over inverse depth:
-/// they are computed at nodes, for three inverse depths, and interpolated linearly between the nodes and by a parabola
-/// in inverse depth. The error is a few thousandths of a pixel for the motions of a read-out, and no pixel needs a
-/// projection. Very near points, and those next to a node without a pixel, are computed individually.
+/// Evaluates one of the two functions above for all pixels of an image. Both are smooth over a few pixels and over
+/// inverse depth: they are computed at nodes for three inverse depths, and interpolated linearly between nodes and by a
+/// parabola in inverse depth. The error is a few thousandths of a pixel for the motion during a read-out, and no pixel
+/// needs a projection. Very near points, and points next to a node without a pixel, are computed individually.
 template <camera_model Camera>
 class row_warp {
  public:
-  /// Allocates for the size of the camera. O(nodes)
+  /// Allocates memory for the image size of the camera. O(nodes)
   row_warp(const Camera& camera, warp_direction direction)
       : direction_{direction}, across_{nodes(camera.width())}, down_{nodes(camera.height())} {
     rays_.reserve(across_ * down_);
@@ -148,14 +148,14 @@ class row_warp {
     time_ = time;
     twist_ = twist;
     const double shift = time.largest(camera.height()) * norm(head<3>(twist));
-    constexpr double nearest = 0.25, largest_angle = 0.1;  // metres; of the shift, as seen from the point
+    constexpr double nearest = 0.25, largest_angle = 0.1;  // metres; angle of the shift, as seen from the point
     most_inverse_ = shift > largest_angle * nearest ? largest_angle / shift : 1.0 / nearest;
     for (std::size_t j = 0; j != down_; ++j)
       for (std::size_t i = 0; i != across_; ++i) nodes_[j * across_ + i] = fit(camera, i, j);
   }
 
   /// Computes the warped positions of the pixels of row `y` at their inverse depths. Entries without depth may have any
-  /// finite non-negative value. O(pixels). @pre `inverse_depth` and `out` have whole cells
+  /// finite non-negative value. O(pixels). @pre the lengths of `inverse_depth` and `out` are multiples of a cell
   void evaluate(const Camera& camera, int y, std::span<const float> inverse_depth, warped_row& out) {
     const auto* const above = nodes_.data() + static_cast<std::size_t>(y / warp_cell) * across_;
     const auto* const below = above + across_;
@@ -229,7 +229,7 @@ class row_warp {
 
   warp_direction direction_;
   std::size_t across_, down_;
-  std::vector<vec3> rays_;             // of the nodes; NaN where undefined
+  std::vector<vec3> rays_;             // rays of the nodes; NaN where undefined
   std::vector<warp_parabolas> nodes_;  // NaN where there is no pixel
   std::vector<warp_parabolas> row_;    // of the current row
   row_time time_;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Resamples images at warped pixels.
+/// Kernels that resample images at warped pixels.
 #pragma once
 
 #include <cstddef>
@@ -17,7 +17,7 @@ struct nearest_pixels_kernel {
   struct arguments {
     std::size_t count;  ///< whole cells
     int width, height;
-    std::int32_t stride;  ///< of the image in memory
+    std::int32_t stride;  ///< row stride of the image in memory
     const float *x, *y;
     std::int32_t* index;
   };
@@ -38,7 +38,7 @@ struct nearest_pixels_kernel {
   }
 };
 
-/// Maximum difference of inverse depth between neighbours on one surface, as a fraction of it.
+/// Maximum relative difference in inverse depth between neighbouring pixels on one surface.
 inline constexpr float same_surface = 0.03F;
 
 /// Interpolates inverse depth linearly between pixels, using only pixels that lie on the target surface.
@@ -49,7 +49,7 @@ struct read_surface_kernel {
     const float* surface;  ///< inverse depth of the target surface ...
     const float *x, *y;    ///< ... the position where it was read ...
     const float* ratio;    ///< ... and the ratio of the depth at that position to the depth at this pixel
-    const float* inverse;  ///< of the image as read, with a border of one zero pixel
+    const float* inverse;  ///< inverse depth of the original image, with a border of one zero pixel
     float* metres;         ///< 0 where undefined
   };
   using signature = void(const arguments&);
