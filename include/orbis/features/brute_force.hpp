@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Brute-force source: compares every query with every train.
+/// Brute-force source: compares every query descriptor with every train descriptor.
 #pragma once
 
 #include <concepts>
@@ -16,8 +16,8 @@
 
 namespace orbis::features {
 
-/// Finds the nearest and the second nearest train of each query and, on request, the nearest query of each train, in
-/// one pass over all pairs. Created by `brute_force(distance)`.
+/// Finds the nearest and second-nearest train descriptor for each query and, on request, the nearest query for each
+/// train descriptor, in one pass over all pairs. Created by `brute_force(distance)`.
 template <class Distance>
 struct brute_force_source {
   using match_source_tag = void;
@@ -29,7 +29,7 @@ struct brute_force_source {
     detail::hamming_workspace search;
   };
 
-  /// Returns one candidate for each query; none if there are no trains. O(queries x trains).
+  /// Returns one candidate per query; none if there are no train descriptors. O(queries x trains).
   template <class Descriptor>
   requires descriptor_distance<Distance, Descriptor>
   void search(std::vector<candidate>& candidates, workspace& memory, const feature_view<Descriptor>& queries,

@@ -14,9 +14,9 @@
 
 namespace orbis::features {
 
-/// Standard deviation of a measured depth: `constant + quadratic * z^2`, metres. The defaults are
-/// those of a Kinect, close to Nguyen, Izadi, Lovell, "Modeling Kinect sensor noise for improved 3D
-/// reconstruction and tracking", 3DIMPVT 2012.
+/// Standard deviation of a measured depth: `constant + quadratic * z^2`, metres. The defaults suit a Kinect and are
+/// close to Nguyen, Izadi, Lovell, "Modeling Kinect sensor noise for improved 3D reconstruction and tracking", 3DIMPVT
+/// 2012.
 struct depth_noise {
   double constant = 0.0012;
   double quadratic = 0.0019;
@@ -25,12 +25,12 @@ struct depth_noise {
 
 /// Options for the estimation of a keypoint's depth from its neighbourhood.
 struct keypoint_depth_options {
-  int radius = 1;               ///< of the window: 1 is 3x3, 2 is 5x5; maximum 3
-  int min_valid = 3;            ///< minimum number of pixels with a depth in the window
-  float edge_sigmas = 4.0F;     ///< a gap of more than this many sigma ...
+  int radius = 1;               ///< radius of the window: 1 is 3x3, 2 is 5x5; maximum 3
+  int min_valid = 3;            ///< minimum number of pixels with depth in the window
+  float edge_sigmas = 4.0F;     ///< a gap of more than this number of standard deviations ...
   float edge_relative = 0.02F;  ///< ... and more than this fraction of the depth is an edge
   float min_share = 0.7F;       ///< minimum fraction of the valid pixels on one side of every edge; > 0.5
-  double position_sigma = 0.5;  ///< of the keypoint, pixels; adds to the depth deviation on slopes
+  double position_sigma = 0.5;  ///< sigma of the keypoint position, pixels; adds to the depth deviation on slopes
   depth_noise noise{};
 };
 
@@ -55,7 +55,7 @@ class depth_plane {
     return n_ >= 6 && spread_uu() * spread_vv() - sq(spread_uv()) > 1.0;
   }
 
-  /// The plane's depth, the residual variance, and its slope, metres per pixel. @pre determined()
+  /// The depth of the plane, its residual variance, and its slope in metres per pixel. @pre determined()
   struct fit {
     double z, variance, slope;
   };
@@ -76,13 +76,13 @@ class depth_plane {
   double n_ = 0.0, u_ = 0.0, v_ = 0.0, z_ = 0.0, uu_ = 0.0, uv_ = 0.0, vv_ = 0.0, uz_ = 0.0, vz_ = 0.0, zz_ = 0.0;
 };
 
-/// Depth along the optical axis at pixel `(x, y)`, including subpixel positions: that of a plane fitted to the valid
-/// depths around it, or their median if there are too few for a plane. Its deviation combines the sensor's noise, the
-/// residual of the plane, and on slopes the keypoint's position error.
+/// Depth along the optical axis at a (subpixel) position `(x, y)`: the depth of a plane fitted to the valid depths
+/// around it, or their median if there are too few for a plane. The standard deviation combines the sensor noise, the
+/// residual of the plane and, on slopes, the keypoint's position error.
 ///
 /// Empty if there are too few valid depths, if `(x, y)` is outside the image or not finite, or if the window straddles
-/// a depth edge: the pixel may then belong to either side, and a wrong choice causes errors of decimetres. Ignores a
-/// few flying pixels beyond an edge.
+/// a depth edge: the pixel may then belong to either side, and a wrong choice causes errors of decimetres. A few flying
+/// pixels beyond an edge are ignored.
 /// @pre 0 <= radius <= 3
 template <camera::depth_source Depth>
 [[nodiscard]] std::optional<keypoint_depth> depth_at(const Depth& depth, float x, float y,

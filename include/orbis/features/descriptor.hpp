@@ -12,13 +12,13 @@
 
 namespace orbis::features {
 
-/// A descriptor of a keypoint: any copyable value. A `descriptor_distance` compares two of them. Place recognition
-/// requires a `bit_string`; `hamming` is fast for these.
+/// A keypoint descriptor: any copyable value. A `descriptor_distance` compares two descriptors. Place recognition
+/// requires a `bit_string`, for which `hamming` is fast.
 template <class D>
 concept feature_descriptor = std::semiregular<D>;
 
 /// A bit string that describes the neighbourhood of a keypoint. Bit `i` is bit `i % 64` of word `i / 64`; on a
-/// little-endian machine these are the bytes of a row of an OpenCV descriptor matrix.
+/// little-endian machine, the bytes are those of a row of an OpenCV descriptor matrix.
 template <std::size_t Bits>
 requires(Bits > 0 && Bits % 64 == 0) struct binary_descriptor {
   static constexpr std::size_t bits = Bits;
@@ -32,7 +32,7 @@ static_assert(sizeof(binary_descriptor<256>) == 32 && std::is_trivially_copyable
 
 /// An image point that can be detected again in other images.
 struct keypoint {
-  float x = 0.0F, y = 0.0F;  ///< pixels of the full image, pixel centres at integers
+  float x = 0.0F, y = 0.0F;  ///< position in the full image, pixels; pixel centres are at integers
   float size = 0.0F;         ///< diameter of the described neighbourhood, pixels of the full image
   float angle = 0.0F;        ///< orientation in radians, [0, 2 pi), from x (right) towards y (down)
   float response = 0.0F;     ///< strength of the corner; comparable within one extractor

@@ -22,23 +22,23 @@
 
 namespace orbis::features {
 
-/// Limits of the distance between a match and its epipolar line.
+/// Limits on the distance between a match and its epipolar line.
 struct epipolar_rule {
-  float distance = 1.96F;       ///< maximum at the finest level, pixels: 95 % if positions have an error of one pixel
-  float scale_factor = 1.2F;    ///< of the pyramid: the limit grows by this factor per level of the train
-  float epipole_radius = 0.0F;  ///< excludes trains this close to the epipole (grows likewise): no parallax
+  float distance = 1.96F;       ///< maximum at the finest level, pixels; accepts 95 % of matches if sigma is one pixel
+  float scale_factor = 1.2F;    ///< scale factor of the pyramid: the limit grows by it per level of the train keypoint
+  float epipole_radius = 0.0F;  ///< excludes train keypoints this close to the epipole (no parallax); grows likewise
 };
 
-/// Finds for each query the nearest and the second nearest of the trains close to its epipolar line: the search for new
-/// landmarks to triangulate between two images of known pose. Created by `epipolar(distance, rule)`; call a chain that
-/// begins with it with the geometry of the two images:
+/// Finds, for each query, the nearest and second-nearest train descriptors among those close to its epipolar line. Used
+/// to find new landmarks to triangulate from two images with known poses. Created by `epipolar(distance, rule)`; a
+/// chain that begins with this source is called with the geometry of the two images:
 ///
 /// @code
 ///   constexpr auto matcher = epipolar(hamming{}, {.epipole_radius = 10.0F}) | ratio_test{0.8f} | cross_check{};
 ///   std::vector<match> found = matcher(f1, f2, ray_geometry{rays1, rays2, T_camera2_camera1, focal});
 /// @endcode
 ///
-/// The reverse neighbour of a train is the nearest of the queries to whose line it is close.
+/// The reverse neighbour of a train descriptor is the nearest query among those whose line it is close to.
 template <class Distance>
 struct epipolar_source {
   using match_source_tag = void;
@@ -47,7 +47,7 @@ struct epipolar_source {
 
   struct workspace {
     detail::search_among_workspace search;
-    std::vector<float> x, y, limit;  ///< of the trains, in whole blocks
+    std::vector<float> x, y, limit;  ///< of the train keypoints, padded to whole blocks
   };
 
   /// Reports invalid arguments with a single compiler error.
@@ -60,7 +60,8 @@ struct epipolar_source {
     static_assert(epipolar_geometry<Other>, "orbis: epipolar(...) requires an epipolar_geometry, such as ray_geometry");
   }
 
-  /// Returns one candidate for each query that has a train close to its line. O(queries x trains) distances to lines.
+  /// Returns one candidate for each query with a train keypoint close to its line. O(queries x trains) distances to
+  /// lines.
   /// @pre one keypoint for each descriptor on both sides
   template <class Descriptor, epipolar_geometry Geometry>
   requires descriptor_distance<Distance, Descriptor>
@@ -85,7 +86,7 @@ struct epipolar_source {
  private:
   static constexpr std::size_t block = 16;
 
-  /// Limit of the distance to the line; a NaN or negative limit matches no line.
+  /// Computes the limit on the distance to the line for each train keypoint; a NaN or negative limit matches no line.
   template <class Geometry>
   void place_trains(workspace& memory, std::span<const keypoint> keypoints, const Geometry& geometry) const {
     constexpr float nowhere = std::numeric_limits<float>::quiet_NaN();
@@ -104,7 +105,7 @@ struct epipolar_source {
     }
   }
 
-  /// A branch-free loop of fixed length, for the vectoriser.
+  /// A branch-free loop of fixed length, so that the compiler vectorises it.
   [[nodiscard]] static bool any_close(const epipolar_line& line, const float* x, const float* y, const float* limit,
                                       std::array<std::uint32_t, block>& close) noexcept {
     std::uint32_t any = 0;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Epipolar lines: loci of the matches of a keypoint for a known relative pose of two images.
+/// Epipolar lines: the loci of a keypoint's matches for a known relative pose of two images.
 #pragma once
 
 #include <cassert>
@@ -17,16 +17,18 @@
 
 namespace orbis::features {
 
-/// A line `a x + b y + c = 0` with `a^2 + b^2 = 1`: the left side is the distance of a point.
+/// A line `a x + b y + c = 0` with `a^2 + b^2 = 1`: the left side is the signed distance of a point from the line.
 struct epipolar_line {
   float a = 0.0F, b = 0.0F, c = 0.0F;
 };
 
-/// Epipolar geometry of the keypoints of two images:
-/// - `line(i, k)`: the line in the train image of query `i` with keypoint `k`, or none;
-/// - `point(i, k)`: position of train `i` with keypoint `k`, pixels; NaN if it has none;
-/// - `epipole()`: intersection of all lines of the train image, or none.
-/// Lines and points are in one plane, which need not be the image itself.
+/// Epipolar geometry for the keypoints of two images:
+///
+/// - `line(i, k)`: the line in the train image for query `i` with keypoint `k`, or empty;
+/// - `point(i, k)`: position of train keypoint `k` (index `i`), pixels; NaN if it has none;
+/// - `epipole()`: intersection of all lines in the train image, or empty.
+///
+/// Lines and points are in one plane, which need not be the image plane.
 template <class G>
 concept epipolar_geometry = requires(const G& geometry, std::size_t i, const keypoint& k) {
   { geometry.line(i, k) } -> std::same_as<std::optional<epipolar_line>>;
@@ -48,12 +50,12 @@ concept epipolar_geometry = requires(const G& geometry, std::size_t i, const key
   return vec2f{static_cast<float>(p.x() / p.z()), static_cast<float>(p.y() / p.z())};
 }
 
-/// Epipolar geometry of two images of any central camera, by the rays through their keypoints: lines and points are in
-/// the plane z = 1 of the train's camera, in pixels of a pinhole camera with this focal length. Refers to the rays; a
-/// ray that is NaN, or does not point forward, has no match.
+/// Epipolar geometry of two images from any central camera, based on the rays through their keypoints: lines and points
+/// are in the plane z = 1 of the train camera, in pixels of a pinhole camera with the given focal length. Refers to the
+/// rays, which must outlive it; a ray that is NaN, or does not point forward, has no match.
 class ray_geometry {
  public:
-  /// @pre one ray for each keypoint of its side; focal > 0 (pixels)
+  /// @pre one ray per keypoint on each side; focal > 0 (pixels)
   ray_geometry(std::span<const vec3> query_rays, std::span<const vec3> train_rays, const se3& T_train_query,
                double focal)
       : query_rays_{query_rays},

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Concepts of feature extractors and of the parts of `basic_orb_extractor`.
+/// Concepts for feature extractors and for the parts of `basic_orb_extractor`.
 ///
 /// | concept | purpose | implementation |
 /// | --- | --- | --- |
-/// | `feature_extractor` | finds and describes the keypoints of an image | `orb_extractor` |
+/// | `feature_extractor` | finds and describes the keypoints in an image | `orb_extractor` |
 /// | `pyramid_extractor` | also returns the image pyramid | `orb_extractor` |
 /// | `corner_detector` | finds the corners of a pyramid level | `fast9` |
 /// | `corner_selection` | selects among the corners of all levels | `cover_first` |
@@ -40,7 +40,7 @@ concept feature_extractor = requires(const E& extract, image_view<const rgb8> im
   requires detail::is_features<decltype(extract(image))>;
 };
 
-/// An extractor for grey images that also returns the pyramid of the image, so that the caller need not rebuild it:
+/// An extractor for grey images that also returns the pyramid of the image, so that callers need not rebuild it:
 /// `extract.into(found, pyramid, image)`. The octave of a keypoint is its level in the pyramid.
 template <class E>
 concept pyramid_extractor = feature_extractor<E> &&
@@ -59,7 +59,7 @@ struct corner {
   int x = 0;              ///< column, pixels of the level
   int y = 0;              ///< row
   float response = 0.0F;  ///< strength, >= 0
-  float dx = 0.0F;        ///< from the pixel's centre, in [-0.5, 0.5]
+  float dx = 0.0F;        ///< subpixel offset from the pixel's centre, in [-0.5, 0.5]
   float dy = 0.0F;
   friend constexpr bool operator==(const corner&, const corner&) = default;
 };
@@ -68,7 +68,8 @@ struct corner {
 [[nodiscard]] constexpr bool before_in_image(const corner& a, const corner& b) noexcept {
   return a.y != b.y ? a.y < b.y : a.x < b.x;
 }
-/// Stronger corners first, ties by position: a total order, so that no choice depends on the order of the input.
+/// Orders corners by strength, strongest first, then by position: a total order, so that selections do not depend on
+/// the input order.
 [[nodiscard]] constexpr bool stronger(const corner& a, const corner& b) noexcept {
   return a.response != b.response ? a.response > b.response : before_in_image(a, b);
 }
@@ -80,15 +81,15 @@ struct region {
   friend constexpr bool operator==(const region&, const region&) = default;
 };
 
-/// Brightness thresholds: a detector returns the corners with a difference of at least `strong` and, in neighbourhoods
-/// without any, those with at least `weak`. 0 <= weak <= strong <= 254.
+/// Brightness thresholds: a detector returns corners with a difference of at least `strong` and, in neighbourhoods
+/// without such corners, corners with at least `weak`. 0 <= weak <= strong <= 254.
 struct corner_thresholds {
   int strong = 20;
   int weak = 7;
 };
 
-/// `detect(image, area, thresholds, memory, corners)` replaces `corners` by those of `image` that are in `area`,
-/// ordered by `before_in_image`. `memory` is a reusable `D::workspace`.
+/// `detect(image, area, thresholds, memory, corners)` replaces `corners` with the corners of `image` in `area`, ordered
+/// by `before_in_image`. `memory` is a reusable `D::workspace`.
 template <class D>
 concept corner_detector = std::default_initializable<typename D::workspace> &&
     requires(const D& detect, image_view<const std::uint8_t> image, const region& area,
@@ -99,12 +100,12 @@ concept corner_detector = std::default_initializable<typename D::workspace> &&
 /// The corners of one pyramid level.
 struct level_corners {
   std::vector<corner> corners;
-  region area;         ///< that contains them, pixels of the level
+  region area;         ///< the area that contains the corners, pixels of the level
   double scale = 1.0;  ///< pixels of the full image per pixel of the level
 };
 
-/// `choose(levels, wanted, memory)` erases corners until at most `wanted` are left on all levels together, each level
-/// ordered by `before_in_image`. Level 0 is the finest.
+/// `choose(levels, wanted, memory)` erases corners until at most `wanted` remain in total; each level is ordered by
+/// `before_in_image`. Level 0 is the finest.
 template <class D>
 concept corner_selection = std::default_initializable<typename D::workspace> &&
     requires(const D& choose, std::span<level_corners> levels, int wanted, typename D::workspace& memory) {
@@ -119,7 +120,7 @@ struct orientation {
 };
 
 /// `orient(image, x, y)` returns the direction at a pixel of a pyramid level that is at least `O::radius` pixels from
-/// the left, upper and lower edges and `O::radius` + 1 pixels from the right one.
+/// the left, upper and lower edges and `O::radius` + 1 pixels from the right edge.
 template <class O>
 concept orientation_estimator = requires(const O& orient, image_view<const std::uint8_t> image, int at) {
   { O::radius } -> std::convertible_to<int>;
@@ -127,7 +128,7 @@ concept orientation_estimator = requires(const O& orient, image_view<const std::
 };
 
 /// Describes the pixels around a keypoint. Call `describe.prepare(image, first, last, memory)` once per pyramid level
-/// with the rows [first, last) of its keypoints; then `describe(memory, x, y, orientation)` returns a `D::descriptor`
+/// with the rows [first, last) of its keypoints; then `describe(memory, x, y, orientation)` returns the `D::descriptor`
 /// of a pixel that is at least `D::reach` pixels from the edge. `D::diameter` (pixels) becomes `keypoint::size`.
 template <class D>
 concept patch_descriptor = std::default_initializable<typename D::workspace> &&

@@ -16,7 +16,7 @@
 
 namespace orbis::features {
 
-/// Finds the keypoints near a pixel, in time proportional to their number. Holds a copy of the positions; concurrent
+/// Finds the keypoints near a pixel, in time proportional to their number. Stores a copy of the positions; concurrent
 /// queries are allowed.
 class keypoint_grid {
  public:

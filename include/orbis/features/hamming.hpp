@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Distances of descriptors, and the Hamming distance of binary ones.
+/// Descriptor distances, and the Hamming distance between binary descriptors.
 #pragma once
 
 #include <concepts>
@@ -18,8 +18,8 @@ concept descriptor_distance = std::regular_invocable<const F&, const Descriptor&
     std::convertible_to<std::invoke_result_t<const F&, const Descriptor&, const Descriptor&>, std::uint32_t>;
 
 /// Hamming distance: the number of bits in which two descriptors differ, for any `bit_string`. Matchers with this
-/// distance type compare many pairs at once with vector instructions. The library orbis::compiled contains this for
-/// strings of 256 bits; for other lengths include brute_force-inl.hpp, windowed-inl.hpp, epipolar-inl.hpp or
+/// distance type compare many pairs at once with vector instructions. The library orbis::compiled contains the code for
+/// strings of 256 bits; for other lengths, include brute_force-inl.hpp, windowed-inl.hpp, epipolar-inl.hpp or
 /// stereo-inl.hpp.
 struct hamming {
   template <bit_string Descriptor>

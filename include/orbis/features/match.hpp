@@ -30,22 +30,23 @@ inline constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
 /// The result of a source for one query; stages accept or reject it.
 struct candidate {
   std::uint32_t query = 0;
-  std::uint32_t train = 0;               ///< the nearest; the lowest index on ties
-  std::uint32_t distance = 0;            ///< to the nearest
-  std::uint32_t second_distance = none;  ///< to the second nearest, `none` if there is only one
+  std::uint32_t train = 0;               ///< index of the nearest train descriptor; the lowest on ties
+  std::uint32_t distance = 0;            ///< distance to the nearest
+  std::uint32_t second_distance = none;  ///< distance to the second-nearest; `none` if there is only one
   std::uint32_t reverse_query = none;    ///< the query nearest to `train` (lowest index on ties), if requested
   friend constexpr bool operator==(const candidate&, const candidate&) = default;
 };
 
-/// Descriptors with optional keypoints, in place: the arguments of a matcher. Constructed from `features` or any
-/// contiguous range of descriptors.
+/// A non-owning view of descriptors with optional keypoints: the arguments of a matcher. Constructed from `features` or
+/// any contiguous range of descriptors.
 template <class Descriptor>
 struct feature_view {
   std::span<const keypoint> keypoints;  ///< empty, or one per descriptor
   std::span<const Descriptor> descriptors;
 };
 
-/// Views any valid argument of a matcher: `basic_features`, a `feature_view`, a contiguous range of descriptors.
+/// Converts any valid argument of a matcher to a view: `basic_features`, a `feature_view`, a contiguous range of
+/// descriptors.
 template <class Descriptor>
 [[nodiscard]] feature_view<Descriptor> as_view(const basic_features<Descriptor>& f) noexcept {
   return {f.keypoints, f.descriptors};
@@ -71,7 +72,7 @@ template <describable T>
 using descriptor_of =
     std::remove_const_t<typename decltype(decltype(as_view(std::declval<const T&>()))::descriptors)::element_type>;
 
-/// Requirements of the stages after a source beyond the nearest neighbour.
+/// Data that the stages after a source require in addition to the nearest neighbour.
 struct search_needs {
   bool reverse = false;    ///< `candidate::reverse_query`
   bool keypoints = false;  ///< the keypoints of both sides, provided by the caller
@@ -80,7 +81,7 @@ struct search_needs {
   }
 };
 
-/// The workspace of a part without one.
+/// The workspace of a part that needs no memory.
 struct no_workspace {};
 
 namespace detail {
@@ -99,8 +100,8 @@ struct workspace_of_part<Part> {
 template <class Part>
 using workspace_of = typename detail::workspace_of_part<Part>::type;
 
-/// The first part of a matcher: it returns the candidates in ascending order of their query, at most one per query, by
-/// `search(candidates, workspace, queries, trains, needs, where...)`.
+/// The first part of a matcher. Its function `search(candidates, workspace, queries, trains, needs, where...)` returns
+/// the candidates in ascending order of query, at most one per query.
 template <class S>
 concept match_source = requires {
   typename S::match_source_tag;
@@ -127,7 +128,7 @@ concept match_filter = std::invocable < const S&,
         std::vector<candidate>
 &, std::span<const keypoint>, std::span<const keypoint>, workspace_of<S>& > ;
 
-/// Any stage. It may request more than the nearest neighbour with a static member `needs`.
+/// Any stage. A static member `needs` may request more data than the nearest neighbour.
 template <class S>
 concept match_stage = (match_predicate<S> || match_filter<S>)&&!match_source<S>;
 

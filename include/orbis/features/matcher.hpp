@@ -10,7 +10,7 @@
 /// A chain begins with one source (`brute_force`, `windowed`, `projected`, `epipolar`); a stage is anything that
 /// satisfies `match_stage`, for example a lambda `bool(const candidate&)`. Stages test candidates in order; each
 /// receives the nearest neighbour, the second distance and the reverse neighbour that the source found among *all*
-/// descriptors, not among those left by earlier stages.
+/// descriptors, not among the descriptors left by earlier stages.
 ///
 /// A matcher that is called every frame can keep its memory in a workspace:
 ///
@@ -32,7 +32,7 @@
 
 namespace orbis::features {
 
-/// A source with its stages. Created by `|`, called with queries and trains.
+/// A source with its stages. Created by `|`, called with query and train descriptors.
 template <match_source Source, match_stage... Stages>
 class match_chain {
  public:
@@ -47,9 +47,9 @@ class match_chain {
     std::tuple<workspace_of<Stages>...> stages;
   };
 
-  /// Returns the matches in ascending order of their query, at most one per query. `where`: additional arguments of the
+  /// Returns the matches in ascending order of query, at most one per query. `where`: additional arguments of the
   /// source, e.g. the windows of `windowed`.
-  /// @pre queries and trains have keypoints if a stage needs them
+  /// @pre both sides have keypoints if a stage needs them
   template <describable Queries, describable Trains, class... Where>
   requires std::same_as<descriptor_of<Queries>, descriptor_of<Trains>> &&
       searches<Source, descriptor_of<Queries>, Where...>
@@ -61,8 +61,8 @@ class match_chain {
     return matches;
   }
 
-  /// Replaces the contents of `matches` by the matches. Once the memory has been used for a call of this size, the
-  /// library's own parts allocate nothing.
+  /// Replaces the contents of `matches`. Once `memory` has been used for a call of the same size, the library's parts
+  /// allocate nothing.
   template <describable Queries, describable Trains, class... Where>
   requires std::same_as<descriptor_of<Queries>, descriptor_of<Trains>> &&
       searches<Source, descriptor_of<Queries>, Where...>
@@ -81,7 +81,7 @@ class match_chain {
     for (const candidate& c : memory.candidates) matches.push_back({c.query, c.train, c.distance});
   }
 
-  /// A copy of this chain with one more stage at its end.
+  /// Returns a copy of this chain with one more stage at the end.
   template <match_stage Stage>
   [[nodiscard]] constexpr auto then(Stage stage) const {
     return match_chain<Source, Stages..., Stage>{source_, std::tuple_cat(stages_, std::tuple<Stage>{std::move(stage)})};

@@ -3,7 +3,7 @@
 /// ORB features that are distributed evenly over the image.
 ///
 /// Source: Rublee, Rabaud, Konolige, Bradski, "ORB: an efficient alternative to SIFT or SURF", ICCV 2011. The paper
-/// selects the strongest corners, which cluster; this extractor covers the image first.
+/// selects the strongest corners, which tend to cluster; this extractor covers the image first.
 #pragma once
 
 #include <algorithm>
@@ -23,26 +23,26 @@
 
 namespace orbis::features {
 
-/// The parts of `orb_extractor`; see `extractor.hpp` for the concepts of replacements.
+/// The parts of `orb_extractor`; see `extractor.hpp` for the concepts that replacements must satisfy.
 /// - `fast9` finds FAST-9/16 corners;
-/// - `cover_first` chooses corners that cover the image, then the strongest;
+/// - `cover_first` selects corners that cover the image, then the strongest;
 /// - `intensity_centroid` orients keypoints towards the intensity centroid;
-/// - `steered_brief` describes keypoints by ORB's pattern, rotated to their direction.
+/// - `steered_brief` describes keypoints with ORB's pattern, rotated to their orientation.
 using detail::fast9, detail::cover_first, detail::intensity_centroid, detail::steered_brief;
 
 /// Options of an ORB extractor.
 struct orb_options {
   int max_features = 1000;    ///< maximum number of features
-  int levels = 8;             ///< of the image pyramid; omits levels that are too small for a patch
-  float scale_factor = 1.2F;  ///< between two levels, > 1
-  int threshold = 14;         ///< brightness difference of a corner (in the slightly smoothed image)
-  int min_threshold = 3;      ///< used in cells without a corner of `threshold`; equal to it: no weaker corners
+  int levels = 8;             ///< number of pyramid levels; levels too small for a patch are omitted
+  float scale_factor = 1.2F;  ///< ratio of the image sizes of successive levels, > 1
+  int threshold = 14;         ///< minimum brightness difference of a corner (in the slightly smoothed image)
+  int min_threshold = 3;      ///< threshold in cells without a corner at `threshold`; if equal, no weaker corners
 };
 
 /// Finds keypoints on the levels of an image pyramid and describes them. Detection, selection, orientation and
 /// description are template parameters. Concurrent calls on a const object are allowed. The extractor reuses its
-/// working memory, one workspace per concurrent call. The library orbis::compiled contains it with the default parts;
-/// for other parts include orb-inl.hpp.
+/// working memory, one workspace per concurrent call. The library orbis::compiled contains the extractor with the
+/// default parts; for other parts, include orb-inl.hpp.
 template <corner_detector Detector = fast9, corner_selection Distribution = cover_first,
           orientation_estimator Orientation = intensity_centroid, patch_descriptor Descriptor = steered_brief>
 class basic_orb_extractor {
@@ -50,7 +50,7 @@ class basic_orb_extractor {
   using descriptor = typename Descriptor::descriptor;
   using features_type = basic_features<descriptor>;
 
-  /// Minimum distance of a keypoint from the edge, pixels of its level.
+  /// Minimum distance of a keypoint from the image edge, pixels of its level.
   static constexpr int border = std::max<int>(Orientation::radius, Descriptor::reach) + 1;
 
   basic_orb_extractor() = default;
@@ -75,20 +75,20 @@ class basic_orb_extractor {
     into(found, image);
     return found;
   }
-  /// Returns the features of the luma of a colour image (`luma`).
+  /// Returns the features of a colour image, converted with `luma`.
   [[nodiscard]] features_type operator()(image_view<const rgb8> image) const {
     features_type found;
     into(found, image);
     return found;
   }
-  /// Deleted: convert a 16-bit image with `narrow` first, which needs its range of values.
+  /// Deleted: convert 16-bit images with `narrow` first, which needs their value range.
   features_type operator()(image_view<const std::uint16_t> image) const = delete;
 
-  /// Replaces the contents of `found` by the features of an image. Allocates nothing after an image of the same size
-  /// and number of corners.
+  /// Replaces the contents of `found` with the features of an image. Allocates nothing after a previous image of the
+  /// same size and number of corners.
   void into(features_type& found, image_view<const std::uint8_t> image) const;
   void into(features_type& found, image_view<const rgb8> image) const;
-  /// As above; also returns the image's pyramid in `pyramid`: a keypoint's octave is its level there.
+  /// As above; also returns the image pyramid in `pyramid`: a keypoint's octave is its level in the pyramid.
   void into(features_type& found, image_pyramid& pyramid, image_view<const std::uint8_t> image) const;
 
  private:

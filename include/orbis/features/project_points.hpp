@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Predicted projections of known points into a camera, for the source `projected`.
+/// Predicted projections of known points into a camera image, for the source `projected`.
 #pragma once
 
 #include <concepts>
@@ -21,10 +21,10 @@ concept world_point = std::convertible_to<const P&, const vec3&> || requires(con
   { p.position } -> std::convertible_to<const vec3&>;
 };
 
-/// Projects world points into the image of a camera at a given pose. Empty if the point is behind the camera or outside
-/// the image. Optional members of a point in addition to `position`:
-/// - `normal`: the unit vector from the point towards its earlier viewpoints; gates the viewing angle;
-/// - `min_distance`, `max_distance`: the range of distances for detection; predicts the level.
+/// Projects world points into the image of a camera at a given pose. The result is empty if the point is behind the
+/// camera or outside the image. Optional members of a point in addition to `position`:
+/// - `normal`: the unit vector from the point towards its earlier viewpoints, for gating the viewing angle;
+/// - `min_distance`, `max_distance`: the range of distances for detection, for predicting the level.
 template <camera::camera_model Camera>
 class camera_projection {
  public:

@@ -23,21 +23,21 @@ namespace orbis::features {
 /// Predicted position and appearance of a known point in an image.
 struct projection {
   float x = 0.0F, y = 0.0F;   ///< pixels
-  float distance = 1.0F;      ///< from the camera, metres
-  float cosine = 1.0F;        ///< of the angle between the line of sight and the earlier viewing direction
+  float distance = 1.0F;      ///< distance from the camera, metres
+  float cosine = 1.0F;        ///< cosine of the angle between the line of sight and the earlier viewing direction
   float min_distance = 0.0F;  ///< minimum distance at which the descriptor is detectable, metres
-  float max_distance = std::numeric_limits<float>::infinity();  ///< appears at the finest level from there, metres
+  float max_distance = std::numeric_limits<float>::infinity();  ///< maximum distance (seen at the finest level), metres
 };
 
 /// Search radius around a projection, and pyramid levels to search.
 struct projection_rule {
-  float radius = 4.0F;            ///< of the window for points predicted at the finest level, pixels
-  float slanted = 1.6F;           ///< factor of the radius if the viewing direction differs from the earlier one
+  float radius = 4.0F;            ///< radius of the window for points predicted at the finest level, pixels
+  float slanted = 1.6F;           ///< factor on the radius if the viewing direction differs from the earlier one
   float frontal_cosine = 0.998F;  ///< the viewing direction differs if its cosine is below this
-  float min_cosine = 0.5F;        ///< below it, the point is not searched; -1: always searched
+  float min_cosine = 0.5F;        ///< points with a smaller cosine are not searched for; -1: no limit
   float range_tolerance = 0.2F;   ///< fraction by which the distance may exceed the point's range at either end
-  int levels = 8;                 ///< of the extractor's pyramid
-  float scale_factor = 1.2F;      ///< between them
+  int levels = 8;                 ///< number of levels of the extractor's pyramid
+  float scale_factor = 1.2F;      ///< ratio of the image sizes of successive levels
   int finer = 1, coarser = 1;     ///< levels to search around the predicted one
 };
 
@@ -51,9 +51,9 @@ struct projection_rule {
   return static_cast<int>(std::clamp(octave, 0.0, static_cast<double>(levels - 1)));
 }
 
-/// The search window of a point; its radius is negative if the point should not be visible: out of its range of
+/// The search window of a point; its radius is negative if the point should not be visible: outside its range of
 /// distances, viewed from too different a direction, or with non-finite values. The radius grows with the predicted
-/// level. A point of unknown range (`max_distance` infinite) is searched at all levels.
+/// level. A point with unknown range (`max_distance` infinite) is searched for at all levels.
 [[nodiscard]] inline window search_window(const projection& p, const projection_rule& rule) noexcept {
   const float most = p.max_distance * (1.0F + rule.range_tolerance);
   const float least = p.min_distance * (1.0F - rule.range_tolerance);
@@ -92,9 +92,9 @@ void predict_windows(std::vector<window>& windows, const Points& points, const P
 }
 }  // namespace detail
 
-/// Finds for each query, the descriptor of a known point, the nearest and the second nearest train near the point's
-/// projection. Created by `projected(distance, rule)`; call a chain that begins with it with the points (one per
-/// query), the projection function, and optionally a grid of the trains' keypoints:
+/// Finds, for each query (the descriptor of a known point), the nearest and second-nearest train descriptors near the
+/// point's projection. Created by `projected(distance, rule)`; a chain that begins with this source is called with the
+/// points (one per query), the projection function, and optionally a grid of the train keypoints:
 ///
 /// @code
 ///   constexpr auto matcher = projected(hamming{}, {.radius = 3.0F}) | max_distance{100} | unique{};
@@ -114,8 +114,8 @@ struct projected_source {
     typename windowed_source<Distance>::workspace search;
   };
 
-  /// Returns one candidate for each query that has a train in its window.
-  /// @pre one point per query; one keypoint per train; `grid` was built from these keypoints
+  /// Returns one candidate for each query with a train keypoint in its window.
+  /// @pre one point per query; one keypoint per train descriptor; `grid` was built from these keypoints
   template <class Descriptor, class Points, class Project>
   requires descriptor_distance<Distance, Descriptor> && projects<Project, Points>
   void search(std::vector<candidate>& candidates, workspace& memory, const feature_view<Descriptor>& queries,
@@ -125,7 +125,7 @@ struct projected_source {
     windowed(distance).search(candidates, memory.search, queries, trains, needs, memory.windows, grid);
   }
 
-  /// Returns one candidate for each query that has a train in its window; builds the grid in its workspace.
+  /// Returns one candidate for each query with a train keypoint in its window; builds the grid in its workspace.
   template <class Descriptor, class Points, class Project>
   requires descriptor_distance<Distance, Descriptor> && projects<Project, Points>
   void search(std::vector<candidate>& candidates, workspace& memory, const feature_view<Descriptor>& queries,

@@ -13,8 +13,9 @@
 
 namespace orbis::features {
 
-/// A grey image and its shrunk copies, each computed from the previous one by bilinear interpolation. Level k is
-/// `scale_factor`^k times smaller than the image, sides rounded to whole pixels. Reuses its memory from image to image.
+/// A grey image and downscaled copies of it, each computed from the previous one by bilinear interpolation. Level k is
+/// `scale_factor`^k times smaller than the image, with its sides rounded to whole pixels. Reuses its memory between
+/// images.
 class image_pyramid {
  public:
   image_pyramid() = default;
@@ -24,9 +25,9 @@ class image_pyramid {
   image_pyramid& operator=(const image_pyramid&) = delete;
   ~image_pyramid() = default;
 
-  /// Builds the pyramid. Level 0 is `image` itself, not a copy: it must outlive the use of the levels. Omits levels
-  /// with a side of less than `min_side` pixels and all coarser ones. O(pixels). Allocates nothing after an image of
-  /// the same size.
+  /// Builds the pyramid. Level 0 is `image` itself, not a copy, so the image must outlive the use of the levels. Levels
+  /// with a side of less than `min_side` pixels, and all coarser levels, are omitted. O(pixels). Allocates nothing
+  /// after a previous image of the same size.
   /// @pre levels >= 0, scale_factor > 1, min_side >= 1
   void build(image_view<const std::uint8_t> image, int levels, double scale_factor, int min_side);
 
@@ -39,8 +40,9 @@ class image_pyramid {
     return views_[level];
   }
 
-  /// Converts a coordinate of a level to that of the full image, pixels, or back with exchanged sizes. Pixels are areas
-  /// whose centres are at integers, so that plain multiplication would shift coarse keypoints by up to a pixel.
+  /// Converts a coordinate on a level to a coordinate in the full image (pixels), or back if the sizes are swapped.
+  /// Pixels are areas whose centres are at integers; plain multiplication would shift coarse keypoints by up to a
+  /// pixel.
   [[nodiscard]] static double full_coordinate(double at, int level_size, int full_size) noexcept {
     return (at + 0.5) * full_size / level_size - 0.5;
   }

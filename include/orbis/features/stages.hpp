@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The stages of a matcher: each rejects candidates by one criterion.
+/// The stages of a matcher: each rejects candidates according to one criterion.
 #pragma once
 
 #include <algorithm>
@@ -17,9 +17,9 @@
 
 namespace orbis::features {
 
-/// Keeps a candidate whose distance is below `ratio` times that of the second nearest. A candidate without a second
-/// nearest is kept; two equal distances never pass. Source: Lowe, "Distinctive image features from scale-invariant
-/// keypoints", IJCV 2004, section 7.1.
+/// Keeps a candidate whose distance is less than `ratio` times the second-nearest distance. A candidate without a
+/// second-nearest neighbour is kept; equal distances never pass. Source: Lowe, "Distinctive image features from
+/// scale-invariant keypoints", IJCV 2004, section 7.1.
 struct ratio_test {
   float ratio = 0.8F;
   [[nodiscard]] constexpr bool operator()(const candidate& c) const noexcept {
@@ -27,7 +27,7 @@ struct ratio_test {
   }
 };
 
-/// Keeps a candidate that is nearest in both directions.
+/// Keeps a candidate if both descriptors are nearest neighbours of each other.
 struct cross_check {
   static constexpr search_needs needs{.reverse = true};
   [[nodiscard]] constexpr bool operator()(const candidate& c) const noexcept { return c.reverse_query == c.query; }
@@ -39,10 +39,10 @@ struct max_distance {
   [[nodiscard]] constexpr bool operator()(const candidate& c) const noexcept { return c.distance <= distance; }
 };
 
-/// Keeps the nearest of the candidates that share a train (the lowest query on ties). Unlike `cross_check`, only
-/// candidates left by earlier stages compete.
+/// Of the candidates with the same train descriptor, keeps the nearest (the lowest query on ties). Unlike
+/// `cross_check`, only candidates left by earlier stages compete.
 struct unique {
-  using workspace = std::vector<std::uint32_t>;  ///< by train: the smallest distance
+  using workspace = std::vector<std::uint32_t>;  ///< the smallest distance, by train descriptor
 
   void operator()(std::vector<candidate>& candidates, std::span<const keypoint>, std::span<const keypoint>,
                   workspace& nearest) const {
@@ -52,7 +52,7 @@ struct unique {
     for (const candidate& c : candidates) nearest[c.train] = std::min(nearest[c.train], c.distance);
     std::erase_if(candidates, [&](const candidate& c) {
       if (c.distance != nearest[c.train]) return true;
-      nearest[c.train] = none;  // taken: later candidates with equal distance lose
+      nearest[c.train] = none;  // assigned: rejects later candidates with equal distance
       return false;
     });
   }
@@ -60,8 +60,8 @@ struct unique {
 
 /// Keeps the candidates whose change of orientation is among the most frequent: between two images with a relative
 /// rotation, the keypoints of true matches rotate by the same angle. The angle differences fill `bins` equal bins
-/// around the circle; the `peaks` fullest bins are kept (the lowest on ties), except those below `weakest` times the
-/// fullest.
+/// around the circle; candidates in the `peaks` fullest bins are kept (the lowest bins on ties), except in bins with
+/// less than `weakest` times the count of the fullest.
 struct rotation_consistency {
   static constexpr search_needs needs{.keypoints = true};
   int bins = 30;
@@ -79,9 +79,9 @@ struct rotation_consistency {
     const auto bin_of = [&](const candidate& c) {
       constexpr float turn = 2.0F * std::numbers::pi_v<float>;
       const float difference = (queries[c.query].angle - trains[c.train].angle) / turn;
-      const float fraction = difference - std::floor(difference);  // [0, 1]: may round up
+      const float fraction = difference - std::floor(difference);  // in [0, 1]: may be rounded up to 1
       if (!std::isfinite(fraction)) return std::size_t{0};
-      // Bins are centred on their angle, so that no rotation falls in the middle of one.
+      // Bins are centred on multiples of their width, so that a rotation of zero is in the middle of a bin.
       return static_cast<std::size_t>(fraction * static_cast<float>(bins) + 0.5F) % static_cast<std::size_t>(bins);
     };
     auto& [counts, order, kept] = memory;

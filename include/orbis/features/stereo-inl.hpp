@@ -57,7 +57,7 @@ struct slide_differences_kernel {
       for (int u = 0; u != side; ++u)
         there = there + simd::convert<std::int32_t>(words::load(columns.data() + u + first));
       alignas(64) std::array<std::int32_t, 16> total;
-      alignas(64) std::array<std::int16_t, 16> offset;  // of the means
+      alignas(64) std::array<std::int16_t, 16> offset;  // offsets of the means
       there.store(total.data());
       for (std::size_t i = 0; i != 16; ++i) offset[i] = static_cast<std::int16_t>((own - total[i]) / n);
       const words offsets = words::load(offset.data());

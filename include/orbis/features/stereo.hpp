@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Subpixel right-image coordinates of features of a rectified stereo pair.
+/// Subpixel right-image coordinates of features in a rectified stereo pair.
 ///
 /// @code
 ///   const stereo_matcher match;
@@ -36,7 +36,7 @@ namespace detail {
 struct pixel_rows {
   const std::uint8_t* first = nullptr;
   std::ptrdiff_t stride = 0;  ///< distance between rows
-  int readable = 0;           ///< pixels of each row, including those after the requested ones
+  int readable = 0;           ///< number of readable pixels per row, including those after the requested ones
 };
 
 /// A square of `side` x `side` pixels, and the strip of the same height along which it slides.
@@ -57,35 +57,35 @@ void slide_differences(const sliding_square& s, int shifts, std::int32_t* sums);
 
 /// Options of `stereo_matcher`. "Pixels of a level" refers to the keypoint's pyramid level.
 struct stereo_options {
-  int levels = 8;               ///< of the extractor's image pyramid; ignored if the pyramids are given
-  float scale_factor = 1.2F;    ///< between two of its levels; ignored if the pyramids are given
+  int levels = 8;               ///< number of levels of the extractor's pyramid; ignored if the pyramids are given
+  float scale_factor = 1.2F;    ///< ratio of the image sizes of successive levels; ignored if the pyramids are given
   float min_disparity = 0.0F;   ///< minimum of left minus right coordinate, pixels
-  float max_disparity = 1e9F;   ///< maximum of the same
-  float rows = 2.0F;            ///< maximum row difference of both keypoints, pixels of a level
-  int octaves = 1;              ///< maximum level difference of both keypoints
+  float max_disparity = 1e9F;   ///< maximum of left minus right coordinate, pixels
+  float rows = 2.0F;            ///< maximum row difference between the keypoints, pixels of a level
+  int octaves = 1;              ///< maximum level difference between the keypoints
   std::uint32_t distance = 75;  ///< maximum descriptor distance
-  int radius = 5;               ///< of the compared square, pixels of a level; maximum 15
+  int radius = 5;               ///< half the side of the compared square, pixels of a level; maximum 15
   int slide = 5;                ///< shift to either side of the right keypoint, pixels of a level; maximum 15
-  float outlier = 3.0F;         ///< drops matches whose difference exceeds this multiple of the median
+  float outlier = 3.0F;         ///< drops matches whose pixel difference exceeds this multiple of the median
 };
 
-/// Finds the right-image coordinates of the features of the left image of a rectified pair. A feature is compared by
-/// descriptor with those of the right image in the band of rows around it; then a square around it slides along the row
-/// around the best match, at the feature's pyramid level, and two lines of equal slope through the smallest differences
-/// give the subpixel position. The differences are invariant to a brightness offset. Concurrent calls on a const object
-/// are allowed.
+/// Finds the right-image coordinates of the left image's features in a rectified pair. The descriptor of a feature is
+/// compared with those of right-image features in a band of rows around it. Then a square around the feature slides
+/// along the row near the best match, on the feature's pyramid level, and two lines of equal slope through the smallest
+/// differences give the subpixel position. The differences are invariant to a brightness offset. Concurrent calls on a
+/// const object are allowed.
 ///
 /// After R. Mur-Artal, J. D. Tardos, "ORB-SLAM2: an open-source SLAM system for monocular, stereo and RGB-D cameras",
-/// T-RO 33 (2017), section III.A. The lines are those of M. Shimizu, M. Okutomi, "Precise sub-pixel estimation on
-/// area-based matching", ICCV 2001: sums of absolute differences are not parabolic; a parabola has errors 1.4 times as
-/// large.
+/// T-RO 33 (2017), section III.A. The line fit is from M. Shimizu, M. Okutomi, "Precise sub-pixel estimation on
+/// area-based matching", ICCV 2001: sums of absolute differences are not parabolic, and fitting a parabola gives errors
+/// 1.4 times as large.
 template <class Distance = hamming>
 class stereo_matcher {
  public:
   stereo_matcher() = default;
   explicit stereo_matcher(Distance distance) : distance_{std::move(distance)} {}
 
-  /// Returns for each feature of the left image its column in the right image, pixels; NaN if not found. O(pixels +
+  /// Returns, for each feature of the left image, its column in the right image in pixels; NaN if not found. O(pixels +
   /// features x features in a band of rows).
   /// @pre both images have the same size; levels >= 1, scale_factor > 1, 0 <= radius <= 15, 1 <= slide <= 15
   template <feature_descriptor D>
@@ -99,7 +99,7 @@ class stereo_matcher {
     return columns;
   }
 
-  /// As above, into `columns`. Allocates nothing after images of the same size and number of features.
+  /// As above; writes to `columns`. Allocates nothing after previous images of the same size and number of features.
   template <feature_descriptor D>
   requires descriptor_distance<Distance, D>
   void into(std::vector<float>& columns, const basic_features<D>& left, image_view<const std::uint8_t> left_image,
@@ -115,7 +115,7 @@ class stereo_matcher {
   }
 
   /// As above, with the pyramids of both images from an extractor (`pyramid_extractor`). O(features x features in a
-  /// band of rows). @pre both pyramids are of images of the same size, with the same options
+  /// band of rows). @pre both pyramids were built from images of the same size, with the same options
   template <feature_descriptor D>
   requires descriptor_distance<Distance, D>
   void into(std::vector<float>& columns, const basic_features<D>& left, const image_pyramid& left_pyramid,
@@ -138,16 +138,16 @@ class stereo_matcher {
     float column = std::numeric_limits<float>::quiet_NaN();
     float difference = 0.0F;
   };
-  /// A right keypoint, in row order.
+  /// A right keypoint, for sorting by row.
   struct right_place {
     float x, y;
     std::int32_t octave;
     std::uint32_t index;
   };
   struct workspace {
-    image_pyramid left, right;                ///< used if none are given
+    image_pyramid left, right;                ///< used if the caller provides no pyramids
     std::vector<double> scales;               ///< pixels of the image per pixel of a level
-    std::vector<std::uint32_t> first_in_row;  ///< of `rows`
+    std::vector<std::uint32_t> first_in_row;  ///< index into `rows`
     std::vector<right_place> rows;            ///< right keypoints by row
     detail::search_among_workspace search;
     std::vector<candidate> candidates;
@@ -205,7 +205,7 @@ class stereo_matcher {
           right[i].x, right[i].y, right[i].octave, static_cast<std::uint32_t>(i)};
   }
 
-  /// Lists the right keypoints to compare a left one with.
+  /// Lists the right keypoints to be compared with a left keypoint.
   template <class Add>
   static void list_band(const stereo_options& options, const workspace& memory, int height, const keypoint& k,
                         Add&& add) {
@@ -225,8 +225,8 @@ class stereo_matcher {
         add(r->index);
   }
 
-  /// Locates the square around the left keypoint in the right image: levels `a` and `b` of both images, `scale` pixels
-  /// of the `full` image per pixel of these.
+  /// Locates the square around the left keypoint in the right image. `a` and `b`: the level in both images; `scale`:
+  /// pixels of the `full` image per pixel of the level.
   [[nodiscard]] static placed place(const stereo_options& options, image_view<const std::uint8_t> a,
                                     image_view<const std::uint8_t> full, const keypoint& left,
                                     image_view<const std::uint8_t> b, const keypoint& right, double scale) {
@@ -247,7 +247,7 @@ class stereo_matcher {
     detail::slide_differences(sliding, shifts, sums.data());
     const auto least = std::min_element(sums.begin(), sums.begin() + shifts);
     const int best = first + static_cast<int>(least - sums.begin());
-    if (best == first || best == last) return {};  // the minimum may be outside
+    if (best == first || best == last) return {};  // the minimum may be outside the range
     const auto sum = [&](int at) { return static_cast<double>(sums[static_cast<std::size_t>(at - first)]); };
     const double before = sum(best - 1), after = sum(best + 1), bend = std::max(before, after) - sum(best);
     const double within = bend > 0.0 ? 0.5 * (before - after) / bend : 0.0;
@@ -256,7 +256,7 @@ class stereo_matcher {
             static_cast<float>(sum(best)) / static_cast<float>(4 * (2 * r + 1) * (2 * r + 1))};
   }
 
-  /// Drops the matches whose difference is far above the median.
+  /// Drops matches whose pixel difference is far above the median.
   static void keep_alike(const stereo_options& options, workspace& memory) {
     if (memory.found.empty()) return;
     memory.differences.clear();

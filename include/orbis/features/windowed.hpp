@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Windowed source: compares every query only with the trains near its predicted position.
+/// Windowed source: compares every query only with the train descriptors near its predicted position.
 #pragma once
 
 #include <cassert>
@@ -19,15 +19,15 @@ namespace orbis::features {
 
 /// The image region to search for the match of one query.
 struct window {
-  float x = 0.0F, y = 0.0F;  ///< predicted position, pixels; NaN: none
+  float x = 0.0F, y = 0.0F;  ///< predicted position, pixels; NaN: no prediction
   float radius = -1.0F;      ///< pixels, inclusive; negative: no search
   int min_octave = 0;        ///< pyramid levels to search, both inclusive
   int max_octave = std::numeric_limits<int>::max();
 };
 
-/// Finds for each query the nearest and the second nearest train inside its window. Created by `windowed(distance)`;
-/// call a chain that begins with it with the windows, one per query, and optionally with a grid of the trains'
-/// keypoints:
+/// Finds, for each query, the nearest and second-nearest train descriptors inside its window. Created by
+/// `windowed(distance)`; a chain that begins with this source is called with the windows, one per query, and optionally
+/// a grid of the train keypoints:
 ///
 /// @code
 ///   constexpr auto matcher = windowed(hamming{}) | ratio_test{0.8f} | max_distance{100} | unique{};
@@ -35,7 +35,7 @@ struct window {
 ///   std::vector<match> b = matcher(landmark_descriptors, frame, windows, keypoint_grid{frame.keypoints});
 /// @endcode
 ///
-/// The reverse neighbour of a train is the nearest of the queries whose window contains it.
+/// The reverse neighbour of a train descriptor is the nearest query among those whose windows contain it.
 template <class Distance>
 struct windowed_source {
   using match_source_tag = void;
@@ -46,8 +46,8 @@ struct windowed_source {
     keypoint_grid grid;
   };
 
-  /// Returns one candidate for each query that has a train in its window.
-  /// @pre one window per query; one keypoint per train; `grid` was built from these keypoints
+  /// Returns one candidate for each query with a train keypoint in its window.
+  /// @pre one window per query; one keypoint per train descriptor; `grid` was built from these keypoints
   template <class Descriptor>
   requires descriptor_distance<Distance, Descriptor>
   void search(std::vector<candidate>& candidates, workspace& memory, const feature_view<Descriptor>& queries,
@@ -61,7 +61,7 @@ struct windowed_source {
     });
   }
 
-  /// Returns one candidate for each query that has a train in its window; builds the grid in its workspace.
+  /// Returns one candidate for each query with a train keypoint in its window; builds the grid in its workspace.
   template <class Descriptor>
   requires descriptor_distance<Distance, Descriptor>
   void search(std::vector<candidate>& candidates, workspace& memory, const feature_view<Descriptor>& queries,

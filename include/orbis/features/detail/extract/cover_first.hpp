@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Selection of corners: first a subset that covers the image, then the strongest of each level.
+/// Selection of corners: first a subset that covers the image, then the strongest corners of each level.
 #pragma once
 
 #include <algorithm>
@@ -17,8 +17,8 @@
 
 namespace orbis::features::detail {
 
-/// Computes the number of features per level: proportional to the side of its image. Levels with too few corners pass
-/// the remainder to finer levels, and then to any level with more corners.
+/// Computes the number of features per level, proportional to the side length of the level's image. Levels with too few
+/// corners pass the remainder to finer levels, and then to any level with more corners.
 inline void assign_quotas(std::span<const level_corners> levels, int wanted, std::vector<int>& quotas) {
   quotas.resize(levels.size());
   double sides = 0.0;
@@ -71,7 +71,7 @@ ORBIS_INLINE void cover_first::take_covering(std::span<level_corners> levels, in
   const int columns = static_cast<int>(area.width / side) + 1, rows = static_cast<int>(area.height / side) + 1;
   memory.best.assign(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows), {});
   for (std::uint32_t l = 0; l != levels.size(); ++l) {
-    // Computes a corner's cell by one product and one sum; positions outside belong to the nearest cell.
+    // Computes a corner's cell with one multiplication and one addition; positions outside belong to the nearest cell.
     const double step = levels[l].scale / side, left = area.x / side, top = area.y / side;
     for (std::uint32_t i = 0; i != levels[l].corners.size(); ++i) {
       const corner& c = levels[l].corners[i];

@@ -25,7 +25,7 @@
 
 namespace orbis::features::detail {
 
-/// to[x] = (a[x] + 2 b[x] + c[x] + 2) / 4. @pre `to` overlaps none of the others
+/// to[x] = (a[x] + 2 b[x] + c[x] + 2) / 4. @pre `to` does not overlap the inputs
 struct binomial_kernel {
   using signature = void(const std::uint8_t* a, const std::uint8_t* b, const std::uint8_t* c, int count,
                          std::uint8_t* to);
@@ -52,8 +52,8 @@ struct binomial_kernel {
 inline constexpr std::size_t row_margin = 64;  // padding of rows that kernels may access
 inline constexpr int band_rows = 64;
 
-/// Position of the maximum of the parabola through three values at -1, 0 and 1. @pre the middle one is the largest, and
-/// not all are equal
+/// Position of the maximum of the parabola through three values at -1, 0 and 1. @pre the middle value is the largest,
+/// and not all are equal
 [[nodiscard]] inline float parabola_peak(int before, int middle, int after) {
   return static_cast<float>(before - after) / static_cast<float>(2 * (before - 2 * middle + after));
 }
@@ -100,10 +100,10 @@ ORBIS_INLINE void fast9::find_peaks(image_view<const std::uint8_t> image, const 
       score_row(image.data() + y * image.stride() + left, image.stride(), count, static_cast<std::uint8_t>(threshold),
                 row_of(y));
     }
-    const int inner = y - 1;  // both of its neighbours are now known
+    const int inner = y - 1;  // both neighbouring rows are now known
     if (inner < std::max(top, area.y) || inner >= area.y + area.height) continue;
     const std::uint8_t* row = row_of(inner);
-    const std::uint8_t* above = row_of(inner + 2);  // the previous slot, cyclically; zero above the first row
+    const std::uint8_t* above = row_of(inner + 2);  // the previous slot, cyclically; zero before the first row
     const std::size_t found = peaks_in_row(above, row, row_of(y), count, ties, memory.columns.data());
     for (std::size_t i = 0; i != found; ++i) {
       const std::uint32_t column = memory.columns[i];
@@ -118,18 +118,18 @@ ORBIS_INLINE void fast9::find_peaks(image_view<const std::uint8_t> image, const 
   }
 }
 
-/// Smooths the pixels that the circles of rows [first, last) cover. Works in bands, so that they are still in the cache
-/// when the circles are evaluated.
+/// Smooths the pixels that the circles of rows [first, last) cover. Called for bands of rows, so that the pixels are
+/// still in the cache when the circles are evaluated.
 ORBIS_INLINE void fast9::smooth_band(image_view<const std::uint8_t> image, int left, int count, int first, int last,
                                      workspace& memory) {
   const std::size_t pitch = static_cast<std::size_t>(count) + 2 * row_margin;
-  const int from = left - circle_radius, columns = count + 2 * circle_radius;  // all of them are in the image
+  const int from = left - circle_radius, columns = count + 2 * circle_radius;  // all columns are in the image
   const int from_more = std::max(0, from - 1), to_more = std::min(image.width(), from + columns + 1);
   if (memory.band.size() < pitch * (band_rows + 2 * circle_radius))
     memory.band.resize(pitch * (band_rows + 2 * circle_radius));
   if (memory.line.size() < pitch) memory.line.resize(pitch);
   const auto mix = simd::kernel<binomial_kernel, binomial_kernel::signature>();
-  std::uint8_t* line = memory.line.data() + row_margin;  // begins with column `from`
+  std::uint8_t* line = memory.line.data() + row_margin;  // points to column `from`
   for (int y = first - circle_radius; y != last + circle_radius; ++y) {
     const std::uint8_t* row = image.row(y).data();
     const std::uint8_t* above = image.row(std::max(0, y - 1)).data();

@@ -2,10 +2,10 @@
 /// @file
 /// FAST-9/16 scores of a row of pixels, and the pixels whose scores are local maxima.
 ///
-/// The score of a pixel is the largest difference by which nine contiguous pixels of the circle around it are all
-/// brighter, or all darker, than the pixel: the maximum over arcs of the minimum over the arc. Every arc of nine
-/// consists of one of the eight arcs of eight that start at an odd pixel, and the pixel before or after it. Eight arcs,
-/// each built by doubling, therefore give all sixteen, and no lane branches.
+/// The score of a pixel is the largest difference by which nine contiguous pixels on the circle around it are all
+/// brighter, or all darker, than the pixel: the maximum over all arcs of the minimum over an arc. Every arc of nine
+/// pixels consists of one of the eight 8-pixel arcs that start at an odd pixel, and the pixel before or after it. Eight
+/// arcs, each built by doubling, therefore give all sixteen, without branches.
 #pragma once
 
 #include <algorithm>
@@ -21,7 +21,7 @@
 namespace orbis::features::detail {
 
 inline constexpr int circle_radius = 3;
-/// The circle, clockwise from the top.
+/// Offsets of the circle's pixels, clockwise from the top.
 inline constexpr std::array<int, 16> circle_x{0, 1, 2, 3, 3, 3, 2, 1, 0, -1, -2, -3, -3, -3, -2, -1};
 inline constexpr std::array<int, 16> circle_y{-3, -3, -2, -1, 0, 1, 2, 3, 3, 3, 2, 1, 0, -1, -2, -3};
 
@@ -47,7 +47,7 @@ inline constexpr std::array<int, 16> circle_y{-3, -3, -2, -1, 0, 1, 2, 3, 3, 3, 
 }
 
 /// Writes the scores of `count` pixels of a row, 0 for scores up to `threshold`.
-/// @pre the circles around all of them are readable
+/// @pre the circles around all pixels are readable
 struct fast_scores_kernel {
   using signature = void(const std::uint8_t* centre, std::ptrdiff_t stride, int count, std::uint8_t threshold,
                          std::uint8_t* scores);
@@ -75,7 +75,7 @@ struct fast_scores_kernel {
     const auto block = [&](int x) ORBIS_INLINE_LAMBDA {
       const std::uint8_t* at = centre + x;
       const bytes c = bytes::load(at);
-      // Every arc of nine contains one pixel of each opposite pair, which bounds the score.
+      // Every arc of nine contains at least one pixel of each opposite pair, which bounds the score.
       bytes pair_max = max(bytes::load(at + circle[0]), bytes::load(at + circle[8]));
       bytes pair_min = min(bytes::load(at + circle[0]), bytes::load(at + circle[8]));
 #pragma GCC unroll 3
@@ -115,9 +115,9 @@ struct fast_scores_kernel {
   }
 };
 
-/// Writes the columns of the scores that are larger than their eight neighbours, ascending; returns their number. With
-/// `ties`, neighbours that precede it by row, then column, may be equal. @pre 64 bytes before the rows and after their
-/// `count` scores are readable and zero
+/// Writes the columns of scores that are larger than their eight neighbours, in ascending order; returns their number.
+/// With `ties`, a score may equal neighbours that precede it by row, then column. @pre 64 bytes before the rows and
+/// after their `count` scores are readable and zero
 struct fast_peaks_kernel {
   using signature = std::size_t(const std::uint8_t* above, const std::uint8_t* row, const std::uint8_t* below,
                                 int count, bool ties, std::uint32_t* columns);

@@ -14,34 +14,34 @@
 
 namespace orbis::features::detail {
 
-/// Detects FAST-9/16 corners: nine contiguous pixels of the circle of radius 3 are all brighter or all darker than the
+/// Detects FAST-9/16 corners: nine contiguous pixels on the circle of radius 3 are all brighter or all darker than the
 /// centre by more than a threshold. The response is the largest threshold at which the pixel is still a corner; only
 /// pixels with a larger response than their eight neighbours count. The threshold adapts to the texture: a cell of the
-/// area with a corner of at least `strong` keeps only such corners; the others keep all down to `weak`. A response does
-/// not depend on the threshold, so one pass finds both.
+/// area with a corner of at least `strong` keeps only such corners; other cells keep all corners of at least `weak`. A
+/// response does not depend on the threshold, so one pass finds both.
 ///
-/// The defaults differ from other implementations in three points. Slight smoothing, and keeping a corner whose
+/// The defaults differ from other implementations in three respects. Slight smoothing, and keeping a corner whose
 /// neighbour has an equal response, improve repeatability (by several per cent, most under noise and shifts). A
 /// parabola through the scores of the pixel and its neighbours gives the subpixel peak (a third less error). With these
-/// options off, the corners are those of OpenCV.
+/// options off, the corners equal OpenCV's.
 struct fast9 {
-  int cell = 35;       ///< side, pixels; about the extent of a descriptor
+  int cell = 35;       ///< side of a cell, pixels; about the extent of a descriptor
   bool smooth = true;  ///< convolve the image with the binomial (1, 2, 1) / 4 in x and y first
-  bool ties = true;    ///< of equal neighbours, the last one (by row, then column) is a corner; false: none is
+  bool ties = true;    ///< the last of equal neighbours (by row, then column) is a corner; false: none is
 
   bool subpixel = true;  ///< compute `dx` and `dy`
 
   struct workspace {
     std::vector<std::uint8_t> band;  ///< rows of the smoothed image
     std::vector<std::uint8_t> line;
-    std::vector<std::uint8_t> scores;  ///< of three rows
+    std::vector<std::uint8_t> scores;  ///< scores of three rows
     std::vector<std::uint32_t> columns;
-    std::vector<std::uint32_t> cell_of;  ///< of each corner
-    std::vector<float> strongest;        ///< of each cell
+    std::vector<std::uint32_t> cell_of;  ///< cell of each corner
+    std::vector<float> strongest;        ///< strongest response in each cell
   };
 
-  /// Replaces `corners` by those of the area. Pixels whose circle leaves the image are not corners. O(pixels of the
-  /// area). @pre the area is inside the image; 0 <= weak <= strong <= 254; cell >= 1
+  /// Replaces `corners` with the corners in the area. Pixels whose circle leaves the image are not corners. O(pixels of
+  /// the area). @pre the area is inside the image; 0 <= weak <= strong <= 254; cell >= 1
   void operator()(image_view<const std::uint8_t> image, const region& area, const corner_thresholds& thresholds,
                   workspace& memory, std::vector<corner>& corners) const;
 
@@ -54,12 +54,13 @@ struct fast9 {
 };
 static_assert(corner_detector<fast9>);
 
-/// Selects corners that cover the image first. The image is divided into square cells, whose number is a fraction of
-/// the requested corners, and every cell contributes its strongest corner of all levels. The rest are the strongest
-/// corners of their levels, at any position, because strong corners are more repeatable. A cell contributes one corner
-/// in total, not one per level, which leaves room for these. O(n), and sorting of the chosen corners.
+/// Selects corners that cover the image first. The image is divided into square cells, their number a fraction of the
+/// number of requested corners, and every cell contributes its strongest corner across all levels. The rest are the
+/// strongest corners of their levels, at any position, because strong corners are more repeatable. A cell contributes
+/// one corner in total, not one per level, which leaves room for strong corners. O(n), plus sorting of the selected
+/// corners.
 struct cover_first {
-  double share = 0.25;  ///< of the wanted corners, for covering; 0: most repeatable, 1: best distributed
+  double share = 0.25;  ///< fraction of the corners used for coverage; 0: most repeatable, 1: best distributed
 
   struct workspace {
     struct candidate {
@@ -68,7 +69,7 @@ struct cover_first {
       std::uint32_t index = 0;
     };
     std::vector<int> quotas;
-    std::vector<candidate> best;  ///< of each cell
+    std::vector<candidate> best;  ///< best corner of each cell
     std::vector<std::vector<corner>> covering;
   };
 
@@ -87,23 +88,23 @@ inline constexpr int disc_radius = 15;
 struct intensity_centroid {
   static constexpr int radius = disc_radius;
 
-  /// @pre at least `radius` pixels from the image's edge, and one more on the right
+  /// @pre the pixel is at least `radius` pixels from the image edge, and one more on the right
   [[nodiscard]] orientation operator()(image_view<const std::uint8_t> image, int x, int y) const;
 };
 static_assert(orientation_estimator<intensity_centroid>);
 
-/// Reusable memory of `smooth`.
+/// Reusable memory for `smooth`.
 struct smooth_workspace {
-  std::vector<std::uint8_t> line;  ///< a row with its reflections
+  std::vector<std::uint8_t> line;  ///< a row with reflected borders
   std::vector<std::int16_t> sums;  ///< the last eight rows, smoothed horizontally
 };
 
-/// ORB's descriptor: the standard pattern, rotated to the keypoint's direction and rounded to pixels, on the image
-/// smoothed by a Gaussian (7x7, sigma 2). Gives the same bits as OpenCV's ORB for the same direction.
+/// ORB's descriptor: the standard pattern, rotated to the keypoint's orientation and rounded to pixels, in the image
+/// smoothed by a Gaussian (7x7, sigma 2). Gives the same bits as OpenCV's ORB for the same orientation.
 struct steered_brief {
   using descriptor = binary_descriptor<256>;
-  static constexpr int reach = 18;     ///< of the rotated pattern, pixels
-  static constexpr int diameter = 31;  ///< of the described neighbourhood, by convention
+  static constexpr int reach = 18;     ///< extent of the rotated pattern, pixels
+  static constexpr int diameter = 31;  ///< diameter of the described neighbourhood, by convention
 
   struct workspace {
     std::vector<std::uint8_t> pixels;
@@ -111,10 +112,11 @@ struct steered_brief {
     smooth_workspace smoothing;
   };
 
-  /// Smooths the pixels that descriptors of keypoints in rows `[first, last)` need. @pre image of at least 4x4 pixels
+  /// Smooths the pixels that descriptors of keypoints in rows `[first, last)` need. @pre the image has at least 4x4
+  /// pixels
   void prepare(image_view<const std::uint8_t> image, int first, int last, workspace& memory) const;
 
-  /// @pre at least `reach` pixels from the edge of the prepared image, in its prepared rows
+  /// @pre the pixel is at least `reach` pixels from the edge of the prepared image, in a prepared row
   [[nodiscard]] descriptor operator()(const workspace& prepared, int x, int y, const orientation& o) const;
 };
 static_assert(patch_descriptor<steered_brief>);

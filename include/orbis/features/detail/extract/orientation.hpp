@@ -22,7 +22,7 @@
 
 namespace orbis::features::detail {
 
-/// Half-width of the disc by distance of the row from its centre.
+/// Half-width of the disc, indexed by the distance of the row from the centre.
 inline constexpr std::array<int, disc_radius + 1> disc_half_width = [] {
   std::array<int, disc_radius + 1> widths{};
   for (int dy = 0; dy <= disc_radius; ++dy) {
@@ -39,7 +39,8 @@ struct image_moments {
   friend bool operator==(const image_moments&, const image_moments&) = default;
 };
 
-/// Masks of the 32 pixels of a row from -15 to 16 that are in the disc, by distance of the row from its centre.
+/// Masks of the pixels in the disc among the 32 pixels of a row from -15 to 16, indexed by the distance of the row from
+/// the centre.
 inline constexpr auto disc_masks = [] {
   std::array<std::array<std::uint8_t, 32>, disc_radius + 1> masks{};
   for (std::size_t dy = 0; dy != masks.size(); ++dy)
@@ -53,7 +54,7 @@ struct disc_moments_kernel {
   template <class Target>
   static ORBIS_ALWAYS_INLINE image_moments run(const std::uint8_t* centre, std::ptrdiff_t stride) {
     using bytes = simd::vec<std::uint8_t, 32, Target>;
-    using words = simd::vec<std::uint16_t, 16, Target>;  // of every other column
+    using words = simd::vec<std::uint16_t, 16, Target>;  // sums of every other column
     const std::uint8_t* const left = centre - disc_radius;
     const auto pixels = [&](int dy) ORBIS_INLINE_LAMBDA {
       return bytes::load(left + dy * stride) &
@@ -94,7 +95,7 @@ struct disc_moments_kernel {
   using std::numbers::pi;
   const double ax = std::abs(x), ay = std::abs(y);
   if (!(ax + ay > 0.0)) return 0.0F;
-  // Reduces to the atan of a ratio below 1, then to one below tan(pi / 8), then uses a series.
+  // Reduces the problem to the atan of a ratio below 1, then to a ratio below tan(pi / 8), then uses a series.
   double t = ax < ay ? ax / ay : ay / ax;
   const bool upper = t > std::numbers::sqrt2 - 1.0;
   if (upper) t = (t - 1.0) / (t + 1.0);
@@ -117,7 +118,7 @@ ORBIS_INLINE orientation intensity_centroid::operator()(image_view<const std::ui
   const image_moments m = moments(image.data() + y * image.stride() + x, image.stride());
   if (m.x == 0 && m.y == 0) return {};
   const double mx = m.x, my = m.y;
-  const double inverse = 1.0 / std::sqrt(mx * mx + my * my);  // exact before the root: below 2^53
+  const double inverse = 1.0 / std::sqrt(mx * mx + my * my);  // exact before the square root: below 2^53
   return {polar_angle(mx, my), static_cast<float>(mx * inverse), static_cast<float>(my * inverse)};
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Bilinear shrinking of 8-bit images, exact in fixed point.
+/// Bilinear downscaling of 8-bit images, exact in fixed point.
 #pragma once
 
 #include <algorithm>
@@ -21,7 +21,7 @@
 
 namespace orbis::features::detail {
 
-/// The two source pixels of a pixel of the result; `weight` of the second in 1/256.
+/// The two source pixels of a result pixel; `weight`: weight of the second, in 1/256.
 struct resize_tap {
   int first = 0;
   int second = 0;
@@ -52,7 +52,7 @@ inline void make_plan(resize_plan& plan, int from, int to) {
   const int padded = (to + resize_block - 1) / resize_block * resize_block;
   for (int i = 0; i != padded; ++i) {
     const resize_tap t = tap_at(std::min(i, to - 1), from, to);
-    const bool last = t.first == from - 1;  // stored as the pixel before it, with all the weight on the second
+    const bool last = t.first == from - 1;  // stored as the previous pixel, with all the weight on the second
     plan.first.push_back(last ? from - 2 : t.first);
     plan.weight.push_back(last ? std::uint16_t{256} : t.weight);
   }
@@ -68,7 +68,7 @@ inline void make_plan(resize_plan& plan, int from, int to) {
   }
 }
 
-/// Interpolates a row of the source horizontally, in 1/256.
+/// Interpolates a source row horizontally, in units of 1/256.
 struct resize_along_kernel {
   using signature = void(const resize_plan& plan, const std::uint8_t* from, std::uint16_t* to);
   template <class Target>
@@ -76,7 +76,7 @@ struct resize_along_kernel {
     if (plan.from == 1) return static_cast<void>(std::fill_n(to, plan.to, static_cast<std::uint16_t>(from[0] * 256)));
     using words = simd::native_vec<std::uint16_t, Target>;
     const auto put = [&](const words& first, const words& second, std::size_t x) ORBIS_INLINE_LAMBDA {
-      // Modulo 2^16, in which the result fits although the difference may be negative.
+      // Computed modulo 2^16: the result fits, although the difference may be negative.
       ((first << 8) + (second - first) * words::load(plan.weight.data() + x)).store(to + x);
     };
     if constexpr (has_byte_look_up<Target>) {
@@ -117,7 +117,7 @@ struct resize_along_kernel {
   }
 };
 
-/// Interpolates vertically between two such rows, `weight` / 256 of the second, rounded.
+/// Interpolates vertically between two such rows with rounding; the second has the weight `weight` / 256.
 struct resize_across_kernel {
   using signature = void(const std::uint16_t* first, const std::uint16_t* second, int weight, int count,
                          std::uint8_t* to);
@@ -134,11 +134,10 @@ struct resize_across_kernel {
   }
 };
 
-/// Shrinks (or enlarges) an image to the size of `to` by bilinear interpolation: weights in 1/256, one rounding at the
-/// end. The same bits as OpenCV's INTER_LINEAR_EXACT. Fast for factors up to 1.8. Shrinking by more than 2 skips
-/// pixels. O(pixels of both).
-/// @pre neither image is empty; the rows of `to` may be written up to a multiple of 32 pixels (at
-///      the end of the last one, too)
+/// Scales an image to the size of `to` by bilinear interpolation: weights in 1/256, one rounding at the end. Gives the
+/// same bits as OpenCV's INTER_LINEAR_EXACT. Fast for downscaling factors up to 1.8. Downscaling by more than 2 skips
+/// pixels. O(pixels of both images).
+/// @pre neither image is empty; every row of `to`, including the last, is writable up to a multiple of 32 pixels
 inline void resize(image_view<const std::uint8_t> from, image_view<std::uint8_t> to, resize_workspace& memory) {
   assert(!from.empty() && !to.empty());
   const auto along = simd::kernel<resize_along_kernel, resize_along_kernel::signature>();
@@ -146,7 +145,7 @@ inline void resize(image_view<const std::uint8_t> from, image_view<std::uint8_t>
   make_plan(memory.plan, from.width(), to.width());
   const auto padded = (static_cast<std::size_t>(to.width()) + resize_block - 1) / resize_block * resize_block;
   memory.rows.resize(std::max(memory.rows.size(), 2 * padded));
-  std::array<int, 2> holds{-1, -1};  // source rows held in memory.rows; even ones in the first
+  std::array<int, 2> holds{-1, -1};  // source rows in memory.rows; even rows in the first
   const auto row_of = [&](int y) {
     const auto slot = static_cast<std::size_t>(y & 1);
     std::uint16_t* row = memory.rows.data() + slot * padded;

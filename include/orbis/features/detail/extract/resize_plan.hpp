@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Memory of the bilinear resize.
+/// Memory for the bilinear resize.
 #pragma once
 
 #include <cstdint>
@@ -8,21 +8,21 @@
 
 namespace orbis::features::detail {
 
-/// Interpolation table from one width to another; computed once, used for any number of images.
+/// Interpolation table from one width to another; computed once, reused for all images.
 struct resize_plan {
   int from = 0, to = 0;  ///< widths
   // For each pixel of the result, up to a whole number of blocks: its position is between `first` and the next pixel.
   std::vector<std::int32_t> first;
-  std::vector<std::uint16_t> weight;  ///< of the next pixel, in 1/256
-  // For each eight pixels of the result; empty if they do not fit into sixteen pixels of the source.
+  std::vector<std::uint16_t> weight;  ///< weight of the next pixel, in 1/256
+  // For each group of eight result pixels; empty if their source pixels do not fit into sixteen.
   std::vector<std::int32_t> base;    ///< start of the sixteen pixels
-  std::vector<std::uint8_t> places;  ///< of each `first` in the sixteen: low byte of a word; the high byte gives zero
+  std::vector<std::uint8_t> places;  ///< index of each `first` in them: low byte of a word; the high byte gives zero
 };
 
-/// Reusable memory of `resize`.
+/// Reusable memory for `resize`.
 struct resize_workspace {
   resize_plan plan;
-  std::vector<std::uint16_t> rows;  ///< two source rows, shrunk horizontally
+  std::vector<std::uint16_t> rows;  ///< two source rows, resized horizontally
 };
 
 }  // namespace orbis::features::detail

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Binary descriptors by brightness comparisons in a rotated pattern.
+/// Binary descriptors from brightness comparisons in a rotated pattern.
 #pragma once
 
 #include <algorithm>
@@ -27,8 +27,8 @@ struct brightness_test {
 };
 
 /// The 256 tests of the ORB paper (chosen for high variance and low correlation), in the order that all implementations
-/// use, so that vocabularies and descriptors are compatible. Recovered from the responses of an implementation to
-/// single bright and dark pixels.
+/// use, so that vocabularies and descriptors are compatible. Determined from an implementation's responses to single
+/// bright and dark pixels.
 // clang-format off
 inline constexpr std::array<brightness_test, 256> orb_pattern{{
     {8, -3, 9, 5}, {4, 2, 7, -12}, {-11, 9, -8, 2}, {7, -12, 12, -13}, {2, -13, 2, 12}, {1, -7, 1, 6},
@@ -76,7 +76,7 @@ inline constexpr std::array<brightness_test, 256> orb_pattern{{
 }};
 // clang-format on
 
-/// The coordinates of the first pixels of the tests, then those of the second ones.
+/// The coordinates of the first pixels of all tests, then of the second pixels.
 struct alignas(64) split_pattern {
   std::array<float, 512> x;
   std::array<float, 512> y;
@@ -92,7 +92,7 @@ inline constexpr split_pattern orb_points = [] {
   return p;
 }();
 
-/// Adding it puts the nearest integer (ties to even) into the low bits of a small float.
+/// Adding this to a small float puts the nearest integer (ties to even) into the low bits.
 inline constexpr float rounder = 12582912.0F;
 
 /// Rotates all points and rounds them to pixels; bit i is set if the second pixel of test i is brighter than the first.

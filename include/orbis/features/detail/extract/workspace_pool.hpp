@@ -10,8 +10,8 @@
 
 namespace orbis::features::detail {
 
-/// A pool of workspaces: a call acquires one and returns it. Concurrent calls use separate workspaces; sequential calls
-/// reuse one. A workspace that is not returned (after an exception) is freed. Copies of the pool are empty.
+/// A pool of workspaces: each call acquires one and returns it. Concurrent calls use separate workspaces; sequential
+/// calls reuse one. A workspace that is not returned (after an exception) is freed. Copies of the pool are empty.
 template <class Workspace>
 class workspace_pool {
  public:

@@ -22,7 +22,7 @@ template <class Target, bit_string D>
   std::uint32_t sum = 0;
 #pragma GCC unroll 8
   for (std::size_t at = 0; at != sizeof(D); at += 8) {
-    std::uint64_t x, y;  // word by word: a copy of the whole string would go through memory
+    std::uint64_t x, y;  // copy word by word: a copy of the whole string would go through memory
     std::memcpy(&x, reinterpret_cast<const char*>(&a) + at, 8);
     std::memcpy(&y, reinterpret_cast<const char*>(&b) + at, 8);
     sum += simd::ones<Target>(x ^ y);

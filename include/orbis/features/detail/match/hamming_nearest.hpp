@@ -19,11 +19,11 @@
 
 namespace orbis::features::detail {
 
-/// The result of a search per query: the nearest train and the distance of the second nearest.
+/// The search result per query: the nearest train descriptor and the distance of the second-nearest.
 struct keep_two {
   nearest_two* nearest;
   [[nodiscard]] std::uint32_t limit(std::size_t q) const noexcept { return nearest[q].second_distance; }
-  /// @pre distance < limit(q); indices arrive ascending
+  /// @pre distance < limit(q); indices are inserted in ascending order
   ORBIS_ALWAYS_INLINE void insert(std::size_t q, std::uint32_t index, std::uint32_t distance) const noexcept {
     nearest_two& n = nearest[q];
     if (distance < n.distance) {
@@ -34,7 +34,7 @@ struct keep_two {
   }
 };
 
-/// Compares pair by pair: for sets too small for bit slices.
+/// Compares pair by pair, for sets too small for bit slices.
 template <class Target, class D>
 ORBIS_ALWAYS_INLINE void search_pairs(std::span<const D> queries, std::span<const D> trains, const keep_two& keep,
                                       std::span<std::uint32_t> reverse, hamming_workspace& workspace) {
@@ -56,7 +56,7 @@ ORBIS_ALWAYS_INLINE void search_pairs(std::span<const D> queries, std::span<cons
   }
 }
 
-/// Calls `visit(index)` for every bit that is set in both, ascending.
+/// Calls `visit(index)` for every bit that is set in both, in ascending order.
 template <std::size_t Words, class Visit>
 ORBIS_ALWAYS_INLINE void for_each_bit(const slice<Words>& bits, const slice<Words>& valid, Visit&& visit) {
   for (std::size_t w = 0; w != Words; ++w)
@@ -64,7 +64,7 @@ ORBIS_ALWAYS_INLINE void for_each_bit(const slice<Words>& bits, const slice<Word
       visit(64 * w + static_cast<std::size_t>(std::countr_zero(rest)));
 }
 
-/// Compares all queries with one block of trains at a time, so that the block's table stays in the first-level cache.
+/// Compares all queries with one block of train descriptors at a time, so that the block's table stays in the L1 cache.
 template <class Target, class D>
 ORBIS_ALWAYS_INLINE void search_slices(std::span<const D> queries, std::span<const D> trains, const keep_two& keep,
                                        std::span<std::uint32_t> reverse, hamming_workspace& workspace) {
@@ -92,7 +92,7 @@ ORBIS_ALWAYS_INLINE void search_slices(std::span<const D> queries, std::span<con
     const std::size_t rank = std::min<std::size_t>(2, block.size());
     std::uint32_t guess = 0;
     slice_distances<Words>
-        distances;  // of the current query; declared here, because initialising them for each query costs a twelfth
+        distances;  // of the current query; declared here, because initialising them per query costs 8 % of the time
     slice<Words> below;
 
     for (std::size_t q = 0; q != queries.size(); ++q) {
@@ -100,7 +100,7 @@ ORBIS_ALWAYS_INLINE void search_slices(std::span<const D> queries, std::span<con
       const bool first = limit == none;
       slice_count<Target>(table, workspace.queries[q], first ? guess : limit, distances, below);
       if (first) {
-        // The limit of the previous query is a good estimate; the exact one costs more.
+        // The limit of the previous query is a good estimate; the exact limit costs more.
         std::size_t found = 0;
         for (std::size_t w = 0; w != Words; ++w) found += simd::ones<Target>(below.words[w] & valid.words[w]);
         if (found < rank || found > 4 * rank + 8) {
@@ -125,7 +125,8 @@ struct hamming_search_kernel {
   template <class Target, class D>
   static ORBIS_ALWAYS_INLINE void run(std::span<const D> queries, std::span<const D> trains, const keep_two& keep,
                                       std::span<std::uint32_t> reverse, hamming_workspace& workspace) {
-    // A table costs about as much as a dozen queries save; a block costs the same for any number of trains.
+    // Building a table costs about as much as it saves in a dozen queries; a block costs the same for any number of
+    // train descriptors.
     if constexpr (bits_of<D> == 256) {
       if (queries.size() >= 16 && trains.size() >= 64)
         return search_slices<Target>(queries, trains, keep, reverse, workspace);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Declarations of searches for bit strings by the Hamming distance; implemented in hamming_nearest.hpp and
-/// hamming_listed.hpp.
+/// Declarations of nearest-neighbour searches among bit strings under the Hamming distance; implemented in
+/// hamming_nearest.hpp and hamming_listed.hpp.
 #pragma once
 
 #include <array>
@@ -17,17 +17,17 @@ namespace orbis::features::detail {
 
 inline constexpr std::size_t slice_groups = 128;
 
-/// One bit of each of `64 * Words` trains.
+/// One bit of each of `64 * Words` train descriptors.
 template <std::size_t Words>
 struct alignas(8 * Words) slice {
   std::array<std::uint64_t, Words> words{};
 };
 
-/// Precomputed counts of groups of three bits, by the pattern of the query's bits.
+/// Precomputed counts for groups of three bits, indexed by the pattern of the query's bits.
 template <std::size_t Words>
 struct slice_table {
   std::array<std::array<slice<Words>, 8>, slice_groups> majority;  ///< set if at least two of the three bits differ
-  std::array<slice<Words>, 2> parity;  ///< set if the distance is odd, by the parity of the query
+  std::array<slice<Words>, 2> parity;  ///< set if the distance is odd, indexed by the parity of the query
 };
 
 /// Positions of a query's slices.
@@ -36,17 +36,17 @@ struct slice_query {
   std::uint64_t parity;
 };
 
-/// Reusable memory of `hamming_nearest`.
+/// Reusable memory for `hamming_nearest`.
 struct hamming_workspace {
   std::vector<slice_query> queries;
-  std::vector<slice_table<4>> table4;  ///< of the current block of trains, for registers of up to 256 bits
-  std::vector<slice_table<8>> table8;  ///< the same for registers of 512 bits
+  std::vector<slice_table<4>> table4;  ///< table of the current block, for registers of up to 256 bits
+  std::vector<slice_table<8>> table8;  ///< table for registers of 512 bits
   std::vector<std::uint32_t> reverse_distance;
 };
 
-/// Finds the nearest and second nearest train of each query; if `reverse` is not empty, also the nearest query of each
-/// train (the lowest on ties), in the same pass. O(queries x trains) time, O(queries + trains) memory, all of it in
-/// `workspace`. Fastest for strings of 256 bits.
+/// Finds the nearest and second-nearest train descriptors for each query; if `reverse` is not empty, also the nearest
+/// query for each train descriptor (the lowest on ties), in the same pass. O(queries x trains) time, O(queries +
+/// trains) memory, all in `workspace`. Fastest for strings of 256 bits.
 /// @pre nearest.size() == queries.size(); reverse is empty or has the size of trains
 template <bit_string D>
 void hamming_nearest(std::span<const D> queries, std::span<const D> trains, std::span<nearest_two> nearest,

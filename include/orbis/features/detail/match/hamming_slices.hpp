@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Bit-sliced Hamming distances of one query to 256 or 512 trains at once.
+/// Bit-sliced Hamming distances from one query to 256 or 512 train descriptors at once.
 ///
-/// Trains are stored by bit: a slice holds one bit of 256 trains, or of 512 with 512-bit registers. A full adder sums
-/// three differing bits to their parity and their majority, which counts two. The parities are summed in turn, so 128
-/// groups of three bits leave 128 majorities and one parity. The three bits of a query, a pattern from 0 to 7, select
-/// the majority of a group from a table, which is built once per block of trains, for all queries. Full adders sum the
-/// majorities in bit planes, so that one logic instruction processes one train per bit of a register. The adders follow
-/// Harley and Seal (Mula, Kurz, Lemire, "Faster population counts using AVX2 instructions", 2018); the selection by
-/// groups is the method of four Russians.
+/// Train descriptors are stored by bit: a slice holds one bit of 256 descriptors, or of 512 with 512-bit registers. A
+/// full adder sums three differing bits to their parity and their majority, which counts two. The parities are then
+/// summed in the same way, so 128 groups of three bits leave 128 majorities and one parity. The three bits of a query,
+/// a pattern from 0 to 7, select the majority of a group from a table, which is built once per block of train
+/// descriptors and used for all queries. Full adders sum the majorities in bit planes, so that one logic instruction
+/// processes one train descriptor per bit of a register. The adders follow Harley and Seal (Mula, Kurz, Lemire, "Faster
+/// population counts using AVX2 instructions", 2018); the table look-up by groups is the method of four Russians.
 #pragma once
 
 #include <array>
@@ -50,7 +50,7 @@ inline void transpose_bits(std::array<std::uint64_t, 64>& m) noexcept {
   swap_blocks(std::integral_constant<std::size_t, 1>{}, 0x5555555555555555ULL);
 }
 
-/// Sets the slices of a group of three bits by the pattern of the query; returns the parity of the three.
+/// Sets the slices of a group of three bits for each query pattern; returns the parity of the three bits.
 template <std::size_t Words>
 ORBIS_ALWAYS_INLINE slice<Words> make_slice_group(const slice<Words>& a, const slice<Words>& b, const slice<Words>& c,
                                                   std::array<slice<Words>, 8>& group) noexcept {
@@ -68,8 +68,8 @@ ORBIS_ALWAYS_INLINE slice<Words> make_slice_group(const slice<Words>& a, const s
   return parity;
 }
 
-/// Group `g` consists of bits `g`, `64 + g` and `128 + g`; group `64 + g` of bit `192 + g`, the parity of group `g`,
-/// and that of the group before.
+/// Group `g` consists of bits `g`, `64 + g` and `128 + g`; group `64 + g` consists of bit `192 + g`, the parity of
+/// group `g`, and the parity of the previous group.
 /// @pre at most 64 * Words trains
 template <class Target, std::size_t Words, bit_string D>
 ORBIS_ALWAYS_INLINE void make_slice_table(std::span<const D> trains, slice_table<Words>& table) noexcept {
@@ -90,7 +90,7 @@ ORBIS_ALWAYS_INLINE void make_slice_table(std::span<const D> trains, slice_table
   for (std::size_t w = 0; w != Words; ++w) table.parity[1].words[w] = ~total.words[w];
 }
 
-/// The patterns of the same groups.
+/// Computes the query's patterns for the same groups.
 template <class Target>
 ORBIS_ALWAYS_INLINE void make_slice_query(const bit_words<256>& query, slice_query& to) noexcept {
   using bytes = simd::vec<std::uint8_t, 64, Target>;
@@ -118,15 +118,16 @@ inline constexpr std::array<slice<Words>, 2> constant_slices = [] {
   return zeros_and_ones;
 }();
 
-/// Bit `i` of `limit` for all trains: a load, because a broadcast from a scalar costs several instructions.
+/// Bit `i` of `limit` for all train descriptors. Loaded from memory, because a broadcast from a scalar costs several
+/// instructions.
 template <class Target>
 [[nodiscard]] ORBIS_ALWAYS_INLINE slice_plane<Target> limit_plane(std::uint32_t limit, std::size_t i) noexcept {
   return slice_plane<Target>::load(constant_slices<slice_words<Target>>[(limit >> i) & 1U].words.data());
 }
 
 #if ORBIS_X86
-/// Lane-wise function of three bits whose truth table is the bits of `Table`. The compiler recognises few of the
-/// functions below: without it brute-force matching takes 1.35 times as long with AVX-512.
+/// Lane-wise function of three bits whose truth table is the bits of `Table`. The compiler recognises only a few of the
+/// functions below as such; without this function, brute-force matching takes 1.35 times as long with AVX-512.
 template <int Table, class R>
 ORBIS_TARGET_AVX512 inline void ternary_logic(R& out, const R& a, const R& b, const R& c) noexcept {
   out = reinterpret_cast<R>(_mm512_ternarylogic_epi64(reinterpret_cast<__m512i>(a), reinterpret_cast<__m512i>(b),
@@ -136,7 +137,7 @@ ORBIS_TARGET_AVX512 inline void ternary_logic(R& out, const R& a, const R& b, co
 template <class V>
 inline constexpr bool has_ternary_logic = ORBIS_X86 != 0 && V::target_type::bytes == 64;
 
-/// One bit of a full adder: sum becomes the sum of the three, carry its carry.
+/// One bit of a full adder: sets `sum` to the sum of the three bits and `carry` to the carry.
 template <class V>
 ORBIS_ALWAYS_INLINE void full_add(V& sum, V& carry, const V& a, const V& b) noexcept {
   if constexpr (has_ternary_logic<V>) {
@@ -150,14 +151,14 @@ ORBIS_ALWAYS_INLINE void full_add(V& sum, V& carry, const V& a, const V& b) noex
     sum = sum ^ either;
   }
 }
-/// One bit of a half adder: sum becomes the sum of both, a the carry.
+/// One bit of a half adder: sets `sum` to the sum of both bits and `a` to the carry.
 template <class V>
 ORBIS_ALWAYS_INLINE void half_add(V& sum, V& a) noexcept {
   const V carry = sum & a;
   sum = sum ^ a;
   a = carry;
 }
-/// One bit of a comparison, starting at the lowest bit: below becomes x < y, given the result for the lower bits.
+/// One bit of a comparison, starting at the lowest bit: sets `below` to x < y, given the result for the lower bits.
 template <class V>
 ORBIS_ALWAYS_INLINE void compare_bit(V& below, const V& x, const V& y) noexcept {
   if constexpr (has_ternary_logic<V>) {
@@ -169,7 +170,8 @@ ORBIS_ALWAYS_INLINE void compare_bit(V& below, const V& x, const V& y) noexcept 
   }
 }
 
-/// Computes the distances of a query to the trains of a table, and the trains whose distance is below `limit`.
+/// Computes the distances from a query to the train descriptors of a table, and the ones whose distance is below
+/// `limit`.
 template <class Target>
 ORBIS_ALWAYS_INLINE void slice_count(const slice_table<slice_words<Target>>& table, const slice_query& query,
                                      std::uint32_t limit, slice_distances<slice_words<Target>>& distances,
@@ -215,7 +217,7 @@ ORBIS_ALWAYS_INLINE void slice_count(const slice_table<slice_words<Target>>& tab
   }
 }
 
-/// The trains whose distance is below `limit`.
+/// The train descriptors whose distance is below `limit`.
 template <class Target>
 ORBIS_ALWAYS_INLINE void slice_below(const slice_distances<slice_words<Target>>& distances, std::uint32_t limit,
                                      slice<slice_words<Target>>& below) noexcept {
@@ -228,7 +230,7 @@ ORBIS_ALWAYS_INLINE void slice_below(const slice_distances<slice_words<Target>>&
   }
 }
 
-/// The trains whose distance is below `least`; lowers `least` to these distances.
+/// The train descriptors whose distance is below `least`; lowers `least` to these distances.
 template <class Target>
 ORBIS_ALWAYS_INLINE void slice_lower(const slice_distances<slice_words<Target>>& distances,
                                      slice_distances<slice_words<Target>>& least,
@@ -246,7 +248,8 @@ ORBIS_ALWAYS_INLINE void slice_lower(const slice_distances<slice_words<Target>>&
   }
 }
 
-/// The `rank`-th smallest distance among the trains in `candidates`, determined bit by bit from the highest.
+/// The `rank`-th smallest distance among the train descriptors in `candidates`, determined bit by bit from the highest
+/// bit.
 /// @pre 0 < rank <= the number of bits in `candidates`
 template <class Target>
 [[nodiscard]] ORBIS_ALWAYS_INLINE std::uint32_t slice_ranked(const slice_distances<slice_words<Target>>& distances,

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Nearest neighbours by any distance: the reference implementation.
+/// Nearest neighbours under any distance: the reference implementation.
 #pragma once
 
 #include <cassert>
@@ -13,7 +13,7 @@
 
 namespace orbis::features::detail {
 
-/// The nearest of a set (lowest index on ties), and the distance of the second nearest.
+/// The nearest of a set (lowest index on ties), and the distance of the second-nearest.
 struct nearest_two {
   std::uint32_t index = none;
   std::uint32_t distance = none;
@@ -21,8 +21,8 @@ struct nearest_two {
   friend constexpr bool operator==(const nearest_two&, const nearest_two&) = default;
 };
 
-/// Finds the nearest and second nearest train of each query; if `reverse` is not empty, also the nearest query of each
-/// train (the lowest on ties). O(queries x trains).
+/// Finds the nearest and second-nearest train descriptors for each query; if `reverse` is not empty, also the nearest
+/// query for each train descriptor (the lowest on ties). O(queries x trains).
 /// @pre nearest.size() == queries.size(); reverse is empty or has the size of trains
 template <class Distance, class Descriptor>
 void nearest_by(const Distance& distance, std::span<const Descriptor> queries, std::span<const Descriptor> trains,

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Search for sources that compare each query with a subset of the trains.
+/// Search for sources that compare each query with a subset of the train descriptors.
 #pragma once
 
 #include <concepts>
@@ -16,20 +16,20 @@
 
 namespace orbis::features::detail {
 
-/// Reusable memory of `search_among`.
+/// Reusable memory for `search_among`.
 struct search_among_workspace {
   struct nearest_query {
     std::uint32_t distance = none;
     std::uint32_t query = none;
   };
-  std::vector<std::uint32_t> indices, distances;  ///< of the trains that the current query is compared with
-  std::vector<nearest_query> reverse;             ///< by train
+  std::vector<std::uint32_t> indices, distances;  ///< of the train descriptors to compare with the current query
+  std::vector<nearest_query> reverse;             ///< by train descriptor
 };
 
-/// Returns one candidate for each query with at least one listed train. `list(q, add)` calls `add(t)` once for every
-/// train to compare query `q` with, in any order; the result does not depend on the order. The reverse neighbour of a
-/// train is the nearest of the queries that it was compared with. For use by sources; accepts any distance, and is fast
-/// for many Hamming distances.
+/// Returns one candidate for each query with at least one listed train descriptor. `list(q, add)` calls `add(t)` once
+/// for every train descriptor `t` to compare with query `q`, in any order; the result does not depend on the order. The
+/// reverse neighbour of a train descriptor is the nearest query that was compared with it. For use by sources; accepts
+/// any distance, and is fast for large numbers of Hamming distances.
 template <class Distance, class Descriptor, class List>
 requires descriptor_distance<Distance, Descriptor>
 void search_among(const Distance& distance, std::vector<candidate>& candidates, search_among_workspace& memory,
@@ -39,7 +39,7 @@ void search_among(const Distance& distance, std::vector<candidate>& candidates, 
   reverse.assign(needs.reverse ? trains.descriptors.size() : 0, {});
   candidates.clear();
   candidates.reserve(queries.descriptors.size());
-  // The lists are short with varying lengths: reserve the maximum once.
+  // The lists are short and vary in length; reserve the maximum once.
   indices.reserve(trains.descriptors.size());
   distances.resize(trains.descriptors.size());
   for (std::size_t q = 0; q != queries.descriptors.size(); ++q) {
