@@ -14,8 +14,8 @@ namespace orbis::places {
 enum class weighting : std::uint8_t {
   tf_idf,  ///< term frequency times inverse document frequency
   tf,      ///< term frequency: number of occurrences in the image
-  idf,     ///< inverse document frequency: rarity among images
-  binary   ///< one
+  idf,     ///< inverse document frequency: rarity across images
+  binary   ///< value 1 for every word
 };
 
 /// A word and its value, > 0.
@@ -25,7 +25,7 @@ struct word_value {
   friend bool operator==(const word_value&, const word_value&) = default;
 };
 
-/// The words that occur, in ascending order without duplicates.
+/// The words that occur in an image, in ascending order without duplicates.
 struct bag_of_words {
   std::vector<word_value> words;
 
@@ -48,10 +48,10 @@ inline void normalize(bag_of_words& bag) noexcept {
   std::erase_if(bag.words, [](const word_value& w) { return !(w.value > 0.0F); });
 }
 
-/// Similarity of two normalised bags, from 0 (no common words) to 1 (equal): the sum of the smaller of both values of
-/// each word, which equals 1 - |a - b| / 2 with the L1 norm. Symmetric to the last bit. O(words).
-/// Source: D. Nister, H. Stewenius, "Scalable recognition with a vocabulary tree", CVPR 2006; D. Galvez-Lopez, J. D.
-/// Tardos, "Bags of binary words for fast place recognition in image sequences", IEEE T-RO 2012.
+/// Similarity of two normalised bags, from 0 (no common words) to 1 (equal): the sum over all words of the smaller of
+/// the two values, which equals 1 - |a - b| / 2 with the L1 norm. Exactly symmetric. O(words). Source: D. Nister, H.
+/// Stewenius, "Scalable recognition with a vocabulary tree", CVPR 2006; D. Galvez-Lopez, J. D. Tardos, "Bags of binary
+/// words for fast place recognition in image sequences", IEEE T-RO 2012.
 [[nodiscard]] inline double similarity(const bag_of_words& a, const bag_of_words& b) noexcept {
   double sum = 0.0;
   const word_value *i = a.words.data(), *j = b.words.data();
@@ -59,7 +59,7 @@ inline void normalize(bag_of_words& bag) noexcept {
   while (i != end_i && j != end_j) {
     const std::uint32_t x = i->word, y = j->word;
     if (x == y) sum += std::min(static_cast<double>(i->value), static_cast<double>(j->value));
-    // The comparison is unpredictable: no branches.
+    // Branch-free, because the comparison is unpredictable.
     i += x <= y ? 1 : 0;
     j += y <= x ? 1 : 0;
   }

@@ -15,9 +15,8 @@
 
 namespace orbis::places {
 
-/// For each word the numbers of the images that contain it, unordered. Unused words cost four bytes; lists release
-/// memory that they no longer need, so that memory does not grow while images are erased at the rate at which they are
-/// added.
+/// For each word, the indices of the images that contain it, unordered. Unused words cost four bytes; lists release
+/// unneeded memory, so memory does not grow while images are erased as fast as they are added.
 class inverted_index {
   static constexpr std::uint32_t nothing = ~std::uint32_t{0};
 
@@ -84,7 +83,7 @@ class inverted_index {
     return taken;
   }
 
-  std::vector<std::uint32_t> list_of_;  // by word
+  std::vector<std::uint32_t> list_of_;  // list index, by word
   std::vector<std::vector<std::uint32_t>> lists_;
   std::vector<std::uint32_t> unused_;  // free lists
 };

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Finds the keyframes that may show the same place as an image, by their visual words.
+/// Finds keyframes that may show the same place as an image, based on their visual words.
 #pragma once
 
 #include <algorithm>
@@ -30,9 +30,9 @@ concept keyframe_id = std::totally_ordered<Id> && std::copyable<Id> && std::defa
 
 /// Acceptance criteria of a query.
 struct query_options {
-  double shared_words = 0.8;  ///< minimum shared words, relative to the keyframe with the most; exclusive
+  double shared_words = 0.8;  ///< minimum number of shared words, relative to the keyframe with the most; exclusive
   double min_score = 0.0;     ///< minimum score
-  double group_score = 0.75;  ///< minimum sum of a group's scores, relative to the best group; exclusive
+  double group_score = 0.75;  ///< minimum score sum of a group, relative to the best group; exclusive
 };
 
 /// A keyframe that may show the same place as the image.
@@ -41,21 +41,21 @@ struct place_candidate {
   Id id{};
   std::uint32_t shared_words = 0;
   double score = 0.0;
-  double group_score = 0.0;  ///< sum over its group
+  double group_score = 0.0;  ///< sum of the scores in its group
   friend bool operator==(const place_candidate&, const place_candidate&) = default;
 };
 
-/// Reusable memory of queries: proportional to the largest number of keyframes so far and of candidates.
+/// Reusable memory for queries, proportional to the largest numbers of keyframes and candidates so far.
 template <class Id>
 struct query_workspace {
   std::vector<std::uint32_t> shared;   ///< number of shared words, by slot
   std::vector<std::uint32_t> touched;  ///< slots that share a word
-  std::vector<double> scores;          ///< by slot, of those scored in the current query
+  std::vector<double> scores;          ///< scores by slot, for the keyframes scored in the current query
   std::vector<std::uint32_t> scored;
   std::vector<place_candidate<Id>> groups;
 };
 
-/// Default callables of queries: exclude no keyframe, and return no neighbours.
+/// Default callables for queries: exclude no keyframes, and return no neighbours.
 struct none_excluded {
   template <class Id>
   [[nodiscard]] constexpr bool operator()(const Id&) const noexcept {
@@ -69,7 +69,7 @@ struct no_neighbors {
 
 /// Keyframes and their bags of words, with an inverted index. The caller chooses the ids. Results depend only on the
 /// contents, not on the order in which keyframes were added and erased. Concurrent queries on a const object are
-/// allowed, each with separate memory; adding and erasing need exclusive access.
+/// allowed, each with its own workspace; adding and erasing need exclusive access.
 ///
 /// Source of the criteria: R. Mur-Artal, J. D. Tardos, "ORB-SLAM: a versatile and accurate monocular SLAM system",
 /// IEEE T-RO 2015, sections III.E and VII.A.
@@ -91,7 +91,7 @@ class basic_keyframe_database {
   }
 
   /// Adds a keyframe; returns false, without changes, if the id is in use. O(words).
-  /// @pre the bag is normalised, and uses the same vocabulary as all others
+  /// @pre the bag is normalised and uses the same vocabulary as all other bags
   bool add(const Id& id, const bag_of_words& bag) {
     const bool reuse = !free_.empty();
     const auto slot = reuse ? free_.back() : static_cast<std::uint32_t>(keyframes_.size());
@@ -138,14 +138,14 @@ class basic_keyframe_database {
   /// Similarity of an image and a keyframe. @pre contains(id)
   [[nodiscard]] double score(const bag_of_words& image, const Id& id) const { return similarity(image, bag(id)); }
 
-  /// Finds the keyframes that may show the same place as an image, the best group first, ties by id.
+  /// Finds the keyframes that may show the same place as an image; the best group comes first, ties are ordered by id.
   ///
-  /// Considers the keyframes that share words with the image, except those for which `exclude(id)` is true (the
-  /// surroundings of the image itself, for loop closure). Computes the scores of those that share enough words; each
-  /// score that is high enough forms a group: the keyframe and those of its neighbours (`neighbors(id)`, a range of
-  /// ids: the keyframes that observe most of the same landmarks) that were also scored. A group represents a place;
-  /// from each group with a sufficient sum of scores, its best keyframe becomes a candidate (at most once). Neighbours
-  /// that are not in the database are ignored.
+  /// Considers the keyframes that share words with the image, except those for which `exclude(id)` is true (for loop
+  /// closing, the surroundings of the image itself). Computes the scores of keyframes that share enough words. Each
+  /// keyframe with a sufficient score forms a group with those of its neighbours that were also scored (`neighbors(id)`
+  /// returns a range of ids: the keyframes with the most common landmarks). A group represents a place; the best
+  /// keyframe of each group with a sufficient score sum becomes a candidate (at most once). Neighbours that are not in
+  /// the database are ignored.
   ///
   /// O(keyframes + keyframes that share a word, word by word + candidates x words); in steady state only the callables
   /// allocate memory.
@@ -160,7 +160,7 @@ class basic_keyframe_database {
     gather_groups(memory, options, neighbors);
     keep_best(memory, options, found);
   }
-  /// Returns the candidates; allocates its memory.
+  /// Returns the candidates; allocates its own memory.
   template <std::predicate<const Id&> Exclude = none_excluded, class Neighbors = no_neighbors<Id>>
   [[nodiscard]] std::vector<candidate> query(const bag_of_words& image, const query_options& options = {},
                                              Exclude&& exclude = {}, Neighbors&& neighbors = {}) const {
@@ -170,8 +170,8 @@ class basic_keyframe_database {
     return found;
   }
 
-  /// The `count` keyframes of the highest score, ties by id; fewer if fewer share a word with the image. O(keyframes
-  /// that share a word x words).
+  /// The `count` keyframes with the highest scores, ties ordered by id; fewer if fewer share a word with the image.
+  /// O(keyframes that share a word x words).
   template <std::predicate<const Id&> Exclude = none_excluded>
   void best(const bag_of_words& image, std::size_t count, std::vector<candidate>& found, workspace& memory,
             Exclude&& exclude = {}) const {
@@ -219,7 +219,7 @@ class basic_keyframe_database {
     memory.touched.clear();
     for (std::size_t i = 0; i != image.size(); ++i) {
 #if defined(__GNUC__)
-      // Prefetch the next list while this one is counted.
+      // Prefetch the next list while counting the current one.
       if (i + 1 != image.size()) __builtin_prefetch(index_.images_with(image.words[i + 1].word).data());
 #endif
       for (const std::uint32_t slot : index_.images_with(image.words[i].word))

@@ -19,7 +19,7 @@ namespace orbis::places {
 
 namespace detail {
 
-/// Trains level by level; each node's descriptors are contiguous, in the order of their images.
+/// Trains level by level; the descriptors of each node are contiguous and in the order of their images.
 template <std::size_t Bits>
 class vocabulary_trainer {
   using words = bit_words<Bits>;
@@ -28,7 +28,7 @@ class vocabulary_trainer {
     std::uint64_t seed;
     [[nodiscard]] std::size_t size() const noexcept { return end - begin; }
   };
-  /// Nodes with more descriptors are split sequentially by all threads, the others in parallel.
+  /// Nodes with more descriptors are split one after the other, each by all threads; the others are split in parallel.
   static constexpr std::size_t large = 65536;
 
  public:
@@ -60,7 +60,7 @@ class vocabulary_trainer {
   }
 
  private:
-  /// Splits the nodes of a level into those of the next.
+  /// Splits the nodes of a level into the nodes of the next level.
   template <execution_policy Policy>
   [[nodiscard]] result<std::vector<segment>> split_level(const Policy& policy, const std::vector<segment>& level) {
     std::vector<clustering<Bits>> parts(level.size());
@@ -126,7 +126,7 @@ class vocabulary_trainer {
     tree.resize(static_cast<std::uint32_t>(child_counts_.size()));
     tree.weights_are = options_.weighting;
     std::ranges::copy(centres_, tree.descriptors.values().begin());
-    for (const auto& [node, part] : leaves_) tree.weights.push_back(word_weight(part));  // by ascending node
+    for (const auto& [node, part] : leaves_) tree.weights.push_back(word_weight(part));  // in ascending order of node
     while (!child_counts_.empty() && child_counts_.back() == 0) child_counts_.pop_back();
     if (std::string problem = connect_tree(tree, child_counts_); !problem.empty())
       return fail(errc::degenerate, "", std::move(problem));
@@ -146,7 +146,7 @@ class vocabulary_trainer {
   training_options options_;
   progress report_;
   std::vector<words> descriptors_;
-  std::vector<std::uint32_t> images_;  // of the descriptors
+  std::vector<std::uint32_t> images_;  // image index of each descriptor
   std::uint32_t image_count_ = 0;
   std::vector<std::uint16_t> child_counts_;  // of the nodes
   std::vector<words> centres_;               // of the nodes except the root

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Trains a vocabulary from the descriptors of images.
+/// Training of a vocabulary on the descriptors of images.
 #pragma once
 
 #include <cassert>
@@ -24,7 +24,7 @@ struct training_options {
   std::uint32_t depth = 4;       ///< levels below the root, at least 1; branching^depth is the maximum number of words
   places::weighting weighting = places::weighting::tf_idf;
   std::uint64_t seed = 1;
-  int max_iterations = 10;  ///< of each clustering
+  int max_iterations = 10;  ///< maximum iterations of each clustering
 };
 
 /// A range of images, each a range of descriptors.
@@ -41,20 +41,20 @@ struct training_data {
   std::uint32_t image_count = 0;
 };
 
-/// `train` for any type of images.
+/// Implementation of `train`, independent of the image type.
 template <std::size_t Bits, execution_policy Policy>
 [[nodiscard]] result<basic_vocabulary<Bits>> train_by(const Policy& policy, training_data<Bits> data,
                                                       const training_options& options, const progress& report);
 
 }  // namespace detail
 
-/// Trains a vocabulary from the descriptors of representative images, each part of the environment shown at most a few
+/// Trains a vocabulary on the descriptors of representative images that show each part of the environment at most a few
 /// times. The same seed gives the same vocabulary under every policy. A node whose descriptors are all equal is not
-/// split. O(descriptors x depth x branching x iterations) time; memory for two copies of the descriptors. `report`
-/// counts descriptors times levels.
+/// split. O(descriptors x depth x branching x iterations) time; memory for two copies of the descriptors. The progress
+/// passed to `report` counts descriptors times levels.
 ///
 /// Errors: no_data, invalid_argument (idf weighting with fewer than two images), cancelled. The library orbis::compiled
-/// contains it for descriptors of 256 bits, `seq` and `par`; for others include train-inl.hpp.
+/// contains the function for descriptors of 256 bits with `seq` and `par`; for other cases, include train-inl.hpp.
 /// @pre 2 <= branching < 65536, depth >= 1, max_iterations >= 0
 template <execution_policy Policy, training_images Images>
 [[nodiscard]] auto train(const Policy& policy, const Images& images, const training_options& options = {},

@@ -16,8 +16,8 @@ namespace detail {
 
 // Finds the words of many descriptors in a vocabulary's tree at once.
 //
-// In a large tree each level costs a cache miss. Several descriptors therefore descend together, level by level: while
-// one is compared with the children of its node, the children of the other nodes are prefetched.
+// In a large tree, each level costs a cache miss. Several descriptors therefore descend together, level by level: while
+// one descriptor is compared with the children of its node, the children of the other nodes are prefetched.
 
 /// Descriptors as bytes, and the output array for their leaves.
 struct descent {
@@ -28,7 +28,7 @@ struct descent {
 
 template <class Target, std::size_t Bits>
 ORBIS_ALWAYS_INLINE void descend(const vocabulary_tree<Bits>& tree, const descent& d) {
-  constexpr std::size_t together = 8;  // at a few lines each, about the number of concurrent fetches of a core
+  constexpr std::size_t together = 8;  // a few cache lines each: about the number of concurrent fetches of a core
   constexpr std::size_t line = 64;
   const tree_node* const nodes = tree.nodes.data();
   const std::uint32_t inner_end = tree.inner_end();
@@ -48,7 +48,7 @@ ORBIS_ALWAYS_INLINE void descend(const vocabulary_tree<Bits>& tree, const descen
       t.at = static_cast<std::uint32_t>(begin + i);
     }
     while (active != 0) {
-      // Drop those that reached a leaf; fetch the children of the others.
+      // Remove descriptors that reached a leaf; prefetch the children for the others.
       std::size_t kept = 0;
       for (std::size_t i = 0; i != active; ++i) {
         query_state& t = states[i];

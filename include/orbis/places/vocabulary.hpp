@@ -19,18 +19,18 @@
 
 namespace orbis::places {
 
-/// Reusable memory of `transform`.
+/// Reusable memory for `transform`.
 struct transform_workspace {
   std::vector<std::uint32_t> words, sorted;
 };
 
-/// A tree of descriptors of `Bits` bits. A descriptor descends from the root to the nearest child at each node; the
-/// leaf that it reaches is its word.
+/// A tree of descriptors of `Bits` bits. Starting at the root, a descriptor descends to the nearest child at each node;
+/// the leaf that it reaches is its word.
 ///
-/// The library orbis::compiled contains the one for 256 bits; for others include vocabulary-inl.hpp.
+/// The library orbis::compiled contains the vocabulary for 256 bits; for other lengths, include vocabulary-inl.hpp.
 ///
 /// Immutable, and cheap to copy: copies share the tree. Created by `train`, `read_vocabulary`, `default_vocabulary` and
-/// the readers of other formats. A default-constructed vocabulary has no words.
+/// readers for other formats. A default-constructed vocabulary has no words.
 ///
 /// Source: D. Nister, H. Stewenius, "Scalable recognition with a vocabulary tree", CVPR 2006; D. Galvez-Lopez,
 /// J. D. Tardos, "Bags of binary words for fast place recognition in image sequences", IEEE T-RO 2012.
@@ -41,9 +41,9 @@ class basic_vocabulary {
   using tree_type = vocabulary_tree<Bits>;
 
   basic_vocabulary() : tree_{std::make_shared<tree_type>(empty_tree())} {}
-  /// @pre a connected tree, see `connect_tree`
+  /// @pre the tree is connected, see `connect_tree`
   explicit basic_vocabulary(tree_type&& tree) : tree_{std::make_shared<tree_type>(std::move(tree))} {}
-  // A move copies the pointer, so that a moved-from vocabulary keeps its words.
+  // Moving copies the pointer, so that a moved-from vocabulary keeps its words.
   basic_vocabulary(const basic_vocabulary&) noexcept = default;
   basic_vocabulary& operator=(const basic_vocabulary&) noexcept = default;
   ~basic_vocabulary() = default;
@@ -58,7 +58,7 @@ class basic_vocabulary {
   /// Maximum number of children of a node.
   [[nodiscard]] std::uint32_t branching() const noexcept { return tree_->branching; }
   [[nodiscard]] places::weighting weighting() const noexcept { return tree_->weights_are; }
-  /// The weight of a word (the part that does not depend on the image). @pre word < size()
+  /// The weight of a word (the part of its value that does not depend on the image). @pre word < size()
   [[nodiscard]] float weight(std::uint32_t word) const noexcept { return tree_->weights[word]; }
   [[nodiscard]] const tree_type& tree() const noexcept { return *tree_; }
 
@@ -74,16 +74,16 @@ class basic_vocabulary {
     return find_word(descriptor);
   }
 
-  /// Computes the normalised bag of words of an image's descriptors. Allocates nothing after an image with the same
-  /// number of descriptors. O(descriptors x depth x branching); safe to call from several threads, each with separate
-  /// memory.
+  /// Computes the normalised bag of words for the descriptors of an image. Allocates nothing after an image with the
+  /// same number of descriptors. O(descriptors x depth x branching); safe to call from several threads, each with its
+  /// own memory.
   template <bit_string_range_of<Bits> Descriptors>
   void transform(const Descriptors& descriptors, bag_of_words& bag, transform_workspace& memory) const {
     transform_bytes(reinterpret_cast<const std::byte*>(std::ranges::data(descriptors)), std::ranges::size(descriptors),
                     bag, memory);
   }
 
-  /// Returns the bag; allocates its memory.
+  /// Returns the bag; allocates its own memory.
   template <bit_string_range_of<Bits> Descriptors>
   [[nodiscard]] bag_of_words transform(const Descriptors& descriptors) const {
     bag_of_words bag;
@@ -116,7 +116,7 @@ class basic_vocabulary {
   std::shared_ptr<const tree_type> tree_;
 };
 
-/// A vocabulary for descriptors of 256 bits, such as those of ORB.
+/// A vocabulary for descriptors of 256 bits, such as ORB's.
 using vocabulary = basic_vocabulary<256>;
 
 }  // namespace orbis::places

@@ -35,7 +35,7 @@ template <std::size_t Bits>
                              : std::span{descriptors.front().data(), descriptors.size() * (Bits / 64)};
 }
 
-/// Reads a vocabulary of `size` bytes by `read(span)`, which fills the span or returns an error.
+/// Reads a vocabulary of `size` bytes with `read(span)`, which fills the span or returns an error.
 template <std::size_t Bits, class Read>
 [[nodiscard]] result<basic_vocabulary<Bits>> read_vocabulary_by(Read&& read, std::uint64_t size,
                                                                 const std::string& where) {
@@ -127,7 +127,7 @@ result<basic_vocabulary<Bits>> read_vocabulary(const std::filesystem::path& path
   if (ec) return fail(errc::unreadable, path.string(), "cannot determine the size: " + ec.message());
   const auto read = [&](std::span<std::byte> to) -> result<void> {
     if (in.read(reinterpret_cast<char*>(to.data()), static_cast<std::streamsize>(to.size()))) return {};
-    return fail(errc::unreadable, path.string(), "ends while it is being read");
+    return fail(errc::unreadable, path.string(), "is shorter than its reported size");
   };
   return detail::read_vocabulary_by<Bits>(read, size, path.string());
 }

@@ -1,20 +1,20 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Vocabulary files, in the layout of the memory: a million words are read in milliseconds.
+/// Vocabulary files, which have the layout of the tree in memory: a million words are read in milliseconds.
 ///
 /// A file is little-endian; the same vocabulary gives the same bytes on every machine:
 ///
 ///     0   "orbisvoc"
 ///     8   version (u32), 1
-///     12  CRC-32C of all that follows (u32)
-///     16  bits of a descriptor, weighting (0 tf-idf, 1 tf, 2 idf, 3 binary), nodes with the root, number of nodes up
-///     to the last one that has children, words (u32 each)
+///     12  CRC-32C of all following bytes (u32)
+///     16  descriptor bits, weighting (0 tf-idf, 1 tf, 2 idf, 3 binary), nodes including the root, number of nodes up
+///         to the last one with children, words (u32 each)
 ///     36  zeros up to byte 64
-///     64  the descriptors of the nodes, level by level, the children of a node side by side, without the root
-///         the weights of the words (f32), which are the leaves in that order
-///         the number of children (u16) of each node up to the last that has any
+///     64  the descriptors of all nodes except the root, level by level, the children of a node consecutively
+///         the weights of the words (f32); the words are the leaves in that order
+///         the number of children (u16) of each node up to the last one with children
 ///
-/// The library orbis::compiled contains the functions for 256 bits; for others include vocabulary_file-inl.hpp.
+/// The library orbis::compiled contains the functions for 256 bits; for other lengths, include vocabulary_file-inl.hpp.
 #pragma once
 
 #include <cstddef>
@@ -28,15 +28,15 @@
 
 namespace orbis::places {
 
-/// The first eight bytes of such a file.
+/// The first eight bytes of a vocabulary file.
 inline constexpr std::string_view vocabulary_magic = "orbisvoc";
 
-/// Serialises a vocabulary to the bytes of a file.
+/// Serialises a vocabulary in the file format.
 template <std::size_t Bits>
 [[nodiscard]] std::string vocabulary_bytes(const basic_vocabulary<Bits>& vocabulary);
 
-/// Parses the vocabulary in `bytes`; `where` is the location in errors. Uses at most three times the memory of the
-/// bytes. Errors: malformed (with the reason), unsupported (another version or descriptor size).
+/// Parses the vocabulary in `bytes`; `where` is the location in errors. Uses at most three times the memory of `bytes`.
+/// Errors: malformed (with the reason), unsupported (another version or descriptor size).
 template <std::size_t Bits = 256>
 [[nodiscard]] result<basic_vocabulary<Bits>> parse_vocabulary(std::span<const std::byte> bytes,
                                                               const std::string& where = "bytes");

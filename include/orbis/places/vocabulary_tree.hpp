@@ -18,34 +18,35 @@
 
 namespace orbis::places {
 
-/// Links of a node, stored separately from its descriptor.
+/// The links of a node, stored separately from its descriptor.
 struct tree_node {
   std::uint32_t first_child = 0;   ///< the children end at the first child of the next node
-  std::uint32_t inner_before = 0;  ///< number of nodes before this one that have children
+  std::uint32_t inner_before = 0;  ///< number of nodes with children before this one
 };
 
-/// A tree of descriptors of `Bits` bits. Nodes are numbered level by level from the root, 0; those of a level in the
-/// order of their parents, so that the children of a node are contiguous. Words are the leaves in that order.
+/// A tree of descriptors of `Bits` bits. Nodes are numbered level by level, starting with 0 for the root, and within a
+/// level in the order of their parents, so that the children of a node are contiguous. Words are the leaves in that
+/// order.
 ///
-/// To build one: call `resize`, fill in `descriptors` and `weights`, then call `connect_tree`.
+/// To build a tree, call `resize`, fill in `descriptors` and `weights`, then call `connect_tree`.
 template <std::size_t Bits>
 struct vocabulary_tree {
-  table_memory<bit_words<Bits>> descriptors;  ///< that of node i is at i - 1: the root has none
+  table_memory<bit_words<Bits>> descriptors;  ///< the descriptor of node i is at i - 1; the root has none
   std::vector<tree_node> nodes;               ///< up to the last node with children, plus one; all others are leaves
-  std::vector<float> weights;                 ///< of the words
+  std::vector<float> weights;                 ///< weights of the words
   std::uint32_t node_count = 1;
   std::uint32_t branching = 0;  ///< maximum number of children of a node
   std::uint32_t depth = 0;      ///< levels below the root
   weighting weights_are = weighting::tf_idf;
 
-  /// Allocates `nodes_with_root` nodes; their descriptors are uninitialised. @pre > 0
+  /// Allocates `nodes_with_root` nodes; their descriptors are uninitialised. @pre nodes_with_root > 0
   void resize(std::uint32_t nodes_with_root) {
     node_count = nodes_with_root;
     descriptors = table_memory<bit_words<Bits>>(nodes_with_root - 1);
   }
 
   [[nodiscard]] std::uint32_t word_count() const noexcept { return static_cast<std::uint32_t>(weights.size()); }
-  /// Number of the first node after the last one with children; that node and all after it are leaves.
+  /// Index of the first node after the last one with children; this node and all later ones are leaves.
   [[nodiscard]] std::uint32_t inner_end() const noexcept { return static_cast<std::uint32_t>(nodes.size() - 1); }
   [[nodiscard]] bool is_leaf(std::uint32_t node) const noexcept {
     return node >= inner_end() || nodes[node].first_child == nodes[node + 1].first_child;
@@ -56,8 +57,9 @@ struct vocabulary_tree {
   }
 };
 
-/// Completes a tree that has its descriptors and weights: `child_counts[i]` is the number of children of node i, for
-/// the nodes up to the last one with children. Returns the reason of failure, or an empty string. O(nodes).
+/// Connects the nodes of a tree after its descriptors and weights are set: `child_counts[i]` is the number of children
+/// of node i, for the nodes up to the last one with children. Returns the reason for a failure, or an empty string.
+/// O(nodes).
 template <std::size_t Bits>
 [[nodiscard]] std::string connect_tree(vocabulary_tree<Bits>& tree, std::span<const std::uint16_t> child_counts) {
   tree.nodes.assign(child_counts.size() + 1, {});

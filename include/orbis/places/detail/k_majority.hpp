@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Clustering of binary descriptors whose centres are the bitwise majority of their members.
+/// Clustering of binary descriptors; a cluster centre is the bitwise majority of its members.
 #pragma once
 
 #include <algorithm>
@@ -27,8 +27,8 @@ namespace orbis::places::detail {
 }
 inline constexpr std::array<std::uint64_t, 256> spread_bits = make_spread_bits();
 
-/// Counts for each bit the descriptors that have it set: bit by bit, with eight counters per word that are flushed
-/// before any of them can overflow.
+/// Counts, for each bit, the descriptors in which it is set. Uses eight counters per word, which are flushed before any
+/// of them can overflow.
 template <std::size_t Bits>
 class bit_votes {
  public:
@@ -46,7 +46,7 @@ class bit_votes {
   }
   [[nodiscard]] std::uint64_t total() const noexcept { return total_ + pending_; }
 
-  /// The bits that more than half of the descriptors have set; ties take the bit of `tie`.
+  /// The bits that are set in more than half of the descriptors; ties are resolved by the bits of `tie`.
   [[nodiscard]] bit_words<Bits> majority(const bit_words<Bits>& tie) noexcept {
     flush();
     bit_words<Bits> result{};
@@ -74,7 +74,7 @@ class bit_votes {
 };
 
 struct k_majority_options {
-  std::uint32_t clusters = 10;  ///< maximum; fewer if there are fewer distinct descriptors
+  std::uint32_t clusters = 10;  ///< maximum number; fewer if there are fewer distinct descriptors
   int max_iterations = 10;
   std::uint64_t seed = 1;
 };
@@ -86,8 +86,8 @@ struct clustering {
   std::vector<std::uint16_t> cluster_of;
 };
 
-/// Lloyd's algorithm under the Hamming distance, whose median is the majority. All sums are integers, so that neither
-/// the number of threads nor the order affects the result.
+/// Lloyd's algorithm under the Hamming distance, for which the median is the bitwise majority. All sums are integers,
+/// so neither the number of threads nor the order affects the result.
 template <std::size_t Bits>
 class k_majority_solver {
   static constexpr std::size_t grain = 4096;
@@ -116,8 +116,8 @@ class k_majority_solver {
   }
 
  private:
-  /// Selects the next seed: a descriptor drawn with a probability proportional to its squared distance from the
-  /// existing seeds: D. Arthur, S. Vassilvitskii, "k-means++: the advantages of careful seeding", SODA 2007.
+  /// Selects the seeds: each is a descriptor drawn with a probability proportional to its squared distance from the
+  /// nearest previous seed. D. Arthur, S. Vassilvitskii, "k-means++: the advantages of careful seeding", SODA 2007.
   template <execution_policy Policy>
   void choose_seeds(const Policy& policy) {
     const std::size_t n = descriptors_.size();
@@ -159,7 +159,7 @@ class k_majority_solver {
   template <execution_policy Policy>
   void move_centres(const Policy& policy) {
     const std::size_t k = result_.centres.size();
-    // A few long pieces: each has separate counters for every cluster.
+    // Use a few long pieces, because each piece needs separate counters for every cluster.
     const std::size_t pieces = std::clamp<std::size_t>(descriptors_.size() / (16 * k * grain / 8 + 1), 1, 16);
     const std::size_t piece = (descriptors_.size() + pieces - 1) / pieces;
     std::vector<bit_votes<Bits>> votes(pieces * k);
@@ -169,7 +169,7 @@ class k_majority_solver {
     });
     for (std::size_t c = 0; c != k; ++c) {
       for (std::size_t p = 1; p != pieces; ++p) votes[c].add(votes[p * k + c]);
-      // A centre without members is unchanged: it may gain members later.
+      // A centre without members is unchanged; it may gain members later.
       if (votes[c].total() != 0) result_.centres[c] = votes[c].majority(result_.centres[c]);
     }
   }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The nearest of a few contiguous descriptors.
+/// Nearest-neighbour search among a few contiguous descriptors.
 #pragma once
 
 #include <algorithm>
@@ -35,7 +35,7 @@ template <class Target, std::size_t Bits>
 [[nodiscard]] ORBIS_ALWAYS_INLINE std::uint32_t nearest_child(const bit_words<Bits>& query,
                                                               const bit_words<Bits>* children,
                                                               std::uint32_t count) noexcept {
-  // Distance and index in one number: the minimum needs no unpredictable branch.
+  // Distance and index are combined into one number, so the minimum needs no unpredictable branch.
   std::uint32_t best = ~std::uint32_t{0};
   for (std::uint32_t c = 0; c != count; ++c)
     best = std::min(best, count_differing_bits<Target, Bits>(query, children[c]) << 16U | c);
