@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Alignment of an estimated trajectory with its reference.
+/// Alignment of an estimated trajectory with a reference trajectory.
 ///
 /// Source: S. Umeyama, "Least-squares estimation of transformation parameters between two point
 /// patterns", PAMI 13(4), 1991.
@@ -20,15 +20,15 @@
 
 namespace orbis::eval {
 
-/// An estimated pose and the reference pose of the same time.
+/// An estimated pose and the reference pose at the same time.
 struct pose_pair {
-  double timestamp = 0.0;  ///< of the estimate, seconds
+  double timestamp = 0.0;  ///< time of the estimate, seconds
   se3 estimate;
   se3 reference;
 };
 
-/// Pairs the poses of two trajectories by their time stamps (nearest first, each used once). @pre both are sorted by
-/// time
+/// Pairs the poses of two trajectories by time stamp (nearest pairs first; each pose is used at most once). @pre both
+/// are sorted by time
 [[nodiscard]] inline std::vector<pose_pair> pair_poses(const trajectory& estimate, const trajectory& reference,
                                                        double max_time_difference) {
   const auto stamps = [](const trajectory& poses) {
@@ -45,27 +45,27 @@ struct pose_pair {
 
 struct alignment_options {
   bool with_scale = false;            ///< also estimate a scale, for trajectories of unknown scale
-  double max_time_difference = 0.02;  ///< between paired poses, seconds
+  double max_time_difference = 0.02;  ///< maximum time difference between paired poses, seconds
 };
 
 /// The transform `reference ~ scale * rotation * estimate + translation`.
 struct alignment {
   double scale = 1.0;
   se3 T_reference_estimate;  ///< the rotation and the translation
-  std::size_t pairs = 0;     ///< number of poses that it was computed from
+  std::size_t pairs = 0;     ///< number of pose pairs used
 
-  /// Transforms a position from the estimate's frame to the reference's.
+  /// Transforms a position from the estimate's frame to the reference frame.
   [[nodiscard]] vec3 operator*(const vec3& p) const {
     return T_reference_estimate.rotation() * vec3(scale * p) + T_reference_estimate.translation();
   }
-  /// Transforms a pose from the estimate's frame to the reference's.
+  /// Transforms a pose from the estimate's frame to the reference frame.
   [[nodiscard]] se3 operator*(const se3& pose) const {
     return {T_reference_estimate.rotation() * pose.rotation(), *this * pose.translation()};
   }
 };
 
 /// The least-squares alignment of the positions of pose pairs. Errors: no_data (fewer than 3 pairs), degenerate (all
-/// positions on one line, so that the rotation about it is not determined; not finite). O(n).
+/// positions are on one line, so the rotation about it is not determined; or a position is not finite). O(n).
 [[nodiscard]] inline result<alignment> align(const std::vector<pose_pair>& pairs, bool with_scale = false) {
   constexpr const char* where = "trajectory alignment";
   if (pairs.size() < 3)
@@ -92,7 +92,8 @@ struct alignment {
   if (!(s[1] > 1e-9 * std::sqrt(variance_e * variance_r)) || !(s[1] > 0.0))
     return fail(errc::degenerate, where,
                 "all positions are collinear: the rotation about their line is not determined");
-  // If the best orthogonal matrix is a reflection, the best rotation flips the weakest direction.
+  // If the best orthogonal matrix is a reflection, the best rotation flips the direction with the smallest singular
+  // value.
   if (determinant(u) * determinant(v) < 0.0) {
     s[2] = -s[2];
     set_column(u, 2, vec3(-column_of(u, 2)));
@@ -102,10 +103,10 @@ struct alignment {
   return alignment{scale, se3(rotation, mean_r - rotation * vec3(scale * mean_e)), pairs.size()};
 }
 
-/// The rigid alignment that is best for the orientations (chordal mean) and, given that, for the positions. Determined
-/// by a single pair, and well determined if the positions hardly differ or are collinear: use it to transform a map
-/// into the reference's world frame, and `align` for the ATE. Errors: no_data (no pairs), degenerate (orientations
-/// without a mean; not finite). O(n).
+/// The rigid alignment that is optimal for the orientations (chordal mean) and, with that rotation, for the positions.
+/// A single pair is sufficient, and the result is well determined even if the positions hardly differ or are collinear.
+/// Use it to transform a map into the reference's world frame; use `align` for the ATE. Errors: no_data (no pairs),
+/// degenerate (the orientations have no mean, or a value is not finite). O(n).
 ///
 /// Source: R. Hartley, J. Trumpf, Y. Dai, H. Li, "Rotation averaging", IJCV 103, 2013, section 5.2.
 [[nodiscard]] inline result<alignment> align_poses(const std::vector<pose_pair>& pairs) {
@@ -125,7 +126,7 @@ struct alignment {
   return alignment{1.0, se3(*rotation, translation), pairs.size()};
 }
 
-/// The alignment of two trajectories: pairs poses by time, then aligns them. Errors: as above.
+/// Aligns two trajectories: pairs poses by time, then aligns the pairs. Errors as for `align` above.
 /// @pre both are sorted by time
 [[nodiscard]] inline result<alignment> align(const trajectory& estimate, const trajectory& reference,
                                              const alignment_options& options = {}) {

@@ -18,11 +18,11 @@ namespace orbis::eval {
 
 struct absolute_trajectory_error {
   error_statistics translation;  ///< metres
-  alignment aligned;             ///< of the estimate to the reference
+  alignment aligned;             ///< alignment of the estimate with the reference
 };
 
 /// Aligns `estimate` to `reference` and compares the positions of paired poses. Errors: no_data (fewer than 3 pairs),
-/// degenerate (all on one line). O(n log n).
+/// degenerate (all positions are on one line). O(n log n).
 /// @pre both are sorted by time
 [[nodiscard]] inline result<absolute_trajectory_error> ate(const trajectory& estimate, const trajectory& reference,
                                                            const alignment_options& options = {}) {

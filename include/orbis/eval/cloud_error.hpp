@@ -18,15 +18,15 @@
 
 namespace orbis::eval {
 
-/// A callable that returns the distance (metres, the sign is ignored) from a point to the surface. Called from several
-/// threads at once.
+/// A callable that returns the distance (metres, the sign is ignored) from a point to the surface. Called concurrently
+/// from several threads.
 template <class F>
 concept distance_function = requires(const F& distance, const vec3& point) {
   { distance(point) } -> std::convertible_to<double>;
 };
 
 struct cloud_error_options {
-  double tolerance = 0.02;  ///< metres
+  double tolerance = 0.02;  ///< maximum distance counted in `percent_within`, metres
 };
 
 struct cloud_error {
@@ -35,8 +35,8 @@ struct cloud_error {
   std::size_t skipped = 0;      ///< points with non-finite coordinates or distances
 };
 
-/// Statistics of the distances from `points` to the surface that `distance` describes. The same result for every
-/// policy. Errors: no_data (no point is finite). O(n log n) in addition to the calls.
+/// Statistics of the distances from `points` to the surface that `distance` describes; the same for every policy.
+/// Errors: no_data (no finite point). O(n log n) in addition to the calls to `distance`.
 template <execution_policy Policy, point_range Points, distance_function Distance>
 [[nodiscard]] result<cloud_error> cloud_to_surface(const Policy& policy, const Points& points, const Distance& distance,
                                                    const cloud_error_options& options = {}) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Detection of references that have positions only: GPS and laser trackers give no orientations, and their files have
-/// the same quaternion in every line.
+/// Detection of reference trajectories without orientations: GPS and laser trackers measure positions only, and their
+/// files have the same quaternion on every line.
 #pragma once
 
 #include <algorithm>
@@ -15,18 +15,18 @@
 
 namespace orbis::eval {
 
-/// Minimum number of poses for which equal orientations mean that there are none.
+/// Minimum number of poses for concluding from equal orientations that there are none.
 inline constexpr std::size_t min_poses_without_orientation = 5;
-/// Maximum angle between equal orientations, radians.
+/// Maximum angle between orientations that count as equal, radians.
 inline constexpr double equal_orientations = 1e-9;
 
 /// Returns true if the references of all pairs have the same orientation (at least `min_poses_without_orientation`),
-/// while the estimates turn by more than a degree: the reference has positions only. A camera on rails does not turn.
-/// O(n).
+/// while the estimates rotate by more than a degree: the reference then has positions only. (The estimates do not
+/// rotate if the camera is on rails.) O(n).
 [[nodiscard]] inline bool lacks_orientations(const std::vector<pose_pair>& pairs) {
   constexpr double degree = std::numbers::pi / 180.0;
   if (pairs.size() < min_poses_without_orientation) return false;
-  double reference = 0.0, estimate = 0.0;  // greatest angles from the first pose
+  double reference = 0.0, estimate = 0.0;  // largest angles from the first pose
   for (const pose_pair& p : pairs) {
     const pose_pair& first = pairs.front();
     reference = std::max(reference, (first.reference.rotation().inverse() * p.reference.rotation()).angle());
@@ -36,8 +36,8 @@ inline constexpr double equal_orientations = 1e-9;
 }
 
 /// Returns true if all poses (at least `min_poses_without_orientation`) have the same orientation, but different
-/// positions: the reference has positions only, or the camera is on rails. `lacks_orientations` decides if there is an
-/// estimate to compare with. O(n).
+/// positions: the reference has positions only, or the camera is on rails. If an estimate is available,
+/// `lacks_orientations` distinguishes the two cases. O(n).
 [[nodiscard]] inline bool has_equal_orientations(const trajectory& reference) {
   constexpr double least_motion = 1e-3;  // metres
   if (reference.size() < min_poses_without_orientation) return false;
@@ -50,7 +50,7 @@ inline constexpr double equal_orientations = 1e-9;
   return motion > least_motion;
 }
 
-/// Returns true if all poses have the identity as orientation, but different positions; see `has_equal_orientations`.
+/// Returns true if all poses have the identity orientation, but different positions; see `has_equal_orientations`.
 /// O(n).
 [[nodiscard]] inline bool has_positions_only(const trajectory& reference) {
   return has_equal_orientations(reference) && reference.front().T_world_camera.rotation().angle() <= equal_orientations;

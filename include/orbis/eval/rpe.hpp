@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Relative pose error: the error of the estimated motion over a short interval. Independent of the frames of the
+/// Relative pose error: the error of the estimated motion over a short interval. Independent of the world frames of the
 /// trajectories.
 ///
 /// Source: J. Sturm et al., "A benchmark for the evaluation of RGB-D SLAM systems", IROS 2012.
@@ -24,8 +24,8 @@ namespace orbis::eval {
 
 struct rpe_options {
   std::size_t delta_frames = 1;           ///< motion from one paired pose to the n-th pose after it ...
-  std::optional<double> delta_seconds{};  ///< ... or, if set, to the pose nearest to this many seconds later
-  double max_time_difference = 0.02;      ///< between paired poses, seconds
+  std::optional<double> delta_seconds{};  ///< ... or, if set, to the pose nearest to this time later, seconds
+  double max_time_difference = 0.02;      ///< maximum time difference between paired poses, seconds
 };
 
 struct relative_pose_error {
@@ -33,20 +33,20 @@ struct relative_pose_error {
   error_statistics rotation;     ///< degrees
 };
 
-/// Compares the motions of `estimate` and `reference` over a delta of frames or seconds. With a delta of seconds,
-/// excludes motions whose duration differs from it by more than a quarter (across a gap). Errors: no_data (no motion to
-/// compare), invalid_argument (a delta of 0 or less), degenerate (the reference has positions only, see
-/// `lacks_orientations`: motions are relative to orientations). O(n log n).
+/// Compares the motions of `estimate` and `reference` over a delta of frames or seconds. With a delta in seconds,
+/// motions whose duration differs from it by more than a quarter (across a gap) are excluded. Errors: no_data (no
+/// motion to compare), invalid_argument (a delta of 0 or less), degenerate (the reference has positions only, see
+/// `lacks_orientations`; relative motions require orientations). O(n log n).
 /// @pre both are sorted by time
 [[nodiscard]] inline result<relative_pose_error> rpe(const trajectory& estimate, const trajectory& reference,
                                                      const rpe_options& options = {}) {
   constexpr const char* where = "relative pose error";
   if (options.delta_seconds ? !(*options.delta_seconds > 0.0) : options.delta_frames == 0)
-    return fail(errc::invalid_argument, where, "the delta must be above zero");
+    return fail(errc::invalid_argument, where, "the delta must be positive");
   const auto pairs = pair_poses(estimate, reference, options.max_time_difference);
   if (lacks_orientations(pairs))
     return fail(errc::degenerate, where,
-                "the reference has no orientations: they are all equal, while the estimate turns");
+                "the reference has no orientations: all are equal, but the estimate rotates");
 
   const auto end_of_motion = [&](std::size_t i) -> std::optional<std::size_t> {
     if (!options.delta_seconds)
@@ -55,7 +55,7 @@ struct relative_pose_error {
     const auto after = std::lower_bound(pairs.begin(), pairs.end(), wanted,
                                         [](const pose_pair& p, double t) { return p.timestamp < t; });
     auto j = static_cast<std::size_t>(after - pairs.begin());
-    if (j <= i) return std::nullopt;  // the delta is below the resolution of the time stamps
+    if (j <= i) return std::nullopt;  // the delta is less than the resolution of the time stamps
     if (j == pairs.size() || (wanted - pairs[j - 1].timestamp < pairs[j].timestamp - wanted)) --j;
     const bool close = std::abs(pairs[j].timestamp - wanted) <= 0.25 * *options.delta_seconds;
     return j > i && close ? std::optional{j} : std::nullopt;

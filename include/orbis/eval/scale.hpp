@@ -16,16 +16,15 @@
 namespace orbis::eval {
 
 struct trajectory_scale {
-  double scale = 1.0;      ///< lengths of the reference over those of the estimate
+  double scale = 1.0;      ///< ratio of lengths in the reference to lengths in the estimate
   double deviation = 0.0;  ///< one standard deviation; infinite if it cannot be estimated
-  std::size_t pairs = 0;   ///< number of poses that it was computed from
+  std::size_t pairs = 0;   ///< number of pose pairs used
 };
 
-/// The scale of the similarity that best aligns `estimate` with `reference`. Its deviation is estimated by leaving out
-/// consecutive tenths of the poses (jackknife), since the errors of successive poses are correlated. For a depth camera
-/// whose depth is `stored / depth_scale`, the true depth scale is `depth_scale / scale`. Errors: as `align`. O(n log
-/// n).
-/// Source: B. Efron, "The jackknife, the bootstrap and other resampling plans", SIAM 1982.
+/// The scale of the similarity that best aligns `estimate` with `reference`. Its deviation is estimated by omitting
+/// consecutive tenths of the poses (jackknife), because the errors of successive poses are correlated. For a depth
+/// camera whose depth is `stored / depth_scale`, the true depth scale is `depth_scale / scale`. Errors as for `align`.
+/// O(n log n). Source: B. Efron, "The jackknife, the bootstrap and other resampling plans", SIAM 1982.
 /// @pre both are sorted by time
 [[nodiscard]] inline result<trajectory_scale> estimate_scale(const trajectory& estimate, const trajectory& reference,
                                                              double max_time_difference = 0.02) {
