@@ -1,18 +1,18 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Collision tests of FCL's geometries (`fcl::Box`, `fcl::Convex`, a mesh as `fcl::BVHModel`, ...) with the octrees of
-/// orbis.
+/// Collision tests between FCL geometries (`fcl::Box`, `fcl::Convex`, a mesh as `fcl::BVHModel`, ...) and orbis
+/// octrees.
 ///
-/// In place: a `fcl_shape` is a shape for `octree::overlaps`, which descends the octree and calls FCL for single boxes
-/// only. Nothing is converted, and the caller chooses the state of unknown space:
+/// Without conversion: an `fcl_shape` is a shape for `octree::overlaps`, which descends the octree and calls FCL only
+/// for single boxes. The caller chooses the state of unknown space:
 ///
 /// @code
 ///   const orbis::interop::fcl_shape arm{std::make_shared<fcl::Capsuled>(0.05, 0.4), T_world_arm};
 ///   const bool hits = orbis::octree::overlaps(map, arm, {.unknown = orbis::octree::occupancy::occupied});
 /// @endcode
 ///
-/// Converted: `to_fcl` returns a `fcl::OcTree` for FCL's own functions and managers. It is a copy of the map as an
-/// octomap::OcTree, and FCL treats unknown space as free.
+/// With conversion: `to_fcl` returns an `fcl::OcTree` for FCL's own functions and managers. It contains a copy of the
+/// map as an octomap::OcTree, and FCL treats unknown space as free.
 ///
 /// J. Pan, S. Chitta, D. Manocha, "FCL: A general purpose library for collision and proximity queries", ICRA 2012.
 #pragma once
@@ -38,12 +38,12 @@
 
 namespace orbis::interop {
 
-/// A geometry at a pose, as an `octree::overlap_shape`. A mesh consists of its triangles: voxels entirely inside a
-/// closed mesh do not overlap it. Results are those of FCL for each box, within its tolerance (1e-6 for most pairs).
+/// A geometry at a pose, as an `octree::overlap_shape`. A mesh consists of its triangles only: voxels entirely inside a
+/// closed mesh do not overlap it. Results are FCL's results for each box, within its tolerance (1e-6 for most pairs).
 /// The geometry is shared.
 class fcl_shape {
  public:
-  /// @pre geometry != nullptr; a finite pose
+  /// @pre geometry != nullptr; the pose is finite
   template <class Geometry>
   fcl_shape(std::shared_ptr<Geometry> geometry, const se3& T_world_geometry)
       : object_{std::move(geometry), to_fcl_transform(T_world_geometry)} {}
@@ -79,13 +79,14 @@ class fcl_shape {
 };
 
 #if FCL_HAVE_OCTOMAP
-/// Copies the map for FCL's own functions: voxels are occupied according to the sensor model; all other space,
-/// including unknown space, is free. O(voxels); uses as much memory as an OctoMap map. Requires FCL built with OctoMap.
+/// Copies the map for FCL's own functions: voxels that the sensor model classifies as occupied are occupied; all other
+/// space, including unknown space, is free. O(voxels); uses as much memory as an OctoMap map. Requires FCL built with
+/// OctoMap.
 template <octree::octomap_model Model>
 [[nodiscard]] std::shared_ptr<fcl::OcTreed> to_fcl(const octree::occupancy_octree<Model>& map) {
   const std::shared_ptr<const octomap::OcTree> tree = to_octomap(map);
   auto out = std::make_shared<fcl::OcTreed>(tree);
-  // A probability equal to the threshold is occupied: FCL tests for free first, and would treat it as free.
+  // A probability equal to the threshold is occupied, but FCL tests for free first and would treat it as free.
   out->setFreeThres(std::nextafter(tree->getOccupancyThres(), 0.0));
   out->computeLocalAABB();
   return out;

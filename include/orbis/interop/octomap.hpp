@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Converts maps to and from `octomap::OcTree` and `octomap::ColorOcTree`; planning on an `octomap::OcTree` in place.
+/// Conversion of maps to and from `octomap::OcTree` and `octomap::ColorOcTree`; planning directly on an
+/// `octomap::OcTree`.
 #pragma once
 
 #include <concepts>
@@ -23,7 +24,7 @@
 
 namespace orbis::interop {
 
-/// A payload of voxels that accumulates colours and returns one.
+/// A voxel payload that accumulates colours and returns one colour.
 template <class P>
 concept color_payload = octree::voxel_payload<P> && requires(P& payload, const P& constant, const rgb8& color) {
   payload.update(color);
@@ -37,15 +38,15 @@ struct colored_map {
   octree::voxel_layer<Color> colors;
 };
 
-/// Converts a map to an `octomap::OcTree` with the same nodes and log-odds, pruned; its parameters are the sensor
-/// model's constants. O(nodes). @pre map.tree_depth() == octree::default_tree_depth
+/// Converts a map to a pruned `octomap::OcTree` with the same nodes and log-odds; its parameters are the sensor model's
+/// constants. O(nodes). @pre map.tree_depth() == octree::default_tree_depth
 template <octree::octomap_model Model>
 [[nodiscard]] std::unique_ptr<octomap::OcTree> to_octomap(const octree::occupancy_octree<Model>& map) {
   return detail::make_tree<octomap::OcTree>(map, [](auto&&...) {});
 }
 /// Converts a map and its colours to an `octomap::ColorOcTree`. A leaf is split where the colours of its voxels differ,
-/// so that none is lost; OctoMap's own `prune()` would merge and average them. Inner nodes have the average of their
-/// children. In OctoMap, white means no colour; colours of unknown voxels are omitted. O(nodes).
+/// so that no colour is lost; OctoMap's own `prune()` would merge and average them. Inner nodes have the average colour
+/// of their children. In OctoMap, white means no colour. Colours of unknown voxels are omitted. O(nodes).
 /// @pre map.tree_depth() == octree::default_tree_depth
 template <octree::octomap_model Model, color_payload Color>
 [[nodiscard]] std::unique_ptr<octomap::ColorOcTree> to_octomap(const octree::occupancy_octree<Model>& map,
@@ -55,15 +56,15 @@ template <octree::octomap_model Model, color_payload Color>
   return tree;
 }
 
-/// Converts an `octomap::OcTree` to a map. The tree's sensor parameters are not used; the map has those of the Model.
-/// Errors: malformed for a log-odds that is not finite, unsupported for a tree whose depth is not 16.
+/// Converts an `octomap::OcTree` to a map. The tree's sensor parameters are ignored; the map uses those of `Model`.
+/// Errors: malformed if a log-odds value is not finite, unsupported if the tree depth is not 16.
 template <octree::octomap_model Model = octree::log_odds<>>
 [[nodiscard]] result<octree::occupancy_octree<Model>> from_octomap(const octomap::OcTree& tree) {
   return detail::read_tree<Model>(tree, [](auto&&...) { return true; });
 }
-/// Converts an `octomap::ColorOcTree` to a map and the colours of its leaves, one observation each; colours of inner
-/// nodes are ignored. Errors: those above, and unsupported for a leaf of more than 32x32x32 voxels with a colour,
-/// because each voxel stores its own.
+/// Converts an `octomap::ColorOcTree` to a map and the colours of its leaves, each as one observation; colours of inner
+/// nodes are ignored. Errors as above, and unsupported for a coloured leaf of more than 32x32x32 voxels, because each
+/// voxel stores its own colour.
 template <octree::octomap_model Model = octree::log_odds<>, color_payload Color = octree::rgb_mean>
 [[nodiscard]] result<colored_map<Model, Color>> from_octomap(const octomap::ColorOcTree& tree) {
   octree::voxel_layer<Color> colors;
@@ -86,7 +87,7 @@ template <octree::octomap_model Model = octree::log_odds<>, color_payload Color 
 
 }  // namespace orbis::interop
 
-/// Access of `nav` to an `octomap::OcTree`, in place. The tree has no change log: each `update` of a field compares
+/// Direct access of `nav` to an `octomap::OcTree`. The tree has no change log, so each `update` of a field compares
 /// everything. Only leaves are read, so inner nodes need not be up to date.
 template <>
 struct orbis::nav::map_access<octomap::OcTree> {
@@ -131,7 +132,7 @@ struct orbis::nav::map_access<octomap::OcTree> {
       if (const octomap::OcTreeNode* const c = child(tree, node, i))
         descend(tree, c, octree::child_key(low, i, octree::node_cells(static_cast<int>(level) - 1)), level - 1, visit);
   }
-  /// States of an octant, or of any octant in a leaf.
+  /// States of an octant, or of any octant in a larger leaf.
   [[nodiscard]] static octree::octant_states states(const octomap::OcTree& tree, const octomap::OcTreeNode* node) {
     octree::octant_states s;
     const auto add = [&](const octomap::OcTreeNode* leaf, std::uint64_t voxels) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// OMPL's planners on maps of orbis: a planning space of `nav` checks states and motions exactly.
+/// OMPL planners on orbis maps: a planning space of `nav` checks states and motions exactly.
 ///
 /// @code
 ///   const auto space = std::make_shared<ompl::base::RealVectorStateSpace>(3);   // or SE3StateSpace
@@ -33,12 +33,12 @@
 
 namespace orbis::interop {
 
-/// Position of a state in metres: the values of a `RealVectorStateSpace` of two or three dimensions, or those of the
-/// first part of a compound space (`SE2StateSpace`, `SE3StateSpace`), if that part is such a space. The rest of the
-/// state is ignored: rotation about the vertical does not change the robot's shape.
+/// Position of a state in metres: the values of a two- or three-dimensional `RealVectorStateSpace`, or of the first
+/// part of a compound space (`SE2StateSpace`, `SE3StateSpace`) if that part is a `RealVectorStateSpace`. The rest of
+/// the state is ignored, because rotation about the vertical does not change the robot's shape.
 class ompl_position {
  public:
-  /// @pre the space is of such a type
+  /// @pre the space has one of these types
   explicit ompl_position(const ompl::base::StateSpace& space) : is_compound_{space.isCompound()} {
     const ompl::base::StateSpace* const part =
         is_compound_ ? space.as<ompl::base::CompoundStateSpace>()->getSubspace(0).get() : &space;
@@ -70,8 +70,8 @@ class ompl_validity_checker : public ompl::base::StateValidityChecker {
   using StateValidityChecker::isValid;
 
   [[nodiscard]] bool isValid(const ompl::base::State* state) const override { return space_.is_free(position_(state)); }
-  /// For a ball in a 3D space: a lower bound on the distance to the nearest obstacle, metres; less than two voxels too
-  /// small, at most the reach of the field, and 0 if the ball may touch an obstacle. For other robots 0. O(1).
+  /// For a ball in a 3D space: a lower bound on the distance to the nearest obstacle, metres. It is less than two
+  /// voxels too small, at most the field's reach, and 0 if the ball may touch an obstacle. For other robots: 0. O(1).
   [[nodiscard]] double clearance(const ompl::base::State* state) const override {
     if constexpr (is_ball)
       return std::max(0.0, space_.field().clearance(position_(state)) - space_.radius());
@@ -89,8 +89,8 @@ class ompl_validity_checker : public ompl::base::StateValidityChecker {
   Space space_;
 };
 
-/// Checks whether the robot is free on the straight segment from one state to another: in continuous space, not at
-/// samples. Safe for concurrent use, but OMPL's motion counters are then approximate, as with its own validator.
+/// Checks whether the robot is free on the straight segment from one state to another, in continuous space rather than
+/// at samples. Safe for concurrent use, but OMPL's motion counters are then approximate, as with OMPL's own validator.
 template <nav::planning_space Space>
 class ompl_motion_validator : public ompl::base::MotionValidator {
  public:
@@ -124,8 +124,8 @@ class ompl_motion_validator : public ompl::base::MotionValidator {
   Space space_;
 };
 
-/// Sets the space as the checker of states and motions of `information`. Call it before `setup()`.
-/// @pre those of ompl_motion_validator
+/// Sets `space` as the state and motion checker of `information`. Call it before `setup()`.
+/// @pre as for ompl_motion_validator
 template <nav::planning_space Space>
 void use_planning_space(const ompl::base::SpaceInformationPtr& information, const Space& space) {
   information->setStateValidityChecker(std::make_shared<ompl_validity_checker<Space>>(information, space));

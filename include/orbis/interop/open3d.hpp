@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Open3D's clouds (`open3d::geometry::PointCloud`). Every algorithm accepts their `points_` in place, as a range of
+/// Open3D point clouds (`open3d::geometry::PointCloud`). Every algorithm accepts their `points_` directly as a range of
 /// points. Filters return indices; `extract` copies the selected points with their colours, normals and covariances:
 ///
 /// @code
@@ -35,13 +35,13 @@ namespace orbis::interop {
   return vec3{static_cast<double>(color.r), static_cast<double>(color.g), static_cast<double>(color.b)} / 255.0;
 }
 
-/// The points with the given indices, in their order, with their colours, normals and covariances.
+/// The points with the given indices, in the order of the indices, with their colours, normals and covariances.
 /// @pre every index < cloud.points_.size()
 [[nodiscard]] inline open3d::geometry::PointCloud extract(const open3d::geometry::PointCloud& cloud,
                                                           std::span<const std::uint32_t> indices) {
   open3d::geometry::PointCloud out;
   const auto take = [&](const auto& from, auto& to) {
-    if (from.size() != cloud.points_.size()) return;  // Open3D's convention: all points have one, or none has
+    if (from.size() != cloud.points_.size()) return;  // Open3D's convention: all points have the attribute, or none
     to.reserve(indices.size());
     for (const std::uint32_t i : indices) {
       assert(i < from.size());
@@ -55,7 +55,7 @@ namespace orbis::interop {
   return out;
 }
 
-/// A copy of the points, as float, and of the colours if every point has one.
+/// Copies the points, as float, and the colours if every point has one.
 [[nodiscard]] inline point_cloud from_open3d(const open3d::geometry::PointCloud& cloud) {
   point_cloud out;
   out.points.reserve(cloud.points_.size());
@@ -66,7 +66,7 @@ namespace orbis::interop {
   return out;
 }
 
-/// A copy as an Open3D cloud, with the colours if there are any.
+/// Copies the points to an Open3D cloud, with the colours if there are any.
 [[nodiscard]] inline open3d::geometry::PointCloud to_open3d(const point_cloud& cloud) {
   open3d::geometry::PointCloud out;
   out.points_.reserve(cloud.size());

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Views of OpenCV's images and points as orbis types, and vice versa, without copies; conversions of keypoints and of
-/// the colour order.
+/// Views of OpenCV images and points as orbis types, and vice versa, without copies; conversion of keypoints and colour
+/// order.
 #pragma once
 
 #include <concepts>
@@ -23,14 +23,14 @@
 
 namespace orbis::interop {
 
-/// Three bytes in OpenCV's usual order.
+/// A colour pixel in OpenCV's usual order.
 struct bgr8 {
   std::uint8_t b = 0, g = 0, r = 0;
   friend bool operator==(const bgr8&, const bgr8&) = default;
 };
 static_assert(sizeof(bgr8) == 3);
 
-/// Pixels that a `cv::Mat` and an `image_view` can share.
+/// Pixel types that a `cv::Mat` and an `image_view` can share.
 template <class T>
 concept shared_pixel = std::same_as<T, std::uint8_t> || std::same_as<T, rgb8> || std::same_as<T, bgr8> ||
     std::same_as<T, std::uint16_t> || std::same_as<T, float> || std::same_as<T, vec3f> || std::same_as<T, vec3>;
@@ -45,9 +45,10 @@ inline constexpr int cv_type = std::same_as<T, std::uint8_t>    ? CV_8UC1
                                : std::same_as<T, vec3>          ? CV_64FC3
                                                                 : CV_8UC3;
 
-/// The pixels of `mat` in place; `mat` (or another header of its data) must outlive the view. The caller chooses `bgr8`
-/// or `rgb8` for three bytes: OpenCV does not record the order. Errors: unsupported, if the type differs, if there are
-/// more than two dimensions, or if rows are not a whole number of pixels apart. An empty matrix gives an empty view.
+/// A view of the pixels of `mat`; `mat` (or another header for its data) must outlive the view. The caller chooses
+/// `bgr8` or `rgb8` for three bytes, because OpenCV does not record the order. Errors: unsupported, if the type
+/// differs, if there are more than two dimensions, or if the row stride is not a multiple of the pixel size. An empty
+/// matrix gives an empty view.
 template <shared_pixel T>
 [[nodiscard]] result<image_view<const T>> view_as(const cv::Mat& mat) {
   if (mat.empty()) return image_view<const T>{};
@@ -58,15 +59,15 @@ template <shared_pixel T>
                 "has type " + cv::typeToString(mat.type()) + ", not " + cv::typeToString(cv_type<T>));
   const std::size_t step = mat.step[0];
   if (mat.rows > 1 && step % sizeof(T) != 0)
-    return fail(errc::unsupported, "cv::Mat", "has rows that are not a whole number of pixels apart");
+    return fail(errc::unsupported, "cv::Mat", "has a row stride that is not a multiple of the pixel size");
   const std::ptrdiff_t stride = mat.rows > 1 ? static_cast<std::ptrdiff_t>(step / sizeof(T)) : mat.cols;
   return image_view<const T>{mat.ptr<T>(), mat.cols, mat.rows, stride};
 }
 
-/// The points of `mat` in place, row by row. S = float: CV_32FC3 of any shape (an organised cloud, a row, a column) or
-/// CV_32FC1 with three columns, a point in each row; S = double: CV_64FC3, CV_64FC1. `mat` (or another header of its
-/// data) must outlive the points. For rows with more than x, y and z pass `mat.colRange(0, 3)`. An empty matrix has no
-/// points. Errors: unsupported, if the type or the shape differs.
+/// A view of the points in `mat`, row by row. S = float: CV_32FC3 of any shape (an organised cloud, a row, a column) or
+/// CV_32FC1 with three columns and one point per row; S = double: CV_64FC3 or CV_64FC1. `mat` (or another header for
+/// its data) must outlive the points. For rows with more than x, y and z, pass `mat.colRange(0, 3)`. An empty matrix
+/// has no points. Errors: unsupported, if the type or the shape differs.
 template <std::floating_point S>
 requires(sizeof(S) == 4 || sizeof(S) == 8) [[nodiscard]] result<strided_points<S>> points_in(const cv::Mat& mat) {
   constexpr int depth = sizeof(S) == 4 ? CV_32F : CV_64F;
@@ -78,7 +79,7 @@ requires(sizeof(S) == 4 || sizeof(S) == 8) [[nodiscard]] result<strided_points<S
                 "has type " + cv::typeToString(mat.type()) + ", not " + cv::typeToString(CV_MAKETYPE(depth, 3)) +
                     " or " + cv::typeToString(CV_MAKETYPE(depth, 1)));
   if (mat.channels() == 1 && mat.cols != 3)
-    return fail(errc::unsupported, "cv::Mat", "has " + std::to_string(mat.cols) + " columns, not x, y and z");
+    return fail(errc::unsupported, "cv::Mat", "has " + std::to_string(mat.cols) + " columns; must have 3 (x, y, z)");
   const auto step = static_cast<std::ptrdiff_t>(mat.step[0] / sizeof(S));
   const auto rows = static_cast<std::size_t>(mat.rows);
   const auto cols = static_cast<std::size_t>(mat.cols);
@@ -96,7 +97,7 @@ template <shared_pixel T>
 }
 
 /// A `cv::Mat` header over constant pixels; the pixels must outlive it. `cv::Mat` has no const data: do not write to
-/// it.
+/// the matrix.
 template <shared_pixel T>
 [[nodiscard]] const cv::Mat mat_over(image_view<const T> view) {  // NOLINT(readability-const-return-type)
   if (view.empty()) return {};
@@ -104,7 +105,7 @@ template <shared_pixel T>
           static_cast<std::size_t>(view.stride()) * sizeof(T)};
 }
 
-/// An `rgb8` image of `bgr8` pixels, a copy.
+/// Copies `bgr8` pixels to an `rgb8` image.
 [[nodiscard]] inline image<rgb8> to_rgb(image_view<const bgr8> view) {
   image<rgb8> rgb(view.width(), view.height());
   for (int y = 0; y != view.height(); ++y)
@@ -112,7 +113,7 @@ template <shared_pixel T>
   return rgb;
 }
 
-/// A CV_8UC3 matrix in OpenCV's usual order, a copy.
+/// Copies the pixels to a CV_8UC3 matrix in OpenCV's usual order.
 [[nodiscard]] inline cv::Mat to_bgr(image_view<const rgb8> view) {
   cv::Mat mat(view.height(), view.width(), CV_8UC3);
   for (int y = 0; y != view.height(); ++y)
@@ -121,7 +122,8 @@ template <shared_pixel T>
   return mat;
 }
 
-/// A keypoint of OpenCV. Angles: degrees in OpenCV (-1: none), radians in orbis (none is 0).
+/// Converts an OpenCV keypoint. Angles are in degrees in OpenCV (-1: no angle) and in radians in orbis (no angle
+/// becomes 0).
 [[nodiscard]] inline features::keypoint from_cv(const cv::KeyPoint& k) {
   constexpr float radians = std::numbers::pi_v<float> / 180.0F;
   return {k.pt.x, k.pt.y, k.size, k.angle < 0.0F ? 0.0F : k.angle * radians, k.response, k.octave};
@@ -143,7 +145,7 @@ template <shared_pixel T>
   return converted;
 }
 
-/// Descriptors as OpenCV's CV_8UC1 rows, in place; read only. @pre little-endian byte order
+/// A read-only view of descriptors as the rows of a CV_8UC1 matrix. @pre little-endian byte order
 template <std::size_t Bits>
 [[nodiscard]] const cv::Mat mat_over(  // NOLINT(readability-const-return-type)
     std::span<const features::binary_descriptor<Bits>> descriptors) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// PCL's clouds. Every algorithm accepts a `pcl::PointCloud` in place, as a range of points. Filters return indices
+/// PCL point clouds. Every algorithm accepts a `pcl::PointCloud` directly as a range of points. Filters return indices
 /// into the cloud; `extract` copies the selected points with all their fields:
 ///
 /// @code
@@ -29,7 +29,7 @@
 
 namespace orbis::interop {
 
-/// A point type of PCL with a colour.
+/// A PCL point type with a colour.
 template <class P>
 concept colored_pcl_point = point_like<P> && requires(P& p, const P& constant) {
   { constant.r } -> std::convertible_to<std::uint8_t>;
@@ -44,9 +44,9 @@ template <colored_pcl_point P>
   return {point.r, point.g, point.b};
 }
 
-/// Position from which the cloud's points were observed, metres in its frame: `sensor_origin_`. PCL uses zeros for an
-/// unknown origin: zeros count as the origin for an organised cloud, which one sensor measured, and as unknown for
-/// other clouds.
+/// Position from which the cloud's points were observed, in metres in the frame of the cloud: `sensor_origin_`. PCL
+/// uses zeros for an unknown origin. Zeros count as the actual origin for an organised cloud, because a single sensor
+/// measured it, and as unknown for other clouds.
 template <point_like P>
 [[nodiscard]] std::optional<vec3> sensor_origin(const pcl::PointCloud<P>& cloud) {
   const vec3 origin = cloud.sensor_origin_.template head<3>().template cast<double>();
@@ -54,7 +54,7 @@ template <point_like P>
   return origin;
 }
 
-/// The points of an organised cloud as an image, in place. Errors: unsupported, if the cloud is not organised. An empty
+/// A view of the points of an organised cloud as an image. Errors: unsupported, if the cloud is not organised. An empty
 /// cloud gives an empty view.
 template <point_like P>
 [[nodiscard]] result<image_view<const P>> as_image(const pcl::PointCloud<P>& cloud) {
@@ -70,8 +70,8 @@ template <point_like P>
   return as_image(cloud);
 }
 
-/// The points with the given indices, in their order, with all of their fields; header and sensor pose are those of the
-/// cloud. @pre every index < cloud.size()
+/// The points with the given indices, in the order of the indices, with all their fields; the header and sensor pose
+/// are copied from the cloud. @pre every index < cloud.size()
 template <point_like P>
 [[nodiscard]] pcl::PointCloud<P> extract(const pcl::PointCloud<P>& cloud, std::span<const std::uint32_t> indices) {
   pcl::PointCloud<P> out;
@@ -90,7 +90,7 @@ template <point_like P>
   return out;
 }
 
-/// A copy of the points, with their colours if they have any.
+/// Copies the points, with their colours if they have any.
 template <point_like P>
 [[nodiscard]] point_cloud from_pcl(const pcl::PointCloud<P>& cloud) {
   point_cloud out;
@@ -106,7 +106,7 @@ template <point_like P>
   return out;
 }
 
-/// A copy as a PCL cloud; colours if both sides have them, PCL's defaults for all other fields.
+/// Copies the points to a PCL cloud, with colours if both types have them; all other fields have PCL's defaults.
 template <point_like P = pcl::PointXYZRGB>
 [[nodiscard]] pcl::PointCloud<P> to_pcl(const point_cloud& cloud) {
   pcl::PointCloud<P> out;
@@ -132,7 +132,7 @@ template <point_like P = pcl::PointXYZRGB>
 
 }  // namespace orbis::interop
 
-/// Origin of the cloud for filters that need ranges.
+/// The sensor origin of a PCL cloud, for filters that need ranges.
 template <orbis::point_like P>
 struct orbis::cloud::cloud_traits<pcl::PointCloud<P>> {
   [[nodiscard]] static std::optional<vec3> sensor_origin(const pcl::PointCloud<P>& cloud) {

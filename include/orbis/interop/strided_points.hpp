@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Points at a constant stride in a buffer, read in place: matrices, images of points, packed
-/// messages, columns of a table.
+/// A view of points at a constant stride in a buffer: matrices, images of points, packed messages, columns of a table.
 ///
-/// Eigen's matrices need none of this: `m.colwise()` and `m.rowwise()` are ranges of points already.
+/// Eigen matrices do not need this: `m.colwise()` and `m.rowwise()` are already ranges of points.
 #pragma once
 
 #include <array>
@@ -16,16 +15,16 @@
 
 namespace orbis::interop {
 
-/// Layout of the points, in units of numbers of type `S`.
+/// Layout of the points; strides are in units of `S`.
 struct point_layout {
   std::ptrdiff_t point_stride = 3;       ///< from one point to the next
   std::ptrdiff_t coordinate_stride = 1;  ///< from x to y, and from y to z
-  std::size_t row_length = 0;            ///< points in a row; 0: all of them are in one
-  std::ptrdiff_t row_stride = 0;         ///< from the first point of a row to that of the next
+  std::size_t row_length = 0;            ///< points in a row; 0: all points are in one row
+  std::ptrdiff_t row_stride = 0;         ///< from the first point of a row to the first point of the next
 };
 
-/// A view of `size` points of coordinates `S`; each is read as a `std::array<S, 3>`. A `point_range`
-/// that owns nothing: the buffer must outlive it. Iterators outlive the view.
+/// A view of `size` points with coordinates of type `S`; each point is read as a `std::array<S, 3>`. A non-owning
+/// `point_range`: the buffer must outlive it. Iterators remain valid after the view is destroyed.
 template <std::floating_point S>
 class strided_points {
  public:
@@ -34,7 +33,7 @@ class strided_points {
     using value_type = std::array<S, 3>;
     using difference_type = std::ptrdiff_t;
     using iterator_concept = std::random_access_iterator_tag;
-    using iterator_category = std::input_iterator_tag;  // points are made as they are read
+    using iterator_category = std::input_iterator_tag;  // points are created when they are read
 
     constexpr iterator() noexcept = default;
 
@@ -90,7 +89,7 @@ class strided_points {
   };
 
   constexpr strided_points() noexcept = default;
-  /// `data`: x of the first point. @pre the buffer holds all of the points; rows are full
+  /// `data`: x of the first point. @pre the buffer holds all points; rows are full
   constexpr strided_points(const S* data, std::size_t size, const point_layout& layout = {}) noexcept
       : data_{data}, size_{size}, layout_{layout} {
     assert(layout.row_length == 0 || size % layout.row_length == 0);

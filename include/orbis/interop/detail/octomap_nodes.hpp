@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Converts between the nodes of OctoMap's trees and those of a map.
+/// Conversion between the nodes of OctoMap trees and the nodes of a map.
 #pragma once
 
 #include <algorithm>
@@ -41,7 +41,7 @@ class open_tree : public Tree {
   }
 };
 
-/// Builds OctoMap's nodes from those of an `.ot` file. Calls `finish_leaf(tree, node, code, level)` for each leaf in
+/// Builds OctoMap nodes from the nodes of an `.ot` file. Calls `finish_leaf(tree, node, code, level)` for each leaf in
 /// Morton order.
 template <class Tree, class FinishLeaf>
 class tree_builder {
@@ -89,7 +89,7 @@ template <class Tree, octree::octomap_model Model, class FinishLeaf>
 /// The level of an octant, the largest node that occupancy_octree::edit_octant changes in one call.
 inline constexpr int octant_level = 2;
 
-/// Builds a map from OctoMap's nodes. Calls `see_leaf(node, key, level)` for each leaf; the callback returns false to
+/// Builds a map from OctoMap nodes. Calls `see_leaf(node, key, level)` for each leaf; the callback returns false to
 /// stop.
 template <class Tree, class Model, class SeeLeaf>
 class tree_reader {
@@ -98,7 +98,7 @@ class tree_reader {
   tree_reader(const Tree& tree, octree::occupancy_octree<Model>& map, SeeLeaf& see_leaf)
       : tree_{tree}, map_{map}, see_leaf_{see_leaf} {}
 
-  /// Reads a node at `level`. Returns false on an error, see problem().
+  /// Reads a node at `level`. Returns false on error, see problem().
   [[nodiscard]] bool read(const node& n, const octree::voxel_key& key, int level) {
     if (!tree_.nodeHasChildren(&n)) {
       float value = 0;
