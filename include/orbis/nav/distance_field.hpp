@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A truncated Euclidean distance field of an occupancy map: the distance to the nearest obstacle. It follows the map.
+/// A truncated Euclidean distance field of an occupancy map (distance to the nearest obstacle) that follows map
+/// changes.
 ///
 /// @code
 ///   map.track_changes();
@@ -35,25 +36,25 @@
 namespace orbis::nav {
 
 struct distance_field_options {
-  double reach = 1.0;  ///< maximum distance; larger ones are reported as `reach`, metres; 1 to 181 voxels
-  /// State that an unknown voxel counts as: occupied or free.
+  double reach = 1.0;  ///< maximum distance, metres (1 to 181 voxels); larger distances are reported as `reach`
+  /// State assumed for unknown voxels: occupied or free.
   octree::occupancy unknown = octree::occupancy::occupied;
-  /// Exchanges obstacles and free space: the field is then the depth inside obstacles, and 0 outside them. See
+  /// Swaps obstacles and free space: the field then contains the depth inside obstacles, and 0 outside them. See
   /// signed_distance.
   bool inside = false;
   /// Maximum number of bricks of 8x8x8 voxels (2.9 kB each) for leaves of the map that are larger than a brick: a file
-  /// of a few bytes can describe a leaf as large as the grid. Leaves beyond the limit are left out, see `is_complete`.
+  /// of a few bytes can describe a leaf as large as the grid. Leaves beyond the limit are omitted, see `is_complete`.
   std::size_t max_bricks = std::size_t{1} << 19U;
 };
 
-/// A distance and its gradient: dimensionless, of length about 1 where a single obstacle is nearest.
+/// A distance and its gradient, which is dimensionless and has a length of about 1 where a single obstacle is nearest.
 struct distance_with_gradient {
   double distance = 0.0;  ///< metres
   vec3 gradient = zeros<vec3>();
 };
 
-/// Distances in metres. The distance of a voxel is the one between its centre and the centre of the nearest obstacle
-/// voxel: 0 in obstacles, and at most `reach()`. Space outside the grid counts as unknown.
+/// Distances in metres. The distance of a voxel is measured between its centre and the centre of the nearest obstacle
+/// voxel; it is 0 in obstacles and at most `reach()`. Space outside the grid counts as unknown.
 template <class Voxels>
 class metric_distances {
  public:
@@ -65,9 +66,9 @@ class metric_distances {
   }
   [[nodiscard]] double distance(const octree::voxel_key& k) const noexcept { return metres(voxels_.squared(k)); }
   /// Interpolates linearly along each axis between the centres of the eight voxels around `p` (metres). The distance is
-  /// continuous, and the gradient is its derivative. Beyond the centres of the outermost voxels of the grid: if the
-  /// outside is an obstacle it counts as one; otherwise the outermost values extend to the edge of the grid, and the
-  /// distance outside the grid is `reach()`. O(1), about 50 ns.
+  /// continuous, and the gradient is its derivative. Beyond the centres of the grid's outermost voxels, space outside
+  /// the grid counts as an obstacle if unknown space does; otherwise the outermost values extend to the edge of the
+  /// grid, and the distance outside the grid is `reach()`. O(1), about 50 ns.
   template <point_like P>
   [[nodiscard]] distance_with_gradient distance_and_gradient(const P& p) const noexcept {
     const auto c = coordinates<double>(p);
@@ -105,7 +106,7 @@ class metric_distances {
     const double along_y = mix(x10 - x00, x11 - x01, w);
     return {mix(y0, y1, w), vec3{along_x, along_y, y1 - y0} / cell};
   }
-  /// Radius (metres) around `p` that is certain to contain no point of an obstacle's cube; 0 in obstacles. O(1).
+  /// Radius (metres) of a ball around `p` that certainly contains no point of an obstacle's cube; 0 in obstacles. O(1).
   template <point_like P>
   [[nodiscard]] double clearance(const P& p) const noexcept {
     const auto k = grid_.key(p);
@@ -138,14 +139,14 @@ class metric_distances {
   double reach_;
 };
 
-/// The distances at one moment, for readers. It shares memory with the field that it was made from, and does not
-/// change.
+/// An immutable snapshot of the distances, for readers. It shares memory with the field from which it was made.
 using distance_view = metric_distances<squared_distance_view>;
 
 /// Signed distance at `p` (metres) and its gradient, from two fields of one map: a normal one, and one with the option
-/// `inside`. The distance is positive outside obstacles and negative in them, where the gradient points outwards;
-/// its range is [-reach, reach], and it is interpolated like both fields. Between two adjacent voxels, one of which is
-/// an obstacle, it changes from minus to plus the edge of a voxel, and is 0 on the face between them. O(1).
+/// `inside`. The distance is positive outside obstacles and negative inside, where the gradient points outwards; it is
+/// interpolated in the same way as the two fields, and its range is [-reach, reach]. Between an obstacle voxel and an
+/// adjacent free voxel, it changes from minus to plus the edge length of a voxel, and is 0 on the face between them.
+/// O(1).
 ///
 /// @code
 ///   const orbis::nav::distance_field outside{map, {.reach = 1.0}}, inside{map, {.reach = 0.5, .inside = true}};
@@ -158,14 +159,14 @@ template <class Outside, class Inside, point_like P>
   return {to.distance - out.distance, to.gradient - out.gradient};
 }
 
-/// The distance field of a map. It is bit for bit equal to one rebuilt from the current map, regardless of the order of
-/// changes, including obstacles that appear and disappear. It needs no bounds. The algorithm is described in
-/// squared_distances.hpp.
+/// The distance field of a map. It is bitwise identical to a field rebuilt from the current map, regardless of the
+/// order of changes, including obstacles that appear and disappear. No bounds need to be specified. The algorithm is
+/// described in squared_distances.hpp.
 ///
-/// For one thread at a time. Readers on other threads use a `view()`, made on the thread that updates the field.
+/// Not thread-safe. Readers on other threads use a `view()` made on the thread that updates the field.
 class distance_field : public metric_distances<squared_distances> {
  public:
-  /// A field of an empty map. @pre options.reach is 1 to 181 times the resolution
+  /// The field of an empty map. @pre options.reach is 1 to 181 times the resolution
   explicit distance_field(const octree::voxel_grid& grid, const distance_field_options& options = {})
       : metric_distances{grid,
                          {static_cast<int>(std::ceil(options.reach / grid.resolution() - 1e-9)), grid.cells(),
@@ -179,21 +180,20 @@ class distance_field : public metric_distances<squared_distances> {
     update(map);
   }
 
-  /// Follows the map by its change log (`map.changes()`) if it has one that covers all changes since the last update.
-  /// Otherwise it compares everything: after changes that the log does not record (see
-  /// occupancy_octree::track_changes), and each time if changes are not tracked. Costs as much as
-  /// squared_distances::update, plus O(bricks of the field + octants of the map) to compare everything. Of a leaf with
-  /// an edge of 256 voxels or more, only the part within reach of its faces costs time and memory; if such a leaf has
-  /// appeared or disappeared since everything was last compared, the field is rebuilt. @pre the same map every time,
-  /// with the same grid
+  /// Updates the field from the map's change log (`map.changes()`) if the log covers all changes since the last update.
+  /// Otherwise compares everything: after changes that the log does not record (see occupancy_octree::track_changes),
+  /// and every time if changes are not tracked. Costs as much as squared_distances::update, plus O(bricks of the field
+  /// + octants of the map) if everything is compared. Of a leaf with an edge of 256 voxels or more, only the part
+  /// within reach of its faces costs time and memory; if such a leaf has appeared or disappeared since everything was
+  /// last compared, the field is rebuilt. @pre the same map every time, with the same grid
   template <planning_map Map>
   void update(const Map& map) {
     assert(map_access<Map>::grid(map) == grid_);
     follower_.follow(map, changed_in(map), [&] { compare_all(map); });
   }
-  /// Follows a copy of the map (a snapshot) with the log of the original map. `revision`: of the log when the copy was
-  /// made. The log may be newer than the copy, and the copy may be older than the previous one: the field becomes that
-  /// of the copy.
+  /// Updates the field from a copy of the map (a snapshot) and the change log of the original map. `revision`: revision
+  /// of the log when the copy was made. The log may be newer than the copy, and the copy may be older than the previous
+  /// one; the result is the field of the copy.
   ///
   /// @code
   ///   listeners.published = [&](const auto& snapshot, const octree::change_log& log) {  // of a live_map_thread
@@ -206,7 +206,7 @@ class distance_field : public metric_distances<squared_distances> {
     assert(map_access<Map>::grid(copy) == grid_);
     follower_.follow(log, revision, changed_in(copy), [&] { compare_all(copy); });
   }
-  /// Follows the map by comparing everything, without the log.
+  /// Updates the field by comparing everything, without the log.
   template <planning_map Map>
   void update_all(const Map& map) {
     assert(map_access<Map>::grid(map) == grid_);
@@ -221,15 +221,15 @@ class distance_field : public metric_distances<squared_distances> {
     const auto found = k ? voxels_.nearest(*k) : std::nullopt;
     return found ? std::optional{grid_.center(*found)} : std::nullopt;
   }
-  /// A view for readers on other threads. Call it on the thread that updates the field, between two updates, for
-  /// example after each one, and pass it on under a lock or by an atomic shared pointer. It shares its memory with the
-  /// field and does not change; several threads may read it at once, and it may be copied and destroyed on any thread.
-  /// O(bricks): a pointer and an atomic increment for each 4 of them; the field then clones the parts that it writes
-  /// to, 4 kB at a time. On the updating thread query the field itself.
+  /// A view for readers on other threads. Call this on the thread that updates the field, between two updates (for
+  /// example, after each one), and pass the view on under a lock or through an atomic shared pointer. The view shares
+  /// memory with the field and does not change; several threads may read it concurrently, and it may be copied and
+  /// destroyed on any thread. O(bricks): one pointer and one atomic increment per 4 bricks; afterwards, the field
+  /// clones the parts that it writes to, 4 kB at a time. On the updating thread, query the field itself.
   [[nodiscard]] distance_view view() const { return {grid_, voxels_.view(), reach_}; }
-  /// False if leaves of the map were left out because of `max_bricks`: they count as unknown, at least where the field
+  /// False if leaves of the map were omitted because of `max_bricks`: they count as unknown, at least where the field
   /// stores nothing. In that case, if unknown space counts as an obstacle, distances may be too short; if it counts as
-  /// free, obstacles are missing. With the option `inside` the reverse holds.
+  /// free, obstacles are missing. With the option `inside`, the reverse holds.
   [[nodiscard]] bool is_complete() const noexcept { return is_complete_; }
   [[nodiscard]] const distance_field_options& options() const noexcept { return options_; }
   /// Bytes on the heap.
@@ -311,14 +311,14 @@ class distance_field : public metric_distances<squared_distances> {
           }
     });
     if (!cubes.empty()) voxels_.begin(cubes);
-    // Parts of a cube that have become unknown in the map are not visited.
+    // The traversal does not visit parts of a cube that have become unknown in the map.
     return is_same && (is_first || in_cubes == cubes_.volume);
   }
   /// Volume of a node in voxels.
   [[nodiscard]] static std::uint64_t volume(int level) noexcept { return std::uint64_t{1} << (3 * level); }
   void apply() {
     voxels_.update(octants_);
-    // Keep the capacity that usual updates need, so that they allocate nothing.
+    // Keep the capacity that typical updates need, so that they allocate nothing.
     constexpr std::size_t few = (std::size_t{1} << 20U) / sizeof(octant_obstacles);
     if (octants_.capacity() > std::max(few, 8 * voxels_.brick_count())) octants_ = std::vector<octant_obstacles>();
   }

@@ -35,7 +35,7 @@ ORBIS_INLINE image<float> squared_floor_distances(const image<floor_state>& stat
       if (last >= 0) offer(x, last);
     }
   }
-  // The lower envelope of the parabolas of a column: the lowest parabola, and where it begins.
+  // The lower envelope of the parabolas in a column: the index of each lowest parabola, and where it begins.
   std::vector<double> column(static_cast<std::size_t>(height)), begin(column.size());
   std::vector<int> lowest(column.size());
   for (int x = 0; x != width; ++x) {

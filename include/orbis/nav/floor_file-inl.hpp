@@ -19,7 +19,7 @@ namespace orbis::nav {
 
 ORBIS_INLINE result<void> save_floor_map(const std::filesystem::path& path, const floor_map& map) {
   const auto fits = [&](double number) { return std::isfinite(number); };
-  if (!path.has_filename()) return fail(errc::invalid_argument, path.string(), "has no file name; name a .yaml file");
+  if (!path.has_filename()) return fail(errc::invalid_argument, path.string(), "has no file name; pass a .yaml file");
   if (map.states.empty() || !fits(map.origin.x()) || !fits(map.origin.y()) ||
       !(fits(map.resolution) && map.resolution > 0))
     return fail(errc::invalid_argument, path.string(),
@@ -27,7 +27,7 @@ ORBIS_INLINE result<void> save_floor_map(const std::filesystem::path& path, cons
   const std::filesystem::path image_path = std::filesystem::path{path}.replace_extension(".pgm");
   const std::string name = image_path.filename().string();
   if (image_path == path)
-    return fail(errc::invalid_argument, path.string(), "ends in .pgm, the name of the image; name a .yaml file");
+    return fail(errc::invalid_argument, path.string(), "is the name of the .pgm image; pass a .yaml file");
   for (const char c : name)
     if (c == '"' || c == '\\' || static_cast<unsigned char>(c) < 0x20)
       return fail(errc::invalid_argument, path.string(),

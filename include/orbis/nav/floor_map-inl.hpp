@@ -30,7 +30,7 @@ inline constexpr std::uint64_t most_octants_on_leaves = std::uint64_t{1} << 24U;
 template <planning_map Map>
 std::optional<double> find_floor(const Map& map) {
   const octree::voxel_grid& grid = map_access<Map>::grid(map);
-  std::vector<std::size_t> surface(grid.cells());  // by layer
+  std::vector<std::size_t> surface(grid.cells());  // surface area by layer
   auto read = map_access<Map>::octants(map);
   std::uint64_t of_leaves = 0;
   map_access<Map>::for_each_octant(map, [&](const octree::voxel_key& k, int level, const octree::octant_states& s) {
@@ -63,7 +63,7 @@ std::optional<double> find_floor(const Map& map) {
 namespace detail {
 
 /// Replaces each value by the extreme of the values at most `radius` away along both axes: combines ranges of doubling
-/// lengths, and finally two of these that overlap. The value `nothing` means "no value". O(values x log radius).
+/// lengths, and finally two overlapping ranges. The value `nothing` means "no value". O(values x log radius).
 template <class Extreme>
 void spread_extremes(image<int>& values, int radius, int nothing, const Extreme& extreme) {
   std::vector<int> line;
@@ -83,12 +83,12 @@ void spread_extremes(image<int>& values, int radius, int nothing, const Extreme&
   for (int x = 0; x != values.width(); ++x) along(&values(x, 0), &values(0, 1) - &values(0, 0), values.height());
 }
 
-/// Surfaces of columns, and those that a robot can reach.
+/// Surfaces in columns, and the ones that a robot can reach.
 class floor_search {
  public:
   static constexpr int none = no_level;
 
-  /// Levels are those of `columns`; `lowest` and `highest`: range of the levels of surfaces; `clear` and `step` in
+  /// Levels are relative to `columns`; `lowest` and `highest`: range of the surface levels; `clear` and `step`: in
   /// voxels.
   floor_search(const voxel_columns& columns, int lowest, int highest, int clear, int step, octree::occupancy unknown)
       : columns_{columns},
@@ -142,7 +142,7 @@ class floor_search {
   [[nodiscard]] floor_state judge_other(int x, int y, int level) const {
     const int from = std::max(level + step_ + 1, 0);
     if (columns_.next_occupied(x, y, from) <= level + step_ + clear_) return floor_state::occupied;
-    // Below level 0 and above the last level everything is unknown, unless the grid ends there.
+    // Below level 0 and above the last level, everything is unknown, unless the grid ends there.
     const int deepest = columns_.low().z == 0 ? std::max(level - step_, 0) : level - step_;
     if (deepest >= 0 && columns_.next_occupied(x, y, deepest) > level && columns_.next_unknown(x, y, deepest) > level)
       return floor_state::occupied;
@@ -151,7 +151,7 @@ class floor_search {
   /// Sets the radius of is_steep, in cells. Call it after `flood` and before `judge_surface`.
   void set_radius(int radius) {
     radius_ = std::min(radius, std::max(levels_.width(), levels_.height()));
-    // Sums of integers are faster, if they fit.
+    // Integer sums are faster if they fit.
     const double r = radius_, rise = std::min(static_cast<double>(step_) * r, static_cast<double>(columns_.levels()));
     if ((2.0 * r + 1.0) * (2.0 * r + 1.0) * r * std::max(r, rise) < std::numeric_limits<std::int32_t>::max())
       sums_ = simd::kernel<plane_sums_kernel<std::int32_t>, plane_sums(const level_window&)>();
@@ -165,8 +165,8 @@ class floor_search {
     spread_extremes(high_, radius_, none, [](int a, int b) { return std::max(a, b); });
   }
 
-  /// For each column, the level of the nearest column that has one, counting steps to the four neighbours; the lowest
-  /// on ties. `otherwise` if there is none.
+  /// For each column, the level of the nearest column with a level, counting steps to the four neighbours; the lowest
+  /// on ties. `otherwise` if no column has a level.
   [[nodiscard]] image<int> spread_levels(int otherwise) const {
     image<int> spread = levels_;
     std::vector<std::array<int, 2>> border, next;
@@ -238,7 +238,7 @@ class floor_search {
     reached_.resize(surfaces_.size());
   }
   /// Returns true if the floor around rises by more than a step, and its least-squares plane is steeper than `steepest`
-  /// (tangent). Columns that differ by at most a step per cell of distance count, so that ledges do not.
+  /// (tangent). Only columns that differ by at most a step per cell of distance count, which excludes ledges.
   [[nodiscard]] bool is_steep(int x, int y, double steepest) const {
     const int level = levels_(x, y);
     if (high_(x, y) - low_(x, y) <= step_ || step_ == 0) return false;
@@ -257,7 +257,7 @@ class floor_search {
     const double xx = s.xx - s.x * s.x / s.n, xy = s.xy - s.x * s.y / s.n, yy = s.yy - s.y * s.y / s.n,
                  xz = s.xz - s.x * s.z / s.n, yz = s.yz - s.y * s.z / s.n;
     const double determinant = xx * yy - xy * xy;
-    if (determinant < 1e-9 * xx * yy || determinant <= 0.0) {  // all in one row: the slope along it
+    if (determinant < 1e-9 * xx * yy || determinant <= 0.0) {  // all columns in one row: the slope along it
       const double along = xx + yy, rise = std::hypot(xz, yz);
       return along > 0.0 && rise > steepest * along;
     }
@@ -270,11 +270,11 @@ class floor_search {
   octree::occupancy unknown_;
   int radius_ = 1;
   plane_sums (*sums_)(const level_window&) = nullptr;
-  std::vector<surface> surfaces_;     ///< by column, from the lowest
-  std::vector<std::uint32_t> first_;  ///< of each column
+  std::vector<surface> surfaces_;     ///< surfaces by column, the lowest first
+  std::vector<std::uint32_t> first_;  ///< index of each column's first surface
   std::vector<bool> reached_;
   image<int> levels_;
-  image<int> low_{}, high_{};  ///< of the levels within the radius
+  image<int> low_{}, high_{};  ///< extremes of the levels within the radius
 };
 
 }  // namespace detail
@@ -286,7 +286,7 @@ result<floor_map> make_floor_map(const Map& map, const ground_robot& robot, cons
   constexpr std::uint64_t most_words = std::uint64_t{1} << 26U;
   const octree::voxel_grid& grid = map_access<Map>::grid(map);
   const double cell = grid.resolution();
-  const auto limited = [&](double voxels) {  // at most the size of the grid: a limit may be infinite
+  const auto limited = [&](double voxels) {  // at most the size of the grid, because a limit may be infinite
     return static_cast<int>(std::min(voxels, static_cast<double>(std::min(grid.cells(), 1U << 24U))));
   };
   const auto voxels = [&](double metres) { return limited(std::ceil(metres / cell - 1e-6)); };

@@ -9,7 +9,7 @@
 /// @endcode
 ///
 /// The world is upright: z points up, against gravity. The library orbis::compiled contains the functions for
-/// octree::occupancy_octree<>; users of other maps include floor_map-inl.hpp.
+/// octree::occupancy_octree<>; for other map types, include floor_map-inl.hpp.
 #pragma once
 
 #include <array>
@@ -27,37 +27,37 @@
 
 namespace orbis::nav {
 
-/// A robot as a vertical cylinder that drives.
+/// A ground robot, modelled as a vertical cylinder.
 struct ground_robot {
   double radius = 0.2;      ///< metres
-  double height = 0.5;      ///< space that it needs above the floor, metres
-  double step = 0.05;       ///< the highest step that it drives up or down, metres; less than a voxel: none
-  double max_slope = 0.35;  ///< the steepest floor that it drives on, radians
+  double height = 0.5;      ///< clearance that it needs above the floor, metres
+  double step = 0.05;       ///< the highest step that it can drive up or down, metres; less than a voxel: none
+  double max_slope = 0.35;  ///< the steepest floor that it can drive on, radians
 };
 
-/// State of a cell of the floor.
+/// State of a floor cell.
 enum class floor_state : std::uint8_t {
   unknown,
-  free,     ///< the robot's centre may be over it, considering this cell alone
-  occupied  ///< an obstacle, a drop, a hole, too high a step, too steep a floor, or too little height
+  free,     ///< the robot's centre may be above it, considering only this cell
+  occupied  ///< an obstacle, a drop, a hole, a step too high, a floor too steep, or too little clearance
 };
 
 struct floor_map_options {
-  std::optional<double> floor{};  ///< height of the floor, metres; empty: that of find_floor
+  std::optional<double> floor{};  ///< height of the floor, metres; empty: the result of find_floor
   double below = 1.0;             ///< how far below the floor ramps and stairs are followed, metres
-  double above = 1.0;             ///< how far above the floor, metres
-  /// State of a cell about which too little is known: unknown, free or occupied.
+  double above = 1.0;             ///< how far above the floor they are followed, metres
+  /// State assigned to a cell if too little is known about it: unknown, free or occupied.
   octree::occupancy unknown = octree::occupancy::unknown;
   std::optional<octree::bounding_box> region{};  ///< part of the map to use (x and y), metres; empty: all
 };
 
 /// The floor as a grid of square cells, one for each column of voxels. Cell (0, 0) has the smallest x and y.
 struct floor_map {
-  double resolution = 0.0;      ///< the edge of a cell, metres
+  double resolution = 0.0;      ///< edge length of a cell, metres
   vec2 origin = zeros<vec2>();  ///< the low corner of cell (0, 0), metres
   double floor = 0.0;           ///< height of the floor where the search began, metres; see find_floor
   image<floor_state> states{};
-  image<float> heights{};  ///< of the floor, metres; NaN where the robot cannot go
+  image<float> heights{};  ///< height of the floor, metres; NaN where the robot cannot go
 
   /// The centre of a cell, metres.
   [[nodiscard]] vec2 center(int x, int y) const noexcept { return origin + resolution * vec2{x + 0.5, y + 0.5}; }
@@ -77,34 +77,35 @@ struct floor_map {
   }
 };
 
-/// Height (metres) of the floor: the top of the lowest large horizontal layer, that is, one with at least half as much
-/// surface with free space right above it as the largest has. Two layers of voxels count as one, because a floor may
-/// lie between them: the observed floor is within these voxels, up to one voxel lower. Empty if there is no such
-/// surface. O(octants + tops of larger leaves in octants; at most 2^24 of the latter).
+/// Height (metres) of the floor: the top of the lowest large horizontal layer. A layer is large if its surface with
+/// free space directly above it is at least half that of the largest layer. Two adjacent voxel layers count as one,
+/// because a floor may lie between them; the observed floor is within these voxels, up to one voxel lower. Empty if
+/// there is no such surface. O(octants + tops of larger leaves in octants; at most 2^24 of the latter).
 template <planning_map Map>
 [[nodiscard]] std::optional<double> find_floor(const Map& map);
 
 /// The floor map of `map` for a robot.
 ///
-/// A voxel is a *surface* if it is occupied and the robot's height above it is not. The robot reaches surfaces within a
-/// step of the floor, and from each surface those of the four neighbour columns that differ by at most a step: up
-/// ramps, over thresholds, under tables. If it reaches several in one column (a bridge and the ground under it), the
-/// lowest counts. Such a cell is free, with these exceptions. It is occupied
-/// - if a neighbour is lower by more than a step: a drop,
-/// - if the floor within the robot's radius (a square) rises by more than a step, and the plane through it is steeper
-///   than `max_slope`. Cells that differ by more than a step per cell of distance are ignored here.
-/// and it has the state `options.unknown` if the robot's height above it is not fully known. A cell that the robot does
-/// not reach is classified relative to the nearest one that it reaches: occupied if an obstacle is in the robot's way,
-/// or if there is nothing to drive on (a hole: all voxels within a step below are known to be free); otherwise it has
-/// the state `options.unknown`. If that is `occupied`, the robot does not drive on surfaces whose height above is not
-/// fully known.
+/// A voxel is a *surface* if it is occupied and no voxel within the robot's height above it is. The robot reaches
+/// surfaces within a step of the floor and, from each reached surface, surfaces in the four neighbouring columns that
+/// differ by at most a step: up ramps, over thresholds, under tables. If it reaches several surfaces in one column (a
+/// bridge and the ground under it), the lowest counts. The cell of a reached surface is free, with these exceptions:
+/// - It is occupied if a neighbour is lower by more than a step (a drop).
+/// - It is occupied if the floor within the robot's radius (a square) rises by more than a step, and the plane through
+///   it is steeper than `max_slope`. Cells that differ by more than a step per cell of distance are ignored here.
+/// - It has the state `options.unknown` if the space above it, up to the robot's height, is not fully known.
+///
+/// A cell that the robot does not reach is classified relative to the nearest reached cell: occupied if an obstacle is
+/// in the robot's way, or if there is nothing to drive on (a hole: all voxels within a step below are known to be
+/// free); otherwise it has the state `options.unknown`. If `options.unknown` is `occupied`, the robot does not drive on
+/// surfaces below space that is not fully known.
 ///
 /// After: A. Hornung et al., "OctoMap", Autonomous Robots 34, 2013 (projection of a height band); P. Fankhauser et al.,
 /// "Probabilistic terrain mapping for mobile robots with uncertain localization", RA-L 3, 2018 (steps and slopes).
 ///
 /// Errors: no_data (no floor is found, or nothing is known at its height), invalid_argument (more than 2^26 cells, each
-/// counted once for each 64 voxels of known height in the layer: pass a region, or reduce `below` and `above`). It
-/// takes 16 bytes for each of these, and about 40 for each cell. O(octants + cells x (height of the layer + (radius /
+/// counted once for each 64 voxels of known height in the layer: pass a region, or reduce `below` and `above`). Uses 16
+/// bytes for each of these units, and about 40 bytes per cell. O(octants + cells x (height of the layer + (radius /
 /// resolution)^2 where it is not level)).
 /// @pre height, radius > 0; step, below, above >= 0; 0 <= max_slope < pi / 2
 template <planning_map Map>

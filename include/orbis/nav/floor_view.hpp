@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Planning space of a round robot on a floor, for paths in two dimensions.
+/// Planning space for a round robot on a floor, for paths in two dimensions.
 ///
 /// @code
 ///   const auto floor = orbis::nav::make_floor_map(map, robot);
@@ -29,24 +29,24 @@ namespace orbis::nav {
 /// Tests whether a disc, at rest or moving along a segment, is free on a floor, i.e. has no point in common with the
 /// square of an occupied cell. The results are exact. Space outside the map counts as unknown cells.
 ///
-/// A `planning_space` that ignores z: the distance between two positions is the horizontal one, and a path is reported
-/// at the height of the floor in the cells of its points. It refers to the floor map, which must not change while the
-/// view is used. Safe for concurrent queries.
+/// A `planning_space` that ignores z: distances are horizontal, and the points of a path are reported at the floor
+/// height of their cells. The view refers to the floor map, which must not change while the view is used. Safe for
+/// concurrent queries.
 class floor_view {
  public:
   static constexpr int dimensions = 2;
 
-  /// `radius`: of the robot, metres. `unknown`: state that unknown cells count as. O(cells).
-  /// @pre radius > 0; fewer than 2^21 cells along x and y; the options'
+  /// `radius`: radius of the robot, metres. `unknown`: state assumed for unknown cells. O(cells).
+  /// @pre radius > 0; fewer than 2^21 cells along x and y; the preconditions of `options`
   floor_view(const floor_map& map, double radius, const planning_options& options = {},
              octree::occupancy unknown = octree::occupancy::occupied)
       : map_{&map}, radius_{radius}, options_{options} {
     look_at_obstacles(unknown, [&](int x, int y) { return map.states(x, y); });
   }
-  /// For the centre of a robot on a cost map (see inflate), which accounts for its radius: cells with a cost of at
-  /// least `inscribed` are obstacles; in the others a metre costs 1 + clearance_weight cost / 252; preferred_clearance
-  /// is ignored.
-  /// @pre as above; costs are those of `map`, and outlive the view
+  /// For the centre of a robot on a cost map (see inflate) that accounts for the robot's radius: cells with a cost of
+  /// at least `inscribed` are obstacles; in other cells a metre costs 1 + clearance_weight cost / 252;
+  /// preferred_clearance is ignored.
+  /// @pre as above; `costs` belongs to `map` and outlives the view
   floor_view(const floor_map& map, const image<std::uint8_t>& costs, const planning_options& options = {},
              octree::occupancy unknown = octree::occupancy::occupied)
       : map_{&map}, costs_{&costs}, options_{options} {
@@ -70,9 +70,9 @@ class floor_view {
   /// away from obstacles, O((radius / resolution)^2) near them.
   [[nodiscard]] bool is_free(const vec3& p) const { return is_free(p, p); }
   /// Returns true if the disc touches no obstacle on the straight segment from `a` to `b` (metres). O(length / distance
-  /// to the obstacles), plus near obstacles the cells of the box around each 4 cells of the segment.
+  /// to the obstacles), plus, near obstacles, the cells in the box around each group of 4 cells on the segment.
   [[nodiscard]] bool is_free(const vec3& a, const vec3& b) const { return is_free(a, b, 0.0); }
-  /// The same for a disc whose radius is larger by `by` (metres). @pre by >= 0
+  /// Like `is_free(a, b)`, for a disc whose radius is larger by `by` (metres). @pre by >= 0
   [[nodiscard]] bool is_free(const vec3& a, const vec3& b, double by) const {
     if (!key(a) || !key(b)) return false;
     const double radius = radius_ + by;
@@ -88,7 +88,7 @@ class floor_view {
     return m != detail::blocked && (m >= 0.0 || !overlaps(center(k), center(k), radius_));
   }
 
-  /// Cost of a metre in the cell, see planning_options. @pre contains(k)
+  /// Cost per metre in the cell, see planning_options. @pre contains(k)
   [[nodiscard]] double density(const octree::voxel_key& k) const {
     const int x = static_cast<int>(k.x), y = static_cast<int>(k.y);
     const double near = costs_ == nullptr ? detail::clearance_density(options_, distance(x, y) - radius_)
@@ -97,12 +97,12 @@ class floor_view {
                                                       (floor_cost::inscribed - 1);
     return is_unknown(x, y) ? near * options_.unknown_cost : near;
   }
-  /// Returns true if every path costs its length.
+  /// Returns true if the cost of every path equals its length.
   [[nodiscard]] bool is_uniform() const noexcept {
     return options_.clearance_weight == 0.0 && options_.unknown_cost == 1.0;
   }
 
-  /// The cell of `p` (metres); empty outside the map or the region, and if not finite. O(1).
+  /// The cell of `p` (metres); empty if `p` is outside the map or the region, or not finite. O(1).
   [[nodiscard]] std::optional<octree::voxel_key> key(const vec3& p) const {
     const auto cell = is_in_region(p) ? map_->cell(p) : std::nullopt;
     if (!cell) return std::nullopt;
@@ -134,10 +134,10 @@ class floor_view {
   }
 
   [[nodiscard]] const floor_map& map() const noexcept { return *map_; }
-  /// Squared distance of each cell to the nearest obstacle, in cells; with a border of one cell around the map. See
+  /// Squared distance from each cell to the nearest obstacle, in cells, with a border of one cell around the map. See
   /// squared_floor_distances.
   [[nodiscard]] const image<float>& squared_distances() const noexcept { return squared_; }
-  /// The edge of a cell, metres.
+  /// Edge length of a cell, metres.
   [[nodiscard]] double resolution() const noexcept { return map_->resolution; }
   /// Radius of the robot, metres; 0 on a cost map.
   [[nodiscard]] double radius() const noexcept { return radius_; }
@@ -188,7 +188,7 @@ class floor_view {
     const auto index = [&](double p, double origin, int cells) {  // in squared_, which has a border
       return std::clamp(static_cast<int>(std::floor((p - origin) / resolution())) + 1, 0, cells - 1);
     };
-    const double edge = resolution();  // includes faces that only touch
+    const double edge = resolution();  // includes cells whose faces only touch the disc
     const int left = index(box.min.x() - 0.5 * edge, map_->origin.x(), squared_.width());
     const int right = index(box.max.x() + 0.5 * edge, map_->origin.x(), squared_.width());
     const int low = index(box.min.y() - 0.5 * edge, map_->origin.y(), squared_.height());

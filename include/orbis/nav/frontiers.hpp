@@ -37,14 +37,14 @@
 
 namespace orbis::nav {
 
-/// Frontier voxels in an octant of 4x4x4 voxels: bit i is the voxel at place i of the Morton curve.
+/// Frontier voxels in an octant of 4x4x4 voxels: bit i is the voxel at index i of the Morton curve.
 struct frontier_octant {
   octree::voxel_key octant;  ///< its lowest voxel
   std::uint64_t mask = 0;
   friend bool operator==(const frontier_octant&, const frontier_octant&) = default;
 };
 
-/// A connected set of frontier voxels: each is one of the 26 neighbours of another one.
+/// A connected set of frontier voxels (26-connectivity).
 struct frontier_cluster {
   std::size_t size = 0;                    ///< voxels
   vec3 center = zeros<vec3>();             ///< mean of the voxels' centres, metres
@@ -55,12 +55,12 @@ struct frontier_cluster {
 struct frontier_options {
   /// Maximum number of octants to examine on the faces of leaves of the map that are larger than 8x8x8 voxels: a file
   /// of a few bytes can describe a leaf as large as the grid, whose faces have 1.6e9 octants. Octants beyond the limit
-  /// are left out, see `is_complete`.
+  /// are omitted, see `is_complete`.
   std::size_t max_octants = std::size_t{1} << 24U;
 };
 
 struct cluster_options {
-  std::size_t min_size = 1;  ///< of a cluster, voxels
+  std::size_t min_size = 1;  ///< minimum size of a cluster, voxels
 };
 
 /// The frontier of a map: the free voxels with an unknown voxel among their six face neighbours. Space outside the
@@ -68,7 +68,7 @@ struct cluster_options {
 /// the order of changes.
 ///
 /// Octants are bit masks, so that a few bit operations compute the frontier of 64 voxels. Only nonempty masks are
-/// stored, 48 to 64 bytes for each. For one thread at a time.
+/// stored, at 48 to 64 bytes each. Not thread-safe.
 class frontiers {
  public:
   /// The frontier of an empty map.
@@ -83,15 +83,15 @@ class frontiers {
     update(map);
   }
 
-  /// Follows the map by its change log, as distance_field::update does. O(octants that changed) on average; if the log
-  /// does not reach back far enough, O(octants of the map + octants on the faces of its larger leaves). @pre the same
-  /// map every time, with the same grid
+  /// Updates the frontier from the map's change log, as distance_field::update does. O(octants that changed) on
+  /// average; if the log does not reach back far enough, O(octants of the map + octants on the faces of its larger
+  /// leaves). @pre the same map every time, with the same grid
   template <planning_map Map>
   void update(const Map& map) {
     assert(map_access<Map>::grid(map) == grid_);
     follower_.follow(map, changed_in(map), [&] { rebuild(map); });
   }
-  /// Follows a copy of the map, as distance_field::update does.
+  /// Updates the frontier from a copy of the map, as distance_field::update does.
   /// @pre revision <= log.revision(); copies of the same map every time, with the same grid
   template <planning_map Map>
   void update(const Map& copy, const octree::change_log& log, std::uint64_t revision) {
@@ -109,8 +109,8 @@ class frontiers {
   /// Number of frontier voxels. O(1)
   [[nodiscard]] std::size_t size() const noexcept { return size_; }
   [[nodiscard]] bool empty() const noexcept { return size_ == 0; }
-  /// False if leaves of the map were left out because of `max_octants`: voxels on their faces are missing, except those
-  /// next to later changes.
+  /// False if leaves of the map were omitted because of `max_octants`: frontier voxels on their faces are missing,
+  /// except next to later changes.
   [[nodiscard]] bool is_complete() const noexcept { return is_complete_; }
   /// Returns true if the voxel belongs to the frontier; false outside the grid. O(1)
   [[nodiscard]] bool contains(const octree::voxel_key& k) const noexcept {
@@ -129,8 +129,8 @@ class frontiers {
     for (const std::uint32_t i : order) out.push_back({octree::morton_key(found_[i].name << 6U), found_[i].mask});
     return out;
   }
-  /// The connected components of the frontier: the largest cluster first; among equal ones, the one with the lowest
-  /// voxel along the Morton curve. O(n log n)
+  /// The connected components of the frontier, the largest cluster first; clusters of equal size are in the order of
+  /// their first voxels along the Morton curve. O(n log n)
   [[nodiscard]] std::vector<frontier_cluster> clusters(const cluster_options& options = {}) const;
 
   [[nodiscard]] const octree::voxel_grid& grid() const noexcept { return grid_; }
@@ -145,8 +145,8 @@ class frontiers {
     std::uint64_t mask;
   };
 
-  /// Direct-mapped cache of a map's octants, addressed by the low bits of the Morton code: one entry for each position
-  /// in a cube.
+  /// Direct-mapped cache of a map's octants, addressed by the low bits of the Morton code: one entry per position in a
+  /// cube.
   template <class Octants>
   class octant_cache {
    public:
@@ -217,7 +217,7 @@ class frontiers {
       stale_.erase(std::unique(stale_.begin(), stale_.end()), stale_.end());
       octant_cache octants{map_access<Map>::octants(map)};
       for (const std::uint64_t name : stale_) set(name, frontier_in(octants, name));
-      // Keep the capacity that usual updates need, so that they allocate nothing.
+      // Keep the capacity that typical updates need, so that they allocate nothing.
       constexpr std::size_t few = (std::size_t{1} << 20U) / sizeof(std::uint64_t);
       if (stale_.capacity() > std::max(few, 8 * found_.size())) stale_ = {};
     };
@@ -233,7 +233,8 @@ class frontiers {
     map_access<Map>::for_each_octant(map, [&](const octree::voxel_key& low, int level, const octree::octant_states& s) {
       if (s.free() == 0) return;
       const std::uint32_t cells = octree::node_cells(level);
-      // A larger cube has equal octants: if everything is known, only the outermost ones can have frontier voxels.
+      // All octants of a larger cube are equal: if all voxels are known, only its outermost octants can have frontier
+      // voxels.
       const bool is_hollow = ~s.known == 0;
       if (level > 3) {
         const std::uint64_t n = cells / 4, inner = is_hollow ? n - 2 : 0;
@@ -282,14 +283,14 @@ class frontiers {
   frontier_options options_;
   bool is_complete_ = true;
   detail::map_follower follower_;
-  hash_index index_;  ///< places in found_
+  hash_index index_;  ///< indices into found_
   std::vector<entry> found_;
   std::size_t size_ = 0;
   std::vector<std::uint64_t> stale_;
 };
 
 inline std::vector<frontier_cluster> frontiers::clusters(const cluster_options& options) const {
-  // Connected pieces within an octant; then the pieces that touch are joined.
+  // Finds the connected pieces within each octant, then joins the pieces that touch.
   struct piece {
     std::uint32_t octant;
     std::uint64_t mask;
@@ -316,7 +317,7 @@ inline std::vector<frontier_cluster> frontiers::clusters(const cluster_options& 
   };
   for (std::uint32_t i = 0; i != all.size(); ++i)
     for (int direction = 14; direction != 27;
-         ++direction) {  // half of the 26: the others are tested from the other side
+         ++direction) {  // 13 of the 26 directions; the others are tested from the other side
       const std::array<int, 3> offset{direction % 3 - 1, direction / 3 % 3 - 1, direction / 9 - 1};
       if (detail::dilated(all[i].mask, offset) == 0) continue;
       const auto along = [](std::uint32_t c, int by) { return c + static_cast<std::uint32_t>(4 * by); };

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Read access of planning to an occupancy map: an octree, a snapshot of it, or a user-defined type with a trait.
+/// Read access to an occupancy map for planning: an octree, a snapshot of it, or a user-defined type with a trait.
 #pragma once
 
 #include <concepts>
@@ -14,20 +14,20 @@
 
 namespace orbis::nav {
 
-/// Access of planning to a map. To support a user-defined type, specialise it with `grid`, `octants` and
-/// `for_each_octant` as in the specialisation for octrees below; the map is read in place and not copied. The other
-/// functions are optional: `state` and `overlaps` are then implemented with `octants`, and octants in a box are
-/// selected from all octants, which is slower.
+/// Access to a map for planning. To support a user-defined type, specialise this template with `grid`, `octants` and
+/// `for_each_octant` as in the specialisation for octrees below; the map is not copied. The other functions are
+/// optional; without them, `state` and `overlaps` are implemented with `octants`, and octants in a box are selected
+/// from all octants, which is slower.
 template <class Map>
 struct map_access;
 
 /// Access to the octrees of orbis.
 template <octree::octree_map Map>
 struct map_access<Map> {
-  /// The grid of voxels.
+  /// The voxel grid.
   [[nodiscard]] static const octree::voxel_grid& grid(const Map& map) noexcept { return map.grid(); }
-  /// A function that returns the states of the octant of 4x4x4 voxels that contains a voxel. Valid while the map does
-  /// not change.
+  /// A function object that returns the states of the octant of 4x4x4 voxels that contains a given voxel. Valid until
+  /// the map changes.
   [[nodiscard]] static octree::octant_reader<Map> octants(const Map& map) { return octree::octant_reader<Map>{map}; }
   /// Calls `visit(lowest voxel, level, states)` for every octant (level 2) with known voxels; larger cubes whose
   /// octants all have the same states may be visited as one. Visits each voxel once, in any order.
@@ -35,7 +35,7 @@ struct map_access<Map> {
   static void for_each_octant(const Map& map, Visit&& visit) {
     octree::for_each_octant(map, visit);
   }
-  /// The same for octants that have a voxel in a box.
+  /// Like the overload above, for octants that have a voxel in a box.
   template <class Visit>
   static void for_each_octant(const Map& map, const octree::key_box& box, Visit&& visit) {
     octree::for_each_octant(map, box, visit);

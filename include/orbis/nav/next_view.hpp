@@ -37,16 +37,16 @@
 
 namespace orbis::nav {
 
-/// Returns the places of a frontier to look at (metres): large clusters are split by the cubes of a lattice, and the
-/// mean of each cube's voxels is a place. Larger clusters come first. `spacing`: edge of the cubes, metres, rounded to
-/// a power of two of voxels, at least 4.
+/// Returns points on a frontier for the camera to look at (metres): large clusters are split by a lattice of cubes, and
+/// each point is the mean of a cube's voxels. Larger clusters come first. `spacing`: edge of the cubes, metres, rounded
+/// to a power of two of voxels, at least 4.
 [[nodiscard]] inline std::vector<vec3> candidate_viewpoints(std::span<const frontier_cluster> clusters,
                                                             const octree::voxel_grid& grid, double spacing = 0.8) {
   const double levels = std::round(std::log2(std::max(4.0, spacing / grid.resolution())));
   const int level = static_cast<int>(std::clamp(levels, 2.0, static_cast<double>(grid.depth())));
   std::vector<vec3> places;
   for (const frontier_cluster& c : clusters) {
-    // Octants are in Morton order: those of a cube are consecutive.
+    // Octants are in Morton order, so the octants of a cube are consecutive.
     for (std::size_t i = 0; i != c.octants.size();) {
       const octree::voxel_key cube = octree::node_key(c.octants[i].octant, level);
       vec3 sum = zeros<vec3>();
@@ -70,24 +70,24 @@ namespace orbis::nav {
 
 struct next_view_options {
   view_gain_options gain{};
-  int candidates = 12;         ///< poses for each place
-  double min_distance = 0.5;   ///< of the camera from the place, metres
-  double max_distance = 2.0;   ///< metres
-  double max_elevation = 0.5;  ///< maximum elevation of the camera's axis, up or down, radians
-  double min_gain = 0.0;       ///< minimum unknown space of a view, cubic metres
+  int candidates = 12;         ///< number of poses for each place
+  double min_distance = 0.5;   ///< minimum distance of the camera from the place, metres
+  double max_distance = 2.0;   ///< maximum distance of the camera from the place, metres
+  double max_elevation = 0.5;  ///< maximum angle of the camera's axis above or below the horizontal, radians
+  double min_gain = 0.0;       ///< minimum unknown space that a view must see, cubic metres
   /// Penalty for path length: the utility of a view is its gain times exp(-lambda * length), 1 / metres.
   double lambda = 0.2;
   path_options path{};
-  std::uint64_t seed = 1;  ///< of the random candidates
+  std::uint64_t seed = 1;  ///< seed of the random candidates
 };
 
 enum class next_view_status : std::uint8_t {
   found,
-  /// No candidate at which the robot is free sees enough. Candidates are random: if little is left to see or the robot
-  /// barely fits, another seed may find a view.
+  /// No candidate pose at which the robot is free sees enough unknown space. Candidates are random: if little is left
+  /// to see or the robot barely fits, another seed may find a view.
   nothing_to_see,
   start_outside,  ///< the robot is outside the grid or the region, or its position is not finite
-  start_blocked,  ///< it touches an obstacle
+  start_blocked,  ///< the robot touches an obstacle
   unreachable,    ///< no path leads to any of the candidates
   gave_up         ///< no path was found after path.max_expanded cells; one may exist
 };
@@ -107,8 +107,8 @@ enum class next_view_status : std::uint8_t {
 /// A view and the path to it, or the reason why there is none.
 struct next_view {
   next_view_status status = next_view_status::nothing_to_see;
-  se3 T_world_camera{};        ///< the camera's axes: x to the right, y down, z forward; x is level
-  vec3 place = zeros<vec3>();  ///< point that the camera looks at, metres
+  se3 T_world_camera{};        ///< the camera's axes: x right, y down, z forward; x is horizontal
+  vec3 place = zeros<vec3>();  ///< the point that the camera looks at, metres
   double gain = 0.0;           ///< unknown space that the camera would see, cubic metres
   double utility = 0.0;        ///< gain * exp(-lambda * length of the path); 0 if that is too small for a double
   found_path path{};
@@ -121,17 +121,17 @@ struct next_view {
   return {so3{columns(right, cross(ahead, right), ahead)}, from};
 }
 
-/// The best random view of the places, among those with a gain greater than 0 and at least `min_gain` where the robot
-/// (whose camera is at its reference point) is free and that it can reach. The best view has the greatest utility, gain
-/// * exp(-lambda * length of the path): H. H. Gonzalez-Banos, J.-C. Latombe, "Navigation strategies for exploring
-/// indoor environments", International Journal of Robotics Research 21, 2002. A path is searched only while a straight
-/// one could still be the best, and only if the straight segment is free or free cells connect both ends. The world has
-/// z up.
+/// Selects the best among random views of the places. A view qualifies if its gain is greater than 0 and at least
+/// `min_gain`, and the robot (whose camera is at its reference point) is free there and can reach it. The best view has
+/// the greatest utility, gain * exp(-lambda * length of the path): H. H. Gonzalez-Banos, J.-C. Latombe, "Navigation
+/// strategies for exploring indoor environments", International Journal of Robotics Research 21, 2002. A path is
+/// searched for only while a straight path could still be the best, and only if the straight segment is free or free
+/// cells connect both ends. The z axis of the world points up.
 ///
 /// All failed searches together expand fewer than 2 `path.max_expanded` cells, regardless of the number of candidates:
-/// each one at most half of the remaining number. If more cells than that are reachable, for example because unknown
-/// space is free and no region is given, some searches may give up; the result is then the best of the views to which a
-/// path was found, if there is one.
+/// each search expands at most half of the remaining number. If more cells than that are reachable, for example because
+/// unknown space is free and no region is given, some searches may give up; the result is then the best of the views to
+/// which a path was found, if there is one.
 ///
 /// Deterministic. Typically takes a millisecond per candidate, plus the cost of find_path.
 /// @pre 0 < min_distance <= max_distance; 0 <= max_elevation < pi / 2; lambda >= 0
@@ -143,7 +143,7 @@ template <planning_map Map, robot_shape Shape, camera::camera_model Camera>
   assert(options.max_elevation >= 0.0 && options.max_elevation < 1.5707963267948966);
   struct candidate {
     next_view view;
-    double bound = 0.0;  ///< of the logarithm of its utility, if the straight segment is free
+    double bound = 0.0;  ///< upper bound of the logarithm of its utility, reached if the straight segment is free
   };
   if (!view.key(position)) return {.status = next_view_status::start_outside};
   if (!view.is_free(position)) return {.status = next_view_status::start_blocked};

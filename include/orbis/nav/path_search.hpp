@@ -33,7 +33,7 @@ enum class path_status : std::uint8_t {
   start_blocked,  ///< the robot touches an obstacle at the start
   goal_outside,
   goal_blocked,
-  unreachable,  ///< both ends are free, and no path on the grid connects them
+  unreachable,  ///< both ends are free, but no path on the grid connects them
   gave_up       ///< `max_expanded` cells were expanded without a result
 };
 
@@ -52,34 +52,34 @@ enum class path_status : std::uint8_t {
 
 /// Method of the path search.
 enum class path_method : std::uint8_t {
-  /// Lazy Theta*: straight across many cells where no obstacle is in between; shorter paths, but not guaranteed
-  /// optimal. If costs other than length apply (see planning_options), it adds up costs along each segment, and takes
-  /// several times as long as `grid` for a marginally better path.
+  /// Lazy Theta*: straight across many cells where no obstacle is in between. Paths are shorter, but not guaranteed to
+  /// be optimal. If costs other than length apply (see planning_options), costs are integrated along each segment,
+  /// which takes several times as long as `grid` for a marginally better path.
   any_angle,
   grid  ///< A*: optimal among paths in steps from cell to neighbouring cell
 };
 
 struct path_options {
   path_method method = path_method::any_angle;
-  /// Weight of the heuristic for `any_angle`; finite and >= 1. With 1 the search expands ten times as many cells, for
-  /// paths that are mostly less than a tenth of a percent shorter.
+  /// Weight of the heuristic for `any_angle`; finite and >= 1. With 1, the search expands ten times as many cells for
+  /// paths that are typically less than 0.1 % shorter.
   double heuristic_weight = 1.1;
-  bool shorten = true;  ///< pull the path straight; otherwise it goes from cell centre to cell centre
-  /// Maximum number of expanded cells. The limit applies separately to the test whether the goal is reachable, to the
-  /// search for the nearest reachable place, and to the search for a path there.
+  bool shorten = true;  ///< straighten the path; otherwise it runs from cell centre to cell centre
+  /// Maximum number of expanded cells. The limit applies separately to the test of whether the goal is reachable, to
+  /// the search for the nearest reachable cell, and to the search for a path to it.
   std::size_t max_expanded = 2'000'000;
   std::size_t max_checks = 2'000;  ///< maximum number of segments checked by shortening
 };
 
-/// A path, or the reason why there is none.
+/// A path, or the reason why no path was found.
 struct found_path {
   path_status status = path_status::unreachable;
-  /// From the start to the goal, metres. If no path leads to the goal but the start is free: to the centre of the
-  /// reached cell nearest to the goal (empty if the goal is not finite).
+  /// From the start to the goal, metres. If no path leads to the goal but the start is free, the path ends at the
+  /// centre of the reached cell nearest to the goal (empty if the goal is not finite).
   std::vector<vec3> points{};
-  double length = 0.0;       ///< of the points, metres
-  double cost = 0.0;         ///< see planning_options; equals the length in a uniform space. Excludes heights of floors
-  std::size_t expanded = 0;  ///< number of expanded cells; 0 if the straight segment was taken immediately
+  double length = 0.0;       ///< length of the path, metres
+  double cost = 0.0;         ///< see planning_options; equals the length in a uniform space. Excludes floor heights
+  std::size_t expanded = 0;  ///< number of expanded cells; 0 if the straight segment was used without a search
 };
 
 /// The length of a polyline, in the unit of its points.
@@ -106,10 +106,11 @@ template <planning_space Space>
   return path_cost(space, points);
 }
 
-/// Makes a path cheaper while the robot fits: removes unnecessary points and cuts corners. Both ends stay. The result
-/// never costs more (see path_cost) and, in a uniform space, is never longer; each of its segments is free
-/// (`space.is_free`). Ends after `max_checks` segments have been checked, or when little is gained. O(max_checks)
-/// checks of segments and, if the space is not uniform, O(max_checks) costs of the path between the ends of a segment.
+/// Makes a path cheaper where the robot fits: removes unnecessary points and cuts corners. Both ends are kept. The
+/// result never costs more (see path_cost) and, in a uniform space, is never longer; each of its segments is free
+/// (`space.is_free`). Stops after `max_checks` segments have been checked, or when the gain becomes small.
+/// O(max_checks) segment checks and, if the space is not uniform, O(max_checks) cost evaluations of the path between
+/// the ends of a segment.
 /// @pre each segment of `points` is free
 template <planning_space Space>
 void shorten_path(const Space& space, std::vector<vec3>& points, std::size_t max_checks = 2'000) {
@@ -132,7 +133,7 @@ void shorten_path(const Space& space, std::vector<vec3>& points, std::size_t max
   const auto erase_between = [&](std::size_t i, std::size_t j) {
     points.erase(points.begin() + static_cast<std::ptrdiff_t>(i) + 1, points.begin() + static_cast<std::ptrdiff_t>(j));
   };
-  // One check for each point first: a path over the middles of cells has many.
+  // First, check each point once: a path over cell centres has many points.
   std::size_t last = 0;
   for (std::size_t i = 2; i < points.size(); ++i) {
     if (is_free(points[last], points[i]) &&
@@ -179,7 +180,7 @@ template <planning_space Space>
 }
 
 /// Searches over cell centres from a free start to a finite goal or, if none of `exits` can be reached and `or_near` is
-/// set, to the reachable cell nearest to the goal. Sets the points and the number of expanded cells.
+/// set, to the reachable cell nearest to the goal. Sets the points and the number of expanded cells in the result.
 template <planning_space Space>
 [[nodiscard]] search_end search_cells(const Space& space, const vec3& start, const vec3& goal,
                                       const std::vector<octree::voxel_key>& exits, const path_options& options,
@@ -192,8 +193,8 @@ template <planning_space Space>
     out.points = search.path();
     return how;
   };
-  // Most paths are found soon. If the search takes longer, the goal may be enclosed: without a flood from its side, all
-  // reachable cells would be expanded.
+  // Most paths are found quickly. If the search takes longer, the goal may be enclosed; without a flood from the goal,
+  // the search would then expand all reachable cells.
   const std::size_t most = options.max_expanded, soon = std::min<std::size_t>(1'000, most);
   auto search = make_search();
   search_end end = search.run(start, goal, exits, exits.empty() ? 0 : soon);
@@ -215,14 +216,14 @@ template <planning_space Space>
 
 }  // namespace detail
 
-/// A path of the robot `from` a start `to` a goal (metres): the straight segment if it is free and its cost equals its
-/// length; otherwise a cheap path over cell centres (see path_method), shortened in continuous space afterwards, or the
-/// straight segment if no other path leads there. Without `shorten`, the path always leads over cell centres. Every
-/// segment is free by `space.is_free`: the robot touches no obstacle anywhere on it. If the goal cannot be reached,
-/// `status` gives the reason and the path leads to the nearest reachable point. A passage between two cell centres that
-/// is wide enough for the robot only off the grid is not found.
+/// Finds a path for the robot `from` a start `to` a goal (metres): the straight segment if it is free and its cost
+/// equals its length; otherwise a cheap path over cell centres (see path_method), which is then shortened in continuous
+/// space, or the straight segment if there is no other path. Without `shorten`, the path always runs over cell centres.
+/// Every segment is free according to `space.is_free`: the robot touches no obstacle anywhere on it. If the goal cannot
+/// be reached, `status` gives the reason and the path leads to the nearest reachable point. A passage in which the
+/// robot fits only between cell centres is not found.
 ///
-/// O(n log n) for n expanded cells, 16 kB for each 8x8x8 voxels (2 kB for each 8x8 cells of a floor) visited, and
+/// O(n log n) for n expanded cells, 16 kB per visited block of 8x8x8 voxels (2 kB per 8x8 cells of a floor), and
 /// `max_checks` segment checks for shortening. An unreachable goal costs little if it, or the start, is in a small
 /// enclosure, or if it is in an obstacle. Otherwise, for example if unknown space is free and no region is given, the
 /// search expands `max_expanded` cells.

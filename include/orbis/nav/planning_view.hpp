@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Planning space of a robot in an occupancy map with its distance field, exact in continuous space.
+/// Planning space for a robot in an occupancy map with a distance field, exact in continuous space.
 #pragma once
 
 #include <algorithm>
@@ -40,7 +40,7 @@ template <planning_map Map>
   }
 }
 
-/// Recursive search of `octants_overlap`.
+/// Recursive search for `octants_overlap`.
 template <class Octants, octree::overlap_shape Shape>
 class octant_overlap_search {
  public:
@@ -52,7 +52,7 @@ class octant_overlap_search {
     const double edge = grid_.resolution() * (grid_.cells() / 2);
     const bool is_inside = all_at_most(filled<vec3>(-edge), bounds.min) && all_at_most(bounds.max, filled<vec3>(edge));
     if (unknown_blocks_ && !is_inside) return true;
-    // Includes faces that only touch.
+    // Includes voxels whose faces only touch the shape.
     const auto keys =
         octree::keys_between(grid_, shifted(bounds.min, -grid_.resolution()), shifted(bounds.max, grid_.resolution()));
     if (!keys) return false;
@@ -110,20 +110,20 @@ template <planning_map Map, octree::overlap_shape Shape>
 }  // namespace detail
 
 /// Tests whether a robot is free, at rest or moving along a segment. The result equals that of `octree::overlaps` for
-/// the robot's shape or the volume that it sweeps (for a ball: a capsule), with unknown space treated as in the field.
-/// Nothing is sampled or approximated by voxel centres; the two results differ at most by rounding where the robot just
-/// touches a voxel. The field alone decides if obstacles are far away, or so near that the robot certainly touches one;
-/// the map is read only in the narrow band in between.
+/// the robot's shape or the volume that it sweeps (for a ball, a capsule), with unknown space treated as in the field.
+/// Nothing is sampled or approximated by voxel centres; the two results differ only by rounding, where the robot just
+/// touches a voxel. The field alone is sufficient if obstacles are far away, or so near that the robot certainly
+/// touches one; the map is read only in the narrow band in between.
 ///
-/// A `planning_space`. It refers to the map and the field; neither may change while it is used. Safe for concurrent
-/// queries.
+/// A `planning_space`. The view refers to the map and the field; neither may change while the view is used. Safe for
+/// concurrent queries.
 template <planning_map Map, robot_shape Shape = ball>
 class planning_view {
  public:
   static constexpr int dimensions = 3;
 
-  /// The reach of the field should be at least two voxels more than the robot's radius, and the field complete
-  /// (`is_complete`). Otherwise queries merely take longer: an incomplete field is used only for distances in costs.
+  /// The field's reach should exceed the robot's radius by at least two voxels, and the field should be complete
+  /// (`is_complete`). Otherwise, queries only take longer: an incomplete field is used only for distances in costs.
   /// @pre the preconditions of the shape and the options; the field belongs to the map, is up to date, and contains
   /// distances to obstacles (not `inside`)
   planning_view(const Map& map, const distance_field& field, const Shape& shape, const planning_options& options = {})
@@ -131,7 +131,7 @@ class planning_view {
     assert(cover_.inner > 0.0 && map_access<Map>::grid(map) == field.grid() && !field.options().inside);
     assert(options.clearance_weight >= 0.0 && options.preferred_clearance > 0.0 && options.unknown_cost >= 1.0);
   }
-  /// A ball. `radius`: metres. @pre radius > 0
+  /// For a ball. `radius`: metres. @pre radius > 0
   planning_view(const Map& map, const distance_field& field, double radius,
                 const planning_options& options = {}) requires std::same_as<Shape, ball>
       : planning_view{map, field, ball{radius}, options} {}
@@ -145,12 +145,12 @@ class planning_view {
                 const planning_options& = {}) requires std::same_as<Shape, ball>
   = delete;
 
-  /// Returns true if the robot with its reference point at `p` (metres) touches no obstacle. False if `p` is not
-  /// finite, or outside the region. O(1) away from obstacles; near them as expensive as `overlaps`.
+  /// Returns true if the robot touches no obstacle with its reference point at `p` (metres). False if `p` is not
+  /// finite, or outside the region. O(1) away from obstacles; near them, as expensive as `overlaps`.
   [[nodiscard]] bool is_free(const vec3& p) const { return is_free(p, p); }
   /// Returns true if the robot touches no obstacle on the straight segment from `a` to `b` (metres). False if an end is
-  /// outside the region, or the segment longer than four edges of the map's grid. O(length / distance to the
-  /// obstacles), plus the cost of `overlaps` for each 4 voxels near them.
+  /// outside the region, or the segment is longer than four times the edge of the map's grid. O(length / distance to
+  /// the obstacles), plus the cost of `overlaps` for every 4 voxels near them.
   [[nodiscard]] bool is_free(const vec3& a, const vec3& b) const {
     const double cell = resolution();
     if (!is_in_region(a) || !is_in_region(b) || !is_short(a, b)) return false;
@@ -159,22 +159,22 @@ class planning_view {
         a, b, cell, [&](const vec3& p) { return margin(reader, p); },
         [&](const vec3& p, const vec3& q) { return overlaps(p, q); });
   }
-  /// Returns true if no obstacle is within `by` (metres) of the volume that the robot sweeps on that segment: is_free
+  /// Returns true if no obstacle is within `by` (metres) of the volume that the robot sweeps from `a` to `b`: is_free
   /// for an inflated robot, exact for a ball and a vertical capsule. A vertical cylinder is inflated in radius and
-  /// height, a user-defined shape to a vertical capsule around the balls that cover it. @pre by >= 0
+  /// height; a user-defined shape is replaced by a vertical capsule around the balls that cover it. @pre by >= 0
   [[nodiscard]] bool is_free(const vec3& a, const vec3& b, double by) const {
     const planning_view<Map, decltype(detail::grown(shape_, by))> thicker{*map_, *field_, detail::grown(shape_, by),
                                                                           options_};
     return thicker.is_free(a, b);
   }
-  /// Returns true if the field alone proves a segment free. False does not mean blocked: the map may still decide
-  /// that it is free. O(length / distance to the obstacles).
+  /// Returns true if the field alone proves a segment free. False does not mean that it is blocked: a test with the map
+  /// may find it free. O(length / distance to the obstacles).
   [[nodiscard]] bool is_surely_free(const vec3& a, const vec3& b) const {
     if (!is_in_region(a) || !is_in_region(b) || !is_short(a, b)) return false;
     squared_distance_view::reader reader{field_->voxels()};
     return detail::is_segment_certainly_free(a, b, resolution(), [&](const vec3& p) { return margin(reader, p); });
   }
-  /// Returns true if the robot with its reference point at the centre of voxel `k` is free. @pre contains(k)
+  /// Returns true if the robot is free with its reference point at the centre of voxel `k`. @pre contains(k)
   [[nodiscard]] bool is_free(const octree::voxel_key& k) const {
     squared_distance_view::reader reader{field_->voxels()};
     const vec3 p = center(k);
@@ -182,7 +182,7 @@ class planning_view {
     return m != detail::blocked && (m >= 0.0 || !overlaps(p, p));
   }
 
-  /// Cost of a metre in the voxel, see planning_options. @pre contains(k)
+  /// Cost per metre in the voxel, see planning_options. @pre contains(k)
   [[nodiscard]] double density(const octree::voxel_key& k) const {
     double sum = 1.0;
     if (options_.clearance_weight > 0.0) {
@@ -195,16 +195,16 @@ class planning_view {
       sum *= options_.unknown_cost;
     return sum;
   }
-  /// Returns true if every path costs its length.
+  /// Returns true if the cost of every path equals its length.
   [[nodiscard]] bool is_uniform() const noexcept {
     return options_.clearance_weight == 0.0 && options_.unknown_cost == 1.0;
   }
 
-  /// The voxel of `p` (metres); empty outside the grid or the region, and if not finite. O(1).
+  /// The voxel of `p` (metres); empty if `p` is outside the grid or the region, or not finite. O(1).
   [[nodiscard]] std::optional<octree::voxel_key> key(const vec3& p) const {
     return is_in_region(p) ? grid().key(p) : std::nullopt;
   }
-  /// Returns true if the voxel is in the grid and its centre in the region.
+  /// Returns true if the voxel is in the grid, and its centre is in the region.
   [[nodiscard]] bool contains(const octree::voxel_key& k) const noexcept {
     return std::max({k.x, k.y, k.z}) < grid().cells() && (!options_.region || is_in_region(center(k)));
   }
@@ -223,7 +223,7 @@ class planning_view {
   [[nodiscard]] const Map& map() const noexcept { return *map_; }
   [[nodiscard]] const distance_field& field() const noexcept { return *field_; }
   [[nodiscard]] const octree::voxel_grid& grid() const noexcept { return field_->grid(); }
-  /// The edge of a voxel, metres.
+  /// Edge length of a voxel, metres.
   [[nodiscard]] double resolution() const noexcept { return grid().resolution(); }
   [[nodiscard]] const Shape& shape() const noexcept { return shape_; }
   [[nodiscard]] const planning_options& options() const noexcept { return options_; }
@@ -253,8 +253,9 @@ class planning_view {
     }
     return least;
   }
-  /// The margin of one of the balls that cover the robot. Its centre is about as far from obstacles as the centres of
-  /// the voxels around it are, and an obstacle's cube is half a voxel to half a diagonal nearer than its centre.
+  /// The margin of one of the balls that cover the robot. The ball's centre is about as far from obstacles as the
+  /// centres of the surrounding voxels, and an obstacle's cube is half a voxel to half a diagonal nearer than its
+  /// centre.
   [[nodiscard]] double ball_margin(squared_distance_view::reader& reader, const vec3& q) const {
     const double cell = resolution();
     const auto k = grid().key(q);
@@ -273,7 +274,7 @@ class planning_view {
     const auto is_certain = [&] {
       return most - 0.4999 * cell < cover_.inner || least - 0.8661 * cell - cover_.outer > 0.5 * cell;
     };
-    // Beyond the last voxel of the grid the field has no distances to obstacles in the grid.
+    // Outside the grid, the field has no distances to obstacles in the grid.
     if (!is_certain() && away != zeros<vec3>())
       for (unsigned i = 1; i != 8; ++i) {
         const auto beside = [&](unsigned bit, int axis) { return (i & bit) == 0 ? 0 : away[axis] < 0.0 ? -1 : 1; };

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Paths in a changing map: tests whether a change blocks the path, and replans only if it does.
+/// Paths in a changing map: tests whether a change blocks a path, and replans only if it does.
 ///
 /// @code
 ///   orbis::nav::replanner planner{goal};
@@ -47,10 +47,10 @@ concept follows_changes = requires(const Space& space) {
 };
 }  // namespace detail
 
-/// Monitors whether a path stays free while the map changes. It uses the map's change log: it retests exactly those
-/// segments along which the robot sweeps over a changed octant (4x4x4 voxels). It tests all segments if the log does
-/// not reach back far enough, on floors, and on maps without a log. It does not notice shorter paths that open up when
-/// obstacles disappear.
+/// Monitors whether a path stays free while the map changes. Uses the map's change log to retest exactly those segments
+/// along which the robot sweeps over a changed octant (4x4x4 voxels). Tests all segments if the log does not reach back
+/// far enough, on floors, and on maps without a log. Does not detect shorter paths that open up when obstacles
+/// disappear.
 class path_monitor {
  public:
   /// A monitor without a path.
@@ -61,10 +61,10 @@ class path_monitor {
     if constexpr (detail::follows_changes<Space>) follower_.mark_read(space.map());
   }
 
-  /// The first segment (from points()[i] to points()[i + 1]) that is no longer free since the path was given or last
-  /// checked. A blocked segment is tested again each time. O(changed octants x segments), few operations for each, plus
-  /// the cost of `is_free` for the segments that are tested. @pre the same map every time (for floors: a map of the
-  /// same world), and a view of its current state
+  /// Index of the first segment (from points()[i] to points()[i + 1]) that is no longer free since the path was set or
+  /// last checked; empty if all are free. A blocked segment is tested again each time. O(changed octants x segments)
+  /// with few operations each, plus the cost of `is_free` for the segments that are tested. @pre the same map every
+  /// time (for floors: a map of the same world), and a view of its current state
   template <planning_space Space>
   [[nodiscard]] std::optional<std::size_t> first_blocked(const Space& space) {
     const std::size_t segments = points_.empty() ? 0 : points_.size() - 1;
@@ -84,16 +84,17 @@ class path_monitor {
     }
     return std::nullopt;
   }
-  /// Number of segments that the last call of first_blocked tested.
+  /// Number of segments tested by the last call to first_blocked.
   [[nodiscard]] std::size_t tested() const noexcept { return tested_; }
   [[nodiscard]] const std::vector<vec3>& points() const noexcept { return points_; }
 
-  /// Sets the robot's position (metres): drops the part of the path that the robot has passed; the path now begins with
-  /// `position`. The segment from there to the next point is tested again, unless `position` is the path's point.
+  /// Sets the robot's position (metres): drops the part of the path that the robot has passed; the path then begins at
+  /// `position`. The segment from there to the next point is tested again, unless `position` is already the first point
+  /// of the path.
   void advance(const vec3& position) {
     if (points_.size() < 2 || position == points_.front()) return;
     is_suspect_.resize(points_.size() - 1);
-    // The nearest place on the path; of equal ones, the first.
+    // The segment nearest to the position; on ties, the first.
     std::size_t nearest = 0;
     double least = -1.0;
     for (std::size_t i = 0; i + 1 != points_.size(); ++i) {
@@ -128,21 +129,21 @@ class path_monitor {
 
   std::vector<vec3> points_;
   detail::map_follower follower_;
-  std::vector<bool> is_suspect_;  ///< segments touched by changes and not known to be free
+  std::vector<bool> is_suspect_;  ///< segments that changes touched and that are not known to be free
   std::vector<octree::bounding_box> sweeps_;
   std::size_t tested_ = 0;
 };
 
-/// Maintains a path to a goal while the map changes and the robot moves. It plans once, and again from the robot's
-/// position only if the rest of the path is blocked. Without a path, it tries again whenever the map has changed or the
-/// robot has moved; for a user-defined map without a log, that is each time.
+/// Maintains a path to a goal while the map changes and the robot moves. It plans once, and replans from the robot's
+/// position only if the rest of the path is blocked. While there is no path, it tries again whenever the map has
+/// changed or the robot has moved; for a user-defined map without a log, at every update.
 class replanner {
  public:
   /// Sets the goal, in metres.
   explicit replanner(const vec3& goal, const path_options& options = {}) : goal_{goal}, options_{options} {}
 
-  /// The path from `position` (metres) to the goal, as found by find_path: the previous one without the part already
-  /// passed, or a new one; on a floor at its current height. Valid until the next call. @pre those of
+  /// The path from `position` (metres) to the goal, as found by find_path: the previous path without the part already
+  /// passed, or a new one; on a floor, at the floor's current height. Valid until the next call. @pre as for
   /// path_monitor::first_blocked
   template <planning_space Space>
   const found_path& update(const Space& space, const vec3& position) {
@@ -171,7 +172,7 @@ class replanner {
   [[nodiscard]] const vec3& goal() const noexcept { return goal_; }
 
  private:
-  /// Obstacles of a floor, with the placement of the map.
+  /// Obstacles on a floor, with the map's origin and resolution.
   struct floor_obstacles {
     double resolution = 0.0;
     vec2 origin = zeros<vec2>();

@@ -53,8 +53,8 @@ struct swept_shape {
                                        box.max - s.shape.low * vec3(0.0, 0.0, 1.0)};
   return touches(octree::capsule{s.a, s.b, s.shape.radius}, stretched);
 }
-/// Exact: the robot touches the box where its height range does (a part of the motion) and, seen from above, its circle
-/// does.
+/// Exact: the robot touches the box if, in the part of the motion where its height range overlaps the box's, its circle
+/// touches the box seen from above.
 [[nodiscard]] inline bool touches(const swept_shape<vertical_cylinder>& s, const octree::bounding_box& box) noexcept {
   const double rise = s.b.z() - s.a.z();
   const double lowest = box.min.z() - s.shape.high, highest = box.max.z() - s.shape.low;  // of the reference point
@@ -80,9 +80,9 @@ struct swept_shape {
   return {a, b, s};
 }
 
-/// Balls on the vertical line through the reference point that bound a shape from outside and inside: `count` balls,
-/// the first `low` above the reference point, `spacing` apart (metres). Balls of radius `outer` cover the shape, and
-/// balls of radius `inner` are inside it.
+/// Balls on the vertical line through the reference point that bound a shape from outside and from inside: `count`
+/// balls, the first `low` above the reference point, `spacing` apart (metres). Balls of radius `outer` cover the shape,
+/// and balls of radius `inner` are inside it.
 struct ball_cover {
   double low = 0.0, spacing = 0.0;
   int count = 1;
@@ -90,7 +90,7 @@ struct ball_cover {
 };
 
 namespace detail {
-/// Number of balls that cover an object of this height (metres): at most a few dozen, however thin it is.
+/// Number of balls that cover an object of this height (metres): at most a few dozen, even for thin objects.
 [[nodiscard]] inline int ball_count(double height, double radius) noexcept {
   return static_cast<int>(std::ceil(std::min(height / radius, 40.0)));
 }
@@ -108,8 +108,9 @@ namespace detail {
   return {s.low + spacing / 2, spacing, pieces, std::hypot(s.radius, spacing / 2), std::min(s.radius, spacing / 2)};
 }
 
-/// A robot that keeps its attitude: `swept(shape, a, b)` is the volume that it sweeps on a straight segment, for
-/// `octree::overlaps`, and `covering_balls(shape)` returns balls that avoid most of these tests.
+/// The shape of a robot with constant orientation: `swept(shape, a, b)` is the volume that it sweeps on a straight
+/// segment, for `octree::overlaps`, and `covering_balls(shape)` returns balls that make most of these tests
+/// unnecessary.
 template <class S>
 concept robot_shape = std::copyable<S> && requires(const S& shape, const vec3& p) {
   { swept(shape, p, p) } -> octree::overlap_shape;
@@ -121,7 +122,7 @@ template <robot_shape S>
 }
 
 namespace detail {
-/// A shape that covers everything within `by` (metres) of another one.
+/// A shape that covers everything within `by` (metres) of `s`.
 [[nodiscard]] inline ball grown(const ball& s, double by) { return {s.radius + by}; }
 [[nodiscard]] inline vertical_capsule grown(const vertical_capsule& s, double by) {
   return {s.radius + by, s.low, s.high};

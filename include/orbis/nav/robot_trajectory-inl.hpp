@@ -39,7 +39,7 @@ ORBIS_INLINE void robot_trajectory::set_times(const motion_limits& limits, const
     std::size_t piece;
     double s, length, a, b;
   };
-  constexpr int parts = 16;  // pieces of a corner
+  constexpr int parts = 16;  // number of intervals in a corner
   std::vector<interval> all;
   std::vector<double> u{0.0};
   const double top = limits.speed * limits.speed;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A path as a trajectory in time, within bounds on speed and acceleration.
+/// Conversion of a path to a timed trajectory within bounds on speed and acceleration.
 ///
 /// @code
 ///   const auto path = orbis::nav::find_path(view, start, goal);
@@ -24,10 +24,10 @@ namespace orbis::nav {
 
 struct motion_limits {
   double speed = 1.0;         ///< metres / second
-  double acceleration = 1.0;  ///< in any direction, metres / second^2
+  double acceleration = 1.0;  ///< magnitude in any direction, metres / second^2
 };
 
-/// State of a moving robot at one moment.
+/// State of a moving robot at one instant.
 struct motion_state {
   vec3 position = zeros<vec3>();      ///< metres
   vec3 velocity = zeros<vec3>();      ///< metres / second
@@ -40,12 +40,12 @@ struct motion_state {
 ///
 ///     q' = (1 - w) direction + w turned,    w = l^2 (3 - 2 l),
 ///
-/// so that |q'| <= 1, and with q'' = 0 at both ends: lines and corners join with continuous velocity and curvature. It
-/// is the Bezier curve of degree 4 whose control points are on both legs of the corner, each half of the length long:
-/// the end of the leg, its middle, the corner (see corner_points).
+/// so that |q'| <= 1, and with q'' = 0 at both ends: lines and corners join with continuous velocity and curvature. A
+/// corner is a Bezier curve of degree 4 with its control points on both legs of the corner, each leg half of `length`
+/// long: the end of the leg, its middle, and the corner (see corner_points).
 struct path_piece {
   vec3 start = zeros<vec3>();
-  vec3 direction = vec3(1.0, 0.0, 0.0), turned = vec3(1.0, 0.0, 0.0);  ///< of length 1
+  vec3 direction = vec3(1.0, 0.0, 0.0), turned = vec3(1.0, 0.0, 0.0);  ///< unit vectors
   double length = 0.0;
 
   [[nodiscard]] vec3 position(double s) const {
@@ -70,8 +70,8 @@ struct path_piece {
   }
 };
 
-/// Positions, velocities and accelerations over time, from rest to rest. Velocity is continuous; acceleration jumps
-/// within its bound: at both ends, at the start of braking, and in corners. Made by make_trajectory.
+/// Positions, velocities and accelerations over time, from rest to rest. Velocity is continuous; acceleration is
+/// bounded but discontinuous at both ends, at the start of braking, and in corners. Created by make_trajectory.
 class robot_trajectory {
  public:
   /// A trajectory along consecutive pieces, as fast as the limits allow. `stops[i]`: true to stop at the start of piece
@@ -85,7 +85,7 @@ class robot_trajectory {
   [[nodiscard]] motion_state at(double time) const;
   /// The lines and corners of the trajectory.
   [[nodiscard]] const std::vector<path_piece>& pieces() const noexcept { return pieces_; }
-  /// Number of stops on the way.
+  /// Number of stops between start and end.
   [[nodiscard]] std::size_t stops() const noexcept { return stops_; }
 
  private:
@@ -94,8 +94,8 @@ class robot_trajectory {
     double time;
     std::size_t piece;
     double s;      ///< parameter of the piece
-    double speed;  ///< speed of the parameter
-    double gain;   ///< time derivative of the speed
+    double speed;  ///< first time derivative of the parameter
+    double gain;   ///< second time derivative of the parameter
   };
 
   /// Computes the knots of the fastest motion within the limits. Over an interval of a piece, with the square u of the
@@ -103,9 +103,9 @@ class robot_trajectory {
   ///
   ///     speed^2 <= a^2 u,    |acceleration| <= a |du| / (2 h) + b u,
   ///
-  /// so that u at one end bounds u at the other: a pass forward and one backward, as in J. E. Bobrow, S. Dubowsky, J.
-  /// S. Gibson, "Time-optimal control of robotic manipulators along specified paths", International Journal of Robotics
-  /// Research 4(3), 1985. `stops`: the pieces at whose start the robot stops.
+  /// so that u at one end bounds u at the other. One forward and one backward pass compute u, as in J. E. Bobrow, S.
+  /// Dubowsky, J. S. Gibson, "Time-optimal control of robotic manipulators along specified paths", International
+  /// Journal of Robotics Research 4(3), 1985. `stops`: the pieces at whose start the robot stops.
   void set_times(const motion_limits& limits, const std::vector<bool>& stops);
 
   vec3 start_ = zeros<vec3>(), end_ = zeros<vec3>();
@@ -117,8 +117,9 @@ class robot_trajectory {
 namespace detail {
 
 /// Returns true if a robot is free along a Bezier curve. The curve is in the convex hull of its control points, so its
-/// distance from the segment between its ends is at most that of the farthest control point. Tests a robot inflated by
-/// that distance along the segment, and if that is not free, each half of the curve recursively. Nothing is sampled.
+/// distance from the segment between its ends is at most the distance of the farthest control point. Tests a robot
+/// inflated by that distance along the segment and, if it is not free, each half of the curve recursively. Nothing is
+/// sampled.
 template <inflatable_space Space>
 [[nodiscard]] bool is_free_curve(const Space& space, const std::array<vec3, 5>& points, int halvings = 6) {
   const vec3 along = points[4] - points[0];
@@ -143,23 +144,23 @@ template <inflatable_space Space>
 
 }  // namespace detail
 
-/// A trajectory along a polyline, from rest to rest, within the limits. Corners are rounded (see path_piece) as far as
-/// the robot fits: each rounded corner is certified as a whole by the exact test of the volume that an inflated robot
-/// (of a user-defined shape: the balls that cover it) sweeps along pieces of the curve's convex hull. If none of
-/// several sizes fits, the robot stops at the corner. The robot is therefore free at all times. Speed and acceleration
-/// are within the limits everywhere, not only at samples.
+/// Makes a trajectory along a polyline, from rest to rest, within the limits. Corners are rounded (see path_piece)
+/// where the robot fits: each rounded corner is certified as a whole by an exact test of the volume that an inflated
+/// robot (for a user-defined shape, its covering balls) sweeps along pieces of the curve's convex hull. If none of
+/// several corner sizes fits, the robot stops at the corner. The robot is therefore free at all times. Speed and
+/// acceleration are within the limits everywhere, not only at samples.
 ///
-/// On a floor (`floor_view`) the points keep their heights. Between them height is linear, so that the robot's true
-/// height may differ: `view.on_ground(position)` returns it. The limits hold for the polyline's motion.
+/// On a floor (`floor_view`), the points keep their heights. Between them, the height is interpolated linearly, so the
+/// robot's true height may differ: `view.on_ground(position)` returns it. The limits hold for the polyline's motion.
 ///
-/// Consecutive points at the same place, or less than 1e-100 m apart, count once. O(points), plus the cost of
+/// Consecutive points at the same position, or less than 1e-100 m apart, count once. O(points), plus the cost of
 /// `is_free`.
-/// @pre points is not empty; each segment is free (space.is_free), as those of find_path are; limits finite and > 0
+/// @pre points is not empty; each segment is free (space.is_free), as in paths from find_path; limits finite and > 0
 template <inflatable_space Space>
 [[nodiscard]] robot_trajectory make_trajectory(const Space& space, const std::vector<vec3>& points,
                                                const motion_limits& limits = {}) {
   assert(!points.empty());
-  constexpr double least = 1e-100;  // minimum length of a leg with a direction: its square does not underflow
+  constexpr double least = 1e-100;  // minimum length of a leg: its square does not underflow
   std::vector<vec3> corners;
   for (const vec3& p : points)
     if (corners.empty() || norm(p - corners.back()) > least) corners.push_back(p);
@@ -175,7 +176,7 @@ template <inflatable_space Space>
     }
     from = to;
   };
-  bool stop = false;  // at the start of the next piece
+  bool stop = false;  // the robot stops at the start of the next piece
   for (std::size_t i = 1; i <= last; ++i) {
     const vec3 leg = corners[i] - corners[i - 1];
     const vec3 direction = normalized(leg);
@@ -185,7 +186,7 @@ template <inflatable_space Space>
     }
     const vec3 next = corners[i + 1] - corners[i];
     const vec3 turned = normalized(next);
-    // Two corners share a leg equally.
+    // A leg between two corners is shared equally.
     const double room = std::min(norm(leg) * (i == 1 ? 1.0 : 0.5), norm(next) * (i + 1 == last ? 1.0 : 0.5));
     bool rounded = false;
     for (double share = 1.0; share > 0.01 && !rounded; share *= 0.5) {

@@ -43,7 +43,8 @@ ORBIS_INLINE void squared_distances::begin(std::span<const voxel_cube> cubes) {
   assert(stages_.empty() && !has_cubes());
   begin_update();
   for (const voxel_cube& c : cubes) directory_.add_cube(place_of(octree::node_key(c.low, c.level)), c.level - 3);
-  // Everything near a face is computed. An obstacle has the same value as all voxels around it: nothing is stored.
+  // Bricks near a face are computed, except bricks full of obstacles: their voxels have one value, so they are not
+  // stored.
   const auto work_out = [&](const detail::brick_place& p) {
     const std::uint32_t found = directory_.find(p);
     if (!directory_.is_inside(p) || is_brick(found) || is_full(found)) return;
@@ -92,7 +93,7 @@ ORBIS_INLINE void squared_distances::finish_update() {
   spread_along_z();
   for (std::size_t i = 0; i != used_kept_; ++i) stages_[kept_[i].brick].kept = none;
   remove_needless();
-  // Keep buffers of the size of usual updates, so that these allocate nothing.
+  // Keep buffers large enough for typical updates, so that they allocate nothing.
   constexpr std::size_t few = std::size_t{1} << 20U;
   const std::size_t field = stages_.size() * (sizeof(stages) + sizeof(brick_values));
   if (buffer_bytes() > std::max(few, field / 8)) release_buffers();
@@ -118,8 +119,8 @@ ORBIS_INLINE std::uint32_t squared_distances::make(const detail::brick_place& p)
   return number;
 }
 
-/// Returns true if removing a brick would not change any value. Distances are unchanged only if all stages are: no
-/// value is less than the distance.
+/// Returns true if removing a brick would not change any value. If the distances equal the implied value, so do all
+/// stages, because no stage has a value less than the distance.
 ORBIS_INLINE bool squared_distances::is_needless(std::uint32_t brick) const {
   const std::uint16_t without = value_without_brick(directory_.without_number(places_[brick]));
   const stages& s = stages_[brick];
@@ -132,13 +133,13 @@ ORBIS_INLINE bool squared_distances::is_needless(std::uint32_t brick) const {
 ORBIS_INLINE void squared_distances::remove_needless() {
   needless_.insert(needless_.end(), stale_space_.begin(), stale_space_.end());
   std::erase_if(needless_, [&](std::uint32_t i) { return !is_needless(i); });
-  // From the last one: the brick that replaces a removed one stays valid.
+  // Remove in descending order, so that the index of the brick that replaces a removed one stays valid.
   std::sort(needless_.begin(), needless_.end(), std::greater{});
   needless_.erase(std::unique(needless_.begin(), needless_.end()), needless_.end());
   for (const std::uint32_t i : needless_) remove(i);
 }
 
-/// The last brick takes the number of the removed one.
+/// Moves the last brick to the index of the removed one.
 ORBIS_INLINE void squared_distances::remove(std::uint32_t brick) {
   const auto last = static_cast<std::uint32_t>(stages_.size() - 1);
   directory_.erase(places_[brick]);
@@ -210,7 +211,7 @@ ORBIS_INLINE void squared_distances::set_obstacles(std::span<const octant_obstac
 
 /// `row`: z * 8 + y in the brick.
 ORBIS_INLINE void squared_distances::list_row(const detail::brick_place& p, std::size_t row) {
-  // Coordinates have at most 21 bits, those of bricks 18.
+  // Voxel coordinates have at most 21 bits, brick coordinates 18.
   rows_.push_back(static_cast<std::uint64_t>(p.z * 8 + static_cast<int>(row >> 3U)) << 39U |
                   static_cast<std::uint64_t>(p.y * 8 + static_cast<int>(row & 7U)) << 18U |
                   static_cast<std::uint64_t>(p.x));
@@ -235,7 +236,7 @@ ORBIS_INLINE void squared_distances::update_line(std::span<const std::uint64_t> 
   const auto brick_x = [](std::uint64_t row) { return static_cast<int>(row & 0x3ffffU); };
   const auto y = static_cast<int>(rows.front() >> 18U & 0x1fffffU), z = static_cast<int>(rows.front() >> 39U);
   const int first = brick_x(rows.front()) - bricks_in_reach_, last = brick_x(rows.back()) + bricks_in_reach_;
-  const int from = first - bricks_in_reach_;  // the rows that reach the first one
+  const int from = first - bricks_in_reach_;  // first of the rows within reach of `first`
   const auto count = static_cast<std::size_t>(last + bricks_in_reach_ - from + 1);
   const auto row = static_cast<std::uint32_t>((z & 7) * 8 + (y & 7));
   line_.resize(count);
@@ -247,7 +248,8 @@ ORBIS_INLINE void squared_distances::update_line(std::span<const std::uint64_t> 
     line_[i] = bricks.find({from + static_cast<int>(i), y >> 3, z >> 3});
     line_bits_[i] = is_brick(line_[i]) ? stages_[line_[i]].obstacles[row] : row_bits(line_[i]);
   }
-  // Distances of each group of eight from the voxel before, or after, to the nearest obstacle on that side.
+  // For each group of eight voxels, the distance from the voxel before (or after) it to the nearest obstacle on that
+  // side.
   constexpr int beyond = far_along - 1;
   int d = beyond;
   for (std::size_t i = 0; i != count; ++i) {
@@ -287,8 +289,8 @@ ORBIS_INLINE void squared_distances::update_line(std::span<const std::uint64_t> 
 
 namespace detail {
 
-/// Offers the squares of those of the eight distances along x that are smaller than in `other`, repeated for the eight
-/// rows of a slice.
+/// Offers the squares of the distances along x that are smaller than in `other`, repeated for the eight rows of a
+/// slice.
 inline void offer_row(std::uint64_t from, std::uint64_t other, slice_offer& out) noexcept {
   const auto a = std::bit_cast<std::array<std::uint8_t, 8>>(from);
   const auto b = std::bit_cast<std::array<std::uint8_t, 8>>(other);
@@ -321,8 +323,8 @@ ORBIS_INLINE void squared_distances::keep_plane(std::uint32_t brick, unsigned ch
 
 ORBIS_INLINE void squared_distances::spread_along_y() {
   detail::slice_offer offer;
-  // Calls visit(place of a target brick, z in it, squares, the smallest of these) for the slices within reach of the
-  // row.
+  // Calls visit(position of a target brick, z in the brick, squares, the smallest square) for the slices within reach
+  // of the row.
   const auto for_each_target = [&](const along_change& c, auto&& visit) {
     const int range = offer_reach(offer.least);
     const detail::brick_place p = places_[c.brick];
@@ -387,7 +389,7 @@ ORBIS_INLINE void squared_distances::make_plane(std::uint32_t brick, int z) {
       const std::uint32_t other = directory_.find({p.x, p.y + side * step, p.z});
       if (is_brick(other)) {
         top = kernels_.add_rows(best.data(), stages_[other].along.data() + 64 * z, squares(-8 * side * step));
-      } else if (is_full(other)) {  // all obstacles, starting with its nearest row
+      } else if (is_full(other)) {  // all voxels are obstacles, starting with the nearest row
         static constexpr std::array<std::uint8_t, 64> all{};
         top = kernels_.add_rows(best.data(), all.data(), squares(-8 * side * step));
         break;
@@ -395,7 +397,7 @@ ORBIS_INLINE void squared_distances::make_plane(std::uint32_t brick, int z) {
     }
   }
   stages& s = stages_[brick];
-  // Combined again as a slice without neighbours, to apply the bound.
+  // Combine as a slice without neighbours, to apply the bound.
   s.plane_top[static_cast<std::size_t>(z)] =
       kernels_.combine_slices(best.data(), nullptr, nullptr, 0, bound(), s.plane.data() + 64 * z);
 }
@@ -404,7 +406,7 @@ ORBIS_INLINE void squared_distances::make_plane(std::uint32_t brick, int z) {
 
 ORBIS_INLINE void squared_distances::spread_along_z() {
   detail::slice_offer offer;
-  // Calls visit(place of a target brick, position of the source relative to its slices, first and last slice in reach).
+  // Calls visit(position of a target brick, source position relative to its slices, first and last slice within reach).
   const auto for_each_target = [&](const detail::brick_place& p, int z, auto&& visit) {
     const int range = offer_reach(offer.least), at = p.z * 8 + z;
     for (int bz = (at - range) >> 3; bz <= (at + range) >> 3; ++bz)

@@ -1,20 +1,20 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Exact squared Euclidean distances of voxels to the nearest obstacle, in integers, kept up to date.
+/// Exact squared Euclidean distances from voxels to the nearest obstacle, as integers, updated incrementally.
 ///
 /// The transform is separable (T. Saito, J. Toriwaki, "New algorithms for Euclidean distance transformation of an
-/// n-dimensional digitized picture with applications", Pattern Recognition 27(11), 1994; P. Felzenszwalb,
-/// D. Huttenlocher, "Distance transforms of sampled functions", Theory of Computing 8, 2012), and all three stages are
-/// kept:
+/// n-dimensional digitized picture with applications", Pattern Recognition 27(11), 1994; P. Felzenszwalb, D.
+/// Huttenlocher, "Distance transforms of sampled functions", Theory of Computing 8, 2012), and all three stages are
+/// stored:
 ///
 ///     along(x, y, z) = distance along x to the nearest obstacle of that row
 ///     plane(x, y, z) = min over j of along(x, j, z)^2 + (y - j)^2
 ///     space(x, y, z) = min over k of plane(x, y, k) + (z - k)^2
 ///
-/// A change propagates through the stages and ends where a value is unchanged. In each stage, sources that increased
-/// mark as stale those slices of 8x8 voxels in which a value equals the source's previous offer: it may have been the
-/// minimum, and the slice is recomputed once. Sources that decreased lower their targets. The values therefore do not
-/// depend on the order of changes.
+/// A change propagates through the stages and ends where a value is unchanged. In each stage, a source that increased
+/// marks the slices of 8x8 voxels in which a value equals the source's previous offer as stale: the offer may have been
+/// the minimum, so the slice is recomputed once. Sources that decreased lower their targets. The values therefore do
+/// not depend on the order of changes.
 #pragma once
 
 #include <algorithm>
@@ -37,27 +37,27 @@
 
 namespace orbis::nav {
 
-/// The obstacles in an octant of 4x4x4 voxels: bit i is the voxel at place i of the Morton curve.
+/// The obstacles in an octant of 4x4x4 voxels: bit i is the voxel at index i of the Morton curve.
 struct octant_obstacles {
-  octree::voxel_key octant;  ///< any voxel of it
+  octree::voxel_key octant;  ///< any voxel in it
   std::uint64_t mask = 0;
 };
 
 /// A node of an octree: a cube with an edge of 2^level voxels, aligned to multiples of that.
 struct voxel_cube {
-  octree::voxel_key low;  ///< any voxel of it
+  octree::voxel_key low;  ///< any voxel in it
   int level = 0;
 };
 
-/// The distances at one moment, for readers. A copy shares memory with the field that it was made from, and later
-/// updates do not change it.
+/// A snapshot of the distances, for readers. A copy shares memory with the field from which it was made; later updates
+/// do not change it.
 class squared_distance_view {
  public:
-  /// The value of voxels beyond the reach.
+  /// The value of voxels whose distance exceeds the reach.
   static constexpr std::uint16_t far = detail::far_away;
 
-  /// The squared distance between the centre of voxel `k` and that of the nearest obstacle, in voxels; 0 in obstacles;
-  /// `far` if it exceeds the reach. O(1), about 10 ns.
+  /// The squared distance between the centres of voxel `k` and the nearest obstacle, in voxels; 0 in obstacles; `far`
+  /// if it exceeds the reach. O(1), about 10 ns.
   [[nodiscard]] std::uint16_t squared(const octree::voxel_key& k) const noexcept {
     const std::uint32_t n = directory_.find(place_of(k));
     return is_brick(n) ? values_[n][index_of(k)] : value_without_brick(n);
@@ -68,7 +68,7 @@ class squared_distance_view {
   }
   /// Maximum distance, in voxels.
   [[nodiscard]] int reach() const noexcept { return reach_; }
-  /// The value outside the grid, and in all bricks that are not stored, except those in a cube (see
+  /// The value outside the grid and in all bricks that are not stored, except for bricks in a cube (see
   /// squared_distances::begin).
   [[nodiscard]] std::uint16_t elsewhere() const noexcept { return elsewhere_; }
   /// Calls `visit(lowest voxel, values)` for every stored brick: 8x8x8 squared distances, x fastest. Bricks that are
@@ -118,9 +118,10 @@ class squared_distance_view {
     return {static_cast<std::int32_t>(k.x >> 3U), static_cast<std::int32_t>(k.y >> 3U),
             static_cast<std::int32_t>(k.z >> 3U)};
   }
-  /// Returns true if the result of a directory look-up is a brick number.
+  /// Returns true if the result of a directory look-up is a brick index.
   [[nodiscard]] static bool is_brick(std::uint32_t found) noexcept { return found < detail::brick_directory::inner; }
-  /// The value of all voxels of a brick that is not stored, where `found` is the result of the directory: 0 or `far`.
+  /// The value of all voxels of a brick that is not stored, where `found` is the result of the directory look-up: 0 or
+  /// `far`.
   [[nodiscard]] std::uint16_t value_without_brick(std::uint32_t found) const noexcept {
     return found == detail::brick_directory::inner ? static_cast<std::uint16_t>(far - elsewhere_) : elsewhere_;
   }
@@ -135,24 +136,24 @@ class squared_distance_view {
   std::uint16_t elsewhere_;
 };
 
-/// Distances that follow their obstacles: after any sequence of updates the values are bit for bit those of a field
-/// rebuilt from the same obstacles. It needs no bounds. Memory is proportional to the space near obstacles or, if space
-/// without information is an obstacle (`elsewhere_is_obstacle`), to the free space: about 2.9 kB for each block of
-/// 8x8x8 voxels with a voxel within reach, released when none is left.
+/// Distances that are updated with the obstacles: after any sequence of updates, the values are bitwise identical to
+/// those of a field rebuilt from the same obstacles. No bounds need to be specified. Memory is proportional to the
+/// space near obstacles or, if unset space counts as an obstacle (`elsewhere_is_obstacle`), to the free space: about
+/// 2.9 kB for each block of 8x8x8 voxels with a voxel within reach, released when none is left.
 ///
-/// For one thread at a time. Readers on other threads use copies of `view()`.
+/// Not thread-safe. Readers on other threads use copies of `view()`.
 class squared_distances : public squared_distance_view {
  public:
-  /// `reach`: maximum distance, in voxels. `cells`: of the grid, along an axis. `elsewhere_is_obstacle`: true if voxels
-  /// that were never set, and all space outside the grid, are obstacles. @pre 1 <= reach <= 181; cells is a multiple of
-  /// 8
+  /// `reach`: maximum distance, in voxels. `cells`: number of grid cells along an axis. `elsewhere_is_obstacle`: true
+  /// if voxels that were never set, and all space outside the grid, are obstacles. @pre 1 <= reach <= 181; cells is a
+  /// multiple of 8
   squared_distances(int reach, std::uint32_t cells, bool elsewhere_is_obstacle);
 
-  /// Sets these cubes to the opposite of all other space: full of obstacles, or free. Only bricks within reach of their
-  /// faces are stored: outside full cubes, inside free ones (see max_added_bricks). @pre before the first update;
-  /// disjoint cubes of level 6 or more, in the grid
+  /// Initialises these cubes to the opposite of all other space: full of obstacles, or free. Only bricks within reach
+  /// of their faces are stored: outside full cubes, inside free ones (see max_added_bricks). @pre before the first
+  /// update; disjoint cubes of level 6 or more, in the grid
   void begin(std::span<const voxel_cube> cubes);
-  /// Maximum number of bricks that one cube alone adds to the field. O(1).
+  /// Maximum number of bricks that a single cube adds to the field. O(1).
   [[nodiscard]] std::uint64_t max_added_bricks(const voxel_cube& cube) const noexcept;
   /// Returns true if a node (level 2 or more) is in one of the cubes that the field was initialised with. O(levels).
   [[nodiscard]] bool is_in_cube(const voxel_cube& node) const noexcept {
@@ -164,25 +165,25 @@ class squared_distances : public squared_distance_view {
   ///
   /// O(changes x reach^3) in the worst case: a single obstacle in free space is the nearest one for all voxels within
   /// reach, and all of these are written, 64 at a time; when it disappears, their slices of 64 are recomputed in
-  /// O(reach) each. Typically obstacles are surfaces: most changes end after a few voxels, where another obstacle is
-  /// nearer, and voxels that several neighbours change are computed once. Memory that a large update needs in addition
-  /// to the field (up to its size) is released at its end; small ones allocate nothing except new bricks.
+  /// O(reach) each. Obstacles are typically surfaces: most changes end after a few voxels, where another obstacle is
+  /// nearer, and voxels affected by several neighbours are computed once. Memory that a large update needs in addition
+  /// to the field (up to its size) is released at its end; small updates allocate nothing except new bricks.
   /// @pre keys lie in the grid
   void update(std::span<const octant_obstacles> octants);
 
   /// Returns true if voxel `k` is an obstacle. O(1).
   [[nodiscard]] bool is_obstacle(const octree::voxel_key& k) const noexcept { return squared(k) == 0; }
-  /// The obstacle nearest to voxel `k`, or one of them if several are; empty if there is none within reach. The nearest
-  /// may be one that was never set (see `elsewhere_is_obstacle`). O(reach).
+  /// The obstacle nearest to voxel `k` (one of them on ties); empty if there is none within reach. It may be a voxel
+  /// that was never set (see `elsewhere_is_obstacle`). O(reach).
   [[nodiscard]] std::optional<octree::voxel_key> nearest(const octree::voxel_key& k) const;
 
   /// A view for readers. It is part of the field: read or copy it on the thread that updates the field, between two
-  /// updates. A copy does not change; it may be passed to other threads, read by several of them at once, and destroyed
-  /// on any. A copy costs a pointer and an atomic increment for each 4 bricks, and 40 to 80 bytes for each block of
-  /// 8x8x8 bricks (the directory); afterwards the field clones the parts that it writes to, 4 kB at a time. On the
-  /// updating thread no copy is needed.
+  /// updates. A copy does not change; it may be passed to other threads, read by several threads concurrently, and
+  /// destroyed on any thread. Copying costs one pointer and one atomic increment per 4 bricks, and 40 to 80 bytes per
+  /// block of 8x8x8 bricks (the directory); afterwards, the field clones the parts that it writes to, 4 kB at a time.
+  /// On the updating thread, no copy is needed.
   [[nodiscard]] const squared_distance_view& view() const noexcept { return *this; }
-  /// Bytes on the heap, including those shared with copies of the view.
+  /// Bytes on the heap, including memory shared with copies of the view.
   [[nodiscard]] std::size_t memory_bytes() const noexcept;
 
  private:
@@ -194,10 +195,10 @@ class squared_distances : public squared_distance_view {
     alignas(64) std::array<std::uint16_t, 512> plane;
     std::array<std::uint8_t, 512> along;
     std::array<std::uint8_t, 64> obstacles;  ///< row z * 8 + y, bit x
-    std::array<std::uint64_t, 8> octants;    ///< the same, as passed to update
+    std::array<std::uint64_t, 8> octants;    ///< the obstacles by octant, as passed to update
     std::array<std::uint16_t, 8> plane_top;  ///< the largest value of each slice
     std::array<std::uint16_t, 8> space_top;
-    std::uint32_t kept = none;     ///< number of the copy of `plane` from before the update
+    std::uint32_t kept = none;     ///< index of the copy of `plane` from before the update
     std::uint8_t stale_plane = 0;  ///< slices to recompute
     std::uint8_t stale_space = 0;
   };
@@ -219,18 +220,18 @@ class squared_distances : public squared_distance_view {
   void remove(std::uint32_t brick);
   [[nodiscard]] std::size_t buffer_bytes() const noexcept;
   void release_buffers();
-  /// For a brick that is not stored: returns true if it is full of obstacles; returns one of its rows as bits.
+  /// For a brick that is not stored: true if it is full of obstacles; one of its rows as bits.
   [[nodiscard]] bool is_full(std::uint32_t found) const noexcept { return value_without_brick(found) == 0; }
   [[nodiscard]] std::uint8_t row_bits(std::uint32_t found) const noexcept { return is_full(found) ? 0xff : 0; }
   [[nodiscard]] std::uint16_t bound() const noexcept { return static_cast<std::uint16_t>(reach_ * reach_); }
-  /// The squares of the distances of eight rows, the first one `distance` rows away, each repeated eight times.
+  /// The squared distances of eight rows, the first one `distance` rows away, each repeated eight times.
   [[nodiscard]] const std::uint16_t* squares(int distance) const noexcept {
     return squares_.data() + 8 * (distance + squares_pad_);
   }
   /// Maximum distance at which an offer of `least` matters, in voxels; negative if it matters nowhere.
   [[nodiscard]] int offer_reach(std::uint16_t least) const noexcept;
 
-  /// Clears the change lists of the previous update; propagates those of this one through all stages.
+  /// Clears the change lists of the previous update; propagates the new changes through all stages.
   void begin_update();
   void finish_update();
   void set_obstacles(std::span<const octant_obstacles> octants);
@@ -250,7 +251,7 @@ class squared_distances : public squared_distance_view {
   std::vector<std::uint16_t> squares_;
   std::array<std::array<std::uint8_t, 8>, 256> nearest_bit_;  ///< distances of 8 voxels to the nearest set bit
 
-  // Buffers of an update.
+  // Buffers for an update.
   std::vector<std::uint64_t> rows_;
   std::vector<std::uint32_t> line_;
   std::vector<std::uint8_t> line_bits_, left_, right_;

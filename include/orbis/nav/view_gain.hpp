@@ -27,19 +27,19 @@ namespace orbis::nav {
 struct view_gain_options {
   double max_range = 4.0;  ///< range of the camera, metres along the ray
   int pixel_step = 8;      ///< spacing of the rays in columns and rows of the image
-  /// Box in which unknown space counts; empty: everywhere. If a map ends in unknown space on all sides, a box around
-  /// the space to explore prevents rays that pass through a gap from counting space outside it.
+  /// Box in which unknown space is counted; empty: everywhere. If a map is surrounded by unknown space, a box around
+  /// the space to explore prevents rays that pass through a gap from counting space outside.
   std::optional<octree::bounding_box> bounds{};
 };
 
 /// Counts the unknown voxels that a camera would see: its rays pass through free and unknown space up to the first
 /// occupied voxel. Each voxel counts once, regardless of how many rays cross it. This is an upper bound on the space
-/// that a view can reveal, because unknown space may hide the space behind it: H. H. Gonzalez-Banos, J.-C. Latombe,
-/// "Navigation strategies for exploring indoor environments", International Journal of Robotics Research 21, 2002. Rays
-/// that are more than a voxel apart miss some.
+/// that a view can reveal, because unknown space may contain obstacles that hide the space behind them: H. H.
+/// Gonzalez-Banos, J.-C. Latombe, "Navigation strategies for exploring indoor environments", International Journal of
+/// Robotics Research 21, 2002. Where rays are more than a voxel apart, some voxels are missed.
 ///
-/// It caches the parts of the map that it reads, so that poses near each other are fast. The map must outlive it and
-/// not change. For one thread at a time.
+/// Caches the parts of the map that it reads, so queries for nearby poses are fast. The map must outlive the object and
+/// not change. Not thread-safe.
 template <planning_map Map, camera::camera_model Camera>
 class view_gain {
  public:
@@ -58,7 +58,7 @@ class view_gain {
   // A temporary would not outlive the gain.
   view_gain(const Map&&, const Camera&, const view_gain_options& = {}) = delete;
 
-  /// The number of unknown voxels seen from a pose; 0 from outside the grid. O(voxels along the rays)
+  /// The number of unknown voxels seen from a pose; 0 if the pose is outside the grid. O(voxels along the rays)
   [[nodiscard]] std::size_t operator()(const se3& T_world_camera) {
     const vec3 origin = T_world_camera.translation();
     const std::optional<octree::voxel_key> start = all_finite(origin) ? grid_.key(origin) : std::nullopt;
@@ -70,7 +70,7 @@ class view_gain {
   }
 
  private:
-  /// States of an octant of 4x4x4 voxels, and the voxels in it that the view with this number has counted.
+  /// States of an octant of 4x4x4 voxels, and the voxels in it that the view with index `view` has counted.
   struct octant {
     octree::octant_states states;
     std::uint64_t counted = 0;
@@ -94,7 +94,7 @@ class view_gain {
   /// Eurographics 1987.
   void cast(const vec3& origin, const octree::voxel_key& start, const vec3& direction) {
     std::array<std::uint32_t, 3> at{start.x, start.y, start.z};
-    std::array<double, 3> next{}, apart{};  // positions where the ray enters the next voxel along an axis, metres
+    std::array<double, 3> next{}, apart{};  // positions on the ray where it enters the next voxel along an axis, metres
     std::array<std::uint32_t, 3> step{};
     for (std::size_t i = 0; i != 3; ++i) {
       const double d = direction[static_cast<Eigen::Index>(i)];
@@ -129,10 +129,10 @@ class view_gain {
   octree::voxel_grid grid_;
   decltype(map_access<Map>::octants(std::declval<const Map&>())) octants_;
   double max_range_;
-  std::vector<vec3> rays_;  ///< of length 1
+  std::vector<vec3> rays_;  ///< unit vectors
   std::optional<octree::key_box> counted_;
   bool counts_any_ = true;
-  hash_index index_;  ///< places in seen_
+  hash_index index_;  ///< indices into seen_
   std::vector<octant> seen_;
   std::uint64_t view_ = 0;
   std::size_t count_ = 0;

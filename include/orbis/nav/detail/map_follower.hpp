@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Finds the parts of a map that changed since they were last read, from the map's change log.
+/// Finds the parts of a map that have changed since they were last read, from the map's change log.
 #pragma once
 
 #include <algorithm>
@@ -23,7 +23,8 @@ concept has_change_log = requires(const Map& map) {
 /// Stores the last revision of a map that was read.
 class map_follower {
  public:
-  /// Updates derived data from `map` by `some(log, since)` or `all()`, as below; by `all()` if the map has no log.
+  /// Updates derived data from `map` by calling `some(log, since)` or `all()`, as below; calls `all()` if the map has
+  /// no log.
   template <class Map, class Some, class All>
   void follow(const Map& map, Some&& some, All&& all) {
     if constexpr (has_change_log<Map>) {
@@ -34,13 +35,13 @@ class map_follower {
       all();
     }
   }
-  /// The same for a copy of the map of `log`, made at `revision`. Calls `some(log, since)` if all possible differences
-  /// from the last revision read are changes after revision `since`, `all()` if the log does not reach back that far,
-  /// and nothing if this revision was read last.
+  /// Like the overload above, for a copy of the map to which `log` belongs, made at `revision`. Calls `some(log,
+  /// since)` if all possible differences from the last revision read are changes after revision `since`, `all()` if the
+  /// log does not reach back that far, and nothing if this revision was read last.
   template <class Some, class All>
   void follow(const octree::change_log& log, std::uint64_t revision, Some&& some, All&& all) {
     assert(revision <= log.revision());
-    // If both revisions are older than the log, it names more octants than have changed between them, never fewer.
+    // If the log is newer than both revisions, it may list more octants than have changed between them, never fewer.
     const std::uint64_t since = seen_ ? std::min(*seen_, revision) : 0;
     const std::optional<std::uint64_t> seen = std::exchange(seen_, std::nullopt);  // in case one of these throws
     if (!seen || since < log.complete_since() || log.revision() == 0)

@@ -8,8 +8,9 @@
 
 namespace orbis::nav::detail {
 
-/// Values in blocks of 16. Adding a value moves no other one. Access takes two loads; a std::deque of large values
-/// computes more. One empty block is kept, so that adding and removing a value repeatedly allocates nothing.
+/// Values in blocks of 16. Adding a value does not move the others. Access takes two loads; a std::deque of large
+/// values needs more instructions. One empty block is kept, so that adding and removing a value repeatedly allocates
+/// nothing.
 template <class T>
 class block_vector {
  public:

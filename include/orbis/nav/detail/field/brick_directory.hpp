@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Index from positions to the numbers of bricks of 8x8x8 voxels.
+/// Index from positions to brick indices; a brick has 8x8x8 voxels.
 #pragma once
 
 #include <algorithm>
@@ -15,34 +15,35 @@
 
 namespace orbis::nav::detail {
 
-/// A brick's place in the grid, in bricks.
+/// A brick's position in the grid, in bricks.
 struct brick_place {
   std::int32_t x = 0, y = 0, z = 0;
   friend bool operator==(const brick_place&, const brick_place&) = default;
 };
 
-/// Numbers of bricks by position, stored in blocks of 8x8x8 bricks. Copies share the blocks until one of them changes.
+/// Brick indices by position, stored in blocks of 8x8x8 bricks. Copies share the blocks until one of them changes.
 class brick_directory {
  public:
-  /// Results of `find` for places without a number: `inner` in one of the cubes (see add_cube), `none` outside all of
-  /// them.
+  /// Results of `find` for positions without an index: `inner` in one of the cubes (see add_cube), `none` outside all
+  /// of them.
   static constexpr std::uint32_t none = hash_index::none, inner = none - 1;
 
-  /// `bricks`: edge of the grid in bricks. Places outside it are never found.
+  /// `bricks`: edge of the grid in bricks. Positions outside the grid are never found.
   explicit brick_directory(std::uint32_t bricks) noexcept : bricks_{bricks} {}
 
   [[nodiscard]] bool is_inside(const brick_place& p) const noexcept {
     return static_cast<std::uint32_t>(p.x) < bricks_ && static_cast<std::uint32_t>(p.y) < bricks_ &&
            static_cast<std::uint32_t>(p.z) < bricks_;
   }
-  /// The number of the brick at `p`, or `inner`, or `none`. O(1).
+  /// The index of the brick at `p`, or `inner`, or `none`. O(1).
   [[nodiscard]] std::uint32_t find(const brick_place& p) const noexcept {
     if (!is_inside(p)) return none;
     const std::uint32_t b = blocks_.find(name(p));
     return b == none ? without_number(p) : numbers_[b][place(p)];
   }
-  /// Sets the result of `find` to `inner` for places without a number in the cube of 2^level bricks that contains `p`.
-  /// @pre no brick has a number; level >= 3; in the grid
+  /// Sets the result of `find` to `inner` for positions without an index in the cube of 2^level bricks that contains
+  /// `p`.
+  /// @pre no brick has an index; level >= 3; in the grid
   void add_cube(const brick_place& p, int level) {
     cubes_.set(cube_name(p, level), 0);
     levels_ |= 1U << static_cast<unsigned>(level);
@@ -54,11 +55,11 @@ class brick_directory {
     return false;
   }
   [[nodiscard]] bool has_cubes() const noexcept { return levels_ != 0; }
-  /// `inner` or `none`: the result of `find` for a place if it had no number. O(levels of cubes).
+  /// `inner` or `none`: the result that `find` would return for `p` if it had no index. O(levels of cubes).
   [[nodiscard]] std::uint32_t without_number(const brick_place& p) const noexcept {
     return has_cubes() && is_in_cube(p, 0) ? inner : none;
   }
-  /// Sets the number of the brick at `p`. @pre is_inside(p)
+  /// Sets the index of the brick at `p`. @pre is_inside(p)
   void set(const brick_place& p, std::uint32_t number) {
     std::uint32_t b = blocks_.find(name(p));
     if (b == none) {
@@ -71,7 +72,7 @@ class brick_directory {
     }
     numbers_.writable(b)[place(p)] = number;
   }
-  /// Removes the brick at `p`, and its block if that becomes empty. @pre it has a number
+  /// Removes the brick at `p`, and its block if the block becomes empty. @pre `p` has an index
   void erase(const brick_place& p) {
     const std::uint32_t b = blocks_.find(name(p));
     block& numbers = numbers_.writable(b);
@@ -129,10 +130,10 @@ class brick_directory {
 
   std::uint32_t bricks_;
   hash_index blocks_;
-  hash_index cubes_;     ///< by their names
-  unsigned levels_ = 0;  ///< bit l: there is a cube of 2^l bricks
+  hash_index cubes_;     ///< cubes by name
+  unsigned levels_ = 0;  ///< bit l is set if there is a cube of 2^l bricks
   cow_pages<block> numbers_;
-  std::vector<std::uint64_t> names_;  ///< of blocks
+  std::vector<std::uint64_t> names_;  ///< names of the blocks
 };
 
 }  // namespace orbis::nav::detail

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Table of the distance field arithmetic; slice_kernels.hpp implements it for each instruction set.
+/// Table of the distance field kernels; slice_kernels.hpp implements them for each instruction set.
 #pragma once
 
 #include <array>
@@ -11,15 +11,15 @@ namespace orbis::nav::detail {
 
 /// Maximum reach of a field, in voxels: its square is less than `far_away`.
 inline constexpr int max_reach = 181;
-/// The value of a voxel that is farther from all obstacles than the field reaches.
+/// The value of a voxel that is farther from all obstacles than the field's reach.
 inline constexpr std::uint16_t far_away = 0x7fff;
-/// Value of a source that offers nothing: with a square added it is neither equal to nor less than any value.
+/// Value of a source that offers nothing: with a square added, it is neither equal to nor less than any value.
 inline constexpr std::uint16_t no_offer = 0x8000;
 
-/// Row y * 8 + x.
+/// Values of 8x8 voxels, at index y * 8 + x.
 using slice = std::array<std::uint16_t, 64>;
 
-/// Offer of a slice to neighbouring slices.
+/// The offer of a slice to neighbouring slices.
 struct slice_offer {
   alignas(64) slice value;
   std::uint16_t least = no_offer;  ///< smallest of the values

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The arithmetic of a distance field, over slices of 8x8 voxels of one brick.
+/// Kernels of the distance field, which process slices of 8x8 voxels of one brick.
 ///
 /// Values are squared distances in voxels or `far_away`. A *source* offers a target voxel its own value plus the square
 /// of the distance between them; the value of a target is the smallest offer.
@@ -21,7 +21,7 @@ namespace orbis::nav::detail {
 template <class Target>
 using slice_lanes = simd::vec<std::uint16_t, 64, Target>;
 
-/// `offer` becomes `from` where `from` is less than `other`, and `no_offer` elsewhere.
+/// Sets `offer` to `from` where `from` is less than `other`, and to `no_offer` elsewhere.
 struct choose_offer_kernel {
   using signature = void(const std::uint16_t* from, const std::uint16_t* other, slice_offer* offer);
   template <class Target>
@@ -34,9 +34,9 @@ struct choose_offer_kernel {
   }
 };
 
-/// Finds those of eight consecutive slices (`targets`; `tops`: the largest value of each) in which a value equals the
-/// offer of the source; returns them as bits. `from`: distance of the source from the first slice, in slices. Examines
-/// slices [first, last] without those in `skip`.
+/// Finds the slices among eight consecutive ones (`targets`; `tops`: the largest value of each) in which a value equals
+/// the source's offer; returns them as bits. `from`: distance of the source from the first slice, in slices. Examines
+/// slices [first, last] except those in `skip`.
 struct equal_slices_kernel {
   using signature = unsigned(const std::uint16_t* targets, const std::uint16_t* tops, const slice_offer* offer,
                              int from, int first, int last, unsigned skip);
@@ -55,7 +55,7 @@ struct equal_slices_kernel {
   }
 };
 
-/// Lowers the values of such slices to the offer of the source if that is less and at most `bound`; updates `tops`.
+/// Lowers the values of such slices to the source's offer where it is less and at most `bound`; updates `tops`.
 struct lower_slices_kernel {
   using signature = void(std::uint16_t* targets, std::uint16_t* tops, const slice_offer* offer, int from, int first,
                          int last, unsigned skip, std::uint16_t bound);
@@ -75,7 +75,7 @@ struct lower_slices_kernel {
   }
 };
 
-/// Returns true if a value of the slice equals the offer of the source; `squares` are added to the offer.
+/// Returns true if a value of the slice equals the source's offer; `squares` are added to the offer.
 struct equal_rows_kernel {
   using signature = bool(const std::uint16_t* target, const slice_offer* offer, const std::uint16_t* squares);
   template <class Target>
@@ -164,7 +164,7 @@ template <class K>
   return simd::kernel<K, typename K::signature>();
 }
 
-/// The kernels for this machine's processor.
+/// The best kernels for the current processor.
 [[nodiscard]] inline slice_code best_slice_code() noexcept {
   return {best_code<choose_offer_kernel>(),  best_code<equal_slices_kernel>(), best_code<lower_slices_kernel>(),
           best_code<equal_rows_kernel>(),    best_code<lower_rows_kernel>(),   best_code<add_rows_kernel>(),

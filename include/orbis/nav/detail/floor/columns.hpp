@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A layer of a map as columns of voxels, in bits.
+/// A layer of a map as bit columns of voxels.
 #pragma once
 
 #include <algorithm>
@@ -19,11 +19,11 @@
 
 namespace orbis::nav::detail {
 
-/// The voxels of an octant at each height.
+/// Masks of the voxels of an octant at each height.
 inline constexpr std::array<std::uint64_t, 4> octant_layers{0x000000000f0f0f0f, 0x00000000f0f0f0f0, 0x0f0f0f0f00000000,
                                                             0xf0f0f0f000000000};
 
-/// The voxels of a box of a map, column by column: the known ones, and the occupied ones among them.
+/// The voxels in a box of a map, column by column: bits for known voxels, and for occupied ones among them.
 class voxel_columns {
  public:
   /// Columns of unknown voxels. @pre low and size are multiples of 4
@@ -53,12 +53,12 @@ class voxel_columns {
   [[nodiscard]] int end_of_run(int x, int y, int z) const noexcept {
     return z + std::countr_one(occupied_[place(x, y) + static_cast<std::size_t>(z >> 6)] >> (z & 63)) - 1;
   }
-  /// The lowest unknown voxel at level `z` or above; levels() if it is beyond the box. @pre z >= 0
+  /// The lowest unknown voxel of a column at level `z` or above; levels() if there is none in the box. @pre z >= 0
   [[nodiscard]] int next_unknown(int x, int y, int z) const noexcept {
     return next(known_, ~std::uint64_t{0}, x, y, z);
   }
 
-  /// Sets all octants of a box of octants that were not set before. @pre the box lies in this one
+  /// Sets all octants in a box of octants that were not set before. @pre the box lies in the box of columns
   void set(const octree::key_box& octants, const octree::octant_states& s) noexcept {
     const std::uint64_t all = ~std::uint64_t{0};
     const bool is_uniform = s.known == all && (s.occupied == 0 || s.occupied == all);
@@ -104,9 +104,10 @@ class voxel_columns {
     }
   }
   /// The voxels of an octant as columns of four, lowest first; columns along x, then rows y = 0, 2, 1, 3. In a Morton
-  /// code, x has bits 0 and 3, y bits 1 and 4, z bits 2 and 5: exchanges bit 0 with 2, and 1 with 5.
+  /// code, x has bits 0 and 3, y bits 1 and 4, z bits 2 and 5; the function exchanges bit 0 with bit 2, and bit 1 with
+  /// bit 5.
   [[nodiscard]] static std::uint64_t by_column(std::uint64_t m) noexcept {
-    const auto exchange = [&](std::uint64_t bits, int distance) {  // exchanges `bits` with those `distance` higher
+    const auto exchange = [&](std::uint64_t bits, int distance) {  // exchanges `bits` with the bits `distance` higher
       const std::uint64_t differ = (m >> distance ^ m) & bits;
       m ^= differ ^ differ << distance;
     };
@@ -129,7 +130,7 @@ class voxel_columns {
   octree::voxel_key low_;
   std::array<std::uint32_t, 3> size_;
   std::size_t words_;
-  std::vector<std::uint64_t> known_, occupied_;  ///< words_ for each column, row by row
+  std::vector<std::uint64_t> known_, occupied_;  ///< words_ words per column, row by row
 };
 
 /// The columns of a box of voxels, cropped along all axes to the octants with known voxels. Errors: no_data,

@@ -20,13 +20,13 @@ namespace orbis::nav::detail {
 /// Marks a column without a level.
 inline constexpr int no_level = std::numeric_limits<int>::min();
 
-/// Columns around a central one at coordinates (0, 0).
+/// Columns around a central column at coordinates (0, 0).
 struct level_window {
-  const int* levels = nullptr;  ///< of the first column
-  std::ptrdiff_t stride = 0;    ///< from row to row
+  const int* levels = nullptr;  ///< points to the level of the first column
+  std::ptrdiff_t stride = 0;    ///< distance between rows
   int x = 0, y = 0;             ///< coordinates of the first column, <= 0
   int width = 0, height = 0;
-  int level = 0;  ///< of the central column
+  int level = 0;  ///< level of the central column
   /// A column counts if its level differs by at most `step` per cell of distance; all columns at `enough` or more cells
   /// count. `step` times `enough` fits in an int.
   int step = 1, enough = 1;
@@ -35,10 +35,10 @@ struct level_window {
 /// Sums over the columns that count; z is the level relative to the central one.
 struct plane_sums {
   double n = 0, x = 0, y = 0, z = 0, xx = 0, xy = 0, yy = 0, xz = 0, yz = 0;
-  int lowest = 0, highest = 0;  ///< of z and 0
+  int lowest = 0, highest = 0;  ///< extremes of z and 0
 };
 
-/// `T`: type of the sums; exact if each sum fits in a T (for double: is less than 2^53).
+/// `T`: type of the sums; exact if each sum fits in a T (for double: if it is less than 2^53).
 template <class T>
 struct plane_sums_kernel {
   using signature = plane_sums(const level_window&);
@@ -56,8 +56,8 @@ struct plane_sums_kernel {
       const auto is_inside = integers::mask::first(count);
       const integers dx = integers(w.x + first) + integers::iota();
       const integers limit_x = min(simd::abs(dx), integers(w.enough)) * integers(w.step);
-      // Over the columns of the block. Sums of sums weight a row by the number of rows from it to the end (t, or t (t +
-      // 1) / 2): products would cost more.
+      // Sums over the columns of the block. Sums of sums weight a row by the number of rows from it to the end (t, or t
+      // (t + 1) / 2), which is cheaper than products.
       V ones = T{0}, ones_t = T{0}, ones_tt = T{0}, rise = T{0}, rise_t = T{0};
       for (int row = 0; row != w.height; ++row) {
         const int dy = w.y + row;

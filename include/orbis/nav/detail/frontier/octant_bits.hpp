@@ -8,16 +8,16 @@
 
 namespace orbis::nav::detail {
 
-// Bit i is the voxel at place i of the Morton curve: along `axis` (0: x), the low bit of its coordinate is bit `axis`
-// of i, the high bit is bit `axis + 3`. Successive voxels are therefore 1, 7 and 1 times 2^axis places apart, and the
-// last one is 9 times 2^axis places after the first.
+// Bit i is the voxel at index i of the Morton curve: along `axis` (0: x), the low bit of its coordinate is bit `axis`
+// of i, the high bit is bit `axis + 3`. The indices of successive voxels therefore differ by 1, 7 and 1 times 2^axis,
+// and the index of the last one is 9 times 2^axis greater than that of the first.
 
-/// The voxels whose coordinate along the axis has the low bit 0.
+/// The voxels with an even coordinate along the axis.
 inline constexpr std::array<std::uint64_t, 3> even_voxels{0x5555555555555555, 0x3333333333333333, 0x0f0f0f0f0f0f0f0f};
 /// The voxels in the lower half along the axis.
 inline constexpr std::array<std::uint64_t, 3> lower_half{0x00ff00ff00ff00ff, 0x0000ffff0000ffff, 0x00000000ffffffff};
 
-/// The voxels of the lowest and of the highest layer along the axis.
+/// The voxels of the lowest (highest) layer along the axis.
 [[nodiscard]] constexpr std::uint64_t lowest_layer(unsigned axis) noexcept {
   return even_voxels[axis] & lower_half[axis];
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Connectivity of free cells.
+/// Connectivity test for free cells.
 #pragma once
 
 #include <algorithm>
@@ -20,19 +20,19 @@
 
 namespace orbis::nav::detail {
 
-/// Tests whether cells are connected to the cells from which a robot starts, by free cells that are 26-neighbours (on a
-/// floor 8-neighbours) of each other. No search over cells reaches unconnected cells. Connected cells are not always
-/// reachable, because a step between two free cells may be blocked.
+/// Tests whether cells are connected to the robot's start cells by a chain of free cells that are 26-neighbours (on a
+/// floor, 8-neighbours) of each other. A search over cells cannot reach unconnected cells. Connected cells are not
+/// always reachable, because a step between two free cells may be blocked.
 ///
-/// Two floods, from the start and from the other cell, alternate, each growing towards the other one's origin, until
-/// they meet or one runs out of cells. Detecting that either side is enclosed is therefore cheap, regardless of the
-/// size of the other.
+/// Alternates between two floods, from the start and from the other cell, each growing towards the origin of the other,
+/// until they meet or one runs out of cells. Detecting that either side is enclosed is therefore cheap, regardless of
+/// the size of the other side.
 template <class Space>
 class cell_floods {
  public:
   using key = octree::voxel_key;
 
-  /// `doors`: the cells of the start. `goal`: finite.
+  /// `doors`: the start cells. @pre `goal` is finite
   cell_floods(const Space& space, const vec3& start, const std::vector<key>& doors, const vec3& goal)
       : space_{space}, start_{start}, goal_{space.clamped(goal)} {
     for (const key& k : doors) begin(k, mark::near);
@@ -60,10 +60,10 @@ class cell_floods {
     return std::any_of(cells.begin(), cells.end(), [&](const key& k) { return may_reach(k, max_cells); });
   }
   /// The cell nearest to the goal that is connected to the start, among the `max_cells` cells that a flood examines;
-  /// empty without doors. O(cells that are nearer to the goal, or enclosed together with one of these), or O(cells
+  /// empty without doors. O(cells that are nearer to the goal, or enclosed together with such a cell), or O(cells
   /// connected to the start).
   [[nodiscard]] std::optional<key> nearest(std::size_t max_cells) {
-    // Visit cells around the goal in the order of their distances, as long as they are fewer than the cells of a flood.
+    // Visit cells around the goal in order of distance, as long as there are fewer of them than cells in a flood.
     constexpr double most = std::size_t{1} << 20U;
     std::array<std::int64_t, 3> middle{};
     const vec3 from_first = (goal_ - space_.center(key{})) / space_.resolution();
@@ -125,7 +125,7 @@ class cell_floods {
     if (mark_at(k) <= mark::free) mark_at(k) = mark::free;
     return add(k, which);
   }
-  /// Adds a cell to a flood if it is in none. Returns true if it is in the other one.
+  /// Adds a cell to a flood unless it is already in a flood. Returns true if it is in the other flood.
   bool add(const key& k, mark which) {
     if (!space_.contains(k) || !is_free(k)) return false;
     mark& m = mark_at(k);

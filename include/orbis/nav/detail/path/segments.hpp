@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Straight segments: whether a robot can move along them, and their costs.
+/// Straight segments: tests of whether a robot can move along them, and their costs.
 #pragma once
 
 #include <algorithm>
@@ -16,7 +16,7 @@
 
 namespace orbis::nav::detail {
 
-/// Cost of a metre at a clearance (metres) from obstacles, see planning_options.
+/// Cost per metre at a clearance (metres) from obstacles, see planning_options.
 [[nodiscard]] inline double clearance_density(const planning_options& options, double clearance) noexcept {
   const double lacking = 1.0 - std::max(0.0, clearance) / options.preferred_clearance;
   return lacking > 0.0 ? 1.0 + options.clearance_weight * lacking * lacking : 1.0;
@@ -26,14 +26,14 @@ namespace orbis::nav::detail {
 inline constexpr double blocked = -std::numeric_limits<double>::infinity();
 
 /// Returns true if the segment from `a` to `b` is free. `margin(p)`: the distance that the robot can certainly move
-/// from `p` in any direction; `blocked`; or less than 0 if that is not certain. `is_blocked(p, q)`: exact test whether
-/// the robot cannot move from `p` to `q`. Steps from clearance to clearance, after J. C. Hart, "Sphere tracing", The
-/// Visual Computer 12, 1996.
+/// from `p` in any direction; `blocked`; or a negative value if neither is certain. `is_blocked(p, q)`: exact test of
+/// whether an obstacle prevents the robot from moving from `p` to `q`. Advances by the available margin, as in J. C.
+/// Hart, "Sphere tracing", The Visual Computer 12, 1996.
 template <class Margin, class IsBlocked>
 [[nodiscard]] bool is_segment_free(const vec3& a, const vec3& b, double cell, Margin&& margin, IsBlocked&& is_blocked) {
   const double length = norm(b - a);
   const auto at = [&](double t) -> vec3 { return t >= length ? b : vec3{a + (b - a) * (t / length)}; };
-  const double least_step = 0.2 * cell;  // several of them cost less than an exact test
+  const double least_step = 0.2 * cell;  // several such steps cost less than an exact test
   // Cheap tests first: the margins alone reject most blocked segments.
   bool is_near = false;
   double t = 0.0;
@@ -84,7 +84,7 @@ template <class Space>
   const std::array<std::uint32_t, 3> last{end->x, end->y, end->z};
   std::array<std::uint32_t, 3> step{};
   // Positions along the segment at which faces are crossed, metres. Rounding errors accumulate and could lead out of
-  // the grid at the end: along an axis no face is crossed after the last cell is reached.
+  // the grid at the end, so no face is crossed along an axis once the last cell is reached.
   std::array<double, 3> next{}, apart{};
   constexpr double never = std::numeric_limits<double>::infinity();
   for (int i = 0; i != 3; ++i) {
@@ -99,7 +99,7 @@ template <class Space>
   while (t < length) {
     const std::size_t i = next[0] < next[1] ? (next[0] < next[2] ? 0U : 2U) : (next[1] < next[2] ? 1U : 2U);
     const double to = std::min(std::max(next[i], t), length);
-    // Through an edge or a corner the segment passes the adjacent cells, which do not count.
+    // Where the segment passes through an edge or a corner, it touches adjacent cells, which do not count.
     if (to - t > 1e-9 * space.resolution()) density = space.density({at[0], at[1], at[2]});
     sum += (to - t) * density;
     t = to;

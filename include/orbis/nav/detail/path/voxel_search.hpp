@@ -24,39 +24,39 @@ namespace orbis::nav::detail {
 enum class search_end : std::uint8_t {
   found,
   exhausted,  ///< all reachable cells have been expanded
-  stopped     ///< at the limit
+  stopped     ///< stopped at the limit
 };
 
-/// Length of the shortest path in steps along axes and diagonals without obstacles; `d`: from one end to the other,
-/// metres. A metric.
+/// Length of the shortest path in steps along axes and diagonals without obstacles; `d`: vector from one end to the
+/// other, metres. The length is a metric.
 [[nodiscard]] inline double length_in_steps(const vec3& d) noexcept {
   std::array<double, 3> s{std::abs(d.x()), std::abs(d.y()), std::abs(d.z())};
   std::sort(s.begin(), s.end());
   return 1.73205080756887729 * s[0] + 1.41421356237309505 * (s[1] - s[0]) + (s[2] - s[1]);
 }
 
-/// Search for the cheapest path between two places over cell centres, with steps to all 26 (on a floor 8) neighbours.
+/// Search for the cheapest path between two points over cell centres, with steps to all 26 (on a floor, 8) neighbours.
 ///
 /// - On the grid: A*, P. Hart, N. Nilsson, B. Raphael, "A formal basis for the heuristic determination of minimum cost
 ///   paths", IEEE Transactions on Systems Science and Cybernetics 4(2), 1968. The result is optimal on the grid.
 /// - At any angle: lazy Theta*, A. Nash, S. Koenig, C. Tovey, "Lazy Theta*: any-angle path planning and path length
 ///   analysis in 3D", AAAI 2010. A cell is first assigned its predecessor's parent, as if it were visible.
 ///
-/// Both test whether a step is possible, and compute the cost of a line, when the cell is expanded and not for each of
-/// its neighbours: before that, costs are lower bounds. A cell whose cost rises is put back into the queue. (Lazy
-/// evaluation of edges, as in C. Dellin, S. Srinivasa, "A unifying formalism for shortest path problems with expensive
-/// edge evaluations via lazy best-first search over paths with edge selectors", ICAPS 2016.)
+/// Both methods test whether a step is possible, and compute the cost of a line, only when the cell is expanded; until
+/// then, costs are lower bounds. A cell whose cost increases is put back into the queue. (Lazy evaluation of edges, as
+/// in C. Dellin, S. Srinivasa, "A unifying formalism for shortest path problems with expensive edge evaluations via
+/// lazy best-first search over paths with edge selectors", ICAPS 2016.)
 ///
 /// The heuristic is the remaining length without obstacles, in steps or straight. It is admissible, because no path
-/// costs less than its length, and consistent, because it is a metric. At any angle, where no optimum is proven anyway,
-/// it may have a weight greater than 1 (I. Pohl, "First results on the effect of error in heuristic search", Machine
-/// Intelligence 5, 1970).
+/// costs less than its length, and consistent, because it is a metric. At any angle, where the optimum is not
+/// guaranteed anyway, it may have a weight greater than 1 (I. Pohl, "First results on the effect of error in heuristic
+/// search", Machine Intelligence 5, 1970).
 template <class Space>
 class voxel_search {
  public:
   using key = octree::voxel_key;
 
-  /// `weight`: of the heuristic at any angle, >= 1.
+  /// `weight`: weight of the heuristic at any angle, >= 1.
   explicit voxel_search(const Space& space, bool any_angle = false, double weight = 1.0)
       : space_{space}, any_angle_{any_angle}, is_uniform_{space.is_uniform()}, weight_{any_angle ? weight : 1.0} {}
 
@@ -96,7 +96,7 @@ class voxel_search {
       std::pop_heap(open_.begin(), open_.end());
       const entry e = open_.back();
       open_.pop_back();
-      if (at(e.number).is_closed || at(e.number).cost != e.cost) continue;  // it has received another offer since
+      if (at(e.number).is_closed || at(e.number).cost != e.cost) continue;  // superseded by a later offer
       if (!confirm_cost(e.number)) continue;
       if (e.number != to && expanded_ >= max_expanded) {
         open_.push_back(e);
@@ -130,11 +130,11 @@ class voxel_search {
   static constexpr double infinity = std::numeric_limits<double>::infinity();
   static constexpr bool is_flat = Space::dimensions == 2;
   static constexpr std::uint32_t brick_bits = is_flat ? 6 : 9;  ///< cells of a brick: 8x8x8, or 8x8 on a floor
-  static constexpr std::uint32_t from = ~std::uint32_t{1}, to = ~std::uint32_t{0};  ///< the numbers of both ends
+  static constexpr std::uint32_t from = ~std::uint32_t{1}, to = ~std::uint32_t{0};  ///< the indices of both ends
 
   /// Certainty of a cell's cost.
   enum class trust : std::uint8_t {
-    bound,  ///< a path from the parent costs no less
+    bound,  ///< a lower bound on the cost from the parent
     exact,  ///< the cost if the segment is free
     sure    ///< the segment is free
   };
@@ -143,7 +143,7 @@ class voxel_search {
     double density = 0.0;  ///< 0: not computed
     std::uint32_t parent = from;
     std::uint32_t tried = to;  ///< the last parent whose line was blocked or cost more than expected
-    std::uint32_t barred = 0;  ///< directions of neighbours without a step to this cell; of the goal: exits
+    std::uint32_t barred = 0;  ///< directions of neighbours without a step to this cell; for the goal: exits
     std::uint8_t free = 0;     ///< 0: not tested, 1: no, 2: yes
     trust known = trust::bound;
     bool is_closed = false;
@@ -204,7 +204,7 @@ class voxel_search {
     if (n.density == 0.0) n.density = space_.density(k);
     return n.density;
   }
-  /// Cost of the step from the centre of a cell to its neighbour's, half of it in each.
+  /// Cost of the step from the centre of a cell to the centre of its neighbour; half of it lies in each cell.
   [[nodiscard]] double step_cost(node& a, const key& from_key, node& b, const key& to_key, unsigned direction) const {
     const double length = step_length(direction);
     return is_uniform_ ? length : length * (0.5 * (density(a, from_key) + density(b, to_key)));
@@ -238,7 +238,7 @@ class voxel_search {
     if (const double away = squared_norm(space_.center(k) - goal_); away < nearest_away_)
       nearest_away_ = away, nearest_ = number;
     node& n = at(number);
-    // As if they were visible from the parent; a line costs at least its length.
+    // Assume that the cells are visible from the parent; a line costs at least its length.
     const std::uint32_t above = any_angle_ ? n.parent : number;
     const double above_cost = at(above).cost;
     const vec3 above_position = position(above);
@@ -257,7 +257,7 @@ class voxel_search {
       const std::uint32_t other = find_or_add(beside);
       node& m = at(other);
       if (m.is_closed || m.free == 1) return;
-      if (any_angle_ && !is_uniform_ && m.tried == above) {  // its cost is known: only the step may be new
+      if (any_angle_ && !is_uniform_ && m.tried == above) {  // the cost of the line is known; only the step may be new
         if ((m.barred >> (26 - direction) & 1U) != 0) return;
         const double cost = n.cost + step_cost(n, k, m, beside, direction);
         if (cost < m.cost && is_free(m, beside)) offer(other, number, cost, trust::exact);
@@ -275,8 +275,8 @@ class voxel_search {
     node& n = at(number);
     if (n.known == trust::sure) return true;
     const std::uint32_t parent = n.parent;
-    // Testing a line over several cells is worth little time; if it is just free, steps lead there, and shortening
-    // finds the line afterwards.
+    // Testing a line over several cells is not worth much time; if the line is barely free, the search finds steps
+    // there, and shortening finds the line afterwards.
     const unsigned direction = direction_between(parent, number);
     double cost = infinity;
     const auto is_line_free = [&] {
