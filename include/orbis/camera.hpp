@@ -7,14 +7,14 @@
 /// | `model.hpp` | the concept `camera_model` |
 /// | `intrinsics.hpp` | image size and camera matrix |
 /// | `pinhole.hpp, radial_tangential.hpp, kannala_brandt.hpp` | the camera models |
-/// | `plausible.hpp` | bounds of camera parameters from files |
+/// | `plausible.hpp` | plausibility bounds of camera parameters read from files |
 /// | `any.hpp` | a camera whose model is only known at run time |
-/// | `parameters.hpp` | parameters of a camera and derivatives with respect to them, for calibration |
+/// | `parameters.hpp` | camera parameters and derivatives with respect to them, for calibration |
 /// | `presets.hpp, settings.hpp` | cameras of common public recordings; the contents of `camera.toml` |
 /// | `depth.hpp, rgbd_frame.hpp` | depth images; a colour image with its depth image |
-/// | `rays.hpp, world_point.hpp, cloud.hpp` | rays of pixels; world points of pixels; points of a depth image |
+/// | `rays.hpp, world_point.hpp, cloud.hpp` | rays through pixels; world points of pixels; points of a depth image |
 /// | `shutter.hpp, shutter_correction.hpp` | rolling-shutter timing; conversion to global-shutter images |
-/// | `depth_clock.hpp` | times of depth images relative to colour images, by their time stamps |
+/// | `depth_clock.hpp` | times of depth images relative to colour images, from their time stamps |
 /// | `undistort.hpp` | removal of lens distortion from images |
 /// | `stereo.hpp, stereo_frame.hpp` | stereo rigs and their rectification; a pair of stereo images |
 /// | `mono_frame.hpp` | the image of a monocular camera |

@@ -11,17 +11,17 @@
 /// | `filter_choice.hpp`        | options and result of the automatic selection, with its evidence            |
 /// | `flying_pixels.hpp`        | removal of flying pixels at edges of depth images                           |
 /// | `log_statistical.hpp`      | filter: mean neighbour distance relative to its median                      |
-/// | `nanoflann.hpp`            | neighbours of single points by a k-d tree; not in this header, needs nanoflann |
+/// | `nanoflann.hpp`            | neighbours of single points with a k-d tree; include it separately, needs nanoflann |
 /// | `neighbors.hpp`            | result type of nearest-neighbour searches                                   |
 /// | `radius.hpp`               | filter: points with too few neighbours within a radius                      |
 /// | `ray_evidence.hpp`         | filter: points that the rays of depth images pass through                   |
-/// | `ray_evidence_counter.hpp` | the counts of that filter, image by image                                   |
+/// | `ray_evidence_counter.hpp` | the counts for that filter, accumulated image by image                      |
 /// | `select.hpp`               | automatic selection and application of filters                              |
-/// | `sensor_origins.hpp`       | sensor positions of points                                                  |
+/// | `sensor_origins.hpp`       | the sensor position for each point                                          |
 /// | `statistical.hpp`          | filter: mean neighbour distance above mu + alpha sigma; also relative to range |
 /// | `view_samples.hpp`         | samples of each depth image, used to compare images with each other         |
 /// | `voxel_grid.hpp`           | voxel-grid downsampling: one point per occupied voxel                       |
-/// | `voxel_sums.hpp`           | centroids of voxels, from which measurements can be removed again           |
+/// | `voxel_sums.hpp`           | voxel centroids, from which measurements can be removed again               |
 #pragma once
 
 #include <orbis/cloud/all_knn.hpp>

@@ -6,22 +6,22 @@
 /// | --- | --- |
 /// | `types.hpp` | short names for vectors and matrices |
 /// | `so3.hpp, se3.hpp, sim3.hpp` | rotations, poses, similarities: Lie groups with exp and log |
-/// | `small_matrix.hpp` | arithmetic of fixed-size matrices that compiles fast |
+/// | `small_matrix.hpp` | arithmetic on fixed-size matrices that compiles fast |
 /// | `small_cholesky.hpp` | Cholesky solver for the normal equations of a few unknowns |
 /// | `jacobi.hpp` | eigenvalues and singular values of small matrices, nearest rotation to a matrix |
 /// | `thread_pool.hpp` | persistent worker threads for parallel loops |
 /// | `trajectory.hpp` | stamped poses, pose interpolation, association of time stamps |
-/// | `point.hpp, point_cloud.hpp` | access to any point type in place; a cloud of points with colours |
+/// | `point.hpp, point_cloud.hpp` | in-place access to any point type; a point cloud with colours |
 /// | `inline.hpp` | for authors of components: marks the functions of -inl files |
 /// | `image.hpp` | images and image views |
 /// | `execution.hpp` | execution policies (`seq`, `par`), progress, cancellation |
 /// | `result.hpp, file.hpp` | values or errors; reading and writing whole files |
 /// | `random.hpp` | random numbers that are the same on every machine |
-/// | `rounded.hpp` | products that are never fused with a sum; bit-exact sines and cosines |
+/// | `rounded.hpp` | products that are never fused with a sum; bitwise reproducible sines and cosines |
 /// | `simd.hpp` | vector kernels, written once for every instruction set |
 /// | `hash_index.hpp, cow_pages.hpp` | hash tables from keys to positions; copy-on-write arrays |
 /// | `bits.hpp, bytes.hpp` | bit counts and bit strings; byte orders, checksums, base-85 text |
-/// | `quote.hpp` | short quotations in messages |
+/// | `quote.hpp` | short quotations for messages |
 /// | `utf8.hpp` | validation of UTF-8 |
 #pragma once
 

@@ -7,10 +7,10 @@
 /// | `alignment.hpp` | pairing of the poses of two trajectories, and the transform between them |
 /// | `ate.hpp` | absolute trajectory error |
 /// | `rpe.hpp` | relative pose error |
-/// | `orientations.hpp` | detection of references that have positions only |
+/// | `orientations.hpp` | detection of reference trajectories without orientations |
 /// | `cloud_error.hpp` | distances of points from the true surface |
 /// | `scale.hpp` | scale error of a trajectory |
-/// | `statistics.hpp` | mean, median, RMSE and others of a list of errors |
+/// | `statistics.hpp` | mean, median, RMSE and other statistics of a list of errors |
 #pragma once
 
 #include <orbis/eval/alignment.hpp>

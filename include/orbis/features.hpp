@@ -19,7 +19,7 @@
 /// | `features/project_points.hpp` | projection by a camera and its pose, for `projected` |
 /// | `features/epipolar.hpp` | source that searches along epipolar lines |
 /// | `features/epipolar_geometry.hpp` | epipolar lines between two images of any cameras |
-/// | `features/stereo.hpp` | `stereo_matcher`: right-image coordinates of features of a stereo pair |
+/// | `features/stereo.hpp` | `stereo_matcher`: right-image coordinates of features in a stereo pair |
 /// | `features/grid.hpp` | spatial index of keypoints |
 /// | `features/depth.hpp` | depth at a keypoint and its standard deviation |
 #pragma once

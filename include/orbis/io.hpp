@@ -8,15 +8,15 @@
 /// | `stereo_recording.hpp` | stereo recordings in the layouts of KITTI odometry and ASL (EuRoC), or two folders |
 /// | `mono_recording.hpp` | recordings of one camera: in the layouts above, or plain folders of images |
 /// | `synthetic.hpp` | a recording rendered on the fly, with exactly known poses and surfaces |
-/// | `synthetic_options.hpp` | its room, its camera's path and its sensor's errors |
+/// | `synthetic_options.hpp` | the room, camera path and sensor errors of that recording |
 /// | `camera_file.hpp` | `camera.toml`: model, size, intrinsics, distortion, depth scale |
 /// | `toml.hpp` | settings in TOML from untrusted bytes; not included here, because it includes toml++ |
-/// | `trajectory_file.hpp` | trajectories in TUM format, and readers of those of EuRoC and KITTI |
+/// | `trajectory_file.hpp` | trajectories in TUM format, and readers for the EuRoC and KITTI formats |
 /// | `trajectory_reading.hpp` | a trajectory from a file, with notes about lost poses, repeated times and units |
 /// | `image.hpp` | colour and depth images in any supported format |
 /// | `png.hpp`, `jpeg.hpp` | reading and writing images of one format |
 /// | `cloud_file.hpp` | point clouds in any supported format |
-/// | `cloud_fields.hpp` | a cloud with all numbers of its file: intensity, normals, time |
+/// | `cloud_fields.hpp` | a cloud with all fields of its file: intensity, normals, time |
 /// | `ply.hpp`, `pcd.hpp` | reading and writing point clouds of one format |
 /// | `bal_problem.hpp`, `bal.hpp` | bundle adjustment problems ("bundle adjustment in the large") and their files |
 /// | `g2o_graph.hpp`, `g2o.hpp` | pose graphs and their files |

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Keyframes to dense clouds, filtered clouds and octrees.
+/// Dense clouds, filtered clouds and octrees from keyframes.
 ///
 /// | header | contents |
 /// | --- | --- |
@@ -8,15 +8,15 @@
 /// | `live_map.hpp` | `live_map`: an octree that grows with each keyframe and follows corrections of their poses |
 /// | `live_map_thread.hpp` | a live map with its own thread, a queue, and snapshots for readers |
 /// | `live_map_events.hpp` | events and callbacks of a live map |
-/// | `depth_history.hpp` | the concept of a store for the keyframes' depth images |
+/// | `depth_history.hpp` | the concept of a store for depth images of keyframes |
 /// | `dense_cloud.hpp` | the points of all keyframes as one cloud that follows corrections of their poses |
 /// | `depth_store.hpp` | depth images of many keyframes, compressed without loss, within a memory budget |
 /// | `filter.hpp` | `filter_points`: the outlier filter, selected at run time |
-/// | `keyframe.hpp` | the keyframe that mapping reads |
+/// | `keyframe.hpp` | the keyframe type that mapping takes |
 /// | `masked_depth.hpp` | depth images with removed pixels |
 /// | `moving_filter.hpp` | removes moved objects from a live map while the camera moves |
 /// | `moving_options.hpp` | thresholds for detecting moved objects |
-/// | `moving_regions.hpp` | removes from a depth image the objects that tracking has found to move |
+/// | `moving_regions.hpp` | removes objects that tracking has detected as moving from a depth image |
 /// | `keyframe_points.hpp` | the points of one keyframe |
 /// | `upright.hpp` | the upward direction in a depth image, so that a map can begin upright |
 #pragma once

@@ -7,19 +7,19 @@
 /// | distance_field.hpp | distance and direction to the nearest obstacle of a map; follows the map |
 /// | floor_map.hpp | free, occupied and unknown cells of the floor for a ground robot |
 /// | floor_cost.hpp | costs near obstacles, as in Nav2's costmaps |
-/// | floor_file.hpp | floor maps as files for the map servers of ROS and Nav2 |
+/// | floor_file.hpp | floor map files for the map servers of ROS and Nav2 |
 /// | floor_view.hpp | planning space of a round robot on a floor, in two dimensions |
 /// | frontiers.hpp | boundary between known free and unknown space; follows the map |
 /// | view_gain.hpp | amount of unknown space that a camera would see |
 /// | next_view.hpp | next best view of an exploring robot |
-/// | robot_shape.hpp | a ball, a vertical capsule, a vertical cylinder |
-/// | planning_view.hpp | exact test whether a robot fits, at rest or along a segment |
+/// | robot_shape.hpp | robot shapes: ball, vertical capsule, vertical cylinder |
+/// | planning_view.hpp | exact test of whether a robot fits at a position or along a segment |
 /// | planning_space.hpp | the space of a path search, and the cost of moving in it |
 /// | path_search.hpp | cheapest paths of a robot through a map or over a floor |
 /// | replanning.hpp | checks a path after map changes, and replans only if it is blocked |
-/// | robot_trajectory.hpp | paths as trajectories in time, within bounds on speed and acceleration |
+/// | robot_trajectory.hpp | conversion of paths to timed trajectories within bounds on speed and acceleration |
 /// | squared_distances.hpp | the distance field without a map: exact squared distances in voxels |
-/// | map_access.hpp | read access of planning to a map, including maps of other libraries |
+/// | map_access.hpp | read access to a map for planning, including maps of other libraries |
 #pragma once
 
 #include <orbis/nav/distance_field.hpp>

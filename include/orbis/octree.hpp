@@ -11,10 +11,10 @@
 /// | accessor.hpp | fast look-up of voxels near each other; the concept of a map |
 /// | octants.hpp | states of voxels, as bit masks of 4x4x4 voxels |
 /// | cast_ray.hpp | ray casting, one ray or many |
-/// | overlap.hpp | collision tests of boxes, spheres and capsules |
+/// | overlap.hpp | collision tests for boxes, spheres and capsules |
 /// | change_log.hpp | log of voxels changed since a revision |
 /// | scan_history.hpp | a map that follows its scans when they change, are removed or arrive late |
-/// | scan.hpp | voxels observed by one scan, packed; the marker that finds them |
+/// | scan.hpp | the voxels observed by one scan, packed; the marker that determines them |
 /// | decay.hpp | decay of voxels that are not observed |
 /// | voxel_layer.hpp | colours, labels or counts per voxel of a map |
 /// | files.hpp | reading and writing of OctoMap's `.bt` and `.ot` files |

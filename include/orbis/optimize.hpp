@@ -4,7 +4,7 @@
 ///
 /// | header | contents |
 /// | --- | --- |
-/// | alignment.hpp | rigid or similarity transform between two lists of points, in closed form or with outliers |
+/// | alignment.hpp | rigid or similarity transform between two lists of points, in closed form or robust to outliers |
 /// | bundle_adjustment.hpp | bundle adjustment: cameras and points from observations |
 /// | bundle_problem.hpp | observations, residual concepts, options and summary of bundle adjustment |
 /// | pnp.hpp | camera pose from known points and pixels with outliers (P3P in RANSAC) |
@@ -18,7 +18,7 @@
 /// | robust_loss.hpp | robust losses (Huber, Cauchy, Tukey), chi-squared gates |
 /// | self_calibration.hpp | bundle adjustment of images of one camera with unknown intrinsics |
 /// | solver_policies.hpp | damping (Gauss-Newton, Levenberg-Marquardt, dogleg), solvers for the reduced system |
-/// | triangulation.hpp | points from two or more rays |
+/// | triangulation.hpp | triangulation of points from two or more rays |
 /// | two_view.hpp | essential matrix, homography and relative pose of two images; initial scene and motion |
 #pragma once
 

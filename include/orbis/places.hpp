@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Place recognition: images as bags of visual words, and retrieval of keyframes by them.
+/// Place recognition: representation of images as bags of visual words, and retrieval of similar keyframes.
 ///
 /// | header | contents |
 /// | --- | --- |
 /// | `places/vocabulary.hpp` | `vocabulary`: converts descriptors to words and images to bags of words |
 /// | `places/default_vocabulary.hpp` | a built-in vocabulary for ORB |
-/// | `places/train.hpp` | `train`: trains a vocabulary from images |
+/// | `places/train.hpp` | `train`: trains a vocabulary on images |
 /// | `places/vocabulary_file.hpp` | reading and writing vocabulary files |
 /// | `places/vocabulary_tree.hpp` | the underlying tree, for readers of other formats |
-/// | `places/bag_of_words.hpp` | `bag_of_words`: the words of an image and their values; similarity of two bags |
+/// | `places/bag_of_words.hpp` | `bag_of_words`: the words in an image and their values; similarity of two bags |
 /// | `places/keyframe_database.hpp` | `keyframe_database`: retrieval of keyframes that may show the same place |
 /// | `places/inverted_index.hpp` | index from words to images |
 ///
