@@ -95,7 +95,7 @@ TEST_CASE("files that are no cameras are refused in one sentence") {
                                    "d": [0.1, 0.1, 0.1, 0.1]})"},
             "distortion model \"fov\""},
         std::tuple{"a.json", std::string{R"({"width": 640, "height": 480, "fx": -1, "fy": 1, "cx": 1, "cy": 1})"},
-                   "above zero"},
+                   "must be positive"},
         std::tuple{"a.json",
                    std::string{R"({"width": 6, "height": 4, "fx": 1, "fy": 1, "cx": 1, "cy": 1, "depth_scale": 0})"},
                    "depth scale"},

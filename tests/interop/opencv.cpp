@@ -156,7 +156,7 @@ TEST_CASE("what holds no points is refused with a reason") {
   };
   CHECK(message(cv::Mat(4, 3, CV_64FC1)) == "has type CV_64FC1, not CV_32FC3 or CV_32FC1");
   CHECK(message(cv::Mat(4, 3, CV_32FC2)) == "has type CV_32FC2, not CV_32FC3 or CV_32FC1");
-  CHECK(message(cv::Mat(4, 4, CV_32FC1)) == "has 4 columns, not x, y and z");
+  CHECK(message(cv::Mat(4, 4, CV_32FC1)) == "has 4 columns; must have 3 (x, y, z)");
   const int sizes[] = {2, 2, 3};
   CHECK(message(cv::Mat(3, sizes, CV_32FC1)) == "has 3 dimensions, not 2");
   CHECK(points_in<float>(cv::Mat{})->empty());

@@ -204,7 +204,7 @@ TEST_CASE("settings of ASL cameras that are damaged or not known are refused in 
   CHECK_THAT(message("resolution: [8, 6]", ""), Contains("sensor.yaml: resolution is missing"));
   CHECK_THAT(message("radial-tangential", "fov"), Contains("distortion_model \"fov\" is not one of"));
   CHECK_THAT(message("camera_model: pinhole", "camera_model: omni"), Contains("camera_model \"omni\""));
-  CHECK_THAT(message("[7.0, 7.1", "[-7.0, 7.1"), Contains("focal lengths above zero"));
+  CHECK_THAT(message("[7.0, 7.1", "[-7.0, 7.1"), Contains("focal lengths must be positive"));
   CHECK_THAT(message("[7.0, 7.1", "[seven, 7.1"), Contains("must be a list of finite numbers"));
   CHECK_THAT(message("data: [0.0", "data: [3.0"), Contains("T_BS: the matrix is not a rigid transform"));
   CHECK_THAT(message("1.0]", "1.0"), Contains("is a list without an end"));
