@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
 /// Bundle adjustment problems in the text format of "Bundle Adjustment in the Large": the numbers of cameras, points
-/// and observations; for each observation its camera, its point and the pixel; nine numbers for each camera; three for
-/// each point. Numbers are separated by any white space.
+/// and observations; for each observation the indices of its camera and point, and the pixel; nine numbers per camera;
+/// three per point. Numbers are separated by any white space.
 ///
 /// Source: S. Agarwal, N. Snavely, S. M. Seitz, R. Szeliski, "Bundle adjustment in the large", ECCV 2010,
 /// and https://grail.cs.washington.edu/projects/bal.
@@ -18,9 +18,9 @@
 
 namespace orbis::io {
 
-/// The problem in `text`; `where` names the source in errors. Linear in the length of the text; memory is proportional
-/// to it, regardless of the numbers in the first line. Errors, with the line: malformed; unsupported (compressed, as
-/// the files of the project's site are).
+/// Parses a problem; `where` names the source in errors. Time and memory are proportional to the length of the text,
+/// regardless of the numbers in the first line. Errors, with the line: malformed; unsupported (compressed, as are the
+/// files on the project's website).
 [[nodiscard]] result<bal_problem> parse_bal(std::string_view text, const std::filesystem::path& where = {});
 
 /// Reads a whole stream; see `parse_bal`. Errors: unreadable, malformed, unsupported.
@@ -29,7 +29,7 @@ namespace orbis::io {
 /// Reads a BAL file; see `parse_bal`. Errors: not_found, unreadable, malformed, unsupported.
 [[nodiscard]] result<bal_problem> read_bal(const std::filesystem::path& path);
 
-/// The problem as text, with enough digits to read the same numbers back.
+/// The problem as text, with enough digits to recover the same numbers.
 /// @pre the observations' indices are in range
 [[nodiscard]] std::string format_bal(const bal_problem& problem);
 

@@ -35,7 +35,7 @@ class camera_fields {
  public:
   camera_fields(const toml::table& table, std::string where) : table_{table}, where_{std::move(where)} {}
 
-  /// The number called `name`; it must satisfy `ok`, which `wanted` describes in errors.
+  /// The number with the key `name`; it must satisfy `ok`, which `wanted` describes in errors.
   template <class Ok>
   double number(const char* name, std::optional<double> fallback, const char* wanted, Ok&& ok) {
     const auto node = table_[name];
@@ -82,13 +82,13 @@ class camera_fields {
     }
     return values;
   }
-  /// Rejects keys that are not in `known`, so that a misspelt setting does not silently get its default.
+  /// Rejects keys that are not in `known`, so that a misspelt key does not silently leave a setting at its default.
   void accept_only(std::initializer_list<std::string_view> known) {
     for (const auto& [key, value] : table_) {
       if (std::find(known.begin(), known.end(), key.str()) != known.end()) continue;
       std::string names;
       for (const std::string_view name : known) names += (names.empty() ? "" : ", ") + std::string{name};
-      reject(shortened(key.str(), 60).c_str(), "is not a setting of a camera; the settings are " + names);
+      reject(shortened(key.str(), 60).c_str(), "is not a camera setting; the settings are " + names);
     }
   }
   void reject(const char* name, const std::string& why) {
@@ -187,7 +187,7 @@ ORBIS_INLINE result<void> write_camera(const std::filesystem::path& path, const 
       const auto& d = model.distortion();
       for (const double value : {d.k1, d.k2, d.k3, d.k4}) add(value);
     } else {
-      static_assert(std::is_same_v<Model, camera::pinhole>, "a camera model without code to write its distortion");
+      static_assert(std::is_same_v<Model, camera::pinhole>, "no code to write the distortion of this camera model");
     }
   });
   return write_file_atomically(path, [&](std::ostream& out) {

@@ -14,9 +14,9 @@
 ///   depth_scale = 5000.0  # stored value / depth_scale = metres; default 1000
 ///   fps = 30.0            # default 30
 ///   baseline = 0.075      # metres, optional
-///   read_out_ms = 30.0    # of a rolling shutter, top row first, optional; 0: a global shutter
-///   depth_read_out_ms = 30.0  # of the depth image, if it differs
-///   depth_delay_ms = 0.0  # from the colour image to the depth image, in addition to their time stamps, if known
+///   read_out_ms = 30.0    # rolling-shutter readout time, top row first, optional; 0: global shutter
+///   depth_read_out_ms = 30.0  # readout time of the depth image, if different
+///   depth_delay_ms = 0.0  # delay of depth after colour, in addition to the difference of their time stamps, if known
 /// @endcode
 #pragma once
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A point cloud with all other numbers that its file has for each point: intensity, normals, time, labels.
+/// A point cloud with all further values that its file stores for each point: intensity, normals, time, labels.
 #pragma once
 
 #include <algorithm>
@@ -16,7 +16,7 @@ namespace orbis::io {
 /// The number types that a cloud file may store.
 enum class scalar_type { int8, uint8, int16, uint16, int32, uint32, int64, uint64, float32, float64 };
 
-/// Numbers of one name and type, `count` for each point.
+/// A named field of a cloud: `count` numbers of one type for each point.
 struct cloud_field {
   std::string name;
   scalar_type type = scalar_type::float32;
@@ -27,7 +27,7 @@ struct cloud_field {
 /// A cloud with the fields of its file that are neither coordinates nor colours.
 struct cloud_with_fields {
   point_cloud cloud;
-  std::vector<cloud_field> fields;  ///< in the order of the file, each for all points
+  std::vector<cloud_field> fields;  ///< in the order of the file, each with the values of all points
   /// VIEWPOINT of a PCD file: translation in metres, then a quaternion, w first.
   std::array<double, 7> viewpoint{0, 0, 0, 1, 0, 0, 0};
   std::vector<std::string> notes;  ///< warnings for the user: interpretations, and parts of the file that are left out
@@ -35,7 +35,7 @@ struct cloud_with_fields {
 
 namespace detail {
 
-/// The texts, separated by commas; of many texts the first ones and the number of others.
+/// The texts, separated by commas; if there are many, only the first ones and the number of omitted ones.
 [[nodiscard]] inline std::string joined(const std::vector<std::string>& texts) {
   constexpr std::size_t most = 12;
   std::string all;
@@ -45,7 +45,7 @@ namespace detail {
 
 }  // namespace detail
 
-/// The names of fields for a message: the first twelve, separated by commas, and the number of others.
+/// The names of fields for a message: the first twelve, separated by commas, and the number of omitted ones.
 [[nodiscard]] inline std::string field_names(const std::vector<cloud_field>& fields) {
   std::vector<std::string> names;
   for (const cloud_field& field : fields) names.push_back(field.name);

@@ -17,7 +17,7 @@ namespace orbis::io {
 
 enum class cloud_format { ply, pcd };
 
-/// The format by the extension of a path, in upper or lower case; none for other extensions.
+/// The format that corresponds to the extension of a path, in upper or lower case; empty for other extensions.
 [[nodiscard]] std::optional<cloud_format> cloud_format_by_extension(const std::filesystem::path& path);
 
 /// Reads a PLY or PCD file, detected by its first bytes or otherwise by its extension. `origin` is subtracted
@@ -25,14 +25,14 @@ enum class cloud_format { ply, pcd };
 /// not_found, unreadable, malformed, unsupported (neither of the two).
 [[nodiscard]] result<point_cloud> read_cloud(const std::filesystem::path& path, const vec3& origin = zeros<vec3>());
 
-/// Reads a cloud like `read_cloud`, with all other numbers that the file has for each point. Errors: those of
+/// Reads a cloud like `read_cloud`, with all further values that the file stores for each point. Errors: as
 /// `read_cloud`.
 [[nodiscard]] result<cloud_with_fields> read_cloud_with_fields(const std::filesystem::path& path,
                                                                const vec3& origin = zeros<vec3>());
 
-/// Writes points of a cloud by index, with all of their fields, in the format of the extension. `origin` is added to
-/// the coordinates, metres. @pre indices are of the cloud. Errors: write_failed, invalid_argument (an extension that is
-/// neither `.ply` nor `.pcd`; more than a PCD file can hold).
+/// Writes the points with the given indices, with all of their fields, in the format of the extension. `origin`
+/// (metres) is added to the coordinates. @pre each index < cloud.cloud.size(). Errors: write_failed, invalid_argument
+/// (an extension that is neither `.ply` nor `.pcd`; more points than a PCD file can hold).
 result<void> write_cloud(const std::filesystem::path& path, const cloud_with_fields& cloud,
                          std::span<const std::uint32_t> indices, const vec3& origin = zeros<vec3>());
 

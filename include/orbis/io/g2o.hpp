@@ -2,7 +2,7 @@
 /// @file
 /// Pose graphs in g2o's text format: `VERTEX_SE3:QUAT id x y z qx qy qz qw`, `EDGE_SE3:QUAT from to
 /// x y z qx qy qz qw` followed by the upper triangle of the 6 x 6 information matrix, row by row, and
-/// `FIX id ...`. Metres; the rotational part of the information is about the quaternion's vector part.
+/// `FIX id ...`. Lengths are in metres; the rotational part of the information refers to the quaternion's vector part.
 ///
 /// Source: R. Kuemmerle et al., "g2o: a general framework for graph optimization", ICRA 2011, and
 /// https://github.com/RainerKuemmerle/g2o/wiki/File-Format.
@@ -19,13 +19,13 @@ namespace orbis::io {
 
 /// The graph in `text`; vertices and edges may be in any order. `where` names the source in errors; quaternions of any
 /// positive norm are normalised. Text without lines gives an empty graph. Errors, with the line: malformed; unsupported
-/// (a vertex or edge type other than 3D poses).
+/// (a vertex or edge type other than that of 3D poses).
 [[nodiscard]] result<g2o_graph> parse_g2o(std::string_view text, const std::filesystem::path& where = {});
 
 /// Reads a g2o file; see `parse_g2o`. Errors: not_found, unreadable, malformed, unsupported.
 [[nodiscard]] result<g2o_graph> read_g2o(const std::filesystem::path& path);
 
-/// The graph as text, with enough digits to read the same numbers back.
+/// The graph as text, with enough digits to recover the same numbers.
 /// @pre ids and fixed have one entry per vertex
 [[nodiscard]] std::string format_g2o(const g2o_graph& graph);
 

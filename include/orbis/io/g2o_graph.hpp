@@ -11,8 +11,8 @@
 
 namespace orbis::io {
 
-/// An edge: `measurement` is the pose of vertex `to` in the frame of vertex `from`; both are indices. `information` is
-/// that of the translation, then of the vector part of the quaternion.
+/// An edge: `measurement` is the pose of vertex `to` in the frame of vertex `from`; both are indices. The first three
+/// rows of `information` refer to the translation, the others to the vector part of the quaternion.
 struct g2o_edge {
   std::uint32_t from = 0;
   std::uint32_t to = 0;
@@ -22,9 +22,9 @@ struct g2o_edge {
 
 /// A graph of poses, in metres.
 struct g2o_graph {
-  std::vector<std::int64_t> ids;    ///< ids of the vertices in the file
+  std::vector<std::int64_t> ids;    ///< the vertices' ids in the file
   std::vector<se3> vertices;        ///< poses in the world frame, in the file's order
-  std::vector<std::uint8_t> fixed;  ///< one per vertex: nonzero if the file fixes it
+  std::vector<std::uint8_t> fixed;  ///< one per vertex: nonzero if the file marks it as fixed
   std::vector<g2o_edge> edges;      ///< in the file's order
 };
 

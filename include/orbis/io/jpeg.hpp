@@ -16,12 +16,12 @@ namespace orbis::io {
 [[nodiscard]] inline bool is_jpeg(std::string_view bytes) noexcept { return bytes.starts_with("\xFF\xD8\xFF"); }
 
 /// Decodes a JPEG to 8-bit colour; grey is copied to all channels. `where` names the source in errors. Errors:
-/// malformed (damaged or truncated; a colour space that cannot be converted to RGB; more scans than such an image
-/// needs, because each costs O(pixels)). O(pixels x scans).
+/// malformed (damaged or truncated; a colour space that cannot be converted to RGB; more scans than an image needs,
+/// because each takes O(pixels)). O(pixels x scans).
 [[nodiscard]] result<image<rgb8>> decode_jpeg(std::string_view bytes, const std::string& where = {});
 
-/// Encodes an image as a baseline JPEG, with half the resolution for colour. `quality`: 1 (small) ... 100 (close to the
-/// image). Errors: invalid_argument (no pixels, or more than 65500 in a row or column), exception (out of memory).
+/// Encodes an image as a baseline JPEG, with chroma at half the resolution. `quality`: 1 (smallest file) ... 100 (best
+/// quality). Errors: invalid_argument (no pixels, or more than 65500 in a row or column), exception (out of memory).
 /// O(pixels).
 /// @pre 1 <= quality <= 100
 [[nodiscard]] result<std::string> encode_jpeg(image_view<const rgb8> pixels, int quality = 85);

@@ -28,10 +28,9 @@
 
 namespace orbis::io {
 
-/// The layouts of recordings that contain the images of one camera. `automatic`: detected. `tum`: a list `rgb.txt` (or
-/// `left.txt`). `kitti`: `image_0` (or 2, 1, 3) with `calib.txt` and `times.txt`. `asl`: `mav0/cam0`, or a single
-/// camera's folder. `rgbd`: the colour images of recordings that `open_recording` reads. `images`: a plain folder of
-/// images.
+/// The supported layouts of recordings of one camera. `automatic`: detected. `tum`: a list `rgb.txt` (or `left.txt`).
+/// `kitti`: `image_0` (or 2, 1, 3) with `calib.txt` and `times.txt`. `asl`: `mav0/cam0`, or a single camera's folder.
+/// `rgbd`: the colour images of recordings that `open_recording` reads. `images`: a plain folder of images.
 enum class mono_format { automatic, tum, kitti, asl, rgbd, images };
 
 /// The name of a format: "tum", "kitti", "asl", "rgbd", "images", "auto".
@@ -68,7 +67,7 @@ class mono_recording {
   [[nodiscard]] const trajectory& ground_truth() const noexcept { return index_.ground_truth; }
   /// The format; never `automatic`.
   [[nodiscard]] mono_format format() const noexcept { return format_; }
-  /// Warnings: skipped lines, images without a time.
+  /// Warnings: skipped lines, images without a time stamp.
   [[nodiscard]] std::span<const std::string> notes() const noexcept { return index_.notes; }
   /// All files of the recording: lists, poses, camera, and all images.
   [[nodiscard]] std::vector<std::filesystem::path> files() const;
@@ -88,11 +87,11 @@ class mono_recording {
 /// Detects the format of the images of one camera in `folder`; `automatic` if none is recognised.
 [[nodiscard]] mono_format detect_mono_format(const std::filesystem::path& folder);
 
-/// Opens the recording in `folder` as that of one camera: reads its lists, poses and camera, but not its images (for
-/// KITTI one, for its size). Ignores depth and the images of other cameras.
+/// Opens the recording in `folder` as a recording of one camera: reads its lists, poses and camera, but not its images
+/// (except one in a KITTI sequence, for its size). Ignores depth and the images of other cameras.
 ///
-/// The camera is, in this order: that of the options; that of `camera.toml` in the folder; that of the format's own
-/// files or the folder's name. Without any of these the function fails.
+/// The camera is taken from the first of these that specifies it: the options; `camera.toml` in the folder; the
+/// format's own files, or the folder's name. If none does, the function fails.
 /// Errors: not_found, unreadable, unsupported (no known format, or a camera of an unknown model), no_data (no images),
 /// malformed (with file and line), invalid_argument (no camera known).
 [[nodiscard]] result<mono_recording> open_mono_recording(const std::filesystem::path& folder,

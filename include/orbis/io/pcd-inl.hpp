@@ -48,7 +48,7 @@ ORBIS_INLINE result<point_cloud> read_pcd(const std::filesystem::path& path) {
 
 namespace detail {
 
-/// Writes the points `at(0)`, ..., `at(n - 1)`.
+/// Writes the points with the indices `at(0)`, ..., `at(n - 1)`.
 template <class At>
 result<void> write_indexed_pcd(const std::filesystem::path& path, const point_cloud& cloud,
                                std::span<const cloud_field> fields, const std::array<double, 7>& viewpoint,

@@ -2,9 +2,9 @@
 /// @file
 /// Point clouds in PCD files (version 0.7: ascii, binary, binary_compressed).
 ///
-/// Source: the Point Cloud Library's documentation of the file format. Points that are not finite are kept: in an
-/// organised cloud the index of a point determines its pixel. The viewpoint is not applied: it may be the place of the
-/// sensor, with points in the world, or the transform from the points to the world.
+/// Source: the Point Cloud Library's documentation of the file format. Non-finite points are kept, because in an
+/// organised cloud the index of a point determines its pixel. The viewpoint is not applied, because it may be either
+/// the pose of the sensor, with points in the world frame, or the transform from the points to the world frame.
 #pragma once
 
 #include <cstdint>
@@ -27,7 +27,7 @@ namespace orbis::io {
                                             const vec3& origin = zeros<vec3>());
 
 /// Parses a PCD file like `parse_pcd`, with all other fields and the viewpoint. Notes report a viewpoint other than the
-/// identity, what is left out, and colours whose range is not that of their type. Errors: those of `parse_pcd`.
+/// identity, omitted data, and colours whose range is not that of their type. Errors: as `parse_pcd`.
 [[nodiscard]] result<cloud_with_fields> parse_pcd_with_fields(std::string_view bytes, const std::string& where = {},
                                                               const vec3& origin = zeros<vec3>());
 
@@ -38,8 +38,8 @@ namespace orbis::io {
 /// there are colours. Errors: write_failed, invalid_argument (more than 4 GiB).
 result<void> write_pcd(const std::filesystem::path& path, const point_cloud& cloud);
 
-/// Writes points of a cloud by index with all of their fields and the viewpoint. `origin` is added to the coordinates,
-/// metres; if it is not zero, they are written as double. @pre indices are of the cloud
+/// Writes the points with the given indices, with all of their fields and the viewpoint. `origin` (metres) is added to
+/// the coordinates; if it is not zero, they are written as double. @pre each index < cloud.cloud.size()
 result<void> write_pcd(const std::filesystem::path& path, const cloud_with_fields& cloud,
                        std::span<const std::uint32_t> indices, const vec3& origin = zeros<vec3>());
 

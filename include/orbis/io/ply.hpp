@@ -28,22 +28,22 @@ enum class ply_encoding { ascii, binary };  ///< binary: little-endian
 
 struct ply_options {
   ply_encoding encoding = ply_encoding::binary;
-  /// Added to the coordinates on writing, metres: the origin that `parse_ply` subtracted. If it is not zero,
+  /// Offset added to the coordinates on writing, metres: the origin that `parse_ply` subtracted. If it is not zero,
   /// coordinates are written as double.
   vec3 origin = zeros<vec3>();
 };
 
 /// Parses the vertices of a PLY file in memory: `x y z` of any type and, if present, colours: `red green blue`,
-/// `r g b`, `diffuse_red diffuse_green diffuse_blue`, or packed `rgb` or `rgba`. Bytes are unchanged. Floating-point
-/// channels are from 0 to 1 if none is greater, otherwise from 0 to 255; wider integers are from 0 to 255 if none is
-/// greater, otherwise from 0 to 65535. Ignores everything else. `origin` is subtracted from the coordinates before they
-/// are converted to float, whose resolution is half a metre at 5000 km. Errors: malformed (damaged, truncated),
-/// unsupported (no vertices with x, y and z).
+/// `r g b`, `diffuse_red diffuse_green diffuse_blue`, or packed `rgb` or `rgba`. 8-bit channels are unchanged. The
+/// range of floating-point channels is 0 to 1 if no value is greater, otherwise 0 to 255; that of wider integers is 0
+/// to 255 if no value is greater, otherwise 0 to 65535. Ignores everything else. `origin` is subtracted from the
+/// coordinates before they are converted to float, whose resolution is half a metre at 5000 km. Errors: malformed
+/// (damaged, truncated), unsupported (no vertices with x, y and z).
 [[nodiscard]] result<point_cloud> parse_ply(std::string_view bytes, const std::string& where = {},
                                             const vec3& origin = zeros<vec3>());
 
-/// Parses a PLY file like `parse_ply`, and all other properties of the vertices except lists. Notes report what is left
-/// out, and colours whose range is not that of their type. Errors: those of `parse_ply`.
+/// Parses a PLY file like `parse_ply`, and all other properties of the vertices except lists. Notes report omitted
+/// data, and colours whose range is not that of their type. Errors: as `parse_ply`.
 [[nodiscard]] result<cloud_with_fields> parse_ply_with_fields(std::string_view bytes, const std::string& where = {},
                                                               const vec3& origin = zeros<vec3>());
 
@@ -57,14 +57,14 @@ struct ply_vertex {
   rgb8 color{};
 };
 
-/// Points of any type as vertices: `read(of, begin, out)` returns those starting at `begin`.
+/// Points of any type as vertices: `read(of, begin, out)` writes the vertices from index `begin` on to `out`.
 struct ply_vertices {
   const void* of = nullptr;
   void (*read)(const void* of, std::size_t begin, std::span<ply_vertex> out) = nullptr;
   std::size_t count = 0;
   bool colored = false;
   std::span<const cloud_field> fields{};
-  std::span<const std::uint32_t> rows{};  ///< of the fields, one per vertex
+  std::span<const std::uint32_t> rows{};  ///< index into the fields, one per vertex
 };
 
 /// Writes vertices in blocks.
@@ -73,8 +73,8 @@ struct ply_vertices {
 
 }  // namespace detail
 
-/// Writes points (as float), and their colours if there are any, as a PLY file atomically. @pre colors.empty() ||
-/// colors.size() == size of points. Errors: write_failed.
+/// Writes points (as float), and their colours if there are any, to a PLY file atomically. @pre colors.empty() ||
+/// colors.size() == number of points. Errors: write_failed.
 template <point_range Points>
 result<void> write_ply(const std::filesystem::path& path, const Points& points, std::span<const rgb8> colors,
                        const ply_options& options = {}) {
@@ -94,13 +94,13 @@ result<void> write_ply(const std::filesystem::path& path, const Points& points, 
 /// Writes a cloud as a PLY file: `x y z`, with `red green blue` if it has colours.
 result<void> write_ply(const std::filesystem::path& path, const point_cloud& cloud, const ply_options& options = {});
 
-/// Writes the points of a cloud that a filter kept, without copying them to another cloud. @pre indices are of the
-/// cloud
+/// Writes the points with the given indices, such as those that a filter kept, without copying them to another cloud.
+/// @pre each index < cloud.size()
 result<void> write_ply(const std::filesystem::path& path, const point_cloud& cloud,
                        std::span<const std::uint32_t> indices, const ply_options& options = {});
 
-/// Writes points of a cloud by index with all of their fields: a field of several numbers `f` as properties `f_0`,
-/// `f_1`, ..., integers of 64 bits as double. @pre indices are of the cloud
+/// Writes the points with the given indices, with all of their fields: a field `f` with several values per point as the
+/// properties `f_0`, `f_1`, ..., 64-bit integers as double. @pre each index < cloud.cloud.size()
 result<void> write_ply(const std::filesystem::path& path, const cloud_with_fields& cloud,
                        std::span<const std::uint32_t> indices, const ply_options& options = {});
 

@@ -53,7 +53,7 @@ enum class recording_format { automatic, tum, seven_scenes, icl_nuim, scannet, f
 struct recording_options {
   recording_format format = recording_format::automatic;
   std::optional<camera::camera_settings> camera{};  ///< replaces the camera of the recording
-  double max_time_difference = 0.020;               ///< between a colour and its depth image, seconds
+  double max_time_difference = 0.020;               ///< between a colour image and its depth image, seconds
 };
 
 /// A list of frames that are read on request. `frame` is thread-safe; iterators are not.
@@ -81,8 +81,9 @@ class recording {
   /// Reads only the colour image of frame `i`. Errors as above. @pre i < size()
   [[nodiscard]] result<image<rgb8>> color(std::size_t i) const;
 
-  /// Single pass over the frames; reads each one when it is reached. Ends at the first frame that cannot be read; the
-  /// recording's `status` then contains the reason. A reference to a frame is valid until the iterator advances.
+  /// Single-pass iterator that reads each frame when it reaches it. Iteration ends at the first frame that cannot be
+  /// read; the recording's `status` then contains the reason. A reference to a frame is valid until the iterator
+  /// advances.
   class iterator {
    public:
     using iterator_category = std::input_iterator_tag;
@@ -112,13 +113,13 @@ class recording {
     std::shared_ptr<const camera::rgbd_frame> frame_;  // shared, so that an iterator can be copied
   };
 
-  /// Restarts the iteration and clears `status`. The recording must outlive the iterator and stay in place.
+  /// Restarts the iteration and clears `status`. The recording must outlive the iterator and must not be moved.
   [[nodiscard]] iterator begin() {
     status_ = {};
     return iterator(*this);
   }
   [[nodiscard]] std::default_sentinel_t end() const noexcept { return {}; }
-  /// The reason why the last iteration ended before the last frame, if it did.
+  /// The error if the last iteration ended before the last frame.
   [[nodiscard]] const result<void>& status() const noexcept { return status_; }
 
  private:
@@ -139,8 +140,8 @@ class recording {
 
 namespace detail {
 
-/// The index of the recording in `folder`; replaces a `format` of `automatic` by the detected one. `fps`: rate of
-/// images without times. Errors: as `open_recording`.
+/// The index of the recording in `folder`; sets a `format` of `automatic` to the detected one. `fps`: frame rate of
+/// images without time stamps. Errors: as `open_recording`.
 [[nodiscard]] result<recording_index> index_recording(const std::filesystem::path& folder, recording_format& format,
                                                       double max_time_difference, double fps);
 
@@ -148,11 +149,11 @@ namespace detail {
 
 /// Opens the recording in `folder`: reads its lists, poses and camera, but not its images.
 ///
-/// The camera is, in this order: that of the options; that of `camera.toml` in the folder; that of the format's own
-/// files; that of the data set, for ICL-NUIM (`*.gt.freiburg`) and the TUM benchmark (`rgbd_dataset_freiburg1` ... in
-/// the path), with a note. Without any of these the function fails. A time between frames that does not match the
-/// camera's rate is noted. Errors: not_found, unreadable, unsupported (no
-/// known format), no_data (no frames), malformed (with file and line), invalid_argument (no camera known).
+/// The camera is taken from the first of these that specifies it: the options; `camera.toml` in the folder; the
+/// format's own files; the data set, for ICL-NUIM (`*.gt.freiburg`) and the TUM benchmark (`rgbd_dataset_freiburg1` ...
+/// in the path), with a note. If none does, the function fails. A time between frames that does not match the camera's
+/// frame rate is noted. Errors: not_found, unreadable, unsupported (no known format), no_data (no frames), malformed
+/// (with file and line), invalid_argument (no camera known).
 [[nodiscard]] result<recording> open_recording(const std::filesystem::path& folder,
                                                const recording_options& options = {});
 

@@ -23,11 +23,11 @@
 namespace orbis::io {
 namespace detail {
 
-// A plain folder of stereo images: `left.txt` (or `rgb.txt`) and `right.txt`, lists in the format of TUM, or numbered
+// A plain folder of stereo images: the lists `left.txt` (or `rgb.txt`) and `right.txt` in the TUM format, or numbered
 // images in `left` (or `rgb`) and `right`; `camera.toml`, and optionally `groundtruth.txt`.
 //
-// Rectified images have one camera, with its `baseline`. Others have a second one in `camera_right.toml`, and its pose
-// in `T_left_right.txt`: a 4x4 matrix from the right camera's frame to the left one's, metres.
+// Rectified images have one camera, with its `baseline`. Others have a second camera in `camera_right.toml`, and its
+// pose in `T_left_right.txt`: a 4x4 matrix from the right camera's frame to the left camera's frame, metres.
 
 /// Returns true if `folder` looks like a plain folder of stereo images.
 [[nodiscard]] inline bool is_image_pairs(const std::filesystem::path& folder) {
@@ -40,15 +40,14 @@ namespace detail {
                                                                     std::vector<std::string>& notes) {
   const keyed_images images = order_by_name(images_in(folder));
   if (images.paths.empty() || images.keys_are == image_keys::alphabet)
-    return fail(
-        errc::no_data, folder.string(),
-        "there are no images named by numbers (000000.png) or times in it; the folder " + describe_content(folder));
+    return fail(errc::no_data, folder.string(),
+                "no images with numbers (000000.png) or times as names; the folder " + describe_content(folder));
   note_order(folder, images, true, notes);
   return in_order_of_time(folder, images.stamped(fps), notes);
 }
 
-/// The index of such a folder. The camera `given` replaces `camera.toml`. Errors: not_found (a file), unreadable,
-/// no_data, malformed (with file and line), invalid_argument (no camera, or no baseline).
+/// The index of a plain folder of stereo images. The camera `given` replaces `camera.toml`. Errors: not_found (a file),
+/// unreadable, no_data, malformed (with file and line), invalid_argument (no camera, or no baseline).
 [[nodiscard]] inline result<stereo_index> index_image_pairs(const std::filesystem::path& folder,
                                                             double max_time_difference,
                                                             const std::optional<camera::camera_settings>& given) {
@@ -173,7 +172,7 @@ ORBIS_INLINE result<stereo_recording> open_stereo_recording(const std::filesyste
   if (const auto unused = folder / "camera.toml"; has_cameras && detail::present(unused))
     index->images.notes.push_back(unused.string() + ": not used; the two cameras are those of " + cameras);
   detail::note_interval(index->images, index->fps);
-  // Check before the rectification maps are made: a wrong size may exceed the memory.
+  // Check the size before computing the rectification maps, because a wrong size may exhaust the memory.
   const auto& file = index->images.frames.front().color;
   const camera::any_camera& left = index->cameras.left;
   if (const auto first = detail::sized(read_color(file), file, left.width(), left.height()); !first)

@@ -48,14 +48,14 @@ enum class stereo_format { automatic, kitti, asl, pairs };
 struct stereo_recording_options {
   stereo_format format = stereo_format::automatic;
   std::optional<camera::camera_settings> camera{};  ///< replaces camera.toml; only for `pairs`
-  double max_time_difference = 0.005;               ///< between a left and its right image, seconds
+  double max_time_difference = 0.005;               ///< between a left image and its right image, seconds
   camera::rectify_options rectify{};
 };
 
 /// A list of pairs that are read, and rectified if necessary, on request. Thread-safe.
 class stereo_recording {
  public:
-  /// @pre !index.images.frames.empty(); `straight` is of `index.cameras`
+  /// @pre !index.images.frames.empty(); `straight` is the rectification of `index.cameras`
   stereo_recording(detail::stereo_index index, camera::rectification straight, stereo_format format);
 
   [[nodiscard]] std::size_t size() const noexcept { return index_.images.frames.size(); }
@@ -69,7 +69,7 @@ class stereo_recording {
   /// The original cameras, before rectification.
   [[nodiscard]] const camera::stereo_rig<camera::any_camera>& cameras() const noexcept { return index_.cameras; }
   [[nodiscard]] const camera::rectification& rectification() const noexcept { return straight_; }
-  /// All poses of the ground truth, of the rectified left camera; empty if there is none.
+  /// All ground-truth poses, as poses of the rectified left camera; empty if there are none.
   [[nodiscard]] const trajectory& ground_truth() const noexcept { return index_.images.ground_truth; }
   /// The format; never `automatic`.
   [[nodiscard]] stereo_format format() const noexcept { return format_; }
@@ -95,11 +95,11 @@ class stereo_recording {
 /// Detects the format of the stereo recording in `folder`; `automatic` if none is recognised.
 [[nodiscard]] stereo_format detect_stereo_format(const std::filesystem::path& folder);
 
-/// Opens the stereo recording in `folder`: reads its lists, poses and cameras, and rectifies the cameras; reads only
-/// the first left image, for its size. Errors: not_found, unreadable, unsupported (no known format, or a camera of an
-/// unknown model), no_data (no pairs), malformed (with file and line; an image whose size differs from its camera's),
-/// invalid_argument (no camera known, a camera option for a format with its own cameras, or cameras that cannot be
-/// rectified).
+/// Opens the stereo recording in `folder`: reads its lists, poses and cameras, and rectifies the cameras. Of the
+/// images, it reads only the first left one, for its size. Errors: not_found, unreadable, unsupported (no known format,
+/// or a camera of an unknown model), no_data (no pairs), malformed (with file and line; an image whose size differs
+/// from its camera's), invalid_argument (no camera known, a camera option for a format with its own cameras, or cameras
+/// that cannot be rectified).
 [[nodiscard]] result<stereo_recording> open_stereo_recording(const std::filesystem::path& folder,
                                                              const stereo_recording_options& options = {});
 

@@ -25,7 +25,7 @@ struct recorded_room {
              (options.frames_around > 0 ? options.path.rounds() * options.frames_around : options.frames) /
                  options.fps},
         surfaces{options.scene, options.seed},
-        camera{std::make_shared<texture_set>(painted(surfaces), std::max(0.003, 2.0 / k.fx)),  // a pixel at 2 m
+        camera{std::make_shared<texture_set>(painted(surfaces), std::max(0.003, 2.0 / k.fx)),  // size of a pixel at 2 m
                k, options.depth_scale, exposed(options.sensor, options.scene.light), options.seed} {}
 
   [[nodiscard]] moment at(double time) const { return {surfaces.solids_at(time), path.at(time)}; }

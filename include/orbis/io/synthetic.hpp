@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Synthetic recordings: a furnished room, a hand-held camera, and the ground truth of both.
+/// Synthetic recordings: a furnished room, a hand-held camera, and ground truth for both.
 ///
 /// @code
 ///   orbis::io::synthetic_recording room{{.frames = 300, .seed = 7}};
@@ -37,7 +37,7 @@ namespace detail::synthetic {
 class scene;
 struct recorded_room;
 
-/// A policy with the same number of threads. The rendered images do not depend on it.
+/// A parallel policy with the same number of threads. The rendered images do not depend on the policy.
 template <execution_policy Policy>
 [[nodiscard]] parallel_policy as_parallel(const Policy& policy) {
   if constexpr (std::is_same_v<Policy, parallel_policy>)
@@ -52,14 +52,14 @@ template <execution_policy Policy>
 /// are independent: they may be requested in any order and from several threads, and are byte for byte equal on every
 /// machine (except the pose, whose last bit may differ).
 ///
-/// The floor of the room is at z = 0 with the origin at its centre. The surfaces' textures are painted when they are
-/// first seen, which takes a few tenths of a second for the first frames at 640x480, and eventually about 50 MB; copies
-/// share them.
+/// The floor of the room is at z = 0 with the origin at its centre. A surface's texture is generated when the surface
+/// is first visible, which takes a few tenths of a second for the first frames at 640x480. All textures together take
+/// about 50 MB; copies of the recording share them.
 class synthetic_recording {
  public:
   class iterator;
 
-  /// @pre frames >= 0, fps > 0, width and height > 0, depth_scale > 0, light > 0, and those of scene and path
+  /// @pre frames >= 0, fps > 0, width and height > 0, depth_scale > 0, light > 0, and those of the scene and the path
   explicit synthetic_recording(const synthetic_options& options = {});
 
   [[nodiscard]] std::size_t size() const noexcept { return static_cast<std::size_t>(options_.frames); }
@@ -67,9 +67,9 @@ class synthetic_recording {
   /// Time in seconds.
   [[nodiscard]] double timestamp(std::size_t i) const noexcept { return static_cast<double>(i) / options_.fps; }
   [[nodiscard]] const synthetic_options& options() const noexcept { return options_; }
-  /// The distance (metres, unsigned) of a point of the world to the nearest surface visible to a camera: the error of a
-  /// map point. Exact in front of the surfaces; behind them, where solids overlap, it is the distance to the hull of
-  /// the solid that contains the point most deeply. Ignores moving solids. O(solids of the room)
+  /// The unsigned distance (metres) from a point in the world frame to the nearest surface visible to a camera: the
+  /// error of a map point. Exact in front of the surfaces; behind them, where solids overlap, it is the distance to the
+  /// surface of the solid that contains the point most deeply. Ignores moving solids. O(number of solids)
   [[nodiscard]] double surface_distance(const vec3& p_world) const noexcept;
   /// The room's solids, for tests of this component (io/detail/synthetic/scene.hpp).
   [[nodiscard]] const detail::synthetic::scene& scene() const noexcept;
@@ -101,23 +101,23 @@ class synthetic_recording {
     return render_on(detail::synthetic::as_parallel(policy), i);
   }
 
-  /// Frame `i` of a stereo camera, whose left camera is `camera()` and whose right one is `stereo_camera().baseline` to
-  /// the right of it. Errors: as `frame`.
+  /// Frame `i` of a stereo camera, whose left camera is `camera()` and whose right camera is displaced by
+  /// `stereo_camera().baseline` to the right. Errors: as `frame`.
   [[nodiscard]] result<camera::stereo_frame> stereo_frame(std::size_t i) const;
   template <execution_policy Policy>
   [[nodiscard]] result<camera::stereo_frame> render_stereo(const Policy& policy, std::size_t i) const {
     return render_stereo_on(detail::synthetic::as_parallel(policy), i);
   }
 
-  /// Colour, depth (metres) and angles of frame `i` without sensor errors. Errors: invalid_argument if there is no
-  /// frame `i`.
+  /// Colour, depth (metres) and angles of incidence of frame `i` without sensor errors. Errors: invalid_argument if
+  /// there is no frame `i`.
   template <execution_policy Policy>
   [[nodiscard]] result<detail::synthetic::exact_view> exact(const Policy& policy, std::size_t i) const {
     return exact_on(detail::synthetic::as_parallel(policy), i);
   }
 
-  /// Exact depth image of a camera of any model at any pose in the room: depths in metres along its axis; 0 where a
-  /// pixel has no ray, and everywhere if the camera is outside the room. Ignores moving solids.
+  /// Exact depth image of a camera of any model at any pose in the room: depths in metres along the optical axis; 0
+  /// where a pixel has no ray, and everywhere if the camera is outside the room. Ignores moving solids.
   template <execution_policy Policy, camera::camera_model Camera>
   [[nodiscard]] image<float> exact_depth(const Policy& policy, const Camera& camera, const se3& T_world_camera) const {
     image<float> depth(camera.width(), camera.height());
@@ -130,7 +130,7 @@ class synthetic_recording {
     return depth;
   }
 
-  /// Iteration renders one frame after another.
+  /// Iterates over the frames; each one is rendered when the iterator reaches it.
   [[nodiscard]] iterator begin() const;
   [[nodiscard]] iterator end() const;
 
@@ -146,7 +146,7 @@ class synthetic_recording {
   std::shared_ptr<const detail::synthetic::recorded_room> room_;  // shared by copies
 };
 
-/// A single pass over the frames; a frame is valid until the iterator advances.
+/// Single-pass iterator over the frames; a frame is valid until the iterator advances.
 class synthetic_recording::iterator {
  public:
   using iterator_concept = std::input_iterator_tag;

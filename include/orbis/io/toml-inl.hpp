@@ -48,9 +48,9 @@ namespace detail {
          (text[0] == ' ' && std::string_view{" \t\r\n#,]}"}.find(next) != std::string_view::npos);
 }
 
-/// The reason why toml++ 3.3 would mishandle the text; null if it does not. Outside strings and comments, TOML requires
-/// ASCII, but some other characters are taken for blanks. Undefined behaviour are a date with "T" and no time, a
-/// list closed by "}", and, in strings or after a quotation mark within a word, some characters beyond ASCII.
+/// The reason why toml++ 3.3 would mishandle the text; null if there is none. Outside strings and comments, TOML
+/// requires ASCII, but toml++ treats some non-ASCII characters as blanks. Its behaviour is undefined for a date with
+/// "T" and no time, a list closed by "}", and some non-ASCII characters in strings or after a quotation mark in a word.
 [[nodiscard]] inline const char* find_mishandled(std::string_view text) {
   static constexpr std::string_view date = "dddd-dd-dd";
   const auto is_date = [](std::string_view word) {
@@ -63,10 +63,10 @@ namespace detail {
     const char c = text[i];
     if (c == '[' || c == '{') open += c;
     if (c == ']' || c == '}') {
-      if (open.empty() || open.back() != (c == ']' ? '[' : '{')) return "a bracket that does not match";
+      if (open.empty() || open.back() != (c == ']' ? '[' : '{')) return "mismatched brackets";
       open.pop_back();
     }
-    if (static_cast<unsigned char>(c) >= 0x80) return "characters beyond ASCII need quotes";
+    if (static_cast<unsigned char>(c) >= 0x80) return "non-ASCII characters need quotes";
     if (is_date(text.substr(i, date.size())) && !may_follow_date(text.substr(i + date.size())))
       return "a date is followed by neither a time nor the end of the value";
     if (c == '#') {
@@ -89,7 +89,7 @@ namespace detail {
         ++i;  // any escaped character
         const std::size_t next = std::min(text.find_first_not_of(" \t\r\n", i), text.size());
         if (next != text.size() && static_cast<unsigned char>(text[next]) >= 0x80)
-          return "a backslash before a character beyond ASCII";
+          return "a backslash before a non-ASCII character";
       } else if (!has_lines && text[i] == '\n') {
         break;  // an error; toml++ stops there too
       } else if (text[i] == c && (!has_lines || text.substr(i).starts_with(three))) {

@@ -14,14 +14,14 @@
 
 namespace orbis::io {
 
-/// Maximum size of a text. toml++ descends nested tables recursively, as deep as the number of dots in the text; this
-/// size does not overflow the stack.
+/// Maximum size of a text. toml++ recurses into nested tables, up to one level per dot in the text; with this size, the
+/// stack does not overflow.
 inline constexpr std::size_t max_toml_bytes = 16384;
 
 /// Parses `text` as a table. `where` names the source in errors. Errors: malformed, with the line if known (not TOML;
 /// more than `max_toml_bytes`; a list of lists over several lines, whose lines could be table headers).
-/// Limitations, for the safety of toml++: refuses two forms of valid TOML: keys with quotes after a dot in inline
-/// tables (`x = {a."b" = 1}`), and bare keys that contain a date with "T" or a blank, but no time, after it
+/// Limitations, because of defects in toml++: two forms of valid TOML are rejected: keys with quotes after a dot in
+/// inline tables (`x = {a."b" = 1}`), and bare keys that contain a date followed by "T" or a blank, but no time
 /// (`2024-01-01Tx = 1`, `2024-01-01 = 1`).
 [[nodiscard]] result<toml::table> parse_toml(std::string_view text, const std::filesystem::path& where = {});
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A trajectory read from a file in any supported layout, with notes about the reading.
+/// A trajectory read from a file in any supported layout, with notes for the user.
 #pragma once
 
 #include <cstddef>
@@ -19,7 +19,7 @@ enum class trajectory_layout {
 
 /// A trajectory from a file in any supported layout.
 struct trajectory_reading {
-  trajectory poses;  ///< each time once; in KITTI's layout the time is the index of the line, see `set_times`
+  trajectory poses;  ///< with distinct times; in KITTI's layout the time is the index of the line, see `set_times`
   trajectory_layout layout = trajectory_layout::tum;
   std::size_t lost = 0;            ///< lines with NaN, infinity or a zero quaternion, which are left out
   std::vector<std::string> notes;  ///< warnings for the user: the file, interpretations, and lines that are left out

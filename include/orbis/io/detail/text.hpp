@@ -22,7 +22,7 @@ namespace orbis::io::detail {
 
 [[nodiscard]] constexpr bool is_blank(char c) noexcept { return c == ' ' || c == '\t' || c == '\r' || c == '\n'; }
 
-/// A letter of ASCII in lower case; any other character as it is.
+/// Converts an ASCII letter to lower case; returns any other character unchanged.
 [[nodiscard]] constexpr char lower_case(char c) noexcept {
   return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
 }
@@ -32,7 +32,7 @@ namespace orbis::io::detail {
   return text;
 }
 
-/// The text without blanks (including CR and LF) at either end.
+/// The text without leading and trailing blanks (including CR and LF).
 [[nodiscard]] constexpr std::string_view trimmed(std::string_view text) noexcept {
   while (!text.empty() && is_blank(text.front())) text.remove_prefix(1);
   while (!text.empty() && is_blank(text.back())) text.remove_suffix(1);
@@ -49,7 +49,7 @@ namespace orbis::io::detail {
   return field;
 }
 
-/// Removes the next line from the front of `text` and returns it without its end. @pre !text.empty()
+/// Removes the next line from the front of `text` and returns it without its line ending. @pre !text.empty()
 [[nodiscard]] constexpr std::string_view next_line(std::string_view& text) noexcept {
   const std::size_t end = text.find('\n');
   std::string_view line = text.substr(0, end);
@@ -67,8 +67,8 @@ requires std::integral<T> || std::floating_point<T>
   return failure == std::errc{} && end == field.data() + field.size();
 }
 
-/// Calls `visit(line, number)` for every line that is neither blank nor a comment (`#`), trimmed and numbered from 1,
-/// while `visit` returns true. Skips a byte order mark.
+/// Calls `visit(line, number)` with every trimmed line that is neither blank nor a comment (`#`), and its line number
+/// (from 1), as long as `visit` returns true. Skips a byte order mark.
 template <std::predicate<std::string_view, std::size_t> Visit>
 void for_each_line(std::string_view text, Visit&& visit) {
   if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);

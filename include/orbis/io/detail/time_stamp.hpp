@@ -30,9 +30,9 @@ struct time_unit {
 inline constexpr time_unit time_units[] = {
     {"seconds", 1.0}, {"milliseconds", 1e-3}, {"microseconds", 1e-6}, {"nanoseconds", 1e-9}};
 
-/// The unit of a time stamp by the digits before its decimal point: times since 1970 have 10 digits in seconds, 13 in
-/// milliseconds, 16 in microseconds and 19 in nanoseconds (from 2001 to 2286). Seconds for any other number of digits,
-/// and for leading zeros.
+/// The unit of a time stamp, determined by the number of digits before its decimal point: times since 1970 have 10
+/// digits in seconds, 13 in milliseconds, 16 in microseconds and 19 in nanoseconds (from 2001 to 2286). Seconds for any
+/// other number of digits, and for leading zeros.
 [[nodiscard]] constexpr time_unit detect_unit(std::string_view stamp) noexcept {
   const std::size_t digits = std::min(stamp.find_first_not_of("0123456789"), stamp.size());
   if (stamp.starts_with('0') || (digits != stamp.size() && stamp[digits] != '.'))  // a sign, or an exponent
@@ -45,8 +45,8 @@ inline constexpr time_unit time_units[] = {
   }
 }
 
-/// Parses a time stamp in `unit`, by default that of its digits (`detect_unit`). Returns seconds; empty if it is not a
-/// finite number.
+/// Parses a time stamp in `unit`, by default the unit that `detect_unit` returns. Returns seconds; empty if the time
+/// stamp is not a finite number.
 [[nodiscard]] inline std::optional<double> parse_time_stamp(std::string_view stamp,
                                                             std::optional<time_unit> unit = {}) noexcept {
   double t = 0.0;
@@ -92,7 +92,7 @@ inline constexpr time_unit time_units[] = {
 }
 
 /// A warning if the median interval of ascending times is more than 30 times longer or shorter than that of a camera
-/// with `fps` frames per second; empty otherwise. It states the factor that the unit of the times seems to have.
+/// with `fps` frames per second; empty otherwise. It states the factor by which the times seem to be wrong.
 [[nodiscard]] inline std::string describe_interval(const std::vector<double>& times, double fps) {
   constexpr double tolerance = 30.0;
   if (times.size() < 3) return {};
@@ -103,7 +103,7 @@ inline constexpr time_unit time_units[] = {
                 "the time between frames is %.3g s, but at %.3g frames per second it would be %.3g s", interval, fps,
                 1.0 / fps);
   std::string warning = text;
-  // A unit that is mistaken makes a factor of a power of 1000; other factors have other reasons.
+  // A wrong unit results in a factor that is a power of 1000; other factors have other causes.
   const double power = std::clamp(std::round(std::log10(ratio) / 3.0), 1.0, 6.0);
   if (ratio > tolerance && std::abs(ratio / std::pow(1000.0, power) - 1.0) < 0.3) {
     std::snprintf(text, sizeof text, "; the time stamps seem to be %.0f times too large: write them in seconds",

@@ -24,7 +24,7 @@
 
 namespace orbis::io::detail {
 
-/// Reads the file number by number, and counts lines for errors.
+/// Reads the file number by number, and counts lines for error messages.
 class bal_parser {
  public:
   bal_parser(std::string_view text, const std::filesystem::path& where)
@@ -47,7 +47,7 @@ class bal_parser {
   }
   [[nodiscard]] std::string field_in_quotes() const { return in_quotes({at_, std::find_if(at_, end_, is_blank)}); }
 
-  /// Reads the next number. `what` and `of`: kind and index of the object that it belongs to, for errors.
+  /// Reads the next number. `what` and `of`: kind and index of the object that the number belongs to, for errors.
   template <class T>
   bool read(T& value, const char* what, std::size_t of) {
     skip_blanks();
@@ -79,7 +79,7 @@ class bal_parser {
                       (at_ == end_ ? std::string{} : ", not with " + field_in_quotes()));
       at_ = last;
     }
-    // A number takes at least a blank and a digit: allocate only for numbers that can follow.
+    // A number takes at least a blank and a digit, so the rest of the file limits the allocation.
     const auto fitting = static_cast<std::uint64_t>(end_ - at_) / 2;
     const auto [cameras, points, observations] = counts;
     constexpr std::uint64_t most = std::numeric_limits<std::uint32_t>::max();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The numbers of a cloud file by name, and their interpretation as points and colours, the same for every format.
+/// The named columns of a cloud file, and their interpretation as points and colours, which all formats share.
 #pragma once
 
 #include <algorithm>
@@ -36,7 +36,7 @@ struct cloud_columns {
   std::vector<cloud_field> columns;  ///< in the order of the file; names may repeat
   std::size_t size = 0;              ///< number of points
   std::array<double, 7> viewpoint{0, 0, 0, 1, 0, 0, 0};
-  std::vector<std::string> left_out;  ///< other parts of the file
+  std::vector<std::string> left_out;  ///< parts of the file that are left out
   std::vector<std::string> notes;
   bool is_text = false;
 };
@@ -46,7 +46,7 @@ constexpr std::array<std::string_view, 3> color_names[] = {
     {"red", "green", "blue"}, {"r", "g", "b"}, {"diffuse_red", "diffuse_green", "diffuse_blue"}};
 constexpr std::string_view packed_color_names[] = {"rgb", "rgba"};
 
-/// Returns true if a name of a file is `known`, a name in lower case.
+/// Returns true if `name`, in any case, is equal to `known`, a name in lower case.
 [[nodiscard]] inline bool is_name(std::string_view name, std::string_view known) {
   return std::ranges::equal(name, known, {}, lower_case);
 }
@@ -55,21 +55,21 @@ constexpr std::string_view packed_color_names[] = {"rgb", "rgba"};
 }
 [[nodiscard]] inline bool is_coordinate(std::string_view name) { return is_one_of(name, coordinate_names); }
 
-/// Returns true if points or colours may be read from columns of this name.
+/// Returns true if points or colours may be read from columns with this name.
 [[nodiscard]] inline bool is_point_or_color(std::string_view name) {
   return is_coordinate(name) || is_one_of(name, packed_color_names) ||
          std::ranges::any_of(color_names, [&](const auto& names) { return is_one_of(name, names); });
 }
 
-/// A column of `points` zeros. In text, coordinates are stored as double whatever the header declares.
+/// A column of zeros for `points` points. Coordinates from text are stored as double, whatever the declared type.
 [[nodiscard]] inline cloud_field make_column(std::string name, scalar_type type, std::size_t count, std::size_t points,
                                              bool text) {
   if (text && is_coordinate(name)) type = scalar_type::float64;
   return {std::move(name), type, count, std::string(points * count * byte_size(type), '\0')};
 }
 
-/// Stores the number `token` as the `index`-th of the column. If the column's type cannot represent it, the column
-/// becomes float64: integers of more than 24 bits in a float, for example. Returns false if it is no number.
+/// Stores the number `token` at `index` in the column. If the column's type cannot represent it (such as an integer of
+/// more than 24 bits in a float), the column is converted to float64. Returns false if `token` is not a number.
 [[nodiscard]] inline bool store_number(cloud_field& column, std::size_t index, std::string_view token) {
   const auto store = [&](auto value) {
     if (!parse_number(token, value)) return false;
@@ -111,9 +111,9 @@ inline std::string shortened(double value) {
   return {text, end};
 }
 
-/// Colours from three columns. The unit of a channel follows from the largest number of all channels of its kind
-/// (8-bit, wider integer, floating point): PLY does not define it. Rounding, interpolation and lighting may lift
-/// floating-point numbers above 1; cameras give 12 bits. Notes report a range that is not that of the type.
+/// Colours from three columns. PLY does not define the range of a channel, so it is inferred from the largest value in
+/// all channels of the same kind (8-bit, wider integer, floating point). Rounding, interpolation and lighting may raise
+/// floating-point values above 1; cameras deliver 12 bits. Notes report a range that is not that of the type.
 inline std::vector<rgb8> channel_colors(const std::array<const cloud_field*, 3>& channels, std::size_t size,
                                         std::vector<std::string>& notes) {
   const auto is_byte = [](scalar_type type) { return byte_size(type) == 1; };
@@ -140,15 +140,16 @@ inline std::vector<rgb8> channel_colors(const std::array<const cloud_field*, 3>&
                        (c.type == scalar_type::uint16 && most > 65535.0 / 4.0) || most == 0.0;
     if (usual) continue;
     std::string note = std::string{"colours are "} + (is_floating(c.type) ? "floating-point numbers" : "integers") +
-                       " up to " + shortened(most) + ": taken as 0 ... " + std::to_string(static_cast<int>(range));
+                       " up to " + shortened(most) + ": interpreted as 0 ... " +
+                       std::to_string(static_cast<int>(range));
     if (note != last_note) notes.push_back(last_note = std::move(note));
   }
   return colors;
 }
 
-/// Colours packed as 0xAARRGGBB into integers or the bits of floats; nothing if the column holds other numbers. In
-/// text, whole numbers in a column of floats are integers: as bits, they are colours with an unusual alpha. `alpha`
-/// receives the most significant bytes.
+/// Colours packed as 0xAARRGGBB into integers or the bits of floats; empty if the column contains other numbers. In
+/// text, whole numbers in a float column are treated as integers, because their bits would be colours with an unusual
+/// alpha. `alpha` receives the most significant bytes.
 inline std::optional<std::vector<rgb8>> packed_colors(const cloud_field& column, std::size_t size, bool is_text,
                                                       std::string& alpha, std::vector<std::string>& notes) {
   std::vector<rgb8> colors(size);
@@ -162,7 +163,7 @@ inline std::optional<std::vector<rgb8>> packed_colors(const cloud_field& column,
   const bool are_bits = column.type == scalar_type::float32 && !(is_text && are_integers && !are_zero);
   if (!are_bits && !are_integers) return std::nullopt;
   if (!are_bits && is_floating(column.type))
-    notes.push_back(column.name + " is declared as floating-point, but has whole numbers: taken as packed integers");
+    notes.push_back(column.name + " is declared as floating-point, but has whole numbers: read as packed integers");
   for (std::size_t i = 0; i != size; ++i) {
     const auto packed = are_bits ? load_number<std::uint32_t>(column.bytes.data() + 4 * i)
                                  : static_cast<std::uint32_t>(static_cast<std::int64_t>(number_at(column, i)));
@@ -220,7 +221,7 @@ inline result<cloud_with_fields> to_cloud(cloud_columns&& read, const std::strin
     if (column == nullptr || byte_size(column->type) < 4) continue;
     auto colors = packed_colors(*column, n, read.is_text, alpha, out.notes);
     colored = colors.has_value();
-    if (!colored) obstacle = column->name + " holds no packed colours";
+    if (!colored) obstacle = column->name + " does not contain packed colours";
     if (!colored) continue;
     out.cloud.colors = *std::move(colors);
     use(column);

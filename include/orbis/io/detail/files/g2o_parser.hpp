@@ -23,7 +23,7 @@
 
 namespace orbis::io::detail {
 
-/// Reads the file line by line; edges refer to vertices by id until all are known.
+/// Reads the file line by line; edges refer to vertices by id until all vertices are known.
 class g2o_parser {
  public:
   explicit g2o_parser(const std::filesystem::path& where) : where_{where} {}
@@ -55,7 +55,7 @@ class g2o_parser {
     if (tag == "VERTEX_SE3:QUAT") return read_vertex(line);
     if (tag == "EDGE_SE3:QUAT") return read_edge(line);
     if (tag == "FIX") return read_fix(line);
-    if (tag.starts_with("PARAMS_")) return true;  // of sensors; the supported edges use none
+    if (tag.starts_with("PARAMS_")) return true;  // sensor parameters, which the supported edges do not use
     return reject(in_quotes(tag) + " is not one of VERTEX_SE3:QUAT, EDGE_SE3:QUAT, FIX", errc::unsupported);
   }
 

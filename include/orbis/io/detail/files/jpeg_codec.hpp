@@ -3,7 +3,7 @@
 /// A JPEG decoder and encoder for bytes in memory.
 ///
 /// libjpeg reports errors by `longjmp`, with a message and without printing. Functions that call `setjmp` have only
-/// trivial locals, so that no destructor is skipped.
+/// trivial local variables, so that no destructor is skipped.
 #pragma once
 
 #include <algorithm>
@@ -25,12 +25,12 @@ namespace orbis::io::detail {
 
 /// Error state of libjpeg. Callers of libjpeg set `jump` first.
 struct jpeg_errors {
-  jpeg_error_mgr base{};  // first: libjpeg passes a pointer to it back
+  jpeg_error_mgr base{};  // must be first: libjpeg passes a pointer to it back
   std::jmp_buf jump{};
   char message[JMSG_LENGTH_MAX] = "";
-  bool ends_at_warning = false;  ///< for a decoder
+  bool ends_at_warning = false;  ///< treats warnings as errors, for a decoder
 
-  /// The error manager to pass to libjpeg. Valid while this object stays in place.
+  /// The error manager to pass to libjpeg. Valid as long as this object is not moved.
   [[nodiscard]] jpeg_error_mgr* manager() {
     jpeg_std_error(&base);
     base.error_exit = [](j_common_ptr info) {
@@ -49,7 +49,7 @@ class jpeg_decoder {
  public:
   explicit jpeg_decoder(std::string_view bytes) : size_{bytes.size()} {
     info_.err = errors_.manager();
-    // A decoder that continues after an invalid code invents pixels.
+    // After an invalid code, libjpeg would continue with arbitrary pixels.
     errors_.base.emit_message = [](j_common_ptr info, int level) {
       jpeg_errors& own = jpeg_errors::of(info->err);
       if (level >= 0 || info->err->num_warnings++ != 0) return;
@@ -80,14 +80,14 @@ class jpeg_decoder {
     jpeg_create_decompress(&info_);
     info_.src = &source_;
     jpeg_read_header(&info_, TRUE);
-    // A Huffman-coded block of 64 pixels takes at least one bit; with arithmetic coding slightly less.
+    // A Huffman-coded block of 64 pixels takes at least one bit; an arithmetic-coded one slightly less.
     const std::uint64_t pixels = std::uint64_t{info_.image_width} * info_.image_height;
     const std::uint64_t pixels_of_byte = info_.arith_code != FALSE ? 2048 : 512;
     if (pixels > (std::uint64_t{1} << 28) || (pixels > (1U << 20) && pixels > pixels_of_byte * size_))
       return give_up("claims more pixels than the file can hold");
     if (jpeg_has_multiple_scans(&info_) != FALSE) {
-      // Each scan traverses all pixels again, and may have only a few bytes; all coefficients are kept in memory.
-      if (pixels > (std::uint64_t{1} << 26)) return give_up("has several scans and too many pixels for that");
+      // Each scan processes all pixels again, and may consist of only a few bytes; all coefficients are kept in memory.
+      if (pixels > (std::uint64_t{1} << 26)) return give_up("has several scans and too many pixels for them");
       progress_.most_scans =
           static_cast<int>(std::clamp<std::uint64_t>((std::uint64_t{1} << 30) / (pixels + 1), 16, 500));
       progress_.base.progress_monitor = [](j_common_ptr common) {
@@ -104,14 +104,14 @@ class jpeg_decoder {
   bool read_pixels(rgb8* to) {
     if (setjmp(errors_.jump) != 0) return false;
     info_.out_color_space = JCS_RGB;
-    info_.err->num_warnings = 0;  // warnings about a header do not affect pixels
+    info_.err->num_warnings = 0;  // warnings about the header do not affect the pixels
     errors_.ends_at_warning = true;
     jpeg_start_decompress(&info_);
     while (info_.output_scanline < info_.output_height) {
       auto* row = reinterpret_cast<JSAMPROW>(to + std::size_t{info_.output_scanline} * info_.output_width);
       jpeg_read_scanlines(&info_, &row, 1);
     }
-    errors_.ends_at_warning = false;  // nor do warnings about data after the pixels
+    errors_.ends_at_warning = false;  // warnings about data after the pixels do not affect them either
     jpeg_finish_decompress(&info_);
     return true;
   }
@@ -122,7 +122,7 @@ class jpeg_decoder {
 
  private:
   struct progress {
-    jpeg_progress_mgr base{};  // first: libjpeg passes a pointer to it back
+    jpeg_progress_mgr base{};  // must be first: libjpeg passes a pointer to it back
     int most_scans = 0;
   };
 
@@ -148,7 +148,7 @@ class jpeg_encoder {
  public:
   jpeg_encoder() {
     info_.err = errors_.manager();
-    // Not `jpeg_mem_dest`: after an error it is unknown whether its buffer was freed.
+    // `jpeg_mem_dest` is not used because after an error it is unknown whether its buffer was freed.
     info_.client_data = this;
     destination_.init_destination = [](j_compress_ptr info) { make_room(info); };
     destination_.empty_output_buffer = [](j_compress_ptr info) -> boolean {
@@ -201,7 +201,7 @@ class jpeg_encoder {
     }
     return true;
   }
-  /// Extends the buffer after the written bytes. No exception passes through libjpeg.
+  /// Extends the buffer after the written bytes. Exceptions do not propagate through libjpeg.
   static void make_room(j_compress_ptr info) {
     auto* own = static_cast<jpeg_encoder*>(info->client_data);
     const std::size_t full = own->bytes_.size();

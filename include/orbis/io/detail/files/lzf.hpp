@@ -2,9 +2,9 @@
 /// @file
 /// The LZF compression of `binary_compressed` PCD files.
 ///
-/// The stream is a sequence of items, each starting with a byte c. Below 32: c + 1 literal bytes follow. Otherwise a
-/// copy: length c >> 5 (if that is 7, plus the next byte) plus 2, from ((c & 31) << 8 | next byte) + 1 bytes back in
-/// the output; it may overlap its own output.
+/// The stream is a sequence of items, each starting with a byte c. If c < 32, c + 1 literal bytes follow. Otherwise the
+/// item is a copy of length c >> 5 (if that is 7, plus the next byte) plus 2, from ((c & 31) << 8 | next byte) + 1
+/// bytes back in the output; source and destination may overlap.
 #pragma once
 
 #include <algorithm>
@@ -17,10 +17,10 @@
 
 namespace orbis::io::detail {
 
-/// Maximum number of bytes that `size` compressed ones expand to: a copy of 264 bytes takes 3.
+/// Maximum number of bytes to which `size` compressed bytes expand: a copy of 264 bytes takes 3.
 [[nodiscard]] constexpr std::uint64_t lzf_max_output(std::uint64_t size) noexcept { return size * 88 + 32; }
 
-/// Exactly `size` bytes decompressed from `compressed`; empty if it is damaged or expands to another size.
+/// Decompresses exactly `size` bytes; empty if `compressed` is damaged or expands to another size.
 [[nodiscard]] inline std::optional<std::string> lzf_decompress(std::string_view compressed, std::size_t size) {
   if (size > lzf_max_output(compressed.size())) return std::nullopt;
   std::string out;
@@ -48,8 +48,8 @@ namespace orbis::io::detail {
   return out;
 }
 
-/// Compresses `data`: greedy, with one stored position for each hash of three bytes. Incompressible data grows by one
-/// byte in 32.
+/// Compresses `data` greedily, with one stored position for each hash of three bytes. Incompressible data grows by one
+/// byte per 32.
 [[nodiscard]] inline std::string lzf_compress(std::string_view data) {
   constexpr std::size_t max_distance = 8192, max_length = 264, none = static_cast<std::size_t>(-1);
   constexpr unsigned hash_bits = 14;

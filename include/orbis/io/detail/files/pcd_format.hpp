@@ -31,8 +31,8 @@ struct pcd_field {
   std::size_t size = 0;         ///< bytes of one element
   char type = 0;                ///< F, I or U
   std::size_t count = 1;        ///< elements per point
-  std::size_t offset = 0;       ///< within a point, bytes
-  std::size_t first_token = 0;  ///< within a line of text
+  std::size_t offset = 0;       ///< offset within a point, bytes
+  std::size_t first_token = 0;  ///< index of the first token within a line of text
 
   [[nodiscard]] std::optional<scalar_type> scalar() const {
     using enum scalar_type;
@@ -53,11 +53,11 @@ struct pcd_header {
   std::size_t lines = 0;       ///< number of lines of the header
   pcd_data data = pcd_data::ascii;
   std::array<double, 7> viewpoint{0, 0, 0, 1, 0, 0, 0};
-  std::string note;  ///< on the viewpoint
+  std::string note;  ///< warning about the viewpoint
 };
 
-/// Parses seven numbers, and describes a viewpoint other than the identity in `header.note`. Rotations of zero length
-/// are taken as none.
+/// Parses seven numbers, and describes a viewpoint other than the identity in `header.note`. A zero quaternion counts
+/// as the identity.
 inline void parse_viewpoint(std::string_view line, pcd_header& header) {
   const std::string text{trimmed(line)};
   std::array<double, 7> read{};
@@ -74,8 +74,8 @@ inline void parse_viewpoint(std::string_view line, pcd_header& header) {
   header.viewpoint = read;
   header.note =
       "VIEWPOINT " + orbis::shortened(text) +
-      " is not applied: the points are taken as they are. This is right if it is the place of the sensor and the "
-      "points are in the world; if it is the transform from the points to the world, apply it first";
+      " is not applied. This is correct if it is the pose of the sensor and the points are in the world frame; if it "
+      "is the transform from the points to the world frame, apply it first";
 }
 
 /// Parses the header and removes it from the front of `bytes`.
@@ -153,7 +153,7 @@ inline result<pcd_header> take_pcd_header(std::string_view& bytes, const std::st
   return header;
 }
 
-/// The columns of the points: all, or those of points and colours. `column_of[k]`: index of the column of field k.
+/// The columns of the points: all, or only coordinates and colours. `column_of[k]`: index of the column of field k.
 inline cloud_columns make_columns(const pcd_header& header, bool all,
                                   std::vector<std::optional<std::size_t>>& column_of) {
   cloud_columns read{.columns = {},
@@ -178,7 +178,7 @@ inline result<cloud_columns> read_pcd_text(std::string_view body, const pcd_head
                                            const std::string& where) {
   if (header.points > (body.size() + 1) / (2 * header.tokens))  // one digit per number, plus separators
     return fail(errc::malformed, where,
-                "the data end early: they are too short for " + std::to_string(header.points) + " points");
+                "the data ends early: it is too short for " + std::to_string(header.points) + " points");
   std::vector<std::optional<std::size_t>> column_of;
   cloud_columns read = make_columns(header, all, column_of);
   std::vector<std::string_view> tokens(header.points == 0 ? 0 : header.tokens);
@@ -205,11 +205,11 @@ inline result<cloud_columns> read_pcd_text(std::string_view body, const pcd_head
   if (bad_line != 0)
     return fail(errc::malformed, where + ":" + std::to_string(bad_line),
                 "the line does not match the fields of the header");
-  if (points != read.size) return fail(errc::malformed, where, "the data end early");
+  if (points != read.size) return fail(errc::malformed, where, "the data ends early");
   return read;
 }
 
-/// Reads points from binary data. `at(field, i)`: address of the field of point i.
+/// Reads points from binary data. `at(field, i)`: address of the field in point i.
 template <class At>
 cloud_columns read_pcd_binary(const pcd_header& header, bool all, At&& at) {
   std::vector<std::optional<std::size_t>> column_of;
@@ -223,7 +223,7 @@ cloud_columns read_pcd_binary(const pcd_header& header, bool all, At&& at) {
   return read;
 }
 
-/// Reads the points of a PCD file: all columns, or those of points and colours. Errors: malformed.
+/// Reads the points of a PCD file: all columns, or only coordinates and colours. Errors: malformed.
 inline result<cloud_columns> read_pcd_columns(std::string_view bytes, const std::string& where, bool all) {
   const auto header = take_pcd_header(bytes, where);
   if (!header) return fail(header.error());

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The subset of YAML used by camera files: names with a value, one level of nested names, lists of numbers in
-/// brackets.
+/// The subset of YAML used by camera files: keys with values, one level of nesting, lists of numbers in brackets.
 #pragma once
 
 #include <algorithm>
@@ -19,14 +18,14 @@
 
 namespace orbis::io::detail {
 
-/// The values of a file by name; a nested name is "outer.inner".
+/// The values in a file, accessed by name; a nested name is "outer.inner".
 class plain_yaml {
  public:
   /// Maximum size of a file; camera files are far smaller.
   static constexpr std::size_t max_bytes = 65536;
 
-  /// Parses a file. Errors: malformed, with the line (not of this form, a repeated name, a list without an end); too
-  /// large a text.
+  /// Parses a file. Errors: malformed, with the line (not of this form, a repeated name, an unterminated list; too
+  /// large).
   [[nodiscard]] static result<plain_yaml> parse(std::string_view text, const std::filesystem::path& where) {
     if (text.size() > max_bytes) return fail(errc::malformed, where.string(), "is too large for a settings file");
     if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
@@ -43,13 +42,13 @@ class plain_yaml {
       const std::string_view name = trimmed(line.substr(0, std::min(colon, line.size())));
       if (colon == std::string_view::npos || !is_name(name) || (colon + 1 < line.size() && !is_blank(line[colon + 1])))
         return reject("is not \"name: value\"");
-      if (indented && outer.empty()) return reject("is indented without a name above it");
+      if (indented && outer.empty()) return reject("is indented, but no name precedes it");
       std::string value{trimmed(line.substr(colon + 1))};
       const std::size_t begins = number;
       while (value.starts_with('[') && value.back() != ']') {
         const std::string_view more = text.empty() ? "" : trimmed(without_comment(next_line(text)));
         if (more.find(':') != std::string_view::npos || (more.empty() && text.empty()))
-          return fail(errc::malformed, at_line(where, begins), "is a list without an end");
+          return fail(errc::malformed, at_line(where, begins), "is an unterminated list");
         value += ' ';
         value += more;
         ++number;
@@ -63,7 +62,7 @@ class plain_yaml {
     return all;
   }
 
-  /// The text of a value, without quotes. Errors: malformed (missing).
+  /// The value as text, without quotes. Errors: malformed (missing).
   [[nodiscard]] result<std::string> text(std::string_view name) const {
     const entry* const e = find(name);
     if (e == nullptr) return missing(name);
@@ -72,7 +71,7 @@ class plain_yaml {
       value = value.substr(1, value.size() - 2);
     return std::string{value};
   }
-  /// The finite numbers of a list, or a single one. Errors: malformed (missing, or not numbers).
+  /// The finite numbers in a list, or a single number. Errors: malformed (missing, or not numbers).
   [[nodiscard]] result<std::vector<double>> numbers(std::string_view name) const {
     const entry* const e = find(name);
     if (e == nullptr) return missing(name);
@@ -90,7 +89,7 @@ class plain_yaml {
     }
     return all;
   }
-  /// Like `numbers`, with exactly `count` of them.
+  /// Like `numbers`, for a list of exactly `count` numbers.
   [[nodiscard]] result<std::vector<double>> numbers(std::string_view name, std::size_t count) const {
     auto all = numbers(name);
     if (all && all->size() != count)

@@ -25,7 +25,7 @@ namespace orbis::io::detail {
 struct ply_property {
   std::string name;
   scalar_type type = scalar_type::float32;
-  std::optional<scalar_type> count;  ///< for a list: the type of its length
+  std::optional<scalar_type> count;  ///< type of the length of a list; empty for a scalar property
 };
 struct ply_element {
   std::string name;
@@ -50,7 +50,7 @@ inline std::optional<scalar_type> ply_type(std::string_view name) {
   return std::nullopt;
 }
 
-/// The name of a type in a PLY file, which has no integers of 64 bits: these are written as double.
+/// The name of a type in a PLY file. PLY has no 64-bit integers: they are written as double.
 constexpr std::string_view ply_name(scalar_type type) {
   constexpr std::string_view names[] = {"char", "uchar",  "short",  "ushort", "int",
                                         "uint", "double", "double", "float",  "double"};
@@ -113,7 +113,7 @@ class ply_body {
  public:
   ply_body(std::string_view bytes, ply_format format) : left_{bytes}, format_{format} {}
 
-  /// Reads a number. Returns false at the end of the data, or if there is no number of that type.
+  /// Reads a number. Returns false at the end of the data, or if the next field is not a number of that type.
   bool next(scalar_type type, double& value) {
     if (format_ == ply_format::ascii) return parse_number(next_field(left_), value);
     const std::size_t size = byte_size(type);
@@ -122,7 +122,7 @@ class ply_body {
     left_.remove_prefix(size);
     return true;
   }
-  /// Reads a number into the column. Returns false like `next`.
+  /// Reads a number into the column. Returns false in the same cases as `next`.
   bool store(cloud_field& column, std::size_t index) {
     if (format_ == ply_format::ascii) return store_number(column, index, next_field(left_));
     const std::size_t size = byte_size(column.type);
@@ -143,7 +143,7 @@ class ply_body {
     return true;
   }
   [[nodiscard]] std::size_t bytes_left() const { return left_.size(); }
-  /// Minimum number of bytes of a property.
+  /// Minimum size of a property in bytes.
   [[nodiscard]] std::size_t least_size(const ply_property& property) const {
     if (format_ == ply_format::ascii) return 1;
     return byte_size(property.count.value_or(property.type));
@@ -154,7 +154,7 @@ class ply_body {
   ply_format format_;
 };
 
-/// Reads the vertices of a PLY file: all columns, or those of points and colours. Errors: malformed, unsupported.
+/// Reads the vertices of a PLY file: all columns, or only coordinates and colours. Errors: malformed, unsupported.
 inline result<cloud_columns> read_ply_columns(std::string_view bytes, const std::string& where, bool all) {
   const auto header = take_ply_header(bytes, where);
   if (!header) return fail(header.error());

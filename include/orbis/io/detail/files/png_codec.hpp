@@ -2,8 +2,8 @@
 /// @file
 /// A PNG decoder and encoder for bytes in memory.
 ///
-/// libpng reports errors by `longjmp`. Functions that call `setjmp` have only trivial locals, so that no destructor is
-/// skipped; objects that own memory are in the caller.
+/// libpng reports errors by `longjmp`. Functions that call `setjmp` have only trivial local variables, so that no
+/// destructor is skipped; objects that own memory belong to the caller.
 #pragma once
 
 #include <bit>
@@ -71,7 +71,7 @@ class png_decoder {
     if (info_ == nullptr) throw std::bad_alloc{};
     png_set_user_limits(png_, max_png_side, max_png_side);
     png_set_chunk_malloc_max(png_, 1U << 23);
-    // Skip data other than pixels: a thousand texts of 8 kB each may expand to 8 GB.
+    // Skip all data except pixels: a thousand text chunks of 8 kB each may expand to 8 GB.
     png_set_keep_unknown_chunks(png_, PNG_HANDLE_CHUNK_NEVER, nullptr, -1);
     png_set_read_fn(png_, &source_, png_take);
     png_read_info(png_, info_);

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A decoder of the PNG files of depth cameras, by libdeflate: in half of libpng's time, with the same pixels. It
-/// leaves all other files, and the errors, to libpng. Empty unless ORBIS_LIBDEFLATE is defined, as in orbis::compiled
-/// if the library is found.
+/// A decoder for the PNG files of depth cameras that uses libdeflate: it takes half the time of libpng and gives the
+/// same pixels. All other files, and errors, are left to libpng. This header is empty unless ORBIS_LIBDEFLATE is
+/// defined, as in orbis::compiled if the library is found.
 ///
 /// "Portable Network Graphics (PNG) Specification", second edition, W3C 2003: chunks (5), filters (9).
 #pragma once
@@ -26,7 +26,7 @@
 
 namespace orbis::io::detail {
 
-/// Size of a 16-bit grey image without interlacing, and its compressed pixels.
+/// Size of a non-interlaced 16-bit grey image, and its compressed pixels.
 struct packed_depth {
   std::uint32_t width = 0, height = 0;
   std::vector<char> pixels;
@@ -63,7 +63,7 @@ struct packed_depth {
 /// Reverses the filter of a row of 16-bit pixels, given the row above.
 [[nodiscard]] inline bool unfilter_depth_row(unsigned filter, unsigned char* row, const unsigned char* above,
                                              std::size_t width) {
-  const auto each = [&](const auto& predict) {  // from the bytes before, above, and above the one before
+  const auto each = [&](const auto& predict) {  // from the bytes to the left, above, and above left
     for (std::size_t byte = 0; byte != 2; ++byte)
       for (std::size_t i = byte, before = 0, corner = 0; i < 2 * width; i += 2) {
         row[i] = static_cast<unsigned char>(row[i] +
@@ -90,9 +90,9 @@ struct packed_depth {
   }
 }
 
-/// Decodes a 16-bit grey PNG file without interlacing in half of libpng's time. Empty for all other files and damaged
-/// ones, which libpng decodes or reports. Allocates a copy of the compressed pixels, their decompressed bytes, at most
-/// 1032 times as many, and the image, which is smaller than those.
+/// Decodes a non-interlaced 16-bit grey PNG file in half the time of libpng. Empty for all other files and damaged
+/// files, which libpng decodes or reports. Allocates a copy of the compressed pixels, the decompressed bytes (at most
+/// 1032 times the compressed size), and the image, which is smaller than the decompressed bytes.
 [[nodiscard]] inline std::optional<image<std::uint16_t>> decode_plain_depth(std::string_view bytes) {
   const auto packed = read_depth_chunks(bytes);
   if (!packed) return std::nullopt;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The columns of a trajectory as text, by the names in its header.
+/// Identifies the columns of a trajectory in text form by the names in its header.
 #pragma once
 
 #include <algorithm>
@@ -16,8 +16,8 @@
 
 namespace orbis::io::detail {
 
-/// Removes the next field from the front of a line: up to a comma, or else a semicolon, if the line contains one,
-/// otherwise up to blanks. A separator at the end of the line starts no field.
+/// Removes the next field from the front of a line and returns it. It ends at a comma or else a semicolon if the line
+/// contains one, otherwise at blanks. A separator at the end of the line does not start another field.
 [[nodiscard]] inline std::string_view next_value(std::string_view& line, char separator) {
   if (separator == ' ') return next_field(line);
   const std::size_t end = std::min(line.find(separator), line.size());
@@ -29,23 +29,23 @@ namespace orbis::io::detail {
   return line.find(',') != line.npos ? ',' : line.find(';') != line.npos ? ';' : ' ';
 }
 
-/// Columns of a pose: time, position and four of the quaternion, in the order of the file.
+/// Column indices of the time, the position and the four components of the quaternion, in the order of the file.
 using pose_columns = std::array<std::size_t, 8>;
 inline constexpr pose_columns usual_columns{0, 1, 2, 3, 4, 5, 6, 7};
 
-/// The columns that a header line names.
+/// The columns listed in a header line.
 struct pose_header {
-  std::optional<std::size_t> quaternion;  ///< first of its four columns; none if the line does not name them
+  std::optional<std::size_t> quaternion;  ///< first of its four columns; empty if the line does not list them
   bool w_first = false;                   ///< w, x, y, z; otherwise x, y, z, w
   bool nanoseconds = false;
   bool is_comment = false;
   pose_columns columns = usual_columns;
   std::string problem{};   ///< the reason why poses cannot be read from these columns
-  std::size_t before = 0;  ///< words of a comment before the name of the time
-  std::size_t names = 0;   ///< words from there on
+  std::size_t before = 0;  ///< number of words in a comment before the name of the time
+  std::size_t names = 0;   ///< number of words from the name of the time on
 };
 
-/// A name of a column in lower case, without quotes, punctuation and units.
+/// The name of a column in lower case, without quotes, punctuation and units.
 struct column_name {
   std::string text;
   bool nanoseconds = false;
@@ -84,7 +84,8 @@ struct column_name {
   return names;
 }
 
-/// The first of `letters.size()` consecutive names that end in these letters, in any order, and are equal otherwise.
+/// Returns true if the `letters.size()` names from `first` on end in these letters, in any order, and are otherwise
+/// equal.
 [[nodiscard]] inline bool are_components(const std::vector<column_name>& names, std::size_t first,
                                          std::string_view letters) {
   if (first + letters.size() > names.size()) return false;
@@ -97,17 +98,17 @@ struct column_name {
   });
 }
 
-/// Parses a header such as `#timestamp [ns], p_RS_R_x [m], ..., q_RS_w [], ...`. The quaternion are the first four
-/// columns whose names end in w, x, y and z and are equal otherwise. Other columns may precede it if the header names
-/// the time and the position.
+/// Parses a header such as `#timestamp [ns], p_RS_R_x [m], ..., q_RS_w [], ...`. The quaternion consists of the first
+/// four consecutive columns whose names end in w, x, y and z and are otherwise equal. Other columns may precede it if
+/// the header lists the time and the position.
 [[nodiscard]] inline pose_header parse_pose_header(std::string_view line) {
   pose_header header;
   header.is_comment = line.starts_with('#');
   while (!line.empty() && (line.front() == '#' || is_blank(line.front()))) line.remove_prefix(1);
   std::vector<column_name> names;
-  for (const char separator : {find_separator(line), ' '}) {  // a comment in words may have a comma
+  for (const char separator : {find_separator(line), ' '}) {  // a comment in prose may contain a comma
     names = column_names(line, separator);
-    for (std::size_t i = 0; i != names.size(); ++i)  // of x, y, z, w, x, y, z the last four
+    for (std::size_t i = 0; i != names.size(); ++i)  // in x, y, z, w, x, y, z, the last four
       if (are_components(names, i, "wxyz") && (!header.quaternion || names[*header.quaternion].prefix().empty()))
         header.quaternion = i;
     if (header.quaternion) break;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Poses as text with a 4x4 matrix, and poses of frames at which the camera was lost.
+/// Poses as 4x4 matrices in text form, and poses of frames in which the camera was lost.
 #pragma once
 
 #include <cmath>
@@ -18,9 +18,9 @@
 
 namespace orbis::io::detail {
 
-/// Parses the pose `T_world_camera` from a text with a 4x4 matrix. Its rotation may deviate by a few parts in a
-/// thousand, as in 7-Scenes: the result has the nearest rotation. Errors: malformed, with the line (not 16 numbers, NaN
-/// or infinity, a matrix that deviates from a rigid transform by more than 5 %).
+/// Parses the pose `T_world_camera` from a text with a 4x4 matrix. Its upper left part may deviate from a rotation by a
+/// few parts in a thousand, as in 7-Scenes: the result has the nearest rotation. Errors: malformed, with the line (not
+/// 16 numbers, NaN or infinity, a matrix that deviates from a rigid transform by more than 5 %).
 [[nodiscard]] inline result<se3> parse_pose_matrix(std::string_view text, const std::filesystem::path& path) {
   double m[16];
   std::size_t count = 0, last_line = 0;
@@ -60,7 +60,7 @@ namespace orbis::io::detail {
   return parse_pose_matrix(*text, path);
 }
 
-/// Returns true if a number of the text is NaN or infinite, or if the text is a matrix (at least 3x4, by rows) whose
+/// Returns true if a number in the text is NaN or infinite, or if the text is a matrix (at least 3x4, by rows) whose
 /// rotation is zero: data sets mark the poses of lost frames in these ways.
 [[nodiscard]] inline bool is_lost_pose(std::string_view text) {
   bool lost = false, is_zero = true;

@@ -35,14 +35,14 @@ struct pose_lines {
   };
   std::vector<entry> entries;  ///< in the order of the file
   trajectory_layout layout = trajectory_layout::tum;
-  time_unit unit = time_units[0];  ///< of the time stamps, by the first one; `entries` have seconds
+  time_unit unit = time_units[0];  ///< unit of the first time stamp in the file; `entries` are in seconds
   std::size_t lost = 0;            ///< lines with NaN, infinity or a zero quaternion
   std::size_t first_lost_line = 0;
   std::vector<std::string> notes{};
 };
 
-/// A pose as numbers: time, position, quaternion in the order of the file. Returns an explanation if it is none; `lost`
-/// is set for NaN and infinity.
+/// Parses a pose as numbers: time, position, quaternion in the order of the file. Returns an explanation if the line is
+/// not a pose; sets `lost` if a number is NaN or infinite.
 [[nodiscard]] inline std::string parse_pose_numbers(std::string_view line, char separator, bool more_columns,
                                                     std::array<double, 8>& v, bool& lost,
                                                     const pose_columns& columns = usual_columns) {
@@ -64,14 +64,14 @@ struct pose_lines {
   return more_columns || trimmed(line).empty() ? std::string{} : eight;
 }
 
-/// A pose of numbers; none if the quaternion is zero or too large.
+/// The pose of a line's numbers; empty if the quaternion is zero or too large.
 [[nodiscard]] inline std::optional<se3> make_pose(const std::array<double, 8>& v, bool w_first) {
   const so3::quaternion q = w_first ? so3::quaternion(v[4], v[5], v[6], v[7]) : so3::quaternion(v[7], v[4], v[5], v[6]);
   if (!(q.norm() > 1e-6) || !std::isfinite(q.norm())) return std::nullopt;
   return se3(so3(q), vec3(v[1], v[2], v[3]));
 }
 
-/// Returns true if no field of the line is a number, or if the fields are 0, 1, 2, ...: names of columns.
+/// Returns true if the line consists of column names: no field is a number, or the fields are 0, 1, 2, ...
 [[nodiscard]] inline bool has_names(std::string_view line) {
   const char separator = find_separator(line);
   std::size_t numbers = 0, columns = 0;
@@ -84,15 +84,15 @@ struct pose_lines {
   return numbers == 0 || (in_order && numbers == columns && columns >= usual_columns.size());
 }
 
-/// Parses the lines of a trajectory in the layout of its header and first pose: a header or commas with nanoseconds are
-/// EuRoC's, 12 numbers per line KITTI's, everything else TUM's. `assumed`: the header of a file without one. Notes
-/// report a line of names that is not understood, and columns that are not the first eight. Errors: malformed, with the
-/// line; unsupported (a header that names the columns in another order).
+/// Parses the lines of a trajectory; the header and the first pose determine the layout: EuRoC if the header is that of
+/// EuRoC, or for commas and nanoseconds; KITTI for 12 numbers per line; otherwise TUM. `assumed`: the header for a file
+/// without one. Notes report a line of names that cannot be interpreted, and columns other than the first eight.
+/// Errors: malformed, with the line; unsupported (a header that lists the columns in another order).
 inline result<pose_lines> parse_pose_lines(std::string_view text, const std::filesystem::path& where,
                                            pose_header assumed = {}) {
   pose_lines read;
   pose_header header = assumed;
-  std::string unknown_names;  // note on a line before the poses
+  std::string unknown_names;  // note about a line before the poses
   const auto start = [&](std::string_view line) {
     const char separator = find_separator(line);
     std::string_view first = line;
@@ -103,15 +103,16 @@ inline result<pose_lines> parse_pose_lines(std::string_view text, const std::fil
     read.layout = header.w_first                                           ? trajectory_layout::euroc
                   : fields == 12 && separator == ' ' && !header.quaternion ? trajectory_layout::kitti
                                                                            : trajectory_layout::tum;
-    // The words before the time in a comment are names if the lines have a column for each.
+    // The words before the time in a comment are column names if the lines have a column for each of them.
     if (header.before != 0 && fields == header.before + header.names)
       for (std::size_t& column : header.columns) column += header.before;
     else if (header.is_comment && fields == usual_columns.size())  // its words need not be names of columns
       header.columns = usual_columns;
     if (header.columns != usual_columns)
-      read.notes.push_back("by the header, column " + std::to_string(header.columns[0] + 1) + " is the time, column " +
-                           std::to_string(header.columns[1] + 1) + " the first of the position, and column " +
-                           std::to_string(header.columns[4] + 1) + " the first of the quaternion");
+      read.notes.push_back("according to the header, column " + std::to_string(header.columns[0] + 1) +
+                           " is the time, column " + std::to_string(header.columns[1] + 1) +
+                           " the first of the position, and column " + std::to_string(header.columns[4] + 1) +
+                           " the first of the quaternion");
     if (!unknown_names.empty() && !header.quaternion && read.layout != trajectory_layout::kitti)
       read.notes.push_back(unknown_names + (header.w_first ? "qw qx qy qz" : "qx qy qz qw"));
   };
@@ -148,7 +149,7 @@ inline result<pose_lines> parse_pose_lines(std::string_view text, const std::fil
   };
 
   if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
-  bool in_header = true;  // up to the first pose, which one line without numbers may precede
+  bool in_header = true;  // until the first pose; one line without numbers may precede it
   bool named = false;
   for (std::size_t number = 1; !text.empty(); ++number) {
     const std::string_view line = trimmed(next_line(text));
@@ -163,7 +164,7 @@ inline result<pose_lines> parse_pose_lines(std::string_view text, const std::fil
       header.nanoseconds = nanoseconds;
       if (!comment && !found.quaternion)
         unknown_names = "line " + std::to_string(number) +
-                        " does not name a quaternion (qx, qy, qz and qw, for example): read as timestamp tx ty tz ";
+                        " does not list a quaternion (such as qx, qy, qz and qw): read as timestamp tx ty tz ";
       continue;
     }
     if (in_header) start(line);
@@ -174,8 +175,8 @@ inline result<pose_lines> parse_pose_lines(std::string_view text, const std::fil
   return read;
 }
 
-/// Lines at which time runs backwards by so much that another run begins there, as indices of entries; empty if the
-/// lines are merely out of order.
+/// Indices of the entries at which time jumps back so far that another run begins there; empty if the lines are only
+/// out of order.
 [[nodiscard]] inline std::vector<std::size_t> starts_of_runs(const std::vector<pose_lines::entry>& entries) {
   constexpr std::size_t shortest = 3, most = 20;
   constexpr double jump = 10.0;  // median intervals
@@ -198,7 +199,7 @@ inline result<pose_lines> parse_pose_lines(std::string_view text, const std::fil
   return starts;
 }
 
-/// Returns true if poses are equal to the last bit.
+/// Returns true if two poses are bit-identical.
 [[nodiscard]] inline bool same_pose(const se3& a, const se3& b) {
   return a.translation() == b.translation() &&
          a.rotation().unit_quaternion().coeffs() == b.rotation().unit_quaternion().coeffs();
@@ -224,8 +225,8 @@ inline repeated_times keep_first(std::vector<pose_lines::entry>& entries) {
   return removed;
 }
 
-/// Returns true if a pose of the entries from `later` on is at a time of the entries before it, which ascend, and is
-/// none of them.
+/// Returns true if an entry from index `later` on has a time within the span of the entries before `later`, which
+/// ascend, and a pose that differs from all poses at that time.
 [[nodiscard]] inline bool contradicts(const std::vector<pose_lines::entry>& entries, std::size_t later) {
   const auto begin = entries.begin(), end = begin + static_cast<std::ptrdiff_t>(later);
   const auto earlier = [](const auto& a, const auto& b) { return a.pose.timestamp < b.pose.timestamp; };
@@ -238,8 +239,8 @@ inline repeated_times keep_first(std::vector<pose_lines::entry>& entries) {
   });
 }
 
-/// Explains equal times of different poses. `entries`: each time once, ascending. Times have too few digits if they are
-/// multiples of a power of ten of seconds that is not shorter than their median interval.
+/// Explains equal times of different poses. `entries`: in ascending order of distinct times. Times have too few digits
+/// if they are multiples of a power of ten seconds that is not shorter than their median interval.
 [[nodiscard]] inline std::string explain_equal_times(const std::vector<pose_lines::entry>& entries) {
   std::vector<double> times;
   for (const pose_lines::entry& e : entries) times.push_back(e.pose.timestamp);
@@ -254,8 +255,8 @@ inline repeated_times keep_first(std::vector<pose_lines::entry>& entries) {
                                           : "the time stamps are written with too few digits";
 }
 
-/// The poses in order of time, each time once: the first line counts. If a later run has another pose during the first
-/// one, only the first one is kept. Errors: degenerate (see `parse_trajectory_file`).
+/// Sorts the poses by time and keeps the first line of each time. If a later run has another pose during the first run,
+/// only the first run is kept. Errors: degenerate (see `parse_trajectory_file`).
 [[nodiscard]] inline result<trajectory_reading> order_poses(pose_lines&& lines, const std::filesystem::path& where) {
   trajectory_reading read{.poses = {}, .layout = lines.layout, .lost = lines.lost, .notes = {}};
   const auto note = [&](const std::string& text) { read.notes.push_back(where.string() + ": " + text); };
@@ -269,8 +270,8 @@ inline repeated_times keep_first(std::vector<pose_lines::entry>& entries) {
   const auto earlier = [](const auto& a, const auto& b) { return a.pose.timestamp < b.pose.timestamp; };
   const bool sorted = std::is_sorted(entries.begin(), entries.end(), earlier);
   const auto runs = sorted ? std::vector<std::size_t>{} : starts_of_runs(entries);
-  std::vector<pose_lines::entry> first;  // the first run, if a later one contradicts it
-  std::string backwards = "not in order of time; sorted";
+  std::vector<pose_lines::entry> first;  // the first run, if a later run contradicts it
+  std::string backwards = "not in chronological order; sorted";
   if (!runs.empty()) {
     if (contradicts(entries, runs[0]))
       first.assign(entries.begin(), entries.begin() + static_cast<std::ptrdiff_t>(runs[0]));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The number types of cloud files: sizes, and numbers from bytes.
+/// The number types of cloud files: their sizes, and conversion from and to bytes.
 #pragma once
 
 #include <bit>

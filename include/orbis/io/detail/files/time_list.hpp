@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Files with one time per line, such as `times.txt` of KITTI.
+/// Files with one time per line, such as KITTI's `times.txt`.
 #pragma once
 
 #include <cstddef>

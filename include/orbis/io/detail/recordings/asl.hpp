@@ -3,8 +3,8 @@
 /// Recordings in the ASL layout of EuRoC MAV and TUM-VI: `mav0/cam0` and `mav0/cam1`, each with `data.csv`, `data/` and
 /// `sensor.yaml`, and `mav0/state_groundtruth_estimate0` (or `mocap0`).
 ///
-/// Source: M. Burri et al., "The EuRoC micro aerial vehicle datasets", IJRR 35 (2016). Times are nanoseconds. Poses are
-/// those of a body; `T_BS` of `sensor.yaml` is the pose of a sensor on it.
+/// Source: M. Burri et al., "The EuRoC micro aerial vehicle datasets", IJRR 35 (2016). Times are in nanoseconds. Poses
+/// are those of a body; `T_BS` in `sensor.yaml` is the pose of a sensor in the body frame.
 #pragma once
 
 #include <algorithm>
@@ -38,7 +38,7 @@
 
 namespace orbis::io::detail {
 
-/// A camera and its pose on the body.
+/// A camera and its pose in the body frame.
 struct asl_camera {
   camera::any_camera model;
   se3 T_body_camera;
@@ -69,11 +69,12 @@ struct asl_camera {
   const auto lens = [&]() -> result<camera::any_camera> {
     const std::vector<double>& c = *d;
     if (*distortion == "radial-tangential" || *distortion == "radtan") {
-      if (c.size() != 4 && c.size() != 5) return reject("distortion_coefficients of radial-tangential are 4 or 5");
+      if (c.size() != 4 && c.size() != 5)
+        return reject("distortion_coefficients must have 4 or 5 values for radial-tangential");
       return camera::any_camera{camera::radial_tangential{k, {c[0], c[1], c[2], c[3], c.size() == 5 ? c[4] : 0.0}}};
     }
     if (*distortion == "equidistant") {
-      if (c.size() != 4) return reject("distortion_coefficients of equidistant are 4");
+      if (c.size() != 4) return reject("distortion_coefficients must have 4 values for equidistant");
       return camera::any_camera{camera::kannala_brandt{k, {c[0], c[1], c[2], c[3]}}};
     }
     if (*distortion == "none") return camera::any_camera{camera::pinhole{k}};
@@ -96,9 +97,9 @@ struct asl_camera {
   return camera;
 }
 
-/// Parses the `data.csv` of the ground truth: nanoseconds, position and quaternion (w first) of the body; further
-/// columns are ignored. Lost poses and repeated times are handled, and noted, as in `parse_trajectory_file`. Errors:
-/// malformed, with the line; degenerate.
+/// Parses the ground truth's `data.csv`: nanoseconds, position and quaternion (w first) of the body; further columns
+/// are ignored. Lost poses and repeated times are handled and noted as in `parse_trajectory_file`. Errors: malformed,
+/// with the line; degenerate.
 [[nodiscard]] inline result<trajectory_reading> parse_asl_poses(std::string_view text,
                                                                 const std::filesystem::path& where) {
   auto lines = parse_pose_lines(text, where, {.quaternion = 4, .w_first = true, .nanoseconds = true});
@@ -126,8 +127,8 @@ struct asl_images {
   std::vector<stamped_file> files;
 };
 
-/// Reads a camera's folder: its `sensor.yaml` and `data.csv`, which are added to the files of `to`. Errors: not_found
-/// (a file), unreadable, no_data, malformed (with file and line), unsupported.
+/// Reads `sensor.yaml` and `data.csv` from a camera's folder and adds both to the files of `to`. Errors: not_found (a
+/// file), unreadable, no_data, malformed (with file and line), unsupported.
 [[nodiscard]] inline result<asl_images> read_asl_images(const std::filesystem::path& where, recording_index& to) {
   std::string missing;
   for (const char* const name : {"sensor.yaml", "data.csv"})
@@ -146,8 +147,8 @@ struct asl_images {
   return asl_images{*std::move(camera), *std::move(files)};
 }
 
-/// Reads the ground truth next to the cameras' folders, if there is one, as poses of a camera, and sets the poses of
-/// the frames of `index`. Errors: unreadable, malformed (with file and line).
+/// Reads the ground truth next to the cameras' folders, if it exists, converts it to poses of a camera, and sets the
+/// poses of the frames of `index`. Errors: unreadable, malformed (with file and line).
 [[nodiscard]] inline result<void> read_asl_truth(const std::filesystem::path& root, const se3& T_body_camera,
                                                  recording_index& index) {
   for (const char* const name : {"state_groundtruth_estimate0", "mocap0"}) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Registration of colour images to the depth camera, if the two are different cameras.
+/// Registration of colour images to the depth camera, if colour and depth are from different cameras.
 #pragma once
 
 #include <algorithm>
@@ -16,7 +16,7 @@
 
 namespace orbis::io::detail {
 
-/// Averages of n x n pixels; drops leftover columns at the right and rows at the bottom. @pre n >= 1
+/// Averages blocks of n x n pixels; drops leftover columns at the right and rows at the bottom. @pre n >= 1
 [[nodiscard]] inline image<rgb8> reduced(image_view<const rgb8> in, int n) {
   image<rgb8> out{in.width() / n, in.height() / n};
   const auto count = static_cast<unsigned>(n * n);
@@ -34,10 +34,10 @@ namespace orbis::io::detail {
   return out;
 }
 
-/// Assigns a colour to each pixel of a depth image. Colour is resampled to depth, not the reverse, so that depth stays
-/// as measured: a depth image with more pixels would need interpolation and would have holes where surfaces end. If the
-/// two cameras are apart, a pixel's depth determines its position in the colour image; a pixel without depth is treated
-/// as far away. A colour image of higher resolution is averaged first.
+/// Assigns a colour to each pixel of a depth image. Colour is resampled to depth, not the reverse, so that the measured
+/// depth remains unchanged: a depth image with more pixels would need interpolation and would have holes at the edges
+/// of surfaces. If the positions of the two cameras differ, a pixel's depth determines its position in the colour
+/// image; a pixel without depth is treated as far away. A colour image of higher resolution is averaged first.
 class color_registration {
  public:
   color_registration(const color_camera& color, const camera::pinhole& depth)

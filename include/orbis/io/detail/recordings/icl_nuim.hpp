@@ -5,7 +5,7 @@
 ///
 /// Source: A. Handa et al., "A benchmark for RGB-D visual odometry, 3D reconstruction and SLAM", ICRA 2014. The time
 /// stamps are frame numbers of a camera at 30 Hz. The poses are those of a left-handed camera with y up, while the
-/// images are stored top down; they are mirrored here, so that poses and images agree in the frames of orbis (y down).
+/// images are stored top down; this reader mirrors the poses, so that they match the images (y down).
 #pragma once
 
 #include <filesystem>
@@ -30,15 +30,15 @@ inline std::filesystem::path icl_ground_truth(const std::filesystem::path& folde
   return {};
 }
 
-/// Converts a pose of the left-handed frames (y up) to one with y down: mirrors it at the x-z plane.
+/// Converts a pose from left-handed frames (y up) to frames with y down by mirroring it in the x-z plane.
 inline se3 mirrored_y(const se3& pose) {
   const auto& q = pose.rotation().unit_quaternion();
   const vec3& t = pose.translation();
   return se3(so3(so3::quaternion(q.w(), -q.x(), q.y(), -q.z())), vec3(t.x(), -t.y(), t.z()));
 }
 
-/// Returns true if `folder` is an ICL-NUIM recording: its trajectory file identifies it. Other recordings with
-/// numbered images have other cameras.
+/// Returns true if `folder` is an ICL-NUIM recording, which the trajectory file identifies, because other recordings
+/// with numbered images have other cameras.
 [[nodiscard]] inline bool is_icl_nuim(const std::filesystem::path& folder) {
   return !present(folder / "rgb.txt") && present(folder / "rgb") && present(folder / "depth") &&
          !icl_ground_truth(folder).empty();
@@ -62,7 +62,7 @@ inline se3 mirrored_y(const se3& pose) {
   }
   attach_ground_truth(index, max_time_difference);
   if (auto camera = camera::preset("icl")) index.camera = *std::move(camera);
-  index.camera_guess = "icl, of the data set ICL-NUIM";
+  index.camera_guess = "icl, of the ICL-NUIM data set";
   return index;
 }
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Recordings as exporters write them: a folder of colour images and one of depth images registered to them, paired by
-/// the numbers or times in their names; optionally `times.txt` and `groundtruth.txt`.
+/// Recordings as written by exporters: a folder of colour images and a folder of depth images registered to them,
+/// paired by the numbers or times in their names; optionally `times.txt` and `groundtruth.txt`.
 #pragma once
 
 #include <algorithm>
@@ -26,7 +26,7 @@
 
 namespace orbis::io::detail {
 
-/// The first of these names that a folder in `folder` has, in upper or lower case; empty if there is none.
+/// The first subfolder of `folder` with one of these names, in upper or lower case; empty if there is none.
 [[nodiscard]] inline std::filesystem::path first_folder(const std::filesystem::path& folder,
                                                         std::initializer_list<const char*> names) {
   const auto paths = list_folder(folder);
@@ -51,13 +51,13 @@ namespace orbis::io::detail {
       folder, {"aligned_depth_to_color", "aligned_depth", "depth_aligned", "depth_registered", "depth", "depths"});
 }
 
-/// Returns true if `folder` holds colour images and a folder for depth images.
+/// Returns true if `folder` contains colour images and a folder for depth images.
 [[nodiscard]] inline bool is_image_folders(const std::filesystem::path& folder) {
   return !find_color_folder(folder).empty() && !find_depth_folder(folder).empty();
 }
 
 /// Pairs images by equal numbers, by times at most `max_time_difference` seconds apart, or by equal names. Errors:
-/// invalid_argument (the names do not pair).
+/// invalid_argument (the names do not match).
 [[nodiscard]] inline result<std::vector<index_pair>> pair_by_name(const keyed_images& color, const keyed_images& depth,
                                                                   double max_time_difference,
                                                                   const std::filesystem::path& where) {
@@ -72,14 +72,15 @@ namespace orbis::io::detail {
     return fail(errc::invalid_argument, where.string(),
                 "the names of colour images (" + color.paths.front().filename().string() + ") and depth images (" +
                     depth.paths.front().filename().string() +
-                    ") do not pair: both need numbers, or times; or list them in rgb.txt and depth.txt (time stamp and "
+                    ") do not match: both need numbers or times, or lists rgb.txt and depth.txt (time stamp and "
                     "file name per line)");
   }
   return associate(color.keys, depth.keys, color.keys_are == image_keys::numbers ? 0.0 : max_time_difference);
 }
 
-/// The index of such a folder. `fps`: rate of numbered images. Errors: not_found (a folder), no_data (no depth images,
-/// no pair), invalid_argument (names that do not pair), unreadable, malformed (times, ground truth, with their line).
+/// The index of a recording in such folders. `fps`: frame rate of numbered images. Errors: not_found (a folder),
+/// no_data (no depth images, no pair), invalid_argument (names that do not match), unreadable, malformed (times, ground
+/// truth, with the line).
 [[nodiscard]] inline result<recording_index> index_image_folders(const std::filesystem::path& folder,
                                                                  double max_time_difference, double fps) {
   const auto color_folder = find_color_folder(folder), depth_folder = find_depth_folder(folder);
@@ -93,7 +94,7 @@ namespace orbis::io::detail {
   std::erase_if(depth_images, [](const auto& path) { return !is_png_name(path); });
   if (depth_images.empty())
     return fail(errc::no_data, depth_folder.string(),
-                "no PNG images: depth images are PNG files of 16 bits; the folder " + describe_content(depth_folder));
+                "no PNG images: depth images must be 16-bit PNG files; the folder " + describe_content(depth_folder));
   const keyed_images color = order_by_name(images_in(color_folder)), depth = order_by_name(std::move(depth_images));
 
   recording_index index;

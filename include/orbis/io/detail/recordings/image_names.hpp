@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Images in a folder, and their times or frame numbers from their names.
+/// Images in a folder, and the times or frame numbers in their names.
 #pragma once
 
 #include <algorithm>
@@ -40,14 +40,14 @@ namespace orbis::io::detail {
 /// The meaning of the names of images.
 enum class image_keys { times, numbers, alphabet };
 
-/// Images, each with a key, in ascending order: seconds, frame numbers, or their index in alphabetical order.
+/// Images in ascending order of their keys: times in seconds, frame numbers, or indices in alphabetical order.
 struct keyed_images {
   image_keys keys_are = image_keys::alphabet;
   std::vector<double> keys;
   std::vector<std::filesystem::path> paths;
   std::vector<std::filesystem::path> others;  ///< images whose names have another form
 
-  /// The images with times in seconds. `fps`: rate of images without times.
+  /// The images with times in seconds. `fps`: frame rate of images without times.
   [[nodiscard]] std::vector<stamped_file> stamped(double fps) const {
     std::vector<stamped_file> all;
     for (std::size_t i = 0; i != keys.size(); ++i)
@@ -56,11 +56,10 @@ struct keyed_images {
   }
 };
 
-/// The number in a file name: its last digits, with a fraction or the seconds before them if it has those, and the text
-/// around it.
+/// The last number in a file name, with a fraction or as seconds and nanoseconds if present, and the text around it.
 struct name_number {
   std::string_view before, number, after;
-  std::string_view fraction;  ///< of `seconds_nanoseconds`, the part after the seconds in `number`
+  std::string_view fraction;  ///< the part after the underscore in `seconds_nanoseconds`; `number` is the part before
 
   explicit name_number(std::string_view stem) {
     constexpr std::string_view digits = "0123456789";
@@ -84,7 +83,7 @@ struct name_number {
     return !fraction.empty() || number.find('.') != std::string_view::npos || !(detect_unit(number) == time_units[0]) ||
            (number.size() == 10 && number.front() != '0');
   }
-  /// The time in seconds, or the frame number. `unit`: of the fraction after whole seconds.
+  /// The time in seconds, or the frame number. `unit`: unit of the fraction after whole seconds.
   [[nodiscard]] std::optional<double> key(double unit) const {
     if (!fraction.empty()) {
       double whole = 0.0, part = 0.0;
@@ -98,8 +97,8 @@ struct name_number {
 };
 
 /// Orders images by their names: `1305031102.1753.png`, `1403636579763555584.png` and `1311868164_20000000.png`
-/// (seconds and nanoseconds) are times, `frame_000123.png` is frame 123. The form that most names have decides; images
-/// with other names are left out. Without such a form, all images keep their alphabetical order.
+/// (seconds and nanoseconds) are times, `frame_000123.png` is frame 123. The most common form of the names is used;
+/// images with other names are left out. If no name has such a form, all images keep their alphabetical order.
 [[nodiscard]] inline keyed_images order_by_name(std::vector<std::filesystem::path> paths) {
   struct image {
     double key = 0.0;
@@ -116,7 +115,7 @@ struct name_number {
       shortest = std::min(shortest, name.fraction.size());
       longest = std::max(longest, name.fraction.size());
     }
-  // Fractions of equal lengths are decimals; others are whole numbers of the coarsest unit in which they are below 1 s.
+  // Fractions of equal lengths are decimals; others are integers in the coarsest unit in which they are below 1 s.
   const bool is_padded = shortest == longest && longest % 3 == 0;
   const double unit = is_padded      ? std::pow(10.0, -static_cast<double>(longest))
                       : longest <= 3 ? 1e-3
@@ -151,7 +150,7 @@ struct name_number {
 }
 
 /// Notes images whose names do not determine their order, and images that are left out because of their names.
-/// `has_times`: their times are known by other means.
+/// `has_times`: the times of the images are known from another source.
 inline void note_order(const std::filesystem::path& folder, const keyed_images& images, bool has_times,
                        std::vector<std::string>& notes) {
   if (images.keys_are == image_keys::alphabet && !has_times)
@@ -175,7 +174,7 @@ inline void note_unused_folders(const std::filesystem::path& folder, const std::
   if (!unused.empty()) notes.push_back(folder.string() + ": the images in " + unused + " are not used");
 }
 
-/// Replaces the times of images in order by those of `times.txt` or `timestamps.txt` in `folder`, if one exists;
+/// Replaces the times of the images, in order, with those in `times.txt` or `timestamps.txt` in `folder`, if it exists;
 /// images without a time are removed and noted. Errors: unreadable, malformed (with file and line).
 [[nodiscard]] inline result<void> read_image_times(const std::filesystem::path& folder,
                                                    std::vector<stamped_file>& images, recording_index& index) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Sequences of the KITTI odometry benchmark: `image_0` and `image_1` (or `image_2` and `image_3`), `calib.txt`,
+/// KITTI odometry sequences: `image_0` and `image_1` (or `image_2` and `image_3`), `calib.txt`,
 /// `times.txt`, and poses in `poses.txt` or in `../../poses/<sequence>.txt`.
 ///
 /// Source: A. Geiger, P. Lenz, R. Urtasun, "Are we ready for autonomous driving? The KITTI vision benchmark suite",
@@ -33,7 +33,7 @@
 
 namespace orbis::io::detail {
 
-/// The numbers of a line. Empty if there are not exactly `N`, or one is not finite.
+/// Parses the numbers in a line. Empty unless there are exactly `N`, all of them finite.
 template <std::size_t N>
 [[nodiscard]] std::optional<std::array<double, N>> parse_numbers(std::string_view line) {
   std::array<double, N> all{};
@@ -42,7 +42,7 @@ template <std::size_t N>
   return trimmed(line).empty() ? std::optional{all} : std::nullopt;
 }
 
-/// The pose of a camera with this projection matrix, K [I t], in the frame of camera 0, metres.
+/// The pose of a camera with the projection matrix K [I t] in the frame of camera 0, in metres.
 [[nodiscard]] inline se3 kitti_place(const std::array<double, 12>& p) {
   return se3{so3{}, -vec3{(p[3] - p[2] * p[11]) / p[0], (p[7] - p[6] * p[11]) / p[5], p[11]}};
 }
@@ -53,8 +53,8 @@ struct kitti_calibration {
   se3 T_first_left;  ///< pose of the left camera in the frame of camera 0
 };
 
-/// Parses the projection matrix `P<camera>:` of `calib.txt`, row by row. Errors: malformed (missing, not a matrix, not
-/// that of a camera).
+/// Parses the projection matrix `P<camera>:` in `calib.txt`, stored row by row. Errors: malformed (missing, not a
+/// matrix, not a camera's matrix).
 [[nodiscard]] inline result<std::array<double, 12>> parse_kitti_projection(std::string_view text, int camera,
                                                                            const std::filesystem::path& where) {
   const std::string wanted = "P" + std::to_string(camera);
@@ -84,12 +84,12 @@ struct kitti_calibration {
   const kitti_calibration k{p[0], p[5], p[2], p[6], (p[3] - (*r)[3]) / p[0], kitti_place(p)};
   const auto differs = [&](std::size_t i) { return std::abs(p[i] - (*r)[i]) > 1e-6 * std::abs(p[0]); };
   if (differs(0) || differs(2) || differs(5) || differs(6) || !(k.baseline > 0.0 && k.baseline < 1e6))
-    return fail(errc::malformed, where.string(), "the two cameras are not a rectified pair, the left one first");
+    return fail(errc::malformed, where.string(), "the two cameras are not a rectified pair with the left camera first");
   return k;
 }
 
-/// Parses a file of poses: the first three rows of `T_world_camera`, 12 numbers per line; a lost pose
-/// (`is_lost_pose`) is none. Errors: malformed, with the line (not 12 numbers, not a rigid transform).
+/// Parses a file of poses: the first three rows of `T_world_camera`, 12 numbers per line. The entry of a lost pose
+/// (`is_lost_pose`) is empty. Errors: malformed, with the line (not 12 numbers, not a rigid transform).
 [[nodiscard]] inline result<std::vector<std::optional<se3>>> parse_kitti_poses(std::string_view text,
                                                                                const std::filesystem::path& where) {
   std::vector<std::optional<se3>> poses;
@@ -110,9 +110,9 @@ struct kitti_calibration {
   return poses;
 }
 
-/// The poses of a camera of a sequence that is at `T_first_camera` in the frame of camera 0: `poses.txt` in its folder,
-/// or the benchmark's file in `../../poses`; empty if there are none. Adds the file to those of `index`, and notes if
-/// their number differs from `times`, and about lost poses. Errors: unreadable, malformed (with the line).
+/// The poses of the camera with the pose `T_first_camera` in the frame of camera 0, from `poses.txt` in the sequence's
+/// folder or from the benchmark's file in `../../poses`; empty if neither exists. Adds the file to those of `index`.
+/// Notes lost poses, and a number of poses that differs from `times`. Errors: unreadable, malformed (with the line).
 [[nodiscard]] inline result<std::vector<std::optional<se3>>> read_kitti_poses(const std::filesystem::path& folder,
                                                                               const se3& T_first_camera,
                                                                               std::size_t times,
@@ -140,7 +140,7 @@ struct kitti_calibration {
   return std::vector<std::optional<se3>>{};
 }
 
-/// Adds frame number `n` with its time and, if there is one, its pose.
+/// Adds frame `n` with its time and, if known, its pose.
 inline void add_kitti_frame(std::size_t n, const std::vector<double>& times,
                             const std::vector<std::optional<se3>>& poses, const std::filesystem::path& color,
                             const std::filesystem::path& depth, recording_index& index) {
@@ -150,7 +150,7 @@ inline void add_kitti_frame(std::size_t n, const std::vector<double>& times,
   index.ground_truth.push_back({times[n], *poses[n]});
 }
 
-/// Sorts the frames of a sequence by time; of frames with the same number keeps the first. `images`: the cameras'
+/// Sorts the frames of a sequence by time; keeps the first of frames with the same number. `images`: the cameras'
 /// folders. Errors: no_data, and those of `check_first_frame`.
 [[nodiscard]] inline result<void> sort_kitti_frames(const std::vector<std::filesystem::path>& images, std::size_t times,
                                                     recording_index& index) {
@@ -159,8 +159,8 @@ inline void add_kitti_frame(std::size_t n, const std::vector<double>& times,
     std::string content;
     for (const auto& path : images) content += path.filename().string() + " " + describe_content(path) + ", ";
     return fail(errc::no_data, folder.string(),
-                "there is no frame: images are named 000000.png to the number of times in times.txt (" +
-                    std::to_string(times) + "), and two cameras have the same names; " +
+                "no frames: images must be named 000000.png and so on, one per time in times.txt (" +
+                    std::to_string(times) + " times), with the same names for both cameras; " +
                     content.erase(content.size() - 2));
   }
   const auto keep_first = [](auto& list) {
@@ -177,7 +177,7 @@ inline void add_kitti_frame(std::size_t n, const std::vector<double>& times,
   return check_first_frame(index, folder);
 }
 
-/// The numbers of the left and right cameras, whose folders exist; grey ones first. Empty if there are none.
+/// The indices of the left and right cameras whose folders exist, preferably the grey ones. Empty if there are none.
 [[nodiscard]] inline std::optional<std::pair<int, int>> kitti_cameras(const std::filesystem::path& folder) {
   for (const auto& [left, right] : {std::pair{0, 1}, std::pair{2, 3}})
     if (present(folder / ("image_" + std::to_string(left))) && present(folder / ("image_" + std::to_string(right))))
@@ -185,14 +185,14 @@ inline void add_kitti_frame(std::size_t n, const std::vector<double>& times,
   return std::nullopt;
 }
 
-/// Returns true if `folder` looks like a sequence of KITTI odometry.
+/// Returns true if `folder` looks like a KITTI odometry sequence.
 [[nodiscard]] inline bool is_kitti(const std::filesystem::path& folder) {
   return kitti_cameras(folder) && present(folder / "calib.txt");
 }
 
 /// The index of a sequence. Images without a partner or a time are skipped and noted. Errors: not_found (a folder, a
-/// file), unreadable, malformed (with file and line), no_data (no pair); those of the first image, which determines the
-/// size.
+/// file), unreadable, malformed (with file and line), no_data (no pair); errors in reading the first image, which
+/// determines the image size.
 [[nodiscard]] inline result<stereo_index> index_kitti(const std::filesystem::path& folder) {
   const auto cameras = kitti_cameras(folder);
   if (!cameras)

@@ -34,14 +34,14 @@ namespace orbis::io::detail {
 /// Maximum time between a pose and an image, seconds, if the poses are in a separate file.
 inline constexpr double mono_pose_distance = 0.020;
 
-// --- lists in the layout of TUM -----------------------------------------------------------------
+// --- lists in the TUM layout --------------------------------------------------------------------
 
 /// The list of a camera's images; empty if there is none.
 [[nodiscard]] inline std::filesystem::path find_image_list(const std::filesystem::path& folder) {
   return first_present(folder, {"rgb.txt", "left.txt"});
 }
 
-/// The index of the images listed in `rgb.txt` or `left.txt`. `fps`: rate of images that have numbers instead of times.
+/// The index of the images listed in `rgb.txt` or `left.txt`. `fps`: frame rate if there are numbers instead of times.
 /// Errors: not_found, unreadable, no_data, malformed (ground truth, with its line).
 [[nodiscard]] inline result<recording_index> index_image_list(const std::filesystem::path& folder, double fps) {
   recording_index index;
@@ -67,7 +67,7 @@ inline constexpr double mono_pose_distance = 0.020;
   return root.empty() ? root : root / "cam0";
 }
 
-/// The index of one camera of a recording in the ASL layout. Errors: as `index_asl`.
+/// The index of one camera in a recording in the ASL layout. Errors: as `index_asl`.
 [[nodiscard]] inline result<recording_index> index_asl_camera(const std::filesystem::path& folder) {
   auto where = asl_camera_folder(folder);
   if (where.empty()) where = folder / "mav0" / "cam0";
@@ -84,20 +84,20 @@ inline constexpr double mono_pose_distance = 0.020;
 
 // --- KITTI --------------------------------------------------------------------------------------
 
-/// Number of the first camera of a KITTI sequence that has images: left before right, grey before colour.
+/// Index of the first camera of a KITTI sequence that has images: left before right, grey before colour.
 [[nodiscard]] inline std::optional<int> kitti_camera(const std::filesystem::path& folder) {
   for (const int i : {0, 2, 1, 3})
     if (present(folder / ("image_" + std::to_string(i)))) return i;
   return std::nullopt;
 }
 
-/// Returns true if `folder` looks like a sequence of KITTI odometry with at least one camera.
+/// Returns true if `folder` looks like a KITTI odometry sequence with at least one camera.
 [[nodiscard]] inline bool is_kitti_camera(const std::filesystem::path& folder) {
   return kitti_camera(folder) && present(folder / "calib.txt");
 }
 
-/// The index of one camera of a sequence. The poses are converted from camera 0 of the file to this camera. Errors: as
-/// `index_kitti`.
+/// The index of one camera of a sequence. The poses in the file, those of camera 0, are converted to this camera.
+/// Errors: as `index_kitti`.
 [[nodiscard]] inline result<recording_index> index_kitti_camera(const std::filesystem::path& folder) {
   const auto camera = kitti_camera(folder);
   if (!camera) return fail(errc::not_found, folder.string(), "has no folder image_0, image_1, image_2 or image_3");
@@ -136,8 +136,8 @@ inline constexpr double mono_pose_distance = 0.020;
 
 // --- plain folders ------------------------------------------------------------------------------
 
-/// The folder with the images of a plain folder: itself, or the one of the usual names in it that has more images;
-/// empty if there are none.
+/// The folder with the most images: `folder` itself, or a subfolder with one of the usual names; empty if there are no
+/// images.
 [[nodiscard]] inline std::filesystem::path find_image_folder(const std::filesystem::path& folder) {
   std::filesystem::path found;
   std::size_t most = 0;
@@ -147,10 +147,10 @@ inline constexpr double mono_pose_distance = 0.020;
   return found;
 }
 
-/// The index of a plain folder of images, PNG or JPEG, in it or in `rgb`, `color`, `images`, `left` or `data`. Their
-/// order is determined by their names (`order_by_name`), and their times are those of `times.txt` or
-/// `timestamps.txt` (one per line), or of the names. `fps`: rate of numbered images. Errors: no_data, unreadable,
-/// malformed (with file and line).
+/// The index of a plain folder with PNG or JPEG images, in the folder itself or in its subfolder `rgb`, `color`,
+/// `images`, `left` or `data`. The names of the images determine their order (`order_by_name`); their times are those
+/// in `times.txt` or `timestamps.txt` (one per line), or in the names. `fps`: frame rate of numbered images. Errors:
+/// no_data, unreadable, malformed (with file and line).
 [[nodiscard]] inline result<recording_index> index_image_folder(const std::filesystem::path& folder, double fps) {
   recording_index index;
   const auto where = find_image_folder(folder);

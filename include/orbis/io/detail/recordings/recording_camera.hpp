@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The camera of a recording: given, in a file of the folder, or known by its format.
+/// The camera of a recording: given by the user, stored in the folder, or known from the format.
 #pragma once
 
 #include <cstdio>
@@ -18,7 +18,7 @@
 
 namespace orbis::io::detail {
 
-/// The camera `given` by the user, or else that of `camera.toml` in `folder`, which is added to `files`; none if
+/// The camera `given` by the user, or else the camera in `camera.toml` in `folder`, which is added to `files`; empty if
 /// neither exists. Errors: those of `read_camera`.
 [[nodiscard]] inline result<std::optional<camera::camera_settings>> given_camera(
     const std::filesystem::path& folder, const std::optional<camera::camera_settings>& given,
@@ -37,14 +37,14 @@ namespace orbis::io::detail {
           "the camera is not known: put a camera.toml into the folder, or specify a camera"};
 }
 
-/// Notes a time between frames that does not suit a camera of `fps` frames per second.
+/// Notes a time between frames that does not match a camera with `fps` frames per second.
 inline void note_interval(recording_index& index, double fps) {
   if (std::string warning = describe_interval(timestamps(index.frames), fps); !warning.empty())
     index.notes.push_back(std::move(warning));
 }
 
-/// Sets `camera` to that of the index if it is empty, with a note if that one is a guess, and notes a time between
-/// frames that does not match its rate. Errors: invalid_argument (no camera is known).
+/// Sets an empty `camera` to the camera of the index, with a note if that camera is guessed, and notes a time between
+/// frames that does not match its frame rate. Errors: invalid_argument (no camera is known).
 [[nodiscard]] inline result<void> complete_camera(const std::filesystem::path& folder,
                                                   std::optional<camera::camera_settings>& camera,
                                                   recording_index& index) {

@@ -20,7 +20,7 @@
 
 namespace orbis::io::detail {
 
-/// The image read from `path`, if it has the size of its camera. Errors: malformed, and those of `read`.
+/// Returns the image `read` from `path` if it has the size of its camera. Errors: malformed, and those of `read`.
 template <class T>
 [[nodiscard]] result<image<T>> sized(result<image<T>> read, const std::filesystem::path& path, int width, int height) {
   if (!read || (read->width() == width && read->height() == height)) return read;
@@ -72,10 +72,11 @@ inline result<void> check_first_frame(const recording_index& index, const std::f
   return paths;
 }
 
-/// Return true if the name of a file has the extension of a supported image format; of PNG.
+/// Returns true if the name of a file has the extension of PNG.
 [[nodiscard]] inline bool is_png_name(const std::filesystem::path& path) {
   return lower_cased(path.extension().string()) == ".png";
 }
+/// Returns true if the name of a file has the extension of a supported image format.
 [[nodiscard]] inline bool is_image_name(const std::filesystem::path& path) {
   const std::string ending = lower_cased(path.extension().string());
   return ending == ".png" || ending == ".jpg" || ending == ".jpeg";
@@ -95,8 +96,8 @@ inline result<void> check_first_frame(const recording_index& index, const std::f
   return {};
 }
 
-/// Summary of a folder for a message: "holds calib.txt, 120 .png files, left/". At most eight items, each a folder, a
-/// file, or all files with one extension.
+/// Summary of a folder for a message: "holds calib.txt, 120 .png files, left/". At most eight items, each of which is a
+/// folder, a file, or all files with one extension.
 [[nodiscard]] inline std::string describe_content(const std::filesystem::path& folder) {
   constexpr std::size_t most = 8;
   std::vector<std::string> items;
@@ -134,7 +135,7 @@ inline result<void> check_first_frame(const recording_index& index, const std::f
   return {};
 }
 
-/// Error for a folder that is not a recording, with its actual content and the layouts that are known.
+/// Error for a folder that is not a recording, with its content and the known layouts.
 [[nodiscard]] inline error unknown_recording(const std::filesystem::path& folder, const std::string& known) {
   return {errc::unsupported, folder.string(),
           "not a known recording; the folder " + describe_content(folder) + ";\n  known layouts: " + known};

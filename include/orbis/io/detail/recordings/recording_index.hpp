@@ -23,22 +23,22 @@ struct color_camera {
 
 /// One frame: its files, time and pose.
 struct recording_entry {
-  double timestamp = 0.0;  ///< of the colour image, seconds
+  double timestamp = 0.0;  ///< time of the colour image, seconds
   std::filesystem::path color;
-  std::filesystem::path depth;              ///< empty for one camera only
+  std::filesystem::path depth;              ///< empty in a recording of one camera
   std::optional<se3> T_world_camera;        ///< ground truth, if there is one
-  std::optional<double> depth_timestamp{};  ///< of the depth image, seconds, if it has its own
+  std::optional<double> depth_timestamp{};  ///< time of the depth image, seconds, if it differs
 };
 
 /// A recording without its pixels.
 struct recording_index {
   std::vector<recording_entry> frames;  ///< in chronological order, never empty when returned
   trajectory ground_truth;
-  std::optional<camera::camera_settings> camera;  ///< if the format's own files contain it, or it is guessed
+  std::optional<camera::camera_settings> camera;  ///< set if it is in the format's own files, or guessed
   std::string camera_guess;                       ///< name and origin of a guessed camera, else empty
   std::optional<color_camera> color;              ///< set if colour has to be resampled to the depth camera
   std::vector<std::string> notes;                 ///< warnings for the user
-  std::vector<std::filesystem::path> files;       ///< files that were read for the index, without images
+  std::vector<std::filesystem::path> files;       ///< files that were read for the index, excluding images
 };
 
 }  // namespace orbis::io::detail

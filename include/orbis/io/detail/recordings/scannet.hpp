@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// ScanNet's scenes as exported by its tools: `color/N.jpg`, `depth/N.png`, `pose/N.txt`, and in `intrinsic` (or next
-/// to the folders) `intrinsic_color.txt`, `intrinsic_depth.txt`, `extrinsic_color.txt`, `extrinsic_depth.txt`.
+/// ScanNet scenes as exported by its tools: `color/N.jpg`, `depth/N.png`, `pose/N.txt`, and in `intrinsic` (or next to
+/// the folders) `intrinsic_color.txt`, `intrinsic_depth.txt`, `extrinsic_color.txt`, `extrinsic_depth.txt`.
 ///
 /// Source: A. Dai et al., "ScanNet: richly-annotated 3D reconstructions of indoor scenes", CVPR 2017, and the data
-/// set's page. Depth is in millimetres and has fewer pixels than colour; poses are from camera to world, with
-/// infinities where the camera was lost. The extrinsics are from a camera to a common frame, and mostly the identity.
+/// set's website. Depth is in millimetres and has fewer pixels than colour; poses are from camera to world, with
+/// infinite elements where the camera was lost. The extrinsics transform from a camera to a common frame, and are
+/// usually the identity.
 #pragma once
 
 #include <algorithm>
@@ -33,7 +34,7 @@ namespace orbis::io::detail {
 
 /// The path of the calibration file `what` (such as "intrinsic_depth") of a ScanNet scene; empty if there is none.
 [[nodiscard]] inline std::filesystem::path scannet_file(const std::filesystem::path& folder, const std::string& what) {
-  std::string plural = what;  // spelling of the data set's smaller edition
+  std::string plural = what;  // spelling in the smaller edition of the data set
   plural.insert(plural.find('_'), "s");
   for (const auto& path :
        {folder / "intrinsic" / (what + ".txt"), folder / (what + ".txt"), folder / (plural + ".txt")})
@@ -41,12 +42,12 @@ namespace orbis::io::detail {
   return {};
 }
 
-/// Returns true if `folder` looks like an exported scene of ScanNet.
+/// Returns true if `folder` looks like an exported ScanNet scene.
 [[nodiscard]] inline bool is_scannet(const std::filesystem::path& folder) {
   return present(folder / "color") && present(folder / "depth") && !scannet_file(folder, "intrinsic_depth").empty();
 }
 
-/// The index of an exported scene, with times from the frame numbers at 30 frames per second. Its frames are those of
+/// The index of an exported scene, with times computed from the frame numbers at 30 frames per second. Its camera is
 /// the depth camera; see `color_registration`. Errors: not_found, unreadable, no_data, malformed (with the file).
 [[nodiscard]] inline result<recording_index> index_scannet(const std::filesystem::path& folder) {
   constexpr double frames_per_second = 30.0;

@@ -4,8 +4,8 @@
 /// `frame-XXXXXX.pose.txt`, optionally `camera-intrinsics.txt`.
 ///
 /// Source: J. Shotton et al., "Scene coordinate regression forests for camera relocalization in RGB-D
-/// images", CVPR 2013. Depth is in millimetres, 0 and 65535 are invalid; colour and depth come from
-/// two cameras and are not registered to each other.
+/// images", CVPR 2013. Depth is in millimetres, 0 and 65535 are invalid; colour and depth come from two cameras and are
+/// not registered to each other.
 #pragma once
 
 #include <algorithm>
@@ -30,7 +30,7 @@
 
 namespace orbis::io::detail {
 
-/// Parses a 3x3 camera matrix, or the upper left part of a 4x4 one. Errors: malformed.
+/// Parses a 3x3 camera matrix, or the upper left 3x3 block of a 4x4 matrix. Errors: malformed.
 [[nodiscard]] inline result<mat3> parse_camera_matrix(std::string_view text, const std::filesystem::path& path) {
   double values[16];
   int count = 0;
@@ -43,12 +43,12 @@ namespace orbis::io::detail {
     return ok;
   });
   if (!ok || (count != 9 && count != 16))
-    return fail(errc::malformed, path.string(), "a camera matrix has 9 finite numbers, or 16");
+    return fail(errc::malformed, path.string(), "a camera matrix must have 9 or 16 finite numbers");
   mat3 k;
   for (int row = 0; row != 3; ++row)
     for (int column = 0; column != 3; ++column) k(row, column) = values[row * (count == 9 ? 3 : 4) + column];
   if (!(k(0, 0) > 0.0) || !(k(1, 1) > 0.0) || k(0, 1) != 0.0)
-    return fail(errc::malformed, path.string(), "focal lengths must be above zero, and skew zero");
+    return fail(errc::malformed, path.string(), "focal lengths must be above zero, and the skew must be zero");
   return k;
 }
 
@@ -61,7 +61,7 @@ namespace orbis::io::detail {
 
 inline constexpr std::string_view seven_scenes_color[] = {".color.png", ".color.jpg"};
 
-/// Returns true if `name` is that of a colour image; if so, sets its stem and number.
+/// Returns true if `name` is the name of a colour image; if so, sets its stem and number.
 inline bool seven_scenes_frame(const std::string& name, std::string& stem, unsigned& number) {
   if (!name.starts_with("frame-")) return false;
   for (const std::string_view ending : seven_scenes_color) {
@@ -94,7 +94,7 @@ inline std::vector<std::filesystem::path> seven_scenes_sequences(const std::file
   return has_seven_scenes_frames(folder) || !seven_scenes_sequences(folder).empty();
 }
 
-/// Sets the pose of a frame from its file, if that exists, and adds it to the ground truth; counts a lost pose in
+/// Sets the pose of a frame from its pose file, if it exists, and adds it to the ground truth; counts a lost pose in
 /// `lost`. Errors: unreadable, malformed.
 [[nodiscard]] inline result<void> read_frame_pose(const std::filesystem::path& file, recording_entry& frame,
                                                   recording_index& index, std::size_t& lost) {
@@ -113,16 +113,16 @@ inline std::vector<std::filesystem::path> seven_scenes_sequences(const std::file
   return {};
 }
 
-/// The index of a 7-Scenes recording, with times from the frame numbers at 30 frames per second. A scene folder with a
-/// single seq-XX is replaced by that folder. `camera-intrinsics.txt` is assumed to be the depth camera's; its image
-/// size is read from the first depth image. Errors: no_data, not_found, unreadable, malformed (a pose, with its file),
-/// invalid_argument (a scene with several sequences).
+/// The index of a 7-Scenes recording, with times computed from the frame numbers at 30 frames per second. A scene
+/// folder with a single seq-XX is replaced by that folder. `camera-intrinsics.txt` is assumed to describe the depth
+/// camera, whose image size is that of the first depth image. Errors: no_data, not_found, unreadable, malformed (a
+/// pose, with its file), invalid_argument (a scene with several sequences).
 [[nodiscard]] inline result<recording_index> index_seven_scenes(std::filesystem::path folder) {
   if (!has_seven_scenes_frames(folder)) {
     const auto sequences = seven_scenes_sequences(folder);
     if (sequences.size() > 1)
       return fail(errc::invalid_argument, folder.string(),
-                  "holds " + std::to_string(sequences.size()) + " sequences, name one of them, for example " +
+                  "holds " + std::to_string(sequences.size()) + " sequences: specify one of them, for example " +
                       sequences.front().filename().string());
     if (!sequences.empty()) folder = sequences.front();
   }

@@ -19,7 +19,7 @@ struct stereo_index {
   recording_index images;
   camera::stereo_rig<camera::any_camera> cameras;
   double fps = 30.0;
-  std::optional<camera::shutter> shutter{};  ///< of both cameras, if known
+  std::optional<camera::shutter> shutter{};  ///< shutter of both cameras, if known
 };
 
 }  // namespace orbis::io::detail

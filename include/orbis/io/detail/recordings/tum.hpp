@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The layout of the TUM RGB-D benchmark: `rgb.txt`, `depth.txt` (or `associations.txt`),
-/// `groundtruth.txt`.
+/// The layout of the TUM RGB-D benchmark: `rgb.txt`, `depth.txt` (or `associations.txt`), `groundtruth.txt`.
 ///
-/// Source: J. Sturm et al., "A benchmark for the evaluation of RGB-D SLAM systems", IROS 2012, and the
-/// benchmark's page on file formats.
+/// Source: J. Sturm et al., "A benchmark for the evaluation of RGB-D SLAM systems", IROS 2012, and the benchmark's page
+/// on file formats.
 #pragma once
 
 #include <algorithm>
@@ -37,8 +36,8 @@ struct stamped_file {
   std::filesystem::path path;
 };
 
-/// The entries of a list in chronological order, each time stamp once; notes report changes. Errors: no_data (the list
-/// is empty).
+/// Sorts the entries of a list by time and removes repeated time stamps; notes report changes. Errors: no_data (the
+/// list is empty).
 template <class Entry>
 [[nodiscard]] result<std::vector<Entry>> in_order_of_time(const std::filesystem::path& list, std::vector<Entry> entries,
                                                           std::vector<std::string>& notes) {
@@ -54,14 +53,14 @@ template <class Entry>
                     " lines with a repeated time stamp skipped");
     entries.erase(repeated, entries.end());
   }
-  if (entries.empty()) return fail(errc::no_data, list.string(), "the list names no image");
+  if (entries.empty()) return fail(errc::no_data, list.string(), "the list contains no images");
   return entries;
 }
 
-/// Parses a list with one entry per line. `parse(line)` returns an entry, or none for a line that is not one; `form`
+/// Parses a list with one entry per line. `parse(line)` returns an entry, or nothing for an invalid line; `form`
 /// describes an entry. Comments, blank lines, CRLF and a byte order mark are accepted, and a first line without an
 /// entry is a heading. The entries are sorted; other lines and repeated time stamps are skipped and noted. Errors:
-/// no_data (no entry; quotes the first line).
+/// no_data (no entry; the message quotes the first line).
 template <class Entry, class Parse>
 [[nodiscard]] result<std::vector<Entry>> parse_list(std::string_view text, const std::filesystem::path& list,
                                                     const std::string& form, Parse&& parse,
@@ -86,7 +85,7 @@ template <class Entry, class Parse>
   if (skipped > most_noted)
     notes.push_back(list.string() + ": " + std::to_string(skipped - most_noted) + " more lines skipped");
   if (entries.empty() && skipped != 0)
-    return fail(errc::no_data, at_line(list, first_line), "the list names no image: " + first_skipped);
+    return fail(errc::no_data, at_line(list, first_line), "the list contains no images: " + first_skipped);
   return in_order_of_time(list, std::move(entries), notes);
 }
 
@@ -103,7 +102,7 @@ template <class Entry, class Parse>
   return field;
 }
 
-/// The file name of a list: without quotes, and without separators at its end; backslashes become slashes.
+/// Cleans a file name in a list: removes quotes and trailing separators, and converts backslashes to slashes.
 [[nodiscard]] inline std::string listed_name(std::string_view name) {
   while (!name.empty() && is_separator(name.back())) name.remove_suffix(1);
   if (name.size() >= 2 && name.front() == '"' && name.back() == '"') name = name.substr(1, name.size() - 2);
@@ -113,8 +112,8 @@ template <class Entry, class Parse>
 }
 
 /// Parses a list of lines with a time stamp (`parse_time_stamp`) and a file name, separated by blanks, a comma or a
-/// semicolon; see `parse_list`. File names are relative to `folder`. `unit`: of the time stamps; empty: by their
-/// digits. Errors: no_data.
+/// semicolon; see `parse_list`. File names are relative to `folder`. `unit`: unit of the time stamps; if empty, their
+/// number of digits determines it. Errors: no_data.
 [[nodiscard]] inline result<std::vector<stamped_file>> parse_image_list(std::string_view text,
                                                                         const std::filesystem::path& list,
                                                                         const std::filesystem::path& folder,
@@ -139,15 +138,15 @@ template <class Entry, class Parse>
   return parse_image_list(*text, list, list.parent_path(), notes);
 }
 
-/// A line of `associations.txt`: a colour and a depth image with a time stamp each.
+/// A line of `associations.txt`: a colour and a depth image, each with a time stamp.
 struct associated_files {
   double timestamp = 0.0, depth_timestamp = 0.0;
   std::filesystem::path color, depth;
 };
 
-/// Parses a line with a time stamp and a file, twice, in either order (the file whose path contains "depth" is the
-/// depth image; colour first if neither or both do). Fields are separated by blanks, commas or semicolons; file names
-/// may contain blanks if only one field between them is a number.
+/// Parses a line with two pairs of a time stamp and a file, in either order (the file whose path contains "depth" is
+/// the depth image; if neither or both contain it, colour is first). Fields are separated by blanks, commas or
+/// semicolons; file names may contain blanks if only one field between them is a number.
 [[nodiscard]] inline std::optional<associated_files> parse_association(std::string_view line,
                                                                        const std::filesystem::path& folder) {
   const std::optional<double> t1 = parse_time_stamp(next_separated(line));
@@ -188,8 +187,8 @@ struct associated_files {
   return parse_associations(*text, list, notes);
 }
 
-/// Makes a trajectory and its notes those of an index. A ground truth whose times are unusable (degenerate) is left out
-/// with a note. Errors: all others of `read`.
+/// Moves a trajectory and its notes into an index. Ground truth whose times are unusable (degenerate) is left out with
+/// a note. Errors: all other errors of `read`.
 [[nodiscard]] inline result<void> take_ground_truth(result<trajectory_reading> read, recording_index& index) {
   if (!read && read.error().code == errc::degenerate) {
     index.notes.push_back(read.error().to_string() + "; the ground truth is not used");
@@ -201,8 +200,7 @@ struct associated_files {
   return {};
 }
 
-/// Converts the times of frames from frame numbers to seconds at `fps` frames per second, if they are such numbers, and
-/// notes it.
+/// Converts the times of frames to seconds at `fps` frames per second if they are frame numbers, and notes it.
 inline void convert_frame_numbers(recording_index& index, double fps) {
   if (!are_frame_numbers(timestamps(index.frames))) return;
   for (recording_entry& frame : index.frames) {
@@ -210,12 +208,13 @@ inline void convert_frame_numbers(recording_index& index, double fps) {
     frame.depth_timestamp.reset();
   }
   char text[100];
-  std::snprintf(text, sizeof text, "the time stamps are frame numbers; times are those of %.6g frames per second", fps);
+  std::snprintf(text, sizeof text, "the time stamps are frame numbers; converted to seconds at %.6g frames per second",
+                fps);
   index.notes.emplace_back(text);
 }
 
-/// Converts the times of a ground truth from frame numbers to seconds at `fps` frames per second, if they are such
-/// numbers and more frames have a pose then; notes it. @pre the times of the frames are in seconds
+/// Converts the times of the ground truth to seconds at `fps` frames per second if they are frame numbers and more
+/// frames then have a pose, and notes it. @pre the times of the frames are in seconds
 inline void convert_numbered_truth(recording_index& index, double max_distance, double fps) {
   if (!are_frame_numbers(timestamps(index.ground_truth))) return;
   const auto known = [&](const trajectory& truth) {
@@ -231,8 +230,8 @@ inline void convert_numbered_truth(recording_index& index, double max_distance, 
 }
 
 /// Reads `groundtruth.txt` of a folder, if it exists, into an index with known frames, and sets their poses
-/// (`attach_ground_truth`). `fps`: frames per second, for poses with frame numbers for times. Errors: unreadable,
-/// malformed (with its line), unsupported.
+/// (`attach_ground_truth`). `fps`: frames per second, for poses with frame numbers instead of times. Errors:
+/// unreadable, malformed (with the line), unsupported.
 [[nodiscard]] inline result<void> read_ground_truth(const std::filesystem::path& folder, double max_time_difference,
                                                     recording_index& index, double fps) {
   const auto file = folder / "groundtruth.txt";
@@ -247,7 +246,7 @@ inline void convert_numbered_truth(recording_index& index, double max_distance, 
   return {};
 }
 
-/// The list of pairs of colour and depth images in `folder`, under one of its usual names; empty if there is none.
+/// The list of pairs of colour and depth images in `folder`, with one of the usual names; empty if there is none.
 [[nodiscard]] inline std::filesystem::path find_association_list(const std::filesystem::path& folder) {
   return first_present(folder, {"associations.txt", "association.txt", "associated.txt", "associate.txt", "assoc.txt"});
 }
@@ -257,8 +256,8 @@ inline void convert_numbered_truth(recording_index& index, double max_distance, 
   return present(folder / "rgb.txt") || present(folder / "depth.txt") || !find_association_list(folder).empty();
 }
 
-/// Sets the camera of a sequence of the TUM benchmark, which `rgbd_dataset_freiburg1` (2, 3) in the path of `folder`
-/// identifies (the innermost such folder is used), or `freiburg1` at the beginning of the folder's own name.
+/// Sets the camera of a TUM benchmark sequence, which is identified by `rgbd_dataset_freiburg1` (2, 3) in the path of
+/// `folder` (the innermost such folder is used) or by `freiburg1` at the beginning of the folder's own name.
 inline void guess_tum_camera(const std::filesystem::path& folder, recording_index& index) {
   const auto full = std::filesystem::absolute(folder / "").lexically_normal().parent_path();
   for (const auto& [word, preset] :
@@ -273,16 +272,16 @@ inline void guess_tum_camera(const std::filesystem::path& folder, recording_inde
     }
     if (named.empty()) continue;
     if (auto camera = camera::preset(preset)) index.camera = *std::move(camera);
-    index.camera_guess = std::string{preset} + ", by the name " + named.filename().string();
+    index.camera_guess = std::string{preset} + ", according to the name " + named.filename().string();
   }
 }
 
 /// The index of a TUM recording. `associations.txt` is used if it exists; otherwise colour and depth images are paired
 /// by `associate` within `max_time_difference` seconds, and images without a partner are noted. The ground truth is
 /// interpolated at the colour images' time stamps. The camera is that of the benchmark's sequences
-/// (`guess_tum_camera`). If all time stamps are frame numbers, times are those at `fps` frames per second. Errors:
-/// not_found (a list, the first image), unreadable, no_data (empty lists, no pair), malformed (ground truth, with its
-/// line).
+/// (`guess_tum_camera`). Time stamps that are all frame numbers are converted to seconds at `fps` frames per second.
+/// Errors: not_found (a list, the first image), unreadable, no_data (empty lists, no pair), malformed (ground truth,
+/// with the line).
 [[nodiscard]] inline result<recording_index> index_tum(const std::filesystem::path& folder,
                                                        double max_time_difference = 0.020, double fps = 30.0) {
   recording_index index;
@@ -299,11 +298,10 @@ inline void guess_tum_camera(const std::filesystem::path& folder, recording_inde
     index.files = {folder / "rgb.txt", folder / "depth.txt"};
     for (const auto& file : index.files)
       if (!present(file))
-        return fail(
-            errc::not_found, file.string(),
-            "no such file; a recording in the layout of TUM has rgb.txt and depth.txt, or associations.txt; the "
-            "folder " +
-                describe_content(folder));
+        return fail(errc::not_found, file.string(),
+                    "no such file; a recording in the TUM layout has rgb.txt and depth.txt, or associations.txt; the "
+                    "folder " +
+                        describe_content(folder));
     const auto color = read_image_list(folder / "rgb.txt", index.notes);
     if (!color) return fail(color.error());
     const auto depth = read_image_list(folder / "depth.txt", index.notes);
@@ -330,8 +328,8 @@ inline void guess_tum_camera(const std::filesystem::path& folder, recording_inde
   return index;
 }
 
-/// Pairs left with right images within `max_time_difference` seconds and adds them as frames; images without a partner
-/// are noted. Errors: no_data (no pair), not_found (the first images).
+/// Pairs left and right images whose times differ by at most `max_time_difference` seconds and adds them as frames;
+/// images without a partner are noted. Errors: no_data (no pair), not_found (the first images).
 [[nodiscard]] inline result<void> pair_images(const std::vector<stamped_file>& left,
                                               const std::vector<stamped_file>& right,
                                               const std::filesystem::path& where, double max_time_difference,

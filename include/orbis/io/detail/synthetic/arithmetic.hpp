@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The arithmetic of synthetic pixels: bit-identical on every machine.
+/// Arithmetic for synthetic pixels: bit-identical on every machine.
 ///
 /// It uses only operations that IEEE 754 defines exactly (+ - * / sqrt, conversions) and integers; sine and cosine are
 /// those of core/rounded.hpp. A compiler may still fuse a product and a sum into one rounding if the target supports it
 /// (`-march=native`), so every header whose arithmetic affects a pixel disables this for its own functions, between
-/// ORBIS_BEGIN_UNFUSED and ORBIS_END_UNFUSED. Functions in such a region are not templates: those would be compiled
-/// elsewhere, with other options.
+/// ORBIS_BEGIN_UNFUSED and ORBIS_END_UNFUSED. Functions in such a region are not templates, because templates would be
+/// compiled elsewhere, with other options.
 #pragma once
 
 #include <cmath>
@@ -38,7 +38,7 @@ struct triple {
 [[nodiscard]] inline triple to_triple(const vec3& v) noexcept { return {v.x(), v.y(), v.z()}; }
 [[nodiscard]] inline vec3 to_vec3(triple v) noexcept { return {v.x, v.y, v.z}; }
 
-/// A word of noise that depends only on the three keys.
+/// A noise word that depends only on the three keys.
 [[nodiscard]] inline std::uint64_t noise_word(std::uint64_t seed, std::uint64_t stream, std::uint64_t index) noexcept {
   return mix64(seed ^ mix64(index * 0x100000001b3ULL + stream));
 }

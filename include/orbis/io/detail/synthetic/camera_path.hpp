@@ -53,7 +53,7 @@ inline void orient(camera_pose& pose, double yaw, double pitch, double roll) noe
   set_rotation(pose, about_up * about_side * axes * about_view);
 }
 
-/// The path: poses by time.
+/// The path of the camera: its pose as a function of time.
 class camera_path {
  public:
   /// @pre duration > 0 (seconds), 0 <= overlap < 0.5, step_rate >= 0, impact_duration > 0
@@ -103,24 +103,24 @@ class camera_path {
     if (gait.step_rate == 0.0) return {};
     const double steps = gait.step_rate * time + upper_fraction(noise_word(seed_, 100, 0));
     const std::int64_t step = floor_to_int(steps);
-    const double since = (steps - static_cast<double>(step)) / gait.step_rate;  // the impact, seconds
+    const double since = (steps - static_cast<double>(step)) / gait.step_rate;  // time since the impact, seconds
     const double fading = std::max(0.0, 1.0 - since / gait.impact_duration);
     const double strength = 0.5 + upper_fraction(noise_word(seed_, 101, static_cast<std::uint64_t>(step)));
     const double shake = strength * fading * fading * fading * sin_turns(gait.impact_frequency * since);
-    const double side = step % 2 == 0 ? 1.0 : -1.0;  // of the foot
+    const double side = step % 2 == 0 ? 1.0 : -1.0;  // left or right foot
     const double speed = speed_at(time / duration_);
     return {speed * (gait.impact * shake - gait.bounce * cos_turns(steps)),
             speed * (gait.impact_angle * shake + gait.pitch * sin_turns(steps)),
             speed * (side * gait.impact_angle * shake + gait.roll * sin_turns(0.5 * steps))};
   }
 
-  /// 0 looking outward, 1 looking inward, at the fraction `s` of the second round: changes smoothly in its first and
-  /// last quarter.
+  /// View direction at the fraction `s` of the second round: 0 is outward, 1 is inward. Changes smoothly in the first
+  /// and last quarter of the round.
   [[nodiscard]] static double inwardness(double s) noexcept {
     const double t = std::clamp(4.0 * std::min(s, 1.0 - s), 0.0, 1.0);
     return t * t * (3.0 - 2.0 * t);
   }
-  /// Fraction of the round trip completed at the fraction `s` of the time: accelerates, moves uniformly, brakes, rests.
+  /// Completed fraction of the trip at the fraction `s` of the time: acceleration, uniform motion, deceleration, rest.
   [[nodiscard]] double progress(double s) const noexcept {
     const double t = std::clamp(s / (1.0 - options_.overlap), 0.0, 1.0);
     constexpr double speed = 1.0 / (1.0 - ramp);
@@ -134,7 +134,7 @@ class camera_path {
     return std::min({1.0, t / ramp, (1.0 - t) / ramp});
   }
 
-  static constexpr double ramp = 0.06;  ///< fraction of the trip that it accelerates, and that it brakes
+  static constexpr double ramp = 0.06;  ///< fraction of the trip for acceleration, and for deceleration
 
   synthetic_path_options options_;
   std::uint64_t seed_;

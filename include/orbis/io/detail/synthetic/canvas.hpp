@@ -96,7 +96,7 @@ class canvas {
   }
 
   [[nodiscard]] static tint patch_colour(double contrast, random_bits& bits) {
-    // Bright or dark, rarely in between; a third of them coloured.
+    // Patches are bright or dark, rarely in between; a third of them are coloured.
     const double level = bits.uniform() < 0.5 ? between(bits, 0.05, 0.40) : between(bits, 0.60, 1.0);
     const double mixed = 0.55 + contrast * (level - 0.55);
     const double colourful = bits.uniform() < 0.35 ? 0.45 : 0.08;
@@ -120,12 +120,12 @@ class canvas {
     return 2.0F * (top + g * (bottom - top)) - 1.0F;
   }
 
-  /// Brightness factors of the base at (u, v) metres.
   [[nodiscard]] static tint shade_grey(float s) noexcept { return {s, s, s}; }
   struct factor {
     tint f;
     [[nodiscard]] friend tint operator*(factor a, tint c) noexcept { return {a.f.r * c.r, a.f.g * c.g, a.f.b * c.b}; }
   };
+  /// Colour factors of the base at (u, v) metres.
   [[nodiscard]] static factor shade(material m, std::uint64_t seed, double u, double v, bool quiet) noexcept {
     const float slow = value_noise(seed, 1.7 * u, 1.7 * v);
     if (quiet) return {shade_grey(1.0F + 0.03F * slow)};
@@ -165,7 +165,7 @@ class canvas {
     return {shade_grey(s)};
   }
 
-  /// Paints one patch: a disc, or a convex polygon of three or four corners.
+  /// Paints one patch: a disc, or a convex polygon with three or four corners.
   void stamp(double u, double v, double r, tint colour, random_bits& bits) {
     const int x0 = std::max(0, static_cast<int>((u - r) / texel_)),
               x1 = std::min(width_ - 1, static_cast<int>((u + r) / texel_));

@@ -21,15 +21,15 @@ namespace orbis::io::detail::synthetic {
 struct face_look {
   material surface = material::plain;  ///< the base
   double patches = 0.0;                ///< number painted per square metre
-  double contrast = 0.8;               ///< of the patches
+  double contrast = 0.8;               ///< contrast of the patches
   std::uint64_t seed = 0;              ///< the same seed and size give the same picture
   double period = 0.0;                 ///< metres; if above 0, the picture repeats with this period along both axes
-  double coarseness = 1.0;             ///< size of its texels relative to those of the other faces
+  double coarseness = 1.0;             ///< size of the face's texels relative to those of other faces
 };
 /// Looks of the six faces of a solid: index 2 * axis, plus one for the positive side.
 using face_looks = std::array<face_look, 6>;
 
-/// Number of patches per square metre of a material: books and clutter have many corners, a plain surface has few.
+/// Number of patches per square metre for a material: books and clutter have many corners, a plain surface has few.
 [[nodiscard]] inline double usual_patches(material m) noexcept {
   switch (m) {
     case material::plain: return 6.0;
@@ -63,7 +63,7 @@ using face_looks = std::array<face_look, 6>;
 struct painted_solids {
   std::vector<solid> solids;
   std::vector<face_looks> looks;  ///< one per solid
-  std::vector<triple> lamps;      ///< metres, world; each place is lit by its brightest lamp
+  std::vector<triple> lamps;      ///< metres, world; each point is lit by the lamp that appears brightest there
 };
 
 /// Looks of the walls, floor and ceiling of a furnished room.
@@ -89,7 +89,7 @@ struct painted_solids {
   return looks;
 }
 
-/// A furnished room with its looks. The person is lit as at their initial position.
+/// A furnished room with its looks. The light on the person is that at the initial position.
 [[nodiscard]] inline painted_solids painted(const scene& room) {
   painted_solids all{room.solids(), {}, {{0.0, 0.0, room.options().height - 0.5}}};
   for (const solid& s : all.solids)

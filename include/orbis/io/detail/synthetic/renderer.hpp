@@ -22,12 +22,12 @@ ORBIS_BEGIN_UNFUSED
 
 namespace orbis::io::detail::synthetic {
 
-/// Renders one image of solids from a pose. Rows of tiles are rendered independently.
+/// Renders one image of solids from a camera pose. Rows of tiles are rendered independently.
 class renderer {
  public:
   static constexpr int tile = 16;  ///< edge, pixels
 
-  /// `solids` are those that `textures` were painted for, in the same order; the first is the room.
+  /// `solids` are the solids of `textures`, in the same order; the first is the room.
   renderer(const std::vector<solid>& solids, const texture_set& textures, const camera_pose& pose,
            const camera::intrinsics& k)
       : textures_{&textures}, pose_{pose}, k_{k}, inverse_fx_{1.0 / k.fx}, inverse_fy_{1.0 / k.fy} {
@@ -49,13 +49,13 @@ class renderer {
 
   [[nodiscard]] int tile_rows() const noexcept { return (k_.height + tile - 1) / tile; }
 
-  /// Renders the pixels of one row of tiles into `out`, whose images have the camera's size; skips colours, a third of
-  /// the work, if its colour image is empty.
+  /// Renders the pixels of one row of tiles into `out`, whose images have the camera's size. If its colour image is
+  /// empty, skips the colours, which are a third of the work.
   void render_tile_row(int row, exact_view& out) const {
     render_rows(row * tile, std::min(row * tile + tile, k_.height), out);
   }
 
-  /// Renders the rows [y0, y1), as above.
+  /// Renders the rows [y0, y1) in the same way as `render_tile_row`.
   void render_rows(int y0, int y1, exact_view& out) const {
     std::vector<const candidate*> band, near;
     const double top = (y0 - 0.5 - k_.cy) / k_.fy, bottom = (y1 - 0.5 - k_.cy) / k_.fy;
@@ -83,8 +83,8 @@ class renderer {
     solid body;
     std::size_t index;
     triple origin, right, down, forward;  // of the camera, in the solid's frame
-    triple offset, bounds;                // the box around it, relative to the camera, in the world's axes
-    double nearest;                       // lower bound of its depth
+    triple offset, bounds;                // the solid's bounding box, relative to the camera, along the world axes
+    double nearest;                       // lower bound of the solid's depth
   };
 
   [[nodiscard]] static bool reaches(const candidate& c, triple inward) noexcept {
@@ -114,7 +114,7 @@ class renderer {
     int face = 0;
     if (c.body.kind == shape::sphere || c.body.kind == shape::capsule ||
         (c.body.kind == shape::cylinder && h.axis != 2)) {
-      // Projected from the centre onto the cube around it.
+      // Projects the point from the centre onto the surrounding cube.
       const double ax = std::abs(p.x), ay = std::abs(p.y);
       const double az = c.body.kind == shape::sphere ? std::abs(p.z) : 0.0;
       const int axis = az > ax && az > ay ? 2 : (ay > ax ? 1 : 0);

@@ -24,14 +24,14 @@ namespace orbis::io::detail::synthetic {
 /// Two legs, two arms, two halves of the trunk, and a head.
 using body_parts = std::array<solid, 7>;
 
-/// A grown person, 1.75 m tall and 0.55 m wide, who stands on `foot` (metres, world) and looks along `(cos_yaw,
-/// sin_yaw)`. `step`: number of double steps made; its fraction determines the position of arms and legs. The textures
-/// depend only on `seed`.
+/// An adult, 1.75 m tall and 0.55 m wide, standing at `foot` (metres, world) and facing along `(cos_yaw, sin_yaw)`.
+/// `step`: number of double steps made; its fraction determines the position of arms and legs. The textures depend only
+/// on `seed`.
 [[nodiscard]] inline body_parts walking_person(triple foot, double cos_yaw, double sin_yaw, double step,
                                                std::uint64_t seed) noexcept {
   body_parts parts;
   std::size_t i = 0;
-  // `from`: the upper end of its axis relative to the foot: forward, to the left, and up.
+  // `from`: the upper end of the part's axis relative to the foot: forward, to the left, and up.
   const auto add = [&](triple from, double radius, double height, double tilt, material surface) {
     solid& s = parts[i];
     s.kind = shape::capsule;
@@ -57,11 +57,11 @@ using body_parts = std::array<solid, 7>;
   return parts;
 }
 
-/// A room with its floor at z = 0 and its centre at the origin, furnished along its walls. The seed determines sizes,
-/// order and places of the furniture, and all textures.
+/// A room with the floor at z = 0 and its centre at the origin, furnished along the walls. The seed determines the
+/// sizes, order and positions of the furniture, and all textures.
 class scene {
  public:
-  /// @pre sizes of 3 m x 3 m x 2 m at least, size_jitter in [0, 0.2]
+  /// @pre the size is at least 3 m x 3 m x 2 m, size_jitter is in [0, 0.2]
   scene(const synthetic_scene_options& options, std::uint64_t seed)
       : options_{options}, bits_{mix64(seed ^ 0x726f6f6dULL)} {
     length_ = options.length * (1.0 + options.size_jitter * between(bits_, -1.0, 1.0));
@@ -79,7 +79,7 @@ class scene {
 
   /// The surfaces: first the room itself, then all objects in it.
   [[nodiscard]] const std::vector<solid>& solids() const noexcept { return solids_; }
-  /// The surfaces `time` seconds after the start; only the person's surfaces move.
+  /// The surfaces `time` seconds after the start; only the person moves.
   [[nodiscard]] std::vector<solid> solids_at(double time) const {
     std::vector<solid> now = solids_;
     if (options_.person) {
@@ -88,7 +88,7 @@ class scene {
     }
     return now;
   }
-  /// Number of static solids: the first ones.
+  /// Number of static solids, which precede the moving ones.
   [[nodiscard]] std::size_t still() const noexcept { return still_; }
 
   /// Size in metres along x, y and z.
@@ -99,9 +99,9 @@ class scene {
     return face < 4 && (face - first_poor_wall_ + 4) % 4 < options_.poor_walls;
   }
 
-  /// The distance (metres, unsigned) of a point to the nearest surface visible to a camera: the error of a map point.
-  /// Exact in front of the surfaces; behind them, where several solids overlap, it is the distance to the hull of the
-  /// solid that contains the point most deeply. Ignores moving solids.
+  /// The unsigned distance (metres) from a point to the nearest surface visible to a camera: the error of a map point.
+  /// Exact in front of the surfaces; behind them, where several solids overlap, it is the distance to the surface of
+  /// the solid that contains the point most deeply. Ignores moving solids.
   [[nodiscard]] double distance(const vec3& p_world) const noexcept {
     const triple p = to_triple(p_world);
     double nearest = solids_.front().signed_distance(p);
@@ -174,7 +174,7 @@ class scene {
   solid& ball(const wall& w, double along, double out, double up, double radius, material surface) {
     return add(shape::sphere, place(w, along, out, up), {radius, radius, radius}, surface);
   }
-  /// Rotates a box about the vertical by up to `turns`.
+  /// Rotates a box about the vertical axis by a random angle of up to `turns`.
   void turn(solid& s, double turns) {
     const double by = between(bits_, -turns, turns);
     s.cos_yaw = cos_turns(by);
@@ -286,7 +286,7 @@ class scene {
   }
 
   void arrange(const wall& w, const std::vector<furniture>& group) {
-    constexpr double corner = 0.7;  // leaves room for furniture at the adjacent wall
+    constexpr double corner = 0.7;  // space for furniture at the adjacent wall
     double taken = 0.0;
     for (const furniture& f : group) taken += f.width;
     double spare = std::max(0.0, w.length - 2.0 * corner - taken);
@@ -295,13 +295,13 @@ class scene {
       const double gap = spare * between(bits_, 0.1, 0.6);
       spare -= gap;
       at += gap;
-      if (at + f.width > 0.5 * w.length) break;  // a small room
+      if (at + f.width > 0.5 * w.length) break;  // no space left in a small room
       (this->*f.build)(w, at + 0.5 * f.width);
       at += f.width;
     }
   }
 
-  /// Adds picture frames, slightly raised.
+  /// Adds picture frames that project slightly from the wall.
   void decorate(const wall& w) {
     const int count = 2 + static_cast<int>(bits_.below(2));
     for (int i = 0; i != count; ++i) {

@@ -23,8 +23,8 @@ namespace orbis::io::detail::synthetic {
 /// The published standard deviation (metres) at depth `z` (metres).
 [[nodiscard]] inline double axial_deviation(double z) noexcept { return 0.0012 + 0.0019 * (z - 0.4) * (z - 0.4); }
 
-/// The sensor with the exposure time and the noise that automatic exposure chooses in this light, relative to that
-/// which `exposure` suits.
+/// The sensor with the exposure time and noise that automatic exposure would choose. `light`: illumination relative to
+/// the illumination for which `exposure` is correct.
 [[nodiscard]] inline synthetic_sensor_options exposed(synthetic_sensor_options sensor, double light) noexcept {
   const double longest = std::max(sensor.exposure, sensor.max_exposure), needed = sensor.exposure / light;
   if (needed > longest) sensor.colour_noise *= std::sqrt(needed / longest);
@@ -46,7 +46,7 @@ class sensor {
     }
   }
 
-  /// Measures the depth of row `y`, in units of 1 / depth_scale metres, 0: none.
+  /// Measures the depth of row `y`, in units of 1 / depth_scale metres; 0: no depth.
   void measure_depth(const exact_view& exact, int y, std::span<std::uint16_t> out) const {
     const int width = exact.depth.width();
     const std::vector<bool> dark = options_.shadow ? projector_shadow(exact.depth.row(y)) : std::vector<bool>{};
@@ -74,12 +74,12 @@ class sensor {
   /// Applies the noise to the colours of row `y`.
   void measure_colour(std::span<rgb8> row, int y) const noexcept {
     if (options_.colour_noise == 0.0) return;
-    const auto sigma = static_cast<float>(options_.colour_noise * 0.015625476858987186);  // of the sum below
+    const auto sigma = static_cast<float>(options_.colour_noise * 0.015625476858987186);  // factor for the sum below
     const std::uint64_t key = noise_word(seed_, 2, static_cast<std::uint64_t>(y)) << 16U;
     for (std::size_t x = 0; x != row.size(); ++x) {
       const std::uint64_t word = mix64(key + x);
       const auto channel = [&](std::uint8_t value, unsigned shift) {
-        // The sum of three uniforms of 7 bits: close enough to normal for colours.
+        // The sum of three uniform 7-bit numbers: close enough to a normal distribution for colours.
         const std::uint64_t w = word >> shift;
         const auto sum = static_cast<float>(static_cast<int>((w & 127U) + ((w >> 7U) & 127U) + ((w >> 14U) & 127U)));
         const float v = static_cast<float>(value) + sigma * (sum - 190.5F);
@@ -97,8 +97,8 @@ class sensor {
            chance * static_cast<double>(safe_cosine_ - lost_cosine_) > static_cast<double>(cosine - lost_cosine_);
   }
 
-  /// Marks pixels that the projector does not light: as seen from the projector, a pixel further to the right in the
-  /// row is further to the left.
+  /// Marks pixels that the projector does not illuminate: seen from the projector, a pixel further to the right in the
+  /// row appears further to the left.
   [[nodiscard]] std::vector<bool> projector_shadow(std::span<const float> depth) const {
     std::vector<bool> dark(depth.size());
     const double shift = focal_ * options_.baseline;
@@ -111,7 +111,7 @@ class sensor {
     return dark;
   }
 
-  /// Measured depth of the ray through (x, y): near a depth edge possibly a neighbour's, or a value in between.
+  /// Measured depth of the ray through (x, y): near a depth edge, it may be a neighbour's or a value in between.
   [[nodiscard]] double beside_edge(const exact_view& exact, int x, int y, std::uint64_t word) const noexcept {
     const image<float>& depth = exact.depth;
     const float* here = depth.data() + std::ptrdiff_t{y} * depth.width() + x;
@@ -125,7 +125,7 @@ class sensor {
     if (std::abs(z - other) <= 0.03F + 0.02F * std::min(z, other)) return static_cast<double>(z);  // no edge
     const std::uint64_t fresh = mix64(word ^ 0x6564676573ULL);
     if (upper_fraction(fresh) < options_.flying_pixels) {
-      // Between the two in disparity, like the result of a correlation window that covers both surfaces.
+      // Interpolate in disparity, like a correlation window that covers both surfaces.
       const double f = lower_fraction(fresh);
       return 1.0 / ((1.0 - f) / static_cast<double>(z) + f / static_cast<double>(other));
     }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A camera with its sensor that takes frames of painted solids.
+/// A camera with a sensor that captures frames of painted solids.
 #pragma once
 
 #include <cassert>
@@ -37,17 +37,17 @@ struct moment {
   return {width, height, focal, focal, 0.5 * (width - 1), 0.5 * (height - 1)};
 }
 
-/// Takes frames of a scene given as a function of time. Thread-safe; copies share the textures.
+/// Captures frames of a scene given as a function of time. Thread-safe; copies share the textures.
 class simulator {
  public:
-  /// `textures`: of the solids to render. @pre depth_scale > 0
+  /// `textures`: the textures of the solids to render. @pre depth_scale > 0
   simulator(std::shared_ptr<const texture_set> textures, const camera::intrinsics& k, double depth_scale,
             const synthetic_sensor_options& sensor, std::uint64_t seed)
       : textures_{std::move(textures)}, k_{k}, depth_scale_{depth_scale}, sensor_{sensor}, seed_{seed} {
     assert(depth_scale > 0.0);
   }
 
-  /// Error-free colour, depth (metres) and angles at one moment; without the colour image if `with_color` is false.
+  /// Error-free colour, depth (metres) and angles of incidence at one moment; no colour image if `with_color` is false.
   template <execution_policy Policy>
   [[nodiscard]] exact_view exact(const Policy& policy, const moment& m, bool with_color = true) const {
     const renderer picture{m.solids, *textures_, m.pose, k_};
@@ -57,8 +57,8 @@ class simulator {
     return out;
   }
 
-  /// The same with row `y` of the image taken `row_time(y)` seconds after `time`, where `at(time)` returns the `moment`
-  /// of any time; without the colour image if `with_color` is false.
+  /// Like `exact`, but row `y` of the image is exposed `row_time(y)` seconds after `time`. `at(time)` returns the
+  /// `moment` at any time.
   template <execution_policy Policy, class At, class RowTime>
   [[nodiscard]] exact_view exact_rows(const Policy& policy, const At& at, double time, const RowTime& row_time,
                                       bool with_color = true) const {
@@ -71,7 +71,7 @@ class simulator {
     return out;
   }
 
-  /// The measured frame at `time`, where `at(time)` returns the `moment` of any time. `key`: different for each frame.
+  /// The measured frame at `time`. `at(time)` returns the `moment` at any time. `key`: different for each frame.
   template <execution_policy Policy, class At>
   [[nodiscard]] camera::rgbd_frame frame(const Policy& policy, const At& at, double time, std::uint64_t key) const {
     exact_view seen = color_view(policy, at, time);
@@ -98,7 +98,8 @@ class simulator {
     return f;
   }
 
-  /// The images of two such cameras at `time`, the second one `baseline` metres to the right of the first. As above.
+  /// The images of two such cameras at `time`, the second one `baseline` metres to the right of the first. `at` and
+  /// `key`: as in `frame`.
   template <execution_policy Policy, class At>
   [[nodiscard]] camera::stereo_frame stereo(const Policy& policy, const At& at, double time, std::uint64_t key,
                                             double baseline) const {
@@ -126,14 +127,14 @@ class simulator {
             image<float>(k_.width, k_.height)};
   }
 
-  /// The exact view while the colour image is read out around `time`.
+  /// The exact view during the readout of the colour image, which is centred on `time`.
   template <execution_policy Policy, class At>
   [[nodiscard]] exact_view color_view(const Policy& policy, const At& at, double time) const {
     if (sensor_.shutter.color_read_out == 0.0) return exact(policy, at(time));
     return exact_rows(policy, at, time, [&](int y) { return sensor_.shutter.color_time(y, k_.height); });
   }
 
-  /// The exact view, without colour, while the depth image of the frame at `time` is read out.
+  /// The exact view, without colour, during the readout of the depth image of the frame at `time`.
   template <execution_policy Policy, class At>
   [[nodiscard]] exact_view depth_view(const Policy& policy, const At& at, double time) const {
     if (sensor_.shutter.depth_read_out == 0.0) return exact(policy, at(time + sensor_.shutter.depth_delay), false);
@@ -141,13 +142,13 @@ class simulator {
         policy, at, time, [&](int y) { return sensor_.shutter.depth_time(y, k_.height); }, false);
   }
 
-  /// The time of image `i` of `count`, spread evenly over an exposure that is centred on 0.
+  /// The time of image `i` of `count` images, evenly distributed over an exposure that is centred on 0.
   [[nodiscard]] static double part_time(double exposure, int i, int count) noexcept {
     return exposure * ((i + 0.5) / count - 0.5);
   }
 
-  /// Replaces depths by those of mean disparity over the integration time, which is centred on the depth image's time.
-  /// At an edge both surfaces contribute, in proportion to the time for which the pixel sees them.
+  /// Replaces each depth by that of the mean disparity over the integration time, which is centred on the depth image's
+  /// time. At an edge both surfaces contribute in proportion to the time for which the pixel sees them.
   template <execution_policy Policy, class At>
   void smear(const Policy& policy, const At& at, double time, image<float>& depth) const {
     const int count = sensor_.depth_blur;
@@ -159,7 +160,7 @@ class simulator {
     for (std::size_t i = 0; i != sums.size(); ++i) depth.pixels()[i] = static_cast<float>(count / sums[i]);
   }
 
-  /// Averages images spread evenly over the exposure time, which is centred on `time`.
+  /// Averages images that are evenly distributed over the exposure time, which is centred on `time`.
   template <execution_policy Policy, class At>
   void blur(const Policy& policy, const At& at, double time, image<rgb8>& color) const {
     const int count = sensor_.motion_blur;

@@ -21,21 +21,21 @@ enum class shape : std::uint8_t {
   box,       ///< half sizes along its own axes
   sphere,    ///< half.x is the radius
   cylinder,  ///< upright; half.x is the radius, half.z half the height
-  capsule,   ///< a cylinder with hemispherical ends, which its half height half.z includes; may be tilted
-  room       ///< a box seen from inside: everything outside it is solid
+  capsule,   ///< a cylinder with hemispherical ends, which are part of the half height half.z; may be tilted
+  room       ///< a box seen from inside: everything outside the box is solid
 };
 
-/// A solid, optionally rotated about the vertical and, for a capsule, first tilted about its own y axis. Each has six
-/// faces, two for each of its own axes (2 * axis, plus one for the positive side); round solids use the face of the
-/// largest coordinate.
+/// A solid, optionally rotated about the vertical axis; a capsule is first tilted about its own y axis. Each solid has
+/// six faces, two for each of its own axes (2 * axis, plus one for the positive side); a point of a round solid belongs
+/// to the face of its largest coordinate.
 struct solid {
   shape kind = shape::box;
   triple centre;  ///< metres, world
   triple half;    ///< half sizes, metres
   double cos_yaw = 1.0, sin_yaw = 0.0;
-  double cos_tilt = 1.0, sin_tilt = 0.0;  ///< of a capsule: its upper end is tilted towards its own x axis
+  double cos_tilt = 1.0, sin_tilt = 0.0;  ///< tilt of a capsule, whose upper end moves towards its own x axis
   material surface = material::plain;
-  std::uint64_t seed = 0;  ///< of its texture
+  std::uint64_t seed = 0;  ///< seed of the texture
 
   [[nodiscard]] triple to_local_direction(triple d) const noexcept {
     const triple turned{cos_yaw * d.x + sin_yaw * d.y, cos_yaw * d.y - sin_yaw * d.x, d.z};
@@ -52,7 +52,7 @@ struct solid {
     if (kind == shape::sphere || kind == shape::cylinder)
       return {half.x, half.x, kind == shape::sphere ? half.x : half.z};
     if (kind == shape::capsule) {
-      const double core = half.z - half.x;  // of its axis
+      const double core = half.z - half.x;  // half the length of the axis
       return {half.x + core * std::abs(sin_tilt * cos_yaw), half.x + core * std::abs(sin_tilt * sin_yaw),
               half.x + core * std::abs(cos_tilt)};
     }
@@ -60,7 +60,7 @@ struct solid {
     return {c * half.x + s * half.y, s * half.x + c * half.y, half.z};
   }
 
-  /// The distance (metres) of a point to the surface, negative inside the solid.
+  /// The distance (metres) from a point to the surface, negative inside the solid.
   [[nodiscard]] double signed_distance(triple p_world) const noexcept {
     const triple p = to_local(p_world);
     switch (kind) {
@@ -75,14 +75,14 @@ struct solid {
     return kind == shape::room ? -d : d;
   }
 
-  /// Vector from the nearest point of a capsule's axis to `p`, in its own frame.
+  /// Vector from the nearest point on a capsule's axis to `p`, in the capsule's frame.
   [[nodiscard]] triple from_axis(triple p) const noexcept {
     const double core = half.z - half.x;
     return {p.x, p.y, p.z - std::clamp(p.z, -core, core)};
   }
 
  private:
-  /// The distance to a box, where `q` are the distances to its faces.
+  /// The distance to a box, given the distances `q` to its faces.
   [[nodiscard]] static double rounded_off(triple q) noexcept {
     const triple outside{std::max(q.x, 0.0), std::max(q.y, 0.0), std::max(q.z, 0.0)};
     return length(outside) + std::min(std::max({q.x, q.y, q.z}), 0.0);
@@ -91,12 +91,12 @@ struct solid {
 
 /// First intersection of a ray with a solid.
 struct hit {
-  double t = std::numeric_limits<double>::infinity();  ///< in units of the ray's direction
-  int axis = 0;                                        ///< boxes, rooms: of the face; cylinders: 2 a cap, 0 the side
+  double t = std::numeric_limits<double>::infinity();  ///< distance in multiples of the ray's direction vector
+  int axis = 0;                                        ///< axis of the face; for cylinders 2 (a cap) or 0 (the side)
 };
 
-/// The intersection of the ray `origin + t direction` in the solid's own frame, with t > 0 only. From the inside, only
-/// a room can be hit.
+/// The first intersection with t > 0 of the ray `origin + t direction`, in the solid's own frame. A ray from inside a
+/// solid hits only a room.
 [[nodiscard]] inline hit intersect(const solid& s, triple origin, triple direction) noexcept {
   const auto inverse = [](double d) { return 1.0 / (d == 0.0 ? 1e-30 : d); };
   hit h;

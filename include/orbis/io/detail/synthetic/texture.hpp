@@ -3,7 +3,7 @@
 /// Textures of the surfaces: painted once, then sampled at the appropriate level of detail.
 ///
 /// Every face is painted with a base (tiles, bricks, wood, ...) under many patches with hard edges whose sizes follow a
-/// power law, as in the "dead leaves" model of natural images: it has corners at every scale, and no two places look
+/// power law, as in the "dead leaves" model of natural images: it has corners at every scale, and no two regions look
 /// the same (A. B. Lee, D. Mumford, J. Huang, "Occlusion models for natural images", IJCV 2001). Sampling is trilinear
 /// in a pyramid (L. Williams, "Pyramidal parametrics", SIGGRAPH 1983), so that corners do not flicker when the camera
 /// moves.
@@ -29,12 +29,12 @@ ORBIS_BEGIN_UNFUSED
 
 namespace orbis::io::detail::synthetic {
 
-/// All faces of some solids, painted and lit, as pyramids. A face is painted when it is first sampled, because no
-/// camera sees all of them. Thread-safe. Four bytes for each texel of the faces sampled so far, and twelve more for the
-/// one being painted.
+/// The painted and lit faces of all solids, as image pyramids. A face is painted when it is first sampled, because no
+/// camera sees all of them. Thread-safe. Memory: four bytes for each texel of the faces sampled so far, and twelve more
+/// for each texel of the face that is being painted.
 class texture_set {
  public:
-  /// `texel`: metres for each texel of the faces.
+  /// `texel`: edge length of a texel in metres.
   texture_set(painted_solids place, double texel)
       : place_{std::move(place)}, texel_{texel}, faces_(6 * place_.solids.size()) {}
 
@@ -42,10 +42,10 @@ class texture_set {
   /// that covers `footprint` metres.
   [[nodiscard]] std::uint32_t sample(std::size_t of, int face, double u, double v, double footprint) const {
     const pyramid& p = painted(6 * of + static_cast<std::size_t>(face));
-    // The logarithm to base 2, linear between powers of two, in 1/256.
+    // The logarithm to base 2, linear between powers of two, in units of 1/256.
     const auto relative = static_cast<float>(footprint * p.inverse_texel);
     const int detail = (std::bit_cast<std::int32_t>(relative) - 0x3f800000) >> 15;
-    // In 1/256 texel of the finest level.
+    // Coordinates in units of 1/256 texel of the finest level.
     const double scale = 256.0 * p.inverse_texel;
     const int a = static_cast<int>(u * scale), b = static_cast<int>(v * scale);
     if (detail <= 0) return pack(bilinear(p, 0, a, b));
@@ -64,7 +64,7 @@ class texture_set {
     std::array<std::uint32_t, most_levels> begin{};
     std::array<std::int32_t, most_levels> width{}, height{};
     int levels = 0;
-    double inverse_texel = 1.0;  // of the finest level
+    double inverse_texel = 1.0;  // texels per metre at the finest level
   };
 
   struct lazy_face {
@@ -97,7 +97,7 @@ class texture_set {
     return ((a * (256 - weight) + b * weight + 0x0000008000800080ULL) >> 8U) & 0x000000ff00ff00ffULL;
   }
 
-  /// Interpolates between the four texel centres of a level around (u, v), in 1/256 texel of the finest level.
+  /// Interpolates between the four texel centres around (u, v) on a level; u and v in 1/256 texel of the finest level.
   [[nodiscard]] static std::uint64_t bilinear(const pyramid& p, int level, int u, int v) noexcept {
     const auto l = static_cast<std::size_t>(level);
     const int w = p.width[l], h = p.height[l];
@@ -112,7 +112,7 @@ class texture_set {
     return blend(top, bottom, g);
   }
 
-  /// Light on a surface: ambient, from a lamp, and through a window.
+  /// Light on a surface: ambient light, and light from a lamp and a window.
   [[nodiscard]] static float light(const painted_solids& place, triple p, triple normal) noexcept {
     double lamp = 0.0;
     for (const triple at : place.lamps) {
@@ -143,7 +143,7 @@ class texture_set {
     p.inverse_texel = 1.0 / texel;
     p.width[0] = repeats ? canvas::texels(across, texel) : c.width();
     p.height[0] = repeats ? canvas::texels(up, texel) : c.height();
-    p.texels.clear();  // an earlier painting may have failed
+    p.texels.clear();  // an earlier attempt to paint the face may have failed
     p.texels.reserve(channels * texel_count(p.width[0], p.height[0]));
     const bool round = s.kind == shape::sphere || s.kind == shape::cylinder || s.kind == shape::capsule;
     for (int y = 0; y != p.height[0]; ++y)
@@ -175,7 +175,7 @@ class texture_set {
       halve(p);
   }
 
-  /// Number of texels of a pyramid.
+  /// Number of texels in a pyramid.
   [[nodiscard]] static std::size_t texel_count(int width, int height) noexcept {
     std::size_t all = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
     for (int level = 1; level != most_levels && (width > 1 || height > 1); ++level) {
