@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Bundle adjustment with a loss. The solver is compiled for each loss, in two source files.
+/// Bundle adjustment with a robust loss. The solver is compiled for each loss, in two source files.
 #pragma once
 
 #include <cmath>
@@ -28,7 +28,7 @@ struct settings {
 
 inline int report_error(int code, const std::string& why) { return examples::report_error("bundle_adjust", code, why); }
 
-/// The problem of a file, as input of the solver.
+/// The problem in a file, as input for the solver.
 struct bundle {
   std::vector<optimize::bal_camera> cameras;
   std::vector<orbis::vec3> points;
@@ -71,7 +71,7 @@ inline optimize::reduced_solver_options solver_named(const std::string& name) {
   return {};
 }
 
-/// Damping that is chosen at run time, in one type.
+/// A damping strategy that is selected at run time.
 struct chosen_damping {
   bool dogleg = false;
   struct state {
@@ -90,7 +90,7 @@ int adjust(const settings& s, orbis::io::bal_problem& problem, Loss loss) {
   bundle b{problem};
   optimize::bundle_adjuster adjuster{optimize::bal_reprojection{}, loss, chosen_damping{s.damping == "dogleg"},
                                      solver_named(s.solver)};
-  // A step reports the gradient at its start, which belongs to the previous line. It is unknown for the last estimate.
+  // A step reports the gradient at its start, which belongs in the previous line. For the last estimate it is unknown.
   bool in_line = false;
   const auto print = [&](const optimize::bundle_summary& now) {
     if (s.json) return;
@@ -119,7 +119,7 @@ int adjust(const settings& s, orbis::io::bal_problem& problem, Loss loss) {
   std::printf("%s; half the sum of squares over %zu cameras, %zu points and %zu observations\n",
               to_string(summary).c_str(), b.cameras.size(), b.points.size(), summary.observations);
   if (summary.left_out != 0)
-    std::printf("omitted: %zu observations without a projection, the first is number %zu\n", summary.left_out,
+    std::printf("omitted: %zu observations without a projection; index of the first: %zu\n", summary.left_out,
                 summary.first_left_out);
   return 0;
 }
