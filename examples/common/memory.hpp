@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// The amount of free memory, so that a program that needs more ends with a message instead of stalling the machine.
+// Determines the free memory, so that a program that needs more ends with a message instead of stalling the machine.
 #pragma once
 
 #include <algorithm>
@@ -22,7 +22,7 @@
 
 namespace examples {
 
-/// The whole number in `text` after the first `label`; nullopt if there is none. Saturates at the largest value.
+/// The integer after the first `label` in `text`; nullopt if there is none. Saturates at the largest value.
 [[nodiscard]] inline std::optional<std::uint64_t> number_after(std::string_view text, std::string_view label) {
   const std::size_t at = text.find(label);
   if (at == text.npos) return std::nullopt;
@@ -37,12 +37,13 @@ namespace examples {
 
 /// The memory files of a control group; empty if there is none.
 struct memory_group {
-  std::string limit;  ///< bytes, or a word if there is no limit
+  std::string limit;  ///< bytes, or a word that means that there is no limit
   std::string use;    ///< bytes, including cached files
   std::string stat;   ///< named values, including those of cached files
 };
 
-/// Free memory in bytes, by the text of /proc/meminfo and a control group; nullopt if the first does not state it.
+/// Free memory in bytes, from the text of /proc/meminfo and a control group; nullopt if /proc/meminfo does not state
+/// it.
 [[nodiscard]] inline std::optional<std::uint64_t> free_memory(std::string_view meminfo, const memory_group& group) {
   const auto available = number_after(meminfo, "MemAvailable:");  // kB
   if (!available) return std::nullopt;
@@ -57,7 +58,7 @@ struct memory_group {
   return std::min(bytes, *limit - std::min(*limit, taken));
 }
 
-/// Free memory of this system in bytes, with the control group of a container.
+/// Free memory of this system in bytes, limited by the control group of a container.
 [[nodiscard]] inline std::optional<std::uint64_t> free_memory() {
   const auto text = [](const std::string& path) { return orbis::read_file(path, 65536).value_or(std::string{}); };
   const std::string folder = "/sys/fs/cgroup/";
@@ -70,7 +71,7 @@ struct memory_group {
 }
 
 /// Limits the memory of this process to 90 % of the free memory: allocations beyond it throw std::bad_alloc, before the
-/// machine swaps or ends other programs. No effect if the system does not report free memory or has no such limit.
+/// machine swaps or kills other programs. No effect if the system does not report free memory or has no such limit.
 inline void limit_memory() {
 #ifdef __linux__
   const auto bytes = free_memory();
@@ -88,7 +89,7 @@ inline void limit_memory() {
 #endif
 }
 
-/// The message of a program that ends with the exception `e`.
+/// The error message for a program that ends with the exception `e`.
 [[nodiscard]] inline std::string describe_exception(const std::exception& e) {
   if (dynamic_cast<const std::bad_alloc*>(&e) != nullptr) return "out of memory";
   const auto* const system = dynamic_cast<const std::system_error*>(&e);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// Errors of the programs, in one line.
+// Prints the errors of the programs in one line.
 #pragma once
 
 #include <cstddef>
@@ -13,8 +13,8 @@
 
 namespace examples {
 
-/// The text in one line: without control characters, and with words of more than 200 characters cut, as input files and
-/// arguments may contain both.
+/// The text in one line: control characters are removed and words of more than 200 characters shortened, because input
+/// files and arguments may contain both.
 [[nodiscard]] inline std::string one_line(std::string_view text) {
   constexpr std::size_t longest = 200;
   std::string all;
@@ -32,7 +32,7 @@ namespace examples {
   return all;
 }
 
-/// "where: message", with the end of a long path.
+/// Returns "where: message", with only the end of a long path.
 [[nodiscard]] inline std::string describe(const orbis::error& e) {
   return orbis::error{e.code, orbis::shortened_path(e.where), e.message}.to_string();
 }

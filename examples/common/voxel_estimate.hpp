@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// Estimates before an octree is built whether its voxels are so small that insertions take long or exceed the memory.
+// Estimates, before an octree is built, whether its voxels are so small that insertion takes long or exceeds the
+// memory.
 #pragma once
 
 #include <algorithm>
@@ -15,8 +16,8 @@
 
 namespace examples {
 
-/// An estimate of the number of voxels that an octree stores for a set of rays: those in the volume between the rays,
-/// or, if the rays are farther apart than a voxel, those along each ray and some neighbours.
+/// An estimate of the number of voxels that an octree stores for a set of rays: the voxels in the volume between the
+/// rays or, if the rays are farther apart than a voxel, the voxels along each ray and some neighbours.
 class voxel_estimate {
  public:
   /// Adds a ray of `length` metres and its share of the volume in cubic metres.
@@ -24,19 +25,19 @@ class voxel_estimate {
     lengths_ += length;
     volume_ += volume;
   }
-  /// The number of voxels of the edge `resolution` (metres).
+  /// The number of voxels with an edge length of `resolution` metres.
   [[nodiscard]] double voxels(double resolution) const {
     return std::min(16.0 * lengths_ / resolution, volume_ / (resolution * resolution * resolution));
   }
-  /// The memory of the octree, as measured for scenes that allow little pruning.
+  /// The size of the octree in bytes, as measured for scenes that allow little pruning.
   [[nodiscard]] double bytes(double resolution) const { return 8.0 * voxels(resolution); }
   [[nodiscard]] bool takes_long(double resolution) const { return voxels(resolution) >= 1e8; }
-  /// Returns true if there are two billion voxels or more, or if they do not fit into `memory` bytes (if known).
+  /// Returns true if there are at least two billion voxels, or if they do not fit into `memory` bytes (if known).
   [[nodiscard]] bool is_too_large(double resolution, std::optional<std::uint64_t> memory) const {
     return voxels(resolution) >= 2e9 || (memory && bytes(resolution) > static_cast<double>(*memory));
   }
 
-  /// "voxels of 1 mm: `what` has about 0.3 billion of them, 2.4 GB".
+  /// A description: "voxels of 1 mm: `what` has about 0.3 billion of them, 2.4 GB".
   [[nodiscard]] std::string describe(double resolution, const std::string& what) const {
     char text[160];
     std::snprintf(text, sizeof text, "voxels of %g mm: %s has about %.1f billion of them, %.1f GB", 1000.0 * resolution,
