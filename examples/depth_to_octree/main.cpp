@@ -34,7 +34,7 @@ orbis::result<orbis::camera::camera_settings> camera_named(const std::string& s,
 int run(int argc, char** argv) {
   std::string input, output, camera_name = "525,525,319.5,239.5";
   std::vector<double> p{0, 0, 0, 0, 0, 0, 1};
-  double resolution = 0.05, scale = 0.0;  // scale 0: that of the camera
+  double resolution = 0.05, scale = 0.0;  // scale 0: use the scale of the camera
   CLI::App cli{"Convert a depth image with a camera pose to an occupancy octree", "depth_to_octree"};
   cli.add_option("DEPTH", input, "16-bit grey PNG")->required();
   cli.add_option("MAP", output, "output .bt file")->required();
