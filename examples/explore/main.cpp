@@ -28,7 +28,7 @@ using map_type = orbis::octree::occupancy_octree<>;
 
 int report_error(int code, const std::string& why) { return examples::report_error("explore", code, why); }
 
-/// A furnished room, divided by two walls with a door each. z is up, the floor is at z = 0, the centre at the origin.
+/// A furnished room, divided by two walls, each with a door. z is up, the floor at z = 0, and the centre at the origin.
 class building {
  public:
   explicit building(std::uint64_t seed)
@@ -43,7 +43,7 @@ class building {
   [[nodiscard]] orbis::octree::bounding_box bounds() const {
     return {{-half.x(), -half.y(), 0.0}, {half.x(), half.y(), 2.6}};
   }
-  /// The distance to the nearest surface, metres.
+  /// The distance to the nearest surface in metres.
   [[nodiscard]] double distance(const vec3& p) const {
     double d = room_.surface_distance(p);
     for (const auto& w : walls_) {
@@ -52,7 +52,7 @@ class building {
     }
     return d;
   }
-  /// A depth image of the camera: depth along its axis, metres.
+  /// A depth image of the camera: depth along the optical axis, metres.
   template <class Camera>
   [[nodiscard]] orbis::image<float> depth(const Camera& camera, const se3& T_world_camera) const {
     auto image = room_.exact_depth(orbis::par, camera, T_world_camera);
@@ -69,7 +69,7 @@ class building {
  private:
   inline static const orbis::vec2 half{6.0, 3.0};
 
-  /// The distance at which a ray enters a box.
+  /// The distance along a ray at which it enters a box.
   [[nodiscard]] static double enter(const orbis::octree::bounding_box& b, const vec3& origin, const vec3& direction) {
     const vec3 one = (b.min - origin).cwiseQuotient(direction), other = (b.max - origin).cwiseQuotient(direction);
     const double in = one.cwiseMin(other).maxCoeff(), out = one.cwiseMax(other).minCoeff();
@@ -111,7 +111,7 @@ struct explorer {
         frontiers{map.grid()},
         position{start} {
     map.track_changes();
-    // The space of the robot is free.
+    // The space that the robot occupies is free.
     const vec3 around = vec3::Constant(radius + 2 * resolution);
     for_each_voxel(map.grid(), {start - around, start + around}, [&](const auto& k) {
       map.edit_octant(k, [&](auto& voxels) {
@@ -141,13 +141,14 @@ struct explorer {
     travelled += (next - position).norm();
     position = next;
   }
-  /// Moves back along the trail to a free position: a wall seen from nearby may extend into voxels that were free.
+  /// Moves back along the trail to a free position, because a wall seen from nearby may extend into voxels that were
+  /// free.
   bool back_out() {
     for (; !view().is_free(position) && !trail.empty(); trail.pop_back()) go(trail.back());
     return view().is_free(position);
   }
-  /// Flies to a position in steps of a second, from rest to rest, takes a view after each and replans. Returns false if
-  /// there is no path or no view is left.
+  /// Flies to a position in steps of one second, from rest to rest; after each step, takes a view and replans. Returns
+  /// false if there is no path or no view is left.
   bool fly_to(const vec3& goal, int budget) {
     orbis::nav::replanner planner{goal};
     while (views < budget) {
@@ -171,8 +172,8 @@ struct explorer {
   }
 };
 
-/// The share of the reachable free space, i.e. of the voxels that touch no surface and are connected to the start, that
-/// the map knows to be free. `air`: the number of these voxels.
+/// The share of the reachable free space that is free in the map. Reachable free space consists of the voxels that
+/// touch no surface and are connected to the start; `air` receives their number.
 double coverage(const explorer& robot, const vec3& start, std::size_t& air) {
   const auto& grid = robot.map.grid();
   const auto keys = *orbis::octree::keys_between(grid, robot.world.bounds().min, robot.world.bounds().max);
@@ -238,7 +239,7 @@ int run(int argc, char** argv) {
   orbis::nav::next_view_options options;
   options.gain = {.max_range = range, .pixel_step = std::max(1, width / 40), .bounds = world.bounds()};
   options.min_gain = 0.01;
-  std::vector<vec3> done;  // targets whose unknown space a view did not show
+  std::vector<vec3> done;  // targets whose unknown space was not visible in a view
   std::string why = "out of views";
   while (robot.views < budget) {
     if (!robot.back_out()) {
@@ -261,7 +262,7 @@ int run(int argc, char** argv) {
     const auto before = gain(next.T_world_camera);
     if (!robot.fly_to(next.T_world_camera.translation(), budget)) continue;
     robot.look(next.T_world_camera);
-    // Unknown space that stays unknown is not visible from here.
+    // Space that is still unknown is not visible from here.
     orbis::nav::view_gain after{robot.map, robot.camera, options.gain};
     if (2 * after(next.T_world_camera) > before) done.push_back(next.place);
   }
