@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Initialisation of pose graphs whose odometry is too inaccurate.
+/// Initialisation of pose graphs whose odometry is too inaccurate as an initial estimate.
 #pragma once
 
 #include <cstddef>
@@ -18,7 +18,7 @@
 
 namespace examples {
 
-/// A vector of N numbers as a graph vertex, to which steps are added. A graph of such vertices is a linear system.
+/// A graph vertex that is a vector of N numbers, to which steps are added. The graph is then a linear system.
 template <int N>
 struct numbers {
   static constexpr int dof = N;
@@ -29,7 +29,7 @@ struct numbers {
   [[nodiscard]] const orbis::matrix<N>& to_matrix() const { return values; }
 };
 
-/// The residual `R_b - R_a * R_a_b` of unconstrained matrices, whose columns are the nine numbers.
+/// The residual `R_b - R_a * R_a_b` for unconstrained matrices, each stored by columns as nine numbers.
 struct rotation_difference {
   static constexpr int dimension = 9;
   using vertex = numbers<9>;
@@ -69,9 +69,9 @@ struct position_difference {
 
 /// Computes all vertices that are not fixed from the edges alone, independently of their initial poses. Solves two
 /// linear least-squares problems: first for unconstrained matrices, which are projected to the nearest rotations, then
-/// for the positions. Edges are weighted by their information. Of the options, `fixed`, `hold` and
-/// `semidefinite_information` apply. Fixed and held vertices stay unchanged; on failure all do (`singular`: vertex
-/// `where` is not determined, or has no nearest rotation).
+/// for the positions. Edges are weighted by their information. Only the options `fixed`, `hold` and
+/// `semidefinite_information` are used. Fixed and held vertices remain unchanged; on failure, all vertices do
+/// (`singular`: vertex `where` is not determined, or has no nearest rotation).
 ///
 /// Sources: L. Carlone, R. Tron, K. Daniilidis, F. Dellaert, "Initialization techniques for 3D SLAM: a survey on
 /// rotation estimation and its use in pose graph optimization", ICRA 2015; D. Martinec, T. Pajdla, "Robust rotation and
@@ -121,7 +121,7 @@ template <std::ranges::contiguous_range Edges>
   for (const auto& e : edges) {
     const orbis::mat3 r = rotations[e.from].rotation_matrix();
     const orbis::mat3 turned = r * e.measurement.rotation_matrix();
-    // The information is that of the translation in the measured frame of `to`.
+    // The information refers to the translation in the measured frame of `to`.
     moves.push_back({e.from,
                      e.to,
                      {r * e.measurement.translation()},
