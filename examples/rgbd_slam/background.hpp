@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Work in the background.
+/// Starts work on background threads.
 #pragma once
 
 #include <future>
@@ -10,8 +10,8 @@
 
 namespace app {
 
-/// Starts `work` on a new thread. If no thread can be created, returns a future without state (`valid()` is false), and
-/// the caller does the work.
+/// Starts `work` on a new thread. If no thread can be created, returns a future without state (`valid()` is false), so
+/// that the caller does the work.
 template <class Work>
 [[nodiscard]] std::future<std::invoke_result_t<Work>> start_in_background(Work work) {
   try {

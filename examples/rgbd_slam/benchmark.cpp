@@ -53,13 +53,13 @@ struct found_recording {
   fs::path path;
 };
 
-/// Returns true for a sequence of 7-Scenes, and for a scene, whose folders are sequences.
+/// Returns true for a 7-Scenes sequence, and for a scene, whose folders are sequences.
 bool is_scene(const fs::path& path) {
   return orbis::io::detect_format(path) == orbis::io::recording_format::seven_scenes;
 }
 
-/// Adds the recordings in and below `path`, in the order of their names; not those inside recordings. `seen`: canonical
-/// paths of the folders so far.
+/// Adds the recordings in and below `path` in the order of their names, but not recordings inside other recordings.
+/// `seen`: canonical paths of the folders so far.
 void find_recordings(const fs::path& path, std::set<fs::path>& seen, std::vector<fs::path>& found) {
   std::error_code failure;
   if (!seen.insert(fs::weakly_canonical(path, failure)).second) return;
@@ -76,7 +76,7 @@ void find_recordings(const fs::path& path, std::set<fs::path>& seen, std::vector
   for (const fs::path& p : inside) find_recordings(p, seen, found);
 }
 
-/// The recordings of the settings. Errors: not_found, no_data.
+/// The recordings selected by the settings. Errors: not_found, no_data.
 orbis::result<std::vector<found_recording>> chosen_recordings(const settings& s) {
   std::vector<found_recording> all;
   std::set<fs::path> seen;
@@ -108,7 +108,7 @@ constexpr const char* sources =
     "2017.\n"
     "BAD SLAM: T. Schoeps et al., CVPR 2019. RTAB-Map: M. Labbe, F. Michaud, Journal of Field Robotics 36(2), 2019.\n";
 
-/// Published ATE RMSE of RGB-D systems on whole recordings of the TUM benchmark, in millimetres; 0: not published.
+/// Published ATE RMSE of RGB-D systems on complete recordings of the TUM benchmark, in millimetres; 0: not published.
 struct published_figures {
   const char* recording;
   std::array<double, systems.size()> ate_mm;
@@ -123,7 +123,7 @@ constexpr std::array<published_figures, 7> published = {{
     {"fr3_nostructure_texture_near_withloop", {19, 16, 12, 0, 17}},
 }};
 
-/// The published figures for a recording, by its name: "fr1_desk", "rgbd_dataset_freiburg1_desk", "fr3_office".
+/// Finds the published figures for a recording by its name: "fr1_desk", "rgbd_dataset_freiburg1_desk", "fr3_office".
 const published_figures* find_figures(const fs::path& recording) {
   std::string name = fs::weakly_canonical(recording).filename().string();
   if (name.ends_with(".bag")) name.resize(name.size() - 4);
@@ -140,17 +140,17 @@ const published_figures* find_figures(const fs::path& recording) {
 
 // -- runs ------------------------------------------------------------------------------------------------------------
 
-/// One way to run a recording.
+/// A mode in which a recording is run.
 struct run_mode {
   std::string name;
   bool deterministic;
-  std::size_t busy_loops;  ///< threads that keep processors busy meanwhile
+  std::size_t busy_loops;  ///< number of threads that keep processors busy during the run
 };
 
 struct outcome {
   json summary;  ///< null if the run failed
   double cpu_s = 0.0, peak_mb = 0.0;
-  std::string failure;  ///< the reason; empty if it succeeded
+  std::string failure;  ///< the reason why the run failed; empty if it succeeded
 
   /// A number in the summary.
   [[nodiscard]] std::optional<double> number(const char* pointer) const {
@@ -160,7 +160,8 @@ struct outcome {
   }
 };
 
-/// Runs this program in a child process, one at a time. An interrupt kills it and removes the temporary folder.
+/// Runs this program in a child process, one at a time. An interrupt kills the process and removes the temporary
+/// folder.
 class runner {
  public:
   /// @pre no other runner exists
@@ -174,7 +175,7 @@ class runner {
     remove_all();
   }
 
-  /// The folder for results that are not kept.
+  /// The folder for temporary results.
   [[nodiscard]] fs::path scratch() const { return temporary_ / "out"; }
 
   /// Runs the program with these arguments and `--out`.
@@ -223,11 +224,11 @@ class runner {
  private:
   static constexpr int not_started = 127;  // exit code
 
-  /// The rest of the child process of `parent`. Makes system calls only.
+  /// Continues the child process of `parent`. Only makes system calls.
   [[noreturn]] static void become(char** argv, const char* log, [[maybe_unused]] pid_t parent) {
 #ifdef __linux__
     ::prctl(PR_SET_PDEATHSIG, SIGKILL);
-    if (::getppid() != parent) ::_exit(not_started);  // it ended before
+    if (::getppid() != parent) ::_exit(not_started);  // the parent has already ended
 #endif
     const int file = ::open(log, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
     if (file < 0) ::_exit(not_started);
@@ -238,7 +239,7 @@ class runner {
     ::_exit(not_started);
   }
 
-  /// Waits until a process has ended, and leaves it to be reaped.
+  /// Waits until a process has ended, without reaping it.
   static void wait_for(pid_t process) {
     siginfo_t ignored{};
     while (::waitid(P_PID, static_cast<id_t>(process), &ignored, WEXITED | WNOWAIT) != 0 && errno == EINTR) {
@@ -258,7 +259,7 @@ class runner {
     fs::remove_all(temporary_, ignored);
   }
 
-  /// Ends everything, on the thread that waits for signals. The lock is kept, so that no other run starts.
+  /// Ends all runs; called on the thread that waits for signals. The lock remains held, so that no other run starts.
   void stop() {
     mutex_.lock();
     if (process_ > 0) {
@@ -274,7 +275,7 @@ class runner {
   fs::path temporary_;
   std::mutex mutex_;
   pid_t process_ = 0;
-  fs::path out_;  ///< of the process
+  fs::path out_;  ///< output folder of the process
 };
 
 /// Creates an empty temporary folder. Errors: write_failed.
@@ -318,12 +319,12 @@ struct row {
 
 using table = std::vector<std::vector<std::string>>;  ///< rows of equal length; the first one is the header
 
-/// The text, or "-" without a value.
+/// Formats a value, or returns "-" if there is none.
 std::string cell(const char* format, const std::optional<double>& value, double factor = 1.0) {
   return value ? text(format, factor * *value) : "-";
 }
 
-/// The ratio of two numbers of a run, times `factor`; empty if one is unknown.
+/// The ratio of two numbers of a run, times `factor`; empty if one of them is unknown.
 std::optional<double> ratio(std::optional<double> a, std::optional<double> b, double factor = 1.0) {
   if (!a || !b || *b == 0.0) return std::nullopt;
   return factor * *a / *b;
@@ -359,7 +360,7 @@ table results_table(const std::vector<row>& rows) {
   return t;
 }
 
-/// The deterministic runs of known recordings, next to published figures; only the header if there are none.
+/// The deterministic runs of known recordings next to published figures; only the header if there are no such runs.
 table published_table(const std::vector<row>& rows) {
   table t{{"ATE mm", "this run"}};
   t.front().insert(t.front().end(), systems.begin(), systems.end());
@@ -372,8 +373,8 @@ table published_table(const std::vector<row>& rows) {
   return t;
 }
 
-/// The table as text with aligned columns, or as Markdown. The first `left` columns, and the last one of failures, are
-/// words.
+/// The table as text with aligned columns, or as Markdown. The first `left` columns and the last column of failures
+/// contain words.
 std::string formatted(const table& t, bool markdown, std::size_t left) {
   std::vector<std::size_t> widths(t.front().size());
   for (const auto& line : t)
@@ -401,7 +402,7 @@ std::string as_tables(const std::vector<row>& rows, bool markdown) {
   std::string all = formatted(results_table(rows), markdown, 2);
   const table known = published_table(rows);
   if (known.size() > 1)
-    all += "\nPublished figures of whole recordings:\n\n" + formatted(known, markdown, 1) + "\n" + sources;
+    all += "\nPublished figures for complete recordings:\n\n" + formatted(known, markdown, 1) + "\n" + sources;
   return all;
 }
 
@@ -447,7 +448,7 @@ exit_code benchmark(const settings& s, console& console) {
                                         : o.failure));
     }
   std::string text = s.json ? as_json(rows) : as_tables(rows, s.markdown);
-  text.pop_back();  // print adds the line's end
+  text.pop_back();  // print adds the line break
   if (!console.print(text))
     return console.error({orbis::errc::write_failed, "standard output", "cannot be written"}), bad_input;
   return any_failed ? run_failed : done;

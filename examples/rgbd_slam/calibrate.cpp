@@ -27,9 +27,9 @@ namespace {
 
 using orbis::slam::calibrated_parameter;
 
-constexpr double most_scale_deviation = 0.005;  // relative standard deviation of an accepted depth scale
+constexpr double most_scale_deviation = 0.005;  // maximum relative standard deviation of an accepted depth scale
 
-/// The depth scale by the ground-truth poses of the recording; empty if they do not determine it.
+/// Estimates the depth scale from the ground-truth poses of the recording; empty if they do not determine it.
 std::optional<calibrated_parameter> find_depth_scale(const frame_source& source, const orbis::trajectory& found) {
   if (source.ground_truth.empty()) return std::nullopt;
   const auto scale = orbis::eval::estimate_scale(found, source.ground_truth);
@@ -59,7 +59,7 @@ std::string parameter_line(const calibrated_parameter& p) {
 std::optional<orbis::error> check_output(const settings& s, const frame_source& source) {
   std::error_code ignored;
   if (s.out.empty()) return std::nullopt;
-  std::vector<std::filesystem::path> kept = source.files;  // without camera files, which may be replaced
+  std::vector<std::filesystem::path> kept = source.files;  // excluding camera files, which may be replaced
   std::erase_if(kept, [](const std::filesystem::path& file) { return file.extension() == ".toml"; });
   if (auto lost = find_overwritten({s.out}, kept)) return lost;
   if (s.out.has_parent_path() && !std::filesystem::is_directory(s.out.parent_path(), ignored))
@@ -93,7 +93,7 @@ exit_code calibrate(const settings& s, console& console) {
   const auto is_held_distortion = [](const calibrated_parameter& p) { return p.name == "k1" && p.is_held; };
   if (s.distortion && std::ranges::any_of(found->parameters, is_held_distortion))
     return give_up({orbis::errc::degenerate, s.input.string(),
-                    "the motion does not determine the distortion of the lens, and the focal length would compensate "
+                    "the motion does not determine the lens distortion, and the focal length would compensate for "
                     "it; omit --distortion to use the lens of the camera file"});
   camera.model = found->last.camera;
   if (!is_settled(found->last, 3.0)) console.warn("the parameters have not converged: do not rely on them");
@@ -103,7 +103,7 @@ exit_code calibrate(const settings& s, console& console) {
   const auto depth_scale = find_depth_scale(*source, found->trajectory);
   if (depth_scale) camera.depth_scale = depth_scale->after;
   printed = console.print(depth_scale ? parameter_line(*depth_scale)
-                                      : "depth_scale: not determined by images alone; it needs poses in metres "
+                                      : "depth_scale: not determined by images alone; needs poses in metres "
                                         "(groundtruth.txt)") &&
             printed;
   if (!found->last.is_complete())

@@ -31,8 +31,7 @@ struct refined {
 /// Returns true if another round would change nothing.
 bool is_last_round(const calibration& c) { return is_settled(c, 1.0); }
 
-/// Tracks all frames with `model` and calibrates it by the largest map.
-/// `is_last`: no other round follows.
+/// Tracks all frames with `model` and calibrates it with the largest map. `is_last`: no other round follows.
 orbis::result<refined> refine(const any_camera& model, const frame_source& source, const settings& s,
                               const orbis::camera::shutter& shutter, const calibration_limits& limits, bool is_last,
                               console& console) {
@@ -63,7 +62,7 @@ orbis::result<refined> refine(const any_camera& model, const frame_source& sourc
   return refined{*found, std::move(poses), lens};
 }
 
-/// The parameters of a camera by their names.
+/// The parameters of a camera, indexed by their names.
 using parameter_table = std::map<std::string_view, double>;
 
 parameter_table make_table(const any_camera& camera) {
@@ -76,7 +75,7 @@ parameter_table make_table(const any_camera& camera) {
   });
 }
 
-/// `camera` with the parameters of the table; unchanged if these are invalid.
+/// `camera` with the parameters in the table; unchanged if these are invalid.
 any_camera with_parameters(const any_camera& camera, const parameter_table& table) {
   return camera.visit([&](const auto& model) -> any_camera {
     using of_model = orbis::camera::parameters_of<std::remove_cvref_t<decltype(model)>>;
@@ -89,7 +88,7 @@ any_camera with_parameters(const any_camera& camera, const parameter_table& tabl
   });
 }
 
-/// The calibrated camera, with held parameters reset to the given values instead of those of an earlier round.
+/// The calibrated camera, with held parameters reset to the given values instead of the values of an earlier round.
 any_camera with_held_as_given(calibration& found, const parameter_table& given) {
   parameter_table held;
   for (auto& p : found.parameters)

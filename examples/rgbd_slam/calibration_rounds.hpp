@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Calibration of a camera with a recording: alternates tracking and calibration by the map.
+/// Calibration of a camera with a recording: alternates between tracking and calibration with the resulting map.
 #pragma once
 
 #include <limits>
@@ -21,19 +21,19 @@
 namespace app {
 
 struct calibration_rounds {
-  orbis::slam::calibration<orbis::camera::any_camera> last;   ///< the last round; held parameters have the given values
-  std::vector<orbis::slam::calibrated_parameter> parameters;  ///< over all rounds: `before` is the given value
-  orbis::trajectory trajectory;                               ///< of the last round
-  std::optional<lens_comparison> lens;                        ///< of the last round, if requested
+  orbis::slam::calibration<orbis::camera::any_camera> last;   ///< of the last round; held parameters are as given
+  std::vector<orbis::slam::calibrated_parameter> parameters;  ///< change over all rounds: `before` is the given value
+  orbis::trajectory trajectory;                               ///< trajectory of the last round
+  std::optional<lens_comparison> lens;                        ///< comparison in the last round, if requested
 };
 
 struct calibration_limits {
   int most_rounds = 5;
-  double longest = std::numeric_limits<double>::infinity();  ///< used part of the recording, seconds
+  double longest = std::numeric_limits<double>::infinity();  ///< maximum length of the part that is used, seconds
   bool compares_lens = false;                                ///< computes `calibration_rounds::lens`
 };
 
-/// Runs rounds until the parameters do not change. Errors: unreadable frames, no_data if tracking never starts,
+/// Runs rounds until the parameters no longer change. Errors: unreadable frames, no_data if tracking never starts,
 /// degenerate if the motion does not determine the camera.
 [[nodiscard]] orbis::result<calibration_rounds> calibrate_by(const frame_source& source, const settings& s,
                                                              const orbis::camera::shutter& shutter,
@@ -41,7 +41,7 @@ struct calibration_limits {
                                                              const calibration_limits& limits, console& console);
 
 /// Returns true if the round changed no parameter by more than `deviations` standard deviations. Exact equality is not
-/// expected, as the maps of two rounds have different landmarks.
+/// expected, because the maps of two rounds have different landmarks.
 [[nodiscard]] bool is_settled(const orbis::slam::calibration<orbis::camera::any_camera>& round, double deviations);
 
 }  // namespace app

@@ -9,9 +9,9 @@
 namespace app {
 namespace {
 
-// A wrong focal length compensates distortion to some extent. If distortion fits the images better, or is not
-// determined, they say little about the focal length.
-constexpr double somewhat = 0.98, clearly = 0.95;  // ratio of the errors
+// A wrong focal length compensates for distortion to some extent. If distortion fits the images better, or is not
+// determined, the images provide little evidence about the focal length.
+constexpr double somewhat = 0.98, clearly = 0.95;  // ratios of the errors
 
 /// The parameter fx; null if it is missing.
 const orbis::slam::calibrated_parameter* find_focal(std::span<const orbis::slam::calibrated_parameter> found) {
@@ -70,8 +70,8 @@ std::optional<lens_comparison> compare_lens(const orbis::slam::map& map, const o
 
 std::string describe(const lens_comparison& lens) {
   if (!lens.is_determined)
-    return "the motion does not determine whether the lens has distortion; if it has, the estimated focal length "
-           "compensates it and is wrong";
+    return "the motion does not determine whether the lens has distortion; if so, the estimated focal length "
+           "compensates for it and is wrong";
   char text[240];
   std::snprintf(text, sizeof text,
                 "a lens with distortion fits the images better (error %.3f instead of %.3f standard deviations), with "

@@ -15,16 +15,17 @@
 
 namespace app {
 
-/// Evidence that another focal length fits the images clearly better than the camera's, in pixels.
+/// Evidence that another focal length fits the images clearly better than that of the camera, in pixels.
 struct focal_doubt {
   double given, found;
   bool is_sure = true;  ///< false if a lens with distortion would fit the images slightly better
 };
 
-/// Adds zero distortion parameters, which can be estimated, to a pinhole camera; returns other cameras unchanged.
+/// Adds distortion parameters with the value zero to a pinhole camera, so that they can be estimated; returns other
+/// cameras unchanged.
 [[nodiscard]] orbis::camera::any_camera with_lens(const orbis::camera::any_camera& camera);
 
-/// The fit of a pinhole camera and of a lens with distortion.
+/// Comparison of the fits of a pinhole camera and a camera with lens distortion.
 struct lens_comparison {
   double pinhole_focal, lens_focal;  ///< fx of each, pixels
   double pinhole_rms, lens_rms;      ///< RMS reprojection error, in standard deviations
@@ -33,20 +34,20 @@ struct lens_comparison {
   [[nodiscard]] bool has_distortion() const;
 };
 
-/// The doubt that follows from calibrated parameters; empty if the calibration is inconclusive, as with a held
-/// parameter.
+/// The doubt that follows from calibrated parameters; empty if the calibration is inconclusive, for example because a
+/// parameter was held.
 [[nodiscard]] std::optional<focal_doubt> find_doubt(std::span<const orbis::slam::calibrated_parameter> found);
 /// The doubt that follows from a map made with the camera. A wrong focal length scales the distances between poses by a
-/// few percent, but so does distortion that a pinhole does not model: empty if distortion fits the images clearly
-/// better, or if they are inconclusive. Runs one or two small self-calibrations, in a few tenths of a second; empty if
-/// `go_on` cancels one.
+/// few percent, but so does distortion that a pinhole camera does not model: empty if distortion fits the images
+/// clearly better, or if the images are inconclusive. Runs one or two small self-calibrations, which take a few tenths
+/// of a second; empty if `go_on` cancels one of them.
 [[nodiscard]] std::optional<focal_doubt> find_doubt(const orbis::slam::map& map,
                                                     const orbis::camera::any_camera& camera,
                                                     const orbis::slam::options& options,
                                                     const orbis::progress& go_on = {});
-/// Returns true if a calibration found a clearly different focal length, even if other parameters were held.
+/// Returns true if a calibration resulted in a clearly different focal length, even if other parameters were held.
 [[nodiscard]] bool has_other_focal_length(std::span<const orbis::slam::calibrated_parameter> found);
-/// Compares the pinhole calibration of a map, done with the options `how`, with one that includes distortion. Empty if
+/// Compares the pinhole calibration with a map, run with the options `how`, with one that includes distortion. Empty if
 /// the camera is not a pinhole camera or the calibration fails. Runs one self-calibration.
 [[nodiscard]] std::optional<lens_comparison> compare_lens(const orbis::slam::map& map,
                                                           const orbis::camera::any_camera& camera,
@@ -54,9 +55,9 @@ struct lens_comparison {
                                                           const orbis::slam::options& options,
                                                           const orbis::slam::calibration_options& how,
                                                           const orbis::progress& go_on = {});
-/// The warning for the user.
+/// The warning for the user about the focal length.
 [[nodiscard]] std::string describe(const focal_doubt& doubt);
-/// The warning for the user. @pre lens.has_distortion() or !lens.is_determined
+/// The warning for the user about distortion. @pre lens.has_distortion() or !lens.is_determined
 [[nodiscard]] std::string describe(const lens_comparison& lens);
 
 }  // namespace app

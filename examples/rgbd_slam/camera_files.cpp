@@ -31,7 +31,7 @@ using orbis::result;
 
 constexpr std::size_t most_bytes = 65536;  // camera files are far smaller
 
-/// Returns true if brackets are nested deeply: the parser is recursive.
+/// Returns true if brackets are nested so deeply that the recursive parser might overflow the stack.
 bool is_nested_deeply(const std::string& text) {
   int depth = 0;
   return std::any_of(text.begin(), text.end(), [&](char c) {
@@ -40,7 +40,7 @@ bool is_nested_deeply(const std::string& text) {
   });
 }
 
-/// OpenCV's dialect of YAML: its first line, indented lists, one document.
+/// Converts YAML to OpenCV's dialect: a special first line, indented lists, one document.
 std::string to_opencv_yaml(const std::string& text) {
   std::istringstream in{text};
   std::string all = "%YAML:1.0\n---\n";
@@ -51,7 +51,7 @@ std::string to_opencv_yaml(const std::string& text) {
   return all;
 }
 
-/// The values of a JSON or YAML file under any of several names.
+/// The values in a JSON or YAML file, each of which may have one of several names.
 class named_values {
  public:
   named_values(cv::FileNode root) : tables_{root} {
@@ -69,7 +69,7 @@ class named_values {
     if (!node.isReal() && !node.isInt()) return std::nullopt;
     return static_cast<double>(node);
   }
-  /// Numbers of a list, which may be nested or the `data` of a matrix; empty if there is none.
+  /// The numbers in a list, which may be nested or the `data` of a matrix; empty if there is no list.
   [[nodiscard]] std::vector<double> numbers(std::initializer_list<const char*> names) const {
     cv::FileNode node = find(names);
     if (node.isMap()) node = node["data"];
@@ -94,7 +94,8 @@ class named_values {
 /// Focal lengths and principal point in pixels.
 using focal_and_center = std::array<double, 4>;
 
-/// Those of a 3x3 camera matrix by rows, or by columns, as Open3D and MATLAB write it; empty if it is none.
+/// The focal lengths and principal point in a 3x3 camera matrix, stored by rows, or by columns as in Open3D and MATLAB;
+/// empty if it is not a camera matrix.
 std::optional<focal_and_center> of_matrix(const std::array<double, 9>& m) {
   const auto vanishes = [&](std::size_t i) { return std::abs(m[i]) <= 1e-3 * std::abs(m[0]); };
   if (m[8] != 1.0 || !vanishes(1) || !vanishes(3)) return std::nullopt;
@@ -187,8 +188,8 @@ result<camera_file> parse_camera(const named_values& values, const std::filesyst
   return file;
 }
 
-/// A 3x3 camera matrix, or the upper left part of a 4x4 one; or fx, fy, cx, cy. The depth scale is 5000 if the folder
-/// has the list of ETH3D's layout.
+/// Reads a 3x3 camera matrix, the upper left part of a 4x4 matrix, or fx, fy, cx, cy. The depth scale is 5000 if the
+/// folder contains the list of the ETH3D layout.
 result<camera_file> read_matrix(const std::string& text, const std::filesystem::path& path) {
   std::istringstream in{text};
   in.imbue(std::locale::classic());
@@ -224,8 +225,8 @@ std::string camera_file::describe() const {
                 k.height, k.fx, k.fy, k.cx, k.cy, camera.depth_scale,
                 has_depth_scale                ? ""
                 : camera.depth_scale == 1000.0 ? " (millimetres are assumed)"
-                                               : " (that of ETH3D is assumed)");
-  return "the camera is that of " + path.filename().string() + ", " + std::string{camera.model.model_name()} + text;
+                                               : " (the depth scale of ETH3D is assumed)");
+  return "the camera is read from " + path.filename().string() + ", " + std::string{camera.model.model_name()} + text;
 }
 
 result<camera_file> read_camera_file(const std::filesystem::path& path) {

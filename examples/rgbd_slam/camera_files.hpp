@@ -12,26 +12,28 @@
 
 namespace app {
 
-/// A camera in a file of another program. Images of any size fit a camera whose width is 0: the file does not state it.
+/// A camera in a file of another program. A width of 0 means that the file does not specify the image size, so that
+/// images of any size are accepted.
 struct camera_file {
   orbis::camera::camera_settings camera;
   std::filesystem::path path;
-  bool has_depth_scale = false;  ///< otherwise `depth_scale` is assumed
+  bool has_depth_scale = false;  ///< the file specifies `depth_scale`, which is otherwise assumed
   /// Describes the camera for a note.
   [[nodiscard]] std::string describe() const;
 };
 
 /// Reads a JSON or YAML file: Open3D (`intrinsic_matrix`), librealsense (`fx`, `ppx`, `coeffs`),
 /// `sensor_msgs/CameraInfo` as text, ROS calibrations (`camera_matrix`), ORB-SLAM settings (`Camera.fx`,
-/// `DepthMapFactor`); or a text file with a 3x3 matrix or `fx fy cx cy`. A depth scale below 1 is the length of a step
-/// in metres. Errors: not_found, unreadable, malformed, unsupported (a distortion model).
+/// `DepthMapFactor`); or a text file with a 3x3 matrix or `fx fy cx cy`. A depth scale below 1 is the depth unit in
+/// metres. Errors: not_found, unreadable, malformed, unsupported (a distortion model).
 [[nodiscard]] orbis::result<camera_file> read_camera_file(const std::filesystem::path& path);
 
-/// The camera of the option --camera: `camera.toml`, a file as above, or a preset. Errors: as above.
+/// The camera given by the option --camera: `camera.toml`, a file that `read_camera_file` reads, or a preset. Errors:
+/// as `read_camera_file`.
 [[nodiscard]] orbis::result<orbis::camera::camera_settings> named_camera(const std::string& name);
 
-/// The file of another program with the camera of the recording in `folder`, under one of its usual names; empty if
-/// there is none.
+/// The file of another program, with one of the usual names, that describes the camera of the recording in `folder`;
+/// empty if there is none.
 [[nodiscard]] std::filesystem::path find_camera_file(const std::filesystem::path& folder);
 
 }  // namespace app

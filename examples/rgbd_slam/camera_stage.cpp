@@ -25,7 +25,7 @@ shutter_results prepare_camera(frame_source& source, const settings& s, console&
   char text[240];
   std::snprintf(
       text, sizeof text,
-      "the images contradict the camera's focal length of %.1f pixels; the run uses a calibrated camera with %.1f "
+      "the images contradict the camera's focal length of %.1f pixels; the run uses a calibrated focal length of %.1f "
       "pixels (--intrinsics given keeps the original; rgbd_slam calibrate writes a camera file)",
       change->given, change->found);
   console.warn(source.notes.emplace_back(text));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A file with the colours of keyframes, so that images are not decoded or rendered twice.
+/// A file for the colours of keyframes, so that images are not decoded or rendered twice.
 #pragma once
 
 #include <cstddef>
@@ -17,8 +17,8 @@
 
 namespace app {
 
-/// Stores colour images of one size by number: every `stride`-th pixel of every `stride`-th row, the pixels that become
-/// points. The file is unlinked once it is open.
+/// Stores numbered colour images of equal size: every `stride`-th pixel of every `stride`-th row, which are the pixels
+/// that become points. The file is unlinked as soon as it is open.
 class color_file {
  public:
   /// `most_bytes`: maximum size of the file. @pre stride > 0
@@ -35,7 +35,7 @@ class color_file {
     if (file_ >= 0) ::close(file_);
   }
 
-  /// Stores an image and replaces a previous one of this number. Returns false if it was not stored.
+  /// Stores an image and replaces a previous one with the same number. Returns false if it was not stored.
   bool put(std::uint64_t number, const orbis::image<orbis::rgb8>& color) {
     if (file_ < 0 && at_.empty()) {
       file_ = ::open(path_.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
@@ -51,8 +51,8 @@ class color_file {
     at_[number] = place;
     return true;
   }
-  /// Reads an image; returns false if that fails. `out` has the size of the images; its other pixels stay unchanged.
-  /// Thread-safe.
+  /// Reads an image; returns false on failure. `out` must have the size of the images; pixels that are not stored
+  /// remain unchanged. Thread-safe.
   bool get(std::uint64_t number, orbis::image<orbis::rgb8>& out) const {
     const auto found = at_.find(number);
     if (found == at_.end()) return false;

@@ -22,17 +22,17 @@ class logger;
 
 namespace app {
 
-/// Copies share the terminal line of the progress bar.
+/// The console of the program. Copies share the terminal line of the progress bar.
 class console {
  public:
   using clock = std::chrono::steady_clock;
   explicit console(bool quiet);
-  /// A console for work that may be given up. It prints nothing from then on.
+  /// A console for work that may be abandoned; it prints nothing from then on.
   [[nodiscard]] console for_dispensable() const;
 
-  /// Begins a stage and ends the previous one.
+  /// Starts a stage and ends the previous one.
   void stage(std::string_view name);
-  /// Shows the progress of the stage and the text `note`. Costs almost nothing between redraws.
+  /// Shows the progress of the stage and the text `note`. Calls between redraws take almost no time.
   void advance(std::size_t done, std::size_t total, const std::string& note = {});
   /// Ends the stage and prints its outcome.
   void finish(const std::string& outcome);
@@ -41,7 +41,7 @@ class console {
   /// Seconds since the start of the program.
   [[nodiscard]] double total() const;
 
-  /// Returns a progress callback for a library call in this stage. It cancels work that was given up.
+  /// Returns a progress callback for a library call in this stage, which cancels work that was abandoned.
   [[nodiscard]] auto progress() {
     return [this](std::size_t done, std::size_t total) {
       advance(done, total);

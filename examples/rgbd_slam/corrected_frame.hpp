@@ -18,7 +18,7 @@ class frame_correction {
  public:
   explicit frame_correction(orbis::camera::any_camera camera) : correct_{std::move(camera)} {}
 
-  /// The frame as a global shutter would have taken it; the frame itself if no correction is needed, or if the camera
+  /// The frame as a global shutter would have captured it; the frame itself if no correction is needed or the camera
   /// moved too fast. `m`: the shutter of the frame, and the motion during the read-out. Valid until the next call.
   [[nodiscard]] const orbis::camera::rgbd_frame& operator()(const orbis::camera::rgbd_frame& frame,
                                                             const orbis::slam::frame_motion& m) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Work that the user can give up at any moment.
+/// Work that the user can abandon at any time.
 #pragma once
 
 #include <chrono>
@@ -17,10 +17,10 @@
 
 namespace app {
 
-/// Calls `work()` on another thread. Returns its result, or rethrows its exception; returns nothing if the work was
-/// given up (`interrupts::is_given_up`) and does not end by itself within a moment. It is then still running: all that
-/// it refers to must outlive it, and the program must end by `interrupts::end_program`. If no thread can be created,
-/// calls `work` on this one.
+/// Calls `work()` on another thread. Returns its result or rethrows its exception. The result is empty if the work was
+/// abandoned (`interrupts::is_given_up`) and does not end promptly by itself. The work is then still running, so that
+/// all data to which it refers must outlive it, and the program must end by `interrupts::end_program`. If no thread can
+/// be created, calls `work` on the current thread.
 template <class Work>
 [[nodiscard]] std::optional<std::invoke_result_t<Work&>> run_dispensable(Work work) {
   constexpr std::chrono::milliseconds poll_interval{20}, moment{500};

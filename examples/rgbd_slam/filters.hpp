@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The filters of `--filter`.
+/// The filters of the option `--filter`.
 #pragma once
 
 #include <string>
@@ -12,7 +12,7 @@
 
 namespace app {
 
-/// The values of `--filter`.
+/// The values of the option `--filter`.
 [[nodiscard]] std::vector<std::string> filter_names();
 /// The options of the requested filter. @pre s.filter is one of the names
 [[nodiscard]] orbis::mapping::filter_options filter_options(const settings& s);

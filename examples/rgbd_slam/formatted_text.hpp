@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// printf formatting to strings.
+/// printf-style formatting to strings.
 #pragma once
 
 #include <cstdio>
@@ -8,7 +8,7 @@
 
 namespace app {
 
-/// Formats at most 511 characters.
+/// Formats a text of at most 511 characters.
 template <class... Args>
 [[nodiscard]] std::string text(const char* format, Args... args) {
   char buffer[512];

@@ -18,7 +18,7 @@ struct frame_range {
 
 class frame_ranges {
  public:
-  /// @pre no frame from this one on was added
+  /// Adds a frame. @pre all frames added before precede it
   void add(std::size_t frame) {
     if (ranges_.empty() || ranges_.back().first + ranges_.back().count != frame) ranges_.push_back({frame, 0});
     ++ranges_.back().count;
@@ -33,7 +33,7 @@ class frame_ranges {
     const auto next = at->count == 0 ? ranges_.erase(at) : at + 1;
     if (after.count != 0) ranges_.insert(next, after);
   }
-  /// Ascending.
+  /// The ranges in ascending order.
   [[nodiscard]] std::span<const frame_range> ranges() const noexcept { return ranges_; }
 
  private:

@@ -18,7 +18,7 @@ namespace {
 
 using clock = std::chrono::steady_clock;
 
-/// From SIGTERM or SIGHUP to the end of work that it finds waiting.
+/// Time for dispensable work to complete after SIGTERM or SIGHUP.
 constexpr std::chrono::seconds patience{5};
 
 struct state {
@@ -33,7 +33,7 @@ struct state {
   std::atomic<bool> stop_requested{false};
 };
 
-/// Never destroyed, as the waiting thread may use it until the process ends.
+/// Never destroyed, because the waiting thread may use it until the process ends.
 state& shared() {
   static state& s = *new state;
   return s;

@@ -2,13 +2,13 @@
 /// @file
 /// Handling of SIGINT (Ctrl-C), SIGTERM and SIGHUP (closed terminal).
 ///
-/// Initially the first signal ends the program. While a run collects results, the first signal asks it to stop and to
-/// write its results so far, and the second one ends the program immediately. Before a signal ends the program, its
-/// temporary files are removed.
+/// Initially, the first signal ends the program. While a run is collecting results, the first signal requests it to
+/// stop and to write its results so far, and the second signal ends the program immediately. Before a signal ends the
+/// program, its temporary files are removed.
 ///
-/// Then a run derives further results, which it can give up (`begin_dispensable`). A signal during that time gives them
-/// up. After an earlier SIGINT they are completed; after SIGTERM or SIGHUP, whose senders do not wait long, they are
-/// given up if they take more than a few seconds.
+/// Afterwards, a run derives optional results (`begin_dispensable`). A signal during that time abandons them. After an
+/// earlier SIGINT they are completed; after SIGTERM or SIGHUP, whose senders do not wait long, they are abandoned if
+/// they take more than a few seconds.
 #pragma once
 
 #include <functional>
@@ -22,22 +22,23 @@ void start();
 /// Makes the first signal set `stop_requested`, print `notice` on stderr and call `on_stop` on the thread that waits
 /// for signals, instead of ending the program.
 void keep_results(std::string notice, std::function<void()> on_stop = {});
-/// Removes `on_stop`. Returns when no call of it is running.
+/// Removes `on_stop`. Returns when no call to it is running.
 void forget_stop();
 /// Returns true if a signal arrived after `keep_results`.
 [[nodiscard]] bool stop_requested();
 
-/// Begins work that may be given up; a signal from now on prints `notice` on stderr.
+/// Marks the start of work that may be abandoned; a signal from now on prints `notice` on stderr.
 void begin_dispensable(std::string notice);
-/// Returns true if that work must be given up.
+/// Returns true if the work since `begin_dispensable` must be abandoned.
 [[nodiscard]] bool is_given_up();
-/// Ends that time. Returns `stop_requested`; a first signal from now on has no effect, as the rest takes moments.
+/// Marks the end of this work. Returns `stop_requested`; a first signal from now on has no effect, because the rest of
+/// the run takes almost no time.
 bool end_dispensable();
-/// Removes the temporary files and ends the program, although threads are running.
+/// Removes the temporary files and ends the program, even while threads are running.
 [[noreturn]] void end_program(int code);
 
-/// Sets the function that is called, on the thread that waits for signals, before a signal ends the program; empty:
-/// none. Returns when no call of the previous function is running.
+/// Sets the function that is called, on the thread that waits for signals, before a signal ends the program; an empty
+/// function disables this. Returns when no call to the previous function is running.
 void set_clean_up(std::function<void()> clean_up);
 
 }  // namespace app::interrupts

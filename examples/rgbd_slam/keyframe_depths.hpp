@@ -18,18 +18,18 @@
 
 namespace app {
 
-/// A thread-safe depth_store.
+/// A thread-safe `depth_store`.
 class keyframe_depths {
  public:
-  /// Without `in_background` images are compressed in the caller's thread.
+  /// If `in_background` is false, images are compressed on the caller's thread.
   keyframe_depths(orbis::mapping::depth_store_options options, bool in_background)
       : store_{std::move(options)}, background_{in_background} {}
   keyframe_depths(const keyframe_depths&) = delete;
   keyframe_depths& operator=(const keyframe_depths&) = delete;
   ~keyframe_depths() { wait(); }
 
-  /// Copies the image; waits first if the previous one is not compressed yet, and rethrows an exception of its
-  /// compression. For one thread.
+  /// Copies the image; first waits until the previous one is compressed and rethrows an exception of that compression.
+  /// For one thread.
   void put(std::uint64_t frame, const orbis::image<std::uint16_t>& depth) {
     finish();
     std::shared_future<void> ahead;
@@ -42,12 +42,12 @@ class keyframe_depths {
     const std::lock_guard lock{ahead_mutex_};
     ahead_ = std::move(ahead);
   }
-  /// Waits for the last image. Rethrows an exception of its compression.
+  /// Waits until the last image is compressed, and rethrows an exception of that compression.
   void finish() const {
     if (const std::shared_future<void> last = ahead(); last.valid()) last.get();
   }
 
-  /// See depth_store; these functions wait for the last image.
+  /// See `depth_store`. The following functions first wait until the last image is compressed.
   [[nodiscard]] orbis::result<void> get(std::uint64_t frame, orbis::image<std::uint16_t>& out) const {
     wait();
     const std::shared_lock lock{mutex_};
@@ -73,7 +73,7 @@ class keyframe_depths {
     const std::lock_guard lock{mutex_};
     store_.free_buffers();
   }
-  /// The error because of which images are in memory instead of the spill file; empty if there was none.
+  /// The spill file error that forced images to be kept in memory; empty if there was none.
   [[nodiscard]] std::optional<orbis::error> unspilled() const {
     wait();
     const std::shared_lock lock{mutex_};
@@ -98,13 +98,13 @@ class keyframe_depths {
   std::optional<orbis::error> unspilled_;
   bool background_;
   mutable std::mutex ahead_mutex_;
-  std::shared_future<void> ahead_;  // of the last image
+  std::shared_future<void> ahead_;  // compression of the last image
 };
 
-/// The images as the live map has them: without the pixels that its filters removed. Models `mapping::masks_depth`.
+/// The depth images of the live map, without the pixels that its filters removed. Models `mapping::masks_depth`.
 class live_depths {
  public:
-  /// @pre `all` contains every image before it is put here, and lives longer
+  /// @pre `all` contains each image before it is added here, and outlives this object
   explicit live_depths(keyframe_depths& all) : all_{&all} {}
   orbis::result<void> put(std::uint64_t frame, orbis::image_view<const std::uint16_t> pixels) {
     return all_->mask(frame, pixels);

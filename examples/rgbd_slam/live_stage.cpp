@@ -17,9 +17,9 @@ using pixels_view = orbis::camera::depth_view<std::uint16_t>;
 orbis::mapping::live_map_thread_options thread_options(const settings& s) {
   orbis::mapping::live_map_thread_options options;
   options.map.resolution = s.resolution;
-  options.correction_slice = std::chrono::milliseconds{2};  // the maximum time that a keyframe waits
+  options.correction_slice = std::chrono::milliseconds{2};  // maximum time for which a keyframe waits
   if (s.map_every_frame) options.map.max_frames = 90;
-  if (s.threads == 1) options.poll_interval = std::chrono::hours{24};  // callers that wait trigger the poll
+  if (s.threads == 1) options.poll_interval = std::chrono::hours{24};  // waiting callers trigger the poll
   options.moving.emplace();
   return options;
 }
@@ -94,7 +94,7 @@ void live_mapping::add(std::size_t frame, orbis::slam::map_keyframe keyframe, co
     made_.push_back({frame, keyframe});
   }
   live_.add_keyframe(frame, pixels_view{image.depth, depth_scale_}, T_world_camera);
-  // The map's thread may have removed the keyframe from made_ before it was in the map.
+  // The map's thread may have removed the keyframe from made_ before the keyframe was in the map.
   if (!find([&](const made& k) { return k.frame == frame; })) live_.remove(frame);
   if (waits_) live_.wait();
 }
@@ -155,10 +155,10 @@ std::vector<std::string> live_notes(const live_results& live) {
   };
   if (live.dropped != 0)
     notes.push_back(count(live.dropped, "keyframe") +
-                    " came in faster than the live map could insert them; the final map contains them");
+                    " arrived faster than the live map could insert them; the final map contains them");
   if (live.dropped_frames != 0)
     notes.push_back(count(live.dropped_frames, "frame") +
-                    " between keyframes came in faster than the live map could insert them, and were omitted");
+                    " between keyframes arrived faster than the live map could insert them, and were omitted");
   if (live.stopped)
     notes.push_back("the live map stopped: " + live.stopped->message + "; the octree is built at the end instead");
   else if (live.depth_error)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The live map: an octree into which keyframes are inserted when they are created, and which follows corrections of
+/// The live map: an octree into which keyframes are inserted as they are created, and which follows corrections by
 /// SLAM.
 #pragma once
 
@@ -40,40 +40,40 @@ class live_mapping {
   /// map, and returns true. Returns false if nothing changed since the last call and `always` is false.
   using find_poses = std::function<bool(const std::vector<made>&, poses&, bool always)>;
 
-  /// `where` is called on the map's thread until `stop`. `depths`: contains the depth images of keyframes before they
-  /// are added here; lives longer.
+  /// `where` is called on the map's thread until `stop`. `depths` contains the depth image of each keyframe before the
+  /// keyframe is added here, and outlives this object.
   live_mapping(const frame_source& source, const settings& s, keyframe_depths& depths, find_poses where);
 
-  /// Reports the number of the last tracked frame.
+  /// Sets the index of the last tracked frame.
   void tracked(std::size_t frame) { newest_ = frame; }
-  /// Adds frame number `frame`, which has become a keyframe.
+  /// Adds the frame with index `frame`, which has become a keyframe.
   void add(std::size_t frame, orbis::slam::map_keyframe keyframe, const orbis::se3& T_world_camera,
            const orbis::camera::rgbd_frame& image);
-  /// Adds the tracked frame number `frame`, which is not a keyframe; its pose follows the keyframe of frame
+  /// Adds the tracked frame with index `frame`, which is not a keyframe; its pose follows the keyframe of the frame
   /// `reference`.
   void add_frame(std::size_t frame, std::uint64_t reference, const orbis::se3& T_reference_camera,
                  const orbis::camera::rgbd_frame& image);
-  /// The frame of the newest keyframe for which `is_wanted(made)` is true.
+  /// The frame index of the newest keyframe for which `is_wanted(made)` is true.
   template <class IsWanted>
   [[nodiscard]] std::optional<std::uint64_t> find(const IsWanted& is_wanted) const {
     const std::lock_guard lock{mutex_};
     const auto k = std::find_if(made_.rbegin(), made_.rend(), is_wanted);
     return k == made_.rend() ? std::nullopt : std::optional{k->frame};
   }
-  /// Waits until the map corresponds to the current poses, or `leave` is called.
+  /// Waits until the map corresponds to the current poses or `leave` is called.
   void wait() { live_.wait(); }
-  /// Calls `where` no more, and lets the thread end after its running step. Does not wait for that step. May be called
-  /// from any thread.
+  /// Stops calling `where`, and lets the thread end after its current step without waiting for it. May be called from
+  /// any thread.
   void leave();
 
   /// The measurements so far. May be called from any thread.
   [[nodiscard]] live_results so_far() const;
-  /// Fills in the occupied leaves of the newest map, without colours, and sets `seen` to its revision. Returns false,
-  /// and changes nothing, if it is still the revision `seen`, or a signal has asked the run to stop. May be called from
-  /// any thread; does not wait for the map. O(leaves).
+  /// Fills in the occupied leaves of the newest map, without colours, and sets `seen` to its revision. Returns false
+  /// and changes nothing if `seen` is still the current revision, or if a signal has requested the run to stop. May be
+  /// called from any thread; does not wait for the map. O(leaves).
   [[nodiscard]] bool occupied_since(std::optional<std::uint64_t>& seen, std::vector<voxel>& cubes) const;
 
-  /// Ends the thread, which may take as long as its running step. Returns the map; null if it failed.
+  /// Ends the thread, which may take as long as its current step. Returns the map; null if mapping failed.
   [[nodiscard]] live_octree* stop();
 
  private:

@@ -15,9 +15,9 @@
 
 namespace {
 
-/// Returns large blocks to the system as soon as they are freed, and makes threads share heaps. Otherwise fragments
-/// left by tracking would be half of the memory during mapping. The heap itself shrinks in steps of several images;
-/// otherwise every image would fault its pages in again.
+/// Returns large blocks to the system as soon as they are freed, and makes threads share heaps. Otherwise, fragments
+/// left by tracking would be half of the memory during mapping. The heap itself shrinks in steps of several images,
+/// because otherwise every image would cause page faults again.
 void set_up_memory() {
 #ifdef __GLIBC__
   mallopt(M_MMAP_THRESHOLD, 1 << 20);

@@ -23,14 +23,14 @@ struct eye {
   vec3 position, right, down, forward;
   double focal, cx, cy;
 
-  [[nodiscard]] vec3 see(const vec3& p) const {  // pixel and depth
+  [[nodiscard]] vec3 see(const vec3& p) const {  // returns the pixel and the depth
     const vec3 d = p - position;
     const double z = forward.dot(d);
     return {cx + focal * right.dot(d) / z, cy + focal * down.dot(d) / z, z};
   }
 };
 
-/// The camera at azimuth and elevation (radians) from the points, at the smallest distance at which all are visible.
+/// A camera at an azimuth and elevation (radians) from the points, at the smallest distance at which all are visible.
 eye look_at(const std::vector<vec3>& points, double azimuth, double elevation, double field, int width, int height) {
   eye e;
   e.forward =
@@ -40,7 +40,8 @@ eye look_at(const std::vector<vec3>& points, double azimuth, double elevation, d
   e.focal = 0.5 * height / std::tan(0.5 * field);
   e.cx = 0.5 * width;
   e.cy = 0.5 * height;
-  // The centre of the points' bounds in the image: exact without perspective, close enough with it after a few rounds.
+  // The centre of the points' bounds in the image: exact without perspective, otherwise close enough after a few
+  // rounds.
   vec3 middle = vec3::Zero();
   for (const vec3& p : points) middle += p / static_cast<double>(points.size());
   for (int round = 0; round != 4; ++round) {
@@ -69,14 +70,14 @@ class picture {
  public:
   picture(int width, int height) : color_(width, height, paper), inverse_depth_(width, height, 0.0F) {}
 
-  /// A convex quadrilateral, its corners as pixel and depth.
+  /// Draws a convex quadrilateral; each corner is a pixel and a depth.
   void quad(const std::array<vec3, 4>& c, rgb8 color) {
     triangle(c[0], c[1], c[2], color);
     triangle(c[0], c[2], c[3], color);
   }
 
-  /// Darkens pixels behind their neighbours (eye-dome lighting: C. Boucheny, "Interactive
-  /// scientific visualization of large datasets", 2009), and averages `oversampling` squared pixels.
+  /// Darkens pixels behind their neighbours (eye-dome lighting: C. Boucheny, "Interactive scientific visualization of
+  /// large datasets", 2009), and averages blocks of `oversampling` x `oversampling` pixels.
   [[nodiscard]] orbis::image<rgb8> finish() const {
     orbis::image<rgb8> out(color_.width() / oversampling, color_.height() / oversampling);
     constexpr int n = oversampling;
@@ -95,7 +96,7 @@ class picture {
             sum[1] += s * c.g;
             sum[2] += s * c.b;
           }
-        const auto byte = [](double v) {  // rounded; std::lround is a call
+        const auto byte = [](double v) {  // rounds; std::lround would be a function call
           const double mean = v / (n * n);
           const auto whole = static_cast<std::uint8_t>(mean);
           return static_cast<std::uint8_t>(whole + (mean - whole >= 0.5 ? 1 : 0));
@@ -120,7 +121,7 @@ class picture {
       for (int x = x0; x <= x1; ++x) {
         const double of_a = (b.x() - x) * (c.y() - y) - (b.y() - y) * (c.x() - x);
         const double of_b = (c.x() - x) * (a.y() - y) - (c.y() - y) * (a.x() - x);
-        if (of_a * area < 0 || of_b * area < 0) continue;  // most pixels: without a division
+        if (of_a * area < 0 || of_b * area < 0) continue;  // avoids a division for most pixels
         const double u = of_a / area, v = of_b / area;
         const double w = 1.0 - u - v;
         if (w < 0) continue;
@@ -167,7 +168,7 @@ rgb8 lit(rgb8 c, double light) {
 /// Returns true if the point is neither above the cut nor an outlier below the floor.
 bool is_shown(const vec3& p, const view_frame& frame) { return p.z() <= frame.cut && p.z() >= frame.low.z() - 0.5; }
 
-/// The points that a view must contain: the drawn voxels without outliers.
+/// The points that a view must contain: the drawn voxels, excluding outliers.
 std::vector<vec3> framed(const std::vector<voxel>& voxels, const view_frame& frame) {
   std::vector<vec3> points;
   for (const voxel& v : voxels) {
@@ -179,7 +180,7 @@ std::vector<vec3> framed(const std::vector<voxel>& voxels, const view_frame& fra
   return points;
 }
 
-/// The voxels with neighbours of the same size that are drawn as well: the faces between them are hidden.
+/// Finds faces that are hidden because the neighbouring voxel of the same size is drawn as well.
 class drawn_voxels {
  public:
   drawn_voxels(const std::vector<voxel>& voxels, const view_frame& frame) {
@@ -194,7 +195,7 @@ class drawn_voxels {
   }
 
  private:
-  using key_type = std::array<long, 4>;  // bits of the size, and the index along each axis
+  using key_type = std::array<long, 4>;  // bits of the size, and the indices along the axes
   static key_type key(const voxel& v) {
     const auto index = [&](int axis) { return std::lround(v.center[axis] / v.size - 0.5F); };
     return {std::bit_cast<std::int32_t>(v.size), index(0), index(1), index(2)};
@@ -205,7 +206,7 @@ class drawn_voxels {
 orbis::image<rgb8> draw(const std::vector<voxel>& voxels, const view_frame& frame, coloring how, const eye& e,
                         int width, int height) {
   picture canvas{width * oversampling, height * oversampling};
-  // Cubes are aligned with the world; the columns of the rotation are their axes in the view.
+  // Cubes are aligned with the world axes, which are the columns of the rotation in the view.
   const orbis::mat3 axes = frame.T_view_world.rotation_matrix();
   const drawn_voxels drawn{voxels, frame};
   for (const voxel& v : voxels) {
@@ -217,7 +218,7 @@ orbis::image<rgb8> draw(const std::vector<voxel>& voxels, const view_frame& fram
       const vec3 half = 0.5 * static_cast<double>(v.size) * axes.col(axis);
       const double side = half.dot(e.position - center) > 0 ? 1.0 : -1.0;  // only one of two opposite faces is visible
       const vec3 face = center + side * half;
-      if ((e.position - face).dot(side * half) <= 0) continue;  // the camera is between the two
+      if ((e.position - face).dot(side * half) <= 0) continue;  // the camera is between the two faces
       if (drawn.contain_neighbor(v, axis, side > 0 ? 1 : -1)) continue;
       const vec3 u = 0.5 * static_cast<double>(v.size) * axes.col((axis + 1) % 3);
       const vec3 w = 0.5 * static_cast<double>(v.size) * axes.col((axis + 2) % 3);

@@ -14,8 +14,8 @@ namespace app {
 
 enum class coloring { camera, height };
 
-/// Draws an oblique perspective view. Voxels above `frame.cut` are omitted. The view fits `in_view`: pictures with the
-/// same `in_view` have the same view.
+/// Draws an oblique perspective view. Voxels above `frame.cut` are omitted. The view is fitted to `in_view`, so that
+/// pictures with the same `in_view` have the same view.
 [[nodiscard]] orbis::image<orbis::rgb8> draw_aslant(const std::vector<voxel>& voxels, const std::vector<voxel>& in_view,
                                                     const view_frame& frame, coloring how, int width, int height);
 /// Draws a view from above; the frame's y axis points up.

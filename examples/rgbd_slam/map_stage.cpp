@@ -20,7 +20,7 @@ using orbis::result;
 using orbis::vec3f;
 using tree = orbis::octree::occupancy_octree<>;
 
-/// Returns memory to the system that was freed in small pieces.
+/// Returns memory that was freed in small pieces to the system.
 void give_back_memory() {
 #ifdef __GLIBC__
   malloc_trim(0);
@@ -32,7 +32,7 @@ std::string describe(const built_map& map) {
          std::string{to_string(map.filter.mode)} + ", octree of " + count_text(map.octree.num_leaves()) + " leaves";
 }
 
-/// The first part of the reason for the removed points.
+/// The first part of the explanation why points were removed.
 std::string describe(const orbis::mapping::moving_count& moving) {
   if (moving.pixels == 0) return {};
   return std::to_string(moving.pixels) + " pixels of " + std::to_string(moving.keyframes) +
@@ -40,7 +40,7 @@ std::string describe(const orbis::mapping::moving_count& moving) {
          " moved objects (rays of other keyframes pass through them) and were removed; ";
 }
 
-/// Marks the voxels of the points as occupied.
+/// An octree in which the voxels of the points are occupied.
 tree occupied_only(const std::vector<vec3f>& points, double resolution) {
   tree map{resolution};
   for (const vec3f& p : points)
@@ -54,7 +54,7 @@ tree_numbers describe_tree(const tree& map, std::uintmax_t bytes) {
   return {n.leaves, n.occupied_leaves, n.free_leaves, bytes};
 }
 
-/// The occupied leaves with the mean colour of their points; of the points `only`, if given.
+/// The occupied leaves with the mean colour of their points, or only of the points with the indices `only`.
 std::vector<voxel> occupied_voxels(const tree& map, const orbis::point_cloud& cloud,
                                    const std::vector<std::uint32_t>* only = nullptr) {
   voxel_colors colors{map.resolution()};
@@ -79,8 +79,8 @@ orbis::mapping::dense_options dense_options(const frame_source& source, const se
   orbis::mapping::dense_options options;
   options.stride = point_stride;
   options.max_depth = static_cast<float>(source.depth_limit(s));
-  // Finer than the octree's voxels, so that these contain every surface; memory grows with the visible surface, not
-  // with the duration.
+  // Finer than the octree's voxels, so that the octree contains every surface; memory is proportional to the visible
+  // surface, not to the duration.
   options.voxel_size = s.resolution / 5;
   options.flying_pixels.emplace();
   return options;
@@ -96,10 +96,10 @@ result<built_map> map_frames(const posed_frames& frames, const frame_source& sou
   const auto policy = orbis::par.on(threads);
   const auto shown = console.progress();
   const auto progress = [&](std::size_t done, std::size_t total) {
-    if (done % frames.size() == 0) give_back_memory();  // of a pass over the frames
+    if (done % frames.size() == 0) give_back_memory();  // used by a pass over the frames
     return shown(done, total);
   };
-  give_back_memory();  // of tracking
+  give_back_memory();  // used by tracking
   auto map = live != nullptr ? orbis::mapping::build_map(policy, frames, *live, options, progress)
                              : orbis::mapping::build_map(policy, frames, source.camera.model, options, progress);
   if (frames.read_error()) return orbis::fail(*frames.read_error());  // the map would be incomplete

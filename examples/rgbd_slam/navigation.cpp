@@ -32,7 +32,7 @@ struct way {
   nav::found_path path;
 };
 
-/// Positions on the camera's path and along its optical axis where the robot fits; on the floor for a driving robot.
+/// Positions on the camera's path and along its optical axis where the robot fits, on the floor for a driving robot.
 template <nav::planning_space View>
 std::vector<vec3> free_places(const View& view, const orbis::trajectory& cameras) {
   std::vector<vec3> places;
@@ -44,7 +44,8 @@ std::vector<vec3> free_places(const View& view, const orbis::trajectory& cameras
   return places;
 }
 
-/// A path from the first of these places to the farthest reachable of a few; preferably one that is not straight.
+/// A path from the first of these places to the farthest reachable one of a few, preferably a path that is not
+/// straight.
 template <nav::planning_space View>
 std::optional<way> plan_through(const View& view, const std::vector<vec3>& places) {
   if (places.size() < 2) return std::nullopt;
@@ -88,7 +89,7 @@ orbis::result<navigation_results> navigate(const octree& map, const orbis::traje
     if (!saved) {
       r.unsaved = {saved.error().code, s.floor_map.string(),
                    (floor ? "" : "there is no floor map to write: ") + saved.error().message};
-      std::error_code ignored;  // the image without the file is of no use
+      std::error_code ignored;  // the image is useless without the file
       std::filesystem::remove(std::filesystem::path{floor_file}.replace_extension(".pgm"), ignored);
     }
   }
@@ -107,7 +108,7 @@ orbis::result<navigation_results> navigate(const octree& map, const orbis::traje
     r.path_m = found->path.length;
     r.straight_m = (found->to - found->from).norm();
   };
-  if (floor && r.free_m2 > 0.0) {  // a path on the floor, if it is more than a few steps; otherwise a flight
+  if (floor && r.free_m2 > 0.0) {  // a path on the floor if it is longer than a few steps, otherwise a flight
     const nav::floor_view on_floor{*floor, s.robot_radius};
     const auto found = plan_through(on_floor, free_places(on_floor, cameras));
     if (found && (found->to - found->from).norm() >= 5.0 * s.robot_radius) note(found, true);

@@ -19,8 +19,8 @@ using orbis::vec3;
 using orbis::octree::occupancy;
 
 constexpr rgb8 dark{28, 32, 40}, nothing{205, 206, 208};
-constexpr rgb8 white{255, 255, 255}, costly{250, 190, 140}, too_near{235, 150, 120};  // of the floor
-constexpr rgb8 at_obstacle{120, 60, 140}, far_off{235, 245, 250};                     // of the slice
+constexpr rgb8 white{255, 255, 255}, costly{250, 190, 140}, too_near{235, 150, 120};  // on the floor
+constexpr rgb8 at_obstacle{120, 60, 140}, far_off{235, 245, 250};                     // in the slice
 const cv::Scalar start_color{22, 140, 80};
 
 cv::Scalar on_sheet(rgb8 c) { return {static_cast<double>(c.r), static_cast<double>(c.g), static_cast<double>(c.b)}; }
@@ -52,7 +52,7 @@ struct window {
   vec2 low, high;
 };
 
-/// The window of the floor map, or of all known space.
+/// The window around the floor map, or around all known space.
 window find_window(const navigation_picture& what) {
   if (what.floor != nullptr) {
     const auto& f = *what.floor;
@@ -148,7 +148,7 @@ orbis::result<void> write_navigation_picture(const navigation_picture& what, con
     std::snprintf(text, sizeof text, "distance to obstacles at a height of %.2f m, 0 to %.1f m", what.height,
                   what.field->reach());
     panel(x, text, draw_slice(what, w, width, height), what.floor == nullptr || !what.drives,
-          {{at_obstacle, "at an obstacle"}, {far_off, "far from any"}});
+          {{at_obstacle, "at an obstacle"}, {far_off, "far from obstacles"}});
   }
   return s.write(path);
 }

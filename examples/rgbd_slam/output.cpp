@@ -21,7 +21,7 @@ using orbis::result;
 
 namespace {
 
-/// Lists the files of this run and those that remain from earlier runs. `coming`: files that are not written yet.
+/// Lists the files of this run and the remaining files of earlier runs. `coming`: files that are not written yet.
 void list_files(results& r, const file_lists& files, file_names coming, console& console) {
   std::error_code ignored;
   for (std::filesystem::directory_iterator it{r.folder, ignored}, end; !ignored && it != end; it.increment(ignored))
@@ -31,7 +31,7 @@ void list_files(results& r, const file_lists& files, file_names coming, console&
   if (r.files_of_earlier_runs == known) return;
   std::string names;
   for (const std::string& name : r.files_of_earlier_runs) names += (names.empty() ? "" : ", ") + name;
-  console.warn(r.warnings.emplace_back("unchanged files of an earlier run: " + names));
+  console.warn(r.warnings.emplace_back("unchanged files from an earlier run: " + names));
 }
 
 }  // namespace

@@ -13,7 +13,7 @@
 
 namespace app {
 
-/// Creates the results with a description of input and settings for the report. Files are created in `folder`.
+/// Creates the results, with a description of input and settings for the report. Files are created in `folder`.
 [[nodiscard]] results begin_results(const settings& s, const std::string& title, const frame_source* source,
                                     const std::filesystem::path& folder);
 
@@ -29,8 +29,8 @@ namespace app {
 [[nodiscard]] orbis::result<void> write_summary_only(results& r, const file_lists& files, console& console);
 /// The error of a run in which no frame could start tracking.
 [[nodiscard]] orbis::error explain_no_start(const results& r, const settings& s);
-/// Ends a run in which no frame was tracked: writes summary.json, prints `why`, returns `code` (or bad_input if writing
-/// fails).
+/// Ends a run in which no frame was tracked: writes summary.json, prints `why`, and returns `code` (or bad_input if
+/// writing fails).
 [[nodiscard]] exit_code report_no_start(results& r, const orbis::error& why, exit_code code, result_files& files,
                                         console& console);
 /// Prints the tables of results and the path of the report.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// The commands run, demo and live. `run_slam` is the pipeline; the other files of this folder contain one step each.
+// The commands run, demo and live. `run_slam` is the pipeline; the other files in this folder contain one step each.
 #include <algorithm>
 #include <cstdio>
 #include <exception>
@@ -26,7 +26,7 @@
 namespace app {
 namespace {
 
-/// Ends the run if it would overwrite a file that it must not replace, or cannot write its results.
+/// Ends the run if it would overwrite a file that it must not replace, or if it cannot write its results.
 std::optional<exit_code> check_outputs(const frame_source& source, const settings& s, console& console) {
   if (const auto conflict = find_overwritten(s, input_files(s, source.files)))
     return console.error(*conflict), bad_usage;
@@ -34,7 +34,7 @@ std::optional<exit_code> check_outputs(const frame_source& source, const setting
   return std::nullopt;
 }
 
-/// Copies the results of tracking and their warnings to `r`.
+/// Copies the tracking results and their warnings to `r`.
 void add_tracking(results& r, const tracked_frames& tracked, const frame_source& source, const settings& s,
                   console& console) {
   const auto warn = [&](std::string note) { console.warn(r.warnings.emplace_back(std::move(note))); };
@@ -50,7 +50,7 @@ void add_tracking(results& r, const tracked_frames& tracked, const frame_source&
   r.world = tracked.world;
 }
 
-/// Ends a run in which no frame was tracked. It writes summary.json, and nothing if the user interrupted it.
+/// Ends a run in which no frame was tracked. Writes summary.json, or nothing if the user interrupted the run.
 exit_code end_untracked(results& r, const tracked_frames& tracked, const frame_source& source, const settings& s,
                         result_files& files, console& console) {
   if (interrupts::stop_requested()) {
@@ -70,7 +70,7 @@ orbis::result<void> build_map(results& r, const tracked_frames& tracked, const f
   if (tracked.live) {
     live = tracked.live->stop();
     const auto known = live_notes(*std::exchange(r.live, tracked.live->so_far()));
-    for (std::string& note : live_notes(*r.live))  // of the map's last step
+    for (std::string& note : live_notes(*r.live))  // includes the map's last step
       if (std::find(known.begin(), known.end(), note) == known.end())
         console.warn(r.warnings.emplace_back(std::move(note)));
   }
@@ -100,15 +100,15 @@ orbis::result<void> complete(results& r, const tracked_frames& tracked, const fr
   return write_report_files(r, r.slam->keyframes, files, console);
 }
 
-/// The end of `complete_or_give_up`.
+/// The outcome of `complete_or_give_up`.
 struct completion {
-  bool was_interrupted;                ///< by the user, during tracking or since
-  std::optional<orbis::error> no_map;  ///< the results are without map: cancelled by the user, or out of memory
-  bool is_running = false;             ///< a thread still works on the map
+  bool was_interrupted;                ///< the user interrupted the run, during tracking or later
+  std::optional<orbis::error> no_map;  ///< the reason why there is no map: cancelled by the user, or out of memory
+  bool is_running = false;             ///< a thread is still working on the map
 };
 
-/// Completes the results and moves their files to the others. If the user gives the map up, or it does not fit in
-/// memory, leaves them as they are. Other errors are those of `complete`; no thread is then running.
+/// Completes the results and moves their files to the others. If the user abandons the map or it does not fit in
+/// memory, leaves the results as they are. Other errors are those of `complete`; no thread is then running.
 orbis::result<completion> complete_or_give_up(results& r, const tracked_frames& tracked, const frame_source& source,
                                               const settings& s, result_files& files, viewer& viewer,
                                               console& console) {
@@ -116,9 +116,9 @@ orbis::result<completion> complete_or_give_up(results& r, const tracked_frames& 
   if (auto begun = files.begin_optional(); !begun) return orbis::fail(begun.error());
   interrupts::begin_dispensable(
       s.quiet ? ""
-              : "\nrgbd_slam: stopping; the map is given up, the other results are written. Interrupt again to stop "
+              : "\nrgbd_slam: stopping; the map is abandoned, the other results are written. Interrupt again to stop "
                 "immediately and leave the folder unchanged\n");
-  // All that changes belongs to the other thread, so that it can be left alone.
+  // The other thread owns all data that it changes, so that it can be left running.
   results whole = r;
   whole.folder = files.optional_folder();
   auto done = run_dispensable([&tracked, &source, &s, &viewer, whole = std::move(whole), lists = files.lists(),
@@ -150,7 +150,7 @@ orbis::result<completion> complete_or_give_up(results& r, const tracked_frames& 
   return end;
 }
 
-/// Evaluates a run without map, and writes its report. If that fails, writes the summary only, if possible, so that it
+/// Evaluates a run without a map and writes its report. If that fails, writes only the summary, if possible, so that it
 /// describes the other files. Errors: write_failed; out of memory.
 orbis::result<void> report_without_map(results& r, const frame_source& source, const file_lists& files,
                                        console& console) {
@@ -169,7 +169,7 @@ orbis::result<void> report_without_map(results& r, const frame_source& source, c
   return written;
 }
 
-/// The exit code of a run that wrote its results; reports the error that limits them, if there is one.
+/// The exit code of a run that wrote its results; reports the error that limits the results, if there is one.
 exit_code end_tracked(const results& r, const tracked_frames& tracked, const completion& end,
                       const frame_source& source, const settings& s, console& console) {
   if (tracked.stopped) return console.error(explain_stop(tracked, source)), bad_input;
@@ -205,7 +205,6 @@ exit_code finish_run(results& r, const tracked_frames& tracked, completion& end,
 exit_code run_slam(const settings& s, console& console) {
   const auto give_up = [&](const orbis::error& e) { return console.error(e), bad_input; };
 
-  // Open the input.
   auto source = open_source(s, console);
   if (!source) return give_up(source.error());
   if (const auto code = check_outputs(*source, s, console)) return *code;
@@ -234,15 +233,15 @@ exit_code run_slam(const settings& s, console& console) {
   auto end = complete_or_give_up(r, *tracked, *source, s, *files, *shown, console);
   if (!end) return give_up(end.error());
   if (!end->is_running) {
-    if (end->no_map) tracked->live.reset();  // its memory
+    if (end->no_map) tracked->live.reset();  // frees memory
     return finish_run(r, *tracked, *end, *source, s, *files, *shown, console);
   }
-  // The thread uses the objects of this function, which must not return.
+  // The thread uses objects of this function, which therefore must not return.
   exit_code code = bad_input;
   try {
     code = finish_run(r, *tracked, *end, *source, s, *files, *shown, console);
   } catch (const std::exception& e) {
-    std::fprintf(stderr, "rgbd_slam: %s\n", e.what());  // takes no memory
+    std::fprintf(stderr, "rgbd_slam: %s\n", e.what());  // allocates no memory
   } catch (...) {
   }
   interrupts::end_program(code);

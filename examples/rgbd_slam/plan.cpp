@@ -43,7 +43,7 @@ using octree = orbis::octree::occupancy_octree<>;
 using orbis::vec3;
 using orbis::octree::occupancy;
 
-/// Reads a .bt or .ot map, by its first bytes.
+/// Reads a .bt or .ot map, which the first bytes distinguish.
 orbis::result<octree> read_map(const std::filesystem::path& path) {
   const auto bytes = orbis::read_file(path);
   if (!bytes) return orbis::fail(bytes.error());
@@ -77,7 +77,7 @@ std::optional<orbis::error> find_conflict(const settings& s) {
   return find_overwritten({s.out, s.picture}, {s.input});
 }
 
-/// Contains all known space, the start and the goal, and bounds the search for an unreachable goal.
+/// A box that contains all known space, the start and the goal, and limits the search for an unreachable goal.
 orbis::octree::bounding_box box_to_search(const octree& map, const settings& s) {
   constexpr double inf = std::numeric_limits<double>::infinity();
   orbis::octree::bounding_box box{vec3::Constant(inf), vec3::Constant(-inf)};
@@ -92,8 +92,8 @@ orbis::octree::bounding_box box_to_search(const octree& map, const settings& s) 
   return {(box.min.array() - margin).matrix(), (box.max.array() + margin).matrix()};
 }
 
-/// The memory that the distance field may take, in bytes: that of all blocks of the size of its reach that contain an
-/// obstacle or are next to one. O(leaves).
+/// The maximum memory of the distance field in bytes: that of all blocks, as large as the field's reach, that contain
+/// an obstacle or are next to one. O(leaves).
 double most_field_bytes(const octree& map, double reach) {
   const auto block_of = [&](double x) { return static_cast<std::int64_t>(std::floor(x / reach)); };
   std::set<std::array<std::int64_t, 3>> occupied, near;
@@ -125,7 +125,7 @@ bool is_only_unknown(const octree& map, const settings& s, const vec3& p) {
                        : !overlaps(map, orbis::octree::capsule{p, p, s.robot_radius}, known);
 }
 
-/// Describes what the robot touches at `p`, where it is blocked: the nearest obstacle, or else unknown space.
+/// Describes what blocks the robot at `p`: the nearest obstacle, or else unknown space.
 std::string describe_blocker(const octree& map, const settings& s, const vec3& p) {
   if (is_only_unknown(map, s, p)) return " by unknown space alone (--unknown free treats it as free)";
   double least = std::numeric_limits<double>::infinity();
@@ -142,7 +142,7 @@ std::string describe_blocker(const octree& map, const settings& s, const vec3& p
   return text(" by an obstacle at %.3f,%.3f,%.3f", nearest.x(), nearest.y(), nearest.z());
 }
 
-/// The same for a robot that drives. Cells of the floor are obstacles, unknown, or outside the floor map.
+/// Describes the cell that blocks a driving robot at `p`: an obstacle, unknown space, or space outside the floor map.
 std::string describe_blocker(const nav::floor_map& floor, const settings& s, const vec3& p) {
   struct blocker {
     double distance = std::numeric_limits<double>::infinity();  // from `p` to the cell
@@ -166,7 +166,7 @@ std::string describe_blocker(const nav::floor_map& floor, const settings& s, con
   return std::string{" by unknown space alone, outside the floor map"} + remedy;
 }
 
-/// The free position nearest to `p`, of the centres of cells within 2 m; empty if there is none.
+/// The free position nearest to `p` among the centres of cells within 2 m; empty if there is none.
 template <nav::planning_space Space>
 std::optional<vec3> nearest_free(const Space& space, const vec3& p) {
   const auto middle = space.key(space.clamped(p));
@@ -176,7 +176,7 @@ std::optional<vec3> nearest_free(const Space& space, const vec3& p) {
   double least = std::numeric_limits<double>::infinity();
   std::optional<vec3> nearest;
   const auto shifted = [](std::uint32_t k, int by) { return k + static_cast<std::uint32_t>(by); };
-  for (int r = 0; r <= farthest && (r - 0.5) * cell < least; ++r) {  // cells on a cube's surface around the middle
+  for (int r = 0; r <= farthest && (r - 0.5) * cell < least; ++r) {  // cells on the surface of a cube around the middle
     const int rz = Space::dimensions == 3 ? r : 0;
     for (int dz = -rz; dz <= rz; ++dz)
       for (int dy = -r; dy <= r; ++dy) {
@@ -195,7 +195,7 @@ std::optional<vec3> nearest_free(const Space& space, const vec3& p) {
   return nearest;
 }
 
-/// The reason why there is no path, and how near the robot comes to the goal.
+/// The reason why there is no path, and the distance from the goal that the robot can reach.
 template <nav::planning_space Space, class Map>
 std::string explain(const nav::found_path& path, const Space& space, const Map& map, const settings& s) {
   using enum nav::path_status;
@@ -266,7 +266,7 @@ exit_code plan(const settings& s, console& console) {
       return give_up(
           {orbis::errc::invalid_argument, s.input.string(),
            text("the distances around its obstacles, up to %.2f m in voxels of %g mm, may take %.1f GB, more "
-                "than there is",
+                "than the available memory",
                 reach, 1000 * cell, 1e-9 * most)});
     field.emplace(*map, nav::distance_field_options{.reach = reach, .unknown = unknown});
   }

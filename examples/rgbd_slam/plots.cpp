@@ -18,7 +18,7 @@ namespace {
 using orbis::vec2;
 using orbis::vec3;
 
-/// Writes the difference to the frame of the files below a picture, if there is one.
+/// Writes a note below a picture if its frame differs from the frame of the files.
 void add_frame_note(sheet& s, const results& r, const view_frame& frame) {
   const std::string note = view_frame_note(frame, r.slam ? r.slam->unit() : "metres");
   if (!note.empty()) s.text(note, {60, 806}, faint, 11);
@@ -144,7 +144,7 @@ orbis::result<void> write_filter_picture(const results& r, const view_frame& fra
 }  // namespace
 
 orbis::result<void> write_pictures(const results& r, const view_frame& frame) {
-  cv::setNumThreads(0);  // little work; a run must not fail here if no threads can be created
+  cv::setNumThreads(0);  // there is little work, and a run must not fail here if no thread can be created
   if (auto done = write_trajectory_picture(r, frame); !done) return done;
   if (!r.map) return {};
   const map_results& m = *r.map;

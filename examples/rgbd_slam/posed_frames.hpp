@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The frames of a map, as a multi-pass range of keyframes. Depth is stored compressed. Colour, which is needed once
-/// and only for the pixels that become points, is stored in a file, or read again if the file would be too large. One
-/// frame at a time is unpacked, and the next one on another thread.
+/// The frames of a map, as a multi-pass range of keyframes. Depth is stored compressed. Colour, which is needed only
+/// once and only for the pixels that become points, is stored in a file, or read again if the file would be too large.
+/// One frame at a time is unpacked, while another thread unpacks the next one.
 #pragma once
 
 #include <cstddef>
@@ -28,10 +28,10 @@
 
 namespace app {
 
-/// The name of the spill file in the folder of new files. The file is unlinked once it is open.
+/// The name of the spill file in the folder of new files. The file is unlinked as soon as it is open.
 inline constexpr const char* spill_name = ".rgbd_slam.depths";  // no result may have this name
 
-/// Every second pixel of every second row becomes a point.
+/// Distance in pixels between the rows and columns whose pixels become points.
 inline constexpr int point_stride = 2;
 
 /// The maximum size of the colour file if colours can be read again.
@@ -40,7 +40,7 @@ inline constexpr std::uint64_t most_color_bytes = std::uint64_t{256} << 20U;
 class posed_frames {
   struct unpacked {
     orbis::image<std::uint16_t> depth;
-    std::optional<orbis::image<orbis::rgb8>> color;  // after the first access
+    std::optional<orbis::image<orbis::rgb8>> color;  // set by the first access
     std::optional<orbis::error> error;
   };
 
@@ -55,13 +55,13 @@ class posed_frames {
         colors_{spill_file.string() + ".colors", point_stride,
                 source.made ? std::numeric_limits<std::uint64_t>::max() : most_color_bytes} {}
 
-  /// Adds frame number `i` of the source with its pose. `corrected_by`: see below.
+  /// Adds frame `i` of the source with its pose. `corrected_by`: as in the overload for keyframes.
   void add(std::size_t i, const orbis::se3& T_world_camera, const orbis::slam::frame_motion& corrected_by,
            const orbis::camera::rgbd_frame& frame) {
     add({i, {}, T_world_camera, corrected_by}, frame);
   }
-  /// Adds frame number `i` of the source, a keyframe whose pose `place` sets later. `corrected_by`: the motion by which
-  /// its images were corrected; none: they are the source's images.
+  /// Adds frame `i` of the source, a keyframe whose pose is set later by `place`. `corrected_by`: the motion by which
+  /// its images were corrected; without a motion, they are the source's images.
   void add(std::size_t i, orbis::slam::map_keyframe keyframe, const orbis::slam::frame_motion& corrected_by,
            const orbis::camera::rgbd_frame& frame) {
     add({i, keyframe, {}, corrected_by}, frame);
@@ -81,7 +81,7 @@ class posed_frames {
 
   [[nodiscard]] std::size_t size() const { return entries_.size(); }
   [[nodiscard]] orbis::trajectory trajectory() const {
-    orbis::trajectory poses;  // frame numbers as timestamps, which are not used
+    orbis::trajectory poses;  // with frame numbers instead of time stamps, which are not used
     for (const entry& e : entries_) poses.push_back({static_cast<double>(e.index), e.T_world_camera});
     return poses;
   }
@@ -107,7 +107,7 @@ class posed_frames {
     orbis::camera::depth_view<std::uint16_t> depth;
     colors color;
     orbis::se3 T_world_camera;
-    std::uint64_t frame;  // its number in the source
+    std::uint64_t frame;  // index in the source
   };
 
   class iterator {
@@ -149,11 +149,11 @@ class posed_frames {
   }
   [[nodiscard]] iterator end() const { return {*this, size()}; }
 
-  /// The error because of which depth images are in memory instead of the spill file; empty if there was none.
+  /// The spill file error that forced depth images to be kept in memory; empty if there was none.
   [[nodiscard]] std::optional<orbis::error> unspilled() const { return depths_->unspilled(); }
-  /// The depth images; the live map shares them.
+  /// The depth images, which are shared with the live map.
   [[nodiscard]] keyframe_depths& depths() const { return *depths_; }
-  /// The last error of reading an image, which then had no pixels; empty if there was none.
+  /// The last error in reading an image, which was then left without pixels; empty if there was none.
   [[nodiscard]] const std::optional<orbis::error>& read_error() const { return read_error_; }
 
  private:
@@ -169,7 +169,7 @@ class posed_frames {
     depths_->put(e.index, frame.depth);
     colors_.put(e.index, frame.color);
   }
-  /// The images of entry `number`, from the other thread if it has read them.
+  /// The images of entry `number`, taken from the other thread if that has read them.
   [[nodiscard]] std::shared_ptr<unpacked> unpack(std::size_t number) const {
     std::shared_ptr<unpacked> images;
     if (ahead_.valid()) {

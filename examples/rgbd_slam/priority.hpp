@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Priorities of background threads, so that tracking comes first if there are fewer cores than threads.
+/// Priorities of background threads, so that tracking takes precedence if there are fewer cores than threads.
 #pragma once
 
 #ifdef __linux__
@@ -11,10 +11,10 @@
 
 namespace app {
 
-inline constexpr int live_map_niceness = 3;  ///< keyframes should be in the map soon
-inline constexpr int viewer_niceness = 10;   ///< may skip frames; takes no lock that tracking waits for
+inline constexpr int live_map_niceness = 3;  ///< keyframes should appear in the map soon
+inline constexpr int viewer_niceness = 10;   ///< may skip frames; holds no lock for which tracking waits
 
-/// Reduces this thread's share of a busy processor by a fifth per step.
+/// Reduces this thread's share of a busy processor by one fifth per step of niceness.
 inline void lower_priority([[maybe_unused]] int niceness) {
 #ifdef __linux__  // niceness is a property of the thread there, not of the process
   const auto thread = static_cast<id_t>(::syscall(SYS_gettid));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// `--profile`: sets of defaults.
+/// The profiles of the option `--profile`: sets of defaults.
 #pragma once
 
 #include <cstddef>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// report.html: a self-contained page.
+/// Writes report.html, a self-contained page.
 #pragma once
 
 #include <orbis/core/result.hpp>

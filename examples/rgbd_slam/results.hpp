@@ -22,7 +22,7 @@
 
 namespace app {
 
-/// Median, 95th percentile and mean of a list; NaN if it is empty.
+/// Median, 95th percentile and mean of a list; NaN for an empty list.
 struct spread {
   double median, p95, mean;
 };
@@ -63,18 +63,18 @@ struct compared_pose {
 struct accuracy {
   double ate_rmse_m, ate_mean_m, ate_median_m, ate_max_m;
   std::optional<double> rpe_trans_rmse_m, rpe_rot_rmse_deg;
-  std::string no_rpe;  ///< the reason if there is no RPE
+  std::string no_rpe;  ///< the reason why there is no RPE, if so
   bool truth_lacks_orientations = false;
   std::vector<compared_pose> poses;
-  double scale = 1.0;           ///< metres of the ground truth per unit of length of the estimate
-  orbis::se3 T_truth_estimate;  ///< aligns the estimate with the ground truth by positions (ATE)
-  orbis::se3 T_truth_map;       ///< aligns them by positions and orientations: well determined even on a short path
+  double scale = 1.0;           ///< metres in the ground truth per unit of length in the estimate
+  orbis::se3 T_truth_estimate;  ///< alignment of the estimate with the ground truth by positions (for the ATE)
+  orbis::se3 T_truth_map;       ///< alignment by positions and orientations: well determined even for a short path
 };
 
-/// The world frame of trajectory, clouds and maps. Its z axis is up.
+/// The world frame of trajectory, clouds and maps. Its z axis points up.
 struct world_results {
   std::string up_from;               ///< "gravity", "floor", "walls", "assumed", "ground truth" or "loaded map"
-  std::optional<double> confidence;  ///< of the estimate from the first depth image, 0 ... 1
+  std::optional<double> confidence;  ///< confidence of the estimate from the first depth image, 0 ... 1
 };
 
 /// The camera's shutter.
@@ -87,24 +87,24 @@ struct shutter_results {
 
 /// The camera intrinsics of the run, pixels.
 struct intrinsics_results {
-  std::string from;  ///< "given", or "refined" with the recording
+  std::string from;  ///< "given" or "refined" (calibrated with the recording)
   double fx = 0.0, fy = 0.0, cx = 0.0, cy = 0.0;
 };
 
 struct slam_results {
-  double exposure = 0.0;  ///< of the colour images, estimated from their motion blur, seconds; 0: no blur
+  double exposure = 0.0;  ///< exposure time estimated from the motion blur of the colour images, seconds; 0: no blur
   orbis::slam::sensor_kind sensor = orbis::slam::sensor_kind::rgbd;
   std::size_t keyframes_made = 0;
   /// The unit of lengths, for display.
   [[nodiscard]] const char* unit() const { return sensor == orbis::slam::sensor_kind::monocular ? "units" : "metres"; }
   std::size_t frames = 0, tracked = 0, lost = 0, relocalized = 0, landmarks = 0;
-  std::optional<std::size_t> dropped;  ///< frames of a camera that arrived while tracking was busy; empty: no camera
+  std::optional<std::size_t> dropped;  ///< frames of a live camera dropped while tracking was busy; empty: no camera
   std::size_t loops_closed = 0, maps_merged = 0, keyframes_culled = 0;
   shutter_results shutter;
   intrinsics_results intrinsics;
   frame_ranges lost_frames;
-  std::vector<double> tracking_ms;  ///< of each frame: time until tracking is ready for the next one
-  std::vector<double> slam_ms;      ///< of each frame: the part in SLAM
+  std::vector<double> tracking_ms;  ///< time per frame until tracking is ready for the next frame
+  std::vector<double> slam_ms;      ///< part of `tracking_ms` spent in SLAM, per frame
   double seconds = 0.0;             ///< total time of reading and tracking
   orbis::trajectory trajectory, keyframes;
   /// Trajectories of maps that were not merged with this one, each in a separate world frame, largest first.
@@ -113,40 +113,40 @@ struct slam_results {
 
 /// Measurements of the live map.
 struct live_results {
-  std::vector<double> insert_ms;            ///< of each keyframe: duration of the insertion
-  std::vector<double> delay_ms;             ///< of each keyframe: time from its creation to its insertion
-  std::size_t behind_frames_max = 0;        ///< maximum number of frames tracked before a keyframe's insertion
+  std::vector<double> insert_ms;            ///< time taken to insert each keyframe
+  std::vector<double> delay_ms;             ///< time from the creation of each keyframe to its insertion
+  std::size_t behind_frames_max = 0;        ///< maximum number of frames tracked between creation and insertion
   std::size_t frames = 0;                   ///< inserted frames between keyframes
-  std::vector<double> frame_delay_ms;       ///< of each of these, as delay_ms
+  std::vector<double> frame_delay_ms;       ///< time from the arrival of each of these frames to its insertion
   std::size_t dropped_frames = 0;           ///< frames between keyframes, dropped because the map was busy
   std::size_t refused_frames = 0;           ///< frames between keyframes whose keyframe was not in the map
-  std::vector<double> correction_ms;        ///< of each correction: duration of moving keyframes
+  std::vector<double> correction_ms;        ///< time taken by each correction to move keyframes
   std::size_t dropped = 0;                  ///< keyframes dropped because the map was busy; the final map contains them
-  std::optional<orbis::error> depth_error;  ///< error of storing or reading a depth image
+  std::optional<orbis::error> depth_error;  ///< error in storing or reading a depth image
   std::optional<orbis::error> stopped;      ///< error that stopped the map; the octree is then built at the end
 };
 
-/// The floor map and a path of a robot in the map.
+/// The floor map, and the path of a robot in the map.
 struct navigation_results {
   double robot_radius = 0.0;        ///< metres
-  std::optional<double> floor_m;    ///< height of the floor; empty: no floor was found
+  std::optional<double> floor_m;    ///< height of the floor; empty if no floor was found
   double free_m2 = 0.0;             ///< area in which the robot can drive
   std::string path_status;          ///< "found", or the reason why there is no path
   bool drives = false;              ///< the path is on the floor; otherwise it is that of a flying ball
   std::vector<orbis::vec3> path{};  ///< metres
   double path_m = 0.0, straight_m = 0.0, planning_ms = 0.0;
-  std::optional<orbis::error> unsaved;  ///< error of writing the requested floor map
+  std::optional<orbis::error> unsaved;  ///< error in writing the requested floor map
 };
 
 struct results {
   std::string command, title;
   std::string profile;                                     ///< one of `profile_names`
-  std::string images_of;                                   ///< as in `frame_source`
+  std::string images_of;                                   ///< see `frame_source::images_of`
   std::filesystem::path folder;                            ///< folder in which the files are created
   std::filesystem::path out;                               ///< output folder
   std::vector<std::string> files, files_of_earlier_runs;   ///< names of the files in `out` at the end
   std::vector<std::pair<std::string, std::string>> setup;  ///< description of input and settings
-  std::optional<world_results> world;                      ///< empty: that of a cloud, unchanged
+  std::optional<world_results> world;                      ///< empty for a cloud, whose world frame is unchanged
   orbis::vec3 origin = orbis::vec3::Zero();                ///< origin of the results in the input's coordinates, metres
   std::optional<slam_results> slam;
   std::optional<live_results> live;

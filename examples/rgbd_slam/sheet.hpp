@@ -45,11 +45,11 @@ class sheet {
     cv::putText(pixels_, what, from, cv::FONT_HERSHEY_SIMPLEX, font_scale(size), color, font_thickness(bold),
                 cv::LINE_AA);
   }
-  /// Draws a legend entry that begins at `p`; returns the beginning of the next one.
+  /// Draws a legend entry that begins at `p`; returns the start of the next entry.
   orbis::vec2 legend(const orbis::vec2& p, const cv::Scalar& color, const std::string& meaning) {
     constexpr double radius = 5.0, size = 11.5, to_text = 16.0, apart = 20.0;
     const orbis::vec2 middle = p + orbis::vec2(radius, -4.0);
-    dot(middle, faint, radius + 0.5);  // a rim, for colours that are almost white
+    dot(middle, faint, radius + 0.5);  // a rim makes colours visible that are almost white
     dot(middle, color, radius);
     text(meaning, p + orbis::vec2(to_text, 0.0), ink, size);
     return p + orbis::vec2(to_text + text_width(meaning, size) + apart, 0.0);
@@ -82,7 +82,7 @@ class sheet {
   cv::Mat pixels_;
 };
 
-/// A step of 1, 2 or 5 times a power of ten that divides `range` into about `parts` parts.
+/// A step size of 1, 2 or 5 times a power of ten that divides `range` into about `parts` parts.
 inline double nice_step(double range, int parts) {
   const double raw = std::max(range, 1e-9) / parts;
   const double power = std::pow(10.0, std::floor(std::log10(raw)));
@@ -97,7 +97,7 @@ inline std::string tick_text(double value, double step) {
   return buffer;
 }
 
-/// Axes in a part of a sheet.
+/// The axes of a plot in a part of a sheet.
 class axes {
  public:
   struct range {
@@ -148,7 +148,7 @@ class axes {
   }
 
  private:
-  /// The multiples of `step` in a range; few even if rounding makes adding the step ineffective.
+  /// The multiples of `step` in a range; their number is limited even if adding the step has no effect due to rounding.
   [[nodiscard]] static std::vector<double> ticks(const range& r, double step) {
     std::vector<double> at;
     const double first = std::ceil(r.low / step);

@@ -17,7 +17,7 @@ namespace app {
 struct camera_inspection {
   shutter_results shutter;
   std::optional<focal_doubt>
-      doubt;  ///< by the map of the first seconds, if they were tracked and a check was requested
+      doubt;  ///< from the map of the first seconds, if they were tracked and a check was requested
 };
 
 /// Takes the shutter from `--read-out-ms`, or else from the camera's settings, or else estimates it: tracks the first
@@ -25,12 +25,12 @@ struct camera_inspection {
 [[nodiscard]] camera_inspection find_shutter(const frame_source& source, const settings& s, bool checks_camera,
                                              console& console);
 
-/// The camera with that shutter, for a camera file. An estimate of zero is omitted: another recording may be
-/// conclusive.
+/// The camera with the given shutter, for a camera file. An estimate of zero is omitted, because another recording may
+/// be conclusive.
 [[nodiscard]] orbis::camera::camera_settings with_shutter(orbis::camera::camera_settings camera,
                                                           const shutter_results& shutter);
 
-/// A description, with the standard deviation of an estimate.
+/// A description of the shutter, with the standard deviation of an estimate.
 [[nodiscard]] std::string describe(const shutter_results& shutter);
 
 }  // namespace app

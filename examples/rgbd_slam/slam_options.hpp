@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The options of SLAM that follow from the camera.
+/// The SLAM options that depend on the camera.
 #pragma once
 
 #include <optional>

@@ -39,19 +39,18 @@ using orbis::slam::sensor_kind;
 
 constexpr const char* camera_request = "specify a camera";
 
-/// Adds the name of the option to a reader's request for a camera.
+/// Adds the command-line option to a reader's request for a camera.
 orbis::error with_option(orbis::error e) {
   if (e.message.ends_with(camera_request))
     e.message +=
         " with --camera, which takes a file (camera.toml; JSON or YAML of Open3D, ROS, RealSense, ORB-SLAM) or "
         "tum_fr1, tum_fr2, tum_fr3, icl, kinect";
   if (e.code == orbis::errc::not_found && e.where.ends_with("depth.txt"))
-    e.message +=
-        ". --format folders pairs the images in rgb/ and depth/ by their names; --sensor mono does without depth";
+    e.message += ". --format folders pairs the images in rgb/ and depth/ by their names; --sensor mono needs no depth";
   return e;
 }
 
-/// The camera of the option --camera; none without it.
+/// The camera given by the option --camera; empty without the option.
 result<std::optional<orbis::camera::camera_settings>> camera_option(const settings& s) {
   if (s.camera.empty()) return std::nullopt;
   auto camera = named_camera(s.camera);
@@ -59,8 +58,8 @@ result<std::optional<orbis::camera::camera_settings>> camera_option(const settin
   return std::optional{*std::move(camera)};
 }
 
-/// Opens a recording with `open(options)`. If it needs a camera and a file of another program in the folder has one,
-/// uses that, and adds a note.
+/// Opens a recording with `open(options)`. If it needs a camera and a file of another program in the folder describes
+/// one, uses that camera and adds a note.
 template <class Open, class Options>
 auto open_with_camera(const settings& s, Options options, Open&& open, std::optional<camera_file>& found)
     -> decltype(open(options)) {
@@ -73,7 +72,7 @@ auto open_with_camera(const settings& s, Options options, Open&& open, std::opti
   if (path.empty()) return opened;
   auto file = read_camera_file(path);
   if (!file) return fail(file.error());
-  if (file->camera.model.width() == 0) {  // of the size of the first image
+  if (file->camera.model.width() == 0) {  // use the size of the first image
     const auto images = orbis::io::open_mono_recording(s.input, {.camera = file->camera});
     if (!images) return fail(images.error());
     const auto first = orbis::io::read_color(images->path(0));
@@ -124,7 +123,7 @@ void subtract_origin(frame_source& source) {
   source.truth_has_positions_only = orbis::eval::has_positions_only(source.ground_truth);
   if (source.truth_has_positions_only) {
     source.notes.push_back(
-        "the ground truth has positions only (all orientations are 0 0 0 1): the world frame is not its frame");
+        "the ground truth has positions only (all orientations are 0 0 0 1): the world frame is a different one");
     return;
   }
   const orbis::vec3 origin = examples::nearby_origin(source.ground_truth.front().T_world_camera.translation());
@@ -134,7 +133,7 @@ void subtract_origin(frame_source& source) {
   if (!origin.isZero()) source.notes.push_back(origin_note(origin));
 }
 
-/// The parts of a source that are the same for recordings of all sensors.
+/// Makes the parts of a source that are the same for recordings of all sensors.
 template <class Recording>
 frame_source make_source(const Recording& recording, const char* kind, const settings& s) {
   frame_source source;
@@ -192,11 +191,11 @@ std::string recording_in(const std::filesystem::path& folder) {
   return first;
 }
 
-/// A sentence about the recording whose part `folder` is; empty if the folder above is none.
+/// A sentence about the recording of which `folder` is a part; empty if the parent folder is not a recording.
 std::string recording_above(const std::filesystem::path& folder) {
   const auto above = std::filesystem::absolute(folder / "").lexically_normal().parent_path().parent_path();
   if (orbis::io::detect_format(above) == orbis::io::recording_format::automatic) return {};
-  return "the folder above, " + above.string() + ", is a recording with depth";
+  return "the parent folder " + above.string() + " is a recording with depth";
 }
 
 result<frame_source> open_recording(const settings& s) {
@@ -272,7 +271,7 @@ result<frame_source> open_mono_recording(const settings& s) {
   if (!opened) {
     orbis::error e = with_option(opened.error());
     if (const std::string above = recording_above(s.input); s.sensor == "auto" && !above.empty())
-      e.message = above + ": open that. Otherwise, " + e.message;
+      e.message = above + ": open that folder. Otherwise, " + e.message;
     return fail(std::move(e));
   }
   const auto recording = std::make_shared<const orbis::io::mono_recording>(*std::move(opened));
@@ -312,7 +311,7 @@ bool is_text(const std::filesystem::path& path) {
 result<frame_source> open_file(const settings& s) {
   if (const auto ending = s.input.extension(); ending == ".png" || ending == ".jpg" || ending == ".jpeg")
     return fail(orbis::errc::unsupported, s.input.string(),
-                "is one image; name its folder, " + std::filesystem::absolute(s.input).parent_path().string());
+                "is a single image; specify its folder, " + std::filesystem::absolute(s.input).parent_path().string());
   if (!is_bag(s.input) && is_text(s.input))
     return fail(
         orbis::errc::unsupported, s.input.string(),
@@ -327,7 +326,7 @@ result<frame_source> open_file(const settings& s) {
   if (!opened) return fail(with_option(opened.error()));
   const std::shared_ptr<const file_recording> recording = *std::move(opened);
   frame_source source;
-  source.title = std::filesystem::weakly_canonical(s.input).filename().string();  // of "folder/", too
+  source.title = std::filesystem::weakly_canonical(s.input).filename().string();  // works for "folder/", too
   source.kind = recording->kind;
   source.images_of = recording->images_of;
   source.camera = recording->camera;
@@ -343,8 +342,8 @@ result<frame_source> open_file(const settings& s) {
   return source;
 }
 
-/// The sensor of the settings, or else the one that the folder's files indicate. A folder with depth and a second
-/// camera counts as RGB-D.
+/// The sensor in the settings, or else the sensor indicated by the files in the folder. A folder with depth and a
+/// second camera counts as RGB-D.
 sensor_kind choose_sensor(const settings& s) {
   if (const auto wanted = wanted_sensor(s)) return *wanted;
   if (s.format == "images") return sensor_kind::monocular;
@@ -361,8 +360,8 @@ sensor_kind choose_sensor(const settings& s) {
                                                                                      : sensor_kind::rgbd;
 }
 
-/// Opens a camera: a folder is played as a camera; numbers, files in /dev and all devices for sensors without depth are
-/// video cameras; other names are OpenNI2 devices.
+/// Opens a camera: a folder is played as if it were a camera; numbers, files in /dev, and all devices if the sensor has
+/// no depth, are video cameras; other names are OpenNI2 devices.
 result<std::unique_ptr<camera_device>> open_device(const settings& s) {
   device_options options{.name = s.input.string(), .sensor = wanted_sensor(s)};
   const auto camera = camera_option(s);
@@ -404,13 +403,13 @@ result<frame_source> open_live(const settings& s) {
     return feed->live->next([] { return interrupts::stop_requested(); });
   };
   source.color = [name = source.title](std::size_t) -> result<orbis::image<orbis::rgb8>> {
-    return fail(orbis::errc::unreadable, name, "a frame of a camera cannot be read again");
+    return fail(orbis::errc::unreadable, name, "a live frame cannot be read again");
   };
   source.dropped = [feed] { return feed->live ? feed->live->dropped() : std::size_t{0}; };
   return source;
 }
 
-/// A synthetic recording whose textures (most of its memory) can be released.
+/// A synthetic recording whose textures, which take most of its memory, can be released.
 class renderer {
  public:
   explicit renderer(const orbis::io::synthetic_options& options) : options_{options} {}
@@ -433,7 +432,7 @@ class renderer {
 /// Puts the camera on a robot that walks through a dim room.
 void make_walk(orbis::io::synthetic_options& options) {
   options.scene.light = 0.6;
-  options.path.jitter = 0.0;  // no hand
+  options.path.jitter = 0.0;  // the camera is not hand-held
   options.path.gait.step_rate = 2.0;
   options.sensor.motion_blur = 6;
   options.sensor.depth_blur = 4;
@@ -456,7 +455,7 @@ frame_source make_synthetic(const settings& s) {
                                        .path = path,
                                        .sensor = {.stray_depths = s.plain ? 0.0 : 0.001}};
   if (s.walk) make_walk(options);
-  const auto recording = std::make_shared<const orbis::io::synthetic_recording>(options);  // of no frame: small
+  const auto recording = std::make_shared<const orbis::io::synthetic_recording>(options);  // small: renders nothing
   const auto frames_of = std::make_shared<renderer>(options);
   frame_source source;
   source.title = s.walk ? "synthetic room, walking robot" : "synthetic room";
@@ -492,8 +491,9 @@ frame_source make_synthetic(const settings& s) {
   return source;
 }
 
-/// Adds a note if voxels are so small that a frame takes seconds, and fails if one frame alone may fill the memory. The
-/// estimate is that of the largest of a few frames; if all frames together fill the memory, the run gives up the map.
+/// Adds a note if voxels are so small that a frame takes seconds, and fails if one frame alone may exhaust the memory.
+/// The estimate is that of the largest of a few frames; if all frames together exhaust the memory, the run abandons the
+/// map.
 result<void> check_resolution(frame_source& source, const settings& s) {
   const orbis::camera::intrinsics& k = source.camera.model.k();
   if (source.frames == 0 || source.is_monocular() || source.is_live) return {};  // live frames cannot be read twice
@@ -542,7 +542,7 @@ result<void> check_images(frame_source& source, const settings& s) {
     std::vector<std::uint16_t> depths;
     for (const std::uint16_t d : frame->depth.pixels())
       if (d != 0 && d != 65535) depths.push_back(d);
-    if (depths.size() < frame->depth.pixels().size() / 100) continue;  // looks at a later frame
+    if (depths.size() < frame->depth.pixels().size() / 100) continue;  // try a later frame
     const auto middle = depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2);
     std::nth_element(depths.begin(), middle, depths.end());
     constexpr double nearest = 0.2;
@@ -561,7 +561,7 @@ result<void> check_images(frame_source& source, const settings& s) {
       }
     if (metres > farthest && metres <= 20.0)
       std::snprintf(text + length, sizeof text - static_cast<std::size_t>(length),
-                    ". Depth beyond %.3g m is not in the map (--max-depth)", farthest);
+                    ". Depths above %.3g m are not used for the map (--max-depth)", farthest);
     source.notes.push_back(text +
                            std::string{". Check depth_scale of the camera: stored depth / depth_scale = metres"});
     return {};
@@ -604,7 +604,7 @@ result<frame_source> open_source(const settings& s, console& console) {
     const bool bag = is_bag(s.input);
     if ((!s.topics.empty() || !s.truth_topic.empty()) && !bag)
       return result<frame_source>{fail(orbis::errc::invalid_argument, s.topics.empty() ? "--truth-topic" : "--topics",
-                                       "needs a ROS bag; " + s.input.string() + " is none")};
+                                       "needs a ROS bag, but " + s.input.string() + " is not a bag")};
     if (bag || std::filesystem::is_regular_file(s.input, ignored)) return open_file(s);
     switch (choose_sensor(s)) {
       case sensor_kind::stereo: return open_stereo_recording(s);

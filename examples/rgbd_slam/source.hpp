@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Sources of frames: a recording on disk, a synthetic one, or a camera.
+/// Sources of frames: a recording on disk, a synthetic recording, or a live camera.
 #pragma once
 
 #include <cstddef>
@@ -21,7 +21,7 @@
 
 namespace app {
 
-/// A frame of an RGB-D, stereo or monocular camera. Of a stereo camera `color` is the left image, and `depth` is empty
+/// A frame of an RGB-D, stereo or monocular camera. For a stereo camera, `color` is the left image; `depth` is empty
 /// and `depth_scale` meaningless until `frame_source::complete` computes them. A monocular frame never has depth.
 struct source_frame : orbis::camera::rgbd_frame {
   orbis::image<orbis::rgb8> right;  ///< empty unless the sensor is a stereo camera
@@ -29,52 +29,53 @@ struct source_frame : orbis::camera::rgbd_frame {
 
 struct frame_source {
   std::string title, kind;
-  std::string images_of;  ///< the used topics of a bag, or folders; empty for other sources
+  std::string images_of;  ///< the topics of a bag, or the folders, that are used; empty for other sources
   orbis::camera::camera_settings camera;
   bool camera_is_refined = false;                 ///< the camera was calibrated with the recording
   double usual_max_depth = app::usual_max_depth;  ///< default maximum depth in a map, metres
-  /// The maximum depth of measurements in the map, metres.
+  /// The maximum depth of the measurements in the map, metres.
   [[nodiscard]] double depth_limit(const settings& s) const { return s.depth_limit(usual_max_depth); }
-  std::optional<double> median_depth;  ///< of one of the first frames of a recording with depth, metres
+  std::optional<double> median_depth;  ///< median depth in one of the first frames of a recording with depth, metres
   orbis::slam::sensor_kind sensor = orbis::slam::sensor_kind::rgbd;
   [[nodiscard]] bool is_stereo() const { return sensor == orbis::slam::sensor_kind::stereo; }
-  /// One camera without depth: lengths are in arbitrary units, and there is no dense map.
+  /// Returns true for one camera without depth: lengths are then in arbitrary units, and there is no dense map.
   [[nodiscard]] bool is_monocular() const { return sensor == orbis::slam::sensor_kind::monocular; }
-  bool is_live = false;    ///< a camera: delivers each frame once, in order, regardless of the requested number
-  std::size_t frames = 0;  ///< number of frames; of a camera, the maximum
-  /// The number of frames of a camera that were dropped because tracking was busy; empty for recordings.
+  bool is_live = false;    ///< a live camera: delivers each frame once, in order, regardless of the requested index
+  std::size_t frames = 0;  ///< number of frames; for a live camera, the maximum number
+  /// The number of frames of a live camera that were dropped because tracking was busy; empty for recordings.
   std::function<std::size_t()> dropped;
-  /// Reads or renders a frame; indices count after `--stride`. May be called from another thread.
+  /// Reads or renders a frame, given its index after applying `--stride`. May be called from another thread.
   std::function<orbis::result<source_frame>(std::size_t)> frame;
-  /// Computes the depth image of a stereo frame, which is costly; no effect on other frames.
+  /// Computes the depth image of a stereo frame, which takes long; no effect on other frames.
   void complete(source_frame& f) const;
   /// Reads or renders only the colour image of a frame; otherwise like `frame`.
   std::function<orbis::result<orbis::image<orbis::rgb8>>(std::size_t)> color;
   bool made = false;  ///< frames are rendered or live: storing them is cheaper than requesting them again
-  /// Frees memory for making frames, which the next request allocates again. May be empty.
+  /// Frees memory that is used to produce frames; the next request allocates it again. May be empty.
   std::function<void()> rest;
   orbis::vec3 origin = orbis::vec3::Zero();  ///< subtracted from all positions, metres
   orbis::trajectory ground_truth;            ///< empty if unknown
   std::string truth_of;                      ///< topic and frames of a bag's ground truth; empty for other sources
-  /// The ground truth has no orientations: it defines no world frame, and cannot place depth images.
+  /// The ground truth has no orientations, so that it neither defines a world frame nor provides poses for depth
+  /// images.
   bool truth_has_positions_only = false;
   std::vector<std::filesystem::path> files;  ///< input files
   std::vector<std::string> notes;            ///< warnings
-  /// Distance (metres) of a point in the ground truth's world from the true surface; empty if unknown.
+  /// Distance (metres) of a point in the ground truth's world frame from the true surface; empty if unknown.
   std::function<double(const orbis::vec3&)> surface_distance;
 };
 
-/// The warning about a subtracted origin.
+/// The warning that an origin is subtracted.
 [[nodiscard]] std::string origin_note(const orbis::vec3& origin);
 
 /// Returns true if `open_source` recognises the layout of a folder or a bag. False for videos and for plain folders of
 /// images.
 [[nodiscard]] bool is_recording(const std::filesystem::path& path);
 
-/// Opens the recording of the settings and prints a description.
+/// Opens the recording specified in the settings and prints a description.
 [[nodiscard]] orbis::result<frame_source> open_source(const settings& s, console& console);
 
-/// Reads the frames of a source in order, one frame ahead.
+/// Reads the frames of a source in order, one frame in advance.
 class read_ahead {
  public:
   read_ahead(const frame_source& source, bool in_background) : source_{source}, background_{in_background} {}

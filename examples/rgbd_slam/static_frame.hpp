@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Frames without the depth of moving objects, for the map.
+/// Removal of the depth of moving objects from frames for the map.
 #pragma once
 
 #include <optional>

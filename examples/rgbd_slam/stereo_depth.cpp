@@ -21,11 +21,11 @@ orbis::image<std::uint16_t> stereo_depth(orbis::image_view<const orbis::rgb8> le
   const orbis::image<std::uint8_t> a = grey(left), b = grey(right);
   const double fx = camera.model.k().fx, bf = fx * camera.baseline.value();
   const int reach = std::min(static_cast<int>(fx / 5.0), left.width() / 2);
-  constexpr int block = 5, uniqueness = 20;  // percent of the cost; a lower value leaves more noise
+  constexpr int block = 5, uniqueness = 20;  // percentage of the cost; a lower value leaves more noise
   // The penalties that OpenCV's documentation recommends for a grey image.
   const auto matcher = cv::StereoSGBM::create(0, std::max(16, (reach + 15) / 16 * 16), block, 8 * block * block,
                                               32 * block * block, 1, 0, uniqueness, 100, 2, cv::StereoSGBM::MODE_SGBM);
-  cv::Mat disparity;  // in 1/16 pixels
+  cv::Mat disparity;  // in units of 1/16 pixel
   matcher->compute(orbis::interop::mat_over(a.view()), orbis::interop::mat_over(b.view()), disparity);
   orbis::image<std::uint16_t> depth(left.width(), left.height());
   for (int y = 0; y != depth.height(); ++y) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Depth images of rectified stereo pairs, by semi-global matching.
+/// Depth images of rectified stereo pairs, computed by semi-global matching.
 #pragma once
 
 #include <cstdint>

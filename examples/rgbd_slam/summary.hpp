@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// summary.json and the tables on the terminal.
+/// Writes summary.json, and formats the tables for the terminal.
 #pragma once
 
 #include <string>
@@ -18,18 +18,18 @@ namespace app {
 [[nodiscard]] std::string accuracy_json(const accuracy& a, const std::vector<std::string>& warnings);
 [[nodiscard]] orbis::result<void> write_summary(const results& r);
 
-/// The sizes of the point cloud and the octree, before and after the filter.
+/// A table with the sizes of the point cloud and the octree before and after the filter.
 [[nodiscard]] std::string size_table(const map_results& m);
 /// The axes of the world frame and how they were found.
 [[nodiscard]] std::string world_text(const world_results& w);
 /// The number and share of removed points: "123 of 4,567 points (2.69 %)".
 [[nodiscard]] std::string removed_text(const map_results& m);
-/// The filter, the number of removed points, and the reason for its choice.
+/// The chosen filter, the number of removed points, and the reason for the choice.
 [[nodiscard]] std::string filter_lines(const map_results& m);
-/// The floor and the planned path.
+/// Lines that describe the floor and the planned path.
 [[nodiscard]] std::string navigation_lines(const navigation_results& n);
 [[nodiscard]] std::string floor_text(const navigation_results& n);
-/// The robot that the path is for: "ball of 0.2 m".
+/// The shape and radius of the robot for which the path is planned: "ball of 0.2 m".
 [[nodiscard]] std::string robot_text(const navigation_results& n);
 [[nodiscard]] std::string path_text(const navigation_results& n);
 [[nodiscard]] std::string accuracy_lines(const accuracy& a);

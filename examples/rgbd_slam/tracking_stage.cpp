@@ -44,7 +44,7 @@ orbis::slam::options options_for(const frame_source& source, const settings& s) 
   return options;
 }
 
-/// Moves a frame's images into a frame for the viewer. `took_ms`: time of tracking so far.
+/// Moves a frame's images into a frame for the viewer. `took_ms`: tracking time so far.
 viewer_frame make_viewer_frame(const slam_system& slam, std::size_t i, const orbis::slam::track_result& found,
                                double took_ms, orbis::camera::rgbd_frame frame) {
   viewer_frame shown{.number = i, .state = std::string{to_string(found.state)}, .tracking_ms = took_ms};
@@ -97,12 +97,12 @@ orbis::slam::track_result track_frame(slam_system& slam, const frame_source& sou
   return slam.track(f);
 }
 
-/// Returns true if the frames of a camera ended regularly: end of a played recording, or interruption by the user.
+/// Returns true if the frames of a camera ended normally: end of a played recording, or interruption by the user.
 bool is_planned_end(const orbis::error& e) {
   return e.code == orbis::errc::no_data || e.code == orbis::errc::cancelled;
 }
 
-/// Tracks frames up to the first unreadable one or Ctrl-C. Each map starts in a separate world frame.
+/// Tracks frames until a frame is unreadable or Ctrl-C is pressed. Each map starts in a separate world frame.
 void track_frames(slam_system& slam, const frame_source& source, const settings& s, upright_worlds& worlds,
                   tracked_frames& out, viewer& viewer, console& console) {
   using orbis::slam::track_state;
@@ -148,14 +148,14 @@ void track_frames(slam_system& slam, const frame_source& source, const settings&
 }
 
 /// The current pose of a keyframe that was created in the active map or in a map merged with it. Culled keyframes are
-/// included: they are redundant for the landmarks, not for the dense cloud and the octree.
+/// included, because they are redundant for the landmarks, but not for the dense cloud and the octree.
 std::optional<se3> present_pose(const orbis::slam::atlas& maps, const orbis::slam::map_keyframe& made) {
   const orbis::slam::map_keyframe now = maps.current(made);
   if (now.map != maps.active_id() || !maps.active().remembers(now.keyframe)) return std::nullopt;
   return maps.active().pose(now.keyframe);
 }
 
-/// The function by which the live map reads the poses of its keyframes.
+/// The function with which the live map reads the poses of its keyframes.
 live_mapping::find_poses make_pose_reader(const slam_system& slam) {
   return [&slam, seen = orbis::slam::pose_revision{.map = orbis::slam::no_id}](
              const std::vector<live_mapping::made>& keyframes, live_mapping::poses& poses, bool always) mutable {
@@ -173,8 +173,8 @@ live_mapping::find_poses make_pose_reader(const slam_system& slam) {
   };
 }
 
-/// The function by which the viewer reads the keyframes and their graph: edges of the spanning tree, loop edges, and
-/// edges between keyframes that share many landmarks. All covisibility edges together would hide each other.
+/// The function with which the viewer reads the keyframes and their graph: edges of the spanning tree, loop edges, and
+/// edges between keyframes that share many landmarks. If all covisibility edges were drawn, they would hide each other.
 auto make_graph_reader(const slam_system& slam) {
   return [&slam, seen = orbis::slam::pose_revision{.map = orbis::slam::no_id}](slam_graph& graph, bool always) mutable {
     constexpr std::uint32_t many_shared = 100;
@@ -222,7 +222,7 @@ scene_sources make_sources(const slam_system& slam, const live_mapping* live) {
   return sources;
 }
 
-/// Returns `make()`, which starts threads of the run. If the system provides too few, those of the viewer end first.
+/// Returns `make()`, which starts threads of the run. If the system provides too few threads, closes the viewer first.
 template <class Make>
 std::invoke_result_t<const Make&> with_threads(viewer& viewer, console& console, const Make& make) {
   try {
@@ -230,7 +230,7 @@ std::invoke_result_t<const Make&> with_threads(viewer& viewer, console& console,
   } catch (const std::system_error&) {
     if (!viewer.give_way(console)) throw;
   }
-  for (int attempt = 0; attempt != 50; ++attempt) try {  // the system counts threads for a moment after their end
+  for (int attempt = 0; attempt != 50; ++attempt) try {  // the system still counts threads shortly after their end
       return make();
     } catch (const std::system_error&) {
       std::this_thread::sleep_for(std::chrono::milliseconds{2});
@@ -312,7 +312,7 @@ orbis::result<tracked_frames> track(const frame_source& source, const shutter_re
   struct forget_stop {
     ~forget_stop() { interrupts::forget_stop(); }
   };
-  std::optional<forget_stop> stops_slam{std::in_place};  // destroyed before what it stops
+  std::optional<forget_stop> stops_slam{std::in_place};  // destroyed before the objects that it stops
   upright_worlds worlds{source, s};
   slam.listen({.keyframe_made = [&out](const orbis::slam::keyframe_event& made) {
     ++out.slam.keyframes_made;
@@ -328,9 +328,9 @@ orbis::result<tracked_frames> track(const frame_source& source, const shutter_re
   stops_slam.reset();
   if (out.live) out.live->leave();
   connection.reset();
-  if (out.stopped && out.stopped->code == orbis::errc::exception) out.live.reset();  // the largest part of the memory
+  if (out.stopped && out.stopped->code == orbis::errc::exception) out.live.reset();  // frees most of the memory
 
-  // The results describe the loaded map if the camera was found in it, otherwise the map with the most frames.
+  // The results describe the loaded map if the camera was relocalised in it, otherwise the map with the most frames.
   const map_id begun = slam.inspect([&](const orbis::slam::atlas& maps) { return maps.current({first_map, 0}).map; });
   const bool goes_on = !s.load_map.empty() && !slam.trajectory(begun).empty();
   slam.activate(goes_on ? begun : slam.largest_map());
@@ -353,7 +353,7 @@ orbis::result<tracked_frames> track(const frame_source& source, const shutter_re
   out.slam.seconds = console.elapsed();
   console.finish(describe(out.slam));
 
-  // If the camera was not found in the loaded map, that map is not overwritten.
+  // If the camera was not relocalised in the loaded map, that map is not overwritten.
   const bool spares_loaded = out.missed_map && examples::is_same_file(s.load_map, s.save_map);
   if (!s.save_map.empty() && !out.slam.trajectory.empty() && !spares_loaded) {
     console.stage("saving");
@@ -386,8 +386,8 @@ std::vector<std::string> mapping_notes(const posed_frames& frames, const std::op
   std::vector<std::string> notes;
   if (world && world->up_from == "assumed")
     notes.emplace_back(
-        "the vertical is unknown: the first frame shows neither a floor nor two walls, and the camera is assumed to be "
-        "level there (--gravity specifies it)");
+        "the vertical direction is unknown: the first frame shows neither a floor nor two walls, and the camera is "
+        "assumed to be level in it (specify the direction with --gravity)");
   if (const auto e = frames.unspilled()) notes.push_back(e->to_string() + "; depth images are kept in memory instead");
   return notes;
 }

@@ -25,17 +25,17 @@ namespace app {
 struct tracked_frames {
   slam_results slam;
   std::optional<world_results> world;       ///< world frame of the poses
-  posed_frames keyframes;                   ///< with images, for the map
-  std::unique_ptr<live_mapping> live;       ///< the live map, if requested; it may be in its last step
+  posed_frames keyframes;                   ///< keyframes with images, for the map
+  std::unique_ptr<live_mapping> live;       ///< the live map, if requested; its last step may still be running
   std::optional<orbis::error> stopped;      ///< the error that ended the reading of frames early
-  std::optional<orbis::error> unsaved;      ///< the error of saving the landmark map
+  std::optional<orbis::error> unsaved;      ///< the error in saving the landmark map
   std::optional<focal_doubt> camera_doubt;  ///< evidence that the focal length is wrong
   bool missed_map = false;                  ///< the camera was never found in the loaded map
 };
 
-/// Tracks the frames of the source up to the first unreadable one, Ctrl-C, or a lack of memory. Errors: a map that
-/// cannot be loaded. `viewer` shows the progress. `landmark_map`: file for the landmark map, if the settings ask for
-/// it. `spill_file`: see posed_frames.
+/// Tracks the frames of the source until a frame is unreadable, Ctrl-C is pressed, or memory is exhausted. Errors: a
+/// map that cannot be loaded. `viewer` shows the progress. `landmark_map`: file for the landmark map, if the settings
+/// request one. `spill_file`: see `posed_frames`.
 [[nodiscard]] orbis::result<tracked_frames> track(const frame_source& source, const shutter_results& shutter,
                                                   const settings& s, const std::filesystem::path& landmark_map,
                                                   const std::filesystem::path& spill_file, viewer& viewer,
@@ -43,12 +43,12 @@ struct tracked_frames {
 
 /// The error that stopped tracking, with the number of frames before it. @pre tracked.stopped
 [[nodiscard]] orbis::error explain_stop(const tracked_frames& tracked, const frame_source& source);
-/// The error that the camera was never found in the loaded map, with the consequences.
+/// The error that relocalisation in the loaded map never succeeded, with the consequences.
 [[nodiscard]] orbis::error explain_miss(const tracked_frames& tracked, const settings& s);
 /// Warnings about the frames of a map and its world frame.
 [[nodiscard]] std::vector<std::string> mapping_notes(const posed_frames& frames,
                                                      const std::optional<world_results>& world);
-/// Warnings about tracking, including those of mapping_notes.
+/// Warnings about tracking, including those of `mapping_notes`.
 [[nodiscard]] std::vector<std::string> tracking_notes(const tracked_frames& tracked, const settings& s);
 
 }  // namespace app

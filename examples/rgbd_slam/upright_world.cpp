@@ -31,7 +31,7 @@ se3 upright_worlds::start_world(const orbis::camera::rgbd_frame& frame, bool is_
   how = {std::string{to_string(view.source)}, view.confidence};
   if (!frame.T_world_camera || !follows_truth_) return {view.R_world_camera, vec3::Zero()};
 
-  // If the z axis of the ground truth is up within the accuracy of the estimate, the ground truth is taken as exact.
+  // If the z axis of the ground truth points up within the accuracy of the estimate, it is assumed to be exact.
   const double reach = (view.source == upright_source::assumed ? 45.0 : 10.0) * std::numbers::pi / 180.0;
   const vec3 up = frame.T_world_camera->rotation() * view.up_camera();
   if (std::atan2(up.cross(vec3::UnitZ()).norm(), up.z()) <= reach) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// World frames with z up, each defined by a first frame.
+/// World frames with z up, each defined by the first frame of a map.
 #pragma once
 
 #include <map>
@@ -21,18 +21,19 @@ class upright_worlds {
  public:
   upright_worlds(const frame_source& source, const settings& s);
 
-  /// The pose of the camera at `frame` in the world that starts with it. With ground truth, this is the world of the
-  /// ground truth, rotated if its z axis is not up; without (or with positions only), the camera is at the origin and
-  /// looks along x. The gravity of the settings applies to the very first frame only (`is_first`).
+  /// The pose of the camera at `frame` in the world frame that starts with this frame. With ground truth, it is the
+  /// world frame of the ground truth, rotated if its z axis does not point up; without (or with positions only), the
+  /// camera is at the origin and looks along x. The gravity of the settings applies only to the very first frame
+  /// (`is_first`).
   [[nodiscard]] orbis::se3 start_world(const orbis::camera::rgbd_frame& frame, bool is_first);
-  /// The source of the vertical in the world that starts at this time; empty if there is none.
+  /// The source of the vertical direction of the world frame that starts at this time; empty if there is none.
   [[nodiscard]] std::optional<world_results> world_starting_at(double timestamp) const;
 
  private:
   orbis::camera::ray_table rays_;
   std::optional<orbis::vec3> gravity_;
   bool follows_truth_;
-  std::map<double, world_results> begun_;  // by time
+  std::map<double, world_results> begun_;  // by start time
 };
 
 }  // namespace app

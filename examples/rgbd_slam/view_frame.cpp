@@ -16,7 +16,7 @@ namespace {
 
 using orbis::vec3;
 
-/// A measure of the concentration of the points along `axis`: large if planes perpendicular to it contain many points.
+/// A measure of the concentration of points along `axis`: large if planes perpendicular to it contain many points.
 double planarity(const std::vector<vec3>& points, const vec3& axis) {
   constexpr double bin = 0.03;
   constexpr int bins = 512;
@@ -40,7 +40,7 @@ double quantile(std::vector<double> values, double q) {
 
 std::optional<double> height_of_floor(const results& r) {
   if (!r.map || !r.navigation || !r.navigation->floor_m) return std::nullopt;
-  // The floor is in one layer of voxels, or between two; `top` is the upper face.
+  // The floor is in one layer of voxels or between two layers; `top` is the upper face.
   const double top = *r.navigation->floor_m, bottom = top - 2 * r.map->resolution;
   std::vector<double> heights;
   for (const std::uint32_t i : r.map->kept)

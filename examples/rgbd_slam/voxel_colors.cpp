@@ -57,8 +57,7 @@ std::optional<orbis::rgb8> voxel_colors::mean_color(const voxel& cube) const {
   };
   // A large cube uses the voxels along its diagonal.
   for (int i = 0; i != cells; ++i) take(i, i, i);
-  // The points, which are means or a subset of the pixels, may be in the voxel next to the one that the pixels
-  // occupied.
+  // The points, which are means or a subset of the pixels, may be in a neighbour of the voxel that the pixels occupy.
   if (n == 0)
     for (int i = 0; i != 27; ++i) take(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1);
   if (n == 0) return std::nullopt;

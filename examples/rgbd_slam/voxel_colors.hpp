@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Colours of voxels: means of the colours of the points in them.
+/// Colours of voxels: the mean colours of the points in them.
 #pragma once
 
 #include <cstddef>
@@ -24,14 +24,14 @@ class voxel_colors {
 
   /// Adds a point (metres, world).
   void add(const orbis::vec3f& point, orbis::rgb8 color);
-  /// Removes a point that was added. The memory of an empty voxel is reused.
+  /// Removes a point that was added before. The memory of an empty voxel is reused.
   void remove(const orbis::vec3f& point, orbis::rgb8 color);
   /// The mean colour of the points in a cube of whole voxels; if there are none, of the points in the neighbouring
   /// voxels; empty if there are none either.
   [[nodiscard]] std::optional<orbis::rgb8> mean_color(const voxel& cube) const;
   /// The number of voxels with points.
   [[nodiscard]] std::size_t size() const { return index_.size(); }
-  /// Bytes on the heap.
+  /// Size of the allocated memory in bytes.
   [[nodiscard]] std::size_t memory_bytes() const {
     return index_.memory_bytes() + sums_.capacity() * sizeof(sum) + unused_.capacity() * sizeof(std::uint32_t);
   }
@@ -46,7 +46,7 @@ class voxel_colors {
   std::vector<std::uint32_t> unused_;  // indices in sums_
 };
 
-/// The colour of surfaces that no image shows.
+/// The colour of surfaces that are not visible in any image.
 inline constexpr orbis::rgb8 no_color{176, 178, 182};
 
 }  // namespace app

@@ -36,7 +36,7 @@ double seconds(std::int64_t nanoseconds) {
   return static_cast<double>(nanoseconds / second) + 1e-9 * static_cast<double>(nanoseconds % second);
 }
 
-/// Sorts by a member, and removes elements of a repeated time. Returns their number.
+/// Sorts by a time and removes elements with repeated times. Returns the number of removed elements.
 template <class T, class Time>
 std::size_t sort_by_time(std::vector<T>& all, Time T::*time) {
   std::ranges::stable_sort(all, {}, time);
@@ -58,13 +58,13 @@ std::string count_text(std::size_t n, const std::string& what, const std::string
 
 bool contains(std::string_view text, std::string_view part) { return text.find(part) != std::string_view::npos; }
 
-/// A topic of images.
+/// An image topic.
 struct topic : bag_topic {
-  std::string encoding;       ///< of the first image, or the format of a compressed image
-  std::string frame_id;       ///< of the first image
-  std::vector<double> times;  ///< of the headers, ascending
+  std::string encoding;       ///< encoding of the first image, or format of a compressed image
+  std::string frame_id;       ///< coordinate frame of the first image
+  std::vector<double> times;  ///< times in the headers, ascending
   std::size_t unread = 0;     ///< number of omitted messages
-  std::string reason;         ///< why the first one is omitted
+  std::string reason;         ///< the reason why the first of them is omitted
   [[nodiscard]] bool is_compressed() const { return type == "sensor_msgs/CompressedImage"; }
   [[nodiscard]] bool is_depth() const { return is_depth_encoding(encoding) || name.ends_with("/compressedDepth"); }
   [[nodiscard]] bool is_read() const { return is_compressed() || is_known_encoding(encoding); }
@@ -73,7 +73,7 @@ struct topic : bag_topic {
     return (contains(name, "registered") || contains(name, "aligned")) && !contains(name, "to_infra");
   }
   /// Returns true if the name indicates infrared or thermal images, or the confidence of depth: a component is one of
-  /// these words, or has one of them and does not name depth ("image_ir", but not "aligned_depth_to_infra1").
+  /// these words, or contains one of them but not "depth" ("image_ir", but not "aligned_depth_to_infra1").
   [[nodiscard]] bool is_auxiliary() const {
     for (std::string_view rest = name; !rest.empty();) {
       std::string_view component = rest.substr(0, rest.find('/'));
@@ -89,7 +89,7 @@ struct topic : bag_topic {
     }
     return false;
   }
-  /// Returns true if the frame of the images is known. All images in bags of librealsense have the frame "0".
+  /// Returns true if the frame of the images is known. All images in librealsense bags have the frame "0".
   [[nodiscard]] bool has_frame() const {
     return !frame_id.empty() && frame_id != "0" && !name.ends_with("/image/data");
   }
@@ -108,12 +108,12 @@ bool is_pose_type(const std::string& type) {
          type == "geometry_msgs/PoseWithCovarianceStamped";
 }
 
-/// Returns true if the images are known to be of one frame.
+/// Returns true if the images are known to be in the same coordinate frame.
 bool has_same_frame(const topic& a, const topic& b) {
   return a.has_frame() && b.has_frame() && a.frame_id == b.frame_id;
 }
 
-/// The number of components that names begin with in common.
+/// The number of leading components that two names have in common.
 std::ptrdiff_t common_components(const std::string& a, const std::string& b) {
   return std::count(a.begin(), std::ranges::mismatch(a, b).in1, '/');
 }
@@ -148,7 +148,7 @@ class bag_recording final : public file_recording {
       return fail(errc::no_data, path_,
                   second_ == nullptr
                       ? "no image in " + first_->name
-                      : "no image of " + first_->name + " has a counterpart in " + second_->name + " at its time");
+                      : "no image of " + first_->name + " has a counterpart in " + second_->name + " at the same time");
     images_of = first_->name + (second_ != nullptr ? " and " + second_->name : "");
     if (auto known = find_camera(options); !known) return known;
     if (sensor == sensor_kind::rgbd)
@@ -192,7 +192,7 @@ class bag_recording final : public file_recording {
     return bag_.read(m, most);
   }
 
-  /// Lists the topics of images. Encoding and frame are those of the first message that can be read.
+  /// Lists the image topics. Encoding and frame are those of the first readable message.
   result<void> list_topics() {
     for (bag_topic& from : bag_.topics) {
       if (from.type != "sensor_msgs/Image" && from.type != "sensor_msgs/CompressedImage") continue;
@@ -245,7 +245,7 @@ class bag_recording final : public file_recording {
       first_ = &topics_.at(options.topics[0]);
       if (options.topics.size() == 2) second_ = &topics_.at(options.topics[1]);
       if (second_ != nullptr && first_->is_depth())
-        return wrong("has depth images in " + first_->name + ": give the topic of colour first, then that of depth");
+        return wrong("has depth images in " + first_->name + ": give the colour topic first, then the depth topic");
       sensor = second_ == nullptr    ? sensor_kind::monocular
                : second_->is_depth() ? sensor_kind::rgbd
                                      : sensor_kind::stereo;
@@ -254,7 +254,7 @@ class bag_recording final : public file_recording {
     }
     const bool needs_info = !options.camera;
     const auto has_info = [&](const topic& t) { return needs_info && info_topic(t) != nullptr; };
-    // Preference: with a camera, visible light, uncompressed, then colour over grey, then rectified over raw.
+    // Preference: with camera information, visible light, uncompressed, then colour over grey, then rectified over raw.
     const auto worth = [&](const topic& t) {
       const bool is_mosaic = t.encoding.starts_with("bayer");
       bool is_color = false;
@@ -262,7 +262,7 @@ class bag_recording final : public file_recording {
       is_color &= !is_mosaic;
       return std::tuple{has_info(t), !t.is_auxiliary(), !t.is_compressed(), is_color, is_mosaic, t.is_rectified()};
     };
-    // Of colour and depth: the same frame, then the names with most components in common.
+    // Preference among pairs of colour and depth: the same frame, then the most name components in common.
     const auto pair_worth = [&](const topic& c, const topic& d) {
       return std::tuple{has_info(c),
                         !c.is_auxiliary(),
@@ -335,14 +335,15 @@ class bag_recording final : public file_recording {
     for (topic* t : {first_, second_}) {
       if (t == nullptr) continue;
       if (t->unread != 0)
-        notes.push_back(count_text(t->unread, "image", t->name) + " omitted, as damaged or cut off: " + t->reason);
-      // A time of zero is that of a simulation that begins there, or there is no time in the header.
+        notes.push_back(count_text(t->unread, "image", t->name) +
+                        " omitted because of damage or truncation: " + t->reason);
+      // A time of zero is the start of a simulation, or the header has no time.
       std::int64_t least = std::numeric_limits<std::int64_t>::max();
       for (const entry& e : entries)
         if (e.of == t && e.time != 0) least = std::min(least, e.time);
       constexpr std::int64_t soon = 10'000'000'000;  // nanoseconds
       std::vector<std::pair<std::int64_t, bag_message>> order;
-      // Times that fall back are those of a second run: of a simulation that was reset, or a recording played again.
+      // Times that jump back belong to a second run: a simulation that was reset, or a recording that was played again.
       constexpr std::int64_t far = 1'000'000'000;  // nanoseconds
       std::int64_t last = std::numeric_limits<std::int64_t>::min();
       std::size_t later = 0;
@@ -358,10 +359,10 @@ class bag_recording final : public file_recording {
       }
       if (later != 0)
         notes.push_back(count_text(later, "image", t->name) +
-                        " omitted, as the times in the headers fall back by more than 1 s after the first " +
+                        " omitted because the times in the headers jump back by more than 1 s after the first " +
                         std::to_string(order.size()));
       if (const std::size_t repeated = sort_by_time(order, &std::pair<std::int64_t, bag_message>::first); repeated != 0)
-        notes.push_back(count_text(repeated, "image", t->name) + " omitted, as the time is that of another one");
+        notes.push_back(count_text(repeated, "image", t->name) + " omitted because another image has the same time");
       t->messages.clear();
       for (const auto& [when, message] : order) {
         t->times.push_back(seconds(when));
@@ -378,12 +379,12 @@ class bag_recording final : public file_recording {
     }
     frames_ = orbis::associate(first_->times, second_->times, sensor == sensor_kind::rgbd ? 0.020 : 0.005);
     if (const std::size_t unpaired = first_->times.size() - frames_.size(); unpaired != 0)
-      notes.push_back(count_text(unpaired, "image", first_->name) + " omitted, as no image of " + second_->name +
+      notes.push_back(count_text(unpaired, "image", first_->name) + " omitted because no image of " + second_->name +
                       " has the same time");
   }
 
-  /// The topic of `CameraInfo` of the camera of `of`; null if there is none. It is `camera_info` next to the images, or
-  /// one level higher for compressed images, or, in bags of librealsense, `info/camera_info` next to `image/data`.
+  /// The `CameraInfo` topic for the images in `of`; null if there is none. It is `camera_info` next to the images, or
+  /// one level higher for compressed images, or, in librealsense bags, `info/camera_info` next to `image/data`.
   [[nodiscard]] const bag_topic* info_topic(const topic& of) const {
     const auto above = [](const std::string& name) { return name.substr(0, name.rfind('/')); };
     const std::string next = above(of.name), higher = above(next);
@@ -393,7 +394,7 @@ class bag_recording final : public file_recording {
         if (t.name == name && t.type == "sensor_msgs/CameraInfo") return &t;
     return nullptr;
   }
-  /// The first `CameraInfo` of the camera of `of` that can be read; empty if there is none.
+  /// The first readable `CameraInfo` for the images in `of`; empty if there is none.
   [[nodiscard]] std::optional<ros_messages::camera_info> read_camera_info(const topic& of) const {
     if (const bag_topic* t = info_topic(of))
       for (const bag_message& m : t->messages)
@@ -403,7 +404,7 @@ class bag_recording final : public file_recording {
     return std::nullopt;
   }
 
-  /// Units of depth per metre in a bag of librealsense, from the option of the depth sensor; empty if there is none.
+  /// Depth units per metre in a librealsense bag, from the option of the depth sensor; empty if there is none.
   [[nodiscard]] std::optional<double> stored_scale() const {
     for (const bag_topic& t : bag_.topics)
       if (is_depth_unit(t.name, t.type) && second_->name.starts_with(t.name.substr(0, t.name.find("option/"))))
@@ -428,7 +429,7 @@ class bag_recording final : public file_recording {
                         " are used as if they were rectified, as the camera is specified");
       if (sensor == sensor_kind::rgbd && !in_metres)
         if (const auto scale = stored_scale(); scale && std::abs(*scale / camera.depth_scale - 1.0) > 1e-3)
-          notes.push_back("the bag stores " + in_words(*scale) + " units of depth per metre, the specified camera " +
+          notes.push_back("the bag stores " + in_words(*scale) + " depth units per metre, the specified camera " +
                           in_words(camera.depth_scale));
       return {};
     }
@@ -443,7 +444,7 @@ class bag_recording final : public file_recording {
       if (const auto scale = stored_scale())
         camera.depth_scale = *scale;
       else
-        notes.push_back("the bag names no unit of depth for " + second_->name + "; it is taken as millimetres");
+        notes.push_back("the bag does not specify the depth unit of " + second_->name + "; millimetres are assumed");
     }
     if (sensor != sensor_kind::stereo) return {};
 
@@ -451,14 +452,14 @@ class bag_recording final : public file_recording {
     if (!other) return fail(errc::invalid_argument, path_, "there is no sensor_msgs/CameraInfo for " + second_->name);
     const auto right = ros_messages::make_camera(*other, second_->is_rectified(), where(*second_));
     if (!right) return fail(right.error());
-    // P of the right camera is that of the left one, shifted along x; R rotates the rays of a camera to rectified ones.
+    // P of the right camera is that of the left camera, shifted along x; R rotates a camera's rays to rectified rays.
     const double baseline = other->P[0] > 0.0 ? (info->P[3] - other->P[3]) / other->P[0] : 0.0;
     orbis::se3 T_left_right{orbis::so3{}, orbis::vec3{baseline, 0.0, 0.0}};
     if (!(baseline > 0.0)) {
       const auto by_frames = static_transform(first_->frame_id, second_->frame_id);
       if (!by_frames || first_->frame_id == second_->frame_id)
         return fail(errc::malformed, where(*second_),
-                    "P of its CameraInfo has no baseline, and no static transform "
+                    "P in its CameraInfo has no baseline, and no static transform "
                     "connects its frame to that of " +
                         first_->name);
       T_left_right = *by_frames;
@@ -471,7 +472,7 @@ class bag_recording final : public file_recording {
         return orbis::so3{orbis::so3::quaternion(m)};
       };
       const auto l = rotation(info->R), r = rotation(other->R);
-      if (!l || !r) return fail(errc::malformed, path_, "R of a CameraInfo is not a rotation");
+      if (!l || !r) return fail(errc::malformed, path_, "R in a CameraInfo is not a rotation");
       T_left_right = orbis::se3{l->inverse(), orbis::vec3::Zero()} * T_left_right * orbis::se3{*r, orbis::vec3::Zero()};
     }
     auto straight = orbis::camera::rectify(
@@ -485,7 +486,7 @@ class bag_recording final : public file_recording {
     return {};
   }
 
-  /// Calls `f` with each transform of the topics whose names `is_wanted`.
+  /// Calls `f` with each transform in the topics whose names satisfy `is_wanted`.
   template <class Wanted, class F>
   void for_each_transform(const Wanted& is_wanted, const F& f) const {
     for (const bag_topic& t : bag_.topics)
@@ -499,7 +500,7 @@ class bag_recording final : public file_recording {
                 f(one);
               }
   }
-  /// The frames of /tf_static, which is read once.
+  /// The frames in /tf_static, which is read only once.
   [[nodiscard]] const frame_tree& static_frames() {
     if (!static_frames_) {
       static_frames_.emplace();
@@ -507,7 +508,7 @@ class bag_recording final : public file_recording {
     }
     return *static_frames_;
   }
-  /// The frames of /tf_static and those of the other topics whose names `is_wanted`.
+  /// The frames in /tf_static and in the other topics whose names satisfy `is_wanted`.
   template <class Wanted>
   [[nodiscard]] frame_tree frames_with(const Wanted& is_wanted) {
     frame_tree tree = static_frames();
@@ -515,15 +516,15 @@ class bag_recording final : public file_recording {
                        [&](const ros_messages::transform& t) { tree.add(t); });
     return tree;
   }
-  /// `T_a_b` of frames that do not move relative to each other, in ROS 1 also published on /tf; empty if unknown.
+  /// `T_a_b` for frames that do not move relative to each other (in ROS 1 also published on /tf); empty if unknown.
   [[nodiscard]] std::optional<orbis::se3> static_transform(const std::string& a, const std::string& b) {
     if (const auto found = static_frames().transform(a, b)) return found;
     if (!all_frames_) all_frames_ = frames_with([](const std::string&) { return true; });
     return all_frames_->transform(a, b);
   }
 
-  /// Prepares registration of depth to colour with both cameras and the transform between them, unless both are known
-  /// to be of one frame and size.
+  /// Prepares the registration of depth to colour by means of both cameras and the transform between them, unless both
+  /// are known to have the same frame and size.
   result<void> register_depth() {
     const bool same_frame = has_same_frame(*first_, *second_);
     const auto info = read_camera_info(*second_);
@@ -537,7 +538,7 @@ class bag_recording final : public file_recording {
     if (!T_color_depth || !info) {
       unregistered_ = " (depth in the frame \"" + orbis::shortened(second_->frame_id, 60) + "\", colour in \"" +
                       orbis::shortened(first_->frame_id, 60) + "\"; " +
-                      (!is_known ? "these names identify no frames"
+                      (!is_known ? "these names do not identify frames"
                        : info    ? "no static transform connects them"
                                  : "no CameraInfo for " + second_->name) +
                       ")";
@@ -551,7 +552,7 @@ class bag_recording final : public file_recording {
     return {};
   }
 
-  /// Reads the poses of a topic as the ground truth of the camera.
+  /// Reads the poses in a topic as the ground truth of the camera.
   result<void> read_truth(const std::string& name) {
     std::string others;
     const bag_topic* from = nullptr;
@@ -598,20 +599,21 @@ class bag_recording final : public file_recording {
     for (orbis::stamped_pose& p : ground_truth)
       if (T_body_camera) p.T_world_camera = p.T_world_camera * *T_body_camera;
     if (!has_child)
-      notes.push_back("poses of " + from.name + " are used as those of the camera; " + from.type + " names no body");
+      notes.push_back("poses of " + from.name + " are used as those of the camera; " + from.type +
+                      " does not specify a body");
     else if (!T_body_camera)
       notes.push_back("poses of " + from.name + " are those of " + pose.child_frame_id +
                       ", not of the camera: no static transform connects it to " + camera_frame);
     return {};
   }
 
-  /// The poses of the camera's frame in the root of the frames, at the times of the images.
+  /// Reads the poses of the camera's frame in the root frame at the times of the images.
   result<void> read_truth_of_frames(const std::string& name) {
     constexpr double most_gap = 0.5, most_distance = 0.05;  // seconds; between two transforms, and to the nearest one
     const auto is_named = [&](const std::string& topic) { return topic == name; };
     const frame_tree tree = frames_with(is_named);
     const std::vector<std::string> path = tree.path_to_root(first_->frame_id);
-    std::map<std::string, orbis::trajectory> moving;  // by the name of the child
+    std::map<std::string, orbis::trajectory> moving;  // name of the child -> poses
     for (const std::string& frame : path)
       if (const auto* link = tree.find(frame); link != nullptr && !link->is_constant) moving[frame];
     if (moving.empty())
@@ -658,7 +660,7 @@ class bag_recording final : public file_recording {
                     " pixels, the camera " + std::to_string(width) + "x" + std::to_string(height) +
                     (is_depth ? ": depth is not registered to colour" + unregistered_ : ""));
   }
-  /// `decode` of a message of either type.
+  /// Applies `decode` to a message of either type.
   template <class Decode>
   [[nodiscard]] auto decoded(const topic& of, std::size_t i, const Decode& decode) const
       -> decltype(decode(ros_messages::image{}, std::string{})) {
@@ -691,11 +693,11 @@ class bag_recording final : public file_recording {
   topic* first_ = nullptr;   // colour, or the left image
   topic* second_ = nullptr;  // depth, or the right image; null: monocular
   std::vector<orbis::index_pair> frames_;
-  std::optional<orbis::camera::rectification> straight_;  // of stereo images that are not rectified yet
+  std::optional<orbis::camera::rectification> straight_;  // for stereo images that are not rectified yet
   orbis::camera::any_camera raw_left_, raw_right_;
-  std::optional<depth_registration> registration_;        // of depth that is not registered yet
+  std::optional<depth_registration> registration_;        // for depth that is not registered yet
   std::optional<frame_tree> static_frames_, all_frames_;  // empty: not read yet
-  std::string unregistered_;                              // why it cannot be registered
+  std::string unregistered_;                              // the reason why depth cannot be registered
 };
 
 }  // namespace

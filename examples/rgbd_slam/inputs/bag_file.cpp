@@ -37,7 +37,7 @@ bool has_bag_name(const fs::path& path) {
       [&](std::string_view ending) { return name.ends_with(ending); });
 }
 
-/// The bag files of a folder, by name; compressed ones only if they are not there uncompressed as well.
+/// The bag files in a folder, sorted by name, excluding compressed files that also exist uncompressed.
 std::vector<fs::path> parts_in(const fs::path& folder) {
   std::vector<fs::path> parts;
   std::error_code error;
@@ -53,7 +53,7 @@ std::vector<fs::path> parts_in(const fs::path& folder) {
   return parts;
 }
 
-/// The file names that metadata.yaml lists: the items of `relative_file_paths`, in lines or as `[a, b]`.
+/// The file names listed in metadata.yaml: the items of `relative_file_paths`, one per line or as `[a, b]`.
 std::vector<std::string> listed_in(const std::string& metadata) {
   std::vector<std::string> names;
   const auto add = [&](std::string_view item) {
@@ -61,7 +61,7 @@ std::vector<std::string> listed_in(const std::string& metadata) {
     std::erase_if(name, [](char c) { return c == '"' || c == '\'' || c == '\r' || c == '\n'; });
     name.erase(0, name.find_first_not_of(' '));
     name.erase(name.find_last_not_of(' ') + 1);
-    if (!name.empty()) names.push_back(fs::path{name}.filename().string());  // old versions store the folder, too
+    if (!name.empty()) names.push_back(fs::path{name}.filename().string());  // old versions include the folder
   };
   bool is_list = false;
   for (std::size_t at = 0; at < metadata.size();) {
@@ -168,8 +168,8 @@ result<bag> bag::open(const fs::path& path) {
     const auto metadata = orbis::read_file(path / "metadata.yaml");
     const std::vector<std::string> listed = metadata ? listed_in(*metadata) : std::vector<std::string>{};
     if (listed.empty())
-      all.notes.push_back("metadata.yaml is missing or damaged; all bag files of the folder are read");
-    // A listed name may have the ending of the compressed file, and the file may be decompressed.
+      all.notes.push_back("metadata.yaml is missing or damaged; all bag files in the folder are read");
+    // A listed name may have the extension of the compressed file although the file has been decompressed.
     const auto is_listed_as = [](const std::string& name) {
       return [name](const fs::path& file) {
         const std::string found = file.filename().string();
@@ -215,7 +215,7 @@ result<std::string> bag::read(const bag_message& m, std::size_t most) {
   if (last_ != m.file && parts_[last_]) parts_[last_]->rest();
   last_ = m.file;
   auto bytes = parts_[m.file]->read(m, most);
-  if (!bytes || !is_zstd(*bytes)) return bytes;  // no message begins like this, unless it is compressed itself
+  if (!bytes || !is_zstd(*bytes)) return bytes;  // only compressed messages begin like this
   if (most != whole_message) bytes = parts_[m.file]->read(m, whole_message);
   if (!bytes) return bytes;
   auto plain = decompress("zstd", *bytes, most, files[m.file].string());

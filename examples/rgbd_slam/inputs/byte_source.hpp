@@ -15,11 +15,11 @@
 
 namespace app {
 
-/// Not thread-safe.
+/// A file or a string of bytes. Not thread-safe.
 class byte_source {
  public:
   explicit byte_source(std::string memory) : memory_{std::move(memory)}, size_{memory_.size()} {}
-  /// Errors: not_found, unreadable.
+  /// Opens a file. Errors: not_found, unreadable.
   [[nodiscard]] static orbis::result<byte_source> open(const std::filesystem::path& path) {
     std::error_code error;
     if (!std::filesystem::exists(path, error))
@@ -32,7 +32,7 @@ class byte_source {
   }
 
   [[nodiscard]] std::uint64_t size() const noexcept { return size_; }
-  /// The bytes from `at` on, `count` of them or fewer at the end.
+  /// Reads `count` bytes from position `at` on; fewer at the end.
   [[nodiscard]] std::string read(std::uint64_t at, std::uint64_t count) {
     if (at >= size_) return {};
     count = std::min(count, size_ - at);

@@ -20,8 +20,8 @@ namespace app {
 class camera_device {
  public:
   virtual ~camera_device() = default;
-  /// Waits for the next frame; empty if none arrived within `patience`. Errors: no_data (end of a played recording),
-  /// others (the device is gone). Called on one thread.
+  /// Waits for the next frame; empty if none arrives within `patience`. Errors: no_data (end of a played recording),
+  /// others (the device is disconnected). Called on one thread.
   [[nodiscard]] virtual orbis::result<std::optional<source_frame>> next(std::chrono::milliseconds patience) = 0;
 
   std::string name;
@@ -31,10 +31,10 @@ class camera_device {
   std::vector<std::filesystem::path> files;  ///< input files of a played recording
 };
 
-/// The selection of a camera.
+/// Options that select and configure a camera.
 struct device_options {
   std::string name;                                        ///< name of the device; empty: the first one
-  std::optional<orbis::slam::sensor_kind> sensor{};        ///< empty: by the device
+  std::optional<orbis::slam::sensor_kind> sensor{};        ///< empty: determined by the device
   std::optional<orbis::camera::camera_settings> camera{};  ///< replaces the device's calibration
 };
 
@@ -45,10 +45,10 @@ struct device_options {
 /// Opens a depth camera (Astra, Xtion, PrimeSense), or plays an .oni file. The device registers depth to colour.
 /// `name`: the URI or the file. Errors: unsupported (not in this build), not_found.
 [[nodiscard]] orbis::result<std::unique_ptr<camera_device>> open_openni(const device_options& options);
-/// Opens a video camera; with `sensor` stereo, one with two rectified images side by side. `name`: the device file
-/// (/dev/video0) or number. Errors: as above, and those of `check_camera`.
+/// Opens a video camera; if `sensor` is stereo, a camera that delivers two rectified images side by side. `name`: the
+/// device file (/dev/video0) or number. Errors: as `open_openni`, and those of `check_camera`.
 [[nodiscard]] orbis::result<std::unique_ptr<camera_device>> open_video_camera(const device_options& options);
-/// Plays the recording in a folder (`name`) at the pace of its timestamps, for tests without a camera. Errors: those of
+/// Plays the recording in a folder (`name`) at the rate of its timestamps, for tests without a camera. Errors: those of
 /// `open_recording`.
 [[nodiscard]] orbis::result<std::unique_ptr<camera_device>> open_playback(const device_options& options);
 

@@ -20,7 +20,7 @@ result<void> chunked_bag::open() {
       if (r->what == kind::topic) define(*r);
       at = r->next;
     }
-  bool is_indexed = false;  // the last chunk
+  bool is_indexed = false;  // the last chunk has an index
   std::uint64_t at = first_record();
   auto r = record_at(file_, at);
   for (; r && r->what != kind::end; r = record_at(file_, at)) {
@@ -89,14 +89,14 @@ result<void> chunked_bag::list(std::uint32_t chunk, bool has_end) {
 result<chunked_bag::opened_chunk> chunked_bag::open_chunk(std::uint32_t chunk) {
   const auto r = record_at(file_, chunks_[chunk]);
   if (!r || r->what != kind::chunk) return fail(errc::unreadable, where_, "the file has changed");
-  if (r->compression.empty())  // its messages are read from the file
+  if (r->compression.empty())  // the messages are read from the file
     return opened_chunk{&file_, r->data, std::min(r->data + r->size, file_.size())};
   if (cache_[1].chunk == chunk) std::swap(cache_[0], cache_[1]);
   if (cache_[0].chunk != chunk) {
     const std::string place = where_ + ": the chunk at byte " + std::to_string(chunks_[chunk]);
     if (r->size > whole_message || r->plain_size > whole_message)
       return fail(errc::unsupported, place, "is larger than 1 GiB");
-    cache_[1] = {};  // its memory is free before more is allocated
+    cache_[1] = {};  // frees memory before more is allocated
     auto plain = decompress(r->compression, file_.read(r->data, r->size), r->plain_size, place);
     if (!plain) return fail(plain.error());
     std::swap(cache_[0], cache_[1]);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The common structure of ROS 1 bags and MCAP files: records, some of which are chunks of further records.
+/// The common structure of ROS 1 bags and MCAP files: records, some of which are chunks that contain further records.
 #pragma once
 
 #include <array>
@@ -23,15 +23,15 @@ struct bag_record {
   kind what = kind::other;
   std::uint64_t next = 0;            ///< position of the next record; exceeds the size of a truncated source
   std::uint64_t data = 0, size = 0;  ///< position and size of a message, of a chunk's contents or of index entries
-  std::uint32_t channel = 0;         ///< of a topic, a message or an index
-  std::int64_t time = 0;             ///< of a message, nanoseconds
-  std::string compression;           ///< of a chunk; empty: none
-  std::uint64_t plain_size = 0;      ///< of a chunk after decompression
-  bag_topic topic;                   ///< name and type; an empty type is not listed
+  std::uint32_t channel = 0;         ///< channel of a topic, a message or an index
+  std::int64_t time = 0;             ///< time of a message, nanoseconds
+  std::string compression;           ///< compression of a chunk; empty: none
+  std::uint64_t plain_size = 0;      ///< size of a chunk after decompression
+  bag_topic topic;                   ///< name and type; a topic with an empty type is not listed
 };
 
-/// Scans the headers of the records from front to back. Lists the messages of a chunk from its index, or from the chunk
-/// itself if it has none or if the index names a topic that is not defined yet.
+/// Scans the headers of the records from front to back. Lists the messages in a chunk from its index, or from the chunk
+/// itself if it has no index or the index refers to a topic that is not defined yet.
 class chunked_bag : public bag_file {
  public:
   chunked_bag(byte_source file, std::string where) : file_{std::move(file)}, where_{std::move(where)} {}
@@ -43,7 +43,7 @@ class chunked_bag : public bag_file {
  protected:
   /// The record at a position; empty if there is none. `next` of a record is greater than its position.
   virtual std::optional<bag_record> record_at(byte_source& from, std::uint64_t at) = 0;
-  /// Position of the first record, and of the definitions of topics outside of chunks (0: none).
+  /// Positions of the first record, and of the topic definitions outside of chunks (0: none).
   virtual std::uint64_t first_record() = 0;
   virtual std::uint64_t definitions() = 0;
   /// Message times and positions in the chunk, from the entries of an index.
@@ -74,7 +74,7 @@ class chunked_bag : public bag_file {
 
   std::string where_;
   std::map<std::uint32_t, std::size_t> topic_of_channel_;
-  std::vector<std::uint64_t> chunks_;  // their positions
+  std::vector<std::uint64_t> chunks_;  // positions of the chunks
   std::array<cached_chunk, 2> cache_;  // most recent first
 };
 

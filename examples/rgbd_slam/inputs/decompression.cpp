@@ -19,13 +19,13 @@
 namespace app {
 namespace {
 
-/// Progress of a decompressor: bytes read and written, and its state.
+/// Progress of a decompressor: the bytes that it has read and written, and its state.
 struct progress {
   std::size_t read = 0, written = 0;
   bool is_end = false, is_bad = false;
 };
 
-/// Calls `step(input, output, room)` until it ends, and at most until there are `most` bytes.
+/// Calls `step(input, output, room)` until decompression ends or there are `most` bytes of output.
 template <class Step>
 decompressed run(std::string_view bytes, std::size_t most, const Step& step) {
   decompressed out;

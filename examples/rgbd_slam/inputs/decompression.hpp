@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Decompression with the libraries of this build: LZ4 frames, Zstandard and bzip2.
+/// Decompression with the libraries that this build includes: LZ4 frames, Zstandard and bzip2.
 #pragma once
 
 #include <cstddef>
@@ -16,12 +16,12 @@ struct decompressed {
   bool is_complete = false;  ///< false if the input is truncated or damaged: `bytes` precede the damage
 };
 
-/// Decompresses "lz4", "zstd" or "bz2", at most the first `most` bytes; memory is allocated as they are produced.
-/// Errors: unsupported (another method, or no library for it), with the name of the missing package.
+/// Decompresses "lz4", "zstd" or "bz2", up to `most` bytes of output; memory is allocated as the output is produced.
+/// Errors: unsupported (another method, or no library for the method), with the name of the missing package.
 [[nodiscard]] orbis::result<decompressed> decompress(std::string_view method, std::string_view bytes, std::size_t most,
                                                      const std::string& where);
 
-/// Returns true if `bytes` begin with a frame of Zstandard.
+/// Returns true if `bytes` begin with a Zstandard frame.
 [[nodiscard]] inline bool is_zstd(std::string_view bytes) { return bytes.starts_with("\x28\xb5\x2f\xfd"); }
 
 }  // namespace app

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Registration of depth images to the colour camera, if the two are different cameras.
+/// Registration of depth images to the colour camera, if depth and colour are from different cameras.
 #pragma once
 
 #include <algorithm>
@@ -16,9 +16,10 @@
 
 namespace app {
 
-/// Computes depth images as seen from the colour camera, which stays unchanged. Each depth pixel is a square facing its
-/// camera that covers the colour pixels between the images of its corners; the nearest one covers the others. Squares
-/// are a quarter of a colour pixel larger on each side, so that slanted surfaces have no gaps.
+/// Computes depth images as seen from the colour camera; colour images remain unchanged. Each depth pixel is treated as
+/// a square that faces the depth camera and covers the colour pixels between the projections of its corners; the
+/// nearest square occludes others. Squares are enlarged by a quarter of a colour pixel on each side, so that slanted
+/// surfaces have no gaps.
 class depth_registration {
  public:
   depth_registration(const orbis::camera::any_camera& depth, const orbis::camera::any_camera& color,
@@ -56,7 +57,7 @@ class depth_registration {
     const orbis::vec3 a = corners_(x, y) * z + t_color_depth_, b = corners_(x + 1, y + 1) * z + t_color_depth_;
     const auto p = color.project(a), q = color.project(b);
     if (!p || !q) return;
-    constexpr double more = 0.25, most = 64.0;  // pixels; larger squares are closer than depth cameras measure
+    constexpr double more = 0.25, most = 64.0;  // pixels; larger squares are closer than depth cameras can measure
     const double left = std::min(p->x(), q->x()) - more, right = std::max(p->x(), q->x()) + more;
     const double top = std::min(p->y(), q->y()) - more, bottom = std::max(p->y(), q->y()) + more;
     if (!(right - left < most && bottom - top < most && right >= 0.0 && bottom >= 0.0 && left < out.width() &&

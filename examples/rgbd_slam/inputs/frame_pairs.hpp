@@ -17,7 +17,7 @@ namespace app {
 /// The two streams.
 enum class stream : std::size_t { color, depth };
 
-/// Pairs frames of colour and depth of the same time. Either stream may be some frames ahead of the other, and either
+/// Pairs colour and depth frames with the same time. Either stream may be some frames ahead of the other, and either
 /// may lose frames.
 template <class Frame>
 class frame_pairs {

@@ -27,7 +27,7 @@ class frame_tree {
   void set(const ros_messages::transform& t) {
     links_.insert_or_assign(t.child_frame_id, link{t.header.frame_id, t.T_parent_child});
   }
-  /// Adds a transform; a link whose transforms differ moves.
+  /// Adds a transform; a link with different transforms is a moving link.
   void add(const ros_messages::transform& t) {
     const auto [at, is_new] = links_.try_emplace(t.child_frame_id, link{t.header.frame_id, t.T_parent_child});
     link& known = at->second;
@@ -40,7 +40,7 @@ class frame_tree {
     const auto at = links_.find(frame);
     return at == links_.end() ? nullptr : &at->second;
   }
-  /// The frame, its parent, and so on to the root. A cycle ends before it repeats.
+  /// The frame, its parent, and so on to the root. In a cycle, each frame occurs once.
   [[nodiscard]] std::vector<std::string> path_to_root(std::string frame) const {
     std::vector<std::string> path{frame};
     for (const link* up = find(frame); up != nullptr; up = find(path.back())) {
@@ -63,7 +63,7 @@ class frame_tree {
     return a.translation() == b.translation() &&
            a.rotation().unit_quaternion().coeffs() == b.rotation().unit_quaternion().coeffs();
   }
-  /// The ancestors of a frame up to the first link that moves, with the pose of the frame in each.
+  /// The ancestors of a frame up to the first moving link, with the pose of the frame in each ancestor.
   [[nodiscard]] std::vector<std::pair<std::string, orbis::se3>> constant_path(const std::string& frame) const {
     std::vector<std::pair<std::string, orbis::se3>> path;
     orbis::se3 T_up_frame;

@@ -12,8 +12,8 @@ using orbis::errc;
 using orbis::fail;
 
 namespace {
-constexpr auto poll_interval = 50ms;  // between checks for the end
-constexpr auto longest_wait = 10s;    // for a frame, before the camera counts as disconnected
+constexpr auto poll_interval = 50ms;  // between checks whether the run has ended
+constexpr auto longest_wait = 10s;    // without a frame, until the camera counts as disconnected
 }  // namespace
 
 live_source::live_source(std::unique_ptr<camera_device> device)
@@ -27,7 +27,7 @@ live_source::~live_source() {
 orbis::result<std::optional<source_frame>> live_source::next_of_device() {
   try {
     return device_->next(poll_interval);
-  } catch (const std::exception& e) {  // of the library, or out of memory
+  } catch (const std::exception& e) {  // from the library, or out of memory
     return fail(errc::unreadable, device_->name, e.what());
   }
 }

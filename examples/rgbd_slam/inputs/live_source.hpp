@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The frames of a camera, for programs that may be slower than it.
+/// The frames of a live camera, for programs that may be slower than the camera.
 #pragma once
 
 #include <atomic>
@@ -19,7 +19,7 @@
 
 namespace app {
 
-/// Reads frames from a camera on a separate thread and keeps the newest one for the next request. A frame that is not
+/// Reads frames from a camera on a separate thread and stores the newest one for the next request. A frame that is not
 /// requested before the next one arrives is dropped and counted.
 class live_source {
  public:
@@ -29,7 +29,7 @@ class live_source {
   live_source& operator=(const live_source&) = delete;
 
   [[nodiscard]] const camera_device& device() const { return *device_; }
-  /// Waits for a new frame. Errors: that of the device, after its last frame; cancelled, if `is_over()` returns true
+  /// Waits for a new frame. Errors: the device's error, after its last frame; cancelled, if `is_over()` returns true
   /// during the wait; unreadable, if no frame arrives for ten seconds.
   [[nodiscard]] orbis::result<source_frame> next(const std::function<bool()>& is_over);
   /// The number of frames dropped so far. May be called from any thread.

@@ -2,9 +2,9 @@
 /// @file
 /// The fields of a serialised ROS message, in order.
 ///
-/// ROS 1 packs fields without gaps in little-endian order (wiki.ros.org/msg). ROS 2 uses CDR: four bytes name the byte
-/// order, numbers are aligned to their size relative to the following byte, strings end with a zero (OMG DDSI-RTPS 2.5,
-/// section 10; OMG DDS-XTYPES 1.3, section 7.4).
+/// ROS 1 packs fields without gaps in little-endian order (wiki.ros.org/msg). ROS 2 uses CDR: the first four bytes
+/// specify the byte order, numbers are aligned to their size relative to the byte after those four, and strings end
+/// with a zero (OMG DDSI-RTPS 2.5, section 10; OMG DDS-XTYPES 1.3, section 7.4).
 #pragma once
 
 #include <algorithm>
@@ -21,8 +21,8 @@ namespace app {
 
 enum class message_encoding : std::uint8_t { ros1, cdr };
 
-/// Reads from bytes that must outlive it. After the first field that exceeds the bytes, all fields are zero or empty
-/// and `ok()` is false.
+/// Reads from bytes that must outlive the reader. After the first field that exceeds the bytes, all fields are zero or
+/// empty and `ok()` is false.
 class message_reader {
  public:
   message_reader(std::string_view bytes, message_encoding encoding) : bytes_{bytes}, encoding_{encoding} {
@@ -54,7 +54,7 @@ class message_reader {
     for (T& v : values) v = number<T>();
     return values;
   }
-  /// The number of elements of a sequence; `ok()` is false if elements of `least` bytes exceed the message.
+  /// The number of elements in a sequence; `ok()` is false if elements of `least` bytes exceed the message.
   [[nodiscard]] std::size_t count(std::size_t least) {
     const std::size_t n = number<std::uint32_t>();
     if (n > rest() / least) ok_ = false;

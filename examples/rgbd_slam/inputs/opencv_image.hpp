@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Conversion of images from OpenCV's readers.
+/// Conversion of images read by OpenCV.
 #pragma once
 
 #include <string>

@@ -29,8 +29,8 @@ std::string reason() {
   return text.substr(begin, text.find('\n', begin) - begin);
 }
 
-/// The mode of a stream with this pixel format: of the given width, or else the largest up to it or 640x480, at the
-/// highest rate.
+/// The mode of a stream with this pixel format and the given width, or else the largest mode up to that width or
+/// 640x480, at the highest rate.
 std::optional<openni::VideoMode> find_mode(const openni::SensorInfo& info, openni::PixelFormat format, int width) {
   std::optional<openni::VideoMode> best;
   const auto& modes = info.getSupportedVideoModes();
@@ -47,9 +47,9 @@ double seconds(const openni::VideoFrameRef& f) { return 1e-6 * static_cast<doubl
 
 class openni_camera final : public camera_device {
  public:
-  // Some drivers, such as that of the dummy device, do not wait for the end of a stream's thread, which sleeps for the
-  // duration of a frame; its data is kept until then. OpenNI2 itself is not shut down, because that unloads the
-  // drivers.
+  // Some drivers, such as that of the dummy device, do not wait until a stream's thread has ended, which sleeps for the
+  // duration of a frame; the data of the stream must exist until then. OpenNI2 itself is not shut down, because that
+  // would unload the drivers.
   ~openni_camera() override {
     pairs_.clear();
     for (openni::VideoStream* s : {&depth_, &color_})
@@ -73,7 +73,7 @@ class openni_camera final : public camera_device {
       return ok;
     if (depth_.getVideoMode().getResolutionX() != mode.getResolutionX() ||
         depth_.getVideoMode().getResolutionY() != mode.getResolutionY())
-      return fail(errc::unsupported, name, "has no depth images of the size of its colour images");
+      return fail(errc::unsupported, name, "has no depth images with the size of its colour images");
     if (device_.isFile()) {
       device_.getPlaybackControl()->setRepeatEnabled(false);
       last_ = std::min(device_.getPlaybackControl()->getNumberOfFrames(color_),
@@ -122,7 +122,7 @@ class openni_camera final : public camera_device {
     return {};
   }
 
-  /// The camera of the options, or a pinhole camera by the field of view.
+  /// Sets the camera to that of the options, or to a pinhole camera with the device's field of view.
   result<void> choose_camera(const device_options& options, const openni::VideoMode& mode) {
     const int width = mode.getResolutionX(), height = mode.getResolutionY();
     if (options.camera) {
@@ -137,8 +137,10 @@ class openni_camera final : public camera_device {
     const bool is_known = std::isfinite(angle) && angle > 0.2 && angle < 2.5;
     const double f = is_known ? 0.5 * width / std::tan(0.5 * angle) : 525.0 * width / 640.0;
     notes.emplace_back(is_known
-                           ? "the camera is not calibrated: the focal length is that of its field of view (--camera)"
-                           : "the camera is not calibrated: the intrinsics are those of a Kinect (--camera)");
+                           ? "the camera is not calibrated: its focal length is computed from the field of view "
+                             "(specify it with --camera)"
+                           : "the camera is not calibrated: the intrinsics of a Kinect are assumed (specify them with "
+                             "--camera)");
     camera = {.model = orbis::camera::pinhole{width, height, f, f, 0.5 * (width - 1), 0.5 * (height - 1)},
               .depth_scale = 1000.0,
               .fps = static_cast<double>(std::max(1, mode.getFps()))};
@@ -171,7 +173,7 @@ class openni_camera final : public camera_device {
   openni::Device device_;
   openni::VideoStream color_, depth_;
   frame_pairs<openni::VideoFrameRef> pairs_;
-  std::optional<int> last_;  // number of frames of a file
+  std::optional<int> last_;  // number of frames in a file
   int newest_index_ = 0;
   bool is_started_ = false;  // at least one stream is started
   double interval_ = 0.0;    // time between frames of the slower stream, seconds

@@ -91,7 +91,7 @@ result<std::unique_ptr<camera_device>> open_playback(const device_options& optio
               [](const auto& r, std::size_t i) -> result<source_frame> {
                 auto frame = r.frame(i);
                 if (!frame) return fail(frame.error());
-                frame->T_world_camera.reset();  // unknown to a camera
+                frame->T_world_camera.reset();  // a live camera provides no poses
                 return source_frame{*std::move(frame), {}};
               });
 }

@@ -26,10 +26,10 @@ using depth_image = orbis::image<std::uint16_t>;
 
 bool contains(std::string_view text, std::string_view part) { return text.find(part) != std::string_view::npos; }
 
-/// The encoding of the image before compression, from the format.
+/// The encoding of the image before compression, as specified in the format.
 std::string_view encoding_in(std::string_view format) { return format.substr(0, format.find(';')); }
 
-/// OpenCV's conversion code for a Bayer mosaic or for colours of pairs of pixels (YUV 4:2:2).
+/// OpenCV's conversion code for a Bayer mosaic or for colours shared by pairs of pixels (YUV 4:2:2).
 std::optional<int> find_conversion(std::string_view encoding) {
   for (const auto& [name, code] :
        {std::pair{"bayer_rggb8", cv::COLOR_BayerRGGB2RGB}, std::pair{"bayer_bggr8", cv::COLOR_BayerBGGR2RGB},
@@ -90,8 +90,7 @@ result<color_image> decode_color(const ros_messages::image& m, const std::string
     const bool mosaic = is_mosaic(m.encoding);
     if (mosaic && (m.width < 4 || m.height < 4))
       return fail(errc::malformed, where, "a Bayer mosaic must have at least 4x4 pixels");
-    if (!mosaic && m.width % 2 != 0)
-      return fail(errc::malformed, where, "an image with colours of pairs of pixels must have an even width");
+    if (!mosaic && m.width % 2 != 0) return fail(errc::malformed, where, "a YUV 4:2:2 image must have an even width");
     const cv::Mat from(out.height(), out.width(), mosaic ? CV_8UC1 : CV_8UC2, const_cast<char*>(m.data.data()), m.step);
     cv::Mat to(out.height(), out.width(), CV_8UC3, out.data());
     cv::cvtColor(from, to, *conversion);
@@ -143,7 +142,8 @@ result<depth_image> decode_depth(const ros_messages::compressed_image& m, const 
     return fail(errc::unsupported, where,
                 "compressed depth in the format \"" + orbis::shortened(m.format, 60) + "\" is not supported");
   if (has_header) bytes.remove_prefix(std::min(header, bytes.size()));
-  if (!orbis::io::is_png(bytes)) return fail(errc::malformed, where, "a compressed depth image contains no PNG");
+  if (!orbis::io::is_png(bytes))
+    return fail(errc::malformed, where, "a compressed depth image does not contain a PNG image");
   auto out = orbis::io::decode_png_depth(bytes, where);
   if (!out || !is_in_metres(m.format)) return out;
   // The stored value is a / z + b.

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The pixels of images in ROS bags, by the encoding of a `sensor_msgs/Image` or the format of a
-/// `sensor_msgs/CompressedImage`. Formats are "ENCODING; CODEC compressed ..." or, of depth, "ENCODING; compressedDepth
-/// CODEC".
+/// Decodes images in ROS bags according to the encoding of a `sensor_msgs/Image` or the format of a
+/// `sensor_msgs/CompressedImage`. Formats are "ENCODING; CODEC compressed ..." or, for depth, "ENCODING;
+/// compressedDepth CODEC".
 #pragma once
 
 #include <cstddef>
@@ -17,13 +17,14 @@
 
 namespace app {
 
-/// The scale of stored depth that was in metres: 0.2 mm steps, up to 13 m.
+/// The scale for storing depth that is in metres in a bag: 0.2 mm steps, up to 13 m.
 inline constexpr double metres_scale = 5000.0;
 
-/// Return true if images of this encoding or format are depth; if they are in metres, not in millimetres.
+/// Returns true if images with this encoding or format are depth images.
 [[nodiscard]] bool is_depth_encoding(std::string_view encoding);
+/// Returns true if depth images with this encoding or format are in metres, not in millimetres.
 [[nodiscard]] bool is_in_metres(std::string_view encoding);
-/// Returns true if images of this encoding (not format) are supported.
+/// Returns true if images with this encoding (not format) are supported.
 [[nodiscard]] bool is_known_encoding(std::string_view encoding);
 
 /// Decodes a grey or colour image, YUV 4:2:2, or a Bayer mosaic, with demosaicing. `where` names the source in errors.
@@ -33,11 +34,12 @@ inline constexpr double metres_scale = 5000.0;
 [[nodiscard]] orbis::result<orbis::image<orbis::rgb8>> decode_color(const ros_messages::compressed_image& m,
                                                                     const std::string& where);
 
-/// Decodes a depth image; depth in metres is stored with `metres_scale`, integers are unchanged. Errors: as above.
+/// Decodes a depth image; depth in metres is converted with `metres_scale`, integers are unchanged. Errors: as
+/// `decode_color`.
 [[nodiscard]] orbis::result<orbis::image<std::uint16_t>> decode_depth(const ros_messages::image& m,
                                                                       const std::string& where);
-/// As above, from a PNG. "compressedDepth" has a header of 12 bytes with the two quantisation parameters of depth in
-/// metres.
+/// Decodes a depth image from a PNG. "compressedDepth" has a header of 12 bytes with the two quantisation parameters
+/// for depth in metres.
 [[nodiscard]] orbis::result<orbis::image<std::uint16_t>> decode_depth(const ros_messages::compressed_image& m,
                                                                       const std::string& where);
 

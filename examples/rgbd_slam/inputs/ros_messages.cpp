@@ -21,7 +21,7 @@ std::string frame_name(std::string_view name) {
   return std::string{name};
 }
 
-/// A position and a quaternion (x, y, z, w).
+/// Reads a position and a quaternion (x, y, z, w).
 orbis::se3 read_rigid(message_reader& in) {
   const auto v = in.array<double, 7>();
   const double norm = std::hypot(std::hypot(v[3], v[4]), std::hypot(v[5], v[6]));
@@ -90,7 +90,7 @@ void read_pose(message_reader& in, transform& m, bool has_child) {
 
 result<orbis::camera::any_camera> make_camera(const camera_info& info, bool is_rectified, const std::string& where) {
   if (info.width == 0 || info.height == 0 || info.width > 65536 || info.height > 65536)
-    return fail(errc::malformed, where, "has a camera without image size: is the camera calibrated?");
+    return fail(errc::malformed, where, "does not specify the image size: is the camera calibrated?");
   const auto width = static_cast<int>(info.width), height = static_cast<int>(info.height);
   const orbis::camera::intrinsics read =
       is_rectified && info.P[0] > 0.0
@@ -110,7 +110,7 @@ result<orbis::camera::any_camera> make_camera(const camera_info& info, bool is_r
   const std::string& model = info.distortion_model;
   if (model == "equidistant" && d.size() == 4)
     return orbis::camera::any_camera{orbis::camera::kannala_brandt{k, {d[0], d[1], d[2], d[3]}}};
-  // Thin prisms and tilted sensors have 12 and 14 numbers. The second name is that of librealsense.
+  // The models of thin prisms and tilted sensors have 12 and 14 numbers. librealsense uses the second name.
   const bool is_radial = model == "plumb_bob" || model == "Brown Conrady" || model == "rational_polynomial";
   const bool has_more = d.size() > 8 && std::any_of(d.begin() + 8, d.end(), [](double v) { return v != 0.0; });
   if (is_radial && d.size() >= 4 && !has_more)

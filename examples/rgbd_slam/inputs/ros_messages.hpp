@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The messages of ROS 1 and ROS 2 that recordings consist of. Both have the same fields, except for the number in the
-/// header of ROS 1.
+/// The ROS 1 and ROS 2 messages of recordings. Both have the same fields, except for the sequence number in the header
+/// of ROS 1.
 #pragma once
 
 #include <array>
@@ -29,7 +29,7 @@ struct image {
   std::uint32_t height = 0, width = 0;
   std::string encoding;
   std::uint8_t is_bigendian = 0;
-  std::uint32_t step = 0;  ///< bytes in a row
+  std::uint32_t step = 0;  ///< bytes per row
   std::string_view data;
 };
 
@@ -40,7 +40,7 @@ struct compressed_image {
   std::string_view data;
 };
 
-/// `sensor_msgs/CameraInfo` without binning and region of interest.
+/// `sensor_msgs/CameraInfo`, excluding binning and region of interest.
 struct camera_info {
   ros_messages::header header;
   std::uint32_t height = 0, width = 0;
@@ -50,16 +50,15 @@ struct camera_info {
   std::array<double, 12> P{};
 };
 
-/// A transform of `tf2_msgs/TFMessage`, `geometry_msgs/PoseStamped`, `geometry_msgs/PoseWithCovarianceStamped` or
-/// `nav_msgs/Odometry` without velocity and covariance. The frame of the header is the parent.
+/// A transform in `tf2_msgs/TFMessage`, `geometry_msgs/PoseStamped`, `geometry_msgs/PoseWithCovarianceStamped` or
+/// `nav_msgs/Odometry`, excluding velocity and covariance. The frame in the header is the parent.
 struct transform {
   ros_messages::header header;
   std::string child_frame_id;  ///< empty for poses
   orbis::se3 T_parent_child;
 };
 
-/// Reads a message. Check `in.ok()` afterwards; it is also false for rotations of norm zero and numbers that are not
-/// finite.
+/// Reads a message. Check `in.ok()` afterwards; it is also false for rotations with norm zero and non-finite numbers.
 [[nodiscard]] std::int64_t read_stamp(message_reader& in);  ///< nanoseconds, at the beginning of a header
 void read(message_reader& in, header& m);
 void read(message_reader& in, image& m);
@@ -69,7 +68,7 @@ void read(message_reader& in, std::vector<transform>& m);
 /// `has_child`: the message is `nav_msgs/Odometry`.
 void read_pose(message_reader& in, transform& m, bool has_child);
 
-/// Reads a message or the beginning of it. Errors: malformed.
+/// Parses a message or the beginning of a message. Errors: malformed.
 template <class Message>
 [[nodiscard]] orbis::result<Message> parse(std::string_view bytes, message_encoding encoding,
                                            const std::string& where) {
@@ -80,8 +79,8 @@ template <class Message>
   return m;
 }
 
-/// The camera of a message. `is_rectified`: the images are rectified, so that the matrix P applies. Errors: malformed
-/// (no size, no camera matrix), unsupported (distortion model).
+/// The camera described by a message. `is_rectified`: the images are rectified, so that the matrix P applies. Errors:
+/// malformed (no size, no camera matrix), unsupported (distortion model).
 [[nodiscard]] orbis::result<orbis::camera::any_camera> make_camera(const camera_info& info, bool is_rectified,
                                                                    const std::string& where);
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// ROS 1 bags, format 2.0 (wiki.ros.org/Bags/Format/2.0): a record is a header of named fields and data, each after its
-// length.
+// ROS 1 bags, format 2.0 (wiki.ros.org/Bags/Format/2.0): a record consists of a header of named fields and of data,
+// each preceded by its length.
 #include <string_view>
 
 #include "inputs/chunked_bag.hpp"
@@ -11,7 +11,7 @@ namespace {
 
 constexpr std::uint64_t magic = 13, most_head = 1U << 20U;  // bytes
 
-/// The value of a field among several; empty if there is none.
+/// The value of the field with this name; empty if there is none.
 std::string_view field(std::string_view fields, std::string_view name) {
   message_reader in{fields, message_encoding::ros1};
   while (in.rest() != 0 && in.ok()) {
@@ -44,10 +44,10 @@ class rosbag1_file final : public chunked_bag {
   /// 0 if the bag was not closed.
   std::uint64_t definitions() override { return read_header().definitions; }
 
-  /// Numbers in the header of the bag.
+  /// The numbers in the header of the bag.
   struct header {
-    std::uint64_t definitions = 0;              // their position
-    std::uint32_t connections = 0, chunks = 0;  // records at this position
+    std::uint64_t definitions = 0;              // position of the definitions
+    std::uint32_t connections = 0, chunks = 0;  // numbers of records at this position
   };
   header read_header() {
     const std::string bytes = file_.read(magic, 4096);
@@ -57,7 +57,7 @@ class rosbag1_file final : public chunked_bag {
     return {number<std::uint64_t>(fields, "index_pos"), number<std::uint32_t>(fields, "conn_count"),
             number<std::uint32_t>(fields, "chunk_count")};
   }
-  /// Returns true if the end of the file has the definitions and chunk information that the header counts.
+  /// Returns true if the end of the file has as many definitions and chunk records as the header specifies.
   bool has_whole_end() {
     const header known = read_header();
     std::uint32_t connections = 0, chunks = 0;
@@ -74,7 +74,7 @@ class rosbag1_file final : public chunked_bag {
   std::optional<bag_record> record_at(byte_source& from, std::uint64_t at) override {
     bag_record r;
     if (&from == &file_ && at == file_.size()) {
-      if (!has_whole_end()) return std::nullopt;  // not closed, or cut off
+      if (!has_whole_end()) return std::nullopt;  // not closed, or truncated
       r.what = bag_record::kind::end;
       r.next = at + 1;
       return r;
@@ -99,7 +99,7 @@ class rosbag1_file final : public chunked_bag {
       r.what = bag_record::kind::chunk;
       r.plain_size = number<std::uint32_t>(fields, "size");
       if (const std::string_view method = field(fields, "compression"); method != "none") r.compression = method;
-      // The lengths of a chunk are written after its messages: those of an interrupted recording are zero.
+      // The lengths of a chunk are written after its messages, so that they are zero if the recording was interrupted.
       if (r.size == 0 && !r.compression.empty() && r.data < from.size()) {
         r.size = from.size() - r.data;
         r.plain_size = whole_message;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// The SQLite databases of rosbag2: a table of topics and one of messages.
+// The SQLite databases of rosbag2: a table of topics and a table of messages.
 #include "inputs/bag_file.hpp"
 
 #ifdef RGBD_SLAM_SQLITE
@@ -35,12 +35,12 @@ std::string_view column(const statement& row, int i) {
                           : std::string_view{static_cast<const char*>(bytes), static_cast<std::size_t>(size)};
 }
 
-/// Makes reading the last page of a truncated file an error; SQLite would complete it with zeros.
+/// Makes reading the incomplete last page of a truncated file an error; SQLite would complete the page with zeros.
 void reject_short_reads(sqlite3* database) {
   sqlite3_file* file = nullptr;
   sqlite3_file_control(database, "main", SQLITE_FCNTL_FILE_POINTER, &file);
   if (file == nullptr || file->pMethods == nullptr) return;
-  static const sqlite3_io_methods& plain = *file->pMethods;  // the same for all files of "unix-none"
+  static const sqlite3_io_methods& plain = *file->pMethods;  // the same for all files opened with "unix-none"
   static const sqlite3_io_methods strict = [] {
     sqlite3_io_methods methods = plain;
     methods.xRead = [](sqlite3_file* from, void* to, int size, sqlite3_int64 at) {
@@ -62,7 +62,7 @@ class sqlite_bag final : public bag_file {
     connect(path_, 0);
     if (sqlite3_exec(database_.get(), "SELECT 1 FROM topics", nullptr, nullptr, nullptr) != SQLITE_OK &&
         sqlite3_extended_errcode(database_.get()) == SQLITE_READONLY_ROLLBACK) {
-      connect(immutable(path_), SQLITE_OPEN_URI);  // as it is, without the journal
+      connect(immutable(path_), SQLITE_OPEN_URI);  // ignores the journal
       notes.push_back(path_ + ": the recording was interrupted; its last messages may be damaged");
     }
 
@@ -76,13 +76,13 @@ class sqlite_bag final : public bag_file {
       topics.push_back({std::string{column(rows, 1)}, type, message_encoding::cdr, {}});
     }
     const statement found = prepare("SELECT id, topic_id, timestamp FROM messages ORDER BY id");
-    if (!rows || !found) return fail(errc::malformed, path_, "is not a readable bag of ROS 2: " + reason());
+    if (!rows || !found) return fail(errc::malformed, path_, "is not a readable bag (rosbag2): " + reason());
     const bool has_topics = state == SQLITE_DONE;
     for (state = sqlite3_step(found.get()); state == SQLITE_ROW; state = sqlite3_step(found.get()))
       if (const auto topic = topic_of_id.find(sqlite3_column_int64(found.get(), 1)); topic != topic_of_id.end())
         topics[topic->second].messages.push_back(
             {sqlite3_column_int64(found.get(), 2), static_cast<std::uint64_t>(sqlite3_column_int64(found.get(), 0))});
-    // Pages at the end of a truncated file hold the rest of messages that begin in earlier pages.
+    // The missing pages at the end of a truncated file contain the rest of messages that begin in earlier pages.
     const auto can_read = [&](const bag_message& m) { return read(m, whole_message).has_value(); };
     const bool has_ends = std::ranges::all_of(
         topics, [&](const bag_topic& t) { return t.messages.empty() || can_read(t.messages.back()); });
@@ -115,7 +115,7 @@ class sqlite_bag final : public bag_file {
     reject_short_reads(opened);
     sqlite3_exec(opened, "PRAGMA locking_mode = EXCLUSIVE; PRAGMA writable_schema = ON", nullptr, nullptr, nullptr);
   }
-  /// The address of a database that SQLite reads as it is.
+  /// The address with which SQLite opens a database as immutable.
   static std::string immutable(const std::string& path) {
     std::string address = "file:";
     for (const char c : path) {
@@ -136,7 +136,7 @@ class sqlite_bag final : public bag_file {
   [[nodiscard]] std::string reason() const { return sqlite3_errmsg(database_.get()); }
 
   std::string path_;
-  std::uintmax_t file_size_;  // with the write-ahead log
+  std::uintmax_t file_size_;  // including the write-ahead log
   std::unique_ptr<sqlite3, closer> database_;
 };
 

@@ -46,7 +46,8 @@ class video_recording final : public file_recording {
   }
 
  private:
-  /// Few containers support exact seeking: reads the file forwards, and from the beginning for earlier frames.
+  /// Reads a frame. Few containers support exact seeking, so the file is read forwards, and from the beginning for
+  /// earlier frames.
   [[nodiscard]] result<orbis::image<orbis::rgb8>> read(std::size_t i) const {
     const std::lock_guard lock{mutex_};
     if (i < next_) {
@@ -96,7 +97,7 @@ result<std::unique_ptr<file_recording>> read_video(const std::filesystem::path& 
   std::error_code ignored;
   if (!std::filesystem::exists(path, ignored)) return fail(errc::not_found, path.string(), "no such file");
   if (options.sensor == orbis::slam::sensor_kind::rgbd)
-    return fail(errc::unsupported, path.string(), "a video has no depth");
+    return fail(errc::unsupported, path.string(), "videos have no depth");
   auto camera = options.camera;
   std::optional<std::filesystem::path> camera_file;
   if (const auto beside = path.parent_path() / "camera.toml"; !camera && std::filesystem::exists(beside, ignored)) {

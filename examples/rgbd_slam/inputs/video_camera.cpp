@@ -46,7 +46,7 @@ class video_camera final : public camera_device {
   }
 
   cv::VideoCapture reader_;
-  // The time of day, continued steadily even if the system clock is set.
+  // The time of day at the start, to which the steady clock is added, because the system clock may be set.
   double opened_at_ = seconds_now<std::chrono::system_clock>(), opened_ = seconds_now<std::chrono::steady_clock>();
 };
 
@@ -54,7 +54,7 @@ result<std::unique_ptr<camera_device>> make_video_camera(const device_options& o
   cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);  // errors are reported here
   const std::string name = options.name.empty() ? "/dev/video0" : options.name;
   if (options.sensor == orbis::slam::sensor_kind::rgbd)
-    return fail(errc::unsupported, name, "a video camera has no depth");
+    return fail(errc::unsupported, name, "video cameras have no depth");
   if (!options.camera)
     return fail(errc::invalid_argument, name, "unknown camera: specify it with --camera camera.toml");
   const bool is_number = name.find_first_not_of("0123456789") == std::string::npos && name.size() < 4;

@@ -12,7 +12,7 @@ namespace {
 using orbis::errc;
 using orbis::fail;
 
-/// A function of the module; the module stays loaded.
+/// Finds a function in the module, which remains loaded.
 template <class Function>
 orbis::result<Function*> find(const char* name) {
   std::error_code ignored;
@@ -22,7 +22,7 @@ orbis::result<Function*> find(const char* name) {
   if (function != nullptr) return reinterpret_cast<Function*>(function);
   const char* const why = dlerror();
   return fail(errc::unsupported, file.string(),
-              std::string{"cannot load the video module: "} + (why != nullptr ? why : "it lacks the function"));
+              std::string{"cannot load the video module: "} + (why != nullptr ? why : "a function is missing"));
 }
 
 }  // namespace

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Back ends that draw the scene: in a window or in a browser.
+/// Back ends that draw the scene in a window or in a browser.
 #pragma once
 
 #include <chrono>
@@ -13,22 +13,22 @@
 
 namespace app {
 
-/// Draws scenes. All calls come from the viewer's thread, which created it.
+/// Draws scenes. The viewer's thread creates the back end and makes all calls to it.
 class viewer_backend {
  public:
   virtual ~viewer_backend() = default;
   /// Draws the scene and handles user input; returns false if the user closed the viewer. Rethrows exceptions of the
   /// back end's threads.
   [[nodiscard]] virtual bool draw(const viewer_scene& scene) = 0;
-  /// The address of the viewer for the user; may be empty.
+  /// The address of the viewer, for the user; may be empty.
   [[nodiscard]] virtual std::string where() const = 0;
-  /// The minimum time between two calls of `draw`.
+  /// The minimum time between two calls to `draw`.
   [[nodiscard]] virtual std::chrono::milliseconds interval() const = 0;
 };
 
 /// Returns true if the program was built with the library that the back end needs; `name`: "window" or "web".
 [[nodiscard]] bool has_viewer(const std::string& name);
-/// The error message for a back end that is not in this build, with build instructions.
+/// The error message for a back end that this build does not include, with build instructions.
 [[nodiscard]] std::string missing_viewer_message(const std::string& name);
 
 /// Opens a window. Errors: no display, or no OpenGL 3.3.

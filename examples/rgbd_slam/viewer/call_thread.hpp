@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A thread for calls with another priority.
+/// A thread that makes calls with another priority.
 #pragma once
 
 #include <condition_variable>
@@ -12,9 +12,9 @@
 
 namespace app {
 
-/// A thread with the priority of its creator. It makes calls on behalf of a low-priority thread that lock mutexes which
-/// high-priority threads need. This avoids priority inversion: on few cores, a low-priority thread may not run for a
-/// long time while it holds a lock.
+/// A thread with the priority of its creator that makes calls on behalf of a low-priority thread. These calls lock
+/// mutexes that high-priority threads need. This avoids priority inversion: on a machine with few cores, a low-priority
+/// thread may not be scheduled for a long time while it holds a lock.
 class call_thread {
  public:
   /// Throws if no thread can be created.

@@ -62,7 +62,7 @@ bool is_same_name(std::string_view a, std::string_view b) {
   });
 }
 
-/// The next part of `text` up to `separator`, which is removed with it.
+/// Removes the next part of `text` up to and including `separator`, and returns it without the separator.
 std::string_view take(std::string_view& text, char separator) {
   const std::size_t end = std::min(text.find(separator), text.size());
   const std::string_view part = text.substr(0, end);
@@ -97,7 +97,7 @@ header parse(std::string_view text) {
   return h;
 }
 
-/// Returns true if the host is this machine. The port may differ, as with a tunnel.
+/// Returns true if the host is this machine. The port may differ, for example because of a tunnel.
 bool is_local(std::string_view host) {
   if (const std::size_t colon = host.rfind(':'); colon != host.npos) {
     if (host.find_first_not_of("0123456789", colon + 1) != host.npos) return false;
@@ -155,7 +155,7 @@ class http_server::connection {
     char bytes[4096];
     const ssize_t count = ::recv(socket_, bytes, sizeof bytes, 0);
     if (count <= 0) return count < 0 && would_block();
-    if (state_ == state::closes) {  // what arrives after the last answer is not read
+    if (state_ == state::closes) {  // data that arrives after the last response is discarded
       ignored_ += static_cast<std::size_t>(count);
       return ignored_ < most_ignored;
     }
@@ -163,7 +163,7 @@ class http_server::connection {
     received_.append(bytes, static_cast<std::size_t>(count));
     return true;
   }
-  /// The answer to the first received request; empty if that is not complete.
+  /// The response to the first received request; empty if the request is not complete.
   std::optional<http_answer> answer_next() {
     const std::size_t crlf = received_.find("\n\r\n"), lf = received_.find("\n\n");
     const std::size_t end =
@@ -174,7 +174,7 @@ class http_server::connection {
     const std::string text = received_.substr(0, end);
     received_.erase(0, end);
     const header h = parse(text);
-    // The same range many times would be thousands of times the size of the whole.
+    // A range that is requested many times could be thousands of times the size of the whole page.
     if (h.has_range) return http_answer{.status = 416};
     if (!h.target.starts_with('/') || !h.version.starts_with("HTTP/1.")) return text_answer(400, "not a request\n");
     if (h.hosts != 1 || !is_local(h.host)) return text_answer(403, "only for this machine\n");
@@ -208,7 +208,7 @@ class http_server::connection {
     return send();
   }
   bool send() {
-    constexpr std::size_t most_at_once = std::size_t{1} << 20U;  // then the other connections
+    constexpr std::size_t most_at_once = std::size_t{1} << 20U;  // before serving the other connections
     for (std::size_t all = 0; part_ != parts_.size() && all < most_at_once;) {
       const std::string& part = *parts_[part_];
       const ssize_t count = ::send(socket_, part.data() + sent_, part.size() - sent_, send_flags);
@@ -220,7 +220,7 @@ class http_server::connection {
     }
     if (part_ != parts_.size()) return true;
     parts_.clear();
-    if (closes_) ::shutdown(socket_, SHUT_WR);  // closed at once, unread bytes of the client would destroy the answer
+    if (closes_) ::shutdown(socket_, SHUT_WR);  // after a close, unread request bytes would discard the response
     state_ = closes_ ? state::closes : state::reads;
     wait(closes_ ? of_.limits_.closing : received_.empty() ? of_.limits_.silence : of_.limits_.request);
     return true;
@@ -230,12 +230,12 @@ class http_server::connection {
   const http_server& of_;
   state state_ = state::reads;
   clock::time_point deadline_;
-  clock::time_point last_{};  // deadline of the whole answer
-  std::string received_;      // of the next requests
+  clock::time_point last_{};  // deadline for the whole response
+  std::string received_;      // data of the next requests
   std::vector<std::shared_ptr<const std::string>> parts_;
   std::size_t part_ = 0, sent_ = 0;  // bytes of that part
-  bool closes_ = false;              // after this answer
-  std::size_t ignored_ = 0;          // bytes after the last answer
+  bool closes_ = false;              // after this response
+  std::size_t ignored_ = 0;          // bytes received after the last response
 };
 
 http_server::http_server(std::function<http_answer(const http_request&)> answer,
@@ -280,7 +280,7 @@ bool http_server::listen(unsigned port) {
 void http_server::accept_one(std::vector<std::unique_ptr<connection>>& open) {
   const int socket = ::accept(listener_, nullptr, nullptr);
   if (socket < 0) {
-    if (!would_block()) accepts_again_ = clock::now() + std::chrono::milliseconds{100};  // no descriptors, no memory
+    if (!would_block()) accepts_again_ = clock::now() + std::chrono::milliseconds{100};  // out of descriptors or memory
     return;
   }
   std::unique_ptr<connection> made;
@@ -329,7 +329,7 @@ void http_server::serve() {
     if (watched[0].revents != 0) return;
     const auto later = clock::now();
     for (std::size_t i = 0; i != open.size(); ++i) {
-      if (ends_) return;  // answers may take long
+      if (ends_) return;  // checked here because responses may take long
       const bool goes_on = watched[i + 2].revents == 0 || open[i]->advance();
       if (!goes_on || open[i]->deadline() <= later) open[i].reset();
     }

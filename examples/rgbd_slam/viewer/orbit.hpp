@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The viewpoint: it rotates about a target that follows the camera.
+/// The viewpoint, which rotates about a target that follows the camera.
 #pragma once
 
 #include <algorithm>
@@ -20,7 +20,7 @@ class orbit {
  public:
   bool follows = true;
 
-  /// Follows the camera; the first pose places the viewpoint behind it. `seconds` since the last call.
+  /// Follows the camera; the first pose places the viewpoint behind the camera. `seconds`: time since the last call.
   void follow(const orbis::se3& T_world_camera, double seconds) {
     const orbis::vec3 goal = T_world_camera * orbis::vec3{0.0, 0.0, 1.0};
     if (!is_placed_) {
@@ -37,7 +37,7 @@ class orbit {
     yaw_ -= 0.006 * dx_pixels;
     pitch_ = std::clamp(pitch_ + 0.006 * dy_pixels, -1.55, 1.55);
   }
-  /// Pans so that the point at the target follows the mouse. `height`: of the view, pixels.
+  /// Pans so that the point at the target follows the mouse. `height`: height of the view in pixels.
   void pan(double dx_pixels, double dy_pixels, double height) {
     const double metres = distance_ * 2.0 * std::tan(0.5 * field_of_view) / height;
     const frame_axes a = axes();
@@ -49,7 +49,7 @@ class orbit {
   [[nodiscard]] double distance() const { return distance_; }
   [[nodiscard]] orbis::vec3 position() const { return target_ + distance_ * axes().back; }
   [[nodiscard]] orbis::vec3 forward() const { return -axes().back; }
-  /// The matrix clip_from_world in OpenGL's convention. `aspect`: width / height.
+  /// The transform from world to clip coordinates in OpenGL's convention. `aspect`: width / height.
   [[nodiscard]] Eigen::Matrix4f clip_from_world(double aspect) const {
     const frame_axes a = axes();
     const orbis::vec3 at = position();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The contents of the viewer as plain data. `scene_builder` fills it, a `viewer_backend` draws it.
+/// The contents of the viewer as plain data, built by `scene_builder` and drawn by a `viewer_backend`.
 #pragma once
 
 #include <array>
@@ -24,13 +24,13 @@ using frustum_rays = std::array<orbis::vec3f, 4>;
 
 struct shown_feature {
   float x = 0.0F, y = 0.0F;  ///< pixels
-  bool tracked = false;      ///< observes a known landmark
+  bool tracked = false;      ///< is an observation of a known landmark
 };
 
 /// The newest frame.
 struct shown_frame {
-  std::uint64_t number = 0;  ///< number of the frame in the recording
-  std::string state;         ///< state of tracking
+  std::uint64_t number = 0;  ///< index of the frame in the recording
+  std::string state;         ///< tracking state
   std::optional<orbis::se3> T_world_camera;
   std::shared_ptr<const orbis::image<orbis::rgb8>> image;  ///< never null
   std::vector<shown_feature> features;                     ///< empty if the frame was not tracked
@@ -46,10 +46,10 @@ struct shown_edge {
 
 struct trail_point {
   orbis::vec3f position;
-  bool begins = false;  ///< not connected with the previous point: tracking was lost between them
+  bool begins = false;  ///< not connected to the previous point, because tracking was lost between them
 };
 
-/// Keyframes and the path of the camera at their current poses.
+/// The current keyframe poses and the path of the camera.
 struct shown_graph {
   std::uint64_t revision = 0;  ///< increases with every change
   std::vector<orbis::se3> keyframes;
@@ -57,7 +57,7 @@ struct shown_graph {
   std::vector<trail_point> trail;
 };
 
-/// An occupied cube with an edge of 2^level voxels, by the coordinates of its lowest voxel in its block.
+/// An occupied cube with an edge of 2^level voxels, given by the coordinates of its lowest voxel in its block.
 struct shown_voxel {
   std::uint8_t x = 0, y = 0, z = 0, level = 0;
   orbis::rgb8 color{};
@@ -73,26 +73,26 @@ struct voxel_block {
   std::vector<shown_voxel> voxels;
 };
 
-/// The occupied voxels in blocks, so that unchanged blocks are not sent again. Blocks that became empty stay in the
+/// The occupied voxels in blocks, so that unchanged blocks are not sent again. Blocks that became empty remain in the
 /// list.
 struct shown_voxels {
-  std::uint64_t revision = 0;  ///< grows with every change
+  std::uint64_t revision = 0;  ///< increases with every change
   double resolution = 0.0;     ///< metres
   std::size_t count = 0;       ///< number of cubes
-  float floor = 0.0F;          ///< heights between which nearly all cubes are, metres
+  float floor = 0.0F;          ///< lower and upper height that enclose nearly all cubes, metres
   float ceiling = 0.0F;
   std::map<block_index, voxel_block> blocks;
   std::string absent;  ///< the reason why there are no voxels; empty otherwise
 };
 
 struct shown_numbers {
-  std::size_t frames = 0;  ///< number of frames of the recording
+  std::size_t frames = 0;  ///< number of frames in the recording
   double tracking_ms = 0.0, tracking_p95_ms = 0.0;
   std::size_t insertions = 0;
-  double insert_ms = 0.0, insert_p95_ms = 0.0;  ///< insertion of a keyframe into the octree
+  double insert_ms = 0.0, insert_p95_ms = 0.0;  ///< time taken to insert a keyframe into the octree
   std::size_t behind_frames = 0;                ///< maximum number of frames tracked before an insertion
   std::size_t corrections = 0;
-  double correction_ms = 0.0;  ///< of the last correction
+  double correction_ms = 0.0;  ///< time taken by the last correction
 };
 
 struct viewer_scene {

@@ -12,21 +12,21 @@ using orbis::se3;
 using orbis::vec3f;
 
 constexpr float trail_step = 0.02F;              // metres between points of the path
-constexpr std::size_t recent_frames = 300;       // for the percentile of the tracking time
-constexpr std::size_t keyframes_at_a_time = 64;  // moved per update after a correction
+constexpr std::size_t recent_frames = 300;       // for the percentile of tracking times
+constexpr std::size_t keyframes_at_a_time = 64;  // maximum number moved per update after a correction
 constexpr int color_tolerance = 12;              // smaller colour changes of a voxel are not shown
 
 std::uint64_t packed_id(orbis::slam::map_keyframe k) {
   return std::uint64_t{k.map.value()} << 32U | k.keyframe.value();
 }
 
-/// The displacement of points two metres in front of the camera, metres.
+/// The displacement in metres of points two metres in front of the camera.
 double motion(const se3& from, const se3& to) {
   const auto difference = (from.inverse() * to).log();
   return difference.head<3>().norm() + 2.0 * difference.tail<3>().norm();
 }
 
-/// The value below which the fraction `share` of the values is. @pre there is at least one value
+/// The value below which the fraction `share` of the values lies. @pre there is at least one value
 template <class T>
 T percentile(std::vector<T> values, double share) {
   const auto nth = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
@@ -51,7 +51,7 @@ frustum_rays corner_rays(const orbis::camera::ray_table& rays) {
   const std::array<std::array<int, 2>, 4> at{{{0, 0}, {right, 0}, {right, bottom}, {0, bottom}}};
   for (std::size_t i = 0; i != 4; ++i) {
     corners[i] = rays.at(at[i][0], at[i][1], 1.0F);
-    // The corners of a wide-angle image may have no such rays; a pyramid of 90 degrees replaces them.
+    // The corners of a wide-angle image may have no such rays; a pyramid of 90 degrees is then drawn.
     if (!corners[i].allFinite()) corners[i] = {at[i][0] == 0 ? -1.0F : 1.0F, at[i][1] == 0 ? -1.0F : 1.0F, 1.0F};
   }
   return corners;
@@ -61,7 +61,7 @@ scene_builder::scene_builder(std::string title, std::size_t frames, orbis::camer
                              std::size_t max_samples)
     : rays_{std::move(rays)},
       resolution_{resolution},
-      // One sample per voxel at a distance of three metres; keyframes mostly see the same voxels.
+      // One sample per voxel at a distance of three metres; most voxels are seen by several keyframes.
       step_{std::clamp(static_cast<int>(resolution / 3.0 * 0.8 * rays_.width()), 3, 8)},
       max_samples_{max_samples},
       colors_{resolution} {
@@ -91,7 +91,7 @@ std::vector<scene_builder::sample> scene_builder::take_samples(const viewer_fram
 }
 
 void scene_builder::push(viewer_frame frame) {
-  // Takes the unread mail back, adds to it, and puts it in again: neither thread blocks the other.
+  // Takes back unread mail, adds the frame, and puts it into the box again, so that neither thread blocks the other.
   std::unique_ptr<mailbox> mail{box_.exchange(nullptr)};
   if (!mail) mail = std::make_unique<mailbox>();
   if (frame.keyframe && takes_colors_ && mail->samples <= max_samples_ / 8) {
@@ -230,7 +230,8 @@ void scene_builder::make_room() {
 bool scene_builder::move_colors(std::size_t limit) {
   for (colored_keyframe& k : colored_) {
     const auto& known = k.asked < graph_.poses.size() ? graph_.poses[k.asked] : std::nullopt;
-    const std::optional<se3> pose = known ? std::optional<se3>{{known->rotation(), known->translation()}} : std::nullopt;
+    const std::optional<se3> pose =
+        known ? std::optional<se3>{{known->rotation(), known->translation()}} : std::nullopt;
     if (pose.has_value() == k.placed.has_value() && (!pose || motion(*k.placed, *pose) < 0.5 * resolution_)) continue;
     if (limit-- == 0) return false;
     if (k.placed) for_each_point(k.samples, *k.placed, [&](const vec3f& p, orbis::rgb8 c) { colors_.remove(p, c); });
@@ -322,8 +323,8 @@ void scene_builder::show_cubes() {
   shown.revision = revision;
   shown.count = cubes_.size();
   if (heights.empty()) return;
-  shown.floor = std::floor(10.0F * percentile(heights, 0.01)) /
-                10.0F;  // in steps, so that colours are stable while the map grows
+  shown.floor =
+      std::floor(10.0F * percentile(heights, 0.01)) / 10.0F;  // rounded, so that colours are stable while the map grows
   shown.ceiling = std::max(std::ceil(10.0F * percentile(heights, 0.99)) / 10.0F, shown.floor + 0.5F);
 }
 

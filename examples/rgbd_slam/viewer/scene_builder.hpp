@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Builds the scene from frames of tracking and from data of SLAM and the live map.
+/// Builds the scene from tracked frames and from data of SLAM and the live map.
 #pragma once
 
 #include <algorithm>
@@ -30,12 +30,12 @@ namespace app {
 
 /// A frame for the viewer.
 struct viewer_frame {
-  std::uint64_t number = 0;  ///< in the recording
+  std::uint64_t number = 0;  ///< index in the recording
   std::string state{};
   double tracking_ms = 0.0;
   std::optional<orbis::se3> T_world_camera{};
-  std::optional<orbis::slam::tracked_frame> tracked{};  ///< empty if it was not tracked
-  std::optional<orbis::slam::map_keyframe> keyframe{};  ///< set if it became a keyframe
+  std::optional<orbis::slam::tracked_frame> tracked{};  ///< empty if the frame was not tracked
+  std::optional<orbis::slam::map_keyframe> keyframe{};  ///< set if the frame became a keyframe
   orbis::image<orbis::rgb8> color{};
   orbis::image<std::uint16_t> depth{};  ///< used for keyframes only
   double depth_scale = 1.0;
@@ -43,11 +43,12 @@ struct viewer_frame {
 
 /// Keyframes of SLAM and their graph.
 struct slam_graph {
-  std::vector<orbis::slam::map_keyframe> asked;  ///< requested keyframes, by the ids at their creation
-  /// Their poses, with the scale of data relative to them (1 with depth); empty if they are not in the active map.
+  std::vector<orbis::slam::map_keyframe> asked;  ///< requested keyframes, identified by their ids at creation
+  /// The poses of the requested keyframes, with the scale of data relative to them (1 with depth); empty for keyframes
+  /// that are not in the active map.
   std::vector<std::optional<orbis::sim3>> poses;
-  std::vector<orbis::se3> keyframes;  ///< poses of the active map
-  std::vector<shown_edge> edges;      ///< between them
+  std::vector<orbis::se3> keyframes;  ///< keyframe poses of the active map
+  std::vector<shown_edge> edges;      ///< edges between these keyframes
 };
 
 /// Data sources of the scene in addition to frames. `update` calls them; each may be empty.
@@ -55,7 +56,7 @@ struct scene_sources {
   /// Fills in a graph, except `asked`, and returns true. Returns false if the poses have not changed since the last
   /// call and `always` is false.
   std::function<bool(slam_graph& graph, bool always)> graph{};
-  /// Fills in the occupied cubes of the newest map, without colours, and returns true. Returns false if they have not
+  /// Fills in the occupied cubes of the newest map, without colours, and returns true. Returns false if the map has not
   /// changed since the last call.
   std::function<bool(std::vector<voxel>& cubes)> voxels{};
   std::function<live_results()> numbers{};
@@ -66,31 +67,31 @@ class scene_builder {
   /// Default maximum number of keyframe pixels that are stored for the colours of voxels: 48 MB.
   static constexpr std::size_t default_max_samples = 4'000'000;
 
-  /// `frames`: of the recording. `resolution`: of the map, metres. `max_samples`: above this number of pixels, every
-  /// other pixel of the keyframe with the most pixels is discarded.
+  /// `frames`: number of frames in the recording. `resolution`: voxel size of the map, metres. `max_samples`: above
+  /// this number of pixels, every other pixel of the keyframe with the most pixels is discarded.
   scene_builder(std::string title, std::size_t frames, orbis::camera::ray_table rays, double resolution,
                 std::size_t max_samples = default_max_samples);
   scene_builder(const scene_builder&) = delete;
   scene_builder& operator=(const scene_builder&) = delete;
   ~scene_builder();
 
-  /// Adds a frame. Lock-free; never waits for the other functions. It replaces the previous frame if that is not in the
-  /// scene yet, except for the path and the colours of keyframes, whose number is limited until the next update. Reads
-  /// the stored pixels of a keyframe. For one thread.
+  /// Adds a frame. Lock-free; never waits for the other functions. The frame replaces the previous one if that is not
+  /// in the scene yet, except for the path and the colours of keyframes, the number of which is limited until the next
+  /// update. Reads the pixels that are stored for a keyframe. For one thread.
   void push(viewer_frame frame);
 
-  /// Updates the scene and returns it. Queries SLAM and the map at most every few hundred milliseconds, for at most a
-  /// tenth of the time each.
+  /// Updates the scene and returns it. Queries SLAM and the map at most every few hundred milliseconds and spends at
+  /// most a tenth of the time on each.
   const viewer_scene& update(const scene_sources& sources);
-  /// As above, but queries immediately.
+  /// Like `update`, but always queries immediately.
   const viewer_scene& update_at_once(const scene_sources& sources);
-  /// As above, for the last time, after the last frame. Frees the data for following corrections.
+  /// Like `update_at_once`, but for the last time, after the last frame. Frees the data for following corrections.
   void finish(const scene_sources& sources);
-  /// Frees the data for following corrections. The scene stays unchanged.
+  /// Frees the data for following corrections. The scene remains unchanged.
   void forget();
   /// Replaces the voxels of the live map.
   void set_voxels(std::vector<voxel> colored);
-  /// Sets the reason why there is no live map. In that case no pixels of keyframes are stored.
+  /// Sets the reason why there is no live map. From then on, no keyframe pixels are stored.
   void set_no_voxels(std::string why) {
     scene_.voxels.absent = std::move(why);
     forget_colors();
@@ -101,20 +102,20 @@ class scene_builder {
  private:
   using clock = std::chrono::steady_clock;
 
-  /// A keyframe pixel with depth, on a grid, that colours voxels.
+  /// A keyframe pixel with depth, sampled on a grid, that colours voxels.
   struct sample {
     std::uint16_t x, y;  // pixels
     float depth;         // metres
     orbis::rgb8 color;
   };
   struct colored_keyframe {
-    std::size_t asked = 0;  // index of its pose in the request
+    std::size_t asked = 0;  // index of the keyframe's pose in the request
     std::vector<sample> samples;
-    std::optional<orbis::se3> placed;  // pose at which its colours were added
+    std::optional<orbis::se3> placed;  // pose at which the keyframe's colours were added
   };
   struct passed_point {
     orbis::slam::map_keyframe reference;
-    orbis::vec3f at;  // in the reference's frame, divided by its scale
+    orbis::vec3f at;  // in the frame of the reference keyframe, divided by the keyframe's scale
     bool begins;
   };
   struct trail_item {
@@ -127,10 +128,10 @@ class scene_builder {
     std::optional<viewer_frame> newest;
     std::vector<passed_point> passed;
     std::vector<std::pair<orbis::slam::map_keyframe, std::vector<sample>>> keyframes;
-    std::size_t samples = 0;  // of the keyframes
+    std::size_t samples = 0;  // total number in the keyframes
     std::vector<double> tracking_ms;
   };
-  /// The time of the next query: queries may take a tenth of the time.
+  /// The time of the next query, chosen such that queries take at most a tenth of the time.
   struct pace {
     std::chrono::milliseconds least;
     clock::time_point next{};
@@ -151,7 +152,7 @@ class scene_builder {
   void forget_colors();
   void update_graph(const scene_sources& sources, bool at_once);
   void draw_trail();
-  /// Moves the colours of moved keyframes, of a limited number per call; returns false if some are left.
+  /// Moves the colours of keyframes that have moved, a limited number per call; returns false if some are left.
   bool move_colors(std::size_t limit);
   void update_voxels(const scene_sources& sources, bool at_once);
   void show_cubes();
@@ -164,13 +165,13 @@ class scene_builder {
 
   std::atomic<mailbox*> box_{nullptr};  // owned
   std::atomic<bool> takes_colors_{true};
-  std::optional<orbis::slam::map_keyframe> last_reference_;  // used by the tracking thread, like the next two
+  std::optional<orbis::slam::map_keyframe> last_reference_;  // this and the next two are used by the tracking thread
   orbis::vec3f last_at_ = orbis::vec3f::Zero();
   bool was_lost_ = true;
 
   viewer_scene scene_;
   slam_graph graph_;
-  std::unordered_map<std::uint64_t, std::size_t> asked_;  // index in graph_.asked, by keyframe
+  std::unordered_map<std::uint64_t, std::size_t> asked_;  // keyframe -> index in graph_.asked
   std::vector<trail_item> trail_;
   std::vector<colored_keyframe> colored_;
   std::size_t sample_count_ = 0;  // total in colored_

@@ -25,7 +25,7 @@ orbis::result<viewer> viewer::open(const settings& s, const frame_source& source
   const auto where = made.thread_->start([&s] { return s.viewer == "web" ? open_web(s.viewer_port) : open_window(); });
   if (!where) return orbis::fail(where.error());
   made.report_error(console);
-  if (!made.thread_->is_open()) return viewer{nullptr};  // without threads that are of no more use
+  if (!made.thread_->is_open()) return viewer{nullptr};  // ends threads that are no longer needed
   if (!where->empty()) {
     console.stage("viewer");
     console.finish(*where);

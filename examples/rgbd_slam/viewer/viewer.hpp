@@ -19,11 +19,11 @@
 namespace app {
 
 /// Shows a run on a separate low-priority thread. Tracking puts its newest frame into a mailbox; it never waits for
-/// drawing or for a lock of the viewer's thread. If the user closes the viewer, or it fails, the run continues. Without
-/// `--viewer` all calls have no effect.
+/// drawing or for a lock that the viewer's thread holds. If the user closes the viewer or the viewer fails, the run
+/// continues. Without `--viewer`, no call has an effect.
 class viewer {
  public:
-  /// Opens the viewer of the settings and prints its address. Errors: no display; the port is in use.
+  /// Opens the viewer selected in the settings and prints its address. Errors: no display; the port is in use.
   [[nodiscard]] static orbis::result<viewer> open(const settings& s, const frame_source& source, console& console);
 
   /// Shows the frame that `make()` returns if the viewer is open. For one thread.
@@ -32,7 +32,8 @@ class viewer {
     if (thread_) thread_->show(std::forward<Make>(make));
   }
 
-  /// Connects the viewer with its sources during its lifetime; queries them a last time at the end.
+  /// Connects the viewer to its sources during the lifetime of this object; at the end, queries the sources a last
+  /// time.
   class connection {
    public:
     connection(viewer& v, scene_sources sources);
@@ -44,7 +45,7 @@ class viewer {
     viewer& viewer_;
   };
 
-  /// Closes the viewer and warns that its threads are needed elsewhere. Returns false if none is open.
+  /// Closes the viewer with a warning that its threads are needed elsewhere. Returns false if no viewer is open.
   bool give_way(console& console);
   /// Shows the final map.
   void show_map(const std::vector<voxel>& voxels);

@@ -37,7 +37,7 @@ orbis::result<std::string> viewer_thread::start(open_backend open) {
 }
 
 void viewer_thread::run(const open_backend& open, std::promise<orbis::result<std::string>>& opened) {
-  lower_priority(viewer_niceness);  // also of the threads that the back end starts
+  lower_priority(viewer_niceness);  // the threads that the back end starts inherit it
   bool has_opened = false;
   try {
     auto backend = open();
@@ -61,7 +61,7 @@ void viewer_thread::draw_until_closed(viewer_backend& backend) {
   while (!ends_) {
     const auto start = clock::now();
     if (!backend.draw(builder_.update(sources_))) return;
-    // Draws for at most a third of the time, as rendering may run on the processor.
+    // Draws for at most a third of the time, because rendering may run on the CPU.
     const auto took = clock::now() - start;
     const auto wait = std::max<clock::duration>(backend.interval() - took, 2 * took);
     changed_.wait_for(lock, wait, [&] { return ends_.load(); });

@@ -26,22 +26,22 @@
 
 namespace app {
 
-/// Draws on a low-priority thread. Sources that lock mutexes of others (`scene_sources::graph` and `numbers`) are
-/// called on a second thread with the priority of the creator. An exception on these threads closes the viewer and does
-/// not propagate.
+/// Draws on a low-priority thread. Sources that lock the mutexes of other threads (`scene_sources::graph` and
+/// `numbers`) are called on a second thread with the priority of the creator. An exception on these threads closes the
+/// viewer and does not propagate.
 class viewer_thread {
  public:
   using open_backend = std::function<orbis::result<std::unique_ptr<viewer_backend>>()>;
 
-  /// See scene_builder. `no_voxels`: the reason why there is no live map; empty if there is one.
+  /// See `scene_builder`. `no_voxels`: the reason why there is no live map; empty if there is one.
   viewer_thread(std::string title, std::size_t frames, orbis::camera::ray_table rays, double resolution,
                 std::string no_voxels = {});
   viewer_thread(const viewer_thread&) = delete;
   viewer_thread& operator=(const viewer_thread&) = delete;
   ~viewer_thread();
 
-  /// Calls `open` on the new thread, which then draws; returns the viewer's address. Errors: those of `open`. If `open`
-  /// throws, or no thread can be created, the viewer is closed, and an empty string is returned. Call it once.
+  /// Calls `open` on a new thread, which then draws; returns the viewer's address. Errors: those of `open`. If `open`
+  /// throws or no thread can be created, closes the viewer and returns an empty string. Call it once.
   [[nodiscard]] orbis::result<std::string> start(open_backend open);
   /// Returns true if the viewer is open.
   [[nodiscard]] bool is_open() const noexcept { return is_open_; }
@@ -57,14 +57,14 @@ class viewer_thread {
     }
   }
 
-  /// Connects the sources. Waits for the current drawing, like the next two.
+  /// Connects the sources. This and the next two functions wait until the current drawing is complete.
   void connect(scene_sources sources);
   /// Queries the sources a last time and disconnects them.
   void disconnect();
   /// Shows the final map.
   void show_map(const std::vector<voxel>& voxels);
 
-  /// The message of the exception that closed the viewer; empty if there was none, or if it was returned before.
+  /// The message of the exception that closed the viewer; empty if there was none or it was already returned.
   [[nodiscard]] std::string take_error();
 
  private:

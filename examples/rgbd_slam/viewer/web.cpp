@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// The scene in a browser: a read-only server on 127.0.0.1 with one page and its data.
+// Shows the scene in a browser: a read-only server on 127.0.0.1 with one page and its data.
 #include <atomic>
 #include <charconv>
 #include <chrono>
@@ -23,7 +23,7 @@
 namespace app {
 namespace {
 
-/// The number after `since=`; 0 without it, empty if it is not a number.
+/// The number after `since=`; 0 if the parameter is missing, empty if it is not a number.
 std::optional<std::uint64_t> parse_since(const http_request& request) {
   const std::string_view text = query_value(request.query, "since").value_or("0");
   std::uint64_t value = 0;
@@ -61,7 +61,7 @@ class web_backend final : public viewer_backend {
   /// A frame whose image is compressed to JPEG once.
   struct published_frame {
     shown_frame frame;
-    bytes features_and_jpeg;  // made on request; belongs to the server's thread
+    bytes features_and_jpeg;  // created on request; used only by the server's thread
   };
   struct published_block {
     std::uint64_t revision;
@@ -88,7 +88,7 @@ class web_backend final : public viewer_backend {
   std::shared_ptr<published_frame> frame_;
   bytes graph_ = std::make_shared<const std::string>();
   std::uint64_t graph_revision_ = 0;
-  shown_voxels voxels_;  // without its blocks
+  shown_voxels voxels_;  // without the blocks
   std::map<block_index, published_block> blocks_;
   http_server server_;  // last member: its thread uses the others
 };
@@ -142,7 +142,7 @@ http_answer web_backend::frame_since(std::uint64_t since) {
     state = state_;
     frame = frame_;
   }
-  // frames are counted from 1; 0: the client has none
+  // frames are counted from 1; 0: the client has no frame
   if (frame && frame->frame.number + 1 == since) frame.reset();
   if (frame && !frame->features_and_jpeg)
     frame->features_and_jpeg = std::make_shared<const std::string>(frame_message({}, &frame->frame).substr(4));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Messages to the page in the browser. Numbers are little-endian, like typed arrays on all machines with a browser.
+/// Messages to the page in the browser. Numbers are little-endian, like typed arrays on all machines that run browsers.
 #pragma once
 
 #include <cstdint>
@@ -10,11 +10,11 @@
 
 namespace app {
 
-/// Numbers, names and revisions of the scene as JSON. `session`: distinguishes the revisions of different servers.
+/// The scene's numbers, names and revisions as JSON. `session`: distinguishes the revisions of different servers.
 [[nodiscard]] std::string state_json(const viewer_scene& scene, std::uint64_t session);
 
 /// u32 length of the JSON, the JSON, u32 number of features, for each u16 x, y (eighths of a pixel) and u16 tracked,
-/// then the image as JPEG. Without features and image if `frame` is null.
+/// then the image as JPEG. Features and image are omitted if `frame` is null.
 [[nodiscard]] std::string frame_message(const std::string& json, const shown_frame* frame);
 
 /// u32 number of keyframes, for each the 3 x 4 matrix T_world_camera (12 f32, row by row); u32 number of edges, for

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// The scene in a window with OpenGL 3.3. GLFW must be called from one thread; on Linux this may be any thread, here the
-// viewer's.
+// Shows the scene in a window with OpenGL 3.3. GLFW must be called from one thread; on Linux this may be any thread,
+// here the viewer's thread.
 #include <algorithm>
 #include <array>
 #include <bit>
@@ -70,7 +70,7 @@ void add_frustum(std::vector<line_instance>& lines, const orbis::se3& T_world_ca
 class gl_program {
  public:
   gl_program() = default;
-  /// False: `message` is the reason.
+  /// Creates the program. Returns false on an error, with the reason in `message`.
   [[nodiscard]] bool make(const char* vertex, const char* fragment, std::string& message) {
     program_ = glCreateProgram();
     for (const auto& [kind, body] : {std::pair{GL_VERTEX_SHADER, vertex}, std::pair{GL_FRAGMENT_SHADER, fragment}}) {
@@ -102,10 +102,10 @@ class gl_program {
   GLuint program_ = 0;
 };
 
-/// Instances on the graphics card: floats and a colour each.
+/// Instances on the graphics card, each with floats and a colour.
 class instance_list {
  public:
-  /// `sizes`: number of floats of each attribute before the colour.
+  /// `sizes`: number of floats in each attribute before the colour.
   void make(std::initializer_list<int> sizes) {
     glGenVertexArrays(1, &array_);
     glGenBuffers(1, &buffer_);
@@ -143,7 +143,7 @@ class instance_list {
   GLsizei count_ = 0;
 };
 
-/// The last error message of GLFW, which reports errors by a callback only.
+/// The last error message of GLFW, which reports errors only by a callback.
 std::string& last_glfw_error() {
   static std::string text;
   return text;
@@ -191,7 +191,7 @@ class window_backend final : public viewer_backend {
   // Objects on the graphics card.
   std::uint64_t voxel_revision_ = 0, graph_revision_ = 0, frame_ = ~std::uint64_t{0};
 
-  float scale_ = 1.0F;  // of the panel; larger on high-resolution screens
+  float scale_ = 1.0F;  // scale of the panel; larger on high-resolution screens
   bool by_height_ = false, shows_voxels_ = true, shows_graph_ = true;
   float cut_ = 0.75F, top_cut_ = 1.0F;
 };
@@ -214,7 +214,7 @@ orbis::result<void> window_backend::open() {
 
   ImGui::CreateContext();
   has_gui_ = true;
-  ImGui::GetIO().IniFilename = nullptr;  // do not write into the current folder
+  ImGui::GetIO().IniFilename = nullptr;  // prevents writing into the current folder
   ImGui::StyleColorsDark();
   ImGuiStyle& style = ImGui::GetStyle();
   float scale_x = 1.0F, scale_y = 1.0F;
@@ -385,7 +385,7 @@ void window_backend::draw_image(const shown_frame& frame) {
   ImGui::Image(std::bit_cast<ImTextureID>(static_cast<std::uintptr_t>(texture_)),
                {width, scale * static_cast<float>(frame.image->height())});
   ImDrawList* const list = ImGui::GetWindowDrawList();
-  for (const bool tracked : {false, true})  // the tracked ones on top
+  for (const bool tracked : {false, true})  // tracked features on top
     for (const shown_feature& f : frame.features) {
       if (f.tracked != tracked) continue;
       const float x = at.x + scale * f.x, y = at.y + scale * f.y, r = tracked ? 2.0F : 1.2F;

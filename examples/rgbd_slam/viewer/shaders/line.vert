@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// One line with a width in pixels per instance: two triangles, 6 vertices without a buffer.
+// Each instance is a line with a width in pixels: two triangles with 6 vertices, without a vertex buffer.
 layout(location = 0) in vec3 from;   // metres
 layout(location = 1) in vec3 to;
 layout(location = 2) in vec4 color;  // 0 ... 1
@@ -13,7 +13,7 @@ void main() {
   vec4 a = clip_from_world * vec4(from, 1.0);
   vec4 b = clip_from_world * vec4(to, 1.0);
   shade = vec4(color.rgb, color.a * opacity);
-  const float least = 0.01;  // clips the part behind the camera, which has no projection
+  const float least = 0.01;  // clips the part of the line behind the camera, which has no projection
   if (a.w < least && b.w < least) {
     gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
     return;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// One cube per instance: the three faces towards the camera, 18 vertices without a buffer.
-layout(location = 0) in vec4 cube;   // centre and edge, metres
+// Each instance is a cube: the three faces towards the camera with 18 vertices, without a vertex buffer.
+layout(location = 0) in vec4 cube;   // centre and edge length, metres
 layout(location = 1) in vec4 color;  // 0 ... 1
 uniform mat4 clip_from_world;
 uniform vec3 eye;
@@ -8,7 +8,7 @@ uniform vec3 forward;     // viewing direction, unit vector
 uniform float nearest;    // cubes nearer than this along `forward` are omitted, metres
 uniform float highest;    // cubes above this are omitted, metres
 uniform vec2 heights;     // range of the height colours, metres
-uniform float by_height;  // 1: coloured by height, 0: by images
+uniform float by_height;  // 1: coloured by height, 0: by the images
 out vec3 shade;
 out vec2 on_face;  // -1 ... 1
 
