@@ -4,8 +4,7 @@
 ///
 /// The first line contains branching, depth, the score (0 to 5; ignored, as scores are types here) and the weighting
 /// (0 tf-idf, 1 tf, 2 idf, 3 binary). Each subsequent line is a node; nodes are numbered from 1. A line contains the
-/// number of the parent (0: the root), 1 for a word or 0 for an inner node, the bytes of the descriptor, and the
-/// weight.
+/// index of the parent (0: the root), 1 for a word or 0 for an inner node, the bytes of the descriptor, and the weight.
 #pragma once
 
 #include <charconv>
@@ -34,7 +33,7 @@ using namespace orbis::places;
 
 [[nodiscard]] constexpr bool is_blank(char c) noexcept { return c == ' ' || c == '\t' || c == '\r' || c == '\n'; }
 
-/// Removes and returns the next field, up to a blank.
+/// Removes the next field, which ends at a blank, and returns it.
 [[nodiscard]] inline std::string_view take_field(std::string_view& text) noexcept {
   std::size_t begin = 0;
   while (begin != text.size() && is_blank(text[begin])) ++begin;
@@ -45,7 +44,7 @@ using namespace orbis::places;
   return field;
 }
 
-/// Removes a number from the front; returns false if there is none.
+/// Removes a number from the front of `text`; returns false if there is none.
 template <class T>
 [[nodiscard]] bool take_number(std::string_view& text, T& value) noexcept {
   const std::string_view field = take_field(text);
@@ -64,8 +63,8 @@ constexpr void set_byte(bit_words<Bits>& descriptor, std::size_t i, std::uint8_t
   return weight >= 0.0 && weight <= static_cast<double>(largest_weight);
 }
 
-/// Parses the vocabulary in `text`; `where` names it in errors. Words are renumbered; bags and scores are the same as
-/// in DBoW2. Errors, with the line: malformed.
+/// Parses the vocabulary in `text`; `where` names the source in errors. Words are renumbered; bags of words and scores
+/// are the same as in DBoW2. Errors, with the line: malformed.
 template <std::size_t Bits = 256>
 [[nodiscard]] result<basic_vocabulary<Bits>> parse_dbow_text(std::string_view text, const std::string& where = "text") {
   std::size_t line_number = 0;
@@ -100,7 +99,7 @@ template <std::size_t Bits = 256>
       if (take_field(text).empty()) break;  // trailing blank lines
       return bad(line_number, "a blank line between nodes");
     }
-    if (!take_number(line, parent)) return bad(line_number, "does not begin with a parent number");
+    if (!take_number(line, parent)) return bad(line_number, "does not begin with the index of the parent");
     if (parent > list.size()) return bad(line_number, "the parent must precede its child");
     if (!take_number(line, leaf) || leaf < 0 || leaf > 1)
       return bad(line_number, "the second field must be 1 (word) or 0");

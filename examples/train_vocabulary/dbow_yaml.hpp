@@ -13,8 +13,8 @@
 ///        words:
 ///           - { wordId:0, nodeId:31 }
 ///
-/// DBoW3 writes OpenCV's type (0: bytes) and the number of columns before the bytes of a descriptor, newer versions
-/// "dbw3" before those; DBoW2 writes only the bytes. The parser supports only this subset of YAML.
+/// DBoW3 writes OpenCV's type (0: bytes) and the number of columns before the bytes of a descriptor; newer versions
+/// write "dbw3" before these numbers. DBoW2 writes only the bytes. The parser supports only this subset of YAML.
 #pragma once
 
 #include <array>
@@ -56,7 +56,7 @@ class yaml_scanner {
   void skip_line() noexcept {
     while (!text_.empty() && text_.front() != '\n') drop();
   }
-  /// Skips blanks and then `c`, if that follows.
+  /// Skips blanks and then `c`; returns false if another character follows.
   [[nodiscard]] bool take(char c) noexcept {
     skip_blanks();
     if (text_.empty() || text_.front() != c) return false;
@@ -67,7 +67,7 @@ class yaml_scanner {
     skip_blanks();
     return !text_.empty() && text_.front() == c;
   }
-  /// Reads a name with its colon; empty if something else follows.
+  /// Reads a name and the colon after it; empty if anything else follows.
   [[nodiscard]] std::string_view take_key() noexcept {
     skip_blanks();
     const std::size_t end = text_.find_first_of(":,{}\n\"");
@@ -163,7 +163,7 @@ class dbow_yaml_parser {
         if (key == "weightingType") {
           if (!number(value, weights_are_) || weights_are_ > 3) return reject("the weighting must be in 0 ... 3");
         } else if (key == "k" || key == "L" || key == "scoringType") {
-          std::uint32_t ignored = 0;  // given by the tree; scores are types
+          std::uint32_t ignored = 0;  // follows from the tree; scores are types
           if (!number(value, ignored)) return reject(orbis::in_quotes(key) + " is not a number");
         }
       }
@@ -259,7 +259,7 @@ class dbow_yaml_parser {
     return take_number(value, to) && take_field(value).empty();
   }
 
-  /// Converts from the order of the file to that of the ids, and then to ours.
+  /// Converts the nodes from the order in the file to the order of their ids, and then to the order of orbis.
   bool order() {
     const std::size_t n = nodes_.size();
     std::vector<std::uint32_t> entry(n + 1, 0);  // index by id, from 1
@@ -304,8 +304,8 @@ class dbow_yaml_parser {
   std::size_t line_ = 1;
 };
 
-/// Parses the vocabulary in `text`; `where` names it in errors. Words are renumbered.
-/// Errors, with the line: malformed; unsupported (descriptors without `Bits` bits).
+/// Parses the vocabulary in `text`; `where` names the source in errors. Words are renumbered. Errors, with the line:
+/// malformed; unsupported (descriptors that do not have `Bits` bits).
 template <std::size_t Bits = 256>
 [[nodiscard]] result<basic_vocabulary<Bits>> parse_dbow_yaml(std::string_view text, const std::string& where = "text") {
   return dbow_yaml_parser<Bits>{text, where}.parse();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Reads a vocabulary of any supported format.
+/// Reads a vocabulary in any supported format.
 #pragma once
 
 #include <cstddef>
@@ -22,7 +22,7 @@ namespace dbow {
 using namespace orbis;
 using namespace orbis::places;
 
-/// Reads a vocabulary in the format of orbis, DBoW2 (text) or DBoW3 (YAML), detected by the first bytes.
+/// Reads a vocabulary in the format of orbis, DBoW2 (text) or DBoW3 (YAML), which is detected from the first bytes.
 /// Errors: not_found, unreadable, malformed, unsupported (such as gzip).
 template <std::size_t Bits = 256>
 [[nodiscard]] result<basic_vocabulary<Bits>> load_vocabulary(const std::filesystem::path& path) {

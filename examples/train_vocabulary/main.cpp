@@ -2,7 +2,7 @@
 //
 // train_vocabulary train OUT | convert IN OUT | recall [VOCABULARY...]
 //
-// Trains a vocabulary on synthetic textures and rooms, and on recordings; converts vocabularies of DBoW2 and DBoW3;
+// Trains a vocabulary on synthetic textures and rooms, and on recordings; converts DBoW2 and DBoW3 vocabularies;
 // measures the recall of vocabularies in place recognition.
 #include <algorithm>
 #include <cstdint>
@@ -127,7 +127,7 @@ int run(int argc, char** argv) {
   auto* const convert_command = cli.add_subcommand("convert", "convert DBoW2's text or DBoW3's YAML format");
   convert_command->add_option("IN", s.input, "input vocabulary")->required();
   convert_command->add_option("OUT", s.output, "output file")->required();
-  auto* const recall_command = cli.add_subcommand("recall", "measure the recall of revisited places");
+  auto* const recall_command = cli.add_subcommand("recall", "measure the recall for revisited places");
   recall_command->add_option("VOCABULARY", s.inputs, "vocabularies to compare with the default one");
   recall_command->add_option("--rooms", s.rooms, "number of synthetic rooms, each visited twice")
       ->capture_default_str();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A tree from a list of nodes with parent numbers, the format of other programs.
+/// Builds a tree from a list of nodes with parent indices, the format of other programs.
 #pragma once
 
 #include <algorithm>
@@ -20,23 +20,23 @@ namespace dbow {
 using namespace orbis;
 using namespace orbis::places;
 
-/// Node `i` of the list has the number `i + 1`; 0 is the root, which is not in the list.
+/// A list of nodes. Entry `i` is the node with the index `i + 1`; 0 is the root, which is not in the list.
 template <std::size_t Bits>
 struct parent_list {
-  std::vector<std::uint32_t> parents;  ///< at most the number of nodes
+  std::vector<std::uint32_t> parents;  ///< index of each node's parent, at most the number of nodes
   std::vector<bit_words<Bits>> descriptors;
   std::vector<float> weights;
 
   [[nodiscard]] std::size_t size() const noexcept { return parents.size(); }
 };
 
-/// An error of a list, and its node (0: none).
+/// An error in a list, and the node in question (0: none).
 struct list_problem {
   std::string what;
   std::size_t node = 0;
 };
 
-/// Numbers the nodes level by level; children keep the order of the list. `is_word(node)`: by the file. O(nodes).
+/// Numbers the nodes level by level; children keep the order of the list. `is_word(node)`: as in the file. O(nodes).
 /// @pre one parent (at most the number of nodes), one descriptor and one weight per node
 template <std::size_t Bits, class IsWord>
 [[nodiscard]] list_problem order_by_level(const parent_list<Bits>& list, IsWord&& is_word,
@@ -46,7 +46,7 @@ template <std::size_t Bits, class IsWord>
   for (const std::uint32_t parent : list.parents) ++begin[parent + 1U];
   for (std::size_t i = 1; i != begin.size(); ++i) begin[i] += begin[i - 1];
   for (std::size_t i = 0; i != list.size(); ++i) {
-    // The end of each parent's children advances to the beginning of the next one's.
+    // The start of each parent's children thereby advances to the start of the next parent's children.
     children[begin[list.parents[i]]++] = static_cast<std::uint32_t>(i + 1);
   }
   const auto first_of = [&](std::uint32_t node) { return node == 0 ? 0U : begin[node - 1]; };
@@ -69,7 +69,7 @@ template <std::size_t Bits, class IsWord>
   if (order.size() != n) {
     std::vector<bool> seen(n);
     for (const std::uint32_t node : order) seen[node] = true;
-    return {"is in a cycle or below one", static_cast<std::size_t>(std::ranges::find(seen, false) - seen.begin())};
+    return {"is part of a cycle or below one", static_cast<std::size_t>(std::ranges::find(seen, false) - seen.begin())};
   }
   while (!child_counts.empty() && child_counts.back() == 0) child_counts.pop_back();
   return {connect_tree(tree, child_counts), 0};

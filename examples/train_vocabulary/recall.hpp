@@ -26,17 +26,17 @@ struct task {
   orbis::camera::camera_settings camera{};
   std::vector<view> map{}, queries{};
   double overlap = 0.6;   ///< minimum share of each view's surface that is visible in the other
-  double turned = 0.6;    ///< maximum rotation between the two, radians
-  bool within = false;    ///< the queries are views of the database
-  std::size_t apart = 0;  ///< in this case, the minimum distance from the query, in views
+  double turned = 0.6;    ///< maximum rotation between the two views, radians
+  bool within = false;    ///< the queries are views in the database
+  std::size_t apart = 0;  ///< minimum distance from the query in views, if `within`
 };
 
 struct outcome {
   std::size_t queries = 0;    ///< queries whose place is in the database
-  double first = 0.0;         ///< share whose best view is correct
-  double among_ten = 0.0;     ///< share with a correct view among the best ten
-  double candidate = 0.0;     ///< share whose first candidate, by the criteria of a query, is correct
-  double transform_ms = 0.0;  ///< median
+  double first = 0.0;         ///< share of queries whose best view is correct
+  double among_ten = 0.0;     ///< share of queries with a correct view among the best ten
+  double candidate = 0.0;     ///< share of queries whose first candidate, by the criteria of a query, is correct
+  double transform_ms = 0.0;  ///< median time to compute a bag of words
 };
 
 [[nodiscard]] inline bool same_place(const task& t, const view& a, const view& b) {
@@ -71,7 +71,7 @@ struct outcome {
     const auto best = database.best(bag, 10, excluded);
     o.first += !best.empty() && right(best.front().id) ? 1.0 : 0.0;
     o.among_ten += std::ranges::any_of(best, [&](const auto& c) { return right(c.id); }) ? 1.0 : 0.0;
-    // The temporal neighbours of a view replace its covisible keyframes.
+    // The temporal neighbours of a view take the role of its covisible keyframes.
     const auto neighbors = [&](std::uint32_t i) {
       std::vector<std::uint32_t> near;
       for (std::uint32_t j = i < 5 ? 0 : i - 5; j != std::min<std::size_t>(i + 6, t.map.size()); ++j)

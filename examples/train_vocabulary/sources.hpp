@@ -23,7 +23,7 @@ namespace sources {
 
 using descriptors = std::vector<orbis::features::binary_descriptor<256>>;
 
-/// The descriptors of a view of a place.
+/// A view of a place, with its descriptors.
 struct view {
   std::size_t place = 0;  ///< views of different places never overlap
   orbis::se3 T_world_camera;
@@ -31,7 +31,7 @@ struct view {
   descriptors found{};
 };
 
-/// The view of a frame.
+/// Makes the view of a frame.
 [[nodiscard]] inline view make_view(const orbis::features::orb_extractor& extract,
                                     const orbis::camera::rgbd_frame& frame,
                                     const orbis::camera::camera_settings& camera, std::size_t place) {
@@ -48,7 +48,7 @@ struct view {
   return v;
 }
 
-/// The share of the points of `a` that are in the image of `b`.
+/// The share of the surface points of `a` that are visible in the image of `b`.
 [[nodiscard]] inline double overlap(const view& a, const view& b, const orbis::camera::camera_settings& camera) {
   if (a.surface.empty()) return 0.0;
   const orbis::se3 T_b_world = b.T_world_camera.inverse();
@@ -63,13 +63,13 @@ struct view {
   return static_cast<double>(inside) / static_cast<double>(a.surface.size());
 }
 
-/// Views of one camera.
+/// The views of one camera.
 struct tour {
   orbis::camera::camera_settings camera;
   std::vector<view> views{};
 };
 
-/// `count` synthetic textures.
+/// The descriptors of `count` synthetic textures.
 [[nodiscard]] inline std::vector<descriptors> of_textures(std::size_t count, std::uint64_t seed, int features) {
   const orbis::features::orb_extractor extract{{.max_features = features}};
   std::vector<descriptors> images(count);
@@ -79,8 +79,8 @@ struct tour {
   return images;
 }
 
-/// `views` views of a room with the seed `seed`, on a path around it; `again`: on another path, with other light and
-/// sensor noise.
+/// `views` views of the room with the seed `seed`, along a path around it. `again`: along another path, with different
+/// light and sensor noise.
 [[nodiscard]] inline tour of_room(std::uint64_t seed, int views, int features, std::size_t place, bool again = false) {
   orbis::io::synthetic_options options{.frames = views, .seed = seed};
   if (again) {
@@ -96,7 +96,7 @@ struct tour {
   seen.views.resize(room.size());
   orbis::for_each_index(orbis::par, room.size(), 1, [&](std::size_t i) {
     auto frame = room.render(orbis::seq, i).value();
-    if (again)  // darker
+    if (again)  // makes the image darker
       for (orbis::rgb8& c : frame.color.pixels())
         c = {static_cast<std::uint8_t>(c.r * 3 / 4), static_cast<std::uint8_t>(c.g * 3 / 4),
              static_cast<std::uint8_t>(c.b * 3 / 4)};
@@ -105,7 +105,7 @@ struct tour {
   return seen;
 }
 
-/// Every `stride`-th frame of a recording, with ground-truth poses if available.
+/// The views of every `stride`-th frame of a recording, with ground-truth poses if available.
 [[nodiscard]] inline orbis::result<tour> of_recording(const std::string& folder, std::size_t stride, int features,
                                                       std::size_t place) {
   const auto recording = orbis::io::open_recording(folder);

@@ -27,7 +27,7 @@ using orbis::sin_turns;
 /// Uniform in [lo, hi).
 [[nodiscard]] inline double between(random_bits& bits, double lo, double hi) noexcept { return bits.uniform(lo, hi); }
 
-/// A texture during painting; brightness is about 0 to 1.
+/// A texture that is being painted; brightness ranges from about 0 to 1.
 class picture {
  public:
   picture(int width, int height, std::uint64_t seed)
@@ -73,7 +73,7 @@ class picture {
     const double bottom = cell(0, 1) + s * (cell(1, 1) - cell(0, 1));
     return top + t * (bottom - top);
   }
-  /// The sum of octaves; the amplitude is proportional to the period.
+  /// A sum of octaves of noise whose amplitudes are proportional to their periods.
   [[nodiscard]] static double cloud(std::uint64_t seed, double u, double v) noexcept {
     return 0.53 * noise(seed, u, v) + 0.27 * noise(seed + 1, 2 * u, 2 * v) + 0.13 * noise(seed + 2, 4 * u, 4 * v) +
            0.07 * noise(seed + 3, 8 * u, 8 * v);
@@ -86,7 +86,7 @@ class picture {
       for (int x = 0; x != width_; ++x) at(x, y) = static_cast<float>(base + swing * cloud(seed, x / size, y / size));
   }
 
-  /// Paints leaves, the large ones first; the number of leaves larger than r is proportional to r^-2.
+  /// Paints leaves, large ones first; the number of leaves larger than r is proportional to r^-2.
   void fall() {
     const double smallest = between(bits_, 2.5, 7.0), largest = between(bits_, 60.0, 240.0);
     const double contrast = between(bits_, 0.25, 1.0), middle = between(bits_, 0.35, 0.65);
@@ -97,7 +97,8 @@ class picture {
       const double rank = (i + bits_.uniform()) / count;
       const double r = std::min(smallest / std::sqrt(rank + 1e-9), largest);
       const double level = middle + contrast * between(bits_, -0.5, 0.5);
-      const double x = between(bits_, 0.0, width_), y = between(bits_, 0.0, height_);  // compilers order arguments
+      // Not as arguments of `leaf`, because their order of evaluation is unspecified.
+      const double x = between(bits_, 0.0, width_), y = between(bits_, 0.0, height_);
       leaf(x, y, r, level, contrast, upright);
     }
   }
@@ -160,7 +161,7 @@ class picture {
       }
   }
 
-  /// A block of signs that resemble writing: short strokes on a grid.
+  /// Paints a block of signs that resemble writing: short strokes on a grid.
   void write() {
     const double size = between(bits_, 5.0, 28.0),
                  turn = bits_.below(2) == 0 ? bits_.uniform() : between(bits_, -0.02, 0.02);
@@ -183,11 +184,12 @@ class picture {
         if (u < 0.0 || v < 0.0 || u >= columns || v >= rows) continue;
         const double cu = std::floor(u), cv = std::floor(v);
         const std::uint64_t sign = orbis::mix64(seed ^ orbis::mix64(static_cast<std::uint64_t>(cu + 64.0 * cv)));
-        if (sign % 7 == 0) continue;  // between words
+        if (sign % 7 == 0) continue;  // gap between words
         if (stroke(sign, u - cu, v - cv, thick)) at(px, py) = static_cast<float>(ink);
       }
   }
-  /// Up to eight strokes of a sign in the unit square: bars, uprights and slants.
+  /// Returns true if a point in the unit square is on a stroke of a sign, which has up to eight strokes: bars, uprights
+  /// and slants.
   [[nodiscard]] static bool stroke(std::uint64_t sign, double u, double v, double thick) noexcept {
     if (u < 0.1 || u > 0.85 || v < 0.15 || v > 0.85) return false;
     const double s = (u - 0.1) / 0.75, t = (v - 0.15) / 0.7;
@@ -198,7 +200,7 @@ class picture {
            (has(7) && has(9) && std::abs(s + t - 1) < 0.6 * thick);
   }
 
-  /// Uneven light and a shadow.
+  /// Applies uneven light and a shadow.
   void light() {
     const double gx = between(bits_, -0.4, 0.4) / width_, gy = between(bits_, -0.4, 0.4) / height_;
     const double turn = bits_.uniform(), nx = cos_turns(turn), ny = sin_turns(turn);
@@ -211,7 +213,7 @@ class picture {
       }
   }
 
-  /// Binomial filter, (1 2 1) / 4 in both directions.
+  /// Applies a binomial filter, (1 2 1) / 4, in both directions.
   void blur() {
     std::vector<float> line(static_cast<std::size_t>(std::max(width_, height_)));
     const auto smooth = [&](int n, auto&& pixel) {
@@ -241,7 +243,7 @@ class picture {
   std::vector<float> pixels_;
 };
 
-/// The texture with the seed `seed`.
+/// Paints the texture with the seed `seed`.
 [[nodiscard]] inline orbis::image<std::uint8_t> paint(int width, int height, std::uint64_t seed) {
   return picture{width, height, seed}.paint();
 }
