@@ -29,13 +29,13 @@ int main(int argc, char** argv) {
     for (int i = 0; i != 200; ++i) cloud.points.push_back({uniform(-1, 1), uniform(-1, 1), uniform(0, 1.8)});
   }
 
-  // PCL's statistical filter, bit for bit: a point stays if the mean distance to its 50 nearest neighbours is at most
-  // mu + 1.0 sigma of all points. The result holds the indices of the points that stay.
+  // PCL's statistical filter with bit-identical results: a point is kept if the mean distance to its 50 nearest
+  // neighbours is at most mu + 1.0 sigma over all points. The result contains the indices of the kept points.
   const std::vector<std::uint32_t> statistical =
       orbis::cloud::statistical_inliers(orbis::par, cloud.points, {.neighbors = 50, .sigma_multiplier = 1.0});
   std::printf("statistical filter: %zu of %zu points kept\n", statistical.size(), cloud.size());
 
-  // The automatic filter examines the cloud, and selects the filter and its parameters.
+  // The automatic filter analyses the cloud, and selects a filter and its parameters.
   const auto automatic = orbis::cloud::filter_automatically(orbis::par, cloud.points);
   std::printf("automatic filter: %zu points kept; %s: %s\n", automatic.inliers.size(),
               to_string(automatic.choice.chain).c_str(), automatic.choice.reason.c_str());

@@ -8,7 +8,7 @@
 #include <orbis/octree.hpp>
 
 int main(int argc, char** argv) {
-  // A depth camera that turns once around in a furnished room. Poses are known.
+  // A depth camera that moves once around in a furnished room, with known poses.
   const orbis::io::synthetic_recording room{{.frames = 36, .width = 320, .height = 240, .frames_around = 36}};
   const auto camera = room.camera().model;
 
@@ -17,7 +17,7 @@ int main(int argc, char** argv) {
     map.integrate(orbis::par, frame.depth_metres(), camera, *frame.T_world_camera, {.max_range = 5.0});
   std::printf("%zu leaves, %zu of them occupied\n", map.num_leaves(), map.num_occupied_leaves());
 
-  // What is at a point (metres, in the world)?
+  // Query the state of points (metres, world frame).
   const orbis::vec3 eye = room.T_world_camera(0).translation();
   for (const orbis::vec3& p : {eye, orbis::vec3{0.0, 0.0, 10.0}}) {
     const auto state = map.state(p);
@@ -26,7 +26,7 @@ int main(int argc, char** argv) {
                                                                    : "unknown";
     std::printf("(%.1f, %.1f, %.1f) is %s\n", p.x(), p.y(), p.z(), name);
   }
-  // How far can the camera see along its optical axis?
+  // Cast a ray along the optical axis to the first surface.
   const orbis::vec3 axis = room.T_world_camera(0).rotation() * orbis::vec3{0.0, 0.0, 1.0};
   const auto hit = map.cast_ray(eye, axis, 8.0);
   if (hit) std::printf("the camera looks at a surface %.2f m away\n", (hit.point - eye).norm());

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // 03_match [RECORDING I J]: matches the ORB features of two RGB-D frames, and estimates the motion of the camera from
-// the matches. Without arguments it takes two frames of a synthetic recording.
+// the matches. Without arguments, it uses two frames of a synthetic recording.
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
@@ -38,7 +38,7 @@ int match_frames(const orbis::camera::rgbd_frame& first, const orbis::camera::rg
     points.push_back(*ray * z);
     pixels.push_back({q.x, q.y});
   }
-  const auto pose = orbis::optimize::estimate_pose(points, pixels, camera);  // P3P in RANSAC, then a refinement
+  const auto pose = orbis::optimize::estimate_pose(points, pixels, camera);  // P3P in RANSAC, then refinement
   if (!pose) return complain(pose.error());
   std::printf("%zu inliers of %zu; the camera moved by %.3f m and turned by %.2f degrees\n", pose->inliers.size(),
               points.size(), pose->T_world_camera.translation().norm(),

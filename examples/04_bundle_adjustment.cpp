@@ -15,7 +15,7 @@ int main() {
   using namespace orbis::optimize;
   const reprojection model{orbis::camera::pinhole{640, 480, 525.0, 525.0, 319.5, 239.5}, 40.0};  // fx * 7.6 cm
 
-  // The scene: true poses and points, and observations with noise of half a pixel.
+  // The scene: true poses and points, and observations with a noise of half a pixel.
   orbis::random_bits random{3};
   std::vector<orbis::se3> truth;
   for (int i = 0; i != 8; ++i) truth.push_back(orbis::se3::exp({0.1 * i, 0.0, 0.0, 0.0, 0.02 * i, 0.0}));

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // 05_rgbd_slam [RECORDING]: RGB-D SLAM with a live map on its own thread; writes trajectory.txt and map.bt, and plans a
-// path. RECORDING: a folder in the layout of TUM RGB-D, 7-Scenes, ICL-NUIM or ScanNet; default: a synthetic room.
+// path. RECORDING: a folder in the TUM RGB-D, 7-Scenes, ICL-NUIM or ScanNet layout; default: a synthetic room.
 #include <cstdio>
 
 #include <orbis/camera/any.hpp>
@@ -35,12 +35,12 @@ int run(Recording&& recording) {
   slam.wait();
   map.finish();
 
-  const auto snapshot = map.latest();  // immutable; any thread may take one at any time
+  const auto snapshot = map.latest();  // immutable; may be called from any thread at any time
   const auto trajectory = slam.trajectory();
   std::printf("%zu frames, %zu tracked, %zu keyframes, %zu leaves in the map\n", i, trajectory.size(),
               snapshot->keyframes, snapshot->map.num_leaves());
   if (trajectory.empty()) return 1;
-  // A path for a ball of 10 cm radius through known free space, between points 0.7 m in front of the camera.
+  // A path for a ball with a radius of 10 cm through known free space, between points 0.7 m in front of the camera.
   const orbis::nav::distance_field field{snapshot->map, {.reach = 0.5}};
   const orbis::nav::planning_view view{snapshot->map, field, 0.1};
   const orbis::vec3 ahead{0.0, 0.0, 0.7};

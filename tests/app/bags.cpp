@@ -165,7 +165,8 @@ TEST_CASE("ground truth of a bag comes from poses, odometry or transforms, and i
   CHECK(norm(vec3{odometry->ground_truth[1].T_world_camera.rotation() * z - vec3(1, 0, 0)}) < 1e-9);
 
   const auto poses = truth("/mocap/pose");
-  CHECK_THAT(poses->notes.at(0), Contains("used as those of the camera; geometry_msgs/PoseStamped names no body"));
+  CHECK_THAT(poses->notes.at(0),
+             Contains("used as those of the camera; geometry_msgs/PoseStamped does not specify a body"));
   check(*poses, vec3(0, 0, 1), vec3(0, 0.1, 0));
 
   CHECK(app::open_bag(path, {}).value()->ground_truth.empty());
@@ -296,7 +297,7 @@ TEST_CASE("an unknown compression is named, and damaged images are omitted with 
   bytes.replace(bytes.rfind("=lz4") + 80, 100, std::string(100, '\xff'));  // in the last chunk
   const auto bag = app::open_bag(folder.write("damaged.bag", bytes), {}).value();
   CHECK_THAT(bag->notes.at(0), Contains("1 image of /camera/camera/color/image_raw/compressed "
-                                        "is omitted, as damaged or cut off: ") &&
+                                        "is omitted because of damage or truncation: ") &&
                                    Contains("a message is damaged in the chunk at byte "));
   check_frames(*bag, 2, 1.7e9);
 }

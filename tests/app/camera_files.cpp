@@ -70,7 +70,7 @@ TEST_CASE("cameras in the files of other programs are read") {
   folder.write("associated.txt", "");
   const auto eth3d = app::read_camera_file(folder.write("calibration.txt", "525.5 526.5 319.5 239.5\n")).value();
   CHECK((eth3d.camera.model.k().fy == 526.5 && eth3d.camera.model.k().cy == 239.5));
-  CHECK_THAT(eth3d.describe(), Contains("depth_scale 5000 (that of ETH3D is assumed)"));
+  CHECK_THAT(eth3d.describe(), Contains("depth_scale 5000 (the depth scale of ETH3D is assumed)"));
   CHECK(app::find_camera_file(folder.path()) == folder / "calibration.yaml");
 }
 

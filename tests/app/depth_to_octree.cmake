@@ -59,7 +59,7 @@ foreach(arguments "no.bt;--camera;${long}x" "no.bt;--pose;${long}" "no.bt;${long
 endforeach()
 
 file(WRITE ${WORK}/misspelt.toml "model = \"pinhole\"\nwidth = 320\nheight = 240\nfx = 262.5\nfy = 262.5\ncx = 159.5\ncy = 119.5\ndepth_skale = 5000\n")
-fails(2 "misspelt.toml: depth_skale is not a setting" ${depth} no.bt --camera misspelt.toml)
+fails(2 "misspelt.toml: depth_skale is not a camera setting" ${depth} no.bt --camera misspelt.toml)
 fails(2 "tum_fr1: .*size" ${depth} no.bt --camera tum_fr1)  # known, but of 640 x 480
 fails(2 "nikon: no such file" ${depth} no.bt --camera nikon)
 # Nothing of it ends up in the map: too far away to have a key.

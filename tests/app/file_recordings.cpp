@@ -166,7 +166,7 @@ TEST_CASE("colour and depth of a bag are found and paired by the times in their 
   CHECK_THAT(message_of(app::open_bag(path, {.topics = {"/camera/rgb/image_color", "/camera/depth/image_raw"}})),
              Contains("16x12 pixels, the camera 32x24: depth is not registered"));
   CHECK_THAT(message_of(app::open_bag(path, {.topics = {"/camera/depth_registered/image", "/camera/rgb/image_color"}})),
-             Contains("give the topic of colour first"));
+             Contains("give the colour topic first"));
   CHECK_THAT(message_of(app::open_bag(path, {.topics = {"/nothing"}})),
              Contains("has no images in /nothing; it contains /camera/depth/image_raw (16UC1)"));
   CHECK_THAT(message_of(app::open_bag(path, {.sensor = sensor_kind::stereo})), Contains("has no suitable images"));
@@ -250,7 +250,7 @@ TEST_CASE("the topics of librealsense's bags are found") {
   write({16, 12, 15.0, 15.0, 7.5, 5.5});
   CHECK_THAT(message_of(app::open_bag(path, {})),
              Contains("16x12 pixels, the camera 32x24: depth is not registered to colour") &&
-                 Contains("these names identify no frames"));
+                 Contains("these names do not identify frames"));
   write(k);
   const auto bag = app::open_bag(path, {}).value();
   CHECK(bag->sensor == sensor_kind::rgbd);
@@ -258,7 +258,7 @@ TEST_CASE("the topics of librealsense's bags are found") {
   CHECK(bag->frame(0).value().depth(3, 3) == 1500);
   CHECK(bag->camera.depth_scale == 1000.0);
   REQUIRE(bag->notes.size() == 2);
-  CHECK_THAT(bag->notes[0], Contains("names no unit of depth for /device_0/sensor_0/Depth_0/image/data"));
+  CHECK_THAT(bag->notes[0], Contains("does not specify the depth unit of /device_0/sensor_0/Depth_0/image/data"));
   CHECK_THAT(bag->notes[1], Contains("registered"));  // no transform between the cameras
   for (const char* units : {"Depth Units", "Depth_Units"}) {
     write(k, units);
@@ -267,7 +267,7 @@ TEST_CASE("the topics of librealsense's bags are found") {
     CHECK(known->frame(0).value().depth_scale == 4000.0);
     CHECK(known->notes.size() == 1);
     CHECK_THAT(app::open_bag(path, {.camera = settings}).value()->notes.at(0),
-               Contains("the bag stores 4000 units of depth per metre, the specified camera 1000"));
+               Contains("the bag stores 4000 depth units per metre, the specified camera 1000"));
   }
 }
 
@@ -394,8 +394,8 @@ TEST_CASE("of times that fall back the first run is used, and repeated times are
   }
   REQUIRE(found->notes.size() == 2);
   CHECK_THAT(found->notes[0],
-             Contains("3 images of /cam/image_raw are omitted, as the times in the headers fall back"));
-  CHECK_THAT(found->notes[1], Contains("1 image of /cam/image_raw is omitted, as the time is that of another one"));
+             Contains("3 images of /cam/image_raw are omitted because the times in the headers jump back"));
+  CHECK_THAT(found->notes[1], Contains("1 image of /cam/image_raw is omitted because another image has the same time"));
 }
 
 TEST_CASE("ground truth is that of the named topic and damaged poses are omitted") {

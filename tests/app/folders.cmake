@@ -30,11 +30,11 @@ foreach(name fx depth_scale)
 endforeach()
 file(WRITE ${WORK}/r/cam_K.txt "${fx} 0 79.5\n0 ${fx} 59.5\n0 0 1\n")
 execute_process(COMMAND ${APP} run r --out out ${quick} WORKING_DIRECTORY ${WORK} ERROR_VARIABLE err)
-check(err MATCHES "the camera is that of cam_K.txt, pinhole: 160 x 120, fx ${fx}[^\n]*depth_scale 1000 .millimetres are assumed")
+check(err MATCHES "the camera is read from cam_K.txt, pinhole: 160 x 120, fx ${fx}[^\n]*depth_scale 1000 .millimetres are assumed")
 file(WRITE ${WORK}/r/intrinsic.json "{\"width\": 160, \"height\": 120, \"depth_scale\": ${depth_scale},"
      "\"intrinsic_matrix\": [${fx}, 0, 0, 0, ${fx}, 0, 79.5, 59.5, 1]}")
 app(0 run r --out out ${quick})
-check(err MATCHES "the camera is that of intrinsic.json, pinhole: 160 x 120, fx ${fx}[^\n]*depth_scale ${depth_scale}")
+check(err MATCHES "the camera is read from intrinsic.json, pinhole: 160 x 120, fx ${fx}[^\n]*depth_scale ${depth_scale}")
 app_fails(1 "intrinsic.json: is an input" run r --quiet --out out ${quick} --save-map r/intrinsic.json)
 
 # Numbered images are no data set: the camera of ICL-NUIM is its own.
@@ -72,11 +72,11 @@ check(err MATCHES "the time between frames is 33[.0-9]* s, .*seem to be 1000 tim
 
 # An image, or one of the folders, instead of the recording.
 recording(r color depth)
-app_fails(2 "000000.png: is one image. name its folder, .*/r/color" run r/color/000000.png --quiet --out out ${quick})
+app_fails(2 "000000.png: is a single image. specify its folder, .*/r/color" run r/color/000000.png --quiet --out out ${quick})
 execute_process(COMMAND ${APP} run r/color --camera r/camera.toml --out out ${quick} WORKING_DIRECTORY ${WORK} ERROR_VARIABLE err)
-check(err MATCHES "the folder above, [^\n]*/r, is a recording with depth")
+check(err MATCHES "the parent folder [^\n]*/r is a recording with depth")
 
-app_fails(2 "the folder above, [^\n]*/room, is a recording with depth: open that" run room/rgb --quiet --out out ${quick})
+app_fails(2 "the parent folder [^\n]*/room is a recording with depth: open that folder" run room/rgb --quiet --out out ${quick})
 file(MAKE_DIRECTORY ${WORK}/up)
 file(COPY ${WORK}/r DESTINATION ${WORK}/up)
 app_fails(2 "up: is not a recording, but contains one: open up/r" run up --quiet --out out ${quick})

@@ -41,11 +41,11 @@ check(fps LESS_EQUAL 0.75)
 set(fine demo --plain --frames 80 --width 160 --resolution 0.008 --filter none --deterministic)
 app(0 ${fine} --batch-map --quiet --out fine_batch)
 app(0 ${fine} --map-every-frame --out fine)
-check(err MATCHES "[0-9]+ frames? between keyframes came in faster than the live map could insert them")
+check(err MATCHES "[0-9]+ frames? between keyframes arrived faster than the live map could insert them")
 summary(dropped ${WORK}/fine live_map frames dropped)
 check(dropped GREATER 0)
 file(READ ${WORK}/fine/report.html page)
-check(page MATCHES "came in faster than the live map")
+check(page MATCHES "arrived faster than the live map")
 must_be_the_same(fine_batch fine)
 
 # No room for the file that depth images are spilled to: that is said, and nothing is lost.

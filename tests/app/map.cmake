@@ -78,7 +78,7 @@ file(WRITE ${WORK}/positions/groundtruth.txt "${constant}")
 app(0 map positions --out out --resolution 0.1)
 check(err MATCHES "warning: all orientations of the ground truth are equal: if the camera turned, the map is wrong")
 app(0 run positions --out out --deterministic)
-check(err MATCHES "warning: the orientations of the ground truth are all equal, but the camera turns: the world frame")
+check(err MATCHES "warning: all orientations in the ground truth are equal, but the camera turns: the world frame")
 app(0 map room --out out --resolution 0.1)
 check(NOT err MATCHES "orientations")
 

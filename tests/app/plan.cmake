@@ -167,5 +167,5 @@ foreach(i RANGE 9)
 endforeach()
 file(WRITE ${WORK}/apart.ply "ply\nformat ascii 1.0\nelement vertex 1000\nproperty float x\nproperty float y\nproperty float z\nend_header\n${points}")
 app(0 map apart.ply --out apart --resolution 0.001 --filter none --quiet)
-app_fails(2 "apart/map.bt: the distances around its obstacles.* GB, more than there is" plan apart/map.bt --from 0,0,1 --to 9,9,1
+app_fails(2 "apart/map.bt: the distances around its obstacles.* GB, more than the available memory" plan apart/map.bt --from 0,0,1 --to 9,9,1
           --unknown free)

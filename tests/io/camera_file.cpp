@@ -62,8 +62,8 @@ TEST_CASE("what may be left out of a camera file has its default") {
 
 TEST_CASE("a key that is no setting of a camera is named, lest a misspelt one gets its default") {
   CHECK(message(camera_text() + "depth_scal = 1000.0\n")
-            .starts_with("camera.toml: depth_scal is not a setting of a camera; the settings are model, width, "));
-  CHECK(message(camera_text() + "[left]\nfx = 1.0\n").starts_with("camera.toml: left is not a setting"));
+            .starts_with("camera.toml: depth_scal is not a camera setting; the settings are model, width, "));
+  CHECK(message(camera_text() + "[left]\nfx = 1.0\n").starts_with("camera.toml: left is not a camera setting"));
   CHECK(message(camera_text("fx") + "f_x = 1.0\n") == "camera.toml: fx is missing");  // the first that is wrong
 }
 

@@ -168,7 +168,7 @@ const std::vector<color_kind> color_kinds{
     {"diffuse", {"diffuse_red", "diffuse_green", "diffuse_blue"}},
     {"0 to 1", {"red", "green", "blue"}, scalar_type::float32, 1.0 / 255.0},
     {"0 to 1 as double", {"r", "g", "b"}, scalar_type::float64, 1.0 / 255.0},
-    {"0 to 255", {"red", "green", "blue"}, scalar_type::float32, 1.0, "up to 200: taken as 0 ... 255"},
+    {"0 to 255", {"red", "green", "blue"}, scalar_type::float32, 1.0, "up to 200: interpreted as 0 ... 255"},
     {"0 to 255 as double", {"diffuse_red", "diffuse_green", "diffuse_blue"}, scalar_type::float64, 1.0, "... 255"},
     {"16 bits", {"red", "green", "blue"}, scalar_type::uint16, 257.0},
     {"bytes as 16 bits", {"red", "green", "blue"}, scalar_type::uint16, 1.0, "... 255"},
@@ -276,20 +276,20 @@ TEST_CASE("the range of channels follows from the greatest one, and an unusual o
     std::string note{};  // none: usual
   };
   const std::string floating = "colours are floating-point numbers up to ", whole = "colours are integers up to ";
-  const std::vector<kind> kinds{{scalar_type::float32, 1.001, 1.0, floating + "1.001: taken as 0 ... 1"},
-                                {scalar_type::float32, 1.01, 1.0, floating + "1.01: taken as 0 ... 1"},
-                                {scalar_type::float64, 2.0, 1.0, floating + "2: taken as 0 ... 1"},
-                                {scalar_type::float32, 2.5, 255.0, floating + "2.5: taken as 0 ... 255"},
-                                {scalar_type::float64, 100.25, 255.0, floating + "100.25: taken as 0 ... 255"},
-                                {scalar_type::float32, 255.0, 255.0, floating + "255: taken as 0 ... 255"},
-                                {scalar_type::float32, 60000.0, 65535.0, floating + "60000: taken as 0 ... 65535"},
-                                {scalar_type::uint16, 255.0, 255.0, whole + "255: taken as 0 ... 255"},
-                                {scalar_type::uint16, 256.0, 4095.0, whole + "256: taken as 0 ... 4095"},
-                                {scalar_type::uint16, 4095.0, 4095.0, whole + "4095: taken as 0 ... 4095"},
-                                {scalar_type::uint16, 4096.0, 65535.0, whole + "4096: taken as 0 ... 65535"},
-                                {scalar_type::uint16, 16383.0, 65535.0, whole + "16383: taken as 0 ... 65535"},
+  const std::vector<kind> kinds{{scalar_type::float32, 1.001, 1.0, floating + "1.001: interpreted as 0 ... 1"},
+                                {scalar_type::float32, 1.01, 1.0, floating + "1.01: interpreted as 0 ... 1"},
+                                {scalar_type::float64, 2.0, 1.0, floating + "2: interpreted as 0 ... 1"},
+                                {scalar_type::float32, 2.5, 255.0, floating + "2.5: interpreted as 0 ... 255"},
+                                {scalar_type::float64, 100.25, 255.0, floating + "100.25: interpreted as 0 ... 255"},
+                                {scalar_type::float32, 255.0, 255.0, floating + "255: interpreted as 0 ... 255"},
+                                {scalar_type::float32, 60000.0, 65535.0, floating + "60000: interpreted as 0 ... 65535"},
+                                {scalar_type::uint16, 255.0, 255.0, whole + "255: interpreted as 0 ... 255"},
+                                {scalar_type::uint16, 256.0, 4095.0, whole + "256: interpreted as 0 ... 4095"},
+                                {scalar_type::uint16, 4095.0, 4095.0, whole + "4095: interpreted as 0 ... 4095"},
+                                {scalar_type::uint16, 4096.0, 65535.0, whole + "4096: interpreted as 0 ... 65535"},
+                                {scalar_type::uint16, 16383.0, 65535.0, whole + "16383: interpreted as 0 ... 65535"},
                                 {scalar_type::uint16, 16384.0, 65535.0},
-                                {scalar_type::int32, 16384.0, 65535.0, whole + "16384: taken as 0 ... 65535"}};
+                                {scalar_type::int32, 16384.0, 65535.0, whole + "16384: interpreted as 0 ... 65535"}};
   for (const kind& k : kinds)
     for (const format& f : formats) {
       INFO(k.greatest << ", " << f.encoding);
@@ -322,7 +322,7 @@ TEST_CASE("whole numbers in a text column of floats are packed integers") {
     CHECK(read.cloud.colors == colors);
     CHECK(read.fields.empty());
     CHECK(read.notes == std::vector<std::string>{
-                            "rgb is declared as floating-point, but has whole numbers: taken as packed integers"});
+                            "rgb is declared as floating-point, but has whole numbers: read as packed integers"});
   }
   const auto bits = io::parse_pcd_with_fields(head + red("2.34180515e-38", "9.25571648e-41", "0")).value();
   CHECK(bits.cloud.colors == std::vector<rgb8>{{255, 0, 0}, {1, 2, 3}, {0, 0, 0}});
@@ -404,7 +404,7 @@ TEST_CASE("what a cloud leaves out is noted") {
     CHECK(parse(packed, f).cloud.colors == std::vector<rgb8>{{1, 2, 3}});
     CHECK_FALSE(has_note(parse(packed, f), "no colours"));
     packed.columns.back() = column_of("rgb", scalar_type::float64, {0.5});
-    CHECK(has_note(parse(packed, f), "no colours: rgb holds no packed colours"));
+    CHECK(has_note(parse(packed, f), "no colours: rgb does not contain packed colours"));
   }
 }
 

@@ -207,7 +207,7 @@ TEST_CASE("settings of ASL cameras that are damaged or not known are refused in 
   CHECK_THAT(message("[7.0, 7.1", "[-7.0, 7.1"), Contains("focal lengths must be positive"));
   CHECK_THAT(message("[7.0, 7.1", "[seven, 7.1"), Contains("must be a list of finite numbers"));
   CHECK_THAT(message("data: [0.0", "data: [3.0"), Contains("T_BS: the matrix is not a rigid transform"));
-  CHECK_THAT(message("1.0]", "1.0"), Contains("is a list without an end"));
+  CHECK_THAT(message("1.0]", "1.0"), Contains("is an unterminated list"));
   CHECK_THAT(message("rate_hz: 20", "- 20"), Contains("sensor.yaml:13: is not \"name: value\""));
   CHECK_THAT(message("rate_hz: 20", "rate_hz: 0"), Contains("rate_hz"));
   CHECK_THAT(message("rate_hz: 20", "sensor_type: x"), Contains("a second time"));

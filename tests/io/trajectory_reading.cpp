@@ -146,8 +146,8 @@ TEST_CASE("columns of trajectories are found by their names") {
     std::vector<std::string> notes{};  // parts, in order
     std::string before{}, after_time{};
   };
-  const std::string at_2 = "by the header, column 2 is the time, column 3 the first of the position, and column 6";
-  const std::string at_1 = "by the header, column 1 is the time, column 3 the first of the position, and column 6";
+  const std::string at_2 = "according to the header, column 2 is the time, column 3 the first of the position, and column 6";
+  const std::string at_1 = "according to the header, column 1 is the time, column 3 the first of the position, and column 6";
   const std::vector<kind> kinds{
       {"timestamp,x,y,z,orientation_w,orientation_x,orientation_y,orientation_z", comma, true, 10, {w}},
       {"time,x,y,z,orientation.x,orientation.y,orientation.z,orientation.w", comma, false, 19, {ns}},
@@ -170,18 +170,18 @@ TEST_CASE("columns of trajectories are found by their names") {
       {"#frame timestamp tx ty tz qw qx qy qz", blank, true, 10, {w, at_2}, "7 "},
       {",timestamp,tx,ty,tz,qw,qx,qy,qz", comma, true, 10, {w, at_2}, "7,"},
       {",timestamp,tx,ty,tz,qx,qy,qz,qw", comma, false, 19, {ns, at_2}, "7,"},
-      {"0,1,2,3,4,5,6,7", comma, false, 10, {"line 1 does not name a quaternion"}},
+      {"0,1,2,3,4,5,6,7", comma, false, 10, {"line 1 does not list a quaternion"}},
       {"time,east,north,up,a,b,c,d",
        comma,
        false,
        10,
-       {"line 1 does not name a quaternion (qx, qy, qz and qw, for example): read as timestamp tx ty tz qx qy qz qw"}},
+       {"line 1 does not list a quaternion (such as qx, qy, qz and qw): read as timestamp tx ty tz qx qy qz qw"}},
       {"time,east,north,up,a,b,c,d",
        comma,
        true,
        19,
        {w, ns,
-        "line 1 does not name a quaternion (qx, qy, qz and qw, for example): read as timestamp tx ty tz qw qx"}}};
+        "line 1 does not list a quaternion (such as qx, qy, qz and qw): read as timestamp tx ty tz qw qx"}}};
   const trajectory poses = some_path(20, 1);
   for (const kind& k : kinds) {
     INFO(k.head);
@@ -303,7 +303,7 @@ TEST_CASE("repeated times and runs: harmless, left out, or refused") {
       {text_of(one_of_four), {}, {"12 of 48 poses", "too few digits"}},
       {text_of(one_of_four) + text_of(between), {}, {"12 of 48 poses", "too few digits"}},
       {text_of(appended(one_of_four, later)), appended(three_of_four, later), {"12 poses with the time stamp"}},
-      {text_of(swapped), first, {"not in order of time; sorted"}},
+      {text_of(swapped), first, {"not in chronological order; sorted"}},
       {interleaved({first, other, some_path(50, 3)}), {}, {"100 of 150 poses", "too few digits"}},
       {a + b + text_of(some_path(50, 3)), {}, {"100 of 150 poses", "backwards at line 51; 3 runs in one file?"}},
       {text_of(whole),

@@ -156,7 +156,7 @@ TEST_CASE("damaged files of ScanNet are named") {
     return m;
   };
   CHECK_THAT(message("intrinsic/intrinsic_depth.txt", "1 2 3"),
-             Contains("intrinsic_depth.txt: a camera matrix has 9 finite numbers, or 16"));
+             Contains("intrinsic_depth.txt: a camera matrix must have 9 or 16 finite numbers"));
   CHECK_THAT(message("intrinsic/intrinsic_color.txt", "40 1 23.5 0 40 17.5 0 0 1"), Contains("skew"));
   CHECK_THAT(message("intrinsic/extrinsic_color.txt", "2 0 0 0 0 2 0 0 0 0 2 0 0 0 0 1"),
              Contains("extrinsic_color.txt: the matrix is not a rigid transform"));

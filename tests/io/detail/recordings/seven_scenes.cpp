@@ -63,7 +63,7 @@ TEST_CASE("a scene with one sequence stands for it and one with several is refus
   CHECK(io::detail::index_seven_scenes(folder.path()).value().frames.size() == 1);
   write_frame(folder, "seq-04/frame-000000");
   CHECK(message_of(io::detail::index_seven_scenes(folder.path()))
-            .find("holds 2 sequences, name one of them, for example seq-03") != std::string::npos);
+            .find("holds 2 sequences: specify one of them, for example seq-03") != std::string::npos);
 }
 
 TEST_CASE("bad pose matrices are named with their file") {

@@ -100,11 +100,11 @@ TEST_CASE("what is missing in a TUM recording is named") {
   const temporary_folder folder;
   folder.write("rgb.txt", "1.00 rgb/1.00.png\n");
   CHECK_THAT(message_of(io::detail::index_tum(folder.path())),
-             StartsWith((folder / "depth.txt").string() + ": no such file; a recording in the layout of TUM") &&
+             StartsWith((folder / "depth.txt").string() + ": no such file; a recording in the TUM layout") &&
                  EndsWith("the folder holds rgb.txt"));
   folder.write("depth.txt", "# nothing\n\n");
   CHECK(message_of(io::detail::index_tum(folder.path())) ==
-        (folder / "depth.txt").string() + ": the list names no image");
+        (folder / "depth.txt").string() + ": the list contains no images");
   folder.write("depth.txt", "1.00 depth/1.00.png\n");
   CHECK(message_of(io::detail::index_tum(folder.path()))
             .find("1.00.png: the first image of the recording does not exist") != std::string::npos);
@@ -179,10 +179,10 @@ TEST_CASE("a list without entries quotes its first line") {
   std::vector<std::string> notes;
   for (const char* const text : {"a b\nc d\n", "x\n[1] rgb/1.png\n[2] rgb/2.png\n", "-\n"})
     CHECK_THAT(message_of(io::detail::parse_image_list(text, "rgb.txt", "", notes)),
-               StartsWith("rgb.txt:") && Contains("the list names no image: \"") &&
+               StartsWith("rgb.txt:") && Contains("the list contains no images: \"") &&
                    EndsWith("\" is not a time stamp and a file name"));
   CHECK_THAT(message_of(io::detail::parse_associations("1 rgb/1.png depth/1.png\n", "a.txt", notes)),
-             Contains("a.txt:1: the list names no image: \"1 rgb/1.png depth/1.png\" is not two pairs"));
+             Contains("a.txt:1: the list contains no images: \"1 rgb/1.png depth/1.png\" is not two pairs"));
 }
 
 TEST_CASE("whole numbers in lists are frame numbers, other stamps have the unit of their digits") {
@@ -195,7 +195,7 @@ TEST_CASE("whole numbers in lists are frame numbers, other stamps have the unit 
   CHECK(index.frames[2].timestamp == 0.6);
   CHECK(index.frames[1].T_world_camera.value().translation().x() == 1.0);
   CHECK(index.ground_truth[1].timestamp == 0.4);
-  CHECK(mentions(index, "the time stamps are frame numbers; times are those of 10 frames per second"));
+  CHECK(mentions(index, "the time stamps are frame numbers; converted to seconds at 10 frames per second"));
   folder.write("depth.txt", "3.01 depth/1.01.png\n4.01 depth/1.04.png\n6.01 depth/1.30.png\n");  // seconds
   CHECK(io::detail::index_tum(folder.path(), 0.02, 10.0).value().frames[2].timestamp == 6.0);
   for (const char* const zeros : {"000", "000000", "000000000"}) {
@@ -223,7 +223,7 @@ TEST_CASE("the folder's name tells the camera of the benchmark's sequences") {
     folder.write(sub / "b.png", "x");
     const auto index = io::detail::index_tum(folder / sub).value();
     CHECK(index.camera.value().model.k().fx == fx);
-    CHECK_THAT(index.camera_guess, Contains("by the name "));
+    CHECK_THAT(index.camera_guess, Contains("according to the name "));
   }
   for (const std::filesystem::path name : {"my_freiburg1_walk", "freiburg1/kitchen", "rgbd_dataset/x"}) {
     folder.write(name / "rgb.txt", "1 a.png\n");
