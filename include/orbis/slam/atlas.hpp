@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Several maps: a new one begins when tracking has been lost for a long time; maps are merged when a place is
-/// recognised.
+/// An atlas of several maps: a new map is started when tracking has been lost for a long time; maps are merged when a
+/// place is recognised.
 ///
 /// Source of the idea: R. Elvira, J. D. Tardos, J. M. M. Montiel, "ORBSLAM-Atlas: a robust and accurate multi-map
 /// system", IROS 2019.
@@ -26,8 +26,8 @@ class basic_atlas {
  public:
   using map_type = basic_map<D>;
 
-  /// Creates an atlas with one empty map. `levels`, `scale_factor`, `min_shared`: as for `basic_map`, the same for all
-  /// maps.
+  /// Creates an atlas with one empty map. `levels`, `scale_factor`, `min_shared`: as for `basic_map`; all maps have the
+  /// same values.
   explicit basic_atlas(int levels = 8, double scale_factor = 1.2, std::uint32_t min_shared = 15)
       : levels_{levels}, scale_factor_{scale_factor}, min_shared_{min_shared} {
     create();
@@ -41,11 +41,11 @@ class basic_atlas {
   [[nodiscard]] map_type& at(map_id id) { return maps_.at(id); }
   /// @pre contains(id)
   [[nodiscard]] const map_type& at(map_id id) const { return maps_.at(id); }
-  /// All maps by ascending id.
+  /// All maps in ascending order of id.
   [[nodiscard]] const std::map<map_id, map_type>& maps() const noexcept { return maps_; }
   [[nodiscard]] std::size_t size() const noexcept { return maps_.size(); }
 
-  /// Returns true if the keyframe exists, by its current id.
+  /// Returns true if a keyframe with this current id exists.
   [[nodiscard]] bool has(map_keyframe k) const { return contains(k.map) && at(k.map).has_keyframe(k.keyframe); }
   /// @pre has(k)
   [[nodiscard]] const basic_keyframe<D>& at(map_keyframe k) const { return at(k.map).at(k.keyframe); }
@@ -74,8 +74,8 @@ class basic_atlas {
     maps_.erase(id);
   }
 
-  /// Merges map `from` into map `into`: it is moved by `T_into_from` and its spanning tree attached at `link`. If it
-  /// was active, `into` becomes active. No landmarks are fused, and no loop edge is added. O(both maps).
+  /// Merges map `from` into map `into`: transforms `from` by `T_into_from` and attaches its spanning tree at `link`. If
+  /// `from` was active, `into` becomes active. No landmarks are fused, and no loop edge is added. O(both maps).
   /// @pre from != into; `link` refers to existing keyframes, unless either map is empty
   id_offsets merge(map_id from, map_id into, const sim3& T_into_from, const map_link& link) {
     assert(from != into && contains(from) && contains(into));
@@ -116,7 +116,7 @@ class basic_atlas {
   map_id next_ = 0;
 };
 
-/// An atlas with the descriptors of ORB.
+/// An atlas with ORB descriptors.
 using atlas = basic_atlas<features::binary_descriptor<256>>;
 
 }  // namespace orbis::slam

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The functions of calibration.hpp.
+/// Implementation of calibration.hpp.
 #pragma once
 
 #include <array>
@@ -24,7 +24,7 @@ namespace orbis::slam {
 
 namespace detail {
 
-/// Returns the start of the `count` consecutive keyframes with the most observations. O(keypoints).
+/// Returns the index of the first of the `count` consecutive keyframes with the most observations. O(keypoints).
 template <feature_descriptor D>
 [[nodiscard]] std::size_t first_to_take(const basic_map<D>& m, std::size_t count) {
   std::vector<std::size_t> up_to{0};  // cumulative number of observations before each keyframe
@@ -43,7 +43,7 @@ template <feature_descriptor D, class Camera>
 [[nodiscard]] bundle_snapshot make_calibration_problem(const basic_map<D>& m, const camera_rig<Camera>& rig,
                                                        const calibration_options& options) {
   bundle_snapshot s;
-  std::unordered_map<std::uint32_t, std::uint32_t> index;  // by keyframe
+  std::unordered_map<std::uint32_t, std::uint32_t> index;  // from keyframe id to index
   const std::size_t first = first_to_take(m, options.max_keyframes);
   std::size_t number = 0;
   for (const auto& k : m.keyframes()) {
@@ -75,8 +75,9 @@ template <camera::parametric_camera Camera>
   return {all & ~(focal_lengths | central), central, focal_lengths};
 }
 
-/// The parameters that are estimated if all are determined. If the distortion is a fraction, its numerator and
-/// denominator are determined only jointly; the same is nearly true for more than two powers of the radius.
+/// The parameters that are estimated if the motion determines all of them. If the distortion is a fraction, its
+/// numerator and denominator are determined only jointly; this nearly holds for more than two powers of the radius as
+/// well.
 template <camera::parametric_camera Camera>
 [[nodiscard]] std::uint32_t usual_parameters(const Camera&) {
   return (1U << camera::parameters_of<Camera>::count) - 1U;
@@ -85,7 +86,7 @@ template <camera::parametric_camera Camera>
   return c.distortion().k3 != 0.0 ? 0x1ffU : 0xffU;
 }
 
-/// Returns the largest displacement of a pixel by one standard deviation of the given parameters, pixels.
+/// Returns the largest displacement of a pixel by one standard deviation of the given parameters, in pixels.
 template <camera::parametric_camera Camera, class Covariance>
 [[nodiscard]] double max_pixel_deviation(const Camera& camera, const Covariance& covariance, std::uint32_t parameters) {
   constexpr int count = camera::parameters_of<Camera>::count, steps = 8;
@@ -112,8 +113,8 @@ template <camera::parametric_camera Camera>
   const std::uint32_t usual = usual_parameters(before);
   constexpr auto groups = parameter_groups<Camera>();
   std::uint32_t free = usual;
-  // The errors of patches in one image have common causes, such as an error of its motion, so that they average out
-  // less than those of corners.
+  // The errors of patches in one image have common causes, such as an error in the camera motion, so that they average
+  // out less than those of corners.
   constexpr double patch_correlation = 2.5;
   const bool by_patches = std::any_of(problem.observations.begin(), problem.observations.end(),
                                       [](const auto& o) { return o.depth_weight < 1.0; });
@@ -161,7 +162,7 @@ template <camera::parametric_camera Camera>
 template <feature_descriptor D, calibrated_camera Camera>
 result<calibration<Camera>> calibrate(const basic_map<D>& m, const camera_rig<Camera>& rig,
                                       const calibration_options& options, const progress& callback) {
-  camera_rig<Camera> loose = rig;  // bf determines how many pixels a depth error counts as
+  camera_rig<Camera> loose = rig;  // bf converts a depth error to pixels
   loose.model.bf *= std::sqrt(options.depth_weight);
   const detail::bundle_snapshot problem = detail::make_calibration_problem(m, loose, options);
   if constexpr (std::same_as<Camera, camera::any_camera>) {

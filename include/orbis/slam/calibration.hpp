@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Calibration of the camera from a map made with it: the intrinsic parameters that agree best with all keyframes, as
-/// far as the motion of the camera determines them.
+/// Calibration of the camera from a map built with it: the intrinsic parameters that best fit all keyframes, as far as
+/// the camera motion determines them.
 #pragma once
 
 #include <algorithm>
@@ -25,20 +25,20 @@ concept calibrated_camera = std::same_as<C, camera::any_camera> || std::same_as<
     std::same_as<C, camera::radial_tangential> || std::same_as<C, camera::kannala_brandt>;
 
 struct calibration_options {
-  /// Maximum displacement of a pixel anywhere in the image, in pixels, by one standard deviation of a group of
-  /// parameters (focal lengths; principal point and tangential distortion; radial distortion). Groups above it are held
+  /// Maximum displacement, in pixels, of any pixel of the image by one standard deviation of a group of parameters
+  /// (focal lengths; principal point and tangential distortion; radial distortion). Groups above this limit are held
   /// fixed.
   double max_effect = 2.0;
   /// Weight of depth relative to tracking. Depth errors are correlated between images (misregistration with colour, the
-  /// depth camera's own distortion) and would be attributed to the lens; a small weight suffices to fix the scale of
-  /// the world.
+  /// depth camera's own distortion) and would be attributed to the lens; a small weight is sufficient to fix the scale
+  /// of the map.
   double depth_weight = 0.0025;
-  bool keeps_aspect = true;  ///< keeps the given ratio of the focal lengths, for example square pixels
-  /// Maximum number of consecutive keyframes, taken where there are most observations; the cost is cubic in their
+  bool keeps_aspect = true;  ///< keeps the given ratio of the focal lengths, for example 1 for square pixels
+  /// Maximum number of consecutive keyframes, chosen where there are the most observations; the cost is cubic in their
   /// number.
   std::size_t max_keyframes = 300;
-  /// Maximum number of landmarks, taken at regular intervals of those that two keyframes observe; the cost is linear in
-  /// their number. With fewer, the standard deviations of the parameters grow, and more groups of them exceed
+  /// Maximum number of landmarks, chosen at regular intervals from those that two keyframes observe; the cost is linear
+  /// in their number. With fewer landmarks, the standard deviations of the parameters grow, and more groups exceed
   /// `max_effect`.
   std::size_t max_landmarks = std::numeric_limits<std::size_t>::max();
 };
@@ -48,18 +48,18 @@ struct calibrated_parameter {
   std::string_view name;  ///< name in camera files and OpenCV
   double before = 0.0;
   double after = 0.0;
-  double deviation = 0.0;  ///< one standard deviation; 0 if the parameter was held
-  bool is_held = false;    ///< not determined by the motion; `after` is `before`
+  double deviation = 0.0;  ///< one standard deviation; 0 if the parameter was held fixed
+  bool is_held = false;    ///< true if not determined by the motion; `after` then equals `before`
 };
 
 /// Result of a calibration, independent of the camera model.
 struct calibration_summary {
   /// The parameters of the model; for `radial_tangential`, k3 only if it is not 0, and never k4 to k6.
   std::vector<calibrated_parameter> parameters;
-  std::size_t keyframes = 0, landmarks = 0;  ///< number of those used
+  std::size_t keyframes = 0, landmarks = 0;  ///< number of each used
   std::size_t observations = 0, outliers = 0;
-  double initial_rms = 0.0;  ///< of the inlier observations, in standard deviations
-  double final_rms = 0.0;    ///< for the refined camera
+  double initial_rms = 0.0;  ///< RMS of the inlier observations, in standard deviations
+  double final_rms = 0.0;    ///< RMS for the refined camera
   [[nodiscard]] bool is_complete() const {
     return std::none_of(parameters.begin(), parameters.end(), [](const auto& p) { return p.is_held; });
   }
@@ -70,13 +70,14 @@ struct calibration : calibration_summary {
   Camera camera;
 };
 
-/// Refines the camera of a map by its keyframes and landmarks. Their poses and positions are refined with it, without
-/// changing the map. Rebuild the map with the refined camera and calibrate again, until nothing changes: observations
-/// that did not fit the first camera were left out of the map.
+/// Refines the camera model of a map, together with the poses of its keyframes and the positions of its landmarks,
+/// without changing the map. Rebuild the map with the refined camera and calibrate again until nothing changes:
+/// observations that did not fit the first camera are missing from the map.
 ///
-/// `rig`: the rig that the map was made with (`make_rig`). @pre options.depth_weight > 0. Errors: `no_data` for a map
-/// without landmarks that two keyframes observe; `degenerate` if its motion determines no parameter, or nothing has
-/// depth; `cancelled` by `callback`. Complexity: see `optimize::self_calibrate`, which is called up to four times.
+/// `rig`: the rig with which the map was built (`make_rig`). @pre options.depth_weight > 0. Errors: `no_data` for a map
+/// without landmarks that two keyframes observe; `degenerate` if the camera motion determines no parameter, or no
+/// observation has depth; `cancelled` by `callback`. Complexity: see `optimize::self_calibrate`, which is called up to
+/// four times.
 template <feature_descriptor D, calibrated_camera Camera>
 [[nodiscard]] result<calibration<Camera>> calibrate(const basic_map<D>& m, const camera_rig<Camera>& rig,
                                                     const calibration_options& options = {},

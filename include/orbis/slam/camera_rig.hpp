@@ -14,17 +14,17 @@
 
 namespace orbis::slam {
 
-/// A camera with the settings that observations depend on.
+/// A camera with the settings that affect observations.
 template <camera::camera_model Camera>
 struct camera_rig {
   optimize::reprojection<Camera> model;  ///< the camera, and `bf`, which weights depth (see `options::bf`)
-  pyramid_scales scales{};               ///< of the extractor's image pyramid
-  double min_depth = 0.1;                ///< metres; depth outside min_depth ... max_depth is not used
+  pyramid_scales scales{};               ///< scales of the extractor's image pyramid
+  double min_depth = 0.1;                ///< metres; depth outside [min_depth, max_depth] is not used
   double max_depth = 10.0;               ///< metres
   bool scale_is_known = true;            ///< false if no depth is measured: lengths are in an arbitrary unit per map
 
   [[nodiscard]] const Camera& camera() const noexcept { return model.camera; }
-  /// Returns the standard deviation, in metres, of a depth (metres) measured at a keypoint of a pyramid level.
+  /// Returns the standard deviation, in metres, of a depth (metres) measured at a keypoint on a pyramid level.
   [[nodiscard]] double depth_deviation(double depth, int octave) const {
     return depth * depth / model.bf * scales.scale(octave);
   }
@@ -43,7 +43,7 @@ template <camera::camera_model Camera>
           settings.scale_is_measured};
 }
 
-/// Returns the focal length in the middle of the image, pixels per radian; 0 if the camera cannot project there.
+/// Returns the focal length at the image centre, pixels per radian; 0 if the camera cannot project there.
 template <camera::camera_model Camera>
 [[nodiscard]] double focal_length(const Camera& camera) {
   matrix<2, 3> j = zeros<matrix<2, 3>>();

@@ -42,12 +42,12 @@ template <class Pairs>
 }
 }  // namespace detail
 
-/// A symmetric graph. It counts every pair of keyframes that shares a landmark. A pair has an edge if it shares at
-/// least `min_shared` landmarks; a keyframe without such a pair has one edge, to the keyframe with which it shares
-/// most. The graph depends only on the counts, not on the order of the changes.
+/// A symmetric graph with the number of shared landmarks for every pair of keyframes that shares any. A pair has an
+/// edge if it shares at least `min_shared` landmarks; a keyframe without such a pair has one edge, to the keyframe with
+/// which it shares the most. The graph depends only on these numbers, not on the order of the changes.
 ///
-/// Let d be the number of keyframes that share landmarks with a given one. Lookups and changes cost O(log d); adding a
-/// pair, removing a pair and lowering the strongest one cost O(d). Memory: O(1) per keyframe that shares landmarks, and
+/// Let d be the number of keyframes that share landmarks with a given one. Lookups and changes take O(log d); adding a
+/// pair, removing a pair and lowering the strongest one take O(d). Memory: O(1) per keyframe that shares landmarks, and
 /// per pair.
 class covisibility_graph {
  public:
@@ -77,7 +77,7 @@ class covisibility_graph {
     if (gone.empty()) return;
     for (const covisible& other : gone.mapped().pairs) decrease(other.keyframe, k, other.shared);
   }
-  /// Adds another graph, whose ids grow by `offset`. @pre all ids of this graph are less than `offset`
+  /// Adds another graph after adding `offset` to its ids. @pre all ids of this graph are less than `offset`
   void append(covisibility_graph&& other, std::uint32_t offset) {
     for (auto& [id, n] : other.nodes_) {
       assert(!nodes_.contains(id + offset));
@@ -88,7 +88,7 @@ class covisibility_graph {
     other.nodes_ = {};
   }
 
-  /// Returns the number of landmarks that both observe.
+  /// Returns the number of landmarks that both keyframes observe.
   [[nodiscard]] std::uint32_t shared(keyframe_id a, keyframe_id b) const {
     const std::span<const covisible> pairs = sharing(a);
     const auto at = detail::find_pair(pairs, b);
@@ -99,12 +99,12 @@ class covisibility_graph {
     const std::uint32_t both = shared(a, b);
     return both != 0 && (both >= min_shared_ || is_only_edge(a, b) || is_only_edge(b, a));
   }
-  /// All keyframes that share a landmark with `k`, with or without an edge, by ascending id.
+  /// All keyframes that share a landmark with `k`, with or without an edge, in ascending order of id.
   [[nodiscard]] std::span<const covisible> sharing(keyframe_id k) const {
     const auto n = nodes_.find(k.value());
     return n != nodes_.end() ? std::span<const covisible>{n->second.pairs} : std::span<const covisible>{};
   }
-  /// Returns the keyframe with which `k` shares most landmarks; `no_id` if it shares nothing.
+  /// Returns the keyframe with which `k` shares the most landmarks; `no_id` if it shares none.
   [[nodiscard]] covisible strongest(keyframe_id k) const {
     const auto n = nodes_.find(k.value());
     return n != nodes_.end() ? n->second.strongest : covisible{};
@@ -132,8 +132,8 @@ class covisibility_graph {
   }
 
  private:
-  struct node {                    // of a keyframe that shares landmarks
-    std::vector<covisible> pairs;  ///< by ascending keyframe
+  struct node {                    // for a keyframe that shares landmarks
+    std::vector<covisible> pairs;  ///< in ascending order of keyframe
     covisible strongest;
   };
 
@@ -161,7 +161,7 @@ class covisibility_graph {
   }
 
   std::uint32_t min_shared_;
-  std::unordered_map<std::uint32_t, node> nodes_;  ///< by keyframe
+  std::unordered_map<std::uint32_t, node> nodes_;  ///< keyed by keyframe id
 };
 
 }  // namespace orbis::slam

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The events of the SLAM system, and the callbacks for them.
+/// Events of the SLAM system and their callbacks.
 #pragma once
 
 #include <cstddef>
@@ -15,19 +15,19 @@
 
 namespace orbis::slam {
 
-/// A keyframe was made or culled. With `options::trajectory_frames` maps eventually forget the poses of culled
+/// A keyframe was created or culled. With `options::trajectory_frames`, maps eventually forget the poses of culled
 /// keyframes (`basic_map::remembers`).
 struct keyframe_event {
   map_keyframe id;
   double timestamp = 0.0;  ///< seconds
   std::size_t frame = 0;   ///< index of the frame, from 0
-  se3 T_world_camera;      ///< in the world of its map
+  se3 T_world_camera;      ///< in the world frame of its map
 };
 
 enum class correction_kind : std::uint8_t {
   loop,               ///< a loop was closed
   global_adjustment,  ///< all keyframes and landmarks of a map were adjusted
-  merge               ///< a map became a part of another one
+  merge               ///< a map was merged into another one
 };
 
 [[nodiscard]] constexpr std::string_view to_string(correction_kind kind) noexcept {
@@ -39,33 +39,33 @@ enum class correction_kind : std::uint8_t {
   return "unknown";
 }
 
-/// A correction that changed the poses of a map by more than local adjustment does. Data built on the poses must be
-/// moved.
+/// A correction that changed the poses of a map by more than local adjustment does. Data derived from the poses must be
+/// updated.
 struct correction_event {
   correction_kind kind{};
   map_id map = 0;  ///< the corrected map
-  /// For a loop or merger: the two keyframes of the same place (`from` by its new id). With threads, either may since
-  /// have been erased (`basic_atlas::current` gives its replacement).
+  /// For a loop or merger: the two keyframes at the same place (`from` with its new id). With threads, either may have
+  /// been erased since then (`basic_atlas::current` returns its replacement).
   map_keyframe from{}, to{};
-  map_id merged = 0;          ///< for a merger: the map that became a part of `map`
-  id_offsets offsets{};       ///< for a merger: the amounts by which the ids of `merged` grew
-  sim3 T_corrected_before{};  ///< the correction at keyframe `from`, in the map's world; scale 1 with depth
-  /// For a merger: the change of the world of `map`, if `merged` is the older map, whose world is kept.
+  map_id merged = 0;          ///< for a merger: the map that was merged into `map`
+  id_offsets offsets{};       ///< for a merger: the offsets added to the ids of `merged`
+  sim3 T_corrected_before{};  ///< the correction at keyframe `from`, in the map's world frame; scale 1 with depth
+  /// For a merger: the change of the world frame of `map` if `merged` is the older map, whose world frame is kept.
   sim3 T_map_before{};
   double milliseconds = 0.0;         ///< wall time
-  double locked_milliseconds = 0.0;  ///< the longest single time that tracking and queries had to wait
+  double locked_milliseconds = 0.0;  ///< the longest single wait of tracking and queries
 };
 
-/// Tracking changed its state.
+/// The state of tracking changed.
 struct state_event {
-  track_state from{};  ///< the state of the last event
+  track_state from{};  ///< the state at the last event
   track_state to{};
   std::size_t frame = 0;  ///< index of the frame, from 0
 };
 
 /// Callbacks; any of them may be empty. They are called without a lock held, so they may query the system. With
-/// threads, those for culled keyframes and corrections are called from the system's own threads. They must not wait for
-/// the system; an exception thrown on a thread of the system ends that thread (see `system`).
+/// threads, the callbacks for culled keyframes and corrections are called on the system's threads. They must not wait
+/// for the system; an exception thrown on a thread of the system ends that thread (see `system`).
 struct listeners {
   std::function<void(const keyframe_event&)> keyframe_made{};
   std::function<void(const keyframe_event&)> keyframe_culled{};

@@ -10,7 +10,7 @@
 
 namespace orbis::slam {
 
-/// The distance of descriptors: `type` is the distance by which a map compares descriptors of type `D`. The default is
+/// The descriptor distance: `type` is the distance with which a map compares descriptors of type `D`. The default is
 /// the Hamming distance. Specialise it for custom descriptors:
 ///
 /// @code

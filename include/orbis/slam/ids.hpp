@@ -15,8 +15,8 @@ namespace orbis::slam {
 /// The value of an id that refers to nothing.
 inline constexpr std::uint32_t no_id = std::numeric_limits<std::uint32_t>::max();
 
-/// A strongly typed 32-bit id. A number converts to an id; an id converts neither to a number nor to an id of another
-/// kind (`value()` returns the number). Ids are assigned in ascending order and never reused.
+/// A strongly typed 32-bit id. An integer converts to an id; an id converts neither to an integer nor to an id of
+/// another kind (`value()` returns the integer). Ids are assigned in ascending order and never reused.
 template <class Kind>
 class basic_id {
  public:
@@ -62,16 +62,16 @@ struct map_keyframe {
   friend constexpr bool operator==(const map_keyframe&, const map_keyframe&) = default;
 };
 
-/// The amounts by which the ids of a map grew when it was merged into another one.
+/// The offsets added to the ids of a map when it was merged into another one.
 struct id_offsets {
   std::uint32_t keyframes = 0;
   std::uint32_t landmarks = 0;
 };
 
-/// A pair of keyframes, one from each map, that observe the same place; it attaches one map to the other.
+/// A pair of keyframes, one from each map, that observe the same place, where one map is attached to the other.
 struct map_link {
-  keyframe_id into;  ///< of the map that is kept
-  keyframe_id from;  ///< of the map that is merged into it, by its id there
+  keyframe_id into;  ///< keyframe of the map that is kept
+  keyframe_id from;  ///< keyframe of the merged map, with its id in that map
 };
 
 }  // namespace orbis::slam

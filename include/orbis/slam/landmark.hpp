@@ -22,16 +22,16 @@ struct observation {
   friend constexpr bool operator==(const observation&, const observation&) = default;
 };
 
-/// A point of the world with a descriptor of type `D`.
+/// A point in the world with a descriptor of type `D`.
 template <feature_descriptor D>
 struct basic_landmark {
   landmark_id id;
-  vec3 position = zeros<vec3>();          ///< in the world, metres
+  vec3 position = zeros<vec3>();          ///< in the world frame, metres
   vec3 normal = zeros<vec3>();            ///< mean direction towards the keyframes that observe it, unit length
-  D descriptor{};                         ///< the most typical descriptor of its observations
+  D descriptor{};                         ///< the most typical descriptor among its observations
   double min_distance = 0.0;              ///< distance at which it appears at the coarsest pyramid level, metres
   double max_distance = 0.0;              ///< distance at which it appears at the finest pyramid level, metres
-  std::vector<observation> observations;  ///< by ascending keyframe; at most one per keyframe
+  std::vector<observation> observations;  ///< in ascending order of keyframe; at most one per keyframe
   keyframe_id created;                    ///< the keyframe that created it
   landmark_patch patch;                   ///< not stored in map files
   std::uint32_t visible = 0;              ///< number of frames in which it was expected

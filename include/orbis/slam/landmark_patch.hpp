@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The image of a landmark, with which its position in later images is measured.
+/// The image patch of a landmark, used to measure its position in later images.
 #pragma once
 
 #include <array>
@@ -16,17 +16,17 @@ namespace orbis::slam {
 /// The pixels around a landmark in one image, on the surface through the landmark. Pixel (u, v) shows the point
 /// `position + (u - centre) * across + (v - centre) * down`.
 struct landmark_patch {
-  static constexpr int size = 24;  ///< pixels per side; most of them are the margin for motion blur
+  static constexpr int size = 24;  ///< pixels per side, most of which are a margin for motion blur
   static constexpr double centre = 0.5 * (size - 1);
   using pixel_array = std::array<std::uint8_t, std::size_t{size} * size>;
 
   std::shared_ptr<const pixel_array> pixels;  ///< row by row; null: the landmark has no patch
-  vec3 across = zeros<vec3>();                ///< from a pixel to the next one, in the world, metres
-  vec3 down = zeros<vec3>();                  ///< from a row to the next one, in the world, metres
-  double corner_deviation = 1.0;  ///< of the position of a corner of this image, longer along its blur, pixels
-  vec2 motion = zeros<vec2>();    ///< of the landmark in the image, pixels of the patch per second
+  vec3 across = zeros<vec3>();    ///< step from a pixel to the next one in its row, in the world frame, metres
+  vec3 down = zeros<vec3>();      ///< step from a row to the next one, in the world frame, metres
+  double corner_deviation = 1.0;  ///< standard deviation of a corner's position in this image along its blur, pixels
+  vec2 motion = zeros<vec2>();    ///< velocity of the landmark in the image, pixels of the patch per second
 
-  /// Moves the surface by a motion in the world.
+  /// Moves the surface by a motion in the world frame.
   void move(const sim3& T_new_old) {
     across = T_new_old.scale() * (T_new_old.rotation() * across);
     down = T_new_old.scale() * (T_new_old.rotation() * down);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The functions of map.hpp.
+/// Implementation of map.hpp.
 #pragma once
 
 #include <array>
@@ -14,8 +14,8 @@ namespace orbis::slam {
 namespace detail {
 
 /// Returns the index of the most typical of `count` descriptors (`of(i)`): the one with the smallest median distance to
-/// the others, the first if several are equal. With more than 16 descriptors, 16 evenly spread ones are compared, which
-/// bounds the cost. With one or two, the last one.
+/// the others, the first if several are equal. With more than 16 descriptors, 16 evenly spaced ones are compared, which
+/// bounds the cost. With one or two, returns the last.
 /// @pre count > 0
 /// Source: R. Mur-Artal, J. M. M. Montiel, J. D. Tardos, "ORB-SLAM", T-RO 31 (2015), section III.C.
 template <class Of>
@@ -90,7 +90,7 @@ keyframe_id basic_map<D>::next_remembered(keyframe_id id) const {
 template <feature_descriptor D>
 void basic_map<D>::forget_erased(std::span<const keyframe_id> keep, std::size_t latest) {
   std::map<keyframe_id, detail::erased_keyframe> kept;
-  const auto take = [&](keyframe_id id) {  // with its chain of replacements
+  const auto take = [&](keyframe_id id) {  // including its chain of replacements
     for (auto e = content_.erased.find(id); e != content_.erased.end();) {
       const keyframe_id next = e->second.replacement;
       kept.insert(content_.erased.extract(e));
@@ -199,7 +199,7 @@ void basic_map<D>::fuse(landmark_id from, landmark_id into) {
   assert(from != into && has_landmark(into));
   landmark_type l = remove(from, into);
   for (const observation& o : l.observations)
-    if (add_observation(into, o.keyframe, o.feature) && l.patch.pixels != nullptr)  // was measured with that patch
+    if (add_observation(into, o.keyframe, o.feature) && l.patch.pixels != nullptr)  // measured with that patch
       set_deviation(o.keyframe, o.feature, std::max(at(o.keyframe).deviation(o.feature), l.patch.corner_deviation));
   landmark_type& by = content_.landmarks[into];
   if (by.patch.pixels == nullptr) by.patch = std::move(l.patch);
@@ -235,7 +235,7 @@ id_offsets basic_map<D>::append(basic_map&& other, const sim3& T_this_other, con
   for (const auto& [id, e] : other.content_.erased) {
     detail::erased_keyframe& here = content_.erased[id + offsets.keyframes] = e;
     if (e.replacement != no_id) here.replacement += offsets.keyframes;
-    here.number += content_.erasures;  // as if all had been erased now, in their order
+    here.number += content_.erasures;  // as if they were erased now, in the same order
   }
   content_.erasures += other.content_.erasures;
   content_.forgotten += other.content_.forgotten;

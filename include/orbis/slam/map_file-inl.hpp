@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The functions of map_file.hpp.
+/// Implementation of map_file.hpp.
 #pragma once
 
 #include <cstdint>
@@ -75,7 +75,7 @@ inline void put_landmark(std::string& to, const landmark& l) {
         const erased_keyframe& e = m.content().erased.at(id);
         put(to, e.replacement.value());
         const double scale = e.replacement == no_id ? 1.0 : m.scale(e.replacement);
-        put_pose(to, scaled(e.T_replacement_camera, scale));  // the scales of a map that is read are 1
+        put_pose(to, scaled(e.T_replacement_camera, scale));  // all scales of a map read from a file are 1
       }
     }
   });
@@ -93,7 +93,7 @@ inline void put_landmark(std::string& to, const landmark& l) {
     }
     const auto is_gone = [&m](landmark_id id) { return m.replacement(id) == no_id; };
     for (landmark_id id = 0; id != m.landmark_end();) {
-      // Erased ids: by pages where the map has forgotten them, one by one where it still has an entry.
+      // Erased ids: runs if the map has forgotten them, one by one if it still has an entry.
       landmark_id next = m.landmarks().next_known_id(id);
       while (next != m.landmark_end() && is_gone(next)) next = m.landmarks().next_known_id(next + 1);
       if (next != id) put(to, run_of_gone, next - id);
@@ -117,7 +117,7 @@ ORBIS_INLINE result<map> parse_map(std::span<const std::byte> bytes, const std::
   constexpr std::size_t head = detail::map_magic.size() + sizeof(detail::map_version);
   if (text.substr(0, detail::map_magic.size()) != detail::map_magic)
     return fail(errc::malformed, where, "not an orbis map: it does not begin with \"orbismap\"");
-  if (text.size() < head) return fail(errc::malformed, where, "ends before its version");
+  if (text.size() < head) return fail(errc::malformed, where, "the file ends before its version");
   const auto version = load_number<std::uint32_t>(text.data() + detail::map_magic.size());
   if (version == 0 || version > detail::map_version)
     return fail(errc::unsupported, where,

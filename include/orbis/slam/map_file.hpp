@@ -25,10 +25,10 @@
 ///           bytes), keyframe that created it (id), times visible, times found (u32 each), a byte that is 1 if the
 ///           descriptor is current, and the observations: keyframe (id), keypoint (u32)
 ///
-/// A file has at most 2^28 ids each of keyframes and landmarks. A map that has assigned more landmark ids is written
-/// without the erased ones: its landmarks get new ids when it is read.
+/// A file has at most 2^28 ids each of keyframes and landmarks. If a map has assigned more landmark ids, the erased
+/// ones are not written: its landmarks get new ids when it is read.
 ///
-/// The covisibility graph and the grids of keypoints are not stored: they are rebuilt from the rest.
+/// The covisibility graph and the grids of keypoints are not stored: they are rebuilt from the other data.
 #pragma once
 
 #include <cstddef>
@@ -41,10 +41,10 @@
 
 namespace orbis::slam {
 
-/// Returns the bytes of a map's file. O(map).
+/// Returns the content of a map file as bytes. O(map).
 [[nodiscard]] std::string map_bytes(const map& m);
 
-/// Parses the map in `bytes`; `where` names the source in errors. The map is consistent for any input. Errors:
+/// Parses the map in `bytes`; `where` names the source in errors. The returned map is consistent for any input. Errors:
 /// `malformed` (with the section and the problem), `unsupported` (another version).
 [[nodiscard]] result<map> parse_map(std::span<const std::byte> bytes, const std::string& where = "bytes");
 
@@ -55,7 +55,7 @@ namespace orbis::slam {
 /// `write_failed`.
 [[nodiscard]] result<void> write_map_bytes(const std::filesystem::path& path, const std::string& bytes);
 
-/// Writes a map to a file, as `write_map_bytes`. Errors: `write_failed`.
+/// Writes a map to a file, like `write_map_bytes`. Errors: `write_failed`.
 [[nodiscard]] result<void> write_map(const std::filesystem::path& path, const map& m);
 
 }  // namespace orbis::slam

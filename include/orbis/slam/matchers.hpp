@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Feature matchers of tracking.
+/// Feature matchers for tracking.
 #pragma once
 
 #include <concepts>
@@ -22,7 +22,7 @@ namespace orbis::slam {
 
 namespace detail {
 
-/// True if the distance `M::distance` of the matchers, if declared, is the one by which a map compares descriptors.
+/// True unless the matchers declare a distance `M::distance` other than the one with which a map compares descriptors.
 template <class M, class D>
 concept compares_as_map = !requires {
   typename M::distance;
@@ -31,11 +31,11 @@ concept compares_as_map = !requires {
 
 }  // namespace detail
 
-/// The matchers of tracking for descriptors of type `D`: `motion` matches the features of the last frame near their
+/// The matchers for tracking with descriptors of type `D`: `motion` matches the features of the last frame near their
 /// predicted positions; `landmarks` matches landmarks near their projections; `appearance` matches two images without a
-/// prediction. Each is a chain as in `features/matcher.hpp`. If a type `distance` exists, it must be the distance by
-/// which a map compares these descriptors: many descriptor types can be compared bit by bit, which is meaningless for
-/// most of them.
+/// prediction. Each is a chain as in `features/matcher.hpp`. If `M` declares a type `distance`, it must be the distance
+/// with which a map compares these descriptors: many descriptor types can be compared bit by bit, which is meaningless
+/// for most of them.
 template <class M, class D>
 concept tracking_matchers = feature_descriptor<D> && detail::compares_as_map<M, D> &&
     requires(const features::basic_features<D>& image, const features::feature_view<D>& seen,
@@ -47,8 +47,7 @@ concept tracking_matchers = feature_descriptor<D> && detail::compares_as_map<M, 
 };
 
 /// Matchers with maximum descriptor distances `Motion`, `Landmarks` and `Appearance`.
-/// Source of the default figures: R. Mur-Artal, J. D. Tardos, "ORB-SLAM2", T-RO 33 (2017), with descriptors of 256
-/// bits.
+/// Source of the default values: R. Mur-Artal, J. D. Tardos, "ORB-SLAM2", T-RO 33 (2017), with descriptors of 256 bits.
 template <class Distance, std::uint32_t Motion = 100, std::uint32_t Landmarks = 80, std::uint32_t Appearance = 80>
 struct distance_matchers {
   using distance = Distance;

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Measures the features of a frame: their rays and, if available, their depths and the corresponding right
+/// Measurement of the features of a frame: their rays and, if available, their depths and the corresponding right
 /// coordinates.
 ///
-/// Tracking and adjustments compare right coordinates (`optimize::reprojection`): those of a second camera, or of a
-/// virtual one that models the depth sensor. To support another kind of sensor, pass a function that makes such a frame
-/// to `system::track_measured`.
+/// Tracking and adjustment compare right coordinates (`optimize::reprojection`), either in a second camera or in a
+/// virtual one that models the depth sensor. To support another kind of sensor, pass a function that creates such a
+/// frame to `system::track_measured`.
 #pragma once
 
 #include <algorithm>
@@ -38,10 +38,10 @@
 
 namespace orbis::slam {
 
-/// Motion of the camera while a frame is taken.
+/// Motion of the camera during the capture of a frame.
 struct frame_motion {
-  camera::shutter shutter{};   ///< its depth image delay is the one of this frame
-  vec6 twist = zeros<vec6>();  ///< motion of the camera in its own frame, per second, translation first
+  camera::shutter shutter{};   ///< includes this frame's depth image delay
+  vec6 twist = zeros<vec6>();  ///< twist of the camera in its own frame, per second, translation first
 };
 
 /// An extractor that also accepts grey images.
@@ -50,7 +50,7 @@ concept grey_extractor = feature_extractor<E> && std::invocable<const E&, image_
 
 namespace detail {
 
-/// Creates a frame of features with rays, before their depth is measured. Features whose pixel has no ray get NaN.
+/// Creates a frame from features and their rays, before depth is measured. The ray is NaN if the pixel has none.
 template <camera::camera_model Camera, feature_descriptor D>
 [[nodiscard]] basic_frame<D> make_frame(const camera_rig<Camera>& rig, features::basic_features<D> features,
                                         sensor_kind sensor) {
@@ -69,7 +69,7 @@ template <camera::camera_model Camera, feature_descriptor D>
   return f;
 }
 
-/// Converts a colour image to grey, in `to`, of which it returns a view.
+/// Converts a colour image to grey in `to`; returns a view of `to`.
 [[nodiscard]] inline image_view<const std::uint8_t> to_grey(image_view<const rgb8> color, image<std::uint8_t>& to) {
   if (to.width() != color.width() || to.height() != color.height())
     to = image<std::uint8_t>(color.width(), color.height());
@@ -86,7 +86,7 @@ template <camera::camera_model Camera, camera::depth_source Depth>
 
 }  // namespace detail
 
-/// Returns the number of points with which a frame can begin a map: the number of its features with depth if lengths
+/// Returns the number of points with which a frame can start a map: the number of its features with depth if lengths
 /// are measured (`options::scale_is_measured`), otherwise of all its features; 0 if there are fewer than
 /// `settings.min_start_points`.
 template <feature_descriptor D>
@@ -99,7 +99,7 @@ template <feature_descriptor D>
 /// Working memory for the grey image of a frame and its pyramid.
 struct image_memory {
   image<std::uint8_t> grey{};
-  features::image_pyramid pyramid{};  ///< of the last image; empty if the extractor makes none
+  features::image_pyramid pyramid{};  ///< pyramid of the last image; empty if the extractor builds none
 
   /// Extracts the features of a colour image.
   template <feature_extractor Extractor>
@@ -137,8 +137,8 @@ template <camera::camera_model Camera, feature_extractor Extractor, camera::dept
   return measure_rgbd(rig, extract, color, depth, memory);
 }
 
-/// Sets `depth` of `f.as_read` to the depth at the time of each keypoint's row of the colour image: reads the depth
-/// image where the moving camera sees the same point. @pre all images have the size of the camera
+/// Sets `depth` of `f.as_read` to the depth at the time of each keypoint's colour image row: reads the depth image
+/// where the moving camera sees the same point. @pre all images have the size of the camera
 template <camera::camera_model Camera, feature_descriptor D, camera::depth_source Depth>
 void follow_rows(const camera_rig<Camera>& rig, const frame_motion& m, basic_frame<D>& f, const Depth& depth) {
   for (keypoint_as_read& k : f.as_read) {
@@ -150,7 +150,7 @@ void follow_rows(const camera_rig<Camera>& rig, const frame_motion& m, basic_fra
     const auto pixel = there.z() > 0.0 ? rig.camera().project(there) : std::nullopt;
     const auto read = pixel ? features::depth_at(depth, static_cast<float>(pixel->x()), static_cast<float>(pixel->y()))
                             : std::nullopt;
-    // If the two readings are of different surfaces, neither is reliable.
+    // If the two readings are from different surfaces, neither is reliable.
     constexpr double same_surface = 0.1;
     const double change = read ? read->z - there.z() : 0.0, z = stored + change;
     const bool usable = read && std::abs(change) < same_surface * stored && z >= rig.min_depth && z <= rig.max_depth;
@@ -168,7 +168,8 @@ struct stereo_memory {
 
 namespace detail {
 
-/// Creates a frame from the left features. `Pixels`: the images, or the pyramids that the extractor built from them.
+/// Creates a frame from the features of the left image. `Pixels`: the images, or the pyramids that the extractor built
+/// from them.
 template <camera::camera_model Camera, feature_descriptor D, class Pixels>
 [[nodiscard]] basic_frame<D> match_stereo(const camera_rig<Camera>& rig, stereo_memory& memory,
                                           features::basic_features<D> left, const Pixels& left_pixels,
@@ -191,9 +192,9 @@ template <camera::camera_model Camera, feature_descriptor D, class Pixels>
 }  // namespace detail
 
 /// Creates a frame from the left image of a rectified pair (`camera::rectify`). A feature has the right coordinate that
-/// `features::stereo_matcher` finds for it, or none; its depth is `options::bf` over the disparity, if that is within
-/// the rig's range. Features without a right coordinate become landmarks once other keyframes observe them with enough
-/// parallax. @pre both images have the size of the camera
+/// `features::stereo_matcher` finds for it, or none; its depth is `options::bf` divided by the disparity if that is
+/// within the rig's range. Features without a right coordinate become landmarks once other keyframes observe them with
+/// enough parallax. @pre both images have the size of the camera
 template <camera::camera_model Camera, grey_extractor Extractor>
 [[nodiscard]] basic_frame<descriptor_of_t<Extractor>> measure_stereo(const camera_rig<Camera>& rig,
                                                                      const Extractor& extract,

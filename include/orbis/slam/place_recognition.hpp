@@ -21,10 +21,10 @@ namespace orbis::slam {
 
 /// A database of the appearance of keyframes, for descriptors of type `D`.
 /// - `describe(features)`: returns the signature of an image. Callable at any time, from any thread.
-/// - `add`, `erase`, `rename`: change the keyframes in the database; return false if that is not possible.
+/// - `add`, `erase`, `rename`: change the keyframes in the database; return false if that is impossible.
 /// - `similar(signature, count, exclude, neighbors)`: returns at most `count` keyframes, the most similar first,
-/// without those for which `exclude(id)` is true. `neighbors(id)` returns keyframes that observe the same place; the
-/// result needs only one of these. The same sequence of changes gives the same results.
+/// excluding those for which `exclude(id)` is true. `neighbors(id)` returns keyframes that observe the same place; the
+/// result needs only one of them. The same sequence of changes gives the same results.
 template <class P, class D>
 concept place_recognizer = std::movable<P> &&
     requires(P& places, const P& known, const features::basic_features<D>& seen,
@@ -37,7 +37,7 @@ concept place_recognizer = std::movable<P> &&
   { places.similar(bow_vector, count, exclude, neighbors) } -> std::convertible_to<std::vector<map_keyframe>>;
 };
 
-/// Place recognition by bags of words of a vocabulary tree (see `orbis/places.hpp`), for ORB descriptors.
+/// Place recognition by bags of words with a vocabulary tree (see `orbis/places.hpp`), for ORB descriptors.
 class bag_of_words_places {
  public:
   using signature = places::bag_of_words;
@@ -52,7 +52,7 @@ class bag_of_words_places {
   /// The number of keyframes.
   [[nodiscard]] std::size_t size() const noexcept { return database_.size(); }
 
-  /// Returns the words of an image.
+  /// Returns the bag of words of an image.
   [[nodiscard]] signature describe(const features::features& f) const { return words_.transform(f.descriptors); }
 
   /// Adds a keyframe. Returns false if the keyframe is already in the database.
@@ -62,7 +62,7 @@ class bag_of_words_places {
   /// Changes the id of a keyframe. Returns false if `from` is not in the database, or `to` is.
   bool rename(map_keyframe from, map_keyframe to) { return database_.rename(packed(from), packed(to)); }
 
-  /// Returns at most `count` keyframes with similar words, the most similar first (see `place_recognizer`).
+  /// Returns at most `count` keyframes with similar bags of words, the most similar first (see `place_recognizer`).
   template <std::predicate<map_keyframe> Exclude, std::invocable<map_keyframe> Neighbors>
   [[nodiscard]] std::vector<map_keyframe> similar(const signature& bow_vector, std::size_t count, Exclude&& exclude,
                                                   Neighbors&& neighbors) {

@@ -12,7 +12,7 @@ namespace orbis::slam {
 /// A shutter estimated from frames; see `options::estimates_shutter`. Components that the motion does not determine are
 /// 0 in `shutter`, and have a deviation that is large or not finite.
 struct shutter_estimate {
-  camera::shutter shutter{};  ///< with the same read-out for both images
+  camera::shutter shutter{};  ///< the estimate, with the same read-out for both images
   double read_out = 0.0;      ///< estimate of the read-out before the significance test, seconds
   double read_out_deviation = std::numeric_limits<double>::infinity();  ///< standard deviation, seconds
   double delay = 0.0;  ///< estimate of the depth image's delay before the significance test, seconds

@@ -19,8 +19,8 @@
 
 namespace orbis::slam {
 
-/// A tree: each keyframe except the root has a parent. In addition, undirected loop edges connect any two keyframes.
-/// Children and loop edges are sorted by id. The caller chooses the parents.
+/// A tree: each keyframe except the root has a parent. In addition, undirected loop edges can connect any two
+/// keyframes. Children and loop edges are sorted by id. The caller chooses the parents.
 class spanning_tree {
  public:
   [[nodiscard]] std::size_t size() const noexcept { return nodes_.size(); }
@@ -29,9 +29,9 @@ class spanning_tree {
   [[nodiscard]] keyframe_id root() const noexcept { return root_; }
   /// The parent of a keyframe; `no_id` for the root. @pre contains(k)
   [[nodiscard]] keyframe_id parent(keyframe_id k) const { return at(k).parent; }
-  /// By ascending id. @pre contains(k)
+  /// The children of a keyframe in ascending order of id. @pre contains(k)
   [[nodiscard]] const std::vector<keyframe_id>& children(keyframe_id k) const { return at(k).children; }
-  /// The other ends of the loop edges of a keyframe, by ascending id. @pre contains(k)
+  /// The other ends of the loop edges of a keyframe, in ascending order of id. @pre contains(k)
   [[nodiscard]] const std::vector<keyframe_id>& loop_edges(keyframe_id k) const { return at(k).loops; }
 
   /// Adds a keyframe. @pre !contains(k); contains(parent), or `parent` is `no_id` and the tree is empty
@@ -64,10 +64,10 @@ class spanning_tree {
     insert(nodes_[b.value()].loops, a);
   }
 
-  /// Erases a keyframe. Each of its children gets a new parent: the old parent or another child, whichever shares most
-  /// landmarks with it (`shared(a, b)`); the old parent if it shares none. If the root is erased, its oldest child
-  /// becomes the root. Loop edges pass to the returned keyframe: the parent, or the new root, or `no_id` if none is
-  /// left. O(children^2). @pre contains(k)
+  /// Erases a keyframe. Each of its children gets a new parent: the old parent or another child, whichever shares the
+  /// most landmarks with it (`shared(a, b)`); the old parent if none does. If the root is erased, its oldest child
+  /// becomes the root. Its loop edges are moved to the returned keyframe: the parent, or the new root, or `no_id` if
+  /// none is left. O(children^2). @pre contains(k)
   template <std::invocable<keyframe_id, keyframe_id> Shared>
   keyframe_id erase(keyframe_id k, Shared&& shared) {
     const node gone = std::move(nodes_.extract(k.value()).mapped());
@@ -90,7 +90,7 @@ class spanning_tree {
     return replacement;
   }
 
-  /// Adds another tree, whose ids grow by `offset`. Its keyframe `by` becomes its root and a child of `at`.
+  /// Adds another tree after adding `offset` to its ids. Its keyframe `by` becomes its root and a child of `at`.
   /// @pre all ids of this tree are less than `offset`; `at` and `by` exist, unless either tree is empty
   void append(spanning_tree&& other, std::uint32_t offset, keyframe_id at, keyframe_id by) {
     const bool was_empty = size() == 0;
@@ -134,7 +134,7 @@ class spanning_tree {
     insert(nodes_[parent.value()].children, k);
   }
 
-  /// Prim's algorithm: next is the orphan that shares most landmarks with a keyframe in the tree.
+  /// Prim's algorithm: the next orphan is the one that shares the most landmarks with a keyframe in the tree.
   template <class Shared>
   void adopt(std::vector<keyframe_id> orphans, keyframe_id replacement, Shared&& shared) {
     struct edge {
@@ -158,7 +158,7 @@ class spanning_tree {
     }
   }
 
-  std::unordered_map<std::uint32_t, node> nodes_;  ///< by keyframe
+  std::unordered_map<std::uint32_t, node> nodes_;  ///< keyed by keyframe id
   keyframe_id root_;
 };
 

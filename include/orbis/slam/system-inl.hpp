@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The functions of system.hpp.
+/// Implementation of system.hpp.
 #pragma once
 
 #include <chrono>
@@ -18,7 +18,7 @@
 namespace orbis::slam {
 namespace detail {
 
-/// Measures the time between calls of `lap`.
+/// Measures the time between calls to `lap`.
 class stopwatch {
  public:
   /// Sets `milliseconds` to the time since the last call, or since construction.
@@ -91,7 +91,7 @@ const Measure&, const camera_rig<Camera>&,
   front_end_->depth().clear_depth();
   front_end_->patches().set_image({});
   frame_type f = std::isfinite(timestamp) ? measure(shared_.rig, extract_) : frame_type{};
-  f.shutter.depth_delay = 0.0;  // depth is of the frame's time
+  f.shutter.depth_delay = 0.0;  // depth was measured at the frame's time
   return track_frame(timestamp, std::move(f), {}, clock);
 }
 
@@ -148,7 +148,7 @@ track_result ORBIS_SLAM_SYSTEM::track_frame(double timestamp, frame_type f, cons
               return shared_.similar(shared_.places.describe(features), count, [](map_keyframe) { return false; });
             },
         .drop_map =
-            [&](map_id m) {  // unless mapping uses it; then the map is kept
+            [&](map_id m) {  // a map in use by mapping is kept
               if (const auto edit = shared_.try_edit()) shared_.remove_map(m);
             },
         .localized = [&] { clock.lap(result.timings.tracking_ms); },
@@ -166,7 +166,8 @@ track_result ORBIS_SLAM_SYSTEM::track_frame(double timestamp, frame_type f, cons
 
 ORBIS_SLAM_SYSTEM_TEMPLATE
 void ORBIS_SLAM_SYSTEM::dispatch_keyframe(map_keyframe k) {
-  if (const auto& callback = shared_.callbacks.keyframe_made)  // its map may have been merged into another one since
+  // The map of the keyframe may have been merged into another one since then.
+  if (const auto& callback = shared_.callbacks.keyframe_made)
     callback(shared_.locked([&] { return shared_.make_event(shared_.atlas.current(k)); }));
   back_end_->process(k);
 }
@@ -298,13 +299,14 @@ result<void> ORBIS_SLAM_SYSTEM::load_map(const std::filesystem::path& path) requ
   if (!loaded) return fail(loaded.error());
   const auto& content = loaded->content();
   if (content.levels != shared_.rig.scales.levels() || !(content.scale_factor == shared_.rig.scales.factor()))
-    return fail(errc::unsupported, path.string(), "the map was made with another image pyramid");
+    return fail(errc::unsupported, path.string(), "the map was built with a different image pyramid");
   if (loaded->scale_is_known() != shared_.rig.scale_is_known)
     return fail(errc::unsupported, path.string(),
-                shared_.rig.scale_is_known ? "the map was made without depth; its unit of length is not the metre"
-                                           : "the map was made with depth, but this sensor does not measure depth");
+                shared_.rig.scale_is_known ? "the map was built without depth; its unit of length is not the metre"
+                                           : "the map was built with depth, but this sensor does not measure depth");
   if (loaded->keyframes().empty()) return fail(errc::no_data, path.string(), "the map has no keyframes");
-  std::vector<std::pair<keyframe_id, typename Places::signature>> bow_vectors;  // before the lock, which stops tracking
+  // Computed before locking, because the lock blocks tracking.
+  std::vector<std::pair<keyframe_id, typename Places::signature>> bow_vectors;
   for (const auto& k : loaded->keyframes()) bow_vectors.emplace_back(k.id, shared_.places.describe(k.features));
   const auto lock = shared_.lock();
   const map_id before = shared_.atlas.active_id();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Keyframe-based SLAM from an RGB-D camera, a stereo pair or one camera.
+/// Keyframe-based SLAM for an RGB-D camera, a stereo pair or a single camera.
 ///
 /// @code
 ///   orbis::slam::system slam{camera, orbis::slam::options{}};
@@ -9,10 +9,10 @@
 /// @endcode
 ///
 /// The scheme is that of R. Mur-Artal, J. D. Tardos, "ORB-SLAM2: an open-source SLAM system for monocular, stereo and
-/// RGB-D cameras", T-RO 33 (2017): predict the pose by constant motion, search for the landmarks of the local map,
-/// refine the pose, make a keyframe when the view has changed, adjust the map around it, and close loops when a place
-/// is recognised. Starting a new map after tracking is lost, and merging maps, follow R. Elvira, J. D. Tardos, J. M. M.
-/// Montiel, "ORBSLAM-Atlas", IROS 2019.
+/// RGB-D cameras", T-RO 33 (2017): predict the pose with a constant-velocity model, search for the landmarks of the
+/// local map, refine the pose, create a keyframe when the view has changed, adjust the map around it, and close loops
+/// when a place is recognised. Starting a new map after tracking is lost, and merging maps, follow R. Elvira, J. D.
+/// Tardos, J. M. M. Montiel, "ORBSLAM-Atlas", IROS 2019.
 #pragma once
 
 #include <algorithm>
@@ -62,18 +62,18 @@ class stopwatch;
 
 }  // namespace detail
 
-/// Tracks the frames of one camera and builds a map of landmarks. Images are not kept; callers that need the images of
-/// keyframes store them when `track` returns a keyframe.
+/// Tracks the frames of one camera and builds a map of landmarks. Images are not kept; callers that need keyframe
+/// images must store them when `track` returns a keyframe.
 ///
-/// Without threads (the default) `track` does everything, and the same frames and options give the same bytes. With
+/// Without threads (the default), `track` does all the work, and the same frames and options give the same bytes. With
 /// threads (`options::threads`) mapping, loop closing and global adjustment run while frames are tracked. Call `track`
-/// from one thread; all other functions may be called from any thread. An exception on a thread of the system
-/// (`std::bad_alloc`, or one thrown by a callback) ends that thread; `track` of a keyframe and `wait` then rethrow it.
-/// A map may be left partly changed: destroy the system.
+/// from one thread; all other functions may be called from any thread. An exception on one of the system's threads
+/// (`std::bad_alloc`, or one thrown by a callback) ends that thread; `wait`, and `track` when it creates a keyframe,
+/// then rethrow the exception. A map may be left partly changed: destroy the system.
 ///
-/// Template parameters: the camera model; the extractor, which determines the type of descriptors; the matchers of
-/// tracking; place recognition. orbis::compiled holds the system of `camera::any_camera` and the library's own parts; a
-/// program that links it and replaces a part includes `<orbis/slam/system-inl.hpp>`.
+/// Template parameters: the camera model; the extractor, which determines the descriptor type; the matchers for
+/// tracking; place recognition. orbis::compiled contains the system for `camera::any_camera` and the default
+/// components; a program that links it and replaces a component must include `<orbis/slam/system-inl.hpp>`.
 template <camera::camera_model Camera, feature_extractor Extractor = features::orb_extractor,
           tracking_matchers<descriptor_of_t<Extractor>> Matchers = orb_matchers,
           place_recognizer<descriptor_of_t<Extractor>> Places = bag_of_words_places>
@@ -84,29 +84,30 @@ class system {
   using map_type = basic_map<descriptor_type>;
   using revision_type = pose_revision;
 
-  /// Creates a system with an extractor built from `settings.features` and default places.
+  /// Creates a system with an extractor built from `settings.features` and default place recognition.
   explicit system(Camera camera, const options& settings = {}) requires
       std::constructible_from<Extractor, const features::orb_options&> && std::default_initializable<Places>;
-  /// Creates a system with a custom extractor and, optionally, custom places. `settings.features.levels` and
+  /// Creates a system with a custom extractor and, optionally, custom place recognition. `settings.features.levels` and
   /// `scale_factor` must describe the image pyramid of the extractor.
   system(Camera camera, const options& settings, Extractor extractor, Places places = Places{});
   system(const system&) = delete;
   system& operator=(const system&) = delete;
-  /// Waits for the threads to finish their running jobs; discards waiting jobs.
+  /// Waits for the threads to finish their current jobs; discards waiting jobs.
   ~system();
 
-  /// Registers callbacks. @pre no frame was tracked yet
+  /// Registers callbacks. @pre no frame has been tracked yet
   void listen(listeners callbacks);
 
   /// Tracks the next frame. Frames whose size differs from the camera's, or without a finite timestamp, count as lost.
-  /// @pre timestamps ascend
+  /// @pre timestamps increase
   track_result track(const camera::rgbd_frame& f) {
     return track(f.timestamp, f.color.view(), f.depth_metres(), f.depth_timestamp);
   }
-  /// As above; the images are used in place. `timestamp`: of the colour image, seconds; `depth`: metres, registered to
-  /// the colour image; `depth_timestamp`: of the depth image by the same clock, if it has its own. Depth is corrected
-  /// for the difference, which is smoothed over about a second; differences of more than 0.1 s are ignored.
-  /// orbis::compiled holds `camera::depth_view` of 16-bit numbers and of float; others include system-inl.hpp.
+  /// As above; the images are not copied. `timestamp`: of the colour image, seconds; `depth`: metres, registered to the
+  /// colour image; `depth_timestamp`: of the depth image by the same clock, if it has a separate one. Depth is
+  /// corrected for the difference, which is smoothed over about a second; differences of more than 0.1 s are ignored.
+  /// orbis::compiled contains this function for `camera::depth_view` of 16-bit integers and of float; for others
+  /// include system-inl.hpp.
   template <camera::depth_source Depth>
   track_result track(double timestamp, image_view<const rgb8> color, const Depth& depth,
                      std::optional<double> depth_timestamp = {});
@@ -117,10 +118,9 @@ class system {
   /// As above, for one image without depth, for a system with `monocular_options`.
   track_result track(double timestamp, image_view<const rgb8> color);
   track_result track(double timestamp, image_view<const std::uint8_t> grey) requires grey_extractor<Extractor>;
-  /// As above, for a sensor of another kind: `measure(rig, extract)` creates the frame, like the functions of
-  /// `measure.hpp`, with the depth of each feature, or 0. In this case there is no depth image (`options::depth_term`),
-  /// and depth is assumed to be measured at the frame's time. With orbis::compiled, include
-  /// `<orbis/slam/system-inl.hpp>`.
+  /// As above, for another kind of sensor: `measure(rig, extract)` creates the frame, like the functions of
+  /// `measure.hpp`, with the depth of each feature, or 0. There is then no depth image for `options::depth_term`, and
+  /// depth is assumed to be measured at the frame's time. With orbis::compiled, include `<orbis/slam/system-inl.hpp>`.
   template <class Measure>
   requires std::is_invocable_r_v < basic_frame<descriptor_of_t<Extractor>>,
   const Measure&, const camera_rig<Camera>&,
@@ -128,77 +128,77 @@ class system {
 
   /// The state after the last frame.
   [[nodiscard]] track_state state() const;
-  /// Enables or disables changes to the map, starting with the next frame; if `on`, the map is kept unchanged.
+  /// Enables or disables localisation-only mode, starting with the next frame; if `on`, the map is kept unchanged.
   void set_localization_only(bool on) noexcept { localization_only_ = on; }
 
   /// Returns the features of the last frame and its pose relative to a keyframe; empty if it was not tracked. For the
   /// tracking thread only; takes no lock, so it does not wait for the back end. O(features).
   [[nodiscard]] std::optional<tracked_frame> last_frame() const;
 
-  /// Sets `T_world_camera` of the first frame of every map that begins with the next frame or later
-  /// (`options::initial_pose`). For the tracking thread only: if frames carry the gravity direction, a new map begins
-  /// upright.
+  /// Sets `T_world_camera` of the first frame of every map started by the next frame or later
+  /// (`options::initial_pose`). For the tracking thread only. Example: if the gravity direction is known per frame, new
+  /// maps can start upright.
   void set_initial_pose(const se3& T_world_camera) {
     options_.initial_pose = T_world_camera;
     options_.find_initial_pose = nullptr;
   }
-  /// As above, but `find` is called only when a map begins with the tracked frame, so its cost arises once per map
+  /// As above, but `find` is called only when the tracked frame starts a map, so its cost is incurred once per map
   /// (`options::find_initial_pose`). `find` must not call the system.
   void set_initial_pose(std::function<se3()> find) { options_.find_initial_pose = std::move(find); }
 
-  /// Waits until the threads have nothing to do.
+  /// Waits until the threads are idle.
   void wait() const;
-  /// Requests that mapping ends soon, so that a program can end: running adjustments end early, and neither waiting nor
-  /// later keyframes are mapped or compared for loops. Then `wait` returns soon, and all results so far can be read.
-  /// May be called from any thread. Cannot be undone.
+  /// Requests that mapping end soon so that a program can exit: running adjustments end early, and neither waiting nor
+  /// later keyframes are mapped or checked for loops. `wait` then returns soon, and all results so far can be read. May
+  /// be called from any thread. Cannot be undone.
   void stop() noexcept;
 
   /// Returns the poses of the frames that were tracked in the active map: all, or those within
   /// `options::trajectory_frames`. Frames follow later corrections of their keyframe, and the first 100 frames of a map
-  /// are localised again when five keyframes have followed. O(frames).
+  /// are localised again after five more keyframes. O(frames).
   [[nodiscard]] orbis::trajectory trajectory() const;
-  /// As above, for another map; empty if there is no such map, or none of its frames is left.
+  /// As above, for another map; empty if that map does not exist or none of its frames is left.
   [[nodiscard]] orbis::trajectory trajectory(map_id map) const;
-  /// Returns timestamp, pose and frame index of each keyframe of the active map.
+  /// Returns the timestamp, pose and frame index of each keyframe of the active map.
   [[nodiscard]] std::vector<keyframe_pose> keyframes() const;
-  /// As above, but empty if the poses are those of revision `seen`. Sets `seen` to the current revision. Suitable for
-  /// polling by code that builds on the keyframes' poses: local adjustment moves keyframes without an event. O(1) if
-  /// nothing has changed.
+  /// As above, but empty if `seen` is the current revision. Sets `seen` to the current revision. Suitable for polling
+  /// by code that builds on the keyframes' poses: local adjustment moves keyframes without an event. O(1) if nothing
+  /// has changed.
   [[nodiscard]] std::optional<std::vector<keyframe_pose>> keyframes_since(pose_revision& seen) const;
-  /// Returns timestamp and pose of each keyframe of the active map.
+  /// Returns the timestamp and pose of each keyframe of the active map.
   [[nodiscard]] orbis::trajectory keyframe_trajectory() const;
   /// Returns the estimated shutter; empty without `options::estimates_shutter`. For the tracking thread only.
   [[nodiscard]] std::optional<shutter_estimate> estimated_shutter() const;
   /// The exposure time of the images, seconds: `patch_options::exposure`, or the estimate from their motion blur, which
-  /// is 0 unless blur is visible. For the tracking thread.
+  /// is 0 unless blur is visible. For the tracking thread only.
   [[nodiscard]] double exposure() const;
   /// The number of landmarks of the active map.
   [[nodiscard]] std::size_t landmark_count() const;
   [[nodiscard]] track_counters counters() const;
   [[nodiscard]] map_id active_map() const;
-  /// Returns the map in which most frames were tracked. O(frames).
+  /// Returns the map in which the most frames were tracked. O(frames).
   [[nodiscard]] map_id largest_map() const;
   /// Activates a map; the camera is relocalised in it. Returns false if there is no such map.
   bool activate(map_id map);
 
-  /// Calls `read(const atlas_type&)` with the lock held: no map changes during the call, and tracking waits. `read`
-  /// must not call the system.
+  /// Calls `read(const atlas_type&)` with the lock held: no map changes during the call, and tracking has to wait.
+  /// `read` must not call the system.
   template <std::invocable<const atlas_type&> Read>
   decltype(auto) inspect(Read&& read) const {
     const auto lock = shared_.lock();
     return std::forward<Read>(read)(std::as_const(shared_.atlas));
   }
-  /// Returns the active map. @pre while it is used, no frame is tracked and the threads are idle (`wait`)
+  /// Returns the active map. @pre while the map is in use, no frame is tracked and the threads are idle (`wait`)
   [[nodiscard]] const map_type& map() const { return shared_.atlas.active(); }
   [[nodiscard]] const Camera& camera() const noexcept { return shared_.rig.camera(); }
 
-  /// Writes the active map to a file. For ORB descriptors. Errors: `write_failed`.
+  /// Writes the active map to a file. For ORB descriptors only. Errors: `write_failed`.
   [[nodiscard]] result<void> save_map(const std::filesystem::path& path)
       const requires std::same_as<descriptor_of_t<Extractor>, features::binary_descriptor<256>>;
-  /// Reads a map from a file and makes it the active one; the camera is relocalised in it. The previous map is kept,
-  /// and merged into the loaded one when that one is recognised; if it has no keyframes, it is removed. For ORB
-  /// descriptors. Errors: those of `read_map`; `unsupported` for a map with another image pyramid, or a map without
-  /// metric scale if the sensor measures lengths, and vice versa; `no_data` for one without keyframes.
+  /// Reads a map from a file and activates it; the camera is relocalised in it. The previous map is kept, and merged
+  /// with the loaded one when a common place is recognised; if the previous map has no keyframes, it is removed. For
+  /// ORB descriptors only. Errors: those of `read_map`; `unsupported` for a map with another image pyramid, or without
+  /// metric scale if the sensor measures lengths, and vice versa; `no_data` for a map without keyframes.
   [[nodiscard]] result<void> load_map(const std::filesystem::path& path) requires
       std::same_as<descriptor_of_t<Extractor>, features::binary_descriptor<256>>;
 
@@ -206,7 +206,7 @@ class system {
   using frame_type = basic_frame<descriptor_type>;
   using front_end = detail::front_end<Camera, descriptor_type, Matchers>;
   using back_end = detail::back_end<Camera, descriptor_type, Places>;
-  /// Moves the measurements to the times of a rolling shutter's rows, once the motion is known.
+  /// Corrects the measurements for the row times of a rolling shutter, once the motion is known.
   using row_follower = std::function<void(frame_type&, const frame_motion&)>;
 
   /// Returns true if the images have the size of the camera and the timestamp is finite.
@@ -217,7 +217,7 @@ class system {
   }
   /// Tracks a measured frame; the frame has no features if its images could not be used.
   track_result track_frame(double timestamp, frame_type f, const row_follower& follow, detail::stopwatch& clock);
-  /// Passes a new keyframe to the callbacks and the back end.
+  /// Passes a new keyframe to the callbacks and to the back end.
   void dispatch_keyframe(map_keyframe k);
   /// Fills in the result of a frame, and reports a change of state.
   void report(track_result& result, const std::optional<map_keyframe>& made);
@@ -231,7 +231,7 @@ class system {
   std::unique_ptr<front_end> front_end_;
   track_state reported_state_ = track_state::not_started;
   std::atomic<bool> localization_only_;
-  std::unique_ptr<back_end> back_end_;  ///< last: its threads use the rest
+  std::unique_ptr<back_end> back_end_;  ///< declared last: its threads use the other members
 };
 
 template <class Camera>
@@ -241,7 +241,7 @@ system(Camera) -> system<typename camera::checked_camera<Camera>::type>;
 template <class Camera, class Extractor>
 system(Camera, options, Extractor) -> system<typename camera::checked_camera<Camera>::type, Extractor>;
 
-/// A system for colour images with registered depth. The first frame with enough depth begins a map.
+/// A system for colour images with registered depth. The first frame with enough depth starts a map.
 template <camera::camera_model Camera, feature_extractor Extractor = features::orb_extractor,
           tracking_matchers<descriptor_of_t<Extractor>> Matchers = orb_matchers,
           place_recognizer<descriptor_of_t<Extractor>> Places = bag_of_words_places>

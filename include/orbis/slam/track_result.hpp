@@ -17,7 +17,7 @@
 namespace orbis::slam {
 
 enum class track_state {
-  /// No map has begun: no frame so far had enough keypoints with depth or, without depth, no two frames gave an
+  /// No map has been started: no frame so far had enough keypoints with depth or, without depth, no two frames gave an
   /// unambiguous reconstruction.
   not_started,
   tracking,    ///< the pose of the last frame is known
@@ -48,11 +48,11 @@ struct track_result {
   std::optional<se3> T_world_camera;    ///< the pose, in the world of `map`; empty if not tracked
   map_id map = 0;                       ///< the active map
   std::size_t inliers = 0;              ///< landmarks that agree with the pose; few or none if depth determines it
-  std::optional<keyframe_id> keyframe;  ///< the keyframe made from the frame, if any
-  /// Motion of the camera in its own frame while the frame was taken with a rolling shutter: per second, translation
-  /// first. Zero if unknown. Argument of `camera::shutter_correction`.
+  std::optional<keyframe_id> keyframe;  ///< the keyframe created from the frame, if any
+  /// Twist of the camera in its own frame during the read-out of a rolling shutter, per second, translation first. Zero
+  /// if unknown. Argument of `camera::shutter_correction`.
   vec6 twist = zeros<vec6>();
-  /// Shutter assumed for the frame: given or estimated, with the depth image delay of this frame.
+  /// Shutter assumed for the frame, given or estimated, with this frame's depth image delay.
   camera::shutter shutter{};
   track_timings timings;
   [[nodiscard]] bool tracked() const noexcept { return T_world_camera.has_value(); }
@@ -75,10 +75,10 @@ struct tracked_frame {
   vec6 twist = zeros<vec6>();  ///< see `track_result::twist`
 };
 
-/// Counts over all frames so far. Frames before the first map begins are neither tracked nor lost.
+/// Counts over all frames so far. Frames before the start of the first map are neither tracked nor lost.
 struct track_counters {
   std::size_t frames = 0;
-  std::size_t tracked = 0;  ///< including relocalised frames and the first of two that begin a map without depth
+  std::size_t tracked = 0;  ///< including relocalised frames and the first of two that start a map without depth
   std::size_t lost = 0;
   std::size_t relocalized = 0;
   std::size_t loops_closed = 0;
@@ -93,8 +93,8 @@ struct keyframe_pose {
   std::size_t frame = 0;  ///< index of the frame, from 0
 };
 
-/// Revision of the keyframes of the active map and their poses: it changes when a keyframe moves, is made or is culled,
-/// and when another map becomes active. The default is the revision of no map.
+/// Revision of the keyframes of the active map and their poses: it changes when a keyframe moves, is created or is
+/// culled, and when another map becomes active. The default value differs from the revision of every map.
 struct pose_revision {
   map_id map = no_id;
   std::uint64_t changes = 0;

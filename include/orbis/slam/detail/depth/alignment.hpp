@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Estimation of the pose of a frame from its depth: its points are aligned with the surfaces of keyframes.
+/// Estimation of a frame's pose from its depth image: aligns points of the frame with surfaces of keyframes.
 ///
-/// Points are associated with surfaces by projection, and their distances from the planes are minimised. Sources: G.
+/// Points are associated with surfaces by projection, and their distances to the planes are minimised. Sources: G.
 /// Blais, M. D. Levine, "Registering multiview range data to create 3D computer objects", PAMI 17(8), 1995; Y. Chen, G.
-/// Medioni, "Object modelling by registration of multiple range images", Image and Vision Computing 10(3), 1992.
-/// Directions that the surfaces leave free are not changed: J. Zhang, M. Kaess, S. Singh, "On degeneracy of
-/// optimization-based state estimation problems", ICRA 2016.
+/// Medioni, "Object modelling by registration of multiple range images", Image and Vision Computing 10(3), 1992. The
+/// pose is not changed in directions that the surfaces do not constrain: J. Zhang, M. Kaess, S. Singh, "On degeneracy
+/// of optimization-based state estimation problems", ICRA 2016.
 #pragma once
 
 #include <algorithm>
@@ -31,7 +31,7 @@
 
 namespace orbis::slam::detail {
 
-/// A surface with its pose in the world.
+/// A surface with its pose in the world frame.
 struct placed_surface {
   const surface* seen = nullptr;
   se3 T_world_camera;
@@ -40,27 +40,27 @@ struct placed_surface {
 /// Maximum deviation of a point from its associated plane.
 struct alignment_gate {
   double distance = 0.05;   ///< metres ...
-  double deviations = 4.0;  ///< ... or this number of standard deviations, if that is more
+  double deviations = 4.0;  ///< ... or this number of standard deviations, whichever is greater
   double cosine = 0.8;      ///< minimum cosine of the angle between the normals of both surfaces
 };
 
 /// A point of the frame and its associated plane.
 struct plane_observation_of_row {
-  optimize::point_to_plane seen;  ///< `measured` in the camera frame of the row's time
-  double time = 0.0;              ///< of the row, relative to the frame, seconds
+  optimize::point_to_plane seen;  ///< `measured` is in the camera frame at the time of the row
+  double time = 0.0;              ///< time of the row relative to the frame, seconds
 };
 
-/// Counts of the associated samples.
+/// Number of associated samples.
 struct association {
-  std::size_t visible = 0;     ///< samples that project onto a known surface
-  std::size_t consistent = 0;  ///< those of the visible samples that are within the gate
+  std::size_t visible = 0;     ///< number of samples that project onto a known surface
+  std::size_t consistent = 0;  ///< number of visible samples within the gate
   [[nodiscard]] double share() const noexcept {
     return visible == 0 ? 0.0 : static_cast<double>(consistent) / static_cast<double>(visible);
   }
 };
 
-/// Finds the planes of samples, given a pose: for each sample the plane of the first surface that agrees with it.
-/// `stride`: every `stride`-th sample is used. O(samples * surfaces).
+/// Finds the planes for samples at a given pose: for each sample, the plane of the first surface that agrees with it.
+/// Every `stride`-th sample is used. O(samples * surfaces).
 template <camera::camera_model Camera>
 association associate(std::span<const surface_sample> samples, std::size_t stride,
                       std::span<const placed_surface> surfaces, const moving_pose& at, const camera::shutter& shutter,
@@ -108,24 +108,24 @@ association associate(std::span<const surface_sample> samples, std::size_t strid
   return count;
 }
 
-/// The residuals of the planes to second order in a motion of the camera frame (`exp(step) * T_camera_world`), without
-/// the directions that they leave free.
+/// The cost of the plane residuals to second order in a motion of the camera frame (`exp(step) * T_camera_world`),
+/// excluding the directions that the planes do not constrain.
 struct depth_equations {
-  pose_quadratic term;     ///< with the information of at most the given number of independent points
+  pose_quadratic term;     ///< cost with the information of at most the given number of independent points
   int determined = 0;      ///< number of determined directions of the pose, of six
   double least = 0.0;      ///< mean square of the normals in the least determined direction
-  double deviation = 0.0;  ///< root mean square of the residuals, standard deviations
+  double deviation = 0.0;  ///< root mean square of the residuals, in standard deviations
 };
 
-/// Returns the equations of planes. `points`: maximum number of independent points; larger numbers are down-weighted to
-/// this. `weakest`: minimum mean square of the normals in a direction; below it, the direction counts as free;
-/// rotations are scaled to metres by the mean depth of the points. O(planes).
+/// Builds the equations for the given planes. `points`: maximum number of independent points; larger numbers are
+/// down-weighted to it. `weakest`: a direction counts as unconstrained if the mean square of the normals along it is
+/// smaller; rotations are scaled to metres by the mean depth of the points. O(planes).
 [[nodiscard]] inline depth_equations build_equations(std::span<const plane_observation_of_row> planes,
                                                      const moving_pose& at, double points, double weakest) {
   depth_equations e;
   e.term.at = at;
   if (planes.empty()) return e;
-  constexpr double width = 2.0;  // of Huber's loss
+  constexpr double width = 2.0;  // of the Huber loss
   std::array<mat6, 3> h{zeros<mat6>(), zeros<mat6>(), zeros<mat6>()};
   std::array<vec6, 2> g{zeros<vec6>(), zeros<vec6>()};
   double weights = 0.0, squares = 0.0, range = 0.0, cost = 0.0;
@@ -135,7 +135,7 @@ struct depth_equations {
     matrix<1, 6> right;
     const auto r = seen.linearize(at.T_world_camera, right);
     if (!r) continue;
-    const vec6 j = -transposed(right);  // a left step of the camera is a right step of its pose, reversed
+    const vec6 j = -transposed(right);  // a left step d of T_camera_world is a right step -d of T_world_camera
     const double error = std::abs((*r)[0]);
     const double weight = error <= width ? 1.0 : width / error;
     cost += 0.5 * weight * error * error;
@@ -150,7 +150,7 @@ struct depth_equations {
   const auto n = static_cast<double>(planes.size());
   e.deviation = std::sqrt(squares / n);
 
-  // Eigenvalues, with radians scaled to metres at the mean range.
+  // Eigenvalues are comparable if radians are scaled to metres at the mean range.
   vec6 scale = filled<vec6>(1);
   for (int i = 3; i != 6; ++i) scale[i] = n / range;
   mat6 scaled;
@@ -165,7 +165,7 @@ struct depth_equations {
     const vec6 v = column_of(directions.vectors, i);
     keep += outer_product(v, v);
   }
-  for (int i = 0; i != 6; ++i)  // from scaled gradients to gradients
+  for (int i = 0; i != 6; ++i)  // undo the scaling of the gradient
     for (int k = 0; k != 6; ++k) keep(i, k) *= scale[k] / scale[i];
   const double share = std::min(1.0, points / n);
   for (mat6& m : h) m = share * (keep * m * transposed(keep));

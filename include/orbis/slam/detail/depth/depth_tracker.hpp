@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Pose constraints from the depth image of a frame, and the keyframe surfaces with which it is aligned.
+/// Pose constraints from the depth image of a frame, and the keyframe surfaces with which the depth image is aligned.
 #pragma once
 
 #include <algorithm>
@@ -28,12 +28,13 @@
 
 namespace orbis::slam::detail {
 
-/// Surfaces by the keyframe with which they move. When full, it replaces the least recently used one.
+/// Surfaces, each attached to the keyframe with which it moves. If the memory is full, the least recently used surface
+/// is replaced.
 class surface_memory {
  public:
   explicit surface_memory(std::size_t capacity) : capacity_{std::max<std::size_t>(capacity, 1)} {}
 
-  /// Stores a surface, and returns one in `s` whose memory can be reused.
+  /// Stores a surface, and returns another one in `s` whose memory can be reused.
   void keep(map_keyframe anchor, const se3& T_anchor_camera, surface& s) {
     if (kept_.size() < capacity_) kept_.emplace_back();
     kept& k =
@@ -44,8 +45,8 @@ class surface_memory {
     std::swap(k.seen, s);
   }
 
-  /// Finds at most `count` surfaces nearest to a camera pose in the active map, the nearest first. They remain valid
-  /// until the next `keep`. O(surfaces).
+  /// Finds the surfaces nearest to a camera pose in the active map, at most `count`, the nearest first. They remain
+  /// valid until the next call to `keep`. O(surfaces).
   template <feature_descriptor D>
   void around(const basic_atlas<D>& maps, const se3& T_world_camera, std::size_t count,
               std::vector<placed_surface>& to) {
@@ -67,7 +68,7 @@ class surface_memory {
     }
   }
 
-  /// Returns the change of the view between two poses, metres, where a radian counts as two metres.
+  /// Returns the change of view between two poses, in metres; a radian counts as two metres.
   [[nodiscard]] static double distance(const se3& a, const se3& b) {
     const se3 between = a.inverse() * b;
     return norm(between.translation()) + 2.0 * between.rotation().angle();
@@ -96,13 +97,13 @@ class surface_memory {
 struct depth_alignment {
   moving_pose at;
   int determined = 0;   ///< number of directions of the pose that the surfaces determine, of six
-  double least = 0.0;   ///< strength of the weakest of these: `depth_equations::least`
-  association seen;     ///< at the aligned pose
-  bool is_only = true;  ///< no other pose fits nearly as well
+  double least = 0.0;   ///< strength of the weakest determined direction: `depth_equations::least`
+  association seen;     ///< counts at the aligned pose
+  bool is_only = true;  ///< true if no other pose fits nearly as well
 };
 
 /// Returns start poses for depth alignment: the predicted pose, the last pose, and the last pose turned left and right,
-/// up and down, by the angle that a hand-held camera may turn in that time. `interval`: seconds since `last`.
+/// up and down, by the angle that a hand-held camera may turn during `interval`. `interval`: seconds since `last`.
 [[nodiscard]] inline std::array<moving_pose, 8> search_starts(const se3& last, const se3& predicted, double interval) {
   const double angle = std::clamp(interval, 0.05, 0.25);  // about a radian per second
   std::array<moving_pose, 8> starts;
@@ -118,7 +119,7 @@ struct depth_alignment {
 }
 
 /// Keeps surfaces of keyframes and compares frames with them. `set_depth` begins a frame; `keep` may end it. Allocates
-/// nothing once its buffers have grown.
+/// nothing once its buffers are large enough.
 template <camera::camera_model Camera>
 class depth_tracker {
  public:
@@ -127,7 +128,7 @@ class depth_tracker {
 
   [[nodiscard]] bool is_on() const noexcept { return options_.enabled || options_.recovers; }
 
-  /// Sets the depth image of the next frame. About half a millisecond.
+  /// Sets the depth image of the next frame. Takes about half a millisecond.
   template <camera::depth_source Depth>
   void set_depth(const Depth& depth) {
     samples_.clear();
@@ -150,10 +151,11 @@ class depth_tracker {
     memory_.around(maps, T_world_camera, 2, placed_);
     return !placed_.empty();
   }
-  /// Returns the last result of `find_surfaces`.
+  /// Returns the result of the last call to `find_surfaces`.
   [[nodiscard]] bool has_surfaces() const noexcept { return !placed_.empty(); }
 
-  /// Returns the cost of a pose close to the true one with respect to the surfaces; empty if they do not constrain it.
+  /// Returns the cost with respect to the surfaces around a pose close to the true one; empty if they do not constrain
+  /// the pose.
   /// @pre find_surfaces
   [[nodiscard]] std::optional<pose_quadratic> term_at(const moving_pose& at, const camera::shutter& shutter) {
     const association seen = associate<Camera>(samples_, 1, placed_, at, shutter, rig_, close, planes_);
@@ -164,17 +166,17 @@ class depth_tracker {
     return e.term;
   }
 
-  /// Counts the points of the frame that are on the surfaces around it at a pose. @pre find_surfaces
+  /// Counts the points of the frame that are on the surfaces around it, given a pose. @pre find_surfaces
   [[nodiscard]] association agreement(const moving_pose& at, const camera::shutter& shutter) {
     return associate<Camera>(samples_, 1, placed_, at, shutter, rig_, close, planes_);
   }
-  /// Returns true if depth agrees well enough to support the pose.
+  /// Returns true if the depth agrees well enough to support the pose.
   [[nodiscard]] bool supports_pose(const association& seen) const noexcept {
     return seen.consistent >= options_.min_points && seen.share() >= options_.min_share;
   }
 
-  /// Aligns the frame from the best of several start poses; empty if the result is uncertain. Directions that the
-  /// surfaces leave free keep their value at the start. About a millisecond. @pre find_surfaces
+  /// Aligns the frame, starting from the best of several poses; empty if the result is uncertain. The pose keeps its
+  /// start value in directions that the surfaces do not constrain. Takes about a millisecond. @pre find_surfaces
   template <class Starts>
   [[nodiscard]] std::optional<depth_alignment> align(const Starts& starts, const camera::shutter& shutter) {
     found_.clear();
@@ -198,7 +200,7 @@ class depth_tracker {
         result.is_only = false;
     return result;
   }
-  /// Returns true if an alignment is certain enough without landmarks.
+  /// Returns true if an alignment is reliable enough without landmarks.
   [[nodiscard]] bool determines_pose(const depth_alignment& found) const noexcept {
     constexpr double share = 0.85, visible = 0.35, least = 0.003;
     return found.is_only && found.least >= least && found.seen.share() >= share &&
@@ -212,7 +214,7 @@ class depth_tracker {
     memory_.keep(anchor, T_anchor_camera, now_);
     now_.cells.clear();
   }
-  /// Returns true if the nearest surface is so far from a pose that another one is needed there.
+  /// Returns true if the nearest surface is so far from a pose that a new one is needed there.
   template <feature_descriptor D>
   [[nodiscard]] bool needs_surface(const basic_atlas<D>& maps, const se3& T_world_camera) {
     constexpr double far = 0.5;
@@ -224,7 +226,7 @@ class depth_tracker {
  private:
   static constexpr alignment_gate close{.distance = 0.03, .deviations = 2.0, .cosine = 0.85};
 
-  /// Iterates with a gate that shrinks from `distance`, metres.
+  /// Iterates with a gate that shrinks, starting from `distance` (metres).
   depth_alignment descend(const moving_pose& start, const camera::shutter& shutter, std::size_t stride, double distance,
                           int iterations) {
     depth_alignment a;
@@ -263,7 +265,7 @@ class depth_tracker {
   surface_builder<Camera> builder_;
   surface_sampler sampler_;
   surface_memory memory_;
-  surface now_;  ///< of the current frame
+  surface now_;  ///< surface of the current frame
   std::vector<surface_sample> samples_;
   std::vector<placed_surface> placed_;
   std::vector<plane_observation_of_row> planes_;

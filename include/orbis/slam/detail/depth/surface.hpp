@@ -3,7 +3,7 @@
 /// The surface measured by a depth image, as a coarse grid of small planes.
 ///
 /// The inverse depth of a plane is a linear function of the ray `(x, y, 1)` through a pixel, and the noise of a
-/// disparity sensor is the same for each inverse depth: planes are fitted to inverse depths by least squares.
+/// disparity sensor in inverse depth is constant: planes are therefore fitted to inverse depths by least squares.
 #pragma once
 
 #include <algorithm>
@@ -18,23 +18,23 @@
 
 namespace orbis::slam::detail {
 
-/// A small plane, in the camera frame.
+/// A small plane in the camera frame.
 struct surface_cell {
   float x = 0.0F, y = 0.0F, z = 0.0F;     ///< a point on it, metres; `z` is 0 if there is no plane
   float nx = 0.0F, ny = 0.0F, nz = 0.0F;  ///< unit normal, towards the camera
-  float measured = 0.0F;                  ///< its measured depth, without its neighbours, metres
+  float measured = 0.0F;                  ///< measured depth of the cell without its neighbours, metres
   [[nodiscard]] bool is_there() const noexcept { return z > 0.0F; }
   [[nodiscard]] vec3 point() const { return {static_cast<double>(x), static_cast<double>(y), static_cast<double>(z)}; }
   [[nodiscard]] vec3 normal() const {
     return {static_cast<double>(nx), static_cast<double>(ny), static_cast<double>(nz)};
   }
-  /// The measured point on the same ray.
+  /// Returns the measured point on the same ray.
   [[nodiscard]] vec3 measured_point() const { return static_cast<double>(measured / z) * point(); }
 };
 
-/// The cells of an image by rows.
+/// The cells of an image, row by row.
 struct surface {
-  int step = 8;  ///< pixels of a cell, in both directions
+  int step = 8;  ///< side of a cell, pixels
   int columns = 0, rows = 0;
   std::vector<surface_cell> cells;
 
@@ -45,18 +45,18 @@ struct surface {
     if (!(u >= 0.0 && v >= 0.0 && u < columns && v < rows)) return nullptr;
     return &cells[static_cast<std::size_t>(v) * static_cast<std::size_t>(columns) + static_cast<std::size_t>(u)];
   }
-  /// Returns the pixel row in the middle of a cell.
+  /// Returns the pixel row of the centre of a cell.
   [[nodiscard]] double pixel_row(std::size_t cell) const noexcept {
     return (static_cast<double>(cell / static_cast<std::size_t>(columns)) + 0.5) * step - 0.5;
   }
 };
 
-/// Builds surfaces from the depth images of one camera. Reuses its memory and that of the surface.
+/// Builds surfaces from the depth images of one camera. Reuses its own memory and that of the surface.
 template <camera::camera_model Camera>
 class surface_builder {
  public:
   /// Builds the surface of a depth image. `noise`: the standard deviation of an inverse depth, 1/m. Depths outside
-  /// `min_depth ... max_depth` (metres) are not used. O(pixels). @pre the image has the size of the camera, and the
+  /// [`min_depth`, `max_depth`] (metres) are not used. O(pixels). @pre the image has the size of the camera, and the
   /// camera is the same in all calls
   template <camera::depth_source Depth>
   void build(const Camera& camera, const Depth& depth, double noise, double min_depth, double max_depth, surface& to) {
@@ -78,17 +78,17 @@ class surface_builder {
  private:
   /// The mean of the depths in a cell.
   struct sampled {
-    float x, y;     ///< the ray to their mean pixel, at z = 1
-    float inverse;  ///< 1/m; 0: none
+    float x, y;     ///< ray through their mean pixel, at z = 1
+    float inverse;  ///< 1/m; 0 if there is none
   };
   struct ray {
-    float x, y;        ///< through the middle of the cell; NaN: none
+    float x, y;        ///< ray through the centre of the cell; NaN if there is none
     float by_u, by_v;  ///< change per pixel
   };
   struct sampling {
     int step;
     float min_depth, max_depth;
-    float jump;  ///< range of inverse depths in a cell that noise alone causes, 1/m
+    float jump;  ///< maximum range of inverse depths in a cell due to noise alone, 1/m
   };
 
   void find_rays(const Camera& camera, const surface& to) {
@@ -135,7 +135,7 @@ class surface_builder {
     s = {r.x + du * r.by_u, r.y + dv * r.by_v, std::isnan(r.x) ? 0.0F : sum / n};
   }
 
-  /// Fits a plane to a cell and the cells around it on the same surface.
+  /// Fits a plane to a cell and the surrounding cells on the same surface.
   void fit(int column, int row, float noise, surface& to) const {
     constexpr int radius = 2, enough = 12;
     constexpr float steepest = 0.05F;  // relative change of depth from cell to cell
@@ -171,11 +171,11 @@ class surface_builder {
     const float most = 0.5F * noise + 0.006F * middle.inverse;
     const float inverse = middle.inverse + (sw - a * sx - b * sy) / n;
     if (rest > most * most || !(inverse > 0.0F)) return;
-    // The plane is that of all points p with (a, b, c) . p = 1.
+    // The plane consists of all points p with (a, b, c) . p = 1.
     const float c = inverse - a * middle.x - b * middle.y;
     const float length = std::sqrt(a * a + b * b + c * c);
     const float slant = inverse / (length * std::sqrt(middle.x * middle.x + middle.y * middle.y + 1.0F));
-    constexpr float grazing = 0.17F;  // cosine
+    constexpr float grazing = 0.17F;  // cosine of the angle between ray and normal
     if (slant < grazing) return;
     const float z = 1.0F / inverse;
     cell = {middle.x * z, middle.y * z, z, -a / length, -b / length, -c / length, 1.0F / middle.inverse};

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Depth points of a frame, spread over the image and over the directions of its surfaces.
+/// Depth points of a frame, spread over the image and over the surface normals.
 ///
 /// Source: S. Rusinkiewicz, M. Levoy, "Efficient variants of the ICP algorithm", 3DIM 2001 (sampling of normals).
 #pragma once
@@ -16,18 +16,18 @@
 
 namespace orbis::slam::detail {
 
-/// A measured point and its surface normal, in the camera frame at the time when it was read.
+/// A measured point and its surface normal, in the camera frame at the read-out time of the point.
 struct surface_sample {
   vec3 point;
   vec3 normal;
-  double row = 0.0;  ///< of the depth image, pixels
+  double row = 0.0;  ///< row in the depth image, pixels
 };
 
-/// Selects points of surfaces. Reuses its memory.
+/// Selects points on surfaces. Reuses its memory.
 class surface_sampler {
  public:
-  /// Selects at most `count` cells of a surface: every direction gets the same number, or all its cells, evenly spread
-  /// over the image. O(cells).
+  /// Selects at most `count` cells of a surface: the same number for every direction of normals, or all cells of that
+  /// direction, evenly spread over the image. O(cells).
   void choose(const surface& from, std::size_t count, std::vector<surface_sample>& to) {
     for (auto& bin : bins_) bin.clear();
     for (std::size_t i = 0; i != from.cells.size(); ++i)
@@ -40,7 +40,7 @@ class surface_sampler {
     });
     to.clear();
     std::size_t left = count;
-    for (std::size_t k = 0; k != bin_count; ++k) {  // the smallest first: unused places go to the others
+    for (std::size_t k = 0; k != bin_count; ++k) {  // the smallest first: their unused share goes to the others
       const auto& bin = bins_[order[k]];
       const std::size_t take = std::min(bin.size(), left / (bin_count - k));
       left -= take;
@@ -55,7 +55,7 @@ class surface_sampler {
  private:
   static constexpr std::size_t across = 5, bin_count = across * across;
 
-  /// Normals point towards the camera: their x and y distinguish them.
+  /// Returns the bin of a normal. Normals point towards the camera, so that x and y are sufficient.
   [[nodiscard]] static std::size_t bin_of(const surface_cell& c) noexcept {
     const auto part = [](float x) {
       const auto i = static_cast<int>((x + 1.0F) * 0.5F * static_cast<float>(across));

@@ -26,16 +26,16 @@
 
 namespace orbis::slam::detail {
 
-/// The result for a frame whose matches do not all agree with one pose.
+/// The result for a frame whose matches do not all agree with a single pose.
 struct motion_split {
-  se3 T_world_camera;                  ///< from static matches
-  std::size_t inliers = 0;             ///< number of matches that agree with it
-  std::vector<std::uint8_t> outliers;  ///< 1 for each match that does not
-  std::vector<std::uint8_t> moving;    ///< 1 for each match on a moving object; these are outliers
-  bool by_trust = false;               ///< the pose is that of the trusted matches alone
+  se3 T_world_camera;                  ///< pose from static matches
+  std::size_t inliers = 0;             ///< number of matches that agree with the pose
+  std::vector<std::uint8_t> outliers;  ///< 1 for each match that disagrees with the pose
+  std::vector<std::uint8_t> moving;    ///< 1 for each match on a moving object; these are also outliers
+  bool by_trust = false;               ///< true if the pose is from the trusted matches alone
 };
 
-/// Minimum trust of a match that counts as static.
+/// Minimum trust for a match to count as static.
 inline constexpr double enough_trust = 0.7;
 /// The weight of a match without trust.
 inline constexpr double least_trust = 0.02;
@@ -47,18 +47,18 @@ inline constexpr double least_trust = 0.02;
   return outliers >= o.min_features && static_cast<double>(outliers) > o.share * static_cast<double>(matches);
 }
 
-/// Searches for a second rigid motion among matches many of which disagree with one pose, and decides which of the two
-/// motions is the camera's: the one with the greater sum of trust times spread. Matches that have long been part of the
-/// map are trusted; an object that biases the pose has appeared recently, or is small compared with the room behind it.
-/// The candidate poses include the one from the trusted matches alone, starting from the prediction. The second motion
-/// is found by RANSAC among the outliers of the first, as in P. H. S. Torr, "Geometric motion segmentation and model
-/// selection", Phil. Trans. R. Soc. A 356 (1998).
+/// Searches for a second rigid motion among matches many of which disagree with a single pose, and decides which of the
+/// two motions is that of the camera: the one with the greater sum of trust times spread. Matches with old landmarks
+/// are trusted; an object that biases the pose has appeared recently, or is small compared with the background. The
+/// candidate poses include the one estimated from the trusted matches alone, starting from the prediction. The second
+/// motion is found by RANSAC among the outliers of the first, as in P. H. S. Torr, "Geometric motion segmentation and
+/// model selection", Phil. Trans. R. Soc. A 356 (1998).
 template <camera::camera_model Camera>
 class motion_splitter {
  public:
-  /// `trust`: of each match, 0 ... 1. `predicted`: the expected pose of the camera; `fitted`: the pose from all
-  /// matches, with which these `outliers` disagree. Empty if there is neither a second motion nor a better pose.
-  /// O(matches), a few tenths of a millisecond. @pre one entry of `trust` and `outliers` for each observation
+  /// `trust`: trust in each match, from 0 to 1. `predicted`: the expected pose of the camera; `fitted`: the pose from
+  /// all matches, with which the `outliers` disagree. Empty if there is neither a second motion nor a better pose.
+  /// O(matches); takes a few tenths of a millisecond. @pre one entry of `trust` and `outliers` for each observation
   [[nodiscard]] static std::optional<motion_split> split(std::span<const optimize::pose_observation> observations,
                                                          std::span<const double> trust,
                                                          const optimize::reprojection<Camera>& model,
@@ -95,7 +95,7 @@ class motion_splitter {
   }
 
   /// Returns true if the untrusted matches agree with the pose from all matches but not with the pose from the trusted
-  /// ones: a slowly moving object biases the pose. O(matches), about ten microseconds.
+  /// ones: a slowly moving object biases the pose. O(matches); takes about ten microseconds.
   [[nodiscard]] static bool is_biased_by_motion(std::span<const optimize::pose_observation> observations,
                                                 std::span<const double> trust,
                                                 const optimize::reprojection<Camera>& model, const se3& fitted,
@@ -140,7 +140,7 @@ class motion_splitter {
     return support * std::sqrt(std::max(variance, 0.0));
   }
 
-  /// Returns 1 for each trusted match.
+  /// Returns a vector with 1 for each trusted match, otherwise 0.
   [[nodiscard]] std::vector<std::uint8_t> trusted() const {
     std::vector<std::uint8_t> all(observations_.size());
     for (std::size_t i = 0; i != all.size(); ++i) all[i] = trust_[i] >= enough_trust ? 1 : 0;
@@ -179,7 +179,7 @@ class motion_splitter {
     for (std::size_t i = 0; i != observations_.size(); ++i)
       outliers[i] = error(T_camera_world, i) <= error_limit(observations_[i].has_depth()) ? 0 : 1;
   }
-  /// The chi-squared error of a match.
+  /// Returns the chi-squared error of a match.
   [[nodiscard]] double error(const se3& T_camera_world, std::size_t i) const {
     const optimize::pose_observation& o = observations_[i];
     const auto r = model_.residual(T_camera_world * o.point, o);
@@ -205,8 +205,9 @@ class motion_splitter {
     return found->T_world_camera;
   }
 
-  /// Marks the outliers that agree with one other motion, clearly disagree with that of the camera, and are surrounded
-  /// by outliers: a moving object is one body, whereas the outliers in a blurred image are spread everywhere.
+  /// Marks the outliers that agree with a common other motion, clearly disagree with that of the camera, and are
+  /// surrounded by outliers: a moving object is one rigid body, whereas the outliers in a blurred image are scattered
+  /// everywhere.
   [[nodiscard]] bool mark_moving(motion_split& s) {
     const std::optional<se3> other = second_motion(s.outliers);
     if (!other) return false;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The features on moving objects, tracked from frame to frame and excluded from all other steps.
+/// Features on moving objects, which are tracked from frame to frame and excluded from all other steps.
 #pragma once
 
 #include <algorithm>
@@ -55,13 +55,13 @@ void remove_features(basic_frame<D>& f, std::span<const std::uint8_t> leave_out)
 }
 
 /// The features of the last frame on moving objects. Call for each frame: `find`, then `judge` on matches of static
-/// features, `spread` when the pose is known, and `take_out` at the end. While nothing moves, each of these returns
-/// immediately and changes nothing.
+/// features, `spread` when the pose is known, and `take_out` at the end. As long as nothing moves, each of these
+/// functions returns immediately and changes nothing.
 ///
 /// When a second motion is found, its features are excluded from that frame onwards. A feature is matched by its
 /// appearance near the position predicted by its image motion, and its world position is compared with an earlier one.
-/// Features of unknown motion around them are excluded as well. An object that stops remains excluded for a while
-/// (`moving_options::hold`), in case it moves again.
+/// Features of unknown motion around moving ones are excluded as well. An object that stops remains excluded for a
+/// while (`moving_options::hold`), in case it moves again.
 template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers>
 class moving_features {
  public:
@@ -75,9 +75,9 @@ class moving_features {
     trusts_old_only_ = false;
   }
   [[nodiscard]] bool is_enabled() const noexcept { return options_.moving.enabled; }
-  /// The number of features of the last frame that were excluded.
+  /// The number of excluded features of the last frame.
   [[nodiscard]] std::size_t size() const noexcept { return tracks_.size(); }
-  /// Their positions, pixels.
+  /// The positions of the excluded features, pixels.
   [[nodiscard]] std::vector<vec2> pixels() const {
     std::vector<vec2> all;
     for (const track& t : tracks_) all.emplace_back(static_cast<double>(t.at.x), static_cast<double>(t.at.y));
@@ -116,14 +116,14 @@ class moving_features {
     }
   }
 
-  /// Removes matches of excluded features.
+  /// Removes the matches of excluded features.
   void remove_excluded(std::vector<features::match>& matches) const {
     if (is_left_out_.empty()) return;
     std::erase_if(matches, [&](const features::match& m) { return is_left_out_[m.train] != 0; });
   }
 
-  /// Searches for a second motion after the pose of a frame was refined on matches of `list`, if many of them disagree.
-  /// If one is found, replaces the pose and landmarks of the frame. Returns the number of matches that agree.
+  /// Searches for a second motion after refinement of a frame's pose on matches of `list`, if many of them disagree. If
+  /// one is found, replaces the pose and landmarks of the frame. Returns the number of matches that agree.
   std::size_t judge(basic_frame<D>& f, const basic_map<D>& m, const search_list<D>& list,
                     std::span<const features::match> matches, std::size_t inliers, const se3& predicted) {
     if (!is_enabled() || inliers == 0) return inliers;
@@ -139,12 +139,13 @@ class moving_features {
   /// Sets the pose of the last frame.
   void set_last(const se3& T_world_camera) { T_world_last_ = T_world_camera; }
 
-  /// Returns true if a landmark must be excluded from the search in the current frame: new landmarks may move.
+  /// Returns true if a landmark must be excluded from the search in the current frame, because new landmarks may be
+  /// moving.
   [[nodiscard]] bool is_excluded(const basic_map<D>& m, landmark_id id, double now) const {
     return trusts_old_only_ && landmark_trust(m, id, now) < enough_trust;
   }
 
-  /// Excludes features around moving ones that are nearer to them than to features that agree with the pose.
+  /// Excludes features that are nearer to moving features than to features that agree with the pose.
   void spread(const basic_frame<D>& f) {
     if (next_.empty()) return;
     struct labelled {
@@ -229,15 +230,15 @@ class moving_features {
   static constexpr double anchor_time = 0.25;  ///< seconds
 
   struct track {
-    std::size_t feature = 0;  ///< of the current frame
+    std::size_t feature = 0;  ///< index in the current frame
     features::keypoint at;
     D descriptor{};
     float flow_x = 0.0F, flow_y = 0.0F;  ///< pixels since the previous frame
-    vec3 anchor = zeros<vec3>();         ///< an earlier position, world
+    vec3 anchor = zeros<vec3>();         ///< an earlier position in the world frame
     double anchored = 0.0;               ///< time of the anchor, seconds
     double moved = 0.0;                  ///< time of the last motion, or of the first observation, seconds
     bool has_anchor = false;
-    bool has_moved = false;  ///< moved on its own; otherwise excluded because of its neighbours
+    bool has_moved = false;  ///< true if it has moved; false if it is excluded because of its neighbours
   };
 
   std::size_t split_motions(basic_frame<D>& f, const basic_map<D>& m, const search_list<D>& list,
@@ -285,8 +286,8 @@ class moving_features {
     return split->inliers;
   }
 
-  /// Returns true if a feature is clearly not at its earlier position. Only its pixel is compared: depth is
-  /// discontinuous at the edge of an object.
+  /// Returns true if a feature is clearly not at its earlier position. Only pixels are compared: depth is discontinuous
+  /// at the edge of an object.
   [[nodiscard]] bool away(const basic_frame<D>& f, const se3& T_camera_world, const track& t) const {
     const auto expected = rig_.camera().project(T_camera_world * t.anchor);
     if (!expected) return false;
@@ -304,10 +305,10 @@ class moving_features {
 
   const camera_rig<Camera>& rig_;
   const options& options_;
-  std::vector<track> tracks_, next_;       ///< of the last frame, of the current one
-  std::vector<std::uint8_t> is_left_out_;  ///< by feature of the current frame; empty: none is excluded
-  std::vector<std::uint8_t> agrees_;       ///< by feature: 1 if it agrees with the pose of the static scene
-  bool trusts_old_only_ = false;           ///< in the current frame
+  std::vector<track> tracks_, next_;       ///< tracks of the last and of the current frame
+  std::vector<std::uint8_t> is_left_out_;  ///< for each feature of the current frame; empty: none is excluded
+  std::vector<std::uint8_t> agrees_;       ///< for each feature: 1 if it agrees with the pose of the static scene
+  bool trusts_old_only_ = false;           ///< applies to the current frame
   double moved_ = 0.0;                     ///< time of the last motion, seconds
   se3 T_world_last_;
 };

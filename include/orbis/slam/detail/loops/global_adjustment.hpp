@@ -2,10 +2,10 @@
 /// @file
 /// Bundle adjustment of a whole map.
 ///
-/// `take_...`, `apply_poses` and `erase_outliers` access the map, solving works on the snapshot. Between them
-/// keyframes, landmarks and observations may be added: keyframes follow their parent in the spanning tree, landmarks
-/// the keyframe that created them. The same holds for a landmark with a single observation, which is not adjusted. The
-/// root of the map is held fixed. If lengths are not measured, everything relative to a keyframe is scaled with the
+/// `take_...`, `apply_poses` and `erase_outliers` access the map; the solver works on the snapshot. Keyframes,
+/// landmarks and observations may be added between these calls: new keyframes follow their parent in the spanning tree,
+/// and new landmarks the keyframe that created them, as do landmarks with a single observation, which are not adjusted.
+/// The root of the map is held fixed. If lengths are not measured, all data relative to a keyframe are scaled with the
 /// lengths in its view.
 ///
 /// Source: R. Mur-Artal, J. D. Tardos, "ORB-SLAM2", T-RO 33 (2017), section III.E.
@@ -34,21 +34,21 @@ struct report {
   std::size_t keyframes = 0;     ///< number of adjusted keyframes
   std::size_t landmarks = 0;     ///< number of adjusted landmarks
   std::size_t observations = 0;  ///< number of observations used
-  std::size_t outliers = 0;      ///< observations that disagreed and were erased
+  std::size_t outliers = 0;      ///< number of observations that disagreed and were erased
   int iterations = 0;
   double initial_cost = 0.0;  ///< half the robust cost (sum of robustified squared errors)
-  double final_cost = 0.0;    ///< the same at the end, without outliers
+  double final_cost = 0.0;    ///< half the robust cost at the end, excluding outliers
 };
 
 struct snapshot : bundle_snapshot {
-  std::unordered_map<std::uint32_t, std::uint32_t> index;  ///< by keyframe id: its index in the arrays
+  std::unordered_map<std::uint32_t, std::uint32_t> index;  ///< from keyframe id to index in the arrays
   landmark_id next_landmark = 0;                           ///< the next landmark to copy
 
   [[nodiscard]] std::uint32_t index_of(keyframe_id k) const {
     const auto i = index.find(k.value());
     return i != index.end() ? i->second : no_id;
   }
-  /// Returns true if `take_landmarks` has more to do.
+  /// Returns true if `take_landmarks` has more landmarks to copy.
   [[nodiscard]] bool has_more() const noexcept { return next_landmark != end_landmark; }
 };
 
@@ -56,7 +56,7 @@ struct snapshot : bundle_snapshot {
   return {
       .robust_iterations = o.robust_iterations, .iterations = o.iterations, .relative_tolerance = o.relative_tolerance};
 }
-/// The loss of its solver: Huber, with the chi-square limit at 95 % of two coordinates.
+/// The loss of the solver: Huber, with the 95 % chi-square limit for two coordinates.
 inline constexpr optimize::huber loss{2.447};
 
 /// Copies the keyframes of a map with enough shared landmarks. O(keypoints).
@@ -77,7 +77,8 @@ template <feature_descriptor D>
     s.index.emplace(k.id.value(), static_cast<std::uint32_t>(s.keyframes.size()));
     s.add_keyframe(k.id, k.T_world_camera, is_root);
   }
-  // Growing arrays would be copied, which would add to the time that the lock is held for a part of the landmarks.
+  // Without reservation, growing arrays would be copied, which would prolong the time with the lock held for one part
+  // of the landmarks.
   s.landmarks.reserve(m.landmark_count());
   s.points.reserve(m.landmark_count());
   s.observations.reserve(keypoints);
@@ -85,8 +86,8 @@ template <feature_descriptor D>
   return s;
 }
 
-/// Copies the next `count` landmarks with their observations, so that a caller that shares the map can do it in parts.
-/// Keyframes, landmarks and observations added in between are not adjusted. O(observations).
+/// Copies the next `count` landmarks with their observations. Callers that share the map can copy them in parts.
+/// Keyframes, landmarks and observations added in the meantime are not adjusted. O(observations).
 template <feature_descriptor D, camera::camera_model Camera>
 void take_landmarks(snapshot& s, const basic_map<D>& m, const camera_rig<Camera>& rig, std::size_t count) {
   const auto next = [&](landmark_id from) { return std::min(m.next_landmark(from), s.end_landmark); };
@@ -99,7 +100,7 @@ void take_landmarks(snapshot& s, const basic_map<D>& m, const camera_rig<Camera>
 }
 
 /// Returns the factor by which a solution scales the lengths in the view of each keyframe: the median over its
-/// landmarks. 1 if lengths are measured. O(observations).
+/// landmarks, or 1 if lengths are measured. O(observations).
 [[nodiscard]] inline std::vector<double> length_scales(const snapshot& s, const bundle_solution& solved,
                                                        bool is_measured) {
   std::vector<double> growth(s.keyframes.size(), 1.0);
@@ -116,7 +117,7 @@ void take_landmarks(snapshot& s, const basic_map<D>& m, const camera_rig<Camera>
   return growth;
 }
 
-/// Writes the poses and positions of a solution into the map of the snapshot. The caller then calls `erase_outliers`
+/// Writes the poses and positions of a solution to the map of the snapshot. The caller must then call `erase_outliers`
 /// and `update_landmarks`. @pre solved.usable
 template <feature_descriptor D>
 report apply_poses(basic_map<D>& m, const snapshot& s, const bundle_solution& solved) {
@@ -140,8 +141,8 @@ report apply_poses(basic_map<D>& m, const snapshot& s, const bundle_solution& so
           solved.iterations,  solved.initial_cost, solved.final_cost};
 }
 
-/// Erases the outliers among the `count` observations starting at `first`, and the landmarks whose position is no
-/// longer determined, so that a caller that shares the map can do it in parts. Returns the number of erased outliers.
+/// Erases the outliers among the `count` observations starting at `first`, and the landmarks whose position is then no
+/// longer determined. Callers that share the map can erase them in parts. Returns the number of erased outliers.
 /// O(count).
 /// @pre solved.usable
 template <feature_descriptor D>

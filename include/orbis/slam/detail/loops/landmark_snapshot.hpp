@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A copy of the landmarks around a keyframe, and the search for them in frames.
+/// A copy of the landmarks around a keyframe, and the search for these landmarks in frames.
 #pragma once
 
 #include <cstddef>
@@ -23,10 +23,10 @@
 
 namespace orbis::slam::detail {
 
-/// The data for the search for a landmark, except the descriptor.
+/// The data needed to search for a landmark, except its descriptor.
 struct snapshot_landmark {
   landmark_id id;
-  vec3 position = zeros<vec3>();  ///< in the world of its map, metres
+  vec3 position = zeros<vec3>();  ///< in the world frame of its map, metres
   vec3 normal = zeros<vec3>();
   double min_distance = 0.0;
   double max_distance = 0.0;
@@ -37,11 +37,11 @@ template <feature_descriptor D>
 struct landmark_snapshot {
   keyframe_id keyframe;
   se3 T_world_camera;
-  std::vector<snapshot_landmark> landmarks;  ///< by ascending id
-  std::vector<D> descriptors;                ///< by landmark
+  std::vector<snapshot_landmark> landmarks;  ///< in ascending order of id
+  std::vector<D> descriptors;                ///< descriptor of each landmark
 };
 
-/// Copies the landmarks of a keyframe and its `neighbors` strongest neighbours. O(their observations).
+/// Copies the landmarks of a keyframe and of its `neighbors` strongest neighbours. O(their observations).
 /// @pre m.has_keyframe(k)
 template <feature_descriptor D>
 [[nodiscard]] landmark_snapshot<D> snapshot_around(const basic_map<D>& m, keyframe_id k, std::size_t neighbors) {
@@ -56,9 +56,9 @@ template <feature_descriptor D>
   return taken;
 }
 
-/// Searches for landmarks in a frame at `T_world_camera`: within `radius` pixels (of the predicted level) of their
-/// projections, with descriptors that differ by at most `distance`. Queries of the matches index the landmarks, trains
-/// the keypoints; no keypoint is matched twice. O(landmarks).
+/// Searches for landmarks in a frame at `T_world_camera`: within `radius` pixels (of the predicted level) around their
+/// projections, with a descriptor distance of at most `distance`. In the matches, `query` is the index of a landmark
+/// and `train` that of a keypoint; no keypoint is matched twice. O(landmarks).
 template <camera::camera_model Camera, feature_descriptor D>
 [[nodiscard]] std::vector<features::match> find_landmarks(const landmark_snapshot<D>& known, const basic_frame<D>& f,
                                                           const se3& T_world_camera, const camera_rig<Camera>& rig,

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Recognises places that a new keyframe observes again, and corrects the maps accordingly.
+/// Recognition of places that a new keyframe revisits, and the corresponding correction of the maps.
 #pragma once
 
 #include <algorithm>
@@ -26,15 +26,15 @@
 
 namespace orbis::slam::detail {
 
-/// A place recognised within a map closes a loop; one in another map merges the two maps.
+/// Closes a loop if a place in the same map is recognised; merges two maps if it is in another map.
 /// Source: R. Mur-Artal, J. D. Tardos, "ORB-SLAM2", T-RO 33 (2017), sections III.D and E; R. Elvira et al.,
-/// "ORBSLAM-Atlas", IROS 2019, for the merging of maps.
+/// "ORBSLAM-Atlas", IROS 2019, for map merging.
 template <camera::camera_model Camera, feature_descriptor D, place_recognizer<D> Places>
 class loop_closer {
  public:
   explicit loop_closer(shared_state<Camera, D, Places>& shared) : shared_{shared} {}
 
-  /// Searches for places that the keyframe observes again. Returns true if a map was corrected and should therefore be
+  /// Searches for places that the keyframe revisits. Returns true if a map was corrected and should therefore be
   /// adjusted globally.
   bool close(map_keyframe k) {
     if (!shared_.settings.places.enabled) return false;
@@ -52,7 +52,7 @@ class loop_closer {
     return false;
   }
 
-  /// Adjusts a whole map. Stops without a result if a loop is closed in the meantime, or `stop` is called.
+  /// Adjusts a whole map. Stops without a result if a loop is closed in the meantime or `stop` is called.
   void adjust_globally(map_id id) {
     if (!shared_.settings.places.adjusts_globally) return;
     const global_adjustment_options& o = shared_.settings.places.adjustment;
@@ -87,20 +87,20 @@ class loop_closer {
     report({.kind = correction_kind::global_adjustment, .map = id}, timing);
   }
 
-  /// Requests that interruptible work stop soon. May be called from any thread.
+  /// Requests that interruptible work end soon. May be called from any thread.
   void stop() noexcept { stopped_ = true; }
 
  private:
   using clock = std::chrono::steady_clock;
-  // Work per lock, chosen such that tracking waits for about a millisecond:
+  // Amount of work per lock, chosen so that tracking waits for about a millisecond:
   static constexpr std::uint32_t at_once = 4096;              ///< landmarks
   static constexpr std::size_t pairs_at_once = 512;           ///< pairs of landmarks to fuse
   static constexpr std::size_t observations_at_once = 65536;  ///< observations to check for outliers
 
-  /// Duration of a correction, and the longest time with the lock held.
+  /// Start of a correction, and the longest time with the lock held.
   struct correction_timing {
     clock::time_point start = clock::now();
-    double locked = 0.0;  ///< milliseconds, the longest single time
+    double locked = 0.0;  ///< longest single time, milliseconds
   };
   /// Holds the lock and records its duration.
   struct timing_lock {
@@ -119,12 +119,12 @@ class loop_closer {
     return std::forward<F>(f)();
   }
 
-  /// Returns the keyframes with similar appearance; updates `k` to its current id. Within its own map, only keyframes
-  /// that share no landmark with it and are at least a few keyframes older.
+  /// Returns the keyframes with similar appearance; updates `k` to its current id. Keyframes of the same map must share
+  /// no landmark with `k` and be at least a few keyframes older.
   std::vector<map_keyframe> find_candidates(map_keyframe& k) {
     typename Places::signature bow_vector;
     {
-      const auto edit = shared_.edit();  // the keyframe must not be erased meanwhile
+      const auto edit = shared_.edit();  // the keyframe must not be erased in the meantime
       const auto* seen = shared_.locked([&]() -> const basic_keyframe<D>* {
         k = shared_.atlas.current(k);
         return shared_.atlas.has(k) ? &shared_.atlas.at(k) : nullptr;
@@ -206,7 +206,7 @@ class loop_closer {
         event.offsets = done.offsets;
         event.from = {candidate.map, done.keyframe};
         event.T_corrected_before = done.T_into_from;
-        if (k.map < candidate.map) {  // the world of the older map is kept
+        if (k.map < candidate.map) {  // the world frame of the older map is kept
           event.T_map_before = done.T_into_from.inverse();
           shared_.atlas.at(candidate.map).transform(event.T_map_before);
           event.T_corrected_before = sim3{};
@@ -223,7 +223,7 @@ class loop_closer {
     return true;
   }
 
-  // In parts, so that tracking does not wait for the whole. @pre edit() is held, and the map exists
+  // These functions work in parts so that tracking waits only for one part. @pre edit() is held, and the map exists
 
   /// Updates all landmarks of a map.
   void update(map_id id, correction_timing& timing) {

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Closes a loop: distributes the drift over the keyframes between its ends, and fuses the landmarks of both ends.
+/// Correction of a map after a loop closure: distributes the drift over the keyframes between the ends of the loop, and
+/// fuses the landmarks at both ends.
 ///
-/// `take` and `apply_poses` access the map, `solve` works on the snapshot. The essential graph with the new edge is
-/// optimised as a pose graph; the root of the map is held fixed, and the other edges keep their measurement. Landmarks
-/// follow the keyframes. Between `take` and `apply_poses`, keyframes, landmarks and observations may be added:
+/// `take` and `apply_poses` access the map; `solve` works on the snapshot. The essential graph with the new edge is
+/// optimised as a pose graph; the root of the map is held fixed, and the other edges keep their measurements. Landmarks
+/// follow the keyframes. Keyframes, landmarks and observations may be added between `take` and `apply_poses`: new
 /// keyframes follow their parent.
 ///
 /// Source: R. Mur-Artal, J. M. M. Montiel, J. D. Tardos, "ORB-SLAM: a versatile and accurate monocular SLAM system",
@@ -47,18 +48,18 @@ enum class edge_kind { tree, loop, covisibility };
 
 /// An edge of a pose graph.
 struct essential_edge {
-  std::uint32_t from = no_id;  ///< a keyframe's id; for `optimize_poses` an index
+  std::uint32_t from = no_id;  ///< id of a keyframe; for `optimize_poses`, an index
   std::uint32_t to = no_id;    ///< like `from`
   edge_kind kind = edge_kind::tree;
-  std::uint32_t shared = 0;  ///< number of landmarks that both observe
-  sim3 measurement;          ///< `T_from_to`; lengths at `from` are its scale times those at `to`
-  double weight = 1.0;       ///< weight of its squared error
+  std::uint32_t shared = 0;  ///< number of landmarks that both keyframes observe
+  sim3 measurement;          ///< `T_from_to`; its scale is the ratio of lengths at `from` to those at `to`
+  double weight = 1.0;       ///< weight of the squared error
 };
 
 /// Returns the edges of the spanning tree, the loop edges, and the pairs that share at least `threshold` landmarks;
-/// each pair of keyframes once, by ascending `from`. Edges of the tree lead from child to parent, the others from the
-/// newer keyframe to the older one. The measurements are the current relative poses. O(keyframes and pairs that share
-/// landmarks).
+/// each pair of keyframes once, in ascending order of `from`. Tree edges lead from child to parent, other edges from
+/// the newer keyframe to the older one. The measurements are the current relative poses. O(keyframes and pairs that
+/// share landmarks).
 template <feature_descriptor D>
 [[nodiscard]] std::vector<essential_edge> essential_graph(const basic_map<D>& m, std::uint32_t threshold = 100) {
   std::vector<essential_edge> edges;
@@ -106,9 +107,9 @@ template <class T>
   return summary.iterations;
 }
 
-/// Moves poses so that they agree with the edges, whose ends are indices of the poses; those with a nonzero entry in
-/// `is_fixed` are held. `scale_is_known`: all scales are 1 and stay 1; otherwise scales are adjusted as well. Returns
-/// the number of iterations; empty, with unusable poses, if it fails or `callback` cancels it.
+/// Optimises poses with respect to the edges, whose ends are indices of poses; poses with a nonzero entry in `is_fixed`
+/// are held fixed. If `scale_is_known`, all scales are 1 and stay 1; otherwise scales are optimised as well. Returns
+/// the number of iterations; empty, with unusable poses, on failure or if `callback` cancels.
 template <class S = double>
 [[nodiscard]] std::optional<int> optimize_poses(std::type_identity_t<std::span<basic_sim3<S>>> poses,
                                                 const std::vector<essential_edge>& edges,
@@ -132,9 +133,9 @@ struct report {
   bool corrected = false;
   double moved = 0.0;         ///< translation of the keyframe, metres
   double turned = 0.0;        ///< rotation of the keyframe, radians
-  double scale = 1.0;         ///< factor by which lengths at the keyframe grew
+  double scale = 1.0;         ///< factor by which lengths at the keyframe were scaled
   std::size_t keyframes = 0;  ///< number of corrected keyframes
-  int iterations = 0;         ///< of the pose graph
+  int iterations = 0;         ///< number of iterations of pose graph optimisation
 };
 
 template <feature_descriptor D>
@@ -142,20 +143,20 @@ struct snapshot {
   loop_match match;
   loop_fusion::snapshot<D> fusion;
   std::vector<keyframe_id> keyframes;
-  std::vector<sim3> poses;  ///< by keyframe of the snapshot
+  std::vector<sim3> poses;  ///< pose of each keyframe of the snapshot
   std::vector<essential_edge> edges;
-  std::vector<std::uint8_t> is_fixed;  ///< by keyframe
+  std::vector<std::uint8_t> is_fixed;  ///< for each keyframe: 1 if its pose is held fixed
 };
 
 struct solution {
-  std::vector<sim3> poses;  ///< by keyframe of the snapshot
+  std::vector<sim3> poses;  ///< pose of each keyframe of the snapshot
   std::vector<loop_fusion::pair> pairs;
   int iterations = 0;
 };
 
-/// Copies the data for the correction. Empty if a keyframe of the match no longer exists. O(keyframes, pairs that share
-/// landmarks, features of the neighbourhood).
-/// @pre the match is within the map
+/// Copies the data needed for the correction. Empty if a keyframe of the match no longer exists. O(keyframes, pairs
+/// that share landmarks, features of the neighbourhood).
+/// @pre both keyframes of the match are in the map
 template <feature_descriptor D>
 [[nodiscard]] std::optional<snapshot<D>> take(const basic_map<D>& m, const loop_match& match,
                                               const loop_correction_options& o = {}) {
@@ -173,14 +174,15 @@ template <feature_descriptor D>
            std::max(e.from, e.to) == std::max(a, b);
   });
   for (essential_edge& e : s.edges) {
-    // The more landmarks two keyframes share, the better their relative pose is known. An edge of an earlier loop may
-    // have passed to keyframes that share few, although many of their neighbours do: it keeps a minimum weight.
+    // The more landmarks two keyframes share, the better their relative pose is known. The edge of an earlier loop may
+    // have been moved to keyframes that share few landmarks although many of their neighbours do: it keeps a minimum
+    // weight.
     const std::uint32_t least = e.kind == edge_kind::loop ? std::max(1U, o.strong / 4) : 1U;
     e.weight *= static_cast<double>(std::clamp(e.shared, least, o.strong)) / o.strong;
   }
   s.edges.push_back(
       {b, a, edge_kind::loop, static_cast<std::uint32_t>(match.inliers), match.scaled_motion(), o.loop_weight});
-  for (essential_edge& e : s.edges) {  // from ids to indices: eventually most ids are those of erased keyframes
+  for (essential_edge& e : s.edges) {  // from ids to indices, because eventually most ids belong to erased keyframes
     const auto index_of = [&s](std::uint32_t id) {
       return static_cast<std::uint32_t>(std::lower_bound(s.keyframes.begin(), s.keyframes.end(), keyframe_id{id}) -
                                         s.keyframes.begin());
@@ -191,8 +193,8 @@ template <feature_descriptor D>
   return s;
 }
 
-/// Solves the correction. Empty if it was stopped (`callback(iteration, iterations)` returned false), or the graph
-/// cannot be solved.
+/// Solves the correction. Empty if `callback(iteration, iterations)` returned false, or the pose graph cannot be
+/// solved.
 template <feature_descriptor D, camera::camera_model Camera>
 [[nodiscard]] std::optional<solution> solve(const snapshot<D>& s, const camera_rig<Camera>& rig,
                                             const loop_correction_options& o = {}, const progress& callback = {}) {
@@ -203,9 +205,9 @@ template <feature_descriptor D, camera::camera_model Camera>
   return found;
 }
 
-/// Writes the poses of a solution into the map of the snapshot. The map is not corrected if no keyframe replaces an end
-/// of the loop. If the report indicates that the map was corrected, the caller then calls `loop_fusion::fuse` and
-/// `update_landmarks`.
+/// Writes the poses of a solution to the map of the snapshot. The map is not corrected if an end of the loop was erased
+/// without a replacement. If the report indicates that the map was corrected, the caller must then call
+/// `loop_fusion::fuse` and `update_landmarks`.
 template <feature_descriptor D>
 report apply_poses(basic_map<D>& m, const snapshot<D>& s, const solution& solved) {
   report done;

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Fuses the landmarks of two parts of a map, or of two maps, that observe the same place.
+/// Fusion of the landmarks of two parts of a map, or of two maps, that observe the same place.
 ///
 /// `take` copies the necessary data, `find_pairs` finds the keypoints of one side that observe landmarks of the other,
-/// `fuse` writes these into the map.
+/// and `fuse` applies the result to the map.
 ///
 /// Source: R. Mur-Artal, J. M. M. Montiel, J. D. Tardos, "ORB-SLAM: a versatile and accurate monocular SLAM system",
 /// T-RO 31 (2015), section VII.C.
@@ -28,7 +28,7 @@
 
 namespace orbis::slam::detail::loop_fusion {
 
-/// A keyframe around that of the match.
+/// A keyframe in the neighbourhood of the match's keyframe.
 template <feature_descriptor D>
 struct image {
   keyframe_id keyframe;
@@ -40,10 +40,10 @@ template <feature_descriptor D>
 struct snapshot {
   loop_match match;
   landmark_snapshot<D> landmarks;  ///< around the candidate
-  std::vector<image<D>> images;    ///< around the keyframe
+  std::vector<image<D>> images;    ///< images around the keyframe
 };
 
-/// A keyframe that observes a landmark of the candidate's side.
+/// A keyframe that observes a landmark of the candidate's neighbourhood.
 struct pair {
   keyframe_id keyframe;
   loop_pair observed;
@@ -63,7 +63,7 @@ template <feature_descriptor D>
   return s;
 }
 
-/// Returns the matches, and the landmarks found in each image at the pose that follows from the match.
+/// Returns the pairs of the match, and the landmarks found in each image at the pose that follows from the match.
 template <camera::camera_model Camera, feature_descriptor D>
 [[nodiscard]] std::vector<pair> find_pairs(const snapshot<D>& s, const camera_rig<Camera>& rig,
                                            const loop_fusion_options& o) {
@@ -81,10 +81,9 @@ template <camera::camera_model Camera, feature_descriptor D>
   return pairs;
 }
 
-/// Fuses the landmarks that the pairs identify; those of the candidate's side are kept. `offsets`: amounts by which the
-/// ids of the keyframe's side have grown, if it was a separate map. Pairs whose keyframe or landmark no longer exists
-/// are skipped. Changed landmarks are updated. A caller that shares the map can call it in parts: the result is the
-/// same.
+/// Fuses the landmarks that the pairs identify; those of the candidate are kept. `offsets`: offsets added to the ids of
+/// the keyframe's map, if that was a separate map. Pairs whose keyframe or landmark no longer exists are skipped.
+/// Changed landmarks are updated. Callers that share the map can pass the pairs in parts: the result is the same.
 template <feature_descriptor D>
 fusion_counts fuse(basic_map<D>& m, std::span<const pair> pairs, const id_offsets& offsets = {}) {
   fusion_counts counts;

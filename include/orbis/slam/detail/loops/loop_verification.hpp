@@ -2,14 +2,16 @@
 /// @file
 /// Verification that two keyframes with similar appearance observe the same place, and their relative pose.
 ///
-/// `take` copies the necessary data from the maps, `verify` works on the copy. Steps: match the keypoints of both
-/// keyframes by appearance; estimate the rigid motion between these; search for the landmarks around the candidate in
-/// the keyframe at that pose, and refine its pose on them; search for the same landmarks in neighbours of the keyframe;
-/// and, within one map, check that the motion differs from the poses by no more than plausible drift.
+/// `take` copies the necessary data from the maps; `verify` works on the copy. Steps: match the keypoints of both
+/// keyframes by descriptors; estimate the rigid motion between their points; search for the landmarks around the
+/// candidate in the keyframe at that pose, and refine the pose on them; search for the same landmarks in neighbours of
+/// the keyframe; and, within one map, check that the motion differs from the poses in the map by no more than plausible
+/// drift.
 ///
 /// Source: C. Campos, R. Elvira, J. J. Gomez Rodriguez, J. M. M. Montiel, J. D. Tardos, "ORB-SLAM3: an accurate
 /// open-source library for visual, visual-inertial and multi-map SLAM", T-RO 37 (2021), section VI. If the scale is not
-/// measured, it is estimated as well: from the points of the matches, then from the landmarks that both sides have.
+/// measured, it is estimated as well: first from the points of the matches, then from the landmarks common to both
+/// sides.
 #pragma once
 
 #include <algorithm>
@@ -55,12 +57,12 @@ struct loop_pair {
 /// Two keyframes that observe the same place.
 struct loop_match {
   keyframe_id keyframe;
-  keyframe_id candidate;     ///< of the same map or another one
-  se3 T_candidate_keyframe;  ///< camera to camera, from the matches; in lengths at the candidate
+  keyframe_id candidate;     ///< in the same map or another one
+  se3 T_candidate_keyframe;  ///< camera to camera, from the matches; in the unit of length at the candidate
   double scale = 1.0;        ///< ratio of lengths at the candidate to those at the keyframe; 1 if depth is measured
-  std::vector<loop_pair> matches;  ///< the inliers, by ascending landmark
-  std::size_t inliers = 0;         ///< their number
-  std::size_t supporters = 0;      ///< neighbours of the keyframe that agree
+  std::vector<loop_pair> matches;  ///< the inliers, in ascending order of landmark
+  std::size_t inliers = 0;         ///< number of inliers
+  std::size_t supporters = 0;      ///< number of neighbours of the keyframe that agree
 
   /// The similarity that transforms points from the keyframe's camera to the candidate's.
   [[nodiscard]] sim3 scaled_motion() const {
@@ -70,13 +72,13 @@ struct loop_match {
 
 enum class loop_verdict {
   accepted,
-  connected,      ///< both already observe the same landmarks
+  connected,      ///< both keyframes already observe the same landmarks
   few_matches,    ///< too few features match
   not_aligned,    ///< no rigid motion explains enough of the matches
   few_inliers,    ///< the keyframe observes too few of the landmarks around the candidate
-  not_supported,  ///< too few neighbours of the keyframe observe them
+  not_supported,  ///< too few neighbours of the keyframe observe these landmarks
   unsure_scale,   ///< the scale is not determined
-  too_far         ///< the drift would be implausible: probably another place with the same appearance
+  too_far         ///< the drift would be implausible: probably a different place with the same appearance
 };
 
 [[nodiscard]] constexpr std::string_view to_string(loop_verdict verdict) noexcept {
@@ -87,7 +89,7 @@ enum class loop_verdict {
     case loop_verdict::not_aligned: return "not aligned";
     case loop_verdict::few_inliers: return "few inliers";
     case loop_verdict::not_supported: return "not supported";
-    case loop_verdict::unsure_scale: return "unsure scale";
+    case loop_verdict::unsure_scale: return "uncertain scale";
     case loop_verdict::too_far: return "too far";
   }
   return "unknown";
@@ -95,7 +97,7 @@ enum class loop_verdict {
 
 struct loop_check {
   loop_verdict verdict = loop_verdict::few_matches;
-  loop_match match;  ///< as far as it was determined
+  loop_match match;  ///< the match, as far as it was determined
   [[nodiscard]] explicit operator bool() const noexcept { return verdict == loop_verdict::accepted; }
 };
 
@@ -106,10 +108,10 @@ template <feature_descriptor D>
 struct view {
   basic_frame<D> image;
   orbis::features::basic_features<D> features;
-  std::vector<vec3> points;          ///< by feature: in the camera frame, metres
-  std::vector<std::uint32_t> index;  ///< by feature: its keypoint
-  std::vector<double> deviations;    ///< by feature: standard deviation of the depth, metres
-  double median_depth = 0.0;         ///< of the points
+  std::vector<vec3> points;          ///< point of each feature, in the camera frame, metres
+  std::vector<std::uint32_t> index;  ///< keypoint of each feature
+  std::vector<double> deviations;    ///< standard deviation of each feature's depth, metres
+  double median_depth = 0.0;         ///< median depth of the points
 };
 
 template <feature_descriptor D>
@@ -122,15 +124,15 @@ template <feature_descriptor D>
 struct snapshot {
   keyframe_id keyframe;
   bool same_map = false;
-  bool connected = false;          ///< both observe the same landmarks: the rest is empty
+  bool connected = false;          ///< true if both observe the same landmarks; the other members are then empty
   view<D> seen, known;             ///< the keyframe and the candidate
-  landmark_snapshot<D> landmarks;  ///< around the candidate
+  landmark_snapshot<D> landmarks;  ///< landmarks around the candidate
   std::vector<neighbor<D>> supporters;
-  double path_length = 0.0;  ///< along the keyframes between the two, metres
+  double path_length = 0.0;  ///< path length along the keyframes between both, metres
 };
 
-/// Returns the standard deviation of a landmark's depth in keyframe `k` if no depth is measured, in the map's unit:
-/// from a one-pixel error of its rays and the largest angle between them. Infinite with one observation.
+/// Returns the standard deviation of a landmark's depth in keyframe `k` if no depth is measured, in the map's unit: the
+/// effect of a one-pixel error of its rays, given the largest angle between them. Infinite with one observation.
 template <feature_descriptor D, camera::camera_model Camera>
 [[nodiscard]] double deviation_by_parallax(const basic_map<D>& m, const basic_keyframe<D>& k, std::uint32_t feature,
                                            const camera_rig<Camera>& rig) {
@@ -168,7 +170,7 @@ template <feature_descriptor D, camera::camera_model Camera>
   return v;
 }
 
-/// Returns the length of the path along the keyframes between two, metres. O(ids between them).
+/// Returns the length of the path along the keyframes between two keyframes, metres. O(ids between them).
 template <feature_descriptor D>
 [[nodiscard]] double path_between(const basic_map<D>& m, keyframe_id a, keyframe_id b) {
   double length = 0.0;
@@ -181,7 +183,7 @@ template <feature_descriptor D>
   return length;
 }
 
-/// Copies the data for the verification. O(features of a few keyframes + keyframes between the two).
+/// Copies the data needed for the verification. O(features of a few keyframes + keyframes between the two).
 /// @pre the keyframes exist and differ
 template <feature_descriptor D, camera::camera_model Camera>
 [[nodiscard]] snapshot<D> take(const basic_map<D>& current, keyframe_id k, const basic_map<D>& candidate_map,
@@ -243,7 +245,7 @@ class checker {
                          features::rotation_consistency{};
     return matcher(s_.seen.features, s_.known.features);
   }
-  /// Estimates the rigid motion between the points of the matches by RANSAC, together with the scale if lengths are not
+  /// Estimates the rigid motion between the points of the matches by RANSAC, including the scale if lengths are not
   /// measured.
   [[nodiscard]] bool align(const std::vector<features::match>& matches, loop_match& found) const {
     if (!rig_.scale_is_known) return align_scaled(matches, found);
@@ -327,7 +329,7 @@ class checker {
     return second.inliers >= options_.min_inliers;
   }
 
-  /// Estimates the scale as the median ratio of the depths of landmarks that both sides have. Returns false if it is
+  /// Estimates the scale as the median ratio of depths of the landmarks common to both sides. Returns false if it is
   /// uncertain.
   [[nodiscard]] bool measure_scale(loop_match& found) const {
     std::vector<vec3> at(s_.seen.image.size(), zeros<vec3>());
@@ -344,7 +346,7 @@ class checker {
     found.scale = median(ratios);
     std::vector<double> off;
     for (const double r : ratios) off.push_back(std::abs(std::log(r / found.scale)));
-    constexpr double deviation_by_median = 1.4826;  // of a normal distribution
+    constexpr double deviation_by_median = 1.4826;  // for a normal distribution
     const double deviation = deviation_by_median * median(off) / std::sqrt(static_cast<double>(off.size()));
     return deviation <= options_.max_scale_deviation;
   }
@@ -355,7 +357,7 @@ class checker {
     const auto localized = localize(n.image, T_world_camera, options_.radius, nullptr);
     if (!localized.ok() || localized.inliers < options_.supporter_inliers) return false;
     if (rig_.scale_is_known) return true;
-    // If the neighbour is at a clear distance, that distance must agree with the scale.
+    // If the neighbour is at a significant distance, that distance must agree with the scale.
     const se3 T_keyframe_neighbor =
         (s_.landmarks.T_world_camera * found.T_candidate_keyframe).inverse() * localized.T_world_camera;
     const double expected = found.scale * norm(n.T_keyframe_camera.translation());
@@ -363,7 +365,7 @@ class checker {
     return off <= 0.3 * expected || expected <= 0.02 * found.scale * s_.seen.median_depth;
   }
 
-  /// Drift of the scale has no bound known in advance; without a known scale only the rotation is limited.
+  /// Scale drift has no bound known in advance: if the scale is unknown, only the rotation is limited.
   [[nodiscard]] bool is_plausible(const se3& T_candidate_keyframe) const {
     const se3& was = s_.seen.image.T_world_camera;
     const se3 is = s_.landmarks.T_world_camera * T_candidate_keyframe;
@@ -379,7 +381,7 @@ class checker {
   const loop_options& options_;
 };
 
-/// Verifies a loop. Deterministic. The cost is that of tracking a few frames.
+/// Verifies a loop. Deterministic. Takes as long as tracking a few frames.
 template <camera::camera_model Camera, feature_descriptor D>
 [[nodiscard]] loop_check verify(const snapshot<D>& s, const camera_rig<Camera>& rig, const loop_options& o = {}) {
   return checker<Camera, D>{s, rig, o}.run();

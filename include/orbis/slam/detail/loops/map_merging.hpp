@@ -2,8 +2,8 @@
 /// @file
 /// Merging of two maps that observe the same place.
 ///
-/// `take` and `join` access the maps, `loop_fusion::find_pairs` works on the snapshot. Between them both maps may grow.
-/// Callers that share the maps lock them for `take`, `join` and each part of `loop_fusion::fuse`.
+/// `take` and `join` access the maps; `loop_fusion::find_pairs` works on the snapshot. Both maps may grow between these
+/// calls. Callers that share the maps lock them for `take`, `join` and each part of `loop_fusion::fuse`.
 ///
 /// Source: C. Campos, R. Elvira, J. J. Gomez Rodriguez, J. M. M. Montiel, J. D. Tardos, "ORB-SLAM3", T-RO 37 (2021),
 /// section VI.
@@ -23,8 +23,8 @@ namespace orbis::slam::detail::map_merging {
 /// The result of merging two maps.
 struct report {
   bool merged = false;
-  id_offsets offsets;     ///< amounts by which the ids of the merged map have grown
-  keyframe_id keyframe;   ///< keyframe of the match, by its new id
+  id_offsets offsets;     ///< offsets added to the ids of the merged map
+  keyframe_id keyframe;   ///< keyframe of the match, with its new id
   keyframe_id candidate;  ///< candidate of the match
   sim3 T_into_from;       ///< motion of the merged map
 };
@@ -36,7 +36,7 @@ struct snapshot {
   loop_fusion::snapshot<D> fusion;
 };
 
-/// Returns true if the maps and keyframes of a match exist and enough ids are left for both maps.
+/// Returns true if the maps and keyframes of a match exist and enough ids are left for the merged map.
 template <feature_descriptor D>
 [[nodiscard]] bool is_possible(const basic_atlas<D>& maps, map_id from, map_id into, const loop_match& match) {
   return from != into && maps.has({from, match.keyframe}) && maps.has({into, match.candidate}) &&
@@ -54,9 +54,9 @@ template <feature_descriptor D>
   return snapshot<D>{from, into, match, loop_fusion::take(maps.at(from), maps.at(into), match, o)};
 }
 
-/// Moves `from` by the match, merges it into `into`, and adds a loop edge at the match. If `from` was active, `into`
-/// becomes active. Changes nothing if a map or keyframe no longer exists. O(`from`). If the report indicates that the
-/// maps were merged, the caller then calls `loop_fusion::fuse`.
+/// Moves `from` according to the match, merges it into `into`, and adds a loop edge at the match. If `from` was active,
+/// `into` becomes active. Changes nothing if a map or keyframe no longer exists. O(`from`). If the report indicates
+/// that the maps were merged, the caller must then call `loop_fusion::fuse`.
 template <feature_descriptor D>
 report join(basic_atlas<D>& maps, const snapshot<D>& s) {
   report done;

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The similarity between two cameras that both know some points, each in a separate unit of length.
+/// The similarity transform between two cameras that observe common points, each with its own unit of length.
 ///
-/// Without a sensor, a point's depth is only as certain as its parallax: pairs are compared by the positions of the
-/// points in the images, not by their distance.
+/// Without a depth sensor, the accuracy of a point's depth depends on its parallax: the error of a pair is therefore
+/// its reprojection error, not the distance between its points.
 ///
 /// Source: R. Mur-Artal, J. M. M. Montiel, J. D. Tardos, "ORB-SLAM: a versatile and accurate monocular SLAM system",
 /// T-RO 31 (2015), section VII.B.
@@ -27,21 +27,21 @@
 
 namespace orbis::slam::detail {
 
-/// A point known to a camera.
+/// A point with its observation by a camera.
 struct known_point {
-  vec3 position = zeros<vec3>();  ///< in the camera frame, in its unit
+  vec3 position = zeros<vec3>();  ///< in the camera frame and its unit
   vec2 pixel = zeros<vec2>();     ///< observed position
-  double information = 1.0;       ///< 1 / sigma^2 of the pixel, 1 / pixel^2
+  double information = 1.0;       ///< 1 / sigma^2 of the pixel, in 1 / pixel^2
 };
 
 /// The RANSAC estimator of the similarity that transforms points from one camera to another. The error of a pair is the
-/// larger of those of its two points, reprojected into the other image, in standard deviations of a pixel.
+/// larger reprojection error of its two points in the other image, in standard deviations of a pixel.
 template <camera::camera_model Camera>
 class scaled_alignment {
  public:
   struct pair {
     known_point from, to;
-    double weight = 1.0;  ///< 1 / variance of the distance between the points, once they are aligned
+    double weight = 1.0;  ///< 1 / variance of the distance between the aligned points
   };
   struct model {
     sim3 T_to_from, T_from_to;

@@ -20,7 +20,7 @@ class counter {
     friend bool operator==(const entry&, const entry&) = default;
   };
 
-  /// Counts an id; returns true the first time. O(1) amortised.
+  /// Counts an id; returns true if it is new. O(1) amortised.
   bool add(Id id) {
     if (2 * (entries_.size() + 1) > table_.size()) grow();
     std::size_t at = index_of(id);
@@ -53,7 +53,7 @@ class counter {
   }
 
   std::vector<entry> entries_;
-  std::vector<std::uint32_t> table_;  ///< index of the entry + 1, or 0; the size is a power of two, half of it free
+  std::vector<std::uint32_t> table_;  ///< index of the entry + 1, or 0; the size is a power of two; at least half free
 };
 
 }  // namespace orbis::slam::detail

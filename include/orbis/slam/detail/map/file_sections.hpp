@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Files in sections, each with a name, a length and a checksum, so that damage can be attributed to a section.
+/// Files of sections, each with a name, a length and a checksum, so that damage can be attributed to a section.
 #pragma once
 
 #include <cstddef>
@@ -14,7 +14,7 @@
 
 namespace orbis::slam::detail {
 
-/// Appends numbers, little-endian.
+/// Appends numbers in little-endian format.
 template <class... T>
 void put(std::string& to, T... values) {
   (append_little_endian(to, values), ...);
@@ -35,7 +35,7 @@ void put_section(std::string& to, std::string_view name, Write&& write) {
   put(to, crc32c(std::as_bytes(std::span{to}).subspan(begin)));
 }
 
-/// Reads numbers from a section's content. At its end it returns zeros and sets `ended`.
+/// Reads numbers from the content of a section. After the end, it returns zeros and sets `ended`.
 class section_reader {
  public:
   explicit section_reader(std::string_view content) : content_{content} {}
@@ -51,7 +51,7 @@ class section_reader {
     return value;
   }
   [[nodiscard]] std::size_t left() const noexcept { return content_.size(); }
-  /// Returns true if more was read than is available.
+  /// Returns true if more data were read than available.
   [[nodiscard]] bool ended() const noexcept { return ended_; }
   /// Discards the rest and sets `ended`. Returns false.
   bool end() {
@@ -70,7 +70,7 @@ class section_finder {
  public:
   section_finder(std::string_view file, std::size_t begin) : file_{file}, at_{begin} {}
 
-  /// Returns the content of the next section if its name is `name` and it is complete.
+  /// Returns the content of the next section if its name is `name` and it is intact.
   [[nodiscard]] std::optional<section_reader> find(std::string_view name) {
     const auto wrong = [&](const std::string& what) {
       problem_ = "section \"" + std::string(name) + "\" " + what;
@@ -94,7 +94,7 @@ class section_finder {
   /// Returns true if no section follows.
   [[nodiscard]] bool at_end() {
     if (at_ == file_.size()) return true;
-    problem_ = "unexpected data after its end at byte " + std::to_string(at_);
+    problem_ = "unexpected data after the end at byte " + std::to_string(at_);
     return false;
   }
   [[nodiscard]] const std::string& problem() const noexcept { return problem_; }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Moves keyframes together with their landmarks.
+/// Motion of keyframes together with their landmarks.
 #pragma once
 
 #include <algorithm>
@@ -17,11 +17,11 @@
 
 namespace orbis::slam::detail {
 
-/// Motions in the world, `T_new_old`, by keyframe.
+/// The motion of each keyframe in the world frame, `T_new_old`.
 using keyframe_motions = std::unordered_map<std::uint32_t, sim3>;
 
-/// Moves every keyframe `k` by `T_new_old[k]`, a motion in the world, and every landmark with the oldest keyframe that
-/// observes it. Does not call `map.update_landmark`: see `update_landmarks`. O(map).
+/// Moves every keyframe `k` by `T_new_old[k]`, a motion in the world frame, and every landmark with the oldest keyframe
+/// that observes it. Does not call `map.update_landmark`: see `update_landmarks`. O(map).
 /// @pre there is a motion for every keyframe of the map
 template <feature_descriptor D>
 void move_all(basic_map<D>& m, const keyframe_motions& T_new_old) {
@@ -29,9 +29,9 @@ void move_all(basic_map<D>& m, const keyframe_motions& T_new_old) {
   for (const auto& k : m.keyframes()) m.move_keyframe(k.id, T_new_old.at(k.id.value()));
 }
 
-/// Calls `map.update_landmark` for `count` landmarks starting at id `first`, or for all that are left. Returns the id
-/// after them, at most `landmark_end()`, from which a caller that shares the map can continue later. Until then,
-/// landmarks are searched for by their old normals and distances.
+/// Calls `map.update_landmark` for `count` landmarks starting at id `first`, or for all that are left. Returns the next
+/// id, at most `landmark_end()`, from which a caller that shares the map can continue later. Until then, searches use
+/// the old normals and distances of the remaining landmarks.
 template <feature_descriptor D>
 landmark_id update_landmarks(basic_map<D>& m, landmark_id first, std::size_t count) {
   landmark_id l = m.next_landmark(first);
@@ -47,9 +47,9 @@ template <feature_descriptor D>
   return around;
 }
 
-/// Returns the motion of every keyframe of a map, given new poses for some of them, with the scale of the lengths in
-/// their views. The others move with their parent in the spanning tree; by the identity if no keyframe up to the root
-/// has a new pose. New poses of erased keyframes are ignored. O(keyframes).
+/// Returns the motion of every keyframe of a map, given new poses, and the scales of the lengths in view, for some of
+/// them. The others move with their parent in the spanning tree; their motion is the identity if no ancestor has a new
+/// pose. New poses of erased keyframes are ignored. O(keyframes).
 template <feature_descriptor D>
 [[nodiscard]] keyframe_motions propagate_motion(const basic_map<D>& m, std::span<const keyframe_id> solved,
                                                 std::span<const sim3> T_world_camera) {

@@ -18,11 +18,11 @@ namespace orbis::slam::detail {
 
 /// A point to search for.
 struct candidate_point {
-  vec3 position = zeros<vec3>();  ///< in the world, metres
+  vec3 position = zeros<vec3>();  ///< in the world frame, metres
   landmark_id landmark;           ///< `no_id` for a point known only from the depth of the last frame
 };
 
-/// Points with their descriptors and search windows, index by index.
+/// Points with their descriptors and search windows, by common index.
 template <feature_descriptor D>
 struct search_list {
   std::vector<candidate_point> points;
@@ -39,15 +39,15 @@ struct search_list {
   [[nodiscard]] std::size_t size() const noexcept { return points.size(); }
 };
 
-/// Returns the rule for windows of `radius` pixels of a keypoint's level around projections.
+/// Returns the rule for search windows around projections with a radius of `radius` pixels of a keypoint's level.
 [[nodiscard]] inline features::projection_rule make_rule(const pyramid_scales& scales, double radius) {
   return {.radius = static_cast<float>(radius),
           .levels = scales.levels(),
           .scale_factor = static_cast<float>(scales.factor())};
 }
 
-/// Adds a point observed by the last frame, if it projects into the image. The window has `radius` pixels of the level
-/// of that observation.
+/// Adds a point observed by the last frame if it projects into the image. The window has a radius of `radius` pixels of
+/// the level of that observation.
 template <camera::camera_model Camera, feature_descriptor D>
 void add_seen_point(search_list<D>& list, const features::camera_projection<Camera>& project,
                     const pyramid_scales& scales, const candidate_point& point, const D& descriptor,

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Reads the sections of a map's file and checks that they are consistent. `map_file.hpp` describes the format.
+/// Reads the sections of a map file and checks their consistency. `map_file.hpp` describes the format.
 #pragma once
 
 #include <algorithm>
@@ -22,9 +22,9 @@
 
 namespace orbis::slam::detail {
 
-/// Upper bound of all coordinates, metres: sums and products remain finite.
+/// Upper bound for all coordinates, metres: sums and products remain finite.
 inline constexpr double farthest = 1e12;
-/// Upper bound of rays at z = 1: their product with a depth, and its square, are finite.
+/// Upper bound for rays at z = 1: their product with a depth, and its square, are finite.
 inline constexpr double farthest_aside = 1e30;
 inline constexpr std::size_t bytes_of_keypoint = 76, bytes_of_observation = 8;
 
@@ -47,8 +47,8 @@ inline constexpr std::size_t bytes_of_keypoint = 76, bytes_of_observation = 8;
   return {x, y, from.take<double>()};
 }
 
-/// Reads section by section. Each function returns true if the section is valid and consistent with those before it;
-/// otherwise `problem` describes the error.
+/// Reads a map section by section. Each function returns true if the section is valid and consistent with the preceding
+/// ones; otherwise `problem` describes the error.
 class map_reader {
  public:
   using content = map_content<features::binary_descriptor<256>>;
@@ -99,7 +99,7 @@ class map_reader {
       const auto count = in.take<std::uint32_t>();
       if (in.ended() || in.left() / sizeof(keyframe_id) < count) return wrong(name + ": the section ends within it");
       if (parent != no_id && !to_.keyframes.contains(parent)) return wrong(name + ": its parent does not exist");
-      if (parent == no_id && std::exchange(root, k.id) != no_id) return wrong(name + ": a second root");
+      if (parent == no_id && std::exchange(root, k.id) != no_id) return wrong(name + ": more than one root");
       if (parent != no_id) children[parent].push_back(k.id);
       keyframe_id last;
       for (std::uint32_t i = 0; i != count; ++i) {
@@ -218,16 +218,16 @@ class map_reader {
     return true;
   }
 
-  /// Checks that the chains of replacements lead to existing keyframes, or to none.
+  /// Checks that each chain of replacements leads to an existing keyframe or to `no_id`.
   bool check_replacements() {
-    std::map<keyframe_id, keyframe_id> met;  // the keyframe from which each was reached first
+    std::map<keyframe_id, keyframe_id> met;  // the keyframe from which each id was first reached
     for (const auto& [id, e] : to_.erased)
       for (keyframe_id k = id; k != no_id && !to_.keyframes.contains(k);) {
         const auto at = to_.erased.find(k);
         if (at == to_.erased.end()) return wrong("keyframe " + to_string(id) + ": its replacement is forgotten");
         const auto [first, is_new] = met.emplace(k, id);
         if (!is_new && first->second == id) return wrong("keyframe " + to_string(id) + ": is its own replacement");
-        if (!is_new) break;  // the rest of the chain has been checked before
+        if (!is_new) break;  // the rest of the chain was checked before
         k = at->second.replacement;
       }
     return true;
@@ -288,7 +288,7 @@ class map_reader {
   content& to_;
   std::uint32_t version_;
   std::uint32_t keyframe_ids_ = 0, landmark_ids_ = 0;
-  std::vector<std::pair<landmark_id, landmark_id>> replacements_;  ///< of erased landmarks
+  std::vector<std::pair<landmark_id, landmark_id>> replacements_;  ///< erased landmarks and their replacements
 };
 
 }  // namespace orbis::slam::detail

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Slots of objects by id, for ids most of which are eventually erased.
+/// A table from ids to slots of objects, for ids most of which are eventually erased.
 #pragma once
 
 #include <cassert>
@@ -14,12 +14,13 @@
 
 namespace orbis::slam::detail {
 
-/// Stores a number for each of the ids 0, 1, 2 ...: the slot of its object, below `erased`; or, once it is erased,
-/// `erased` with the id that replaced it; or `gone`: erased without a replacement.
+/// Stores a number for each of the ids 0, 1, 2 ...: the slot of its object (less than `erased`); `erased` combined with
+/// the id of its replacement if it was replaced; or `gone` if it was erased without a replacement.
 ///
-/// Numbers are in pages of 256. A page whose ids are all erased is freed when `remembered` more ids have been assigned
-/// since; its ids are then `gone` and take 16 bytes per thousand. A page with one id that is not erased takes 1 kB. A
-/// robot that runs indefinitely therefore needs memory for the existing objects, and almost none for erased ones.
+/// Numbers are in pages of 256. A page whose ids are all erased is freed after `remembered` more ids have been
+/// assigned; its ids are then `gone` and take 16 bytes per thousand. A page with at least one id that is not erased
+/// takes 1 kB. A robot that runs indefinitely therefore needs memory for the existing objects, and almost none for
+/// erased ones.
 class paged_slots {
  public:
   static constexpr std::uint32_t erased = 0x80000000U;
@@ -28,7 +29,7 @@ class paged_slots {
 
   explicit paged_slots(std::uint32_t remembered) : remembered_{remembered} {}
   paged_slots(const paged_slots&) = default;
-  /// Moves the ids of `other`, which has none afterwards.
+  /// Takes the ids of `other`, which has none afterwards.
   paged_slots(paged_slots&& other) : paged_slots{other.remembered_} { swap(other); }
   paged_slots& operator=(paged_slots other) noexcept {
     swap(other);
@@ -70,15 +71,15 @@ class paged_slots {
     if (i / page_size != size_ / page_size) end_page(i);
   }
 
-  /// Returns the first id >= `i` that is not erased; `size()` if there is none. O(erased ids in between); a page whose
-  /// ids are all erased takes one step, as do 65536 ids that were `gone` from the start.
+  /// Returns the first id >= `i` that is not erased; `size()` if there is none. O(erased ids skipped); a page whose ids
+  /// are all erased takes one step, as do 65536 ids that were `gone` from the start.
   [[nodiscard]] std::uint32_t next_contained(std::uint32_t i) const noexcept {
     return next(
         i, [this](std::uint32_t page) { return contained_[page] != 0; },
         [](std::uint32_t slot) { return (slot & erased) == 0; });
   }
-  /// Returns the first id >= `i` that is not `gone`; `size()` if there is none. O(ids in between); a freed page takes
-  /// one step, as do 65536 ids that were `gone` from the start.
+  /// Returns the first id >= `i` that is not `gone`; `size()` if there is none. O(ids skipped); a freed page takes one
+  /// step, as do 65536 ids that were `gone` from the start.
   [[nodiscard]] std::uint32_t next_known(std::uint32_t i) const noexcept {
     return next(
         i, [](std::uint32_t) { return true; }, [](std::uint32_t slot) { return slot != gone; });
@@ -97,15 +98,15 @@ class paged_slots {
     return size_;
   }
 
-  /// Begins or ends the import of ids of another source, which were erased at other times. During the import no page is
-  /// freed; the imported erased ids count as erased at its end.
+  /// Begins or ends the import of ids from another source. During the import no page is freed; imported erased ids
+  /// count as erased at the end of the import.
   void adopt(bool on) noexcept {
     if (!on)
       for (; adopted_from_ < retired_.size(); ++adopted_from_) retired_[adopted_from_].since = size_;
     adopts_ = on;
     adopted_from_ = retired_.size();
   }
-  /// Heap memory in bytes.
+  /// Returns the heap memory in bytes.
   [[nodiscard]] std::size_t memory_bytes() const noexcept {
     return (chunks_.capacity() + pages_.capacity() + slots_.capacity() + free_.capacity()) * sizeof(std::uint32_t) +
            contained_.capacity() * sizeof(std::uint16_t) + retired_.size() * sizeof(retired_page);
@@ -148,7 +149,7 @@ class paged_slots {
   [[nodiscard]] bool has_chunk(std::uint32_t i) const noexcept {
     return i / chunk_size < chunks_.size() && chunks_[i / chunk_size] != none;
   }
-  /// The page of `slots_` that holds an id, or `none`.
+  /// Returns the page of `slots_` that contains an id, or `none`.
   [[nodiscard]] std::uint32_t page_of(std::uint32_t i) const noexcept {
     return has_chunk(i) ? pages_[place_of_page(i)] : none;
   }
@@ -177,7 +178,8 @@ class paged_slots {
     pages_[place_of_page(size_)] = free_.back();
     free_.pop_back();
   }
-  /// Completes the page of an id: it may be freed if all its ids are erased.
+  /// Must be called when an id of a fully assigned page is erased or the page becomes fully assigned: retires the page
+  /// if all its ids are erased.
   void end_page(std::uint32_t i) {
     if (remembered_ != no_id && contained_[page_of(i)] == 0) retired_.push_back({i, size_});
   }
@@ -186,10 +188,10 @@ class paged_slots {
   std::uint32_t size_ = 0;
   bool adopts_ = false;
   std::size_t adopted_from_ = 0;          ///< index in `retired_` of the first page of the import
-  std::vector<std::uint32_t> chunks_;     ///< by id / 2^16: index of a group of 256 `pages_`; or `none`
-  std::vector<std::uint32_t> pages_;      ///< by group of 256 ids: index of the page of `slots_`, or `none`
+  std::vector<std::uint32_t> chunks_;     ///< for each id / 2^16: index of a group of 256 `pages_`, or `none`
+  std::vector<std::uint32_t> pages_;      ///< for each group of 256 ids: index of the page of `slots_`, or `none`
   std::vector<std::uint32_t> slots_;      ///< page after page
-  std::vector<std::uint16_t> contained_;  ///< by page of `slots_`: number of its ids that are not erased
+  std::vector<std::uint16_t> contained_;  ///< for each page of `slots_`: number of its ids that are not erased
   std::vector<std::uint32_t> free_;       ///< unused pages of `slots_`
   std::deque<retired_page> retired_;      ///< pages whose ids are all erased, the oldest first
 };

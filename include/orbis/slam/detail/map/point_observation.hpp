@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The observation of a point by a keypoint, and the test for their agreement.
+/// The observation of a point by a keypoint, and the test whether they agree.
 #pragma once
 
 #include <algorithm>
@@ -16,8 +16,8 @@
 
 namespace orbis::slam::detail {
 
-/// Returns the observation of `point` (world, metres), which may be any point, by keypoint `i` of a frame: the
-/// deviation of the keypoint is a pixel of its level.
+/// Returns the observation of any `point` (world, metres) by keypoint `i` of a frame; the standard deviation of the
+/// keypoint is a pixel of its level.
 template <camera::camera_model Camera, feature_descriptor D>
 [[nodiscard]] optimize::pose_observation make_observation(const camera_rig<Camera>& rig, const basic_frame<D>& f,
                                                           std::size_t i, const vec3& point) {
@@ -29,9 +29,9 @@ template <camera::camera_model Camera, feature_descriptor D>
   return o;
 }
 
-/// Sets the weights of an observation of the keypoint's own landmark. `deviation`: of the keypoint's position, pixels
-/// of its level (`basic_frame::deviation`). The deviation of the depth remains the same, except that the third residual
-/// contains that of the pixel.
+/// Sets the weights of an observation of the keypoint's own landmark. `deviation`: standard deviation of the keypoint's
+/// position, pixels of its level (`basic_frame::deviation`). The standard deviation of the depth is unchanged, but the
+/// third residual also contains that of the pixel.
 inline void set_deviation(optimize::pose_observation& o, double deviation) {
   o.information /= deviation * deviation;
   o.depth_weight = std::min(1.0, deviation);
@@ -46,7 +46,7 @@ template <camera::camera_model Camera, feature_descriptor D>
   return o;
 }
 
-/// The chi-square limit at 95 % of a squared error in standard deviations, with two coordinates, or three with depth.
+/// The 95 % chi-square limit for a squared error in standard deviations, with two coordinates, or three with depth.
 [[nodiscard]] constexpr double error_limit(bool has_depth) noexcept {
   return optimize::chi_squared_gate(has_depth ? 3 : 2);
 }

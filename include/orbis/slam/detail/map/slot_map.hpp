@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Objects by id. Ids remain valid while other objects are added and erased.
+/// A container of objects with ids that remain valid while other objects are added and erased.
 #pragma once
 
 #include <cassert>
@@ -17,16 +17,15 @@
 
 namespace orbis::slam::detail {
 
-/// Objects with the ids 0, 1, 2 ... in the order in which they were added. No id is reused, but the memory of erased
-/// objects is. An erased id remembers its replacement, if any, at least until `remembered` more ids have been assigned
-/// (`no_id`: indefinitely). References stay valid until their object is erased. All operations take O(1) unless stated
-/// otherwise.
+/// Objects with the ids 0, 1, 2 ... in the order of insertion. Ids are not reused; the memory of erased objects is. The
+/// replacement of an erased id, if any, is known at least until `remembered` more ids have been assigned (`no_id`:
+/// indefinitely). References stay valid until their object is erased. All operations take O(1) unless stated otherwise.
 template <std::default_initializable T, class Id, std::uint32_t remembered = no_id>
 class slot_map {
  public:
   static constexpr std::uint32_t most_ids = 0x7fffffffU;
 
-  /// Adds an object and returns its id. @pre fewer than `most_ids` ids assigned so far
+  /// Adds an object and returns its id. @pre fewer than `most_ids` ids have been assigned
   Id add(T value) {
     assert(slots_.size() < most_ids);
     std::uint32_t slot = static_cast<std::uint32_t>(items_.size());
@@ -41,8 +40,8 @@ class slot_map {
     return last_id();
   }
 
-  /// Begins or ends the import of objects and ids of another store, for example a file. Ids erased there count as
-  /// erased at the end of the import.
+  /// Begins or ends the import of objects and ids from another source, such as a file. Erased ids of the source count
+  /// as erased at the end of the import.
   void adopt(bool on) noexcept { slots_.adopt(on); }
   /// Adds an id whose object is already erased.
   /// @pre `replacement` is `no_id`, or the id of an object that will be added
@@ -82,15 +81,15 @@ class slot_map {
   [[nodiscard]] bool empty() const noexcept { return size() == 0; }
   /// The id of the next object.
   [[nodiscard]] Id end_id() const noexcept { return slots_.size(); }
-  /// Returns the first id >= `i` that has an object; `end_id()` if there is none. O(erased ids in between), in steps of
-  /// 256 where all are erased.
+  /// Returns the first id >= `i` that has an object; `end_id()` if there is none. O(erased ids skipped), in steps of
+  /// 256 if all 256 are erased.
   [[nodiscard]] Id next_id(Id i) const noexcept { return slots_.next_contained(i.value()); }
   /// Returns the first id >= `i` that has an object or a replacement; `end_id()` if there is none. Cost as for
   /// `next_id`.
   [[nodiscard]] Id next_known_id(Id i) const noexcept { return slots_.next_known(i.value()); }
 
-  /// Returns `i` itself if its object exists; otherwise its replacement, following the chain of replacements; `no_id`
-  /// if there is none, or if it was forgotten. O(replacements).
+  /// Returns `i` if its object exists; otherwise its replacement, following the chain of replacements; `no_id` if there
+  /// is none, or if it was forgotten. O(replacements).
   [[nodiscard]] Id replacement(Id i) const noexcept {
     std::uint32_t at = i.value();
     while (at < slots_.size()) {
@@ -102,8 +101,8 @@ class slot_map {
     return no_id;
   }
 
-  /// Appends all objects and erased ids of `other`, which count as erased now. Returns the amount by which its ids
-  /// grow. Ids inside the objects are not changed. O(ids of `other`), in steps of 256 for ids forgotten long ago.
+  /// Appends all objects and erased ids of `other`; the latter count as erased now. Returns the offset added to its
+  /// ids. Ids inside the objects are not changed. O(ids of `other`), in steps of 256 for ids forgotten long ago.
   /// @pre at most `most_ids` ids in all
   std::uint32_t append(slot_map&& other) {
     assert(other.slots_.size() <= most_ids - slots_.size());
@@ -124,7 +123,7 @@ class slot_map {
     return offset;
   }
 
-  /// Iterates over the objects by ascending id.
+  /// Iterates over the objects in ascending order of id.
   class const_iterator {
    public:
     using value_type = T;
@@ -165,7 +164,7 @@ class slot_map {
  private:
   [[nodiscard]] Id last_id() const noexcept { return slots_.size() - 1; }
 
-  paged_slots slots_{remembered};  ///< by id: index in `items_`
+  paged_slots slots_{remembered};  ///< for each id: index in `items_`
   std::deque<T> items_;
   std::vector<std::uint32_t> free_;  ///< slots without an object
 };

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Turns a frame into a keyframe, and its depth into landmarks.
+/// Insertion of a frame into a map as a keyframe, with landmarks from its depth.
 #pragma once
 
 #include <algorithm>
@@ -14,8 +14,8 @@
 
 namespace orbis::slam::detail {
 
-/// Returns the keypoints that become landmarks: those with depth that observe none yet, the nearest first; all that are
-/// closer than `o.close_depth`, and at least `o.min_new_landmarks` if that many exist.
+/// Returns the keypoints that become landmarks: keypoints with depth that observe no landmark yet, the nearest first;
+/// all that are closer than `o.close_depth`, and at least `o.min_new_landmarks` if available.
 template <feature_descriptor D>
 [[nodiscard]] std::vector<std::uint32_t> new_landmark_keypoints(const basic_frame<D>& f, const options& o) {
   std::vector<std::uint32_t> with_depth;
@@ -34,7 +34,7 @@ template <feature_descriptor D>
 /// id.
 template <feature_descriptor D>
 keyframe_id insert_keyframe(basic_map<D>& m, basic_frame<D> f, const options& o) {
-  f.as_read = {};  // the map does not use rows
+  f.as_read = {};  // the map does not use row times
   const keyframe_id id = m.add_keyframe(std::move(f));
   for (const landmark_id l : m.at(id).landmarks)
     if (l != no_id) m.update_landmark(l);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Finds and fuses duplicate landmarks around a keyframe.
+/// Search for duplicate landmarks around a keyframe, and their fusion.
 ///
 /// Source: R. Mur-Artal, J. M. M. Montiel, J. D. Tardos, "ORB-SLAM: a versatile and accurate monocular SLAM system",
 /// T-RO 31 (2015), sections VI.C and VII.C.
@@ -27,14 +27,14 @@
 namespace orbis::slam::detail {
 
 struct fusion_counts {
-  std::size_t fused = 0;     ///< landmarks fused into another one
-  std::size_t observed = 0;  ///< added observations
+  std::size_t fused = 0;     ///< number of landmarks fused into another one
+  std::size_t observed = 0;  ///< number of added observations
 };
 
-/// Searches for landmarks in a keyframe that does not observe them. A found keypoint that observes another landmark
-/// fuses both: the one with fewer observations into the other, or the younger into the older if they have the same
-/// number. A keypoint that observes none gets an observation. The descriptors must match, and the position must agree
-/// with the keypoint (95 %). Changed landmarks are updated.
+/// Searches for landmarks in a keyframe that does not observe them. If the keypoint found observes another landmark,
+/// both are fused: the one with fewer observations into the other, or the younger into the older if the numbers are
+/// equal. If it observes none, an observation is added. The descriptors must match, and the position must agree with
+/// the keypoint (95 %). Changed landmarks are updated.
 template <feature_descriptor D, camera::camera_model Camera>
 fusion_counts fuse_into(basic_map<D>& m, keyframe_id id, std::span<const landmark_id> landmarks,
                         const camera_rig<Camera>& rig, const fusion_options& o = {}) {
@@ -68,8 +68,8 @@ fusion_counts fuse_into(basic_map<D>& m, keyframe_id id, std::span<const landmar
   return counts;
 }
 
-/// Searches for the landmarks of a keyframe in its neighbours and their neighbours, and for their landmarks in it
-/// (`fuse_into`). O(neighbours).
+/// Searches for the landmarks of a keyframe in its neighbours and their neighbours, and vice versa (`fuse_into`).
+/// O(neighbours).
 template <feature_descriptor D, camera::camera_model Camera>
 fusion_counts fuse_with_neighbors(basic_map<D>& m, keyframe_id id, const camera_rig<Camera>& rig,
                                   const fusion_options& o = {}) {

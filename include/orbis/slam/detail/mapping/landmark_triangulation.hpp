@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Triangulation of new landmarks from matching keypoints of two keyframes: for points without depth.
+/// Triangulation of new landmarks, for points without depth, from matching keypoints of two keyframes.
 ///
 /// Sources: R. Mur-Artal, J. M. M. Montiel, J. D. Tardos, "ORB-SLAM: a versatile and accurate monocular SLAM system",
 /// T-RO 31 (2015), section VI.C; R. Mur-Artal, J. D. Tardos, "ORB-SLAM2", T-RO 33 (2017), section III.A, for the
-/// weight of depth against parallax.
+/// choice between depth and parallax.
 #pragma once
 
 #include <algorithm>
@@ -40,7 +40,7 @@ template <feature_descriptor D>
 struct free_keypoints {
   orbis::features::basic_features<D> features;
   std::vector<vec3> rays;
-  std::vector<std::uint32_t> index;  ///< in the keyframe
+  std::vector<std::uint32_t> index;  ///< index of each keypoint in the keyframe
 
   void assign(const basic_keyframe<D>& k) {
     features.keypoints.clear();
@@ -84,8 +84,8 @@ struct view_pair {
   }
 
  private:
-  /// Computes the point by triangulation or depth, whichever has the larger parallax; the parallax of depth is that of
-  /// the virtual stereo camera.
+  /// Computes the point by triangulation or from depth, whichever has the larger parallax; for depth, that is the
+  /// parallax of the virtual stereo camera.
   [[nodiscard]] std::optional<vec3> place(std::uint32_t i, std::uint32_t j) const {
     const double of_a = stereo_parallax(a, i), of_b = stereo_parallax(b, j);
     const auto met = optimize::triangulate(a.T_world_camera, a.rays[i], b.T_world_camera, b.rays[j],
@@ -98,14 +98,15 @@ struct view_pair {
   }
 };
 
-/// Matches keypoints without a landmark of a keyframe with those of its best neighbours, along epipolar lines, and
-/// creates landmarks from the matches. The position is triangulated, or taken from the depth of either keypoint if that
-/// is more precise. A match becomes a landmark with both observations if
+/// Matches keypoints without landmarks between a keyframe and its best neighbours, along epipolar lines, and creates
+/// landmarks from the matches. The position is triangulated, or taken from the depth of either keypoint if that is more
+/// precise. A match becomes a landmark with both observations if
 /// - it is in front of both cameras;
 /// - the angle between the rays is large enough (not required if depth is used);
 /// - it agrees with both keypoints (chi-square, 95 %), and with their depth if available;
 /// - the ratio of its distances agrees with the keypoints' pyramid levels.
-/// Returns the number of new landmarks. O(neighbours x keypoints^2) distances to lines. @pre m.has_keyframe(newest)
+/// Returns the number of new landmarks. Computes O(neighbours x keypoints^2) distances to epipolar lines. @pre
+/// m.has_keyframe(newest)
 template <feature_descriptor D, camera::camera_model Camera>
 std::size_t triangulate_landmarks(basic_map<D>& m, keyframe_id newest, const camera_rig<Camera>& rig,
                                   const triangulation_options& o = {}) {

@@ -2,7 +2,7 @@
 /// @file
 /// Local bundle adjustment: a keyframe, its neighbours, and the landmarks they observe.
 ///
-/// Callers that share the map lock it for `take` and `apply` only:
+/// Callers that share the map lock it only for `take` and `apply`:
 ///
 /// @code
 ///   snapshot s = take(map, newest, rig, options);                       // reads the map
@@ -10,7 +10,7 @@
 ///   apply(map, s, solved);                                              // changes the map
 /// @endcode
 ///
-/// Between `take` and `apply`, keyframes, landmarks and observations may be added to the map or erased. No other thread
+/// Keyframes, landmarks and observations may be added to the map or erased between `take` and `apply`. No other thread
 /// may move the copied keyframes and landmarks.
 ///
 /// Source: R. Mur-Artal, J. M. M. Montiel, J. D. Tardos, "ORB-SLAM: a versatile and accurate monocular SLAM system",
@@ -41,7 +41,7 @@ namespace orbis::slam::detail::local_adjustment {
 struct snapshot : bundle_snapshot {
   std::vector<keyframe_id> moving;  ///< the keyframes whose landmarks are adjusted, the newest first
 
-  /// Returns the index of a keyframe in the arrays; the number of keyframes if it is not among them.
+  /// Returns the index of a keyframe in the arrays; the number of keyframes if it is not found.
   [[nodiscard]] std::uint32_t index_of(keyframe_id k) const {
     const auto at = std::lower_bound(keyframes.begin(), keyframes.end(), k);
     return static_cast<std::uint32_t>((at != keyframes.end() && *at == k ? at : keyframes.end()) - keyframes.begin());
@@ -52,9 +52,10 @@ struct snapshot : bundle_snapshot {
   return {.robust_iterations = o.robust_iterations, .iterations = o.iterations, .keep_partial = true};
 }
 
-/// Copies keyframe `newest`, the keyframes that share most with it, and their landmarks. Other keyframes that observe
-/// these landmarks are included but held fixed, as are the root of the map and keyframes localised by depth. Empty if
-/// there is nothing to adjust. `memory`: a previous snapshot, whose memory is reused. O(observations of the landmarks).
+/// Copies keyframe `newest`, the keyframes that share the most landmarks with it, and their landmarks. Other keyframes
+/// that observe these landmarks are included but held fixed, as are the root of the map and keyframes localised by
+/// depth. Empty if there is nothing to adjust. `memory`: a previous snapshot, whose memory is reused. O(observations of
+/// the landmarks).
 /// @pre m.has_keyframe(newest)
 template <feature_descriptor D, camera::camera_model Camera>
 [[nodiscard]] snapshot take(const basic_map<D>& m, keyframe_id newest, const camera_rig<Camera>& rig,
@@ -90,8 +91,8 @@ template <feature_descriptor D, camera::camera_model Camera>
   return s;
 }
 
-/// Returns the motion of a keyframe in the world; for one that was added later, that of its nearest ancestor in the
-/// snapshot. Empty if it did not move.
+/// Returns the motion of a keyframe in the world frame; for a keyframe added later, the motion of its nearest ancestor
+/// in the snapshot. Empty if it did not move.
 template <feature_descriptor D>
 [[nodiscard]] std::optional<se3> find_motion(const basic_map<D>& m, keyframe_id k, const snapshot& s,
                                              const bundle_solution& solved) {
@@ -103,9 +104,9 @@ template <feature_descriptor D>
   return solved.poses[i] * s.poses[i].inverse();
 }
 
-/// Writes a solution into the map, if it is usable. Keyframes that were added since `take` move with their ancestor in
-/// the spanning tree, landmarks with the keyframe that created them. Outliers are erased, as are landmarks whose
-/// position is no longer determined.
+/// Writes a solution to the map if it is usable. Keyframes added since `take` move with their ancestor in the spanning
+/// tree, and landmarks added since then with the keyframe that created them. Outliers are erased, as are landmarks
+/// whose position is no longer determined.
 template <feature_descriptor D>
 void apply(basic_map<D>& m, const snapshot& s, const bundle_solution& solved) {
   if (!solved.usable) return;

@@ -34,8 +34,8 @@ template <feature_descriptor D>
 }
 
 /// Returns true if a landmark is unreliable at the time of keyframe `newest`: rarely found where it is expected, or
-/// hardly observed by the keyframes after the one that created it. Always false for landmarks of the newest keyframe.
-/// Source: R. Mur-Artal, J. M. M. Montiel, J. D. Tardos, "ORB-SLAM", T-RO 31 (2015), section VI.B.
+/// observed by too few of the keyframes after the one that created it. Always false for landmarks of the newest
+/// keyframe. Source: R. Mur-Artal, J. M. M. Montiel, J. D. Tardos, "ORB-SLAM", T-RO 31 (2015), section VI.B.
 template <feature_descriptor D>
 [[nodiscard]] bool is_unreliable(const basic_map<D>& m, const basic_landmark<D>& l, keyframe_id newest,
                                  const culling_options& o) {
@@ -48,7 +48,7 @@ template <feature_descriptor D>
 }
 
 /// Removes the unreliable landmarks among those observed by the last keyframes and the neighbours of the newest one.
-/// Call after each keyframe. Returns the number removed. O(observations of these keyframes).
+/// Call after each keyframe. Returns the number of removed landmarks. O(observations of these keyframes).
 template <feature_descriptor D>
 std::size_t cull_landmarks(basic_map<D>& m, keyframe_id newest, const culling_options& o) {
   std::vector<keyframe_id> around;
@@ -65,9 +65,9 @@ std::size_t cull_landmarks(basic_map<D>& m, keyframe_id newest, const culling_op
   return removed;
 }
 
-/// Returns true if enough of a keyframe's landmarks that are closer than `close_depth` (metres; infinite if no depth is
-/// measured, so that all count) are observed by enough other keyframes at the same or a finer pyramid level. False for
-/// a keyframe without close landmarks. O(observations of its landmarks). Source: R. Mur-Artal, J. D. Tardos,
+/// Returns true if enough of a keyframe's landmarks closer than `close_depth` (metres; infinite if no depth is
+/// measured, so that all count) are observed by enough other keyframes at about the same or a finer pyramid level.
+/// False for a keyframe without close landmarks. O(observations of its landmarks). Source: R. Mur-Artal, J. D. Tardos,
 /// "ORB-SLAM2", T-RO 33 (2017), section III.C, after ORB-SLAM (2015), VI.E.
 template <feature_descriptor D>
 [[nodiscard]] bool is_redundant(const basic_map<D>& m, keyframe_id id, double close_depth, const culling_options& o) {
@@ -88,9 +88,9 @@ template <feature_descriptor D>
 }
 
 /// Erases the redundant neighbours of keyframe `newest`, the strongest first; each is tested after the previous ones
-/// were erased. Keeps the root and the keyframes for which `keep(id)` is true. Keyframes with loop edges are erased
-/// like others, and their edges pass to the replacement (ORB-SLAM keeps such keyframes: a map that closes loops for
-/// days would grow by two keyframes for each). Returns the erased ones.
+/// have been erased. Keeps the root and the keyframes for which `keep(id)` is true. Keyframes with loop edges are
+/// erased like others, and their edges are moved to the replacement (ORB-SLAM keeps such keyframes: a map with loop
+/// closures over days would grow by two keyframes per loop). Returns the erased keyframes.
 template <feature_descriptor D, std::predicate<keyframe_id> Keep>
 std::vector<keyframe_id> cull_keyframes(basic_map<D>& m, keyframe_id newest, double close_depth,
                                         const culling_options& o, Keep&& keep) {
@@ -113,8 +113,8 @@ class local_mapper {
  public:
   explicit local_mapper(shared_state<Camera, D, Places>& shared) : shared_{shared}, solver_{shared.rig.model} {}
 
-  /// Adds the keyframe to place recognition, and improves the map around it. Does nothing if it no longer exists. Calls
-  /// `stop_requested()` before each step of the adjustment: true ends it early.
+  /// Adds the keyframe to place recognition, and improves the map around it. Does nothing if the keyframe no longer
+  /// exists. Calls `stop_requested()` before each step of the adjustment, which ends early if the result is true.
   void process(map_keyframe k, const std::function<bool()>& stop_requested) {
     std::vector<keyframe_event> culled;
     {
@@ -154,7 +154,7 @@ class local_mapper {
   }
   std::vector<keyframe_event> cull(basic_map<D>& m, map_keyframe newest) {
     return shared_.locked([&] {
-      // The events are made while the keyframes exist. Newer keyframes have not been mapped yet and are kept.
+      // Create the events while the keyframes exist. Newer keyframes have not been mapped yet and are kept.
       std::vector<keyframe_event> judged;
       const auto keep = [&](keyframe_id k) {
         if (k > newest.keyframe) return true;

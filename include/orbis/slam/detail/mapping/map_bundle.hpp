@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A part of a map as a bundle adjustment problem: copied from the map, solved, and solved again without outliers.
+/// A part of a map as a bundle adjustment problem: copied from the map, solved, and solved again after exclusion of
+/// outliers.
 #pragma once
 
 #include <algorithm>
@@ -28,19 +29,19 @@ namespace orbis::slam::detail {
 /// Keyframes, landmarks and observations of a map, as arrays.
 struct bundle_snapshot {
   std::vector<keyframe_id> keyframes;                      ///< ascending
-  std::vector<std::uint8_t> is_fixed;                      ///< by keyframe: 1 if its pose is held fixed
-  std::vector<se3> poses;                                  ///< by keyframe: `T_world_camera`
+  std::vector<std::uint8_t> is_fixed;                      ///< for each keyframe: 1 if its pose is held fixed
+  std::vector<se3> poses;                                  ///< `T_world_camera` of each keyframe
   std::vector<landmark_id> landmarks;                      ///< ascending
-  std::vector<vec3> points;                                ///< by landmark: in the world, metres
-  std::vector<optimize::bundle_observation> observations;  ///< `pose` and `point` index the arrays above
-  std::vector<observation> sources;                        ///< by observation: the keyframe and keypoint
-  keyframe_id end_keyframe = 0;                            ///< this id and greater ones were added to the map later
+  std::vector<vec3> points;                                ///< position of each landmark in the world frame, metres
+  std::vector<optimize::bundle_observation> observations;  ///< `pose` and `point` are indices into the arrays above
+  std::vector<observation> sources;                        ///< keyframe and keypoint of each observation
+  keyframe_id end_keyframe = 0;                            ///< keyframes from this id on were added to the map later
   landmark_id end_landmark = 0;
 
   /// Returns true if there is nothing to adjust.
   [[nodiscard]] bool empty() const noexcept { return observations.empty(); }
 
-  /// Empties the arrays, keeping their memory.
+  /// Clears the arrays but keeps their memory.
   void clear() {
     keyframes.clear();
     is_fixed.clear();
@@ -55,7 +56,7 @@ struct bundle_snapshot {
     poses.push_back(T_world_camera);
     is_fixed.push_back(fixed ? 1 : 0);
   }
-  /// Adds a landmark with the observations by keyframes for which `index_of(id)` returns an index, not `no_id`.
+  /// Adds a landmark with the observations by those keyframes for which `index_of(id)` is not `no_id`.
   template <feature_descriptor D, camera::camera_model Camera, class IndexOf>
   void add_landmark(const basic_map<D>& m, const basic_landmark<D>& l, const camera_rig<Camera>& rig,
                     IndexOf&& index_of) {
@@ -72,7 +73,7 @@ struct bundle_snapshot {
   }
 };
 
-/// Returns true if at least two keyframes for which `index_of(id)` returns an index observe a landmark.
+/// Returns true if at least two keyframes for which `index_of(id)` is not `no_id` observe a landmark.
 template <feature_descriptor D, class IndexOf>
 [[nodiscard]] bool is_shared(const basic_landmark<D>& l, const IndexOf& index_of) {
   const auto takes_part = [&](const observation& by) { return index_of(by.keyframe) != no_id; };
@@ -94,22 +95,22 @@ bool erase_outlier(basic_map<D>& m, landmark_id l, const observation& source) {
 struct bundle_solution {
   std::vector<se3> poses;
   std::vector<vec3> points;
-  std::vector<std::uint8_t> outliers;  ///< by observation: 1 if it disagrees with the result
+  std::vector<std::uint8_t> outliers;  ///< for each observation: 1 if it disagrees with the result
   bool usable = false;                 ///< true if poses and points are valid, and better than before
-  bool complete = false;               ///< false if it was stopped, or failed
+  bool complete = false;               ///< false if the adjustment was stopped or failed
   int iterations = 0;
   double initial_cost = 0.0;  ///< half the robust cost (sum of robustified squared errors)
-  double final_cost = 0.0;    ///< the same at the end, without outliers
+  double final_cost = 0.0;    ///< half the robust cost at the end, excluding outliers
 };
 
 struct bundle_schedule {
-  int robust_iterations = 5;  ///< maximum number with all observations
-  int iterations = 5;         ///< maximum number without the outliers
+  int robust_iterations = 5;  ///< maximum number of iterations with all observations
+  int iterations = 5;         ///< maximum number of iterations after exclusion of the outliers
   double relative_tolerance = 1e-6;
   bool keep_partial = false;  ///< uses the partial result if the adjustment is stopped
 };
 
-/// Solves snapshots. It keeps its memory: the next problem allocates almost nothing if it is not larger.
+/// Solves snapshots. Memory is reused: a subsequent problem allocates almost nothing unless it is larger.
 template <camera::camera_model Camera>
 class bundle_solver {
  public:
@@ -170,8 +171,8 @@ class bundle_solver {
       to.outliers[i] = squared_[i] > error_limit(!std::isnan(s.observations[i].right)) ? 1 : 0;
   }
 
-  /// Removes the marks of observations that agree with the current poses and points if the deviation of their pixel is
-  /// one pixel of its level: a patch that is slightly off remains an observation.
+  /// Unmarks the observations that agree with the current poses and points if the standard deviation of their pixel is
+  /// one pixel of its level: a slightly misplaced patch remains an observation.
   void keep_rough(const bundle_snapshot& s, bundle_solution& to) const {
     for (std::size_t i = 0; i != s.observations.size(); ++i) {
       const optimize::bundle_observation& o = s.observations[i];

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Refinement of the pose of a frame together with the motion during its read-out.
+/// Refinement of a frame's pose together with the camera motion during its read-out.
 #pragma once
 
 #include <algorithm>
@@ -28,24 +28,24 @@ namespace orbis::slam::detail {
 /// A pose and the twist of the camera at its time.
 struct moving_pose {
   se3 T_world_camera;
-  vec6 twist = zeros<vec6>();  ///< motion of the camera in its own frame, per second, translation first
+  vec6 twist = zeros<vec6>();  ///< twist of the camera in its own frame, per second, translation first
 };
 
-/// The prior of the twist, before the frame is used: the mean motion since a previous pose, extrapolated by part of its
-/// change, with a deviation for the acceleration of a hand-held camera. Without a previous pose, the prior only limits
-/// the twist to that of a hand-held camera.
+/// The prior of the twist, independent of the frame's measurements: the mean motion since a previous pose, extrapolated
+/// by part of its change, with a standard deviation for the acceleration of a hand-held camera. Without a previous
+/// pose, the prior only limits the twist to that of a hand-held camera.
 struct twist_prior {
   std::optional<se3> T_world_before{};  ///< the previous pose ...
-  double interval = 0.0;                ///< ... and the seconds since
-  double trend = 0.0;                   ///< part of the change from `twist_before` to the mean motion that is added
-  vec6 twist_before = zeros<vec6>();    ///< at the previous pose; without one, the expected twist
+  double interval = 0.0;                ///< ... and the time since then, seconds
+  double trend = 0.0;                   ///< share of the change since `twist_before` that is added to the mean motion
+  vec6 twist_before = zeros<vec6>();    ///< twist at the previous pose; without one, the expected twist
   double translation_deviation = 0.5;   ///< metres per second
   double rotation_deviation = 1.0;      ///< radians per second
 
-  /// Returns the prior `interval` seconds after a previous frame. With constant acceleration a trend of 1 is exact, but
-  /// errors of the twist would alternate indefinitely; a trend of one half damps them. @pre interval > 0
+  /// Returns the prior `interval` seconds after a previous frame. With constant acceleration, a trend of 1 is exact,
+  /// but errors of the twist would oscillate indefinitely; a trend of one half damps them. @pre interval > 0
   [[nodiscard]] static twist_prior after(const moving_pose& before, double interval, bool twist_is_known) {
-    constexpr double acceleration = 6.0;  // metres, or radians, per second squared
+    constexpr double acceleration = 6.0;  // metres or radians per second squared
     const twist_prior unknown;
     const double deviation = 0.5 * acceleration * interval;
     return {before.T_world_camera,
@@ -67,10 +67,10 @@ struct twist_prior {
 /// A keypoint as read, and the known point that it observes.
 struct row_observation {
   optimize::pose_observation seen;
-  double time = 0.0;  ///< of its row, relative to the frame, seconds
+  double time = 0.0;  ///< time of its row relative to the frame, seconds
 };
 
-/// Returns the mean twist of the camera from a frame to a later one; zero if it is not later.
+/// Returns the mean twist of the camera from one frame to a later one; zero if the other frame is not later.
 template <feature_descriptor D>
 [[nodiscard]] vec6 motion_between(const basic_frame<D>& before, const basic_frame<D>& after) {
   const double interval = after.timestamp - before.timestamp;
@@ -78,7 +78,7 @@ template <feature_descriptor D>
   return (before.T_world_camera.inverse() * after.T_world_camera).log() / interval;
 }
 
-/// Finds the observations of landmarks by the keypoints of a frame, as read if the rows have times. O(features).
+/// Finds the observations of landmarks by the keypoints of a frame, as read if available. O(features).
 template <feature_descriptor D, camera::camera_model Camera>
 void find_row_observations(const basic_frame<D>& f, const basic_map<D>& m, const camera_rig<Camera>& rig,
                            std::vector<row_observation>& to) {
@@ -101,18 +101,18 @@ void find_row_observations(const basic_frame<D>& f, const basic_map<D>& m, const
   }
 }
 
-/// Returns the depth of the landmark that keypoint `i` of a frame observes, metres; 0 without one.
+/// Returns the depth of the landmark that keypoint `i` of a frame observes, metres; 0 if there is none.
 template <feature_descriptor D>
 [[nodiscard]] double landmark_depth(const basic_frame<D>& f, std::size_t i, const basic_map<D>& m) {
   return f.landmarks[i] == no_id ? 0.0 : (f.T_world_camera.inverse() * m.landmark_at(f.landmarks[i]).position).z();
 }
 
-/// Width of Huber's loss of these residuals, standard deviations: as in the refinement of the pose alone.
+/// Width of the Huber loss for these residuals, in standard deviations: as in pose-only refinement.
 inline constexpr double row_loss_width = 2.447;
 
 /// Returns the residual of an observation, and its derivative with respect to a motion of the camera frame (`exp(step)
-/// * T_camera_world`) at the time of its row; the derivative with respect to the twist is `-o.time` times this. Empty
-/// if the point has no projection.
+/// * T_camera_world`) at the time of its row; the derivative with respect to the twist is `-o.time` times that
+/// derivative. Empty if the point has no projection.
 template <camera::camera_model Camera>
 [[nodiscard]] std::optional<vec3> row_residual(const optimize::reprojection<Camera>& model, const se3& T_camera_world,
                                                const vec6& twist, const row_observation& o, matrix<3, 6>& j) {
@@ -124,15 +124,15 @@ template <camera::camera_model Camera>
   return r;
 }
 
-/// A cost of pose and twist, to second order around `at`, from measurements other than keypoints. The steps are a
-/// motion of the camera frame (`exp(step) * T_camera_world`), then a change of the twist.
+/// A cost of pose and twist to second order around `at`, from measurements other than keypoints. A step consists of a
+/// motion of the camera frame (`exp(step) * T_camera_world`) and a change of the twist.
 struct pose_quadratic {
   moving_pose at;
   matrix<12, 12> h = zeros<matrix<12, 12>>();
   matrix<12, 1> g = zeros<matrix<12, 1>>();
   double cost = 0.0;
 
-  /// Treats the twist as known: the cost no longer depends on it.
+  /// Treats the twist as known, so that the cost no longer depends on it.
   void hold_twist() {
     for (int i = 0; i != 12; ++i)
       for (int k = 6; k != 12; ++k) h(i, k) = h(k, i) = 0.0;
@@ -140,7 +140,7 @@ struct pose_quadratic {
   }
 };
 
-/// Inputs of the refinement of a pose other than the keypoints.
+/// Inputs of pose refinement other than the keypoints.
 struct refinement_terms {
   const pose_quadratic* other = nullptr;  ///< an additional cost, or null
   bool moves = true;                      ///< true if the camera moves during read-out; otherwise the twist is fixed
@@ -153,7 +153,7 @@ struct moving_pose_equations {
   double cost = 0.0;  ///< half the robust cost
 };
 
-/// Sets the equations for a pose and its twist (h, g of `to`) from equations in powers of the rows' times.
+/// Sets the equations for a pose and its twist (h, g of `to`) from equations in powers of the row times.
 template <class Equations>
 void set_parts(Equations& to, const std::array<mat6, 3>& h, const std::array<vec6, 2>& g) {
   set_block(to.h, 0, 0, h[0]);
@@ -163,8 +163,8 @@ void set_parts(Equations& to, const std::array<mat6, 3>& h, const std::array<vec
   to.g = stacked(g[0], g[1]);
 }
 
-/// Adds the other constraints on pose and twist to the equations of the keypoints, which are given in powers of the
-/// rows' times.
+/// Adds the other constraints on pose and twist to the equations of the keypoints, which are given in powers of the row
+/// times.
 inline void add_terms(moving_pose_equations& e, const std::array<mat6, 3>& h, const std::array<vec6, 2>& g,
                       const se3& T_camera_world, const vec6& twist, const twist_prior& prior,
                       const refinement_terms& terms) {
@@ -228,28 +228,28 @@ template <camera::camera_model Camera>
   return e;
 }
 
-/// Returns the diagonal matrix of the squared deviations times the square of `factor`.
+/// Returns the diagonal matrix of the squared standard deviations times the square of `factor`.
 [[nodiscard]] inline mat6 prior_covariance(const twist_prior& prior, double factor) {
   const double t = factor * prior.translation_deviation, r = factor * prior.rotation_deviation;
   return diagonal_matrix(stacked(filled<vec3>(t * t), filled<vec3>(r * r)));
 }
 
-/// The twist that moves a depth image taken before its frame to the frame's time.
+/// The twist used to correct a depth image captured before its frame to the frame's time.
 ///
-/// A twist follows from the poses around it, and the pose of the frame from depth that was moved by the twist. If depth
-/// comes after the frame, an error of the pose feeds back with the opposite sign and decays; if it comes before, a
-/// direction that pixels hardly determine would oscillate from frame to frame with growing amplitude. Such a depth
-/// image therefore follows the refined twist only as far as pixels alone determine it, and the previous twist
-/// otherwise, with the gain of R. E. Kalman, "A new approach to linear filtering and prediction problems", J. Basic
-/// Engineering 82 (1960).
+/// A twist depends on the poses before and after it, and the pose of the frame depends on depth that was corrected by
+/// the twist. If the depth image is captured after the frame, an error of the pose feeds back with the opposite sign
+/// and decays; if before, the pose would oscillate from frame to frame with growing amplitude in directions that pixels
+/// hardly determine. Such a depth image is therefore corrected by the refined twist only as far as pixels alone
+/// determine it, and otherwise by the previous twist, with the gain of R. E. Kalman, "A new approach to linear
+/// filtering and prediction problems", J. Basic Engineering 82 (1960).
 class early_depth_twist {
  public:
-  /// Computes the gain from the pixels of a frame's observations. Call before `between`. O(observations).
+  /// Computes the gain from the pixels of a frame's observations. Must be called before `between`. O(observations).
   template <camera::camera_model Camera>
   void update(std::span<const row_observation> observations, const optimize::reprojection<Camera>& model,
               const moving_pose& at, const twist_prior& prior) {
     constexpr double width = row_loss_width;
-    constexpr double share = 0.25;  // of the information: errors of near landmarks are correlated
+    constexpr double share = 0.25;  // share of the information: errors of nearby landmarks are correlated
     const se3 T_camera_world = at.T_world_camera.inverse();
     std::array<mat6, 3> h{identity<mat6>(), zeros<mat6>(), zeros<mat6>()};  // a metre or a radian, without observations
     for (const row_observation& o : observations) {
@@ -265,36 +265,37 @@ class early_depth_twist {
     determine(h, prior);
   }
 
-  /// Returns a twist between that of the previous frame and that of this one.
+  /// Returns a twist between those of the previous and the current frame.
   [[nodiscard]] vec6 between(const twist_prior& prior, const vec6& refined) const {
     if (!prior.T_world_before || !all_finite(gain_)) return refined;
     return prior.twist_before + gain_ * (refined - prior.twist_before);
   }
 
-  /// Sets the previous frame to the current one.
+  /// Makes the current frame the previous one.
   void advance() { former_covariance_ = pose_covariance_; }
 
  private:
-  /// Computes the gain from the information of the pixels, given in powers of the rows' times.
+  /// Computes the gain from the information of the pixels, given in powers of the row times.
   void determine(const std::array<mat6, 3>& h, const twist_prior& prior) {
     pose_covariance_ = inverse(h[0]);
     if (!prior.T_world_before) return;
-    // The prior relates the twist to both poses; the previous pose is not exact either.
+    // The prior relates the twist to both poses, and the previous pose is also uncertain.
     const double by_pose = (1.0 + prior.trend) / prior.interval;
     const mat6 tie = inverse(prior_covariance(prior, 1.0) + by_pose * by_pose * former_covariance_);
     const mat6 mixed = h[1] + by_pose * tie;
     const mat6 of_twist = h[2] + tie - transposed(mixed) * inverse(h[0] + by_pose * by_pose * tie) * mixed;
-    // From one frame to the next a twist changes by twice the deviation of the prior, which is that from the mean.
+    // From one frame to the next, the twist changes by twice the standard deviation of the prior, which is relative to
+    // the mean.
     const mat6 change = prior_covariance(prior, 2.0);
     gain_ = change * inverse(change + inverse(of_twist));
   }
 
-  mat6 pose_covariance_ = zeros<mat6>(), former_covariance_ = zeros<mat6>();  ///< by pixels alone
+  mat6 pose_covariance_ = zeros<mat6>(), former_covariance_ = zeros<mat6>();  ///< determined by pixels alone
   mat6 gain_ = identity<mat6>();
 };
 
-/// Refines pose and twist, or the pose alone, by Gauss-Newton steps while they lower the cost. The observations should
-/// contain few outliers. O(observations) per step.
+/// Refines pose and twist, or the pose alone, by Gauss-Newton steps as long as they reduce the cost. The observations
+/// should contain few outliers. O(observations) per step.
 template <camera::camera_model Camera>
 [[nodiscard]] moving_pose refine_moving_pose(std::span<const row_observation> observations,
                                              const optimize::reprojection<Camera>& model, const moving_pose& start,

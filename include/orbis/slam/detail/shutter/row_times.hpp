@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Motion of rolling-shutter keypoints to their positions at the time of the frame.
+/// Correction of rolling-shutter keypoints to their positions at the time of the frame.
 ///
-/// The camera moves by a constant body twist while an image is read out. A keypoint of a row that is read `t` seconds
-/// after the frame's time observes, a point at `p` in the camera frame of that moment; in the camera frame of the
-/// frame's time it is at `exp(t * twist) p`. Projected there, with its depth, it is a measurement of a global shutter,
-/// and later steps need no knowledge of rows.
+/// The camera moves with a constant body twist while an image is read out. A keypoint in a row read `t` seconds after
+/// the frame's time observes a point at `p` in the camera frame at that moment; in the camera frame at the frame's
+/// time, the point is at `exp(t * twist) p`. Its projection and depth there are equivalent to a measurement with a
+/// global shutter, so that later steps do not depend on row times.
 ///
-/// Source of the model of constant velocity during read-out: J. Hedborg, P.-E. Forssen, M. Felsberg, E. Ringaby,
-/// "Rolling shutter bundle adjustment", CVPR 2012.
+/// Source of the constant-velocity model during read-out: J. Hedborg, P.-E. Forssen, M. Felsberg, E. Ringaby, "Rolling
+/// shutter bundle adjustment", CVPR 2012.
 #pragma once
 
 #include <cmath>
@@ -25,7 +25,7 @@ namespace orbis::slam::detail {
 
 using camera::moved_by;
 
-/// Stores the keypoints as read in `as_read`. @pre their rays and depths are set
+/// Copies the keypoints to `as_read`. @pre their rays and depths are set
 template <feature_descriptor D>
 void keep_as_read(basic_frame<D>& f) {
   f.as_read.resize(f.size());
@@ -34,10 +34,10 @@ void keep_as_read(basic_frame<D>& f) {
         f.rays[i].x(), f.rays[i].y(), f.features.keypoints[i].x, f.features.keypoints[i].y, f.depth[i], f.depth[i], {}};
 }
 
-/// Moves the keypoints from their read positions to those at the frame's time; sets their rays and depths, the grid and
-/// `f.twist`. `depth_of(i)`: the depth of the point observed by a keypoint without measured depth, if known; 0: the
-/// point is distant, and only the rotation is applied. A keypoint that leaves the image keeps its read position. Does
-/// nothing without stored keypoints (`keep_as_read`). O(features).
+/// Moves the keypoints from their positions as read to those at the frame's time; sets their rays and depths, the grid
+/// and `f.twist`. `depth_of(i)`: the depth of the point observed by a keypoint without measured depth, if known; 0: the
+/// point is distant, and only the rotation is applied. A keypoint that would leave the image keeps its position as
+/// read. Does nothing if `as_read` is empty (`keep_as_read`). O(features).
 template <feature_descriptor D, camera::camera_model Camera, class DepthOf>
 void move_to_frame_time(basic_frame<D>& f, const camera_rig<Camera>& rig, const camera::shutter& shutter,
                         const vec6& twist, DepthOf&& depth_of) {
@@ -52,7 +52,7 @@ void move_to_frame_time(basic_frame<D>& f, const camera_rig<Camera>& rig, const 
     constexpr double far = 1e6;  // metres
     const vec3 moved = moved_by(twist, t, (known > 0.0 ? known : far) * vec3(read.ray_x, read.ray_y, 1.0));
     const auto pixel = moved.z() > 0.0 ? rig.camera().project(moved) : std::nullopt;
-    if (!pixel) {  // also if it has no ray
+    if (!pixel) {  // also true if it has no ray
       at.x = read.x, at.y = read.y;
       f.rays[i] = {read.ray_x, read.ray_y, std::isnan(read.ray_x) ? read.ray_x : 1.0};
       f.depth[i] = read.depth;
@@ -65,7 +65,7 @@ void move_to_frame_time(basic_frame<D>& f, const camera_rig<Camera>& rig, const 
   f.grid.assign(f.features.keypoints);
 }
 
-/// As above; all keypoints without measured depth are treated as distant.
+/// As above, but all keypoints without measured depth are treated as distant.
 template <feature_descriptor D, camera::camera_model Camera>
 void move_to_frame_time(basic_frame<D>& f, const camera_rig<Camera>& rig, const camera::shutter& shutter,
                         const vec6& twist) {

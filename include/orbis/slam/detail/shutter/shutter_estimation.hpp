@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Estimation of the read-out time of a camera, and the delay of its depth image, from the frames.
+/// Estimation of a camera's read-out time, and of the delay of its depth image, from the frames.
 ///
 /// A point observed by a keyframe and a frame is projected from one into the other; its error depends on read-out and
-/// delay in a known way, because the motion of the camera is known from the poses around each. For each pair the
-/// relative pose is eliminated (it would explain part of the error); two linear equations remain, which are summed over
-/// all pairs. Their deviation is estimated from the variation of the keyframes' sums, because the errors of the pairs
-/// of one keyframe are not independent.
+/// delay in a known way, because the motion of the camera is known from the poses before and after each. For each pair,
+/// the relative pose, which would explain part of the error, is eliminated; two linear equations remain, which are
+/// summed over all pairs. The standard deviation of the solution is estimated from the variation of the sums per
+/// keyframe, because the errors of pairs with a common keyframe are not independent.
 ///
 /// Sources: read-out from motion: P.-E. Forssen, E. Ringaby, "Rectifying rolling shutter video from hand-held devices",
-/// CVPR 2010; deviations from sums over clusters: K.-Y. Liang, S. L. Zeger, "Longitudinal data analysis using
+/// CVPR 2010; standard deviations from sums over clusters: K.-Y. Liang, S. L. Zeger, "Longitudinal data analysis using
 /// generalized linear models", Biometrika 73 (1986).
 #pragma once
 
@@ -34,13 +34,13 @@
 
 namespace orbis::slam::detail {
 
-/// A frame as read, with its motion estimated from its neighbours.
+/// A frame as read, with its motion estimated from the neighbouring frames.
 struct row_view {
   se3 T_world_camera;
   vec6 twist = zeros<vec6>();
   std::vector<keypoint_as_read> read;
-  std::vector<landmark_id> landmarks;  ///< by keypoint
-  std::vector<double> information;     ///< by keypoint: 1 / variance of the pixel
+  std::vector<landmark_id> landmarks;  ///< landmark of each keypoint
+  std::vector<double> information;     ///< for each keypoint: 1 / variance of the pixel
 };
 
 /// Linear equations `h * (read-out, delay) = c`.
@@ -49,7 +49,7 @@ struct shutter_equations {
   vec2 c = zeros<vec2>();
 };
 
-/// Eliminates the relative pose from equations and gradient; returns false if the points do not determine it.
+/// Eliminates the relative pose from the equations and the gradient; returns false if the points do not determine it.
 [[nodiscard]] inline bool eliminate_pose(shutter_equations& e, vec2& gradient, const mat6& pose,
                                          const matrix<6, 2>& mixed, const vec6& pose_gradient) {
   const matrix<6, 2> solved = inverse(pose) * mixed;
@@ -59,14 +59,14 @@ struct shutter_equations {
   return true;
 }
 
-/// Returns the equations of the points that two views share; empty if there are too few. `shutter`: the one with which
-/// `depth` of the keypoints was read, around which the equations are linear. O(keypoints).
+/// Returns the equations of the points that two views share; empty if there are too few. `shutter`: the shutter assumed
+/// when `depth` of the keypoints was read; the equations are linearised around it. O(keypoints).
 template <camera::camera_model Camera>
 [[nodiscard]] std::optional<shutter_equations> build_shutter_equations(const row_view& from, const row_view& to,
                                                                        const camera_rig<Camera>& rig,
                                                                        const camera::shutter& shutter) {
   constexpr std::size_t enough = 30;
-  constexpr double width = 3.5;  // of Huber's loss: both keypoints have errors
+  constexpr double width = 3.5;  // of the Huber loss: both keypoints have errors
   std::vector<std::pair<landmark_id, std::uint32_t>> seen;
   for (std::uint32_t i = 0; i != from.read.size(); ++i)
     if (from.landmarks[i] != no_id && from.read[i].depth > 0.0F) seen.emplace_back(from.landmarks[i], i);
@@ -120,8 +120,8 @@ template <camera::camera_model Camera>
     e.h += weight * (transposed(by_shutter) * by_shutter);
     gradient += weight * (transposed(by_shutter) * *r);
     ++count;
-    // Depth is noisy, and so is its rate, whose square would be biased upwards: the delay would be underestimated. The
-    // squared errors of three readings with the same noise form a parabola without this bias.
+    // Depth is noisy, and so is its rate: the square of the rate would be biased upwards, and the delay underestimated.
+    // The parabola through the squared errors of three readings with equal noise does not have this bias.
     const auto moved = [&](float in_a, float in_b) {
       const vec3 row = row_of(by_point, 2);
       return (*r)[2] + dot(row, T_to_from.rotation() * vec3(static_cast<double>(in_a) * ray)) -
@@ -140,10 +140,10 @@ template <camera::camera_model Camera>
   return e;
 }
 
-/// Sums equations over a run and decides which components are significant.
+/// Sums the equations of a run and decides which components are significant.
 class shutter_estimator {
  public:
-  /// Adds the equations of a pair. `block`: the same for all pairs of one keyframe.
+  /// Adds the equations of a pair. `block`: an id common to all pairs of one keyframe.
   void add(std::uint64_t block, const shutter_equations& e) {
     if (blocks_.empty() || blocks_.back().first != block) {
       const auto at = std::find_if(blocks_.begin(), blocks_.end(), [&](const auto& b) { return b.first == block; });
@@ -157,11 +157,11 @@ class shutter_estimator {
     blocks_.back().second.h += e.h;
     blocks_.back().second.c += e.c;
   }
-  /// Forgets all equations, after a change of the shutter with which they were made.
+  /// Discards all equations, after a change of the shutter for which they were built.
   void clear() { blocks_.clear(); }
 
-  /// Returns the current estimate. The threshold for keeping an assumed value is lower than for adopting a new one.
-  /// O(keyframes).
+  /// Returns the current estimate. The threshold for keeping an assumed value is lower than that for adopting a new
+  /// one. O(keyframes).
   [[nodiscard]] shutter_estimate estimate(const camera::shutter& assumed = {}) const {
     constexpr std::size_t enough = 8;
     shutter_estimate result;
@@ -197,7 +197,7 @@ class shutter_estimator {
       const double sigmas = before == 0.0 ? 5.0 : 2.5;
       return std::abs(value) > sigmas * deviation && std::abs(value) >= least && std::abs(value) <= most;
     };
-    // A shorter read-out has no relevant effect, and no camera needs longer for an image.
+    // A shorter read-out has no relevant effect, and no camera has a longer one.
     if (result.read_out > 0.0 && holds(result.read_out, result.read_out_deviation, assumed.color_read_out, 0.003, 0.07))
       result.shutter.color_read_out = result.shutter.depth_read_out = result.read_out;
     if (holds(result.delay, result.delay_deviation, assumed.depth_delay, 0.003, 0.05))

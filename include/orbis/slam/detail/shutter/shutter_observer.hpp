@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Estimates the shutter from tracked frames.
+/// Estimation of the shutter from tracked frames.
 #pragma once
 
 #include <algorithm>
@@ -24,14 +24,14 @@
 
 namespace orbis::slam::detail {
 
-/// Compares each tracked frame with the last keyframes once the next frame determines its motion from both sides, and
-/// periodically proposes the resulting shutter.
+/// Compares each tracked frame with the last keyframes as soon as the next frame is known, which helps to determine its
+/// motion, and periodically proposes the resulting shutter.
 class shutter_observer {
  public:
   [[nodiscard]] shutter_estimate estimate() const { return estimate_; }
 
-  /// Reads the depth of the keypoints of a frame as if its image had been taken at other times, and sets the changes.
-  /// `read_depth(frame, motion)` sets that of `as_read`; `assumed`: the motion of the frame.
+  /// Reads the depth of the keypoints of a frame as if its depth image had been captured at other times, and sets the
+  /// depth changes. `read_depth(frame, motion)` sets the depths of `as_read`; `assumed`: the motion of the frame.
   template <feature_descriptor D, class ReadDepth>
   static void set_changes(basic_frame<D>& f, const frame_motion& assumed, ReadDepth&& read_depth) {
     basic_frame<D> now, later, earlier;
@@ -50,15 +50,15 @@ class shutter_observer {
     }
   }
 
-  /// Adds a tracked frame that follows `last` (as it was tracked, with its current pose). `keyframe`: the one made from
-  /// the frame. Returns the shutter to assume for subsequent frames, if it changes.
+  /// Adds a tracked frame that follows `last` (as tracked, with its current pose). `keyframe`: the keyframe created
+  /// from the frame, if any. Returns the shutter to assume for subsequent frames, if it changes.
   template <feature_descriptor D, camera::camera_model Camera>
   [[nodiscard]] std::optional<camera::shutter> add(const basic_frame<D>& last, const basic_frame<D>& f,
                                                    const std::optional<map_keyframe>& keyframe, const basic_map<D>& m,
                                                    const camera_rig<Camera>& rig, const camera::shutter& assumed) {
     const vec6 motion = motion_between(last, f);
     if (before_ && before_that_) {
-      // The velocity between two intervals, from the means of three: exact for motions that are cubic in time.
+      // The velocity between two intervals from the mean velocities of three: exact for motions that are cubic in time.
       pending_.T_world_camera = last.T_world_camera;
       pending_.twist = (-*before_that_ + 5.0 * *before_ + 2.0 * motion) / 6.0;
       compare(m, rig, assumed);
@@ -107,10 +107,10 @@ class shutter_observer {
     views_.emplace_back(id, pending_);
   }
 
-  /// Revises the estimate each time the observation time has grown by half, and discards the measurements made with
-  /// the previous shutter: the equations are linear only around the assumed values, and the gates of tracking have
-  /// favoured them. Slopes of depth are noisy, and their squares too large, so a step towards the delay is about half
-  /// as long as it should be: several steps are needed.
+  /// Revises the estimate each time the observation time has grown by half, and discards the measurements made with the
+  /// previous shutter: the equations are valid only near the assumed values, and the gates of tracking are biased
+  /// towards these. Depth slopes are noisy, so that their squares are too large and a step towards the delay is about
+  /// half as long as it should be: several steps are needed.
   [[nodiscard]] std::optional<camera::shutter> decide(const camera::shutter& assumed) {
     constexpr double first = 2.0, often = 0.5, same = 0.001;  // seconds
     if (watched_ - looked_ < often) return std::nullopt;
@@ -124,21 +124,21 @@ class shutter_observer {
                                    std::abs(next.depth_delay - assumed.depth_delay));
     if (change < same) return std::nullopt;
     estimator_.clear();
-    views_.clear();  // their depths were read with the previous delay
+    views_.clear();  // their depths were read assuming the previous delay
     interrupt();
     last_ = estimate_;
     return next;
   }
 
-  /// Returns a new estimate once there are enough equations: it is better than the previous one, which was linearised
-  /// around a shutter that was far off.
+  /// Returns the new estimate once there are enough equations, because it is better than the previous one, which was
+  /// linearised around a less accurate shutter.
   [[nodiscard]] shutter_estimate best(const shutter_estimate& now) const {
     return last_ && !(now.read_out_deviation <= 2.0 * last_->read_out_deviation) ? *last_ : now;
   }
 
   shutter_estimator estimator_;
   shutter_estimate estimate_;
-  std::optional<shutter_estimate> last_;  ///< at the last change
+  std::optional<shutter_estimate> last_;  ///< estimate at the last change
   std::vector<std::pair<map_keyframe, row_view>> views_;
   row_view pending_;
   std::optional<map_keyframe> pending_keyframe_;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The back end: mapping, loop closing and global adjustment, synchronous or in separate threads.
+/// The back end: mapping, loop closing and global adjustment, synchronously or in separate threads.
 #pragma once
 
 #include <algorithm>
@@ -23,9 +23,9 @@
 
 namespace orbis::slam::detail {
 
-/// Calls `work` for each job in the order of `push`. `stop` and the destructor wait for the running job and discard the
-/// others. If jobs use a pointer to their worker, call `stop` before the pointer is reset. If `work` throws, the worker
-/// ends: the other jobs are discarded, and `push`, `wait` and `wait_for_room` rethrow the exception afterwards.
+/// Calls `work` for each job in the order of `push`. `stop` and the destructor wait for the current job and discard the
+/// others. If jobs use a pointer to their worker, call `stop` before resetting the pointer. If `work` throws, the
+/// worker ends: the other jobs are discarded, and `push`, `wait` and `wait_for_room` rethrow the exception afterwards.
 template <std::movable Job>
 class worker {
  public:
@@ -34,7 +34,7 @@ class worker {
   worker& operator=(const worker&) = delete;
   ~worker() { stop(); }
 
-  /// Waits for the running job; no other job is started. Must not be called by a job.
+  /// Waits for the current job; no other job is started. Must not be called by a job.
   void stop() {
     {
       const std::lock_guard lock(mutex_);
@@ -55,12 +55,12 @@ class worker {
     });
   }
 
-  /// The number of jobs in the queue, without the running one.
+  /// The number of jobs in the queue, excluding the current one.
   [[nodiscard]] std::size_t waiting() const {
     const std::lock_guard lock(mutex_);
     return jobs_.size();
   }
-  /// Returns true if no job runs or waits.
+  /// Returns true if no job is running or waiting.
   [[nodiscard]] bool idle() const {
     const std::lock_guard lock(mutex_);
     return jobs_.empty() && !busy_;
@@ -71,7 +71,7 @@ class worker {
     changed_.wait(lock, [&] { return jobs_.size() < count; });
     rethrow_failure();
   }
-  /// Waits until no job runs or waits.
+  /// Waits until no job is running or waiting.
   void wait() const {
     std::unique_lock lock(mutex_);
     changed_.wait(lock, [&] { return jobs_.empty() && !busy_; });
@@ -97,7 +97,7 @@ class worker {
     for (;;) {
       changed_.wait(lock, [&] { return ends_ || !jobs_.empty(); });
       if (ends_) {
-        jobs_.clear();  // no caller must wait for them
+        jobs_.clear();  // callers must not wait for these
         changed_.notify_all();
         return;
       }
@@ -133,8 +133,9 @@ class worker {
 };
 
 /// Processes each new keyframe: local mapping, then loop closing, then, if a loop was closed, global adjustment. With
-/// threads each of the three has its own, and passes the keyframe to the next. All queues are bounded: mapping waits
-/// while too many keyframes wait for loop closing, and a map is queued for adjustment at most once.
+/// threads, each of the three has a separate thread and passes the keyframe to the next. All queues are bounded:
+/// mapping waits while too many keyframes are waiting for loop closing, and a map is queued for adjustment at most
+/// once.
 template <camera::camera_model Camera, feature_descriptor D, place_recognizer<D> Places>
 class back_end {
  public:
@@ -147,7 +148,7 @@ class back_end {
     });
     mapping_ = std::make_unique<worker<map_keyframe>>([this](map_keyframe k) {
       if (stopped_) return;
-      // If frames wait for mapping, the load of the machine affects only the time, not the map.
+      // If `track` waits for mapping, the load of the machine must affect only the time, not the map.
       mapper_.process(k, [this] { return stopped_ || (!shared_.settings.threads.wait && mapping_->waiting() != 0); });
       loops_->wait_for_room(most_waiting());
       loops_->push(k);
@@ -155,10 +156,10 @@ class back_end {
   }
   back_end(const back_end&) = delete;
   back_end& operator=(const back_end&) = delete;
-  /// Waits for the running jobs and discards the others.
+  /// Waits for the current jobs and discards the others.
   ~back_end() {
     stop();
-    // Each worker pushes jobs to the next one and queries its own queue: none is destroyed until all have stopped.
+    // Each worker pushes jobs to the next one and queries its own queue: none may be destroyed until all have stopped.
     if (mapping_) mapping_->stop();
     if (loops_) loops_->stop();
     if (global_) global_->stop();
@@ -171,13 +172,13 @@ class back_end {
     mapper_.process(k, [this] { return stopped_.load(); });
     if (!stopped_ && closer_.close(k)) closer_.adjust_globally(shared_.atlas.current(k).map);
   }
-  /// Requests that the work ends soon: adjustments end early, waiting and later keyframes are not processed. May be
+  /// Requests that the work end soon: adjustments end early; waiting and later keyframes are not processed. May be
   /// called from any thread.
   void stop() noexcept {
     stopped_ = true;
     closer_.stop();
   }
-  /// Returns true if the limit of waiting keyframes is reached and no more keyframes should be made.
+  /// Returns true if the limit of waiting keyframes is reached and no more keyframes should be created.
   [[nodiscard]] bool is_full() const { return mapping_ && mapping_->waiting() >= most_waiting(); }
   /// Waits until `is_full` is false.
   void wait_for_room() const {
@@ -199,7 +200,7 @@ class back_end {
   std::atomic<bool> stopped_{false};
   local_mapper<Camera, D, Places> mapper_;
   loop_closer<Camera, D, Places> closer_;
-  std::unique_ptr<worker<map_id>> global_;  ///< null without threads, like the others
+  std::unique_ptr<worker<map_id>> global_;  ///< null without threads, like the other workers
   std::unique_ptr<worker<map_keyframe>> loops_, mapping_;
 };
 

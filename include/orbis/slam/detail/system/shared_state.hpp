@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The state shared by tracking, mapping and loop closing, and its locks.
+/// The state shared by tracking, mapping and loop closing, with its locks.
 #pragma once
 
 #include <concepts>
@@ -20,9 +20,10 @@ namespace orbis::slam::detail {
 
 /// Two locks, always locked in this order:
 /// - `edit()`: held while maps are changed in several steps (mapping of a keyframe, correction of a loop, global
-/// adjustment). Between the steps only tracking changes the map: it adds to it, and makes it forget long-erased
-/// keyframes;
-/// - `lock()`: held for a short time while anything here is read or changed; never while solving or calling callbacks.
+/// adjustment). Between these steps, only tracking changes the map: it adds data, and forgets keyframes erased long
+/// ago;
+/// - `lock()`: held for a short time while any of this state is read or changed; never while solving or during
+/// callbacks.
 ///
 /// Both are fair: a thread that releases and relocks a lock repeatedly lets waiting threads go first.
 template <camera::camera_model Camera, feature_descriptor D, place_recognizer<D> Places>
@@ -45,7 +46,7 @@ struct shared_state {
 
   [[nodiscard]] std::unique_lock<std::mutex> lock() const { return lock_fairly(next_map_mutex_, map_mutex_); }
   [[nodiscard]] std::unique_lock<std::mutex> edit() const { return lock_fairly(next_edit_mutex_, edit_mutex_); }
-  /// Like `edit`, without waiting: check whether the lock is owned.
+  /// Like `edit`, but without waiting: callers must check whether the lock is owned.
   [[nodiscard]] std::unique_lock<std::mutex> try_edit() const {
     return std::unique_lock{edit_mutex_, std::try_to_lock};
   }
@@ -81,8 +82,7 @@ struct shared_state {
   }
 
  private:
-  /// The next thread in line holds `next` while it waits, because a plain mutex may be relocked before waiting threads
-  /// wake up.
+  /// The first waiting thread holds `next`, because a plain mutex could be relocked before waiting threads wake up.
   [[nodiscard]] static std::unique_lock<std::mutex> lock_fairly(std::mutex& next, std::mutex& mutex) {
     const std::lock_guard first{next};
     return std::unique_lock{mutex};

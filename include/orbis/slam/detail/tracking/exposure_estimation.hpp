@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Estimation of the exposure time from the motion blur of patches.
+/// Estimation of the exposure time from motion blur of patches.
 #pragma once
 
 #include <algorithm>
@@ -10,21 +10,22 @@
 namespace orbis::slam::detail {
 
 /// Compares exposure times of up to 32 ms by the correlation of patches that are blurred accordingly. Old evidence
-/// fades, so that the estimate follows slow changes. Patches are assumed to have the exposure time of the image.
+/// decays, so that the estimate follows slow changes. The exposure time of a patch is assumed to be that of the image.
 class exposure_estimation {
  public:
   static constexpr std::size_t count = 9;
-  /// The exposure times that are compared, seconds.
+  /// Returns the `i`-th exposure time to compare, seconds.
   [[nodiscard]] static constexpr double candidate(std::size_t i) noexcept { return 0.004 * static_cast<double>(i); }
 
-  /// Adds the correlations of one patch in one frame, by candidate. A patch counts as much as its blur changes.
+  /// Adds the correlations of one patch in one frame for all candidates. The weight of a patch is the change of its
+  /// blur.
   void add(const std::array<double, count>& correlations) noexcept {
     constexpr double memory = 0.999;
     weight_ = memory * weight_ + 1.0;
     for (std::size_t i = 0; i != count; ++i) sums_[i] = memory * sums_[i] + correlations[i];
   }
 
-  /// The estimate, seconds: the best candidate, refined by a parabola; 0 until there is enough evidence.
+  /// Returns the estimate, seconds: the best candidate, refined by a parabola; 0 until there is enough evidence.
   [[nodiscard]] double exposure() const noexcept {
     constexpr double enough = 100.0, clear = 0.002;  // patches; gain of the mean correlation
     const auto best = static_cast<std::size_t>(std::max_element(sums_.begin(), sums_.end()) - sums_.begin());

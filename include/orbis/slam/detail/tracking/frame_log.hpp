@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The tracked frames, each relative to a keyframe, so that they follow later corrections. With a limit, only the
-/// latest frames are kept, and the others are counted.
+/// The tracked frames, each relative to a keyframe, so that they follow later corrections. If limited, only the latest
+/// frames are kept; the others are only counted.
 #pragma once
 
 #include <algorithm>
@@ -40,28 +40,28 @@ class frame_log {
     frames_.pop_front();
     ++first_number_;
   }
-  /// The number of the next frame; the first frame has number 0.
+  /// The index of the next frame; the first frame has index 0.
   [[nodiscard]] std::size_t end_number() const noexcept { return first_number_ + frames_.size(); }
-  /// Returns the reference keyframe of a kept frame, by its id when the frame was tracked.
+  /// Returns the reference keyframe of a kept frame, with its id at the time of tracking.
   /// @pre the frame is kept
   [[nodiscard]] const map_keyframe& reference(std::size_t number) const {
     return frames_[number - first_number_].reference;
   }
-  /// Returns the current pose of a frame in the map of its reference; empty if that is not kept.
+  /// Returns the current pose of a frame in the map of its reference; empty if the reference is no longer known.
   template <feature_descriptor D>
   [[nodiscard]] static std::optional<se3> pose(const logged_frame& f, const basic_atlas<D>& maps) {
     const map_keyframe k = maps.current(f.reference);
     if (!maps.contains(k.map) || !maps.at(k.map).remembers(k.keyframe)) return std::nullopt;
     return maps.at(k.map).pose(k.keyframe) * scaled(f.T_reference_camera, maps.at(k.map).scale(k.keyframe));
   }
-  /// Returns the current pose of the frame with a number, as above; empty if the frame is not kept, either.
+  /// As above, for the frame with index `number`; also empty if the frame is not kept.
   template <feature_descriptor D>
   [[nodiscard]] std::optional<se3> pose(std::size_t number, const basic_atlas<D>& maps) const {
     const bool is_kept = number >= first_number_ && number < end_number();
     return is_kept ? pose(frames_[number - first_number_], maps) : std::nullopt;
   }
-  /// Returns the motion of the camera at a frame, in its own frame, per second, translation first: the mean from the
-  /// frame before it to the one after it. Empty unless both are kept, are in one map, and are close in time.
+  /// Returns the twist of the camera in its own frame at frame `number`, per second, translation first: the mean from
+  /// the previous to the next frame. Empty unless both are kept, in the same map, and close in time.
   template <feature_descriptor D>
   [[nodiscard]] std::optional<vec6> motion(std::size_t number, const basic_atlas<D>& maps) const {
     const auto before = number == 0 ? std::nullopt : pose(number - 1, maps), after = pose(number + 1, maps);
@@ -82,8 +82,8 @@ class frame_log {
     f.T_reference_camera = scaled(m.pose(k.keyframe).inverse() * T_world_camera, 1.0 / m.scale(k.keyframe));
   }
 
-  /// Returns the current poses of the kept frames that were tracked in a map, or in one that was merged into it. Empty
-  /// if there is no such map. O(frames).
+  /// Returns the current poses of the kept frames that were tracked in a map, or in a map that was merged into it.
+  /// Empty if there is no such map. O(frames).
   template <feature_descriptor D>
   [[nodiscard]] orbis::trajectory trajectory(const basic_atlas<D>& maps, map_id map) const {
     orbis::trajectory all;
@@ -94,20 +94,20 @@ class frame_log {
     return all;
   }
 
-  /// Returns the reference keyframes of the kept frames that are in a map, by their current ids. O(frames).
+  /// Returns the reference keyframes of the kept frames in a map, with their current ids. O(frames).
   template <feature_descriptor D>
   [[nodiscard]] std::vector<keyframe_id> references(const basic_atlas<D>& maps, map_id map) const {
     std::vector<keyframe_id> all;
     map_keyframe before;
     for (const logged_frame& f : frames_) {
-      if (std::exchange(before, f.reference) == f.reference) continue;  // as for most frames
+      if (std::exchange(before, f.reference) == f.reference) continue;  // true for most frames
       if (const map_keyframe k = maps.current(f.reference); k.map == map) all.push_back(k.keyframe);
     }
     return all;
   }
 
-  /// Returns the map with most frames, kept or not; the oldest on ties; the active map if there are no frames.
-  /// O(frames).
+  /// Returns the map with the most frames, kept or not; the oldest in case of a tie; the active map if there are no
+  /// frames. O(frames).
   template <feature_descriptor D>
   [[nodiscard]] map_id largest_map(const basic_atlas<D>& maps) const {
     std::map<map_id, std::size_t> frames;
@@ -122,15 +122,16 @@ class frame_log {
   }
 
  private:
-  /// The forgotten frames of a map.
+  /// The number of forgotten frames of a map.
   struct forgotten {
     std::size_t frames = 0;
-    map_keyframe reference;  ///< of the last frame: it leads to the map into which this one was merged
+    /// Reference of the last forgotten frame: identifies the map into which this one was merged.
+    map_keyframe reference;
   };
 
   std::size_t most_, first_number_ = 0;
-  std::deque<logged_frame> frames_;        // grows without moving its elements, so tracking does not wait
-  std::map<map_id, forgotten> forgotten_;  ///< by the map in which they were tracked
+  std::deque<logged_frame> frames_;        // grows without moving its elements, so that tracking does not wait
+  std::map<map_id, forgotten> forgotten_;  ///< keyed by the map in which the frames were tracked
 };
 
 }  // namespace orbis::slam::detail

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Refinement of a frame whose pose is roughly known: by the landmarks around it, their patches, and depth.
+/// Refinement of a frame with a roughly known pose: by the landmarks around it, their patches, and depth.
 #pragma once
 
 #include <cstddef>
@@ -27,15 +27,15 @@ class frame_refinement {
  public:
   explicit frame_refinement(Context& context) : c_{context} {}
 
-  /// With a rolling shutter, reads the rows of a frame again and moves its keypoints to its time, by the motion from
-  /// the last frame to its current pose.
+  /// With a rolling shutter, reads the row measurements of a frame again and corrects its keypoints to its time, based
+  /// on the motion from the last frame to its current pose.
   void correct_rows(const task& t) const {
     if (t.frame.shutter.is_global()) return;
     t.read_rows(t.frame, {t.frame.shutter, motion_between(c_.last, t.frame)});
     move_keypoints(t.frame);
   }
-  /// With a rolling shutter, moves the keypoints of a frame to its time, by the motion from the last frame to its
-  /// current pose.
+  /// With a rolling shutter, corrects the keypoints of a frame to its time, based on the motion from the last frame to
+  /// its current pose.
   void move_keypoints(frame_type& f) const {
     if (!f.shutter.is_global()) move_to_frame_time(f, c_.rig, f.shutter, motion_between(c_.last, f));
   }
@@ -58,8 +58,8 @@ class frame_refinement {
     return left.value_or(inliers);
   }
 
-  /// Refines a frame by its observed landmarks and, if enabled, by depth: the pose and, with a rolling shutter, the
-  /// twist, by which the keypoints are then moved. `is_next`: the frame follows the last one.
+  /// Refines the pose of a frame from its observed landmarks and, if enabled, from depth; with a rolling shutter, also
+  /// the twist, with which the keypoints are then corrected. `is_next`: the frame follows the last one.
   void refine_motion(const task& t, bool is_next) {
     frame_type& f = t.frame;
     const auto& m = t.map();
@@ -78,7 +78,7 @@ class frame_refinement {
     if (!rolls && with_depth) find_row_observations(f, m, c_.rig, rows_);
     for (int round = 0; round != rounds; ++round) {
       if (rolls) {
-        t.read_rows(f, {f.shutter, refined.twist});  // depth was read with the previous motion
+        t.read_rows(f, {f.shutter, refined.twist});  // depth was read assuming the previous motion
         find_row_observations(f, m, c_.rig, rows_);
       }
       if (with_depth) c_.depth_quadratic = c_.depth.term_at(refined, f.shutter);
@@ -101,7 +101,7 @@ class frame_refinement {
     move_to_frame_time(f, c_.rig, f.shutter, refined.twist, [&](std::size_t i) { return landmark_depth(f, i, m); });
   }
 
-  /// Removes the landmarks of a frame that disagree with its pose. Returns the number left.
+  /// Removes the landmarks of a frame that disagree with its pose. Returns the number of remaining landmarks.
   std::size_t drop_disagreeing(const task& t) const {
     frame_type& f = t.frame;
     const se3 T_camera_world = f.T_world_camera.inverse();

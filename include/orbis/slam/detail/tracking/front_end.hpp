@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The front end: localises frames in the active map and makes keyframes.
+/// The front end: localises frames in the active map and creates keyframes.
 #pragma once
 
 #include <cassert>
@@ -35,7 +35,8 @@
 
 namespace orbis::slam::detail {
 
-/// Tracks the frames of one camera. It takes no lock: the caller ensures that the maps are not changed during a call.
+/// Tracks the frames of one camera. It takes no lock: the caller must ensure that the maps are not changed during a
+/// call.
 ///
 /// Follows R. Mur-Artal, J. D. Tardos, "ORB-SLAM2", T-RO 33 (2017), section III.
 template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers>
@@ -46,16 +47,17 @@ class front_end {
   using frame_type = basic_frame<D>;
   using atlas_type = basic_atlas<D>;
   using task = tracking_task<D>;
-  /// Minimum number of erased keyframes whose poses remain queryable: users may have received their ids from an event.
+  /// Minimum number of erased keyframes whose poses can still be queried: users may have received their ids from an
+  /// event.
   static constexpr std::size_t latest_erased = 1024;
 
-  /// The outcome of a frame.
+  /// The outcome of tracking a frame.
   struct outcome {
-    /// Number of landmarks that agree with the pose (of points with depth, if the frame begins a map); 0 if the frame
-    /// has no pose, or, with `is_tracking()`, if only depth determines it.
+    /// Number of landmarks that agree with the pose (number of points with depth, if the frame starts a map); 0 if the
+    /// frame has no pose or, with `is_tracking()`, if only depth determines the pose.
     std::size_t inliers = 0;
-    std::optional<map_keyframe> made;   ///< the keyframe made from the frame, if any
-    std::optional<map_keyframe> first;  ///< the keyframe before it, made from an earlier frame to begin a map
+    std::optional<map_keyframe> made;   ///< the keyframe created from the frame, if any
+    std::optional<map_keyframe> first;  ///< the preceding keyframe, created from an earlier frame to start a map
   };
 
   front_end(const camera_rig<Camera>& rig, const options& settings)
@@ -70,8 +72,8 @@ class front_end {
   [[nodiscard]] std::optional<shutter_estimate> estimated_shutter() const {
     return context_.observer ? std::optional{context_.observer->estimate()} : std::nullopt;
   }
-  /// Sets the shutter of a frame, whose `shutter.depth_delay` is that by its clocks, and keeps its keypoints as read if
-  /// they need a correction.
+  /// Sets the shutter of a frame, whose `shutter.depth_delay` is the difference of its timestamps, and keeps its
+  /// keypoints as read if they need correction.
   void set_shutter(frame_type& f) const {
     const double by_clock = f.shutter.depth_delay;
     f.shutter = shutter_;
@@ -79,28 +81,29 @@ class front_end {
     if (context_.observer || !f.shutter.is_global()) keep_as_read(f);
   }
 
-  /// The depth tracker. Pass it the depth image of the next frame before the frame is tracked.
+  /// The depth tracker. It must receive the depth image of the next frame before the frame is tracked.
   [[nodiscard]] depth_tracker<Camera>& depth() noexcept { return context_.depth; }
-  /// The patch tracker. Pass it the image of the next frame before the frame is tracked.
+  /// The patch tracker. It must receive the image of the next frame before the frame is tracked.
   [[nodiscard]] patch_tracker<Camera, D>& patches() noexcept { return context_.patches; }
 
   [[nodiscard]] track_state state() const noexcept { return context_.state; }
   [[nodiscard]] bool is_tracking() const noexcept { return context_.is_tracking(); }
-  /// Counts over all frames; those of mapping are not set.
+  /// Counts over all frames; the counters of mapping are not set.
   [[nodiscard]] const track_counters& counters() const noexcept { return counters_; }
-  /// The tracked frames, at most the latest `options::trajectory_frames`.
+  /// The log of tracked frames: at most the latest `options::trajectory_frames`.
   [[nodiscard]] const frame_log& log() const noexcept { return log_; }
   [[nodiscard]] double last_timestamp() const noexcept { return context_.last.timestamp; }
   /// The current pose of the last tracked frame; it follows later corrections of its keyframe.
   [[nodiscard]] se3 last_pose(const atlas_type& maps) const { return context_.last_pose(maps); }
-  /// The motion during read-out of the last tracked frame; zero with a global shutter.
+  /// The twist during the read-out of the last tracked frame; zero with a global shutter.
   [[nodiscard]] vec6 last_twist() const {
     return last_shutter().is_global() ? vec6(zeros<vec6>()) : context_.last.twist;
   }
   /// The shutter assumed for the last tracked frame.
   [[nodiscard]] const camera::shutter& last_shutter() const { return context_.last.shutter; }
 
-  /// Returns the last tracked frame with its features. For the tracking thread; does not read the maps. O(features).
+  /// Returns the last tracked frame with its features. For the tracking thread only; does not read the maps.
+  /// O(features).
   [[nodiscard]] tracked_frame last_frame() const {
     const frame_type& last = context_.last;
     tracked_frame shown{context_.anchor().reference, context_.anchor().T_reference_camera, {}, last_twist()};
@@ -108,7 +111,7 @@ class front_end {
     for (std::size_t i = 0; i != last.size(); ++i) {
       const landmark_id l = last.landmarks[i];
       const auto& at = last.features.keypoints[i];
-      const bool moved = !last.as_read.empty();  // at their positions in the image
+      const bool moved = !last.as_read.empty();  // report the positions in the image
       shown.features.push_back(
           {moved ? last.as_read[i].x : at.x, moved ? last.as_read[i].y : at.y, l != no_id && l < first_new_, false});
     }
@@ -117,13 +120,13 @@ class front_end {
     return shown;
   }
 
-  /// Records that another map became active: the camera is relocalised in it.
+  /// Records that another map has become active: the camera is relocalised in it.
   void set_lost() {
     context_.state = track_state::lost;
     lost_since_.reset();
   }
 
-  /// Localises a frame, makes it a keyframe if one is due, and keeps it for the next frame and in the log.
+  /// Localises a frame, creates a keyframe from it if necessary, and keeps it for the next frame and in the log.
   outcome track(const task& t) {
     assert(t.has_room && t.read_rows && t.find_similar && t.drop_map);
     context_.follow_maps(t.maps);
@@ -142,9 +145,9 @@ class front_end {
     return result;
   }
 
-  /// If the trajectory is limited, limits the erased keyframes that the active map remembers: to the reference
-  /// keyframes of the frames in the trajectory, and the latest ones. O(1), except O(frames + n log n) for every
-  /// thousandth erased keyframe, where n is the number remembered.
+  /// If the trajectory is limited, makes the active map forget erased keyframes except the latest ones and the
+  /// reference keyframes of the frames in the trajectory. O(1), except O(frames + n log n) for every thousandth erased
+  /// keyframe, where n is the number of erased keyframes remembered.
   void forget_erased(atlas_type& maps) {
     if (context_.settings.trajectory_frames == std::numeric_limits<std::size_t>::max()) return;
     if (maps.active().content().erased.size() < most_erased_) return;
@@ -171,14 +174,14 @@ class front_end {
     if (!lost_since_) lost_since_ = t.frame.timestamp;
     context_.state = track_state::lost;
     const options& o = context_.settings;
-    // Finding two frames takes time: if little is lost, the search begins immediately.
+    // Finding two frames for a new map takes time: if not much is lost, the search begins immediately.
     const bool is_here = context_.last.size() != 0 && context_.last_map(t.maps) == t.maps.active_id();
     const bool at_once =
         is_here && !context_.rig.scale_is_known && t.map().keyframes().size() < o.recovery.min_map_keyframes;
     if (t.is_frozen || (!at_once && t.frame.timestamp - *lost_since_ < o.recovery.new_map_after)) return 0;
     return begin_map(t);
   }
-  /// Tracks from the last frame, otherwise from the reference keyframe; refines the pose on the local map.
+  /// Tracks from the last frame or, if that fails, from the reference keyframe; refines the pose on the local map.
   std::size_t track_from_last(const task& t) {
     frame_type& f = t.frame;
     auto& moving = context_.moving;
@@ -211,7 +214,7 @@ class front_end {
   }
 
   /// Returns true if a localised frame should become a keyframe. A frame localised by depth becomes one if landmarks
-  /// have not localised the camera for some time and a map could begin with the frame.
+  /// have not localised the camera for some time and the frame could start a map.
   [[nodiscard]] bool needs_keyframe(const task& t, std::size_t inliers) const {
     if (start_.begins_map()) return true;
     if (t.is_frozen || !t.has_room()) return false;
@@ -237,7 +240,7 @@ class front_end {
     f.landmarks = m.at(id).landmarks;
     return context_.reference = {t.maps.active_id(), id};
   }
-  /// Counts a frame and, if it was localised, keeps it. `made`: the keyframe made from it.
+  /// Counts a frame and, if it was localised, keeps it. `made`: the keyframe created from the frame, if any.
   void finish(frame_type f, const atlas_type& maps, const std::optional<map_keyframe>& made) {
     const track_state state = context_.state;
     ++counters_.frames;
@@ -257,7 +260,7 @@ class front_end {
       context_.depth.keep(anchor.reference, anchor.T_reference_camera, f.twist, f.shutter);
     if (start_.begins_map()) young_.begin_map(maps.active_id());
     if (made) young_.count_keyframe(made->map);
-    // A frame that was tracked while the shutter is estimated has other rows than the map.
+    // While the shutter is being estimated, a frame may have been tracked with a different shutter than the map.
     const bool may_wait = !made && !context_.observer && state == track_state::tracking && !f.held_by_depth;
     if (may_wait && context_.moving.size() == 0) young_.add(f, context_.depth_quadratic, log_);
     context_.set_last(std::move(f), anchor);
@@ -278,9 +281,9 @@ class front_end {
   camera::shutter shutter_;
   frame_log log_;
   track_counters counters_;
-  double held_since_ = 0.0;  ///< time of the last tracked frame whose pose was not determined by depth alone, seconds
-  std::optional<double> lost_since_;  ///< timestamp; empty: that of the next frame
-  landmark_id first_new_;             ///< landmarks from this id on were made from the last frame; `no_id`: none
+  double held_since_ = 0.0;           ///< time of the last tracked frame not localised by depth alone, seconds
+  std::optional<double> lost_since_;  ///< timestamp; empty: the timestamp of the next frame
+  landmark_id first_new_;             ///< landmarks from this id on were created from the last frame; `no_id`: none
   std::size_t most_erased_ = 2 * latest_erased;  ///< maximum number of erased keyframes before some are forgotten
 };
 

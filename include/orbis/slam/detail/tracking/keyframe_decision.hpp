@@ -17,14 +17,14 @@ struct keyframe_evidence {
   double since = 0.0;   ///< seconds since the last keyframe
   double moved = 0.0;   ///< translation since then, metres; if the scale is unknown, relative to the depth of the scene
   double turned = 0.0;  ///< rotation since then, radians
-  std::size_t inliers = 0;          ///< landmarks tracked in the frame
-  std::size_t reference = 0;        ///< landmarks of the reference keyframe that other keyframes observe as well
-  std::size_t close_tracked = 0;    ///< close keypoints that observe a landmark
-  std::size_t close_untracked = 0;  ///< close keypoints that could become landmarks
-  std::size_t keyframes = 0;        ///< number of keyframes of the map
+  std::size_t inliers = 0;          ///< number of landmarks tracked in the frame
+  std::size_t reference = 0;        ///< number of landmarks of the reference keyframe that other keyframes also observe
+  std::size_t close_tracked = 0;    ///< number of close keypoints that observe a landmark
+  std::size_t close_untracked = 0;  ///< number of close keypoints that could become landmarks
+  std::size_t keyframes = 0;        ///< number of keyframes in the map
 };
 
-/// Collects the evidence for a frame. @pre the map has keyframes, and `reference` is one
+/// Collects the evidence for a frame. @pre `reference` is a keyframe of the map
 template <feature_descriptor D>
 [[nodiscard]] keyframe_evidence gather_evidence(const basic_map<D>& m, const basic_frame<D>& f, keyframe_id reference,
                                                 std::size_t inliers, const options& o, bool scale_is_known = true) {
@@ -40,7 +40,7 @@ template <feature_descriptor D>
   e.turned = motion.rotation().angle();
   e.inliers = inliers;
   e.keyframes = m.keyframes().size();
-  // Without depth two observations make a landmark; only a third one confirms it.
+  // Without depth, a landmark is created from two observations; only a third one confirms it.
   const std::size_t seen_by_others = std::min<std::size_t>(scale_is_known ? 2 : 3, e.keyframes);
   for (const landmark_id l : m.at(reference).landmarks)
     if (l != no_id && m.landmark_at(l).observations.size() >= seen_by_others) ++e.reference;
@@ -51,8 +51,9 @@ template <feature_descriptor D>
   return e;
 }
 
-/// Returns true if the view has changed much, if too few of the close keypoints observe landmarks, or if some time has
-/// passed since the last keyframe and the camera has moved. False with too few inliers, and for a camera at rest.
+/// Returns true if the view has changed significantly, if too few of the close keypoints observe landmarks, or if some
+/// time has passed since the last keyframe and the camera has moved. Always false with too few inliers, and for a
+/// camera at rest.
 [[nodiscard]] inline bool is_keyframe_due(const keyframe_evidence& e, const keyframe_options& o) {
   if (e.inliers <= o.min_inliers) return false;
   const double ratio = e.keyframes < 2 ? o.inlier_ratio_start : o.inlier_ratio;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The beginning of a map: with one frame with depth, or with two frames without.
+/// Initialisation of a map: from one frame with depth, or from two frames without.
 #pragma once
 
 #include <cstddef>
@@ -18,7 +18,7 @@
 
 namespace orbis::slam::detail {
 
-/// Begins maps. `Context` is a `tracking_context`.
+/// Initialises maps. `Context` is a `tracking_context`.
 template <class Context>
 class map_start {
   using frame_type = typename Context::frame_type;
@@ -29,14 +29,15 @@ class map_start {
   explicit map_start(Context& context)
       : c_{context}, pair_{context.rig, context.settings.start, context.settings.seed} {}
 
-  /// The first of the two keyframes with which a map without depth begins.
+  /// The first of the two keyframes that start a map without depth.
   struct first_frame {
     map_keyframe keyframe;
     double timestamp;  ///< seconds
   };
-  /// The first keyframe of the map that the last frame begins; empty if there is none, or the frame is the first.
+  /// The first keyframe of the map that the last frame has started; empty if the frame has started no map, or is the
+  /// first keyframe.
   [[nodiscard]] const std::optional<first_frame>& first() const noexcept { return first_; }
-  /// Returns true if the last frame begins a map.
+  /// Returns true if the last frame has started a map.
   [[nodiscard]] bool begins_map() const noexcept { return begins_map_; }
 
   /// Prepares for the next frame.
@@ -44,11 +45,11 @@ class map_start {
     begins_map_ = false;
     first_.reset();
   }
-  /// Forgets the candidates for the first frame of a map without depth, because a frame was tracked.
+  /// Discards the candidates for the first frame of a map without depth, because a frame was tracked.
   void forget_candidates() { pair_.reset(); }
 
-  /// Begins a map with a frame, if its measurements allow it; without depth, together with an earlier frame. The map
-  /// becomes active. Returns the number of its points.
+  /// Starts a map from a frame if its measurements are sufficient; without depth, together with an earlier frame. The
+  /// map becomes active. Returns the number of its points.
   std::size_t begin(const task& t) {
     frame_type& f = t.frame;
     std::size_t points = start_points(f, c_.settings);
@@ -60,7 +61,7 @@ class map_start {
       points = start->points.size();
     }
     enter_new_map(t);
-    f.landmarks.assign(f.size(), no_id);  // they are from searches in other maps
+    f.landmarks.assign(f.size(), no_id);  // these are from searches in other maps
     f.deviations.clear();
     f.T_world_camera =
         c_.settings.find_initial_pose ? c_.settings.find_initial_pose() : c_.settings.initial_pose.value_or(se3{});
@@ -69,7 +70,7 @@ class map_start {
     c_.state = track_state::tracking;
     return points;
   }
-  /// Adds the landmarks of both frames once the second one is a keyframe.
+  /// Adds the landmarks of both frames. The second frame must already be a keyframe.
   void add_landmarks(basic_map<descriptor>& m, keyframe_id second) {
     for (const start_point& p : std::exchange(points_, {})) {
       const landmark_id l = m.add_landmark(second, p.second, p.position);
@@ -79,7 +80,7 @@ class map_start {
   }
 
  private:
-  /// Activates a new map, unless the active one is new. If the previous map has few keyframes, it is passed to
+  /// Activates a new map, unless no map has been started yet. If the previous map has few keyframes, it is passed to
   /// `drop_map`.
   void enter_new_map(const task& t) {
     if (c_.state == track_state::not_started) return;
@@ -89,7 +90,7 @@ class map_start {
     c_.last = {};
     c_.motion.reset();
   }
-  /// Adds the first of two frames with which a map begins, and sets the pose of the second.
+  /// Adds the first of the two frames that start a map, and sets the pose of the second.
   void add_first(monocular_start_result<descriptor> start, const task& t) {
     frame_type& f = t.frame;
     // `find_initial_pose` returns the pose of `f`; `initial_pose` is that of the first frame.
@@ -110,7 +111,7 @@ class map_start {
   monocular_start<typename Context::camera_type, descriptor> pair_;
   bool begins_map_ = false;
   std::optional<first_frame> first_;
-  std::vector<start_point> points_;  ///< points of both frames, in the world, until the second is a keyframe
+  std::vector<start_point> points_;  ///< points of both frames, in the world frame, until the second is a keyframe
 };
 
 }  // namespace orbis::slam::detail

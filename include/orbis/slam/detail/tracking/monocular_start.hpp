@@ -31,25 +31,25 @@ namespace orbis::slam::detail {
 /// A point that two frames observe.
 struct start_point {
   std::uint32_t first = 0, second = 0;  ///< keypoints of the two frames
-  vec3 position = zeros<vec3>();        ///< in the world
+  vec3 position = zeros<vec3>();        ///< position in the world frame
 };
 
-/// Two frames with poses, and the points that they share. The first camera is the world frame; the unit of length is
-/// the median depth of the points in it.
+/// Two frames with poses, and their common points. The first camera frame is the world frame; the unit of length is the
+/// median depth of the points in it.
 template <feature_descriptor D>
 struct monocular_start_result {
   basic_frame<D> first;              ///< its pose is the identity
   se3 T_first_second;                ///< pose of the last frame
-  std::vector<start_point> points;   ///< by ascending keypoints of the first frame
-  double parallax = 0.0;             ///< median angle between the rays of a point, radians
+  std::vector<start_point> points;   ///< in ascending order of the first frame's keypoints
+  double parallax = 0.0;             ///< median angle between the two rays to a point, radians
   double rotation_deviation = 0.0;   ///< standard deviation of the rotation, radians ...
   double direction_deviation = 0.0;  ///< ... and of the direction of the translation, radians
 };
 
-/// Selects two frames with which a map can begin. Keeps several frames of different age as candidates for the first,
-/// tracks the keypoints of each from frame to frame, and reconstructs the scene once it is certain
-/// (`optimize::reconstruct_two_views`). A candidate is discarded when too few of its keypoints can be tracked; younger
-/// candidates remain, so that the search does not restart. Each candidate costs about a millisecond per frame.
+/// Selects two frames from which a map can be started. Keeps several frames of different ages as candidates for the
+/// first frame, tracks the keypoints of each from frame to frame, and reconstructs the scene as soon as the result is
+/// reliable (`optimize::reconstruct_two_views`). A candidate is discarded when too few of its keypoints can be tracked;
+/// newer candidates remain, so that the search does not restart. Each candidate takes about a millisecond per frame.
 ///
 /// Source: R. Mur-Artal, J. M. M. Montiel, J. D. Tardos, "ORB-SLAM: a versatile and accurate monocular SLAM system",
 /// T-RO 31 (2015), section IV, which keeps one frame.
@@ -59,7 +59,7 @@ class monocular_start {
   /// A candidate for the first frame of a map.
   struct candidate {
     basic_frame<D> frame;
-    std::vector<features::match> matches;   ///< of its keypoints (query) with those of the last frame (train)
+    std::vector<features::match> matches;   ///< from its keypoints (query) to those of the last frame (train)
     std::vector<features::window> windows;  ///< one per keypoint, around its last position
     std::size_t most = 0;                   ///< maximum number of matches with any frame
   };
@@ -67,10 +67,10 @@ class monocular_start {
   monocular_start(const camera_rig<Camera>& rig, const start_options& options, std::uint64_t seed = 1)
       : rig_{rig}, options_{options}, seed_{seed} {}
 
-  /// Processes the next frame; its pose is not used. Returns the start of a map, after which all frames are forgotten,
-  /// or nothing.
+  /// Processes the next frame; its pose is not used. Returns the start of a map and forgets all frames, or returns
+  /// nothing.
   [[nodiscard]] std::optional<monocular_start_result<D>> process(const basic_frame<D>& f) {
-    why_ = {errc::no_data, "start of a map", "no earlier frame has enough matches"};
+    why_ = {errc::no_data, "map initialisation", "no earlier frame has enough matches"};
     std::erase_if(candidates_, [&](candidate& c) { return !follow(c, f); });
     for (candidate& c : candidates_) {
       auto start = reconstruct(c, f);
@@ -87,9 +87,9 @@ class monocular_start {
   /// Forgets all frames.
   void reset() { candidates_.clear(); }
 
-  /// The reason why the last frame did not begin a map with the oldest candidate.
+  /// The reason why the last frame and the oldest candidate could not start a map.
   [[nodiscard]] const error& why() const noexcept { return why_; }
-  /// The candidates for the first frame, the oldest one first.
+  /// The candidates for the first frame, the oldest first.
   [[nodiscard]] const std::vector<candidate>& candidates() const noexcept { return candidates_; }
 
  private:
@@ -109,9 +109,9 @@ class monocular_start {
     }
     return c.matches.size() >= options_.min_matches;
   }
-  /// Makes `f` a candidate if it has enough features and differs from the youngest one.
+  /// Makes `f` a candidate if it has enough features and differs from the newest candidate.
   void add(const basic_frame<D>& f) {
-    constexpr double faded = 0.6;  // maximum share of its matches that the youngest one still has
+    constexpr double faded = 0.6;  // maximum share of its matches that the newest candidate still has
     if (f.size() < options_.min_features || candidates_.size() == options_.max_candidates) return;
     if (!candidates_.empty() &&
         static_cast<double>(candidates_.back().matches.size()) > faded * static_cast<double>(candidates_.back().most))

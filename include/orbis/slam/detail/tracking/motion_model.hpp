@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The motion of the camera between frames, assumed to be constant.
+/// A constant-velocity model of the camera motion between frames.
 #pragma once
 
 #include <algorithm>
@@ -17,10 +17,10 @@ struct timed_pose {
   se3 T_world_camera;
 };
 
-/// Predicts poses by the motion between the last two frames, which is unknown at first.
+/// Predicts poses from the motion between the last two frames, which is unknown at first.
 class motion_model {
  public:
-  /// Makes the motion unknown.
+  /// Marks the motion as unknown.
   void reset() { velocity_.reset(); }
   /// Sets the motion to that between two frames.
   void set(const timed_pose& before, const timed_pose& after) {
@@ -32,13 +32,13 @@ class motion_model {
     if (velocity_) velocity_->head<3>() *= factor;
   }
   [[nodiscard]] bool is_known() const noexcept { return velocity_.has_value(); }
-  /// The motion of the camera in its own frame, per second; zero if it is unknown.
+  /// The twist of the camera in its own frame, per second; zero if it is unknown.
   [[nodiscard]] vec6 twist() const {
     return velocity_ && interval_ > 0.0 ? vec6(*velocity_ / interval_) : vec6(zeros<vec6>());
   }
 
   /// Predicts `T_world_camera` at `timestamp` by continuing the motion from `last`, for at most three times the last
-  /// interval; returns `last` itself if the motion is unknown.
+  /// interval; returns the pose of `last` if the motion is unknown.
   [[nodiscard]] se3 predict(const timed_pose& last, double timestamp) const {
     if (!velocity_) return last.T_world_camera;
     const double ratio = interval_ > 0.0 ? (timestamp - last.timestamp) / interval_ : 1.0;
@@ -46,7 +46,7 @@ class motion_model {
   }
 
  private:
-  std::optional<vec6> velocity_;  ///< of the camera in its own frame, per interval
+  std::optional<vec6> velocity_;  ///< twist of the camera in its own frame, per interval
   double interval_ = 0.0;         ///< seconds
 };
 

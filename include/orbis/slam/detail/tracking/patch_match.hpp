@@ -30,14 +30,14 @@ namespace orbis::slam::detail {
   return upper + fy * (lower - upper);
 }
 
-/// The mean along a line centred on a pixel, as weights of the pixels around it: motion blur.
+/// A filter for motion blur: the mean along a line centred on a pixel, as weights of the surrounding pixels.
 class line_kernel {
  public:
   static constexpr int reach = 6;  ///< pixels; longer lines are shortened
 
   explicit line_kernel(vec2 line) {
     const double longest = std::max(std::abs(line.x()), std::abs(line.y()));
-    if (!(norm(line) >= 0.1 && norm(line) < 1e6)) {  // also if it is not a number
+    if (!(norm(line) >= 0.1 && norm(line) < 1e6)) {  // also true for NaN
       weights_[count_++] = {0, 0, 1.0F};
       return;
     }
@@ -63,11 +63,11 @@ class line_kernel {
         }
   }
 
-  /// The distance to the farthest pixels with a weight.
+  /// The horizontal and vertical distances of the farthest pixels with a weight.
   [[nodiscard]] int reach_x() const noexcept { return reach_x_; }
   [[nodiscard]] int reach_y() const noexcept { return reach_y_; }
 
-  /// Sets `to`, `Rows` rows of 16 values, to the weighted means around the values from `from` on, whose rows are
+  /// Sets `to`, `Rows` rows of 16 values, to the weighted means around the values starting at `from`, whose rows are
   /// `stride` apart.
   template <int Rows, simd::target Target>
   ORBIS_ALWAYS_INLINE void apply(const float* from, std::ptrdiff_t stride, float* to) const {
@@ -94,16 +94,16 @@ class line_kernel {
   int reach_x_ = 0, reach_y_ = 0;
 };
 
-/// The place of a patch in an image: pixel (u, v) of the patch, relative to its centre, is at
-/// `centre + u * across + v * down`, pixels of the image.
+/// The placement of a patch in an image: pixel (u, v) of the patch, relative to its centre, is at
+/// `centre + u * across + v * down`, in pixels of the image.
 struct patch_placement {
   vec2 centre, across, down;
 };
 
 /// The result of aligning a patch.
 struct patch_shift {
-  vec2 shift;          ///< from the expected place to the measured one, pixels of the patch
-  double correlation;  ///< normalised, of the 8 x 8 pixels in the middle
+  vec2 shift;          ///< from the expected position to the measured one, pixels of the patch
+  double correlation;  ///< normalised correlation of the central 8 x 8 pixels
 };
 
 /// Aligns a patch with an image; see `match_patch`.
@@ -116,13 +116,13 @@ struct match_patch_kernel {
                                       const line_kernel& by_patch, image_view<const std::uint8_t> image,
                                       const patch_placement& expected, patch_shift& found) {
     using lanes = simd::vec<float, 8, Target>;
-    constexpr int side = 8;           // of the compared part: a row is one vector
-    constexpr int around = 3;         // pixels by which it may move
+    constexpr int side = 8;           // size of the compared region: a row is one vector
+    constexpr int around = 3;         // maximum shift, pixels
     constexpr double weakest = 64.0;  // smallest eigenvalue of the sum of squared gradients, grey levels squared
     constexpr int most_iterations = 12;
     constexpr double enough = 0.01;  // pixels
 
-    // The middle of the patch, blurred, with a border for the gradient.
+    // The blurred centre of the patch, with a border for the gradient.
     constexpr int size = landmark_patch::size, first = (size - side) / 2 - 1;
     std::array<float, std::size_t{size} * size + 16> values;
     for (std::size_t k = 0; k != pixels.size(); ++k) values[k] = static_cast<float>(pixels[k]);
@@ -149,10 +149,10 @@ struct match_patch_kernel {
     const double determinant = xx * yy - xy * xy, trace = xx + yy;
     if (!(0.5 * (trace - std::sqrt(std::max(0.0, trace * trace - 4.0 * determinant))) >= weakest)) return false;
 
-    // The image around the expected place, in the pixels of the patch.
+    // The image around the expected position, sampled at pixels of the patch.
     constexpr int window = side + 2 * (around + 1), margin = line_kernel::reach, stride = window + 2 * margin + 4;
     static_assert(window == 16 && stride % 8 == 0);
-    std::array<float, std::size_t{stride} * (window + 2 * margin) + 8> seen;  // a vector may end after its row
+    std::array<float, std::size_t{stride} * (window + 2 * margin) + 8> seen;  // a vector may extend beyond its row
     if (!sample<Target>(image, expected, by_patch, seen.data(), stride)) return false;
     float there[window][16];
     by_patch.apply<window, Target>(seen.data() + margin * stride + margin, stride, there[0]);
@@ -196,8 +196,8 @@ struct match_patch_kernel {
   static ORBIS_ALWAYS_INLINE double lane_sum(const L& v) {
     return static_cast<double>(simd::sum(v));
   }
-  /// Sets `to`, rows `stride` apart, to the image at the pixels of the patch from -(8 + margin) on that `by_patch`
-  /// needs. Returns false if one of them is outside of the image.
+  /// Sets `to`, with rows `stride` apart, to the image at those pixels of the patch, starting at -(8 + margin), that
+  /// `by_patch` needs. Returns false if one of these is outside the image.
   template <simd::target Target>
   static ORBIS_ALWAYS_INLINE bool sample(image_view<const std::uint8_t> image, const patch_placement& expected,
                                          const line_kernel& by_patch, float* to, int stride) {
@@ -217,7 +217,7 @@ struct match_patch_kernel {
               corner.y() < image.height() - 1.01))
           return false;
       }
-    // Lanes beyond x1 are clamped to the image, and not used.
+    // Lanes beyond x1 are clamped to the image and not used.
     const lanes right(static_cast<float>(image.width()) - 1.01F), bottom(static_cast<float>(image.height()) - 1.01F);
     alignas(32) constexpr std::array<float, 8> ramp{0, 1, 2, 3, 4, 5, 6, 7};
     const lanes along = lanes::load(ramp.data());
@@ -247,11 +247,11 @@ struct match_patch_kernel {
   }
 };
 
-/// Measures where a patch is in `image`, at most three pixels of the patch from the expected place. Both images are
-/// blurred: the patch by `patch_smear`, the image by `image_smear` (motions, pixels of the patch). Each is blurred by
-/// the other's motion as well, so that both show the same: blur along two lines does not depend on their order. The
-/// mean and the contrast of the patch may differ. Empty if the patch lacks texture in a direction, leaves the image, or
-/// is not found.
+/// Measures the position of a patch in `image`, at most three pixels of the patch from the expected position. Both
+/// contain motion blur: the patch by `patch_smear`, the image by `image_smear` (motions, pixels of the patch). Each is
+/// additionally blurred by the motion of the other, which makes both equal: blur along two lines does not depend on
+/// their order. The mean and the contrast of the patch may differ. Empty if the patch lacks texture in a direction,
+/// leaves the image, or is not found.
 ///
 /// Sources: S. Baker, I. Matthews, "Lucas-Kanade 20 years on", IJCV 56 (2004), for the inverse compositional steps;
 /// H. Jin, P. Favaro, R. Cipolla, "Visual tracking in the presence of motion blur", CVPR 2005, for blurring the patch.

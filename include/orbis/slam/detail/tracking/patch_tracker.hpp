@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Subpixel positions of landmarks in the image of a frame, also in a blurred one.
+/// Measurement of the subpixel positions of landmarks in the image of a frame, even if it is blurred.
 #pragma once
 
 #include <algorithm>
@@ -33,17 +33,17 @@
 
 namespace orbis::slam::detail {
 
-/// The image of a frame, which is valid while the frame is tracked.
+/// The image of a frame, which must be valid while the frame is tracked.
 struct frame_image {
-  const features::image_pyramid* levels = nullptr;  ///< those of the keypoints; null: not available
+  const features::image_pyramid* levels = nullptr;  ///< the pyramid used for the keypoints; null if not available
   /// Returns the depth at a pixel, metres; 0 if it is unknown. Empty if there is no depth image.
   std::function<double(const vec2& pixel)> depth_at{};
 
   [[nodiscard]] bool empty() const noexcept { return levels == nullptr || levels->empty(); }
 };
 
-/// Measures where the landmarks of a frame are in its image, by comparison with their patches. A detector finds a
-/// corner in a blurred image somewhere on its streak. A patch is found where the landmark is in the middle of the
+/// Measures the positions of landmarks in the image of a frame by comparison with their patches. In a blurred image, a
+/// detector finds a corner anywhere on its streak, whereas a patch is found where the landmark is in the middle of the
 /// exposure, to a fraction of a pixel.
 template <camera::camera_model Camera, feature_descriptor D>
 class patch_tracker {
@@ -54,7 +54,7 @@ class patch_tracker {
 
   /// Sets the image of the next frame. It must remain valid until the next call.
   void set_image(frame_image image) { image_ = std::move(image); }
-  /// Returns true if there is an image to measure in.
+  /// Returns true if there is an image for measurements.
   [[nodiscard]] bool is_ready() const noexcept { return options_.enabled && !image_.empty(); }
 
   /// Returns a copy of the image. @pre is_ready()
@@ -67,9 +67,10 @@ class patch_tracker {
   /// The exposure time, given or estimated, seconds.
   [[nodiscard]] double exposure() const noexcept { return options_.exposure.value_or(estimation_.exposure()); }
 
-  /// Moves the keypoints that observe landmarks to where their patches are in the image, and sets `f.deviations`.
-  /// `twist`: the motion of the camera in its own frame, per second. Returns false, and leaves `f.deviations` empty, if
-  /// no patch is found. `estimates`: the frame contributes to the estimate of the exposure. O(features).
+  /// Moves the keypoints that observe landmarks to the positions of their patches in the image, and sets
+  /// `f.deviations`. `twist`: the twist of the camera in its own frame, per second. Returns false, and leaves
+  /// `f.deviations` empty, if no patch is found. `estimates`: the frame contributes to the estimate of the exposure.
+  /// O(features).
   /// @pre is_ready()
   [[nodiscard]] bool align(basic_frame<D>& f, const basic_map<D>& m, const vec6& twist, bool estimates = true) {
     const double seconds = exposure();
@@ -78,7 +79,7 @@ class patch_tracker {
     moved_.clear();
     std::size_t moving = 0;
     for (std::size_t i = 0; i != f.size(); ++i) {
-      if (seconds == 0.0 && f.landmarks[i] == no_id) continue;  // a sharp corner
+      if (seconds == 0.0 && f.landmarks[i] == no_id) continue;  // without blur, the deviation stays 1
       const double scale = rig_.scales.scale(f.features.keypoints[i].octave);
       constexpr double far = 1e3;  // metres
       const vec2 motion = image_motion(f.has_depth(i) ? f.point_camera(i) : vec3(far * f.rays[i]), twist);
@@ -87,7 +88,7 @@ class patch_tracker {
       const basic_landmark<D>& l = m.landmark_at(f.landmarks[i]);
       const auto view = predict_view(f, i, l, T_camera_world, motion);
       if (!view) continue;
-      constexpr std::size_t every = 32;  // patch: a fraction of the time of the alignment
+      constexpr std::size_t every = 32;  // patches: takes a fraction of the time of the alignment
       if (estimates && !options_.exposure && shows_exposure(l.patch, *view) && moving++ % every == 0)
         compare_exposures(l.patch, *view);
       const auto found = match(l.patch, *view, seconds);
@@ -101,8 +102,8 @@ class patch_tracker {
     return !moved_.empty();
   }
 
-  /// Aligns the patches of a frame and refines its pose. Returns the number of landmarks left; empty if no patch is
-  /// found. `estimates`: see `align`. @pre is_ready()
+  /// Aligns the patches of a frame and refines its pose. Returns the number of remaining landmarks; empty if no patch
+  /// is found. `estimates`: see `align`. @pre is_ready()
   [[nodiscard]] std::optional<std::size_t> refine(basic_frame<D>& f, const basic_map<D>& m, const vec6& twist,
                                                   bool estimates = true) {
     if (!align(f, m, twist, estimates)) return std::nullopt;
@@ -111,7 +112,8 @@ class patch_tracker {
     return left;
   }
 
-  /// Updates the deviation of patches from the reprojection errors of the last aligned frame, at its refined pose.
+  /// Updates the standard deviation of patch positions from the reprojection errors of the last aligned frame at its
+  /// refined pose.
   void update_deviation(const basic_frame<D>& f, const basic_map<D>& m) {
     constexpr std::size_t enough = 30;
     constexpr double least = 0.3, most = 1.0, rate = 0.05;
@@ -130,8 +132,8 @@ class patch_tracker {
     deviation_ += rate * (std::clamp(*middle / median_of_rayleigh, least, most) - deviation_);
   }
 
-  /// Gives the landmarks of a new keyframe that have no patch one from its image. These keypoints define where the
-  /// landmarks are in images. `f`: the frame from which the keyframe was made. @pre is_ready()
+  /// Adds a patch from the image of a new keyframe to each of its landmarks that has none. These keypoints define the
+  /// positions of the landmarks in images. `f`: the frame from which the keyframe was created. @pre is_ready()
   void add_patches(basic_map<D>& m, keyframe_id id, const basic_frame<D>& f, const vec6& twist) const {
     const se3 T_camera_world = f.T_world_camera.inverse();
     for (std::uint32_t i = 0; i != f.size(); ++i) {
@@ -144,7 +146,7 @@ class patch_tracker {
     }
   }
 
-  /// Sets the motion of the patches from the first keyframe of a map, which is known from the next frame only.
+  /// Sets the motion of the patches of a map's first keyframe, which is known only after the next frame.
   /// @pre m.has_keyframe(id), is_ready()
   void set_first_motion(basic_map<D>& m, keyframe_id id, const vec6& twist) const {
     const auto& k = m.at(id);
@@ -159,8 +161,8 @@ class patch_tracker {
     }
   }
 
-  /// Moves the keypoints of the last aligned frame that no longer observe a landmark, or all, back to where the
-  /// detector found them.
+  /// Moves the keypoints of the last aligned frame that no longer observe a landmark, or all keypoints, back to their
+  /// detected positions.
   void move_back(basic_frame<D>& f, bool all) const {
     for (const moved_keypoint& k : moved_) {
       if (!all && f.landmarks[k.index] != no_id) continue;
@@ -172,22 +174,23 @@ class patch_tracker {
   }
 
  private:
-  /// A keypoint before it was moved to a patch.
+  /// A keypoint before it was moved to the position of a patch.
   struct moved_keypoint {
     std::size_t index;
     float x, y, deviation, depth;
     vec3 ray;
     keypoint_as_read read;
   };
-  /// A landmark's expected place in the image.
+  /// A landmark's expected placement in the image.
   struct patch_view {
-    vec2 pixel, across, down;  ///< of the centre of the patch, and the steps to its next pixels, pixels of the image
-    vec2 delay;                ///< its motion from the frame's time to that of its row, pixels of the image
+    vec2 pixel, across, down;  ///< centre of the patch, and the steps to its next pixels, pixels of the image
+    vec2 delay;                ///< motion from the frame's time to that of its row, pixels of the image
     vec2 motion;               ///< pixels of the patch per second
     image_view<const std::uint8_t> level;
   };
 
-  /// The deviation of a corner's position, pixels: it may be found anywhere on its streak, of `length` pixels.
+  /// Returns the standard deviation of a corner's position, pixels: it may be found anywhere on its streak of `length`
+  /// pixels.
   [[nodiscard]] static double corner_deviation(double length) noexcept {
     return std::sqrt(1.0 + length * length / 12.0);
   }
@@ -196,12 +199,12 @@ class patch_tracker {
     return f.as_read.empty() ? f.pixel(i)
                              : vec2(static_cast<double>(f.as_read[i].x), static_cast<double>(f.as_read[i].y));
   }
-  /// Converts a pixel of the image to one of a pyramid level.
+  /// Converts a pixel of the image to a pixel of a pyramid level.
   [[nodiscard]] vec2 on_level(const vec2& pixel, image_view<const std::uint8_t> level) const {
     return {features::image_pyramid::full_coordinate(pixel.x(), rig_.camera().width(), level.width()),
             features::image_pyramid::full_coordinate(pixel.y(), rig_.camera().height(), level.height())};
   }
-  /// The sides of a pixel of a level, pixels of the image.
+  /// Returns the width and height of a pixel on a level, in pixels of the image.
   [[nodiscard]] vec2 pixel_size(image_view<const std::uint8_t> level) const {
     return {static_cast<double>(rig_.camera().width()) / level.width(),
             static_cast<double>(rig_.camera().height()) / level.height()};
@@ -212,7 +215,7 @@ class patch_tracker {
     if (!rig_.camera().project(point, by_point)) return zeros<vec2>();
     return by_point * (cross(tail<3>(twist), point) + head<3>(twist));
   }
-  /// Returns the level with the pixel size nearest to `scale`, pixels of the image.
+  /// Returns the level whose pixel size is nearest to `scale` (pixels of the image).
   [[nodiscard]] std::size_t nearest_level(double scale) const {
     const auto levels = std::min(image_.levels->size(), static_cast<std::size_t>(rig_.scales.levels()));
     std::size_t level = 0;
@@ -221,8 +224,8 @@ class patch_tracker {
     return level;
   }
 
-  /// Returns the expected place of landmark `l`, which keypoint `i` observes. Empty without a patch, if the patch is
-  /// out of view, or if it appears at a very different size.
+  /// Returns the expected placement of landmark `l`, which keypoint `i` observes. Empty if the landmark has no patch,
+  /// or if the patch is out of view or appears at a very different size.
   [[nodiscard]] std::optional<patch_view> predict_view(const basic_frame<D>& f, std::size_t i,
                                                        const basic_landmark<D>& l, const se3& T_camera_world,
                                                        const vec2& motion) const {
@@ -255,7 +258,7 @@ class patch_tracker {
     return match_patch(patch, seconds * patch.motion, seconds * v.motion, v.level,
                        {on_level(v.pixel, v.level), on_grid(v.across), on_grid(v.down)});
   }
-  /// Returns true if the blur of the image differs from that of the patch. Opposite motions have the same blur.
+  /// Returns true if the blur of the image differs from that of the patch. Opposite motions cause the same blur.
   [[nodiscard]] static bool shows_exposure(const landmark_patch& patch, const patch_view& v) {
     constexpr double visible = 100.0;  // pixels of the patch per second
     return std::min(norm(v.motion - patch.motion), norm(v.motion + patch.motion)) > visible;
@@ -270,7 +273,7 @@ class patch_tracker {
     estimation_.add(correlations);
   }
 
-  /// Moves keypoint `i` to a pixel of the image, and reads its depth there. `delay`: its motion from the frame's time
+  /// Moves keypoint `i` to a pixel of the image, and reads its depth there. `delay`: the motion from the frame's time
   /// to that of its row. Returns false, without a change, if a pixel has no ray.
   bool move_keypoint(basic_frame<D>& f, std::size_t i, const vec2& to, const vec2& delay) {
     const auto read_ray = rig_.camera().unproject(to), ray = rig_.camera().unproject(to - delay);
@@ -289,7 +292,7 @@ class patch_tracker {
     read.x = static_cast<float>(to.x()), read.y = static_cast<float>(to.y());
     read.ray_x = read_ray->x() / read_ray->z(), read.ray_y = read_ray->y() / read_ray->z();
     if (!image_.depth_at) return true;
-    // What was corrected for the time of the depth image at the old pixel applies to the new one.
+    // The correction for the time of the depth image at the old pixel is applied to the new one.
     const auto corrected = [&](float depth) {
       if (!(read.stored_depth > 0.0F && stored > 0.0F)) return stored;
       return depth > 0.0F ? stored + (depth - read.stored_depth) : 0.0F;
@@ -300,8 +303,8 @@ class patch_tracker {
     return true;
   }
 
-  /// Sets the motion of a patch whose landmark is at `point` (camera frame, metres). `size`: of its pixels, pixels of
-  /// the image.
+  /// Sets the motion of a patch whose landmark is at `point` (camera frame, metres). `size`: size of its pixels, in
+  /// pixels of the image.
   void set_motion(landmark_patch& patch, const vec3& point, const vec2& size, const vec6& twist) const {
     const vec2 motion = image_motion(point, twist);
     patch.motion = {motion.x() / size.x(), motion.y() / size.y()};
@@ -333,9 +336,9 @@ class patch_tracker {
     patch.pixels = std::move(pixels);
     return patch;
   }
-  /// Returns the motion on the surface (camera frame, metres) by a step in the image, pixels. If the depth image is
-  /// flat around the pixel, its slope is that of the surface; otherwise the surface is parallel to the image. `z`:
-  /// depth at the pixel, metres. Empty if a pixel has no ray.
+  /// Returns the motion on the surface (camera frame, metres) for a step in the image (pixels). If depth varies
+  /// smoothly around the pixel, the slope of the surface is measured; otherwise the surface is assumed parallel to the
+  /// image. `z`: depth at the pixel, metres. Empty if a pixel has no ray.
   [[nodiscard]] std::optional<vec3> step_on_surface(const vec2& pixel, const vec2& step, double z) const {
     constexpr double arm = 4.0, unevenness = 0.01, steepest = 0.1;  // steps; shares of the depth
     const vec2 before = pixel - arm * step, after = pixel + arm * step;
@@ -353,8 +356,8 @@ class patch_tracker {
   const patch_options& options_;
   frame_image image_;
   exposure_estimation estimation_;
-  double deviation_ = 0.5;             ///< of the position of a patch, pixels of its level
-  std::vector<moved_keypoint> moved_;  ///< of the last frame
+  double deviation_ = 0.5;             ///< standard deviation of a patch's position, pixels of its level
+  std::vector<moved_keypoint> moved_;  ///< keypoints of the last frame
   std::vector<double> errors_;         ///< reused working memory
 };
 

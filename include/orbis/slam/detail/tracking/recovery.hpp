@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Recovery of a frame that landmarks do not localise: by depth, by appearance, or around the last pose.
+/// Recovery of a frame that cannot be localised by landmarks: by depth, by appearance, or by a search around the last
+/// pose.
 #pragma once
 
 #include <algorithm>
@@ -20,7 +21,7 @@
 
 namespace orbis::slam::detail {
 
-/// Localises frames where tracking is weak or lost. `Context` is a `tracking_context`. The functions return the number
+/// Localises frames when tracking is weak or lost. `Context` is a `tracking_context`. The functions return the number
 /// of landmarks that agree with the pose, 0 on failure, and set the state.
 template <class Context>
 class recovery {
@@ -30,7 +31,7 @@ class recovery {
  public:
   recovery(Context& context, frame_refinement<Context>& refinement) : c_{context}, refinement_{refinement} {}
 
-  /// Aligns the depth of a frame near the last one with the surfaces of keyframes.
+  /// Aligns the depth of a frame, whose pose is near that of the last one, with the surfaces of keyframes.
   [[nodiscard]] std::optional<depth_alignment> align_depth(const task& t) {
     constexpr double longest = 2.0;  // seconds
     const double interval = t.frame.timestamp - c_.last.timestamp;
@@ -66,8 +67,8 @@ class recovery {
     c_.state = c_.is_tracking() ? track_state::tracking : track_state::relocalized;
     return inliers;
   }
-  /// Sets the pose from depth alone. Returns false if the alignment is uncertain, or leaves a direction of the pose
-  /// free.
+  /// Sets the pose from depth alone. Returns false if the alignment is uncertain or does not constrain all directions
+  /// of the pose.
   bool localize_by_depth(const task& t, const depth_alignment& aligned) {
     if (!c_.depth.determines_pose(aligned)) return false;
     frame_type& f = t.frame;
@@ -80,11 +81,11 @@ class recovery {
     return true;
   }
   /// Checks a frame tracked by `inliers` landmarks against its depth. If the depth disagrees with the pose but agrees
-  /// with another one, tracks from that pose; the result is 0 if only depth determines it.
+  /// with a different one, tracks from that pose; returns 0 if only depth determines the pose.
   std::size_t recheck_with_depth(const task& t, std::size_t inliers) {
     frame_type& f = t.frame;
     const depth_term_options& by_depth = c_.settings.depth_term;
-    // If something moves in the view, it causes the disagreement.
+    // A moving object in view would cause the disagreement.
     if (!by_depth.recovers || c_.moving.size() != 0 || !c_.depth.has_surfaces()) return inliers;
     const association seen = c_.depth.agreement({f.T_world_camera, f.twist}, f.shutter);
     if (seen.visible < by_depth.min_points || seen.share() >= by_depth.min_share) return inliers;
@@ -100,7 +101,7 @@ class recovery {
     return inliers;
   }
 
-  /// Relocalises a frame from the reference and the keyframes with similar appearance, in any map.
+  /// Relocalises a frame from the reference keyframe and keyframes with similar appearance in any map.
   std::size_t relocalize(const task& t) {
     c_.moving.clear();
     std::vector<map_keyframe> candidates = t.find_similar(t.frame.features, c_.settings.recovery.candidates);
@@ -119,8 +120,8 @@ class recovery {
     c_.reference = reference_before;
     return 0;
   }
-  /// Searches around the last tracked frame's pose, for a camera that has turned; requires a frame with enough points
-  /// to begin a map.
+  /// Searches around the pose of the last tracked frame, in case the camera has turned; requires a frame with enough
+  /// points to start a map.
   std::size_t search_in_place(const task& t) {
     const bool is_here = c_.last.size() != 0 && c_.reference.map == t.maps.active_id() && t.maps.has(c_.reference);
     const bool is_recent = t.frame.timestamp - c_.last.timestamp < c_.settings.recovery.new_map_after;
@@ -129,7 +130,7 @@ class recovery {
   }
 
  private:
-  /// Refines a pose found by a search, in the active map around the reference, on the local map.
+  /// Refines a pose found by a search on the local map around the reference in the active map.
   std::size_t track_found(const task& t) {
     const std::size_t inliers = refinement_.match_local_map(t, 3.0 * c_.settings.search_radius);
     if (inliers < c_.settings.recovery.min_inliers) return 0;

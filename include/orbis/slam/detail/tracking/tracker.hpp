@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Estimation of the pose of a frame: from the last frame, from a keyframe, or from the landmarks around it.
+/// Estimation of a frame's pose: from the last frame, from a keyframe, or from the landmarks around it.
 #pragma once
 
 #include <algorithm>
@@ -51,7 +51,7 @@ std::size_t refine_on_matches(basic_frame<D>& f, const search_list<D>& list, std
   return refined.inliers;
 }
 
-/// Refines the pose of `f` on its landmarks, of which it keeps those that agree with the result. Returns their number;
+/// Refines the pose of `f` on its landmarks, and keeps the landmarks that agree with the result. Returns their number;
 /// 0 if the pose cannot be determined. @pre f.deviations is set
 template <feature_descriptor D, camera::camera_model Camera>
 std::size_t refine_on_landmarks(basic_frame<D>& f, const basic_map<D>& m, const camera_rig<Camera>& rig) {
@@ -84,17 +84,17 @@ std::size_t refine_on_landmarks(basic_frame<D>& f, const basic_map<D>& m, const 
 }
 
 /// Estimates poses of frames in a map. Each function sets the pose of the frame and the landmarks that agree with it,
-/// and returns the number of matches that agree, 0 if the pose cannot be determined. The map is not changed.
+/// and returns the number of matches that agree, or 0 if the pose cannot be determined. The map is not changed.
 ///
-/// Source of the scheme and its figures: R. Mur-Artal, J. D. Tardos, "ORB-SLAM2: an open-source SLAM system for
+/// Source of the method and its parameters: R. Mur-Artal, J. D. Tardos, "ORB-SLAM2: an open-source SLAM system for
 /// monocular, stereo and RGB-D cameras", T-RO 33 (2017).
 template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers>
 class tracker {
  public:
   tracker(const camera_rig<Camera>& rig, const options& settings) : rig_{rig}, options_{settings} {}
 
-  /// Searches for the observations of the last frame: its landmarks, and its other points with depth. `last` has its
-  /// current pose, and landmarks by the ids of the map at that time. `predicted`: the expected `T_world_camera`.
+  /// Searches for the points observed by the last frame: its landmarks, and its other points with depth. `last` has its
+  /// current pose, and landmark ids as of its tracking. `predicted`: the expected `T_world_camera`.
   std::size_t by_motion(basic_frame<D>& f, const basic_map<D>& m, const basic_frame<D>& last, const se3& predicted,
                         moving_features<Camera, D, Matchers>& moving) const {
     for (const double widening : {1.0, 2.0}) {
@@ -112,7 +112,7 @@ class tracker {
   }
 
   /// Like `by_motion`, for a camera that may have turned in any direction by up to half of its view since the last
-  /// frame: tries the turned poses with most matches, from the last frame's position. About 80 searches.
+  /// frame: tries the turned poses with the most matches, at the position of the last frame. Takes about 80 searches.
   std::size_t by_turning(basic_frame<D>& f, const basic_map<D>& m, const basic_frame<D>& last) const {
     const auto& camera = rig_.camera();
     const auto corner = camera.unproject({0.0, 0.0});
@@ -123,7 +123,7 @@ class tracker {
       se3 T_world_camera;
     };
     std::vector<attempt> attempts;
-    constexpr int steps = 4;  // from the middle of the view to its edge
+    constexpr int steps = 4;  // from the centre of the view to its edge
     const double radius = 4.0 * options_.motion_radius;
     for (int across = -steps; across <= steps; ++across)
       for (int down = -steps; down <= steps; ++down) {
@@ -150,7 +150,7 @@ class tracker {
     return 0;
   }
 
-  /// Matches a frame with a keyframe by appearance and estimates its pose by RANSAC. @pre m.has_keyframe(id)
+  /// Matches a frame with a keyframe by descriptors and estimates its pose by RANSAC. @pre m.has_keyframe(id)
   std::size_t by_appearance(basic_frame<D>& f, const basic_map<D>& m, keyframe_id id) const {
     const auto& k = m.at(id);
     search_list<D> list;
@@ -182,8 +182,8 @@ class tracker {
   }
 
   /// Searches for the landmarks of the local map in a frame whose pose is roughly known, within `radius` pixels of a
-  /// keypoint's level. Calls `expected(id)` for the landmarks that the frame is expected to observe, `found(id)` for
-  /// those that it observes.
+  /// keypoint's level. Calls `expected(id)` for the landmarks that the frame is expected to observe, and `found(id)`
+  /// for those that it observes.
   template <class Expected, class Found>
   std::size_t on_local_map(basic_frame<D>& f, const basic_map<D>& m, keyframe_id reference, double radius,
                            const moving_features<Camera, D, Matchers>& moving, Expected&& expected,

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The data that the steps of tracking share.
+/// The data shared by the steps of tracking.
 #pragma once
 
 #include <functional>
@@ -29,21 +29,22 @@
 
 namespace orbis::slam::detail {
 
-/// A frame to localise, which is changed and finally moved from, and its environment. Only `localized` may be empty.
+/// A frame to localise, which is modified and finally moved from, and its environment. Of the functions, only
+/// `localized` may be empty.
 template <feature_descriptor D>
 struct tracking_task {
   basic_frame<D>& frame;
   basic_atlas<D>& maps;
-  bool is_frozen = false;  ///< the maps are not changed, and no map is begun
-  /// Returns true if the back end takes another keyframe of a map that exists.
+  bool is_frozen = false;  ///< true if the maps are not changed and no map is started
+  /// Returns true if the back end accepts another keyframe of an existing map.
   std::function<bool()> has_room;
-  /// Sets the measurements of a rolling shutter's rows (`as_read`), given the motion.
+  /// Sets the row measurements of a rolling shutter (`as_read`), given the motion.
   std::function<void(basic_frame<D>&, const frame_motion&)> read_rows;
   /// Returns the ids of the `count` keyframes with the most similar appearance.
   std::function<std::vector<map_keyframe>(const decltype(basic_frame<D>::features)&, std::size_t count)> find_similar;
   /// Called for a map with few keyframes when another one becomes active.
   std::function<void(map_id)> drop_map;
-  /// Called when the pose is estimated, before a keyframe is made.
+  /// Called when the pose has been estimated, before a keyframe is created.
   std::function<void()> localized;
 
   [[nodiscard]] basic_map<D>& map() const { return maps.active(); }
@@ -53,10 +54,10 @@ struct tracking_task {
 struct anchored_pose {
   map_keyframe reference;
   se3 T_reference_camera;  ///< translation divided by the scale of the reference
-  double scale = 1.0;      ///< of the reference when the pose was last used
+  double scale = 1.0;      ///< scale of the reference when the pose was last used
 };
 
-/// The tools of tracking and its memory between frames: the last frame, its reference keyframe and the motion.
+/// The components of tracking and its state between frames: the last frame, its reference keyframe and the motion.
 template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers>
 struct tracking_context {
   using camera_type = Camera;
@@ -74,7 +75,7 @@ struct tracking_context {
         patches{used, given.patches} {
     if (given.estimates_shutter) observer.emplace();
   }
-  tracking_context(const tracking_context&) = delete;  // its parts refer to each other
+  tracking_context(const tracking_context&) = delete;  // its members refer to each other
   tracking_context& operator=(const tracking_context&) = delete;
 
   const camera_rig<Camera>& rig;
@@ -86,10 +87,10 @@ struct tracking_context {
   std::optional<shutter_observer> observer;  ///< empty unless the shutter is estimated
 
   track_state state = track_state::not_started;
-  map_keyframe reference;  ///< the keyframe with which the current frame shares most landmarks
+  map_keyframe reference;  ///< the keyframe with which the current frame shares the most landmarks
   frame_type last;         ///< the last frame that was tracked
   motion_model motion;
-  std::optional<keyframe_id> first_patches;       ///< the first keyframe of the map, until its motion is known
+  std::optional<keyframe_id> first_patches;       ///< the first keyframe of the map, as long as its motion is unknown
   std::optional<pose_quadratic> depth_quadratic;  ///< the depth term of the last refined frame
 
   [[nodiscard]] bool is_tracking() const noexcept {
@@ -97,7 +98,7 @@ struct tracking_context {
   }
   /// The pose of the last frame.
   [[nodiscard]] const anchored_pose& anchor() const noexcept { return anchor_; }
-  /// The map that contains the last frame; a pose can be predicted from it only there.
+  /// The map that contains the last frame; poses can be predicted from that frame only in this map.
   [[nodiscard]] map_id last_map(const atlas_type& maps) const { return maps.current(anchor_.reference).map; }
   /// The current pose of the last frame; it follows later corrections of its keyframe.
   [[nodiscard]] se3 last_pose(const atlas_type& maps) const {
@@ -105,16 +106,16 @@ struct tracking_context {
         .value_or(last.T_world_camera);
   }
 
-  /// Predicts `T_world_camera` of a frame by constant velocity.
+  /// Predicts `T_world_camera` of a frame with the constant-velocity model.
   [[nodiscard]] se3 predict(const frame_type& f) const {
     return motion.predict({last.timestamp, last.T_world_camera}, f.timestamp);
   }
-  /// Returns true if the frame before `f` was tracked as well, so that the motion between both is that of the camera.
+  /// Returns true if the frame before `f` was also tracked, so that their poses determine the camera motion.
   [[nodiscard]] bool follows_last(const frame_type& f) const noexcept {
     return state == track_state::tracking && last.size() != 0 && last.index + 1 == f.index;
   }
-  /// Returns the motion of a frame, per second: that since the last frame, extrapolated by half of its change (see
-  /// `twist_prior`). Empty if the last frame is not the one before, or the pose has jumped.
+  /// Returns the twist of the camera at a frame, per second: the mean since the last frame, extrapolated by half of its
+  /// change (see `twist_prior`). Empty if the last frame is not the preceding one, or the pose has jumped.
   [[nodiscard]] std::optional<vec6> motion_to(const frame_type& f) const {
     constexpr double fastest = 5.0, fastest_turn = 10.0;  // metres and radians per second
     if (!follows_last(f)) return std::nullopt;
@@ -123,8 +124,8 @@ struct tracking_context {
     return motion.is_known() ? vec6(mean + 0.5 * (mean - motion.twist())) : mean;
   }
 
-  /// Updates ids and poses kept from the last frame to the state of the maps, which may have been merged, corrected and
-  /// culled since.
+  /// Updates ids and poses kept from the last frame to the current state of the maps, which may have been merged,
+  /// corrected and culled since then.
   void follow_maps(const atlas_type& maps) {
     const map_keyframe now = maps.current(reference);
     if (now.map != reference.map)
@@ -143,12 +144,13 @@ struct tracking_context {
     reference.keyframe = maps.at(now.map).replacement(now.keyframe);
   }
 
-  /// Returns the pose of a tracked frame relative to the reference.
+  /// Returns the pose of a tracked frame relative to its reference keyframe.
   [[nodiscard]] anchored_pose refer(const frame_type& f, const atlas_type& maps) const {
     const basic_keyframe<D>& k = maps.active().at(reference.keyframe);
     return {reference, scaled(k.T_world_camera.inverse() * f.T_world_camera, 1.0 / k.scale), k.scale};
   }
-  /// Makes a tracked frame the last one, and updates the motion, which is unknown unless the frame follows the last.
+  /// Makes a tracked frame the last one, and updates the motion, which is unknown unless the frame follows the previous
+  /// last one.
   void set_last(frame_type&& f, const anchored_pose& anchor) {
     if (follows_last(f)) motion.set({last.timestamp, last.T_world_camera}, {f.timestamp, f.T_world_camera});
     anchor_ = anchor;
@@ -156,7 +158,7 @@ struct tracking_context {
   }
 
  private:
-  anchored_pose anchor_;  ///< of `last`
+  anchored_pose anchor_;  ///< pose of `last`
 };
 
 }  // namespace orbis::slam::detail

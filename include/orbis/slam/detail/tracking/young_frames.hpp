@@ -30,9 +30,9 @@
 
 namespace orbis::slam::detail {
 
-/// Keeps the first frames of a map. A young map has few landmarks, and keyframes that are not yet adjusted with later
-/// ones; the frames between its keyframes would keep the errors of that time in the trajectory. They are therefore
-/// localised once more when several keyframes have followed, with the motion between their neighbours.
+/// Keeps the first frames of a map. A new map has few landmarks, and keyframes that have not yet been adjusted with
+/// later ones; the frames between these keyframes would retain the initial errors in the trajectory. They are therefore
+/// localised again after several more keyframes, using the motion between their neighbours.
 template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers>
 class young_frames {
  public:
@@ -40,10 +40,10 @@ class young_frames {
                patch_tracker<Camera, D>& patches)
       : rig_{rig}, options_{settings}, tracker_{track}, patches_{patches}, nothing_moves_{rig, settings} {}
 
-  young_frames(const young_frames&) = delete;  // it refers to parts of its owner
+  young_frames(const young_frames&) = delete;  // it refers to members of its owner
   young_frames& operator=(const young_frames&) = delete;
 
-  /// Starts with the frames of a new map.
+  /// Starts to keep the frames of a new map.
   void begin_map(map_id map) {
     waiting_.clear();
     count_ = 0;
@@ -52,8 +52,8 @@ class young_frames {
   /// Counts a keyframe of a map.
   void count_keyframe(map_id map) { keyframes_ += map == map_; }
 
-  /// Adds the last frame of the log, with its image, if it is one of the first frames of the map, and not too many
-  /// wait. `depth`: the cost of its pose by depth, if any.
+  /// Adds the last frame of the log, with its image, if it is one of the first frames of the map and not too many are
+  /// waiting. `depth`: the depth term of its pose, if any.
   void add(const basic_frame<D>& f, const std::optional<pose_quadratic>& depth, const frame_log& log) {
     const std::size_t number = log.end_number() - 1;
     if (count_ == most || !patches_.is_ready() || log.reference(number).map != map_) return;
@@ -65,7 +65,7 @@ class young_frames {
   }
 
   /// If enough keyframes have followed the oldest frame, localises it again in the current map, corrects its pose in
-  /// the log, and forgets the frame. A few milliseconds.
+  /// the log, and forgets the frame. Takes a few milliseconds.
   void localize_oldest(frame_log& log, const basic_atlas<D>& maps) {
     if (waiting_.empty()) return;
     young_frame& oldest = waiting_.front();
@@ -75,17 +75,17 @@ class young_frames {
   }
 
  private:
-  static constexpr std::size_t most = 100;                ///< frames of a map
-  static constexpr std::size_t most_pixels = 20'000'000;  ///< of the frames that wait: 65 of 640x480
-  static constexpr std::size_t enough = 5;                ///< keyframes
+  static constexpr std::size_t most = 100;                ///< maximum number of frames per map
+  static constexpr std::size_t most_pixels = 20'000'000;  ///< maximum for the waiting frames: 65 of 640x480
+  static constexpr std::size_t enough = 5;                ///< required number of later keyframes
 
   struct young_frame {
     basic_frame<D> frame;
     image<std::uint8_t> grey;
     std::optional<pose_quadratic> depth;
-    std::size_t number;     ///< in the log
-    std::size_t keyframes;  ///< made before it
-    std::size_t landmarks;  ///< observed at first
+    std::size_t number;     ///< index in the log
+    std::size_t keyframes;  ///< number of keyframes created before the frame
+    std::size_t landmarks;  ///< number of landmarks observed initially
   };
 
   /// Returns the new pose; empty if the frame is not localised.
@@ -115,7 +115,7 @@ class young_frames {
     patches_.set_image({});
     if (left && *left < least) return std::nullopt;
 
-    constexpr double deviation = 0.05;  // of the mean motion of two intervals, metres or radians per second
+    constexpr double deviation = 0.05;  // of the mean motion over two intervals, metres or radians per second
     const bool moves = motion && !f.shutter.is_global();
     find_row_observations(f, m, rig_, rows_);
     return refine_moving_pose(
@@ -131,8 +131,8 @@ class young_frames {
   patch_tracker<Camera, D>& patches_;
   moving_features<Camera, D, Matchers> nothing_moves_;
   std::deque<young_frame> waiting_;
-  map_id map_ = no_id;        ///< the last map that began
-  std::size_t count_ = most;  ///< frames of that map so far
+  map_id map_ = no_id;        ///< the last map that was started
+  std::size_t count_ = most;  ///< number of frames of that map so far
   std::size_t keyframes_ = 0;
   features::image_pyramid pyramid_;    ///< reused working memory
   std::vector<row_observation> rows_;  ///< reused working memory
