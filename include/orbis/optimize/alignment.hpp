@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The rigid or similarity transform between two lists of points: in closed form, or robustly if many pairs may be
-/// wrong.
+/// The rigid or similarity transform between two lists of points: in closed form, or by robust estimation if many pairs
+/// may be wrong.
 ///
 /// Sources: B. K. P. Horn, "Closed-form solution of absolute orientation using unit quaternions", JOSA A 4 (1987);
 /// S. Umeyama, PAMI 13 (1991) for the scale.
@@ -45,14 +45,14 @@ template <point_range Points>
   return out;
 }
 
-/// Returns an error unless lists of these lengths can be aligned.
+/// Returns an error if lists of these lengths cannot be aligned.
 [[nodiscard]] result<void> check_pairs(std::size_t from, std::size_t to, std::span<const double> weights);
-/// The transform from the moments of n pairs. Empty if they do not determine a rotation.
+/// Returns the transform determined by the moments of n pairs; empty if they do not determine a rotation.
 [[nodiscard]] std::optional<sim3> align_by_moments(const pair_moments& moments, std::size_t n, bool with_scale);
 /// The error for a failed alignment; `not_finite`: index of the first pair that is not finite, or n.
 [[nodiscard]] error alignment_error(std::size_t not_finite, std::size_t n);
 
-/// The transform between two lists of points. Without weights all pairs have equal weight.
+/// Returns the transform between two lists of points. Without weights, all pairs have equal weight.
 template <point_range From, point_range To>
 [[nodiscard]] result<sim3> align(const From& from, const To& to, bool with_scale,
                                  std::span<const double> weights = {}) {
@@ -77,9 +77,10 @@ template <class Transform>
 
 }  // namespace detail
 
-/// Absolute orientation: the `T_to_from` that minimises the sum of `|T_to_from * from[i] - to[i]|^2`, in closed form.
-/// Not robust; see `estimate_alignment` for pairs that may be wrong. O(n). Errors: `invalid_argument` for lists of
-/// different length; `no_data` for fewer than three pairs; `degenerate` for collinear, coincident or non-finite points.
+/// Absolute orientation: returns the `T_to_from` that minimises the sum of `|T_to_from * from[i] - to[i]|^2`, in closed
+/// form. Not robust; see `estimate_alignment` for pairs that may be wrong. O(n). Errors: `invalid_argument` for lists
+/// of different lengths; `no_data` for fewer than three pairs; `degenerate` for collinear, coincident or non-finite
+/// points.
 template <point_range From, point_range To>
 [[nodiscard]] result<se3> absolute_orientation(const From& from, const To& to) {
   const auto s = detail::align(from, to, false);
@@ -88,7 +89,7 @@ template <point_range From, point_range To>
 }
 
 /// Absolute orientation with unknown scale: minimises the sum of `|s R from[i] + t - to[i]|^2`, weighted by
-/// `weights[i]` unless these are empty. O(n). Errors as above; `invalid_argument` also unless there is one finite
+/// `weights[i]` unless `weights` is empty. O(n). Errors: as above; also `invalid_argument` unless there is one finite,
 /// non-negative weight per pair.
 template <point_range From, point_range To>
 [[nodiscard]] result<sim3> absolute_orientation_with_scale(const From& from, const To& to,
@@ -97,32 +98,32 @@ template <point_range From, point_range To>
 }
 
 struct alignment_options {
-  /// Maximum distance between the transformed point and its partner for an inlier: metres, or units of `deviations` if
-  /// these are given.
+  /// Maximum distance between the transformed point and its partner for an inlier: in metres, or in units of
+  /// `deviations` if specified.
   double threshold = 0.05;
   double confidence = 0.9999;
   std::size_t min_iterations = 10;
   std::size_t max_iterations = 10000;
   std::size_t min_inliers = 6;  ///< minimum number of inliers for success
   std::uint64_t seed = 1;
-  /// Standard deviation of the distance of each pair, metres; for a depth camera it grows with the square of the depth.
-  /// Pairs are weighted by 1 / deviation^2. Empty: all pairs have equal weight.
+  /// Standard deviation of the distance of each pair, metres; for a depth camera, it grows with the square of the
+  /// depth. Pairs are weighted by 1 / deviation^2. Empty: all pairs have equal weight.
   std::span<const double> deviations = {};
 };
 
 template <class Transform>
 struct alignment_estimate {
   Transform T_to_from;
-  std::vector<std::uint32_t> inliers;  ///< exactly the pairs within the threshold, ascending
-  double rmse = 0.0;                   ///< of the inliers, in the threshold's units
+  std::vector<std::uint32_t> inliers;  ///< indices of all pairs within the threshold, ascending
+  double rmse = 0.0;                   ///< root mean square error of the inliers, in units of the threshold
   std::size_t iterations = 0;
 };
 
-/// Estimates the transform `T_to_from` (`se3` or `sim3`) that maps most points `from[i]` close to `to[i]`: three pairs
-/// in RANSAC, each new best transform refined on its inliers. Non-finite pairs, and those with a zero or non-finite
-/// deviation, are outliers. Deterministic for a given `options.seed`. Errors: `invalid_argument` for lists of different
-/// length or options out of range; `no_data` for fewer than three pairs; `degenerate` if all points are collinear or
-/// coincide, or no transform has `min_inliers` inliers. The message gives the reason.
+/// Estimates the transform `T_to_from` (`se3` or `sim3`) that maps most points `from[i]` close to `to[i]`: RANSAC with
+/// three pairs per sample; each new best transform is refined on its inliers. Non-finite pairs, and those with a zero
+/// or non-finite deviation, are outliers. Deterministic for a given `options.seed`. Errors: `invalid_argument` for
+/// lists of different lengths or options out of range; `no_data` for fewer than three pairs; `degenerate` if all points
+/// are collinear or coincide, or no transform has `min_inliers` inliers. The message gives the reason.
 template <class Transform = se3, point_range From, point_range To>
 requires(std::same_as<Transform, se3> || std::same_as<Transform, sim3>)
     [[nodiscard]] result<alignment_estimate<Transform>> estimate_alignment(const From& from, const To& to,

@@ -22,7 +22,7 @@
 namespace orbis::optimize {
 
 namespace detail {
-/// The initial damping of bundle adjustment, stronger than that of pose graphs.
+/// The initial damping of bundle adjustment, which is stronger than that of pose graphs.
 template <class Damping>
 [[nodiscard]] Damping default_bundle_damping() {
   Damping damping{};
@@ -33,21 +33,21 @@ template <class Residual, class Loss, class Damping>
 class bundle_solver;
 }  // namespace detail
 
-/// Bundle adjustment with a residual, a robust loss and a damping policy, each a type:
+/// Bundle adjustment with a residual, a robust loss and a damping policy as template parameters:
 ///
 /// @code
 ///   bundle_adjuster ba{reprojection{camera}, huber{2.45}};
 ///   auto summary = ba.solve(par, poses, points, observations, {.max_iterations = 10});
 /// @endcode
 ///
-/// The points are eliminated by the Schur complement. One step costs O(observations + sum over the points of the square
-/// of the number of cameras that observe them), plus the solution of the reduced system of the cameras. Reuses its
-/// memory: a second problem of the same size allocates nothing (with `orbis::seq`, unless its reduced system is
-/// factorised as a sparse one). Every policy, number of threads and instruction set gives the same bits. Not
+/// The points are eliminated by the Schur complement. One step takes O(observations + sum over the points of the square
+/// of the number of cameras that observe them), plus the solution of the reduced system of the cameras. Memory is
+/// reused: a second problem of the same size allocates nothing (with `orbis::seq`, unless its reduced system is
+/// factorised as a sparse matrix). Every policy, number of threads and instruction set gives the same bits. Not
 /// thread-safe.
 ///
-/// The library orbis::compiled contains it for `reprojection` of `camera::pinhole` and `camera::any_camera` with the
-/// default loss and policies and without a report; for anything else include bundle_adjustment-inl.hpp.
+/// The library orbis::compiled contains it for `reprojection` with `camera::pinhole` and `camera::any_camera`, the
+/// default loss and policies, and no report; for other arguments include bundle_adjustment-inl.hpp.
 template <bundle_residual Residual, robust_loss Loss = huber, damping_policy Damping = levenberg_marquardt>
 class bundle_adjuster {
  public:
@@ -58,18 +58,18 @@ class bundle_adjuster {
                            Damping damping = detail::default_bundle_damping<Damping>(),
                            const reduced_solver_options& reduced = {});
 
-  /// The chi-squared error of an observation: `information` times the squared norm of its residual; infinite if there
-  /// is no projection.
+  /// Returns the chi-squared error of an observation: `information` times the squared norm of its residual; infinite if
+  /// there is no projection.
   [[nodiscard]] double chi2(const camera_state& camera, const vec3& point, const observation& o) const;
 
-  /// Computes the chi-squared errors of all observations: `out[k]` of `observations[k]`.
+  /// Computes the chi-squared errors of all observations: `out[k]` is the error of `observations[k]`.
   /// @pre the observations' indices are in range; `out` has room for all
   void chi2(std::span<const camera_state> cameras, std::span<const vec3> points,
             std::span<const observation> observations, std::span<double> out);
 
   /// Minimises the robust cost over `cameras` and `points`. Their final cost is never higher than the initial one, and
-  /// they are unchanged if the status is a failure of the input. Observations that are not finite, or have no
-  /// projection at the start, are excluded; the summary counts them.
+  /// they are unchanged if the status is a failure (`is_failure`). Observations that are not finite, or have no
+  /// projection at the start, are excluded; the summary contains their number.
   /// `callback(iteration, max_iterations)` is called before each step and returns false to stop. `report(summary)` is
   /// called before the first step and after each one.
   /// @pre the options' spans are empty or of matching length
@@ -78,10 +78,10 @@ class bundle_adjuster {
                        std::span<const observation> observations, const bundle_options& options = {},
                        progress callback = {}, Report&& report = {});
 
-  /// Solves again for the observations of the last call of `solve`, from these estimates and with these options; other
-  /// observations may be ignored, and other poses or points fixed. Ordering and structure are reused unless the fixed
-  /// poses change.
-  /// @pre the same number of cameras and points as in that call; its observations are unchanged and in the same memory
+  /// Solves again with the observations of the last call to `solve`, from these estimates and with these options; a
+  /// different set of observations may be ignored, and different poses or points may be fixed. Ordering and structure
+  /// are reused unless the fixed poses change.
+  /// @pre the same number of cameras and points as in that call; the observations are unchanged and in the same memory
   template <execution_policy Policy, class Report = detail::no_report>
   bundle_summary solve_again(const Policy& policy, std::span<camera_state> cameras, std::span<vec3> points,
                              const bundle_options& options = {}, progress callback = {}, Report&& report = {});

@@ -21,12 +21,12 @@ struct bundle_observation {
   std::uint32_t pose = 0;
   std::uint32_t point = 0;
   vec2 pixel = zeros<vec2>();
-  double right = std::numeric_limits<double>::quiet_NaN();  ///< as in `pose_observation`; NaN without depth
-  double information = 1.0;                                 ///< 1 / sigma^2 of the pixel, 1 / pixel^2
+  double right = std::numeric_limits<double>::quiet_NaN();  ///< as in `pose_observation`; NaN if there is no depth
+  double information = 1.0;                                 ///< 1 / sigma^2 of the pixel, in 1 / pixel^2
   double depth_weight = 1.0;                                ///< as in `pose_observation`
 };
 
-/// Manifold of the state of a camera: its type, and the effect of a step. `m.retract(p, d)` is the estimate after the
+/// Manifold of a camera state: the type of the state and the effect of a step. `m.retract(p, d)` is the state after the
 /// step `d` from `p`, with `retract(p, 0) == p`. A step has `M::dimension` entries.
 template <class M>
 concept camera_manifold = std::copyable<M> &&
@@ -35,7 +35,7 @@ concept camera_manifold = std::copyable<M> &&
   requires std::same_as<typename M::tangent, matrix<M::dimension>>;
 };
 
-/// A Lie group whose steps act on the right: `T * exp(d)`. For a pose `T_world_camera` the step is in the camera frame.
+/// A Lie group with steps on the right: `T * exp(d)`. For a pose `T_world_camera`, the step is in the camera frame.
 template <class T>
 struct lie_group {
   using point = T;
@@ -57,13 +57,14 @@ concept observation_of_a_point = std::copyable<O> && requires(const O& o) {
 ///
 /// - `R::camera_state` is the estimated state of each camera (a pose, or a pose with intrinsics); `R::camera_manifold`
 /// defines its steps;
-/// - `r.prepare(state)` computes an `R::view`, the values shared by all observations of one camera; it is called once
+/// - `r.prepare(state)` computes an `R::view`, the values shared by all observations by one camera; it is called once
 /// per camera and linearisation;
 /// - `r.is_usable(o)` is false for an observation that must be excluded, for example a non-finite one;
 /// - `r.residual(view, point, o)` is a vector of `R::dimension` numbers, not yet whitened, or empty if the point has no
 /// projection. `point` is in the world frame;
 /// - `r.linearize(view, point, o, by_camera, by_point)` returns the same vector and writes its derivatives with respect
-///   to a step of the camera and to the point.
+/// to
+///   a step of the camera and to the point.
 template <class R>
 concept bundle_residual = std::copyable<R> && camera_manifold<typename R::camera_manifold> &&
     observation_of_a_point<typename R::observation> &&
@@ -77,10 +78,10 @@ concept bundle_residual = std::copyable<R> && camera_manifold<typename R::camera
   { r.linearize(view, point, o, by_camera, by_point) } -> std::same_as<std::optional<matrix<R::dimension>>>;
 };
 
-/// A residual that depends on the point only through its coordinates q in the camera frame. Its camera is a pose with
-/// steps `T_world_camera * exp(d)`, followed by `R::intrinsic_dimension` more parameters. All derivatives are then
+/// A residual that depends on the point only through its coordinates q in the camera frame. Its camera state is a pose
+/// with steps `T_world_camera * exp(d)`, followed by `R::intrinsic_dimension` more parameters. All derivatives are then
 /// products of the derivative with respect to q with R_camera_world and with (-I, hat(q)), which halves the solver's
-/// arithmetic. The view has the members `rotation` (R_camera_world) and `translation`.
+/// arithmetic operations. The view has the members `rotation` (R_camera_world) and `translation`.
 template <class R>
 concept camera_frame_residual =
     bundle_residual<R> && R::camera_manifold::dimension ==
@@ -93,11 +94,11 @@ concept camera_frame_residual =
   { r.linearize_in_camera(view, q, o, by_q, by_intrinsics) } -> std::same_as<std::optional<matrix<R::dimension>>>;
 };
 
-/// Options of bundle adjustment. Damping of the steps fixes the directions that neither the observations nor the fixed
-/// poses and points determine (the gauge: overall position and rotation and, without depth, scale).
+/// Options of bundle adjustment. The damping fixes the directions that are determined neither by the observations nor
+/// by the fixed poses and points (the gauge: overall position and rotation and, without depth, scale).
 struct bundle_options {
   int max_iterations = 10;
-  double relative_tolerance = 1e-6;              ///< stop when a step lowers the cost by less than this fraction
+  double relative_tolerance = 1e-6;              ///< stop when a step reduces the cost by less than this fraction
   double gradient_tolerance = 0.0;               ///< stop when no gradient entry exceeds this
   std::span<const std::uint8_t> fixed_poses{};   ///< empty, or one entry per pose: nonzero keeps the pose fixed
   std::span<const std::uint8_t> fixed_points{};  ///< empty, or one entry per point: nonzero keeps the point fixed
@@ -108,7 +109,7 @@ enum class bundle_status {
   converged,
   iteration_limit,
   cancelled,
-  no_progress,       ///< no step lowers the cost, although the model predicts a decrease
+  no_progress,       ///< no step reduces the cost, although the model predicts a decrease
   nothing_to_do,     ///< no usable observation, or every pose and point is fixed
   missing_pose,      ///< observation `where` refers to a nonexistent pose
   missing_point,     ///< observation `where` refers to a nonexistent point
@@ -120,7 +121,7 @@ enum class bundle_status {
 /// `undetermined_pose` was detected.
 [[nodiscard]] constexpr bool is_failure(bundle_status status) noexcept { return status >= bundle_status::missing_pose; }
 
-/// The status as text.
+/// Returns the status as text.
 [[nodiscard]] constexpr std::string_view to_string(bundle_status status) noexcept {
   switch (status) {
     case bundle_status::converged: return "converged";
@@ -138,7 +139,7 @@ enum class bundle_status {
 
 /// Time spent in each stage, seconds.
 struct bundle_times {
-  double set_up = 0.0;           ///< checks, ordering, structure of the reduced system
+  double set_up = 0.0;           ///< checks, ordering and structure of the reduced system
   double linearize = 0.0;        ///< residuals, Jacobians, normal equations
   double schur = 0.0;            ///< elimination of the points
   double factor = 0.0;           ///< factorisation of the reduced system
@@ -153,16 +154,16 @@ struct bundle_summary {
   double initial_cost = 0.0;       ///< half the sum of the robust loss over the observations
   double final_cost = 0.0;         ///< never above `initial_cost`
   double gradient = 0.0;           ///< largest gradient entry at the start of the last step
-  int iterations = 0;              ///< steps taken
-  int steps_tried = 0;             ///< steps taken and steps rejected
+  int iterations = 0;              ///< accepted steps
+  int steps_tried = 0;             ///< accepted and rejected steps
   int linear_iterations = 0;       ///< iterations of an iterative solver of the reduced system
   std::size_t observations = 0;    ///< number of observations used
-  std::size_t left_out = 0;        ///< neither ignored nor usable: not finite or without a projection at the start
-  std::size_t first_left_out = 0;  ///< the first of these
+  std::size_t left_out = 0;        ///< number of observations that are not finite or have no projection at the start
+  std::size_t first_left_out = 0;  ///< index of the first of these
   bundle_times seconds;
 };
 
-/// The status as text; for a failure, includes the index of the observation or pose.
+/// Returns the status as text; for a failure, with the index of the observation or pose.
 [[nodiscard]] inline std::string to_string(const bundle_summary& s) {
   std::string text{to_string(s.status)};
   if (is_failure(s.status)) {

@@ -41,7 +41,8 @@ result<pose_estimate> estimate_pose(std::span<const vec3> points_world, std::spa
     return fail(errc::degenerate, where, why.empty() ? found.error().message : why);
   }
 
-  // From here on with the exact camera model: the pose with the smallest truncated squared error, and its inliers.
+  // From here on, the exact camera model is used: find the pose with the smallest truncated squared error, and its
+  // inliers.
   const double squared_threshold = options.threshold * options.threshold;
   const auto error_at = [&](const se3& T_camera_world, std::size_t i) {
     const auto pixel = camera.project(T_camera_world * points_world[i]);
@@ -70,7 +71,7 @@ result<pose_estimate> estimate_pose(std::span<const vec3> points_world, std::spa
   if (const auto polished = estimator.refine(model, found->inliers, 10)) model = *polished;
   se3 pose = in_world(model.pose);
   double score = judge(pose);
-  if constexpr (!std::same_as<Camera, camera::pinhole>) {  // the loops above are exact for a pinhole camera
+  if constexpr (!std::same_as<Camera, camera::pinhole>) {  // for a pinhole camera, the loops above are already exact
     for (int k = 0; k != 3 && inliers.size() >= 3; ++k) {
       workspace.part.assign(inliers.begin(), inliers.end());
       const auto sum_up = [&](const detail::centred_pose& at, detail::pose_equations& e) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Perspective-n-point: the camera pose from known points and their pixels, many of which may be wrongly matched.
+/// Perspective-n-point: the camera pose from known points and their pixels, many of which may be mismatched.
 ///
 /// Sources: M. Fischler, R. Bolles, CACM 24 (1981) for P3P in RANSAC; see `ransac.hpp` for its parts.
 #pragma once
@@ -31,31 +31,31 @@ struct pnp_options {
 
 struct pose_estimate {
   se3 T_world_camera;
-  std::vector<std::uint32_t> inliers;  ///< exactly the matches within the threshold for this pose, ascending
-  double rmse = 0.0;                   ///< of the inliers' reprojection errors, pixels
+  std::vector<std::uint32_t> inliers;  ///< indices of all matches within the threshold for this pose, ascending
+  double rmse = 0.0;                   ///< root mean square reprojection error of the inliers, pixels
   std::size_t iterations = 0;
 };
 
-/// Reusable memory, not for concurrent calls: once it is large enough, an estimate allocates only its inliers.
+/// Reusable memory, not for concurrent calls: once it is large enough, only the inliers of the result are allocated.
 struct pnp_workspace {
   detail::pnp_matches matches;
   ransac_workspace ransac;
   std::vector<std::uint32_t> part;
 };
 
-/// Estimates the pose from which most of `points_world[i]` (metres) project to `pixels[i]`: P3P in RANSAC with a
+/// Estimates the pose at which most of `points_world[i]` (metres) project to `pixels[i]`: P3P in RANSAC with a
 /// sequential test of the models; each new best pose is refined on its inliers. Non-finite matches, and pixels that the
-/// camera cannot unproject, are outliers. Deterministic for a given `options.seed`. O(matches) for each sample that is
-/// scored completely. Errors: `invalid_argument` for spans of different length or options out of range; `no_data` for
-/// fewer than three matches; `degenerate` if fewer than three are usable, all points are collinear or coincide, or no
-/// pose has `min_inliers` inliers. The message gives the reason. The library orbis::compiled contains it for `pinhole`,
+/// camera cannot unproject, are outliers. Deterministic for a given `options.seed`. O(matches) per completely scored
+/// sample. Errors: `invalid_argument` for spans of different lengths or options out of range; `no_data` for fewer than
+/// three matches; `degenerate` if fewer than three are usable, all points are collinear or coincide, or no pose has
+/// `min_inliers` inliers. The message gives the reason. The library orbis::compiled contains it for `pinhole`,
 /// `radial_tangential` and `any_camera`; for others include pnp-inl.hpp.
 template <camera::camera_model Camera>
 [[nodiscard]] result<pose_estimate> estimate_pose(std::span<const vec3> points_world, std::span<const vec2> pixels,
                                                   const Camera& camera, const pnp_options& options,
                                                   pnp_workspace& workspace);
 
-/// As above, with its own memory.
+/// As above, with temporary working memory.
 template <camera::camera_model Camera>
 [[nodiscard]] result<pose_estimate> estimate_pose(std::span<const vec3> points_world, std::span<const vec2> pixels,
                                                   const Camera& camera, const pnp_options& options = {}) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The distance of a measured point from a plane: the residual of a depth measurement.
+/// The distance between a measured point and a plane: the residual of a depth measurement.
 ///
 /// Source: Y. Chen, G. Medioni, "Object modelling by registration of multiple range images", Image and
 /// Vision Computing 10(3), 1992.
@@ -16,8 +16,8 @@
 
 namespace orbis::optimize {
 
-/// A point, measured in the camera frame, on a plane in the world. The whitened residual of the pose `T_world_camera`
-/// is `sqrt(information) * n . (T_world_camera * q - p)`. Use it only if `is_usable()`.
+/// A point, measured in the camera frame, on a plane in the world frame. The whitened residual of the pose
+/// `T_world_camera` is `sqrt(information) * n . (T_world_camera * q - p)`. Use it only if `is_usable()`.
 struct point_to_plane {
   using point = se3;
   static constexpr int dimension = 1;
@@ -25,21 +25,21 @@ struct point_to_plane {
   vec3 measured = zeros<vec3>();      ///< q, in the camera frame, metres
   vec3 on_plane = zeros<vec3>();      ///< p, in the world frame, metres
   vec3 normal = vec3(0.0, 0.0, 1.0);  ///< n, in the world frame, of unit length
-  double information = 1.0;           ///< 1 / sigma^2 along the normal, 1 / m^2
+  double information = 1.0;           ///< 1 / sigma^2 along the normal, in 1 / m^2
 
   [[nodiscard]] bool is_usable() const {
     return all_finite(measured) && all_finite(on_plane) && std::abs(squared_norm(normal) - 1.0) < 1e-6 &&
            information > 0.0 && std::isfinite(information);
   }
-  /// The residual; empty if it is not finite.
+  /// Returns the residual; empty if it is not finite.
   [[nodiscard]] std::optional<matrix<1>> residual(const se3& T_world_camera) const {
     const vec3 off = T_world_camera * measured - on_plane;
     const matrix<1> r(std::sqrt(information) * dot(normal, off));
     if (!std::isfinite(r[0])) return std::nullopt;
     return r;
   }
-  /// The residual and its derivative with respect to a step `T_world_camera * exp(d)`; the derivative is unchanged if
-  /// the residual is empty.
+  /// Returns the residual and writes its derivative with respect to a step `T_world_camera * exp(d)`; if the residual
+  /// is empty, the derivative is not written.
   [[nodiscard]] std::optional<matrix<1>> linearize(const se3& T_world_camera, matrix<1, 6>& jacobian) const {
     const auto r = residual(T_world_camera);
     if (!r) return r;
@@ -54,14 +54,14 @@ struct point_to_plane {
   }
 };
 
-/// A depth measurement by the camera `pose` of the plane through the point `point`; both are indices into the caller's
+/// Depth measurement, by the camera `pose`, of the plane through the point `point`; both are indices into the caller's
 /// arrays.
 struct plane_observation {
   std::uint32_t pose = 0;
   std::uint32_t point = 0;
   vec3 measured = zeros<vec3>();      ///< in the camera frame, metres
-  vec3 normal = vec3(0.0, 0.0, 1.0);  ///< of the plane, in the world frame, of unit length
-  double information = 1.0;           ///< 1 / sigma^2 along the normal, 1 / m^2
+  vec3 normal = vec3(0.0, 0.0, 1.0);  ///< unit normal of the plane, in the world frame
+  double information = 1.0;           ///< 1 / sigma^2 along the normal, in 1 / m^2
 };
 
 /// The point-to-plane residual for bundle adjustment: estimates a point on the plane; the normal is fixed. Only the

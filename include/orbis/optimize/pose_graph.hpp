@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Pose graph optimisation: the poses that best agree with measured relative poses.
+/// Pose graph optimisation: estimates the poses that best agree with measured relative poses.
 ///
 /// Sources: F. Lu, E. Milios, "Globally consistent range scan alignment for environment mapping", Autonomous Robots 4,
 /// 1997; G. Grisetti, R. Kuemmerle, C. Stachniss, W. Burgard, "A tutorial on graph-based SLAM", IEEE ITS Magazine 2(4),
@@ -22,7 +22,7 @@
 
 namespace orbis::optimize {
 
-/// The default residual of graphs of `T`. For `se3` it is that of g2o.
+/// The default residual for graphs of `T`. For `se3`, it is the residual of g2o.
 template <class T>
 using default_between_t = std::conditional_t<std::same_as<T, se3>, quaternion_between, logarithm_between<T>>;
 
@@ -31,12 +31,12 @@ template <class T, class Loss, class Damping, class Between>
 class pose_graph_descent;
 }  // namespace detail
 
-/// Solver of pose graphs with vertices of type T (`se3`, `sim3`, `so3`), with a robust loss, a damping policy and a
-/// residual, for example `pose_graph_solver<se3, huber, levenberg_marquardt> solver{huber{1.0}}`. Reuses its memory:
+/// Solver for pose graphs with vertices of type T (`se3`, `sim3`, `so3`), with a robust loss, a damping policy and a
+/// residual, for example `pose_graph_solver<se3, huber, levenberg_marquardt> solver{huber{1.0}}`. Memory is reused:
 /// solving a graph with the same edges again allocates nothing (with `orbis::seq`). Not thread-safe.
 ///
-/// The library orbis::compiled contains it for graphs of `se3` with the default policies and `pose_graph_edge`, without
-/// a report; for anything else include pose_graph-inl.hpp.
+/// The library orbis::compiled contains it for `se3` graphs with the default policies and `pose_graph_edge`, without a
+/// report; for other arguments include pose_graph-inl.hpp.
 template <class T, robust_loss Loss = trivial, damping_policy Damping = dogleg,
           between_factor<T> Between = default_between_t<T>>
 class pose_graph_solver {
@@ -44,9 +44,9 @@ class pose_graph_solver {
   explicit pose_graph_solver(Loss loss = {}, Damping damping = {}, Between between = {});
 
   /// Minimises half the sum of the robust loss over the edges by moving `vertices`. The final cost is never higher than
-  /// the initial one, and the vertices are unchanged if the status is a failure. Vertices without edges do not move,
-  /// nor do directions that the edges do not determine, except with `gauss_newton`, which then stops with `singular`.
-  /// Every execution policy gives the same result. One step costs O(blocks of the factor).
+  /// the initial one, and the vertices are unchanged if the status is a failure. Vertices do not move if they have no
+  /// edges, and only in directions that the edges determine; if there are others, `gauss_newton` stops with `singular`.
+  /// Every execution policy gives the same result. One step takes O(blocks of the factor).
   ///
   /// `callback(iteration, max_iterations)` is called before each step and returns false to stop. `report(summary)` is
   /// called before the first step and after each one.

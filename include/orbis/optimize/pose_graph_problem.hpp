@@ -35,9 +35,9 @@ concept relative_measurement = requires(const E& e) {
   { e.information(0, 0) } -> std::convertible_to<double>;
 };
 
-/// A residual of an edge: a vector computed from `D = T_a_b^-1 * (T_world_a^-1 * T_world_b)`, where `T_a_b` is measured
-/// and D is the identity for a perfect fit. `linearize` returns it and writes its derivatives with respect to a step of
-/// each pose, on the right: `T * exp(d)`.
+/// The residual of an edge: a vector computed from `D = T_a_b^-1 * (T_world_a^-1 * T_world_b)`, where `T_a_b` is
+/// measured and D is the identity for a perfect fit. `linearize` returns it and writes its derivatives with respect to
+/// a step of each pose, on the right: `T * exp(d)`.
 template <class F, class T>
 concept between_factor = std::copyable<F> &&
     requires(const F& f, const T& pose, matrix<F::dimension, T::dof>& jacobian) {
@@ -45,7 +45,7 @@ concept between_factor = std::copyable<F> &&
   { f.linearize(pose, pose, pose, jacobian, jacobian) } -> std::same_as<matrix<F::dimension>>;
 };
 
-/// The logarithm of `D`, for any Lie group: (rho, phi), for Sim(3) followed by the logarithm of the scale.
+/// The logarithm of `D`, for any Lie group: (rho, phi), followed by the logarithm of the scale for Sim(3).
 template <class T>
 struct logarithm_between {
   static constexpr int dimension = T::dof;
@@ -116,10 +116,10 @@ struct quaternion_between {
 static_assert(between_factor<quaternion_between, se3> && between_factor<logarithm_between<se3>, se3> &&
               between_factor<logarithm_between<sim3>, sim3> && between_factor<logarithm_between<so3>, so3>);
 
-/// Vertices to hold fixed so that the others are determined: relative poses do not determine the position of the graph
-/// in the world.
+/// Selection of the vertices held fixed so that the others are determined: relative poses do not determine the position
+/// of the graph in the world frame.
 enum class pose_graph_gauge {
-  automatic,            ///< the fixed vertices; if a connected graph has none, its first vertex
+  automatic,            ///< the fixed vertices; if there are none and the graph is connected, its first vertex
   first_of_each_piece,  ///< the fixed vertices; in each component without one, its first vertex
   as_given              ///< only the fixed vertices
 };
@@ -128,13 +128,13 @@ enum class pose_graph_status {
   converged,
   iteration_limit,
   cancelled,
-  no_progress,      ///< no step lowers the cost, although the model predicts a decrease
-  nothing_to_do,    ///< no edge at a movable vertex
+  no_progress,      ///< no step reduces the cost, although the model predicts a decrease
+  nothing_to_do,    ///< no edge has a vertex that can move
   bad_vertex,       ///< vertex `where` is not finite
   missing_vertex,   ///< edge `where` refers to a nonexistent vertex
   self_edge,        ///< edge `where` connects a vertex to itself
-  bad_measurement,  ///< edge `where`: the measurement is not finite
-  bad_information,  ///< edge `where`: the information is not finite, not symmetric or not positive definite
+  bad_measurement,  ///< the measurement of edge `where` is not finite
+  bad_information,  ///< the information of edge `where` is not finite, symmetric and positive definite
   no_gauge,         ///< vertex `where` is in a connected component without a fixed vertex
   singular          ///< the edges do not determine vertex `where`
 };
@@ -144,7 +144,7 @@ enum class pose_graph_status {
   return status >= pose_graph_status::bad_vertex;
 }
 
-/// The status as text, with the index `where` of the edge or vertex.
+/// Returns the status as text, with the index `where` of the edge or vertex.
 [[nodiscard]] inline std::string describe(pose_graph_status status, std::size_t where) {
   const auto vertex = [&](const char* what) { return "vertex " + std::to_string(where) + " " + what; };
   const auto edge = [&](const char* what) { return "edge " + std::to_string(where) + " " + what; };
@@ -176,7 +176,7 @@ struct pose_graph_options {
 
 /// Time spent in each stage, seconds.
 struct pose_graph_times {
-  double set_up = 0.0;     ///< checks, elimination order, structure of the factor
+  double set_up = 0.0;     ///< checks, elimination order and structure of the factor
   double linearize = 0.0;  ///< residuals, Jacobians, normal equations
   double factor = 0.0;
   double solve = 0.0;
@@ -188,12 +188,12 @@ struct pose_graph_summary {
   std::size_t where = 0;      ///< index of the edge or vertex that caused a failure
   double initial_cost = 0.0;  ///< half the sum of the robust loss over the edges
   double final_cost = 0.0;    ///< never above `initial_cost`
-  int iterations = 0;         ///< steps taken
+  int iterations = 0;         ///< accepted steps
   int factorizations = 0;     ///< including those of rejected steps
   pose_graph_times seconds;
 };
 
-/// The status as text.
+/// Returns the status as text.
 [[nodiscard]] inline std::string to_string(const pose_graph_summary& s) { return describe(s.status, s.where); }
 
 }  // namespace orbis::optimize

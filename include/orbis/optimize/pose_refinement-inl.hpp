@@ -17,7 +17,7 @@
 namespace orbis::optimize {
 namespace detail {
 
-/// The observations of a refinement as a structure of arrays: packed once if they fit, otherwise piece by piece in
+/// The observations of a refinement as a structure of arrays: packed once if they fit, otherwise chunk by chunk in
 /// every pass. Observations that are not outliers are active.
 class pose_pieces {
  public:
@@ -26,7 +26,7 @@ class pose_pieces {
     if (fits()) pack(0);
   }
 
-  /// Returns true if an observation has information and numbers that are finite when squared.
+  /// Returns true if an observation has positive information, and values whose squares are finite.
   [[nodiscard]] static bool usable(const pose_observation& o) {
     constexpr double most = 1e100;
     const double size = std::abs(o.point.x()) + std::abs(o.point.y()) + std::abs(o.point.z()) + std::abs(o.pixel.x()) +
@@ -34,7 +34,7 @@ class pose_pieces {
     return size < most && o.information > 0.0 && !(std::abs(o.right) >= most);
   }
 
-  /// Calls `f(lanes, first, count, padded)` for every piece; `padded` is `count` rounded up to a multiple of eight.
+  /// Calls `f(lanes, first, count, padded)` for every chunk; `padded` is `count` rounded up to a multiple of eight.
   template <class F>
   void for_each(F&& f) {
     for (std::size_t first = 0; first < observations_.size(); first += pose_lanes::capacity) {
@@ -44,7 +44,7 @@ class pose_pieces {
     }
   }
 
-  /// Call this after the outliers have changed.
+  /// Updates the active observations; call it after the outliers have changed.
   void update() {
     if (!fits()) return;
     for (std::size_t i = 0; i != observations_.size(); ++i)
@@ -101,7 +101,7 @@ class pose_refiner {
         options_{options},
         pieces_{observations, outliers} {}
 
-  /// Iterates until a step lowers the cost by less than the fraction `enough`.
+  /// Iterates until a step reduces the cost by less than the fraction `enough`.
   [[nodiscard]] refinement_status run_round(const huber& loss, double enough) {
     double lambda = 1e-6;
     pose_normal_equations now = linearize(T_camera_world_, loss);
@@ -224,12 +224,12 @@ pose_refinement refine_pose(std::span<const pose_observation> observations, cons
   bool changed = true;
   for (int round = 0; round < options.rounds; ++round) {
     const bool last = round + 1 == options.rounds;
-    if (last)  // least squares: an unbounded width gives the same bits
+    if (last)  // an infinite width is least squares, with the same bits
       out.status = refiner.run_round(huber{std::numeric_limits<double>::infinity()}, 1e-9);
     else if (changed || out.status != refinement_status::converged)
       out.status = refiner.run_round(loss, 1e-6);  // only needs to identify the outliers
     else
-      continue;  // the same problem as solved in the last round
+      continue;  // the problem is the same as in the previous round
     if (out.status == refinement_status::degenerate) return give_up(out.status);
     changed = refiner.apply_gates();
     if (refiner.inliers() < 3) return give_up(refinement_status::too_few_observations);

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Pose-only refinement: the camera pose that minimises the reprojection errors of known points.
+/// Pose-only refinement: estimates the camera pose that minimises the reprojection errors of known points.
 ///
 /// Levenberg-Marquardt on SE(3) in rounds. After each round every observation is classified as an inlier or an outlier
 /// by its chi-squared error at the current pose; the last round omits the robust loss. Eight observations are processed
-/// at once. Needs about 80 kB of stack and never allocates.
+/// at a time. Needs about 80 kB of stack and never allocates memory.
 ///
 /// Source of the rounds: R. Mur-Artal, J. D. Tardos, "ORB-SLAM2", T-RO 33 (2017).
 #pragma once
@@ -23,7 +23,7 @@
 namespace orbis::optimize {
 
 enum class refinement_status {
-  converged,             ///< the last round ended because no step improved the pose
+  converged,             ///< the last round ended because no further step improved the pose
   iteration_limit,       ///< the last round reached its maximum number of iterations
   too_few_observations,  ///< fewer than three usable observations, initially or after gating
   degenerate,            ///< the observations do not determine the pose (for example collinear points)
@@ -36,7 +36,7 @@ enum class refinement_status {
     case refinement_status::iteration_limit: return "iteration limit";
     case refinement_status::too_few_observations: return "too few observations";
     case refinement_status::degenerate: return "degenerate";
-    case refinement_status::invalid_start: return "invalid start";
+    case refinement_status::invalid_start: return "initial pose is not finite";
   }
   return "unknown";
 }
@@ -52,8 +52,8 @@ struct pose_refinement {
   refinement_status status = refinement_status::too_few_observations;
   se3 T_world_camera;  ///< the initial pose if `!ok()`
   std::size_t inliers = 0;
-  double cost = 0.0;   ///< half the sum of chi-squared over the inliers
-  int iterations = 0;  ///< accepted steps, over all rounds
+  double cost = 0.0;   ///< half the sum of the chi-squared errors of the inliers
+  int iterations = 0;  ///< accepted steps in all rounds
   [[nodiscard]] bool ok() const noexcept {
     return status == refinement_status::converged || status == refinement_status::iteration_limit;
   }
@@ -61,7 +61,7 @@ struct pose_refinement {
 
 namespace detail {
 
-/// A camera whose model is only known at run time.
+/// A camera whose model is known only at run time.
 template <class Camera>
 concept holds_a_model = requires(const Camera& camera) {
   {camera.visit([](const auto&) {})};
@@ -74,10 +74,11 @@ template <class Camera>
 
 }  // namespace detail
 
-/// Refines `T_world_camera` from an initial pose, and sets for each observation whether it is an outlier (1) or not
-/// (0). Observations that are not finite, or have no information or no projection, are outliers. O(observations) per
-/// step. Every instruction set gives the same bits. The library's camera models are faster than user-defined ones. The
-/// library orbis::compiled contains it for these models; for others include pose_refinement-inl.hpp.
+/// Refines `T_world_camera` from an initial pose, and sets `outliers[i]` to 1 if observation `i` is an outlier,
+/// otherwise to 0. Observations that are not finite, or have no information or no projection, are outliers.
+/// O(observations) per step. Every instruction set gives the same bits. The library's camera models are faster than
+/// user-defined ones. The library orbis::compiled contains this function for these models; for others include
+/// pose_refinement-inl.hpp.
 /// @pre outliers.size() == observations.size()
 template <camera::camera_model Camera>
 [[nodiscard]] pose_refinement refine_pose(std::span<const pose_observation> observations,

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
 /// RANSAC for any model, deterministic for a given seed: models are scored by the truncated squared error, and each new
-/// best one is refined on its inliers.
+/// best model is refined on its inliers.
 ///
 /// Sources: M. Fischler, R. Bolles, CACM 24 (1981); P. Torr, A. Zisserman, "MLESAC", CVIU 78 (2000), for the score; J.
 /// Matas, O. Chum, "Randomized RANSAC with sequential probability ratio test", ICCV 2005; R. Raguram et al., "USAC: a
@@ -28,13 +28,13 @@ namespace orbis::optimize {
 
 /// A model and its data, as required by RANSAC.
 ///
-/// - `E::sample_size`: the number of data that determine the model up to a few solutions.
-/// - `size()`: the number of data.
-/// - `fit(sample)`: a range of candidate models from `sample_size` data; empty if these are degenerate.
-/// - `squared_error(model, i)`: the squared error of datum `i`, in squared units of the threshold; infinite or NaN if
-///   it has none.
-/// - `refine(model, inliers)`: a better model from many data, starting at `model`; empty if that fails. Return the
-/// model itself to disable refinement.
+/// - `E::sample_size`: the number of data points that determine the model up to a few solutions.
+/// - `size()`: the number of data points.
+/// - `fit(sample)`: a range of candidate models from `sample_size` data points; empty if these are degenerate.
+/// - `squared_error(model, i)`: the squared error of data point `i`, in squared units of the threshold;
+///   infinite or NaN if it has none.
+/// - `refine(model, inliers)`: a better model from many data points, starting at `model`; empty if that fails. Return
+/// the model itself to disable refinement.
 template <class E>
 concept model_estimator = requires(const E& estimator, const typename E::model& model,
                                    std::span<const std::uint32_t> indices, std::size_t i,
@@ -54,12 +54,12 @@ struct one_or_none {
   [[nodiscard]] const Model* end() const noexcept { return found ? &*found + 1 : nullptr; }
 };
 
-/// The number of data scored at a time.
+/// The number of data points scored at a time.
 inline constexpr std::size_t consensus_block = 32;
 
 /// An estimator with batched errors: `squared_errors(model, first, out)` writes the errors of `consensus_block` data
-/// starting at `first`, which is a multiple of it; the values for data beyond the last are ignored. These errors rank
-/// the models; `squared_error` determines the inliers.
+/// points starting at index `first`, which is a multiple of `consensus_block`; values beyond the last data point are
+/// ignored. These errors rank the models; `squared_error` determines the inliers.
 template <class E>
 concept block_estimator = model_estimator<E> && requires(const E& estimator, const typename E::model& model,
                                                          std::size_t first, std::span<float, consensus_block> out) {
@@ -72,15 +72,15 @@ struct ransac_options {
   std::size_t min_iterations = 10;
   std::size_t max_iterations = 10000;
   std::size_t min_inliers = 0;  ///< minimum number of inliers for success
-  std::size_t refinements = 4;  ///< maximum number, for each new best model
+  std::size_t refinements = 4;  ///< maximum number of refinements of each new best model
   /// If positive, bad models are rejected by a sequential probability ratio test, which sometimes rejects a good one;
   /// the number of iterations accounts for that. The value is the time to compute a model from a sample, divided by the
-  /// time to score one datum. It requires data in random order.
+  /// time to score one data point. The test requires data in random order.
   double model_cost = 0.0;
   std::uint64_t seed = 1;
 };
 
-/// Reusable memory, not for concurrent calls: with it only the inliers of the result are allocated.
+/// Reusable memory, not for concurrent calls: with it, only the inliers of the result are allocated.
 struct ransac_workspace {
   std::vector<std::uint32_t> inliers;
 };
@@ -88,20 +88,21 @@ struct ransac_workspace {
 template <class Model>
 struct ransac_estimate {
   Model model;
-  std::vector<std::uint32_t> inliers;  ///< exactly the data within the threshold of `model`, ascending
-  double score = 0.0;                  ///< sum over all data of min(squared error, squared threshold)
+  std::vector<std::uint32_t> inliers;  ///< indices of all data points within the threshold of `model`, ascending
+  double score = 0.0;                  ///< sum over all data points of min(squared error, squared threshold)
   std::size_t iterations = 0;
 };
 
 namespace detail {
 
-/// The truncated squared error: the contribution of a datum to the score (smaller is better); NaN costs the limit.
+/// The truncated squared error: the contribution of a data point to the score (smaller is better); NaN counts as the
+/// limit.
 template <std::floating_point S>
 [[nodiscard]] constexpr S msac_cost(S squared, S limit) noexcept {
   return squared < limit ? squared : limit;
 }
 
-/// `N` distinct numbers below `n`. @pre n >= N
+/// Returns `N` distinct random indices less than `n`. @pre n >= N
 template <std::size_t N>
 [[nodiscard]] std::array<std::uint32_t, N> draw_sample(random_bits& random, std::size_t n) {
   std::array<std::uint32_t, N> sample{};
@@ -114,8 +115,8 @@ template <std::size_t N>
   return sample;
 }
 
-/// The number of samples after which at least one is free of outliers with probability `confidence`; `recognised` is
-/// the probability that such a sample is accepted by the sequential test.
+/// Returns the number of samples after which at least one is free of outliers with probability `confidence`;
+/// `recognised` is the probability that the sequential test accepts such a sample.
 [[nodiscard]] inline double wanted_iterations(double confidence, double inlier_ratio, std::size_t sample_size,
                                               double recognised) {
   const double clean = std::pow(inlier_ratio, static_cast<double>(sample_size)) * recognised;
@@ -124,8 +125,8 @@ template <std::size_t N>
   return std::log(1.0 - confidence) / std::log1p(-clean);
 }
 
-/// Sequential probability ratio test: scoring stops as soon as the evaluated data are much more likely under a bad
-/// model than under one as good as the best so far.
+/// Sequential probability ratio test: scoring stops as soon as the scored data are much more likely under a bad model
+/// than under one as good as the best so far.
 class sequential_test {
  public:
   /// `model_cost` as in `ransac_options`; 0: no model is rejected.
@@ -133,12 +134,12 @@ class sequential_test {
 
   /// Call before scoring a model.
   void begin() noexcept { log_ratio_ = 0.0; }
-  /// Returns true to stop scoring, after a block of data with this number of inliers.
+  /// Returns true if scoring should stop after a block of `data` data points with this number of inliers.
   [[nodiscard]] bool rejects(std::size_t inliers, std::size_t data) noexcept {
     log_ratio_ += static_cast<double>(inliers) * if_inlier_ + static_cast<double>(data - inliers) * if_outlier_;
     return log_ratio_ > log_threshold_;
   }
-  /// Call after scoring a model, with the number of inliers among the evaluated data.
+  /// Call after scoring a model, with the number of inliers among the scored data points.
   void end(std::size_t inliers, std::size_t data) noexcept {
     // Nearly all models are bad: their mean inlier ratio estimates that of bad models.
     const double ratio = static_cast<double>(inliers) / static_cast<double>(std::max<std::size_t>(1, data));
@@ -146,12 +147,12 @@ class sequential_test {
     bad_ += (std::min(ratio, 0.5) - bad_) / std::min(500.0, 10.0 + seen_);
     if (std::abs(bad_ - designed_for_) > 0.1 * designed_for_) design();
   }
-  /// Sets the inlier ratio of a new best model.
+  /// Sets the inlier ratio of the new best model.
   void adopted(double inlier_ratio) noexcept {
     good_ = inlier_ratio;
     design();
   }
-  /// The probability that a model as good as the best is scored completely.
+  /// Returns the probability that a model as good as the best one is scored completely.
   [[nodiscard]] double recognised() const noexcept {
     return std::isfinite(log_threshold_) ? 1.0 - std::exp(-log_threshold_) : 1.0;
   }
@@ -167,7 +168,7 @@ class sequential_test {
     }
     if_inlier_ = std::log(bad / good);
     if_outlier_ = std::log((1.0 - bad) / (1.0 - good));
-    const double information = bad * if_inlier_ + (1.0 - bad) * if_outlier_;  // per datum of a bad model
+    const double information = bad * if_inlier_ + (1.0 - bad) * if_outlier_;  // per data point, for a bad model
     const double k = model_cost_ * information + 1.0;
     double threshold = k;
     for (int i = 0; i != 5; ++i) threshold = k + std::log(threshold);
@@ -185,7 +186,7 @@ class sequential_test {
   double log_ratio_ = 0.0;
 };
 
-/// The state of one RANSAC.
+/// The state of a RANSAC run.
 template <model_estimator E>
 class ransac_run {
  public:
@@ -210,7 +211,7 @@ class ransac_run {
     return true;
   }
   [[nodiscard]] std::span<const std::uint32_t> inliers() const noexcept { return workspace_.inliers; }
-  /// Refines the best model on its inliers, then on those of the result, while the score improves.
+  /// Refines the best model on its inliers, then the result on its own inliers, as long as the score improves.
   void refine() {
     for (std::size_t k = 0; k < options_.refinements && workspace_.inliers.size() > sample_size; ++k) {
       const std::optional<model> refined = estimator_.refine(*best_, workspace_.inliers);
@@ -218,14 +219,14 @@ class ransac_run {
     }
   }
   [[nodiscard]] const std::optional<model>& best() const noexcept { return best_; }
-  /// The required number of samples if the best model is correct.
+  /// Returns the required number of samples if the best model is correct.
   [[nodiscard]] double wanted() const {
     return wanted_iterations(options_.confidence,
                              static_cast<double>(workspace_.inliers.size()) / static_cast<double>(estimator_.size()),
                              sample_size, test_.recognised());
   }
 
-  /// The score of the best model by `squared_error`.
+  /// Returns the score of the best model, computed with `squared_error`.
   [[nodiscard]] double exact_score() const {
     double sum = 0.0;
     for (std::size_t i = 0; i < estimator_.size(); ++i)
@@ -245,7 +246,7 @@ class ransac_run {
     test_.adopted(static_cast<double>(workspace_.inliers.size()) / static_cast<double>(n));
   }
 
-  /// Scores a candidate; infinite if the sequential test stopped the scoring.
+  /// Returns the score of a candidate; infinite if scoring stopped early.
   [[nodiscard]] double score_model(const model& candidate) {
     const std::size_t n = estimator_.size();
     double score = 0.0;
@@ -276,7 +277,7 @@ class ransac_run {
       std::array<float, consensus_block> errors;
       estimator_.squared_errors(candidate, first, std::span<float, consensus_block>(errors));
       const auto limit = static_cast<float>(squared_threshold_);
-      if (count == consensus_block) {  // eight partial sums, which stay in registers
+      if (count == consensus_block) {  // eight partial sums stay in registers
         std::array<float, 8> cost{};
         std::array<std::int32_t, 8> inside{};
         for (std::size_t i = 0; i != consensus_block; i += 8)
@@ -312,7 +313,7 @@ class ransac_run {
   double best_score_ = std::numeric_limits<double>::infinity();
 };
 
-/// The RANSAC options among the options of an estimator, which have the same names.
+/// Returns the RANSAC options among an estimator's options, which have the same names.
 template <class Options>
 [[nodiscard]] ransac_options ransac_part(const Options& options, double model_cost = 200.0) {
   return {.threshold = options.threshold,
@@ -324,7 +325,7 @@ template <class Options>
           .seed = options.seed};
 }
 
-/// The reason why the options are invalid; null if they are valid.
+/// Returns the reason why the options are invalid; null if they are valid.
 [[nodiscard]] inline const char* find_fault(const ransac_options& options) noexcept {
   if (!(options.threshold > 0.0) || !std::isfinite(options.threshold))
     return "the threshold must be positive and finite";
@@ -332,18 +333,19 @@ template <class Options>
   return nullptr;
 }
 
-/// Returns an error if `have` inliers of `n` data are fewer than `min_inliers`, or fewer than a sample.
+/// Returns an error if `have`, the number of inliers among `n` data points, is less than `min_inliers` or the sample
+/// size.
 [[nodiscard]] inline result<void> enough_inliers(const char* where, std::size_t have, std::size_t n,
                                                  std::size_t min_inliers, std::size_t sample_size) {
   const std::size_t needed = std::max(min_inliers, sample_size);
   if (have >= needed) return {};
   return fail(errc::degenerate, where,
               "no model has enough inliers: " + std::to_string(have) + " of " + std::to_string(n) + ", " +
-                  std::to_string(needed) + " are wanted");
+                  std::to_string(needed) + " are required");
 }
 
-/// The model of `found` after ten refinement steps on its inliers, if that improves its score and keeps `min_inliers`;
-/// otherwise the model itself.
+/// Returns the model of `found` after ten refinement steps on its inliers if that improves its score and leaves at
+/// least `min_inliers` inliers; otherwise the model of `found`.
 template <class E>
 [[nodiscard]] typename E::model polished(const E& estimator, const ransac_estimate<typename E::model>& found,
                                          double squared_threshold, std::size_t min_inliers) {
@@ -361,17 +363,17 @@ template <class E>
 
 }  // namespace detail
 
-/// Estimates the model that agrees with most of the data. The same data, options and seed give the same result. O(data)
-/// for each model that is scored completely. Errors: `invalid_argument` for options out of range; `no_data` for fewer
-/// data than a sample; `degenerate` if no sample gives a model, or no model has at least `min_inliers` inliers and at
-/// least the size of a sample.
+/// Estimates the model that agrees with most of the data. The same data, options and seed give the same result. O(data
+/// points) per completely scored model. Errors: `invalid_argument` for options out of range; `no_data` for fewer data
+/// points than the sample size; `degenerate` if no sample gives a model, or no model has at least `max(min_inliers,
+/// sample_size)` inliers.
 template <model_estimator E>
 [[nodiscard]] result<ransac_estimate<typename E::model>> ransac(const E& estimator, const ransac_options& options,
                                                                 ransac_workspace& workspace) {
   constexpr const char* where = "ransac";
   if (const char* const fault = detail::find_fault(options)) return fail(errc::invalid_argument, where, fault);
   const std::size_t n = estimator.size();
-  if (n < E::sample_size) return fail(errc::no_data, where, "fewer data than one sample needs");
+  if (n < E::sample_size) return fail(errc::no_data, where, "fewer data points than the sample size");
 
   random_bits random(options.seed);
   detail::ransac_run<E> run(estimator, options, workspace);
@@ -388,7 +390,7 @@ template <model_estimator E>
     wanted = run.wanted();
   }
 
-  if (!run.best()) return fail(errc::degenerate, where, "no sample of the data gives a model");
+  if (!run.best()) return fail(errc::degenerate, where, "no sample yields a model");
   if (auto enough = detail::enough_inliers(where, run.inliers().size(), n, options.min_inliers, E::sample_size);
       !enough)
     return fail(std::move(enough.error()));
@@ -396,7 +398,7 @@ template <model_estimator E>
       *run.best(), {run.inliers().begin(), run.inliers().end()}, run.exact_score(), iteration};
 }
 
-/// As above, with its own memory.
+/// As above, with temporary working memory.
 template <model_estimator E>
 [[nodiscard]] result<ransac_estimate<typename E::model>> ransac(const E& estimator, const ransac_options& options) {
   ransac_workspace workspace;

@@ -16,26 +16,27 @@
 
 namespace orbis::optimize {
 
-/// Observation of a known point in an image.
+/// Observation of a known point in one image.
 struct pose_observation {
-  vec3 point = zeros<vec3>();  ///< in the world, metres
+  vec3 point = zeros<vec3>();  ///< in the world frame, metres
   vec2 pixel = zeros<vec2>();
   /// The virtual right coordinate `u - bf / depth` of an RGB-D or stereo camera, pixels; NaN if the depth is unknown.
   double right = std::numeric_limits<double>::quiet_NaN();
-  double information = 1.0;  ///< 1 / sigma^2 of the pixel, 1 / pixel^2
-  /// Factor of the third residual: sigma of the pixel over sigma of the right coordinate, finite and not negative.
+  double information = 1.0;  ///< 1 / sigma^2 of the pixel, in 1 / pixel^2
+  /// Weight of the third residual: sigma of the pixel divided by sigma of the right coordinate; finite and not
+  /// negative.
   double depth_weight = 1.0;
   [[nodiscard]] bool has_depth() const noexcept { return !std::isnan(right); }
 };
 
-/// A pose in the form used by residuals: from the world to the camera.
+/// A pose in the form used by residuals: the transform from the world to the camera frame.
 struct camera_view {
   mat3 rotation = identity<mat3>();
   vec3 translation = zeros<vec3>();
 };
 
-/// The reprojection error, projected minus observed, in pixels: two coordinates, and with depth a third, `u - bf / z`,
-/// the coordinate in a camera displaced by the baseline. In this unit the error of a disparity-based depth sensor is
+/// The reprojection error, projected minus observed, in pixels: two coordinates and, with depth, a third: `u - bf / z`,
+/// the column in a camera displaced by the baseline. In this unit, the error of a disparity-based depth sensor is
 /// nearly constant, like that of the pixel. Satisfies `camera_frame_residual`; the estimated camera state is the pose
 /// `T_world_camera`. Source: R. Mur-Artal, J. D. Tardos, "ORB-SLAM2", T-RO 33 (2017).
 template <camera::camera_model Camera>
@@ -50,19 +51,19 @@ struct reprojection {
   static constexpr int dimension = 3;
   static constexpr int intrinsic_dimension = 0;
 
-  /// The virtual right coordinate of a pixel with the coordinate `u`, at `depth` metres.
+  /// Returns the virtual right coordinate of a pixel in column `u` at `depth` metres.
   [[nodiscard]] double right(double u, double depth) const noexcept { return u - bf / depth; }
 
-  /// The residual at a point in the camera frame. The third entry is 0 without depth. Empty if the point has no
-  /// projection.
+  /// Returns the residual for a point in the camera frame; empty if it has no projection. Without depth, the third
+  /// entry is 0.
   [[nodiscard]] std::optional<vec3> residual(const vec3& point_camera, const pose_observation& o) const {
     const auto pixel = camera.project(point_camera);
     if (!pixel) return std::nullopt;
     return difference(*pixel, point_camera.z(), o);
   }
 
-  /// The residual and its derivative `j` with respect to the point in the camera frame; the third row is 0 without
-  /// depth.
+  /// As above; writes the derivative with respect to the point in the camera frame to `j`. Without depth, its third row
+  /// is 0.
   [[nodiscard]] std::optional<vec3> residual(const vec3& point_camera, const pose_observation& o, mat3& j) const {
     matrix<2, 3> projection;
     const auto pixel = camera.project(point_camera, projection);
@@ -99,7 +100,7 @@ struct reprojection {
     return residual(q, as_pose_observation(o), by_q);
   }
 
-  // Evaluates eight observations at once; see detail/bundle/lane_residual.hpp.
+  // Evaluation of eight observations at a time; see detail/bundle/lane_residual.hpp.
   static constexpr int measured = 4;
   static void measure(const observation& o, double* to) {
     to[0] = o.pixel.x();

@@ -52,9 +52,10 @@ template <class Camera, int... Free>
 
 }  // namespace detail
 
-/// A step moves the pose in its own frame, as `T_world_camera * exp(d)`, and is added to the estimated parameters (in
-/// the order of `camera::parameters_of`; to all if `Free` is empty). If the new parameters are invalid, for example a
-/// focal length below 0, the step of the parameters is halved until they are valid.
+/// The manifold of a posed camera: the first six entries of a step move the pose in its own frame, `T_world_camera *
+/// exp(d)`; the others are added to the estimated parameters (in the order of `camera::parameters_of`; all if `Free` is
+/// empty). If the new parameters are invalid, such as a negative focal length, the parameter step is halved until they
+/// are valid.
 template <camera::parametric_camera Camera, int... Free>
 struct posed_camera_manifold {
   static_assert(detail::names_parameters<Camera, Free...>(),
@@ -89,14 +90,14 @@ struct posed_camera_manifold {
 /// @endcode
 ///
 /// The template arguments are the indices of the estimated parameters, in the order of `camera::parameters_of<Camera>`;
-/// the others keep their values. Without indices all are estimated. For `radial_tangential` estimate only some: its
-/// numerator and denominator are correlated.
+/// the others keep their values. Without indices, all are estimated. For `radial_tangential`, estimate only some:
+/// numerator and denominator of its distortion are correlated.
 ///
 /// Each camera has its own intrinsics, as for photographs of unknown origin; several cameras cannot share them.
-/// `bundle_options::fixed_poses` fixes the intrinsics of a camera together with its pose. For images of one known
-/// camera use `reprojection`.
+/// `bundle_options::fixed_poses` fixes the intrinsics of a camera together with its pose. For images from one known
+/// camera, use `reprojection`.
 ///
-/// `bf` must be the value that `bundle_observation::right` was computed with. It stays constant, which is correct for
+/// `bf` must be the value with which `bundle_observation::right` was computed. It stays constant, which is correct for
 /// sensors that measure depth, but not for a stereo pair whose focal length is estimated.
 template <camera::parametric_camera Camera, int... Free>
 struct reprojection_with_intrinsics {
@@ -111,7 +112,7 @@ struct reprojection_with_intrinsics {
   static constexpr int dimension = 3;
   static constexpr int intrinsic_dimension = camera_manifold::dimension - 6;
 
-  /// The virtual right coordinate of a pixel with the coordinate `u`, at `depth` metres.
+  /// Returns the virtual right coordinate of a pixel in column `u` at `depth` metres.
   [[nodiscard]] double right(double u, double depth) const noexcept { return u - bf / depth; }
 
   [[nodiscard]] static view prepare(const camera_state& c) {
@@ -162,15 +163,15 @@ struct reprojection_with_intrinsics {
 };
 
 /// The camera of "Bundle adjustment in the large": a pose, a focal length and two radial distortion coefficients. With
-/// p = R X + t the pixel of a point is `-f (1 + k1 r^2 + k2 r^4) (p.x, p.y) / p.z`, r^2 = (p.x^2 + p.y^2) / p.z^2, from
-/// the centre of the image, x right, y up: the camera looks along -z. Source: S. Agarwal, N. Snavely, S. M. Seitz, R.
-/// Szeliski, "Bundle adjustment in the large", ECCV 2010.
+/// p = R X + t, the pixel of a point is `-f (1 + k1 r^2 + k2 r^4) (p.x, p.y) / p.z`, where r^2 = (p.x^2 + p.y^2) /
+/// p.z^2, relative to the image centre, with x to the right and y up: the camera looks along -z. Source: S. Agarwal, N.
+/// Snavely, S. M. Seitz, R. Szeliski, "Bundle adjustment in the large", ECCV 2010.
 struct bal_camera {
   se3 T_camera_world;
   double focal = 1.0;  ///< pixels
   double k1 = 0.0, k2 = 0.0;
 
-  /// Rotation vector, translation, focal length, k1, k2, as in the files of the data set.
+  /// Creates a camera from rotation vector, translation, focal length, k1 and k2, as in the files of the data set.
   [[nodiscard]] static bal_camera from_parameters(std::span<const double, 9> p) {
     return {se3{so3::exp(vec3{p[0], p[1], p[2]}), vec3{p[3], p[4], p[5]}}, p[6], p[7], p[8]};
   }
@@ -181,7 +182,8 @@ struct bal_camera {
   }
 };
 
-/// A step moves and rotates the camera in its own frame, and is added to focal length, k1 and k2.
+/// The manifold of a `bal_camera`: a step moves the pose in the camera's own frame, and adds to focal length, k1 and
+/// k2.
 struct bal_manifold {
   using point = bal_camera;
   using tangent = matrix<9>;
@@ -250,7 +252,7 @@ struct bal_reprojection {
     return r;
   }
 
-  // Evaluates eight observations at once; see detail/bundle/lane_residual.hpp.
+  // Evaluation of eight observations at a time; see detail/bundle/lane_residual.hpp.
   static constexpr int measured = 2;
   static void measure(const observation& o, double* to) {
     to[0] = o.pixel.x();

@@ -3,8 +3,9 @@
 /// Robust losses, which limit the influence of large residuals, and chi-squared gates against outliers.
 ///
 /// A loss maps the *squared* norm `s` of a whitened residual to `rho(s)`, with `rho(s) ~ s` near 0. The cost of a
-/// problem is half the sum of `rho`. Widths are positive and in units of the residual, not of its square: `huber{2.0}`
-/// becomes linear at a residual norm of 2. Iteratively reweighted least squares weights a residual by `rho'(s)`.
+/// problem is half the sum of `rho`. Widths are positive and in units of the whitened residual, not of its square:
+/// `huber{2.0}` becomes linear at a residual norm of 2. Iteratively reweighted least squares weights a residual by
+/// `rho'(s)`.
 ///
 /// Sources: Z. Zhang, "Parameter estimation techniques: a tutorial with application to conic
 /// fitting", Image and Vision Computing 15 (1997); M. J. Black, A. Rangarajan, "On the unification of
@@ -16,14 +17,14 @@
 
 namespace orbis::optimize {
 
-/// For s >= 0 `loss.cost(s)` is rho(s) >= 0, and `loss.weight(s)` its derivative, in [0, 1].
+/// A robust loss: for s >= 0, `loss.cost(s)` is rho(s) >= 0, and `loss.weight(s)` is its derivative, in [0, 1].
 template <class L>
 concept robust_loss = std::copyable<L> && requires(const L& loss, double squared) {
   { loss.cost(squared) } -> std::same_as<double>;
   { loss.weight(squared) } -> std::same_as<double>;
 };
 
-/// Least squares.
+/// Least squares: no robust loss.
 struct trivial {
   [[nodiscard]] constexpr double cost(double squared) const noexcept { return squared; }
   [[nodiscard]] constexpr double weight(double) const noexcept { return 1.0; }

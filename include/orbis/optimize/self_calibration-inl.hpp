@@ -24,7 +24,7 @@ result<self_calibrated<Camera>> self_calibrate(const Camera& start, std::span<se
   detail::shared_intrinsics<Camera> problem{start, options.bf, options.free, options.keeps_aspect,
                                             poses, points,     observations};
   if (problem.observations() == 0)
-    return fail(errc::no_data, where, "no point is seen by two images: the camera has hardly moved");
+    return fail(errc::no_data, where, "no point is observed by two images: the camera has hardly moved");
   if (!problem.has_depth()) return fail(errc::degenerate, where, "no observation has depth");
   self_calibrated<Camera> found{start};
   const int total = options.robust_iterations + options.iterations;

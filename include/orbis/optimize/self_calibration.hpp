@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Bundle adjustment of images of a single camera, with its intrinsic parameters among the unknowns, and their
+/// Bundle adjustment of images from a single camera, with its intrinsic parameters among the unknowns, and their
 /// covariance.
 #pragma once
 
@@ -18,12 +18,12 @@
 namespace orbis::optimize {
 
 struct self_calibration_options {
-  double bf = 40.0;            ///< value that `bundle_observation::right` was computed with, pixel metres
-  std::uint32_t free = ~0U;    ///< bit i: parameter i, in the order of `camera::parameters_of`, is estimated
-  bool keeps_aspect = true;    ///< parameters 0 and 1, if both are estimated, change in proportion: fx / fy is known
+  double bf = 40.0;            ///< value with which `bundle_observation::right` was computed, pixel metres
+  std::uint32_t free = ~0U;    ///< bit i is set if parameter i is estimated, in the order of `camera::parameters_of`
+  bool keeps_aspect = true;    ///< keeps fx / fy constant if parameters 0 and 1 are both estimated
   int robust_iterations = 20;  ///< maximum number of iterations with all observations
-  int iterations = 20;         ///< maximum number of iterations without the outliers
-  double relative_tolerance = 1e-8;  ///< either stage ends when a step lowers the cost by less than this fraction
+  int iterations = 20;         ///< maximum number of iterations after exclusion of the outliers
+  double relative_tolerance = 1e-8;  ///< either stage ends when a step reduces the cost by less than this fraction
 };
 
 /// A camera estimated from its images.
@@ -34,8 +34,8 @@ struct self_calibrated {
   /// Covariance of the parameters, in the order of `camera::parameters_of`; 0 for those that were not estimated.
   parameter_matrix covariance = zeros<parameter_matrix>();
   std::size_t observations = 0;  ///< number of observations used
-  std::size_t outliers = 0;      ///< number of these that were finally excluded
-  double initial_rms = 0.0;      ///< of the inliers, in standard deviations, before ...
+  std::size_t outliers = 0;      ///< number of these that were excluded at the end
+  double initial_rms = 0.0;      ///< RMS of the inliers, in standard deviations, before ...
   double final_rms = 0.0;        ///< ... and after
   int iterations = 0;
 };
@@ -45,24 +45,24 @@ struct self_calibrated {
 /// result. The pose of the first image with observations is fixed.
 ///
 /// Observations with depth (`right`) determine the scale of the world. A common scale error of all depths changes only
-/// that scale, so images cannot reveal it. Excludes points with fewer than two observations, images with fewer than
-/// ten, and images not connected to the largest group by common points; their poses are unchanged.
+/// that scale, so it cannot be detected from the images. Points with fewer than two observations, images with fewer
+/// than ten, and images not connected to the largest group by common points are excluded and keep their values.
 ///
 /// Errors, all of which leave `poses` and `points` unchanged: `invalid_argument` for observations of nonexistent images
 /// or points; `no_data` without a usable observation; `degenerate` if the motion of the camera does not determine the
 /// parameters, or no observation has depth; `cancelled` if `callback(iteration, iterations)`, which is called before
-/// each step, requests it.
+/// each step, returns false.
 ///
-/// The covariance assumes neither independent errors of a point's observations nor a known error size: it is computed
-/// from the points' own contributions to the gradient ("sandwich" of the normal equations).
+/// The covariance assumes neither that the errors of a point's observations are independent nor that their size is
+/// known: it is computed from the points' contributions to the gradient (a "sandwich" estimator).
 ///
-/// One step costs O(observations + sum over the points of the squared number of images that observe them), plus
+/// One step takes O(observations + sum over the points of the squared number of images that observe them), plus
 /// O(images^3): use at most a few hundred images.
 ///
 /// Sources: B. Triggs, P. McLauchlan, R. Hartley, A. Fitzgibbon, "Bundle adjustment - a modern synthesis", Vision
 /// Algorithms 2000; K.-Y. Liang, S. L. Zeger, "Longitudinal data analysis using generalized linear models", Biometrika
-/// 73 (1986), for the covariance. The library orbis::compiled contains it for the library's camera models; for others
-/// include self_calibration-inl.hpp.
+/// 73 (1986), for the covariance. The library orbis::compiled contains this function for the library's camera models;
+/// for others include self_calibration-inl.hpp.
 /// @pre options.bf > 0
 template <camera::parametric_camera Camera>
 [[nodiscard]] result<self_calibrated<Camera>> self_calibrate(const Camera& start, std::span<se3> poses,

@@ -19,10 +19,10 @@
 
 namespace orbis::optimize {
 
-/// A problem linearised at its current estimate: it provides the cost there, its gradient `g`, and the positive
-/// semidefinite `H` of the model `cost + g^T s + s^T H s / 2`. `factor(d)` factorises `H + diag(d)` (an empty `d` is 0)
-/// and returns true if it is positive definite; `newton_step(x)` then sets `x` to the solution for the right-hand side
-/// `-g`. `try_step(s)` is the true cost after a step; not finite if it is undefined.
+/// A problem linearised at its current estimate: it provides the cost at this estimate, the gradient `g`, and the
+/// positive semidefinite matrix `H` of the model `cost + g^T s + s^T H s / 2`. `factor(d)` factorises `H + diag(d)` (an
+/// empty `d` means 0) and returns true if it is positive definite; `newton_step(x)` then sets `x` to the solution for
+/// the right-hand side `-g`. `try_step(s)` returns the true cost after a step; not finite if it is undefined.
 template <class P>
 concept stepped_problem = requires(P& problem, const Eigen::VectorXd& in, Eigen::VectorXd& out) {
   { problem.cost() } -> std::same_as<double>;
@@ -36,8 +36,8 @@ concept stepped_problem = requires(P& problem, const Eigen::VectorXd& in, Eigen:
 
 enum class step_outcome {
   taken,       ///< accept the last attempted step
-  stationary,  ///< the predicted decrease is below rounding
-  exhausted,   ///< no step lowers the cost
+  stationary,  ///< the predicted decrease is below the rounding error
+  exhausted,   ///< no step reduces the cost
   singular     ///< H is not positive definite
 };
 
@@ -47,7 +47,7 @@ struct step_workspace {
 };
 
 namespace detail {
-/// The members available to a policy, for the concept below; never constructed.
+/// A problem with the members available to a policy, for the concept below; never constructed.
 struct any_stepped_problem {
   double cost() const;
   const Eigen::VectorXd& gradient() const;
@@ -59,7 +59,7 @@ struct any_stepped_problem {
 };
 }  // namespace detail
 
-/// A step strategy for any `stepped_problem`. `state` persists between the steps of one solution.
+/// A step strategy for any `stepped_problem`. `state` persists between the steps of one solve.
 template <class D>
 concept damping_policy = std::copyable<D> && std::default_initializable<typename D::state> &&
     requires(const D& d, typename D::state& s, detail::any_stepped_problem& problem, step_workspace& w) {
@@ -68,11 +68,11 @@ concept damping_policy = std::copyable<D> && std::default_initializable<typename
 
 namespace detail {
 
-/// Returns true if a decrease is below the rounding of a sum of squares.
+/// Returns true if a decrease is below the rounding error of a sum of squares.
 [[nodiscard]] inline bool is_rounding(double decrease, double cost) { return decrease <= 1e-14 * cost; }
 
-/// The outcome when the predicted decrease is below rounding: `stationary`, unless the step is short only because of
-/// the damping. Uses the diagonal of H, which bounds the decrease.
+/// Returns the outcome when the predicted decrease is below the rounding error: `stationary`, unless the step is short
+/// only because of the damping. Uses the diagonal of H, which bounds the decrease.
 template <class P>
 [[nodiscard]] step_outcome bottom_or_stuck(P& problem) {
   double promise = 0.0;
@@ -93,7 +93,7 @@ void set_each(Eigen::VectorXd& out, Eigen::Index size, const Value& value) {
   return sum_over(static_cast<std::size_t>(a.size()), [&](std::size_t i) { return p[i] * q[i]; });
 }
 
-/// The diagonal of H as a metric of steps, which makes them invariant to the units of the unknowns.
+/// Sets `out` to the diagonal of H, a metric that makes the steps invariant to the units of the unknowns.
 template <class P>
 void set_metric(P& problem, Eigen::VectorXd& out) {
   const Eigen::VectorXd& diagonal = problem.diagonal();
@@ -123,8 +123,8 @@ struct gauss_newton {
 /// Steps to the minimum of the model with `lambda * diag(H)` added to H; `lambda` decreases after accurate predictions
 /// and increases after inaccurate ones.
 struct levenberg_marquardt {
-  double initial = 1e-5;  ///< first lambda
-  int max_attempts = 16;  ///< rejected steps before giving up
+  double initial = 1e-5;  ///< initial lambda
+  int max_attempts = 16;  ///< maximum number of rejected steps
 
   struct state {
     double lambda = -1.0;
@@ -161,11 +161,11 @@ struct levenberg_marquardt {
   }
 };
 
-/// Steps between steepest descent and the minimum of the model, within a trust region. A rejected step costs no
+/// Steps between steepest descent and the minimum of the model, within a trust region. A rejected step needs no new
 /// factorisation.
 struct dogleg {
-  double initial_radius = 0.0;  ///< 0: the length of the first Gauss-Newton step
-  int max_attempts = 30;        ///< rejected steps before giving up
+  double initial_radius = 0.0;  ///< initial trust region radius; 0: the length of the first Gauss-Newton step
+  int max_attempts = 30;        ///< maximum number of rejected steps
 
   struct state {
     double radius = -1.0;
@@ -221,7 +221,7 @@ struct dogleg {
   [[nodiscard]] static double length(const Eigen::VectorXd& x, const step_workspace& w) {
     return std::sqrt(square(x, w));
   }
-  /// The Gauss-Newton step, with the smallest damping that makes H positive definite.
+  /// Computes the Gauss-Newton step, with the smallest damping that makes H positive definite.
   template <stepped_problem P>
   [[nodiscard]] static bool find_newton(P& problem, step_workspace& w) {
     const Eigen::VectorXd none;
@@ -236,15 +236,16 @@ struct dogleg {
   }
 };
 
-/// Solver for the reduced system of bundle adjustment: dense up to `dense_limit` cameras, fastest for up to about a
-/// hundred with many common points ((C cameras)^3 / 3 multiplications); a block-sparse factorisation in a fill-reducing
-/// order while the factor has at most `fill_limit` blocks, as for thousands of cameras along a path; otherwise
-/// conjugate gradients, preconditioned with the diagonal blocks, with inexact steps.
+/// Choice of the solver for the reduced system of bundle adjustment: a dense factorisation for up to `dense_limit`
+/// cameras, the fastest for up to about a hundred cameras with many common points ((C cameras)^3 / 3 multiplications);
+/// a block-sparse factorisation in a fill-reducing order if the factor has at most `fill_limit` blocks, as for
+/// thousands of cameras along a path; otherwise conjugate gradients with a block-diagonal preconditioner and inexact
+/// steps.
 struct reduced_solver_options {
   std::size_t dense_limit = 100;
   std::size_t fill_limit = 2'000'000;
-  double relative_tolerance = 1e-6;  ///< of the iteration: norm of the residual divided by that of the right-hand side
-  int max_iterations = 500;          ///< of the iteration
+  double relative_tolerance = 1e-6;  ///< conjugate gradients: residual norm relative to that of the right-hand side
+  int max_iterations = 500;          ///< maximum number of conjugate gradient iterations
 };
 
 }  // namespace orbis::optimize

@@ -20,7 +20,7 @@ ORBIS_INLINE mat3 essential_matrix(const se3& T_second_first) {
 }
 
 /// Corrects two rays at z = 1 so that they intersect, with the smallest sum of squared corrections. Takes two steps,
-/// which suffice for convergence.
+/// which are enough to converge.
 ORBIS_INLINE void intersect_rays(const mat3& essential, vec3& first, vec3& second) {
   // `second` is x and `first` is x' in the paper.
   const mat2 e = block<2, 2>(essential, 0, 0);
@@ -28,7 +28,7 @@ ORBIS_INLINE void intersect_rays(const mat3& essential, vec3& first, vec3& secon
   const double a = dot(n, e * m), b = 0.5 * (squared_norm(n) + squared_norm(m));
   const double c = dot(second, essential * first);
   const double d = std::sqrt(std::fmax(0.0, b * b - a * c));
-  if (!(b + d > 0.0)) return;  // along the baseline: they intersect anyway
+  if (!(b + d > 0.0)) return;  // rays along the baseline intersect anyway
   double lambda = c / (b + d);
   const vec2 moved_second = lambda * n, moved_first = lambda * m;
   n -= e * moved_first;
@@ -48,7 +48,7 @@ triangulation triangulate_all(std::span<const basic_se3<S>> T_world_camera, std:
   const std::size_t n = rays.size();
   if (n < 2) return out;
   const auto direction = [&](std::size_t i) { return vec3(normalized(T_world_camera[i].rotation() * rays[i])); };
-  // The point nearest to all rays, relative to the first camera to preserve precision.
+  // Compute the point nearest to all rays relative to the first camera to preserve precision.
   const vec3 origin = T_world_camera[0].translation();
   mat3 a = zeros<mat3>();
   vec3 b = zeros<vec3>();
@@ -63,7 +63,7 @@ triangulation triangulate_all(std::span<const basic_se3<S>> T_world_camera, std:
     b += across * from_origin;
     baseline = std::max(baseline, norm(from_origin));
   }
-  // Two distant rays: the one farthest from the first, and the one farthest from that.
+  // Two distant rays: the one farthest from the first, and the one farthest from that one.
   const auto farthest_from = [&](std::size_t k) {
     std::size_t farthest = k;
     double angle = 0.0;
@@ -148,7 +148,7 @@ ORBIS_INLINE triangulation triangulate(const se3& T_world_first, const vec3& fir
   out.status = triangulation_status::no_parallax;
   if (!(out.parallax >= options.min_parallax)) return out;
   detail::intersect_rays(detail::essential_matrix(T_second_first), first, second);
-  // In the second camera: t + depth_1 u = depth_2 v.
+  // In the second camera frame, t + depth_1 u = depth_2 v.
   const vec3 u = T_second_first.rotation() * first;
   const vec3& t = T_second_first.translation();
   const vec3 normal = cross(u, second);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Triangulation: a point from the rays of two or more cameras with known poses.
+/// Triangulation of a point from the rays of two or more cameras with known poses.
 ///
 /// Rays are in the camera frame, as returned by `unproject`; errors are distances in the plane z = 1.
 ///
@@ -21,13 +21,13 @@ namespace orbis::optimize {
 
 enum class triangulation_status {
   ok,
-  too_few_views,  ///< fewer than two
+  too_few_views,  ///< fewer than two views
   not_finite,     ///< a pose or a ray is not finite
-  no_parallax,    ///< the rays are nearly parallel or start at one point: the depth is not determined
+  no_parallax,    ///< the rays are nearly parallel or start at the same point: the depth is not determined
   behind_camera   ///< the rays intersect behind a camera
 };
 
-/// The status as text.
+/// Returns the status as text.
 [[nodiscard]] constexpr std::string_view to_string(triangulation_status status) noexcept {
   switch (status) {
     case triangulation_status::ok: return "ok";
@@ -46,8 +46,8 @@ struct triangulation_options {
 struct triangulation {
   triangulation_status status = triangulation_status::too_few_views;
   vec3 point = zeros<vec3>();  ///< in the world frame, metres; valid only if `ok()`
-  double parallax = 0.0;       ///< angle between the rays (for more than two views between two distant ones), radians
-  double error = 0.0;          ///< root mean square distance from the rays at z = 1
+  double parallax = 0.0;       ///< angle between the rays (with more than two views: between two distant ones), radians
+  double error = 0.0;          ///< root mean square distance between projections and rays at z = 1
   [[nodiscard]] bool ok() const noexcept { return status == triangulation_status::ok; }
 };
 
@@ -58,10 +58,10 @@ namespace detail {
   return std::atan2(std::sqrt(x * x + y * y + z * z), a.x() * b.x() + a.y() * b.y() + a.z() * b.z());
 }
 
-/// The matrix E with `second^T E first = 0` for rays of one point: translation x rotation of `T_second_first`.
+/// Returns the matrix E with `second^T E first = 0` for two rays to the same point: [t]x R of `T_second_first`.
 [[nodiscard]] mat3 essential_matrix(const se3& T_second_first);
 
-/// `triangulate` for any number of rays.
+/// Implements `triangulate` for any number of rays.
 template <class S>
 [[nodiscard]] triangulation triangulate_all(std::span<const basic_se3<S>> T_world_camera,
                                             std::span<const matrix<3, 1, S>> rays,
@@ -69,13 +69,13 @@ template <class S>
 
 }  // namespace detail
 
-/// The point whose projections to z = 1 have the smallest sum of squared distances from the two rays. Constant time.
+/// Returns the point whose projections to z = 1 have the smallest sum of squared distances from the two rays. O(1).
 [[nodiscard]] triangulation triangulate(const se3& T_world_first, const vec3& first_ray, const se3& T_world_second,
                                         const vec3& second_ray, const triangulation_options& options = {});
 
-/// The point whose projections to z = 1 have the smallest sum of squared distances from all rays: starts at the point
-/// nearest to the rays and refines it by Levenberg-Marquardt. O(views) per step, a few steps. `poses` are the cameras'
-/// `T_world_camera`. @pre poses.size() == rays.size()
+/// Returns the point whose projections to z = 1 have the smallest sum of squared distances from all rays: starts at the
+/// point nearest to the rays and refines it with a few Levenberg-Marquardt steps. O(views) per step. `poses` are the
+/// cameras' `T_world_camera`. @pre poses.size() == rays.size()
 template <std::ranges::contiguous_range Poses, std::ranges::contiguous_range Rays>
 requires std::same_as<std::ranges::range_value_t<Poses>, se3> && std::same_as<std::ranges::range_value_t<Rays>, vec3>
 [[nodiscard]] triangulation triangulate(const Poses& poses, const Rays& directions,

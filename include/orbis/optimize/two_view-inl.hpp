@@ -101,7 +101,8 @@ result<homography_estimate> estimate_homography(std::span<const vec2> first, std
         "only " + std::to_string(matches.size()) + " of " + std::to_string(n) + " matches are finite; four are needed");
   first_centre /= static_cast<double>(matches.size());
   second_centre /= static_cast<double>(matches.size());
-  // Relative to the centres and in units of the size of the images, so that the entries of H have similar magnitude.
+  // Points are relative to the centres and in units of the image size, so that the entries of H have similar
+  // magnitudes.
   double size = 0.0;
   mat2 first_spread = zeros<mat2>(), second_spread = zeros<mat2>();
   for (auto& m : matches) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Two-view geometry: essential matrix and homography of two images from matched pixels, many of which may be wrong,
-/// the corresponding relative poses, and the reconstruction of a scene from two images, or the reason for its failure.
+/// Two-view geometry: essential matrix and homography of two images from matched pixels, many of which may be wrong;
+/// the corresponding relative poses; and the reconstruction of a scene from two images, or the reason for failure.
 ///
 /// Sources: D. Nister, PAMI 26(6), 2004, for five points and the choice among four decompositions; P. Sampson, "Fitting
 /// conic sections to very scattered data", CGIP 18 (1982), for the error; R. Hartley, A. Zisserman, "Multiple View
@@ -36,30 +36,30 @@ struct essential_options {
 };
 
 struct relative_pose_estimate {
-  se3 T_first_second;                  ///< pose of the second camera in the first; the translation has length 1
+  se3 T_first_second;                  ///< pose of the second camera in the frame of the first; unit translation
   mat3 essential;                      ///< `second^T E first = 0` for rays, of norm sqrt(2)
-  std::vector<std::uint32_t> inliers;  ///< exactly the matches within the threshold, ascending
+  std::vector<std::uint32_t> inliers;  ///< indices of all matches within the threshold, ascending
   std::size_t in_front = 0;            ///< number of inliers whose rays intersect in front of both cameras
-  double parallax = 0.0;               ///< median angle between the rays of an inlier, radians
-  double rmse = 0.0;                   ///< of the inliers' Sampson distances, pixels
+  double parallax = 0.0;               ///< median angle between the two rays of an inlier, radians
+  double rmse = 0.0;                   ///< root mean square Sampson distance of the inliers, pixels
   std::size_t iterations = 0;
 };
 
 namespace detail {
 
-/// Implements `estimate_essential` for the usable matches of `n`.
+/// Implements `estimate_essential` for the usable ones of `n` matches.
 template <class Match>
 [[nodiscard]] result<relative_pose_estimate> essential_of_matches(const std::vector<Match>& matches, std::size_t n,
                                                                   const essential_options& options);
 
 }  // namespace detail
 
-/// Estimates the essential matrix, and the relative pose, that agrees with most matches: five points in RANSAC, each
-/// new best matrix refined on its inliers. `first_pixels[i]` matches `second_pixels[i]`. Matches that are not finite or
-/// cannot be unprojected are outliers. Deterministic for a given `options.seed`. Errors: `invalid_argument` for spans
-/// of different length or options out of range; `no_data` for fewer than five matches; `degenerate` if fewer than five
-/// are usable, no matrix has `min_inliers` inliers, or a rotation alone explains nearly all inliers, so that the
-/// translation is not determined. The message gives the reason.
+/// Estimates the essential matrix and the relative pose that agree with most matches: RANSAC with five points per
+/// sample; each new best matrix is refined on its inliers. `first_pixels[i]` matches `second_pixels[i]`. Matches that
+/// are not finite or cannot be unprojected are outliers. Deterministic for a given `options.seed`. Errors:
+/// `invalid_argument` for spans of different lengths or options out of range; `no_data` for fewer than five matches;
+/// `degenerate` if fewer than five are usable, no matrix has `min_inliers` inliers, or a rotation alone explains nearly
+/// all inliers, so that the translation is not determined. The message gives the reason.
 template <camera::camera_model Camera>
 [[nodiscard]] result<relative_pose_estimate> estimate_essential(std::span<const vec2> first_pixels,
                                                                 std::span<const vec2> second_pixels,
@@ -81,7 +81,7 @@ template <camera::camera_model Camera>
 }
 
 struct homography_options {
-  double threshold = 3.0;  ///< maximum error of an inlier, pixels: root mean square of the transfers both ways
+  double threshold = 3.0;  ///< maximum error of an inlier, pixels: root mean square of the two transfer errors
   double confidence = 0.9999;
   std::size_t min_iterations = 10;
   std::size_t max_iterations = 10000;
@@ -91,64 +91,64 @@ struct homography_options {
 
 struct homography_estimate {
   mat3 H_second_first;                 ///< `second ~ H * (first, 1)`, with H(2, 2) = 1 unless that is 0
-  std::vector<std::uint32_t> inliers;  ///< exactly the matches within the threshold, ascending
-  double rmse = 0.0;                   ///< of the inliers, pixels
+  std::vector<std::uint32_t> inliers;  ///< indices of all matches within the threshold, ascending
+  double rmse = 0.0;                   ///< root mean square error of the inliers, pixels
   std::size_t iterations = 0;
 };
 
 /// A decomposition of the homography of a plane: `H ~ rotation + translation * normal^T`. `normal` is the unit normal
-/// of the plane in the first camera, towards the plane (its points have normal . p > 0). `translation` is that of
-/// `T_second_first`, in units of the distance of the plane from the first camera.
+/// of the plane in the first camera frame; it points from the camera to the plane (normal . p > 0). `translation` is
+/// that of `T_second_first`, in units of the distance of the plane from the first camera.
 struct plane_motion {
   so3 R_second_first;
   vec3 translation = zeros<vec3>();
   vec3 normal = vec3(0.0, 0.0, 1.0);
 };
 
-/// Estimates the homography that agrees with most matches: four points in RANSAC, each new best one refined on its
-/// inliers (least squares of the transfer errors in both images). `first[i]` matches `second[i]`, in undistorted
-/// pixels. Matches that are not finite are outliers. Deterministic for a given `options.seed`. Errors:
-/// `invalid_argument` for spans of different length or options out of range; `no_data` for fewer than four matches;
+/// Estimates the homography that agrees with most matches: RANSAC with four points per sample; each new best homography
+/// is refined on its inliers (least squares of the transfer errors in both images). `first[i]` matches `second[i]`, in
+/// undistorted pixels. Matches that are not finite are outliers. Deterministic for a given `options.seed`. Errors:
+/// `invalid_argument` for spans of different lengths or options out of range; `no_data` for fewer than four matches;
 /// `degenerate` if fewer than four are finite, all points of an image are collinear, or no homography has `min_inliers`
 /// inliers. The message gives the reason.
 template <std::same_as<homography_options> Options = homography_options>
 [[nodiscard]] result<homography_estimate> estimate_homography(std::span<const vec2> first, std::span<const vec2> second,
                                                               const Options& options = {});
 
-/// The motions that a homography between rays at z = 1 may represent, independent of its scale and sign: two, or one if
-/// there is no translation. (Two further solutions have the plane behind the first camera.) `ray` is any matched ray of
-/// the first camera, in front of it. Errors: `degenerate` if the homography is singular or not finite.
+/// Returns the motions that a homography between rays at z = 1 may represent, regardless of its scale and sign: two, or
+/// one if there is no translation. (Two further solutions have the plane behind the first camera.) `ray` is any matched
+/// ray of the first camera, with z > 0. Errors: `degenerate` if the homography is singular or not finite.
 [[nodiscard]] result<std::vector<plane_motion>> decompose_homography(const mat3& homography,
                                                                      const vec3& ray = vec3(0.0, 0.0, 1.0));
 
 struct two_view_options {
   double deviation = 1.0;            ///< standard deviation of a matched pixel, along each axis, pixels
   std::size_t min_points = 50;       ///< minimum number of points of a reconstruction
-  double min_parallax = 0.02;        ///< minimum median angle between the rays of its points, radians
+  double min_parallax = 0.02;        ///< minimum median parallax of its points, radians
   double max_rotation = 0.01;        ///< maximum standard deviation of its rotation, radians ...
   double max_direction = 0.035;      ///< ... and of the direction of its translation, radians
   double max_depth = 0.3;            ///< maximum standard deviation of a point's depth, relative to the depth
-  double confidence = 0.999;         ///< of RANSAC
-  std::size_t max_iterations = 500;  ///< of RANSAC, for either model
+  double confidence = 0.999;         ///< confidence of RANSAC
+  std::size_t max_iterations = 500;  ///< maximum number of RANSAC iterations for either model
   std::uint64_t seed = 1;
 };
 
 /// A scene and the motion between two images of it. The unit of length is the median depth of `points`.
 struct two_view_reconstruction {
-  se3 T_first_second;                  ///< pose of the second camera in the first
-  std::vector<vec3> points;            ///< in the first camera; their median z is 1
+  se3 T_first_second;                  ///< pose of the second camera in the frame of the first
+  std::vector<vec3> points;            ///< in the first camera frame; their median z is 1
   std::vector<std::uint32_t> matches;  ///< index of the match of each point, ascending
   std::size_t inliers = 0;           ///< matches that agree with the motion, including distant ones that give no point
-  double parallax = 0.0;             ///< median angle between the rays of a point, radians
-  double rmse = 0.0;                 ///< of the inliers' distances from their epipolar lines, pixels
+  double parallax = 0.0;             ///< median angle between the two rays to a point, radians
+  double rmse = 0.0;                 ///< root mean square distance of the inliers from their epipolar lines, pixels
   double rotation_deviation = 0.0;   ///< standard deviation of the rotation, radians ...
   double direction_deviation = 0.0;  ///< ... and of the direction of the translation, radians
-  bool from_homography = false;      ///< true if a homography described the images better than epipolar geometry
+  bool from_homography = false;      ///< true if a homography explains the matches better than epipolar geometry
 };
 
 namespace detail {
 
-/// Implements `reconstruct_two_views` for the usable matches of `n`.
+/// Implements `reconstruct_two_views` for the usable ones of `n` matches.
 template <class Match>
 [[nodiscard]] result<two_view_reconstruction> reconstruction_of_matches(const std::vector<Match>& matches,
                                                                         std::size_t n, const two_view_options& options);
@@ -157,12 +157,12 @@ template <class Match>
 
 /// Reconstructs the scene and the motion from matched pixels, or returns the reason for failure. `first_pixels[i]`
 /// matches `second_pixels[i]`; many may be wrong. `deviations`: standard deviation of each match relative to
-/// `options.deviation` (the scale of a keypoint's level); empty: all are equal. Intended to be retried with the next
-/// image: a result is reliable, and ambiguous cases are rejected. Deterministic for a given `options.seed`. Errors:
-/// `invalid_argument` for spans of different length or options out of range; `no_data` if fewer than `min_points`
+/// `options.deviation` (the scale of a keypoint's level); empty: all are equal. Ambiguous cases are rejected so that a
+/// result is reliable; on failure, try again with the next image. Deterministic for a given `options.seed`. Errors:
+/// `invalid_argument` for spans of different lengths or options out of range; `no_data` if fewer than `min_points`
 /// matches are usable; `degenerate` if the motion is not determined: pure rotation, too little parallax, two motions
-/// that explain the matches about equally well (as for a plane), too few points or too large deviations. The message
-/// gives the reason.
+/// that explain the matches about equally well (as for a plane), too few points or too large standard deviations. The
+/// message gives the reason.
 template <camera::camera_model Camera>
 [[nodiscard]] result<two_view_reconstruction> reconstruct_two_views(std::span<const vec2> first_pixels,
                                                                     std::span<const vec2> second_pixels,

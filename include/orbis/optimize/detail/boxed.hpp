@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A heap-allocated value whose type may be incomplete where its owner is copied, moved and destroyed: API headers can
-/// declare the types of solvers without including them.
+/// A heap-allocated value whose type may be incomplete where its owner is copied, moved and destroyed, so that API
+/// headers need not include the definitions of solvers.
 #pragma once
 
 #include <utility>
 
 namespace orbis::optimize::detail {
 
-/// A `T`, copied with its owner. Empty after a move; only assignment is allowed in that state.
+/// A `T` that is copied with its owner. It is empty after a move; only assignment is then allowed.
 template <class T>
 class boxed {
  public:

@@ -13,7 +13,7 @@
 namespace orbis::optimize::detail {
 
 /// `lanes_of_loss<Loss>::weigh(loss, s, cost, weight)` computes rho(s) and its derivative, up to rounding, for finite s
-/// >= 0. Losses without a specialisation are called eight times.
+/// >= 0. Losses without a specialisation are evaluated eight times.
 template <robust_loss Loss>
 struct lanes_of_loss {
   template <camera::double_lanes L>
@@ -27,7 +27,7 @@ struct lanes_of_loss {
 
  private:
   using values = std::array<double, 8>;
-  /// Not inlined: the kernels are compiled for instruction sets that might round differently.
+  /// Not inlined, because the kernels are compiled for instruction sets that might round differently.
   [[gnu::noinline]] static void weigh_each(const Loss& loss, const values& squared, values& cost, values& weight) {
     for (std::size_t i = 0; i != squared.size(); ++i) {
       cost[i] = loss.cost(squared[i]);

@@ -7,7 +7,7 @@
 
 namespace orbis::optimize::detail {
 
-/// The sum of `term(i)`, i < n, as four partial sums, which shortens the dependency chain.
+/// Returns the sum of `term(i)` for i < n, computed as four partial sums, which shortens the dependency chain.
 template <class Term>
 [[nodiscard]] double sum_over(std::size_t n, const Term& term) {
   double a = 0.0, b = 0.0, c = 0.0, d = 0.0;

@@ -10,7 +10,7 @@
 
 namespace orbis::optimize::detail {
 
-/// Calls `f` with the constants 0 ... N - 1.
+/// Calls `f` with the constants 0 to N - 1.
 template <int N, class F>
 ORBIS_ALWAYS_INLINE void unroll(const F& f) {
   [&]<int... I>(std::integer_sequence<int, I...>) ORBIS_INLINE_LAMBDA { (f(std::integral_constant<int, I>{}), ...); }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The normal equations of bundle adjustment: linearisation, reduction to the cameras, solution.
+/// The normal equations of bundle adjustment: linearisation, reduction to the cameras, and solution.
 ///
 /// Source: B. Triggs, P. McLauchlan, R. Hartley, A. Fitzgibbon, "Bundle adjustment - a modern
 /// synthesis", Vision Algorithms 2000.
@@ -31,8 +31,8 @@
 
 namespace orbis::optimize::detail {
 
-/// The unknowns are the steps of the movable cameras, C numbers each, then those of the points in the order of
-/// `structure()`, three each. Reuses its memory.
+/// The unknowns are the steps of the movable cameras, with C entries each, followed by the steps of the points in the
+/// order of `structure()`, with three entries each. Reuses its memory.
 template <bundle_residual R, robust_loss Loss>
 class bundle_equations {
  public:
@@ -75,8 +75,8 @@ class bundle_equations {
     analyze_reduced();
   }
 
-  /// Initialises with these estimates and the observations that are not ignored and have a projection; counts them in
-  /// `summary`.
+  /// Initialises the estimates, with the observations that are not ignored and have a projection; writes their number
+  /// to `summary`.
   template <class Policy>
   void begin(const Policy& policy, std::span<const camera_state> cameras, std::span<const vec3> points,
              const bundle_options& options, bundle_summary& summary) {
@@ -126,7 +126,7 @@ class bundle_equations {
   [[nodiscard]] const Eigen::VectorXd& gradient() const { return gradient_; }
   [[nodiscard]] const Eigen::VectorXd& diagonal() const { return diagonal_; }
 
-  /// `x^T H x`.
+  /// Returns `x^T H x`.
   [[nodiscard]] double curvature(const Eigen::VectorXd& x) const {
     double sum = 0.0;
     for (std::size_t u = 0; u != structure_.unknowns(); ++u) {
@@ -146,8 +146,8 @@ class bundle_equations {
     return sum;
   }
 
-  /// Eliminates the points from H + diag(damping); an empty `damping` is 0. Returns false if the block of a point is
-  /// not positive definite; `failed_camera()` is then a camera that observes it.
+  /// Eliminates the points from H + diag(damping); an empty `damping` means 0. Returns false if the block of a point is
+  /// not positive definite; `failed_camera()` is then a camera that observes this point.
   template <class Policy>
   [[nodiscard]] bool eliminate(const Policy& policy, const Eigen::VectorXd& damping) {
     const std::size_t n = structure_.unknowns();
@@ -158,7 +158,7 @@ class bundle_equations {
       buffers_.resize(buffers);
     for (std::size_t s = 0; s != structure_.slots.size(); ++s) begin_reduced(s);
     for (std::size_t i = 0; i != reduced_right_.size(); ++i) reduced_right_[i] = -gradient_.data()[i];
-    if constexpr (one_by_one) {  // a single buffer, which stays in the cache
+    if constexpr (one_by_one) {  // a single buffer stays in the cache
       for (std::size_t k = 0; k != runs_.size(); ++k) {
         if (!is_regular(eliminate_run(runs_[k], point_damping, buffers_[0]))) return false;
         for (std::size_t s = runs_[k].first_slot; s != runs_[k].end_slot; ++s) subtract(s, buffers_[0]);
@@ -179,7 +179,7 @@ class bundle_equations {
       camera_block& to = reduced_diagonal_[u];
       for (int i = 0; i != camera_size; ++i) {
         if (damping.size() != 0) to(i, i) += damping[static_cast<Eigen::Index>(camera_size * u) + i];
-        if (camera_hessian_[u](i, i) == 0.0) to(i, i) = 1.0;  // undetermined: does not move
+        if (camera_hessian_[u](i, i) == 0.0) to(i, i) = 1.0;  // undetermined unknowns do not move
       }
     }
     return true;
@@ -193,13 +193,13 @@ class bundle_equations {
   }
   [[nodiscard]] std::size_t failed_camera() const { return failed_camera_; }
 
-  /// Solves for the step of the cameras, their part of `-(H + D)^-1 g`.
+  /// Solves for the step of the cameras: their part of `-(H + D)^-1 g`.
   void solve_cameras(Eigen::VectorXd& step) {
     step.resize(gradient_.size());
     std::copy(reduced_right_.begin(), reduced_right_.end(), step.data());
     if (structure_.unknowns() != 0) reduced_.solve({step.data(), reduced_right_.size()});
   }
-  /// Solves for the step of the points, given that of the cameras in `step`.
+  /// Solves for the step of the points, given the step of the cameras in `step`.
   template <class Policy>
   void solve_points(const Policy& policy, Eigen::VectorXd& step) {
     for_each_index(policy, structure_.chunks(), 1, [&](std::size_t chunk) {
@@ -258,7 +258,7 @@ class bundle_equations {
   using mixed_block_tile = mixed_tile<camera_size, through_camera>;
 
   /// Chunks whose points are eliminated sequentially, and the slots that they modify. The bounds depend only on the
-  /// problem.
+  /// problem, not on the number of threads.
   struct elimination_run {
     std::size_t first_chunk = 0, end_chunk = 0, first_slot = 0, end_slot = 0;
   };
@@ -274,7 +274,7 @@ class bundle_equations {
     h << v[0], v[1], v[2], v[1], v[3], v[4], v[2], v[4], v[5];
     return h;
   }
-  /// The camera-point block of an observation by a movable camera, by its number in `structure()`.
+  /// Returns the camera-point block of an observation by a movable camera, given its index in `structure()`.
   [[nodiscard]] matrix<camera_size, 3> mixed_block(std::size_t number) const {
     const std::size_t place = structure_.mixed_place[number];
     const double* const tile = mixed_.data() + mixed_block_tile::size * (place / 8) + place % 8;
@@ -311,7 +311,7 @@ class bundle_equations {
     pulled_.resize(4 * points);
     reduced_right_.resize(camera_size * n);
 
-    // Use fewer runs if the reduced system is large compared to the work for it.
+    // Use fewer runs if the reduced system is large compared with the work of elimination.
     const std::size_t chunks = structure_.chunks();
     const std::size_t most =
         std::clamp<std::size_t>(structure_.pairs() / (20 * std::max<std::size_t>(1, structure_.slots.size())), 1, 8);
@@ -326,7 +326,7 @@ class bundle_equations {
       const std::size_t end_group = structure_.chunk_begin[run.end_chunk].first_group;
       for (std::size_t g = structure_.chunk_begin[begin].first_group; g != end_group; ++g) {
         const bundle_structure::group& group = structure_.groups[g];
-        if (group.cameras == 0) continue;  // other slots are between those on the diagonal
+        if (group.cameras == 0) continue;  // all slots of a group are between two diagonal slots
         touch(structure_.diagonal_slot[structure_.mixed_unknown[group.first_mixed]]);
         touch(structure_.diagonal_slot[structure_.mixed_unknown[group.first_mixed +
                                                                 std::size_t{group.points} * (group.cameras - 1)]]);
@@ -505,28 +505,28 @@ class bundle_equations {
   schur_kernels<camera_size, camera_frame_residual<R>> schur_;
   bundle_structure structure_;
 
-  // For each place in the order by camera.
+  // Values for each place in the order by camera.
   std::vector<double> measurements_, base_information_, information_, flags_;
   std::vector<observation> observations_;
-  // Estimates, and those after an attempted step.
+  // Current estimates, and estimates after an attempted step.
   std::vector<camera_state> states_, tried_states_;
   std::vector<typename R::view> views_, tried_views_;
-  std::vector<double> positions_, tried_positions_;  // four numbers per point
+  std::vector<double> positions_, tried_positions_;  // four values per point
   std::vector<std::uint8_t> holds_point_;
   // The normal equations.
   double cost_ = 0.0, tried_cost_ = 0.0;
   std::vector<double> segment_cost_, segment_sums_;
   std::vector<camera_block> camera_hessian_;
-  std::vector<double> mixed_;             // of each observation by a movable camera
-  std::vector<double> normal_, inverse_;  // of each point
+  std::vector<double> mixed_;             // the block of each observation by a movable camera
+  std::vector<double> normal_, inverse_;  // values of each point
   Eigen::VectorXd gradient_, diagonal_;
   // The reduced system.
   std::size_t failed_camera_ = 0;
   std::vector<elimination_run> runs_;
-  std::vector<std::size_t> failed_point_;  // of each run, or `none`
+  std::vector<std::size_t> failed_point_;  // failed point of each run, or `none`
   std::vector<elimination_buffer> buffers_;
   std::vector<block_place> off_diagonal_places_;
-  std::vector<std::uint32_t> place_of_slot_;  // index among the blocks on, or off, the diagonal
+  std::vector<std::uint32_t> place_of_slot_;  // index among the blocks on or off the diagonal
   std::vector<camera_block> reduced_diagonal_, reduced_off_diagonal_;
   std::vector<double> reduced_right_, pulled_;
 };

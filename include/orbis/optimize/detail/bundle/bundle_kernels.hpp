@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Linearisation and cost of eight observations by one camera at a time.
+/// Linearisation and cost of the observations by one camera, eight at a time.
 ///
 /// With q = R X + t and M = J_q^T W J_q, all blocks of the normal equations of an observation are products of M with R
-/// and hat(q), which halves the arithmetic; see `camera_frame_residual`.
+/// and hat(q), which halves the number of arithmetic operations; see `camera_frame_residual`.
 #pragma once
 
 #include <algorithm>
@@ -25,18 +25,18 @@
 
 namespace orbis::optimize::detail {
 
-/// The cost of an observation that loses its projection in a step: that of an error of a thousand sigmas, so that
-/// losing observations never makes a step cheaper.
+/// The cost of an observation without a projection after a step: that of an error of a thousand standard deviations, so
+/// that losing observations never reduces the cost.
 inline constexpr double out_of_sight = 0.5e6;
 
-/// Camera-point blocks of eight observations in memory, row by row in vectors of eight. With camera-frame residuals,
-/// rows 3 to 5 are hat(q) times rows 0 to 2, and q is stored in their place.
+/// Memory layout of the camera-point blocks of eight observations: row by row in vectors of eight. With camera-frame
+/// residuals, rows 3 to 5 are hat(q) times rows 0 to 2, and q is stored instead of them.
 template <int C, bool ThroughCamera>
 struct mixed_tile {
   static constexpr int vectors = 3 * C - (ThroughCamera ? 6 : 0);
   static constexpr std::size_t size = 8 * vectors;
 
-  /// Offset of row `i`; not for rows 3 to 5 of camera-frame residuals.
+  /// Returns the offset of row `i`; not valid for rows 3 to 5 of camera-frame residuals.
   [[nodiscard]] static constexpr int row(int i) { return 24 * (ThroughCamera && i >= 6 ? i - 2 : i); }
   static constexpr int q = 72;  ///< offset of q
 
@@ -56,31 +56,31 @@ struct mixed_tile {
     }
   }
 };
-/// Numbers of a point: the upper triangle of its block of the normal equations, row by row, then its gradient.
+/// Number of values per point: the upper triangle of its block of the normal equations, row by row, then its gradient.
 inline constexpr int point_size = 12;
-/// Numbers of a camera: the lower triangle of its block, row by row, then its gradient.
+/// Number of values per camera: the lower triangle of its block, row by row, then its gradient.
 template <int C>
 inline constexpr int camera_numbers = C*(C + 1) / 2 + C;
 
-/// Observations by one camera.
+/// Inputs and outputs for the observations by one camera.
 template <class R>
 struct camera_work {
   const R& residual;
   const typename R::view& view;
   std::size_t count = 0;
-  const double* measurements = nullptr;                   ///< for residuals that are evaluated in lanes
-  const typename R::observation* observations = nullptr;  ///< for other residuals
+  const double* measurements = nullptr;                   ///< for residuals evaluated in lanes
+  const typename R::observation* observations = nullptr;  ///< for residuals evaluated individually
   const double* information = nullptr;                    ///< 0 for excluded observations
   const std::uint32_t* point = nullptr;
-  const double* positions = nullptr;  ///< of the points, four numbers each
+  const double* positions = nullptr;  ///< positions of the points, four values each
   // Outputs.
-  double* normal = nullptr;  ///< `point_size` per point; observations are added to it
-  double* mixed = nullptr;   ///< one `mixed_tile` per eight observations, if the camera is movable
-  double* sums = nullptr;    ///< `camera_numbers` of the camera; null if it is fixed
+  double* normal = nullptr;  ///< `point_size` values per point, to which the observations are added
+  double* mixed = nullptr;   ///< one `mixed_tile` per eight observations if the camera is movable
+  double* sums = nullptr;    ///< `camera_numbers` values; null if the camera is fixed
 };
 
-/// Residuals of eight observations, for residuals that are evaluated individually. Not inlined into the kernels, which
-/// are compiled for instruction sets that might round differently.
+/// Evaluates eight residuals individually. Not inlined into the kernels, because these are compiled for instruction
+/// sets that might round differently.
 template <class R, int Columns>
 struct tile_of_residuals {
   static constexpr std::size_t rows = R::dimension;
@@ -125,8 +125,8 @@ template <bool Derive, class R, int Columns>
 }
 
 /// Computes the residuals `r` of eight observations, and with `Derive` their derivatives with respect to `q` (the point
-/// in the camera frame, or for general residuals in the world) and to the other parameters. Returns the mask of those
-/// with a projection.
+/// in the camera frame, or, for general residuals, in the world frame) and to the other parameters. Returns the mask of
+/// observations with a projection.
 template <bool Derive, class R, int Columns, class L>
 ORBIS_ALWAYS_INLINE typename L::mask_type residuals_of_tile(const camera_work<R>& work, std::size_t first, const L* q,
                                                             L* r, L (*by_q)[3],
@@ -152,7 +152,7 @@ ORBIS_ALWAYS_INLINE typename L::mask_type residuals_of_tile(const camera_work<R>
   }
 }
 
-/// Loads eight points in the camera frame; for general residuals in the world frame.
+/// Loads eight points in the camera frame or, for general residuals, in the world frame.
 template <class R, class L>
 ORBIS_ALWAYS_INLINE void points_of_tile(const camera_work<R>& work, std::size_t first, L* q) {
   const double* from[8];
@@ -168,7 +168,7 @@ ORBIS_ALWAYS_INLINE void points_of_tile(const camera_work<R>& work, std::size_t 
   }
 }
 
-/// The cost of a camera's observations at `work.view` and `work.positions`.
+/// Returns the cost of a camera's observations at `work.view` and `work.positions`.
 template <simd::target Target, class R, class Loss>
 ORBIS_ALWAYS_INLINE double camera_cost(const camera_work<R>& work, const Loss& loss) {
   using L = simd::vec<double, 8, Target>;
@@ -217,18 +217,18 @@ ORBIS_ALWAYS_INLINE void add_to_points(const camera_work<R>& work, std::size_t f
   add_transposed(share[8], none, none, none, to, 8);
 }
 
-/// Number of unknowns of a camera in addition to its pose; all of them for general residuals.
+/// Number of unknowns of a camera in addition to its pose; for general residuals, all unknowns.
 template <class R>
 inline constexpr int other_unknowns = R::camera_manifold::dimension - (camera_frame_residual<R> ? 6 : 0);
 
 /// Eight linearised observations; zero for excluded ones.
 template <class R, class L>
 struct linear_tile {
-  L q[3];                   ///< the points, from `points_of_tile`
+  L q[3];                   ///< points, from `points_of_tile`
   L r[R::dimension];        ///< residuals
-  L by_q[R::dimension][3];  ///< their derivatives
+  L by_q[R::dimension][3];  ///< derivatives of the residuals
   L by_rest[R::dimension][std::max(1, other_unknowns<R>)];
-  L weight;  ///< includes the information and the weight of the loss
+  L weight;  ///< product of the information and the weight of the loss
 };
 
 /// Linearises eight observations; returns their costs.
@@ -241,7 +241,7 @@ ORBIS_ALWAYS_INLINE L linearize_tile(const camera_work<R>& work, const Loss& los
   const auto valid = residuals_of_tile<true, R, columns>(work, first, q, r, by_q, by_rest);
   const L information = L::load(work.information + first);
   L squared = r[0] * r[0];
-  L size = squared;  // becomes non-finite if any value is
+  L size = squared;  // not finite if any value is not finite
   for (int d = 0; d != rows; ++d) {
     if (d != 0) squared = squared + r[d] * r[d];
     for (int k = 0; k != 3; ++k) size = size + by_q[d][k] * by_q[d][k];
@@ -263,7 +263,7 @@ ORBIS_ALWAYS_INLINE L linearize_tile(const camera_work<R>& work, const Loss& los
   return select(L(0.0) < information, select(seen, 0.5 * rho, L(out_of_sight)), L(0.0));
 }
 
-/// Normal equations of a camera's observations; returns their cost.
+/// Computes the normal equations of a camera's observations; returns their cost.
 template <simd::target Target, class R, class Loss>
 ORBIS_ALWAYS_INLINE double linearize_camera(const camera_work<R>& work, const Loss& loss) {
   using L = simd::vec<double, 8, Target>;
@@ -281,8 +281,8 @@ ORBIS_ALWAYS_INLINE double linearize_camera(const camera_work<R>& work, const Lo
     for (int i = 0; i != 9; ++i) minus_rotation[i] = -work.view.rotation.data()[i];
   const auto at = [](int i, int j) ORBIS_INLINE_LAMBDA { return i * (i + 1) / 2 + j; };  // index in the lower triangle
 
-  // Linearisation is one long dependency chain, normal equations are many short ones: separated, the processor can
-  // overlap several tiles.
+  // Linearisation is one long dependency chain; the normal equations are many short ones. If they are separate, the
+  // processor can overlap several tiles.
   constexpr std::size_t group = 8;
   linear_tile<R, L> tiles[group];
   for (std::size_t first = 0; first < work.count; first += 8) {

@@ -74,7 +74,7 @@ class bundle_solver {
  private:
   using equations_type = bundle_equations<Residual, Loss>;
 
-  /// The interface of the equations for damping policies.
+  /// The interface of the equations to damping policies.
   template <class Policy>
   struct problem {
     equations_type& equations;
@@ -215,8 +215,8 @@ class bundle_solver {
   equations_type equations_;
   Damping damping_;
   step_workspace workspace_;
-  std::span<const observation> observations_;  // of the last call of `solve`
-  std::vector<std::uint8_t> fixed_;            // of the structure
+  std::span<const observation> observations_;  // observations of the last call to `solve`
+  std::vector<std::uint8_t> fixed_;            // fixed cameras of the structure
   std::vector<typename Residual::view> chi2_views_;
 };
 

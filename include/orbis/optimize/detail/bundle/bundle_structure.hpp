@@ -15,13 +15,15 @@
 
 namespace orbis::optimize::detail {
 
-/// Observations in two orders. By camera, for arithmetic that is the same for each observation: within chunks of points
-/// that fit into the cache; such segments consist of tiles of eight places, and the last tile may have empty places. By
-/// point, cameras ascending, for products of pairs of observations of a point: points observed by the same cameras are
-/// adjacent and form groups; points with the same first camera are also adjacent, so that their pairs update one part
-/// of the reduced system. Reuses its memory.
+/// Observations in two orders. The order by camera is for arithmetic that is the same for each observation: within a
+/// chunk of points that fits into the cache, the observations by one camera form a segment; segments consist of tiles
+/// of eight places, and the last tile may have empty places. The order by point, with cameras ascending, is for
+/// products of pairs of observations of a point: points observed by the same cameras are adjacent and form groups;
+/// points with the same first camera are also adjacent, so that their pairs update a common part of the reduced system.
+/// Reuses its memory.
 ///
-/// O(observations + pairs of observations of one point + pairs of movable cameras); one bit for each of the last.
+/// O(observations + pairs of observations of the same point + pairs of movable cameras); one bit for each pair of
+/// cameras.
 class bundle_structure {
  public:
   static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
@@ -32,48 +34,48 @@ class bundle_structure {
     std::uint32_t camera = 0;
     std::uint32_t count = 0;
     std::size_t first_tile = 0;
-    std::size_t first_mixed_tile = 0;  ///< the same, counting only tiles of movable cameras
+    std::size_t first_mixed_tile = 0;  ///< like `first_tile`, but counting only tiles of movable cameras
   };
-  /// Points observed by the same `cameras` movable cameras. Observation a of the i-th of them by these
-  /// cameras has the number `first_mixed + a * points + i`.
+  /// Points observed by the same `cameras` movable cameras. The observation of the i-th point by the a-th of these
+  /// cameras has the index `first_mixed + a * points + i`.
   struct group {
     std::uint32_t first_point = 0, points = 0;
     std::uint32_t first_mixed = 0, cameras = 0;
-    std::size_t first_pair = 0;  ///< of its pairs a > b, a ascending; shared by equal groups
+    std::size_t first_pair = 0;  ///< index of its first pair (a > b, a ascending); shared by equal groups
   };
   /// Consecutive points with all their observations; ends at the beginning of the next chunk.
   struct chunk {
     std::size_t first_point = 0, first_segment = 0, first_group = 0, first_mixed = 0;
   };
 
-  std::vector<chunk> chunk_begin;           ///< of each chunk, followed by the end
-  std::vector<segment> segments;            ///< by chunk, then by camera
+  std::vector<chunk> chunk_begin;           ///< start of each chunk, followed by the end
+  std::vector<segment> segments;            ///< ordered by chunk, then by camera
   std::vector<std::uint32_t> source;        ///< index of the caller's observation at each place
-  std::vector<std::uint32_t> point;         ///< of each place; empty places have the point of the segment's first place
-  std::vector<std::uint32_t> mixed_number;  ///< of each place: its number among observations by movable cameras
+  std::vector<std::uint32_t> point;         ///< point of each place; for empty places that of the segment's first one
+  std::vector<std::uint32_t> mixed_number;  ///< for each place: its index among observations by movable cameras
 
   std::vector<std::uint32_t> point_source;  ///< index of point p in the caller's array
   std::vector<group> groups;
-  std::vector<std::uint32_t> mixed_unknown;  ///< of each observation by a movable camera: its unknown
-  std::vector<std::uint32_t> mixed_place;    ///< its place, counting only places of movable cameras
+  std::vector<std::uint32_t> mixed_unknown;  ///< for each observation by a movable camera: the unknown of the camera
+  std::vector<std::uint32_t> mixed_place;    ///< for each of these: its place, counting only places of movable cameras
   std::vector<std::uint32_t> pair_slot;      ///< slot of each pair of observations
 
-  // Movable cameras, and blocks of the reduced system: lower triangle with diagonal, row by row.
-  std::vector<std::uint32_t> count;            ///< observations by each camera
-  std::vector<std::uint32_t> unknown, camera;  ///< of each camera, its number or `none`; and the inverse
+  // Movable cameras, and blocks of the reduced system: the lower triangle including the diagonal, row by row.
+  std::vector<std::uint32_t> count;            ///< number of observations by each camera
+  std::vector<std::uint32_t> unknown, camera;  ///< for each camera, the index of its unknown or `none`; and the inverse
   std::vector<block_place> slots;
-  std::vector<std::uint32_t> diagonal_slot;  ///< of each movable camera
+  std::vector<std::uint32_t> diagonal_slot;  ///< slot of each movable camera
 
   [[nodiscard]] std::size_t unknowns() const { return camera.size(); }
   [[nodiscard]] std::size_t points() const { return point_source.size(); }
   [[nodiscard]] std::size_t chunks() const { return chunk_begin.empty() ? 0 : chunk_begin.size() - 1; }
   [[nodiscard]] std::size_t places() const { return source.size(); }
   [[nodiscard]] std::size_t mixed_tiles() const { return mixed_tiles_; }
-  [[nodiscard]] std::size_t pairs() const { return pairs_; }  ///< of observations of one point
-  /// Largest number of observations of a chunk by movable cameras.
+  [[nodiscard]] std::size_t pairs() const { return pairs_; }  ///< number of pairs of observations of the same point
+  /// The largest number of observations by movable cameras in a chunk.
   [[nodiscard]] std::size_t largest_chunk() const { return largest_chunk_; }
 
-  /// Orders the observations for which `is_usable(index)` is true. Cameras without any are not moved.
+  /// Orders the observations for which `is_usable(index)` is true. Cameras without such observations are not moved.
   /// @pre their indices are in range; `fixed` is empty or has one entry per camera
   template <class Observation, class Usable>
   void build(std::size_t cameras, std::size_t points, std::span<const Observation> observations,
@@ -88,17 +90,18 @@ class bundle_structure {
 
  private:
   struct entry {
-    std::uint32_t observation, other;  ///< `other`: its point or its camera, depending on the order
+    std::uint32_t observation, other;  ///< `other`: index of its point or its camera, depending on the order
   };
   struct span_of_cameras {
-    std::uint32_t first = none, last = none, seen = 0;  ///< of a point, among movable cameras
+    /// The first and last movable cameras that observe a point, and their number.
+    std::uint32_t first = none, last = none, seen = 0;
   };
 
   [[nodiscard]] std::span<const entry> point_observations(std::size_t source_point) const {
     return std::span{by_point_}.subspan(of_point_[source_point], of_point_[source_point + 1] - of_point_[source_point]);
   }
 
-  /// Sorts by camera, then by point: `by_point_` has the observations of each point by ascending camera.
+  /// Sorts by camera, then by point: `by_point_` contains the observations of each point in ascending order of camera.
   template <class Observation, class Usable>
   void sort(std::size_t cameras, std::size_t points, std::span<const Observation> observations,
             const Usable& is_usable) {
@@ -133,7 +136,7 @@ class bundle_structure {
       }
   }
 
-  /// Sorts by the first movable camera, the last one, and their number.
+  /// Sorts points by their first movable camera, the last one, and the number of movable cameras.
   void order_points(std::size_t points) {
     const auto n = static_cast<std::uint32_t>(unknowns());
     spans_.assign(points, {});
@@ -153,7 +156,7 @@ class bundle_structure {
     sort_points(n, [&](std::uint32_t p) { return std::min(spans_[p].last, n); });
     sort_points(n, [&](std::uint32_t p) { return std::min(spans_[p].first, n); });
   }
-  /// Stable sort of `point_source` by a key of at most `largest`.
+  /// Stably sorts `point_source` by a key of at most `largest`.
   template <class Key>
   void sort_points(std::uint32_t largest, const Key& key) {
     cursor_.assign(std::size_t{largest} + 2, 0);
@@ -179,7 +182,7 @@ class bundle_structure {
     }
   }
 
-  /// Ends a chunk when it has enough observations, in total and per camera.
+  /// Divides the points into chunks. A chunk ends when it has enough observations, in total and per camera.
   void lay_out(std::size_t cameras) {
     constexpr std::size_t enough = 2048, enough_of_camera = 48;
     segments.clear();
@@ -228,7 +231,7 @@ class bundle_structure {
       chunk_begin.push_back({end, segments.size(), groups.size(), mixed_unknown.size()});
     }
   }
-  /// End of the group at `p`; groups fit into the first-level cache.
+  /// Returns the end of the group that begins at `p`; groups fit into the first-level cache.
   [[nodiscard]] std::size_t end_of_group(std::size_t p, std::size_t end) const {
     constexpr std::size_t room = 96;
     const std::size_t most = std::max<std::size_t>(1, room / std::max(1U, spans_[point_source[p]].seen));
@@ -262,7 +265,8 @@ class bundle_structure {
 
   /// Returns true if the group has the same pairs as the previous one.
   [[nodiscard]] bool shares_pairs(std::size_t g) const { return g != 0 && is_like_last_[groups[g].first_point] != 0; }
-  /// Calls `f(row * (row + 1) / 2 + column)` for the pairs of each group that does not share them.
+  /// Calls `f(row * (row + 1) / 2 + column)` for the pairs of each group that does not share the previous group's
+  /// pairs.
   template <class F>
   void for_each_pair(const F& f) const {
     for (std::size_t k = 0; k != groups.size(); ++k) {
@@ -303,7 +307,7 @@ class bundle_structure {
     pair_slot.clear();
     for_each_pair([&](std::size_t pair) { pair_slot.push_back(slot_of(pair)); });
     pairs_ = 0;
-    std::size_t distinct = 0;  // pairs up to this group
+    std::size_t distinct = 0;  // number of pairs up to this group
     for (std::size_t k = 0; k != groups.size(); ++k) {
       group& g = groups[k];
       const std::size_t own = std::size_t{g.cameras} * (std::max(1U, g.cameras) - 1) / 2;
@@ -316,7 +320,7 @@ class bundle_structure {
   std::size_t mixed_tiles_ = 0, largest_chunk_ = 0, pairs_ = 0;
   std::vector<entry> by_camera_, by_point_;
   std::vector<std::uint32_t> of_point_, cursor_, moved_, in_chunk_, mixed_in_chunk_, touched_;
-  std::vector<std::uint8_t> is_like_last_;  // of each point: true if the same movable cameras observe the previous one
+  std::vector<std::uint8_t> is_like_last_;  // for each point: true if its movable cameras are those of the previous one
   std::vector<span_of_cameras> spans_;
   std::vector<std::uint64_t> present_;
   std::vector<std::uint32_t> rank_;

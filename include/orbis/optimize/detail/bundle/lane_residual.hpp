@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Residuals that the kernels of bundle adjustment evaluate for eight observations at a time.
+/// Residuals that the bundle adjustment kernels evaluate for eight observations at a time.
 #pragma once
 
 #include <concepts>
@@ -14,10 +14,10 @@ namespace orbis::optimize::detail {
 
 using portable_lanes = simd::vec<double, 8, simd::portable>;
 
-/// A `camera_frame_residual` that evaluates eight observations by one camera at once. `measure(o, to)` writes the
+/// A `camera_frame_residual` that evaluates eight observations by one camera at a time. `measure(o, to)` writes the
 /// required values of an observation to `to[8 * i]`, i < `R::measured`. `lanes_in_camera<Derive>(view, measurements, q,
-/// r, by_q, by_intrinsics)` does the same as `linearize_in_camera` for all eight (without `Derive`: as
-/// `residual_in_camera`) and returns the mask of those with a projection.
+/// r, by_q, by_intrinsics)` is equivalent to `linearize_in_camera` (without `Derive`: `residual_in_camera`) for all
+/// eight and returns the mask of observations with a projection.
 template <class R>
 concept lane_residual = camera_frame_residual<R> &&
     requires(const R& r, const typename R::observation& o, const typename R::view& view, double* to,

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The Schur complement: elimination of the points from the normal equations, and their steps by back-substitution.
+/// The Schur complement: elimination of the points from the normal equations, and back-substitution for their steps.
 ///
-/// With V = L L^T of a point and Y = W L^-T of each camera that observes it, Y_a Y_b^T is subtracted from the reduced
-/// system for every pair of cameras; this is symmetric despite rounding. Source: D. C. Brown, "The bundle adjustment -
-/// progress and prospects", 1976.
+/// With V = L L^T for a point and Y = W L^-T for each camera that observes it, Y_a Y_b^T is subtracted from the reduced
+/// system for every pair of cameras; the result is exactly symmetric despite rounding. Source: D. C. Brown, "The bundle
+/// adjustment - progress and prospects", 1976.
 #pragma once
 
 #include <algorithm>
@@ -22,15 +22,15 @@
 
 namespace orbis::optimize::detail {
 
-/// Memory layout of C rows: whole registers, except that a row alone in a register is stored separately.
+/// Memory layout of C rows: whole registers; a last row that would be alone in a register is stored separately.
 template <int C>
 struct row_layout {
   static constexpr bool has_last = C > 8 && C % 8 == 1;
   static constexpr int body = has_last ? C - 1 : (C + 3) / 4 * 4;  ///< rows in registers
-  static constexpr int size = has_last ? body + 4 : body;          ///< numbers of a vector of C rows
-  /// Size of a C x C block: C columns of `body` rows, then the last row if it is separate.
+  static constexpr int size = has_last ? body + 4 : body;          ///< number of values of a vector of C rows
+  /// Size of a C x C block: C columns of `body` rows, followed by the last row if it is separate.
   static constexpr int block = C * body + (has_last ? size : 0);
-  /// Offset of an entry of a block by row and column.
+  /// Returns the offset of an entry of a block.
   [[nodiscard]] static constexpr int at(int row, int column) {
     return row < body ? body * column + row : C * body + column;
   }
@@ -38,7 +38,7 @@ struct row_layout {
 /// Number of rows in a register.
 template <int C, simd::target Target>
 inline constexpr int row_width = row_layout<C>::body % static_cast<int>(Target::bytes / 8) == 0 ? Target::bytes / 8 : 4;
-/// True if two rows of blocks fit into the registers: the sums, and two rows and a factor.
+/// True if the registers have room for two rows of blocks: the sums, and in addition two rows and a factor.
 template <int C, simd::target Target>
 inline constexpr bool has_room_for_two = 2 * C + 3 <= (Target::bytes == 64 ? 32 : 16);
 
@@ -46,18 +46,18 @@ inline constexpr bool has_room_for_two = 2 * C + 3 <= (Target::bytes == 64 ? 32 
 struct elimination {
   const bundle_structure& structure;
   std::size_t chunk = 0;
-  const double* normal = nullptr;   ///< `point_size` per point; all zero: the point is fixed
-  const double* damping = nullptr;  ///< three per point, or null
+  const double* normal = nullptr;   ///< `point_size` values per point; all zero if the point is fixed
+  const double* damping = nullptr;  ///< three values per point, or null
   const double* mixed = nullptr;    ///< tiles of camera-point blocks
-  double* inverse = nullptr;        ///< `point_size` per point: L^-1, row by row, and L^-1 g
+  double* inverse = nullptr;        ///< `point_size` values per point: L^-1, row by row, and L^-1 g
   // Contributions to subtract from the reduced system.
-  double* blocks = nullptr;   ///< `row_layout<C>::block` per slot
-  double* right = nullptr;    ///< C per unknown
+  double* blocks = nullptr;   ///< `row_layout<C>::block` values per slot
+  double* right = nullptr;    ///< C values per unknown
   double* scratch = nullptr;  ///< three vectors per observation of the chunk by a movable camera
 };
 
-/// Computes L^-1 and L^-1 g of up to eight points starting at `p`, before `end`. Returns the first of them whose block
-/// is not positive definite, or `end`.
+/// Computes L^-1 and L^-1 g of up to eight points starting at `p`, before `end`. Returns the first point whose block is
+/// not positive definite, or `end`.
 template <simd::target Target>
 ORBIS_ALWAYS_INLINE std::size_t invert_factors(const elimination& work, std::size_t p, std::size_t end) {
   using L = simd::vec<double, 8, Target>;
@@ -113,7 +113,7 @@ ORBIS_ALWAYS_INLINE std::size_t invert_factors(const elimination& work, std::siz
   return p + i;
 }
 
-/// Computes Y of the observations of a chunk by one camera, its sum of Y Y^T, and the contribution to the right-hand
+/// Computes Y for the observations in a chunk by one camera, the sum of Y Y^T, and the contribution to the right-hand
 /// side.
 template <int C, bool ThroughCamera, simd::target Target>
 ORBIS_ALWAYS_INLINE void make_factors(const elimination& work, const bundle_structure::segment& segment,
@@ -129,7 +129,7 @@ ORBIS_ALWAYS_INLINE void make_factors(const elimination& work, const bundle_stru
   for (std::size_t first = 0; first < segment.count; first += 8, mixed += mixed_block::size) {
     const std::uint32_t* const point = work.structure.point.data() + 8 * segment.first_tile + first;
     const std::uint32_t* const number = work.structure.mixed_number.data() + 8 * segment.first_tile + first;
-    double nowhere[3 * rows::size];  // dummy output for the empty places of the last tile
+    double nowhere[3 * rows::size];  // output for the empty places of the last tile, not used
     const double* from[8];
     double* to[8];
     for (std::size_t i = 0; i != 8; ++i) {
@@ -177,8 +177,8 @@ ORBIS_ALWAYS_INLINE void make_factors(const elimination& work, const bundle_stru
   }
 }
 
-/// Adds Y_a Y_c^T, summed over a group of points, to a block, for `Count` cameras a to one block each. The Y of a
-/// camera are `columns` vectors, followed by those of the next camera a.
+/// Adds Y_a Y_c^T, summed over a group of points, to a block for each of `Count` cameras a. The Y of a camera are
+/// `columns` vectors, followed by those of the next camera.
 template <int C, int Count, simd::target Target>
 ORBIS_ALWAYS_INLINE void add_products(const double* ya, const double* yc, std::size_t columns,
                                       double* const (&blocks)[Count]) {
@@ -191,7 +191,7 @@ ORBIS_ALWAYS_INLINE void add_products(const double* ya, const double* yc, std::s
       unroll<C>([&](auto c) ORBIS_INLINE_LAMBDA { sum[r][c] = row::load(blocks[r] + rows::body * c + width * i); });
     });
     const double *a = ya + width * i, *b = yc;
-    for (std::size_t k = 0; k != columns; ++k, a += rows::size, b += rows::size) {  // unrolling would spill
+    for (std::size_t k = 0; k != columns; ++k, a += rows::size, b += rows::size) {  // unrolling would spill registers
       row own[Count];
       unroll<Count>([&](auto r) ORBIS_INLINE_LAMBDA { own[r] = row::load(a + r * columns * rows::size); });
       unroll<C>([&](auto c) ORBIS_INLINE_LAMBDA {
@@ -247,10 +247,10 @@ ORBIS_ALWAYS_INLINE std::size_t eliminate(const elimination& work) {
       return work.scratch + rows::size * (3 * (group.first_mixed - begin.first_mixed) + columns * a);
     };
     const auto unknown = [&](std::size_t a) { return structure.mixed_unknown[group.first_mixed + a * group.points]; };
-    bool is_seen_twice = false;  // by the same camera
+    bool is_seen_twice = false;  // true if the same camera observes a point twice
     for (std::size_t a = 1; a != count; ++a) is_seen_twice |= unknown(a) == unknown(a - 1);
     std::size_t a = 1;
-    if constexpr (has_room_for_two<C, Target>)  // two rows of blocks share the loads of their factors
+    if constexpr (has_room_for_two<C, Target>)  // two rows of blocks share loads of their factors
       for (; a + 1 < count && !is_seen_twice; a += 2) {
         for (std::size_t c = 0; c != a; ++c)
           add_products<C, 2, Target>(y(a), y(c), columns, {block_at(a, c), block_at(a + 1, c)});
@@ -259,7 +259,7 @@ ORBIS_ALWAYS_INLINE std::size_t eliminate(const elimination& work) {
     for (; a != count; ++a)
       for (std::size_t c = 0; c != a; ++c) {
         add_products<C, 1, Target>(y(a), y(c), columns, {block_at(a, c)});
-        if (is_seen_twice && unknown(c) == unknown(a))  // on the diagonal, where the transposed product also counts
+        if (is_seen_twice && unknown(c) == unknown(a))  // on the diagonal, add the transposed product as well
           add_products<C, 1, Target>(y(c), y(a), columns, {block_at(a, c)});
       }
   }
@@ -273,8 +273,8 @@ struct substitution {
   const double* mixed = nullptr;
   const double* inverse = nullptr;
   const double* cameras = nullptr;
-  double* pulled = nullptr;  ///< four numbers per point
-  double* steps = nullptr;   ///< three per point
+  double* pulled = nullptr;  ///< four values per point
+  double* steps = nullptr;   ///< three values per point
 };
 
 template <int C, bool ThroughCamera, simd::target Target>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The normal equations of poses, points and one shared camera.
+/// The normal equations of poses, points and one shared camera model.
 #pragma once
 
 #include <algorithm>
@@ -26,13 +26,13 @@
 namespace orbis::optimize::detail {
 
 /// Levenberg-Marquardt with eliminated points and a dense reduced system: six unknowns for each image except the first,
-/// then the estimated parameters.
+/// followed by the estimated camera parameters.
 template <camera::parametric_camera Camera>
 class shared_intrinsics {
   using parameters = camera::parameters_of<Camera>;
   using residual_type = reprojection_with_intrinsics<Camera>;
   using view_type = typename residual_type::view;
-  // Theta, the unknowns of the camera, has room for all parameters; only the first `count_` entries are used.
+  // Theta, the vector of camera unknowns, has room for all parameters; only the first `count_` entries are used.
   using by_theta_type = matrix<3, parameters::count>;
   using block_63 = matrix<6, 3>;
   using block_t3 = matrix<parameters::count, 3>;
@@ -50,7 +50,7 @@ class shared_intrinsics {
   enum class out : std::uint8_t {
     no,
     outlier,  ///< inconsistent with the estimate
-    alone     ///< its image or its point is not determined, or not connected to the others
+    alone     ///< its image or its point is not determined or not connected to the others
   };
 
  public:
@@ -69,7 +69,7 @@ class shared_intrinsics {
     keep_connected();
   }
 
-  /// Number of observations used, and outliers.
+  /// The number of observations used, and the number of outliers among them.
   [[nodiscard]] std::size_t observations() const noexcept {
     return static_cast<std::size_t>(std::count_if(out_.begin(), out_.end(), [](out o) { return o != out::alone; }));
   }
@@ -88,7 +88,7 @@ class shared_intrinsics {
     std::copy(now_.points.begin(), now_.points.end(), points.begin());
   }
 
-  /// Iterates until the cost stops decreasing; counts the steps. Returns false if `go_on()` returned false.
+  /// Iterates until the cost stops decreasing; counts the steps in `steps`. Returns false if `go_on()` returned false.
   template <class GoOn>
   [[nodiscard]] bool descend(int limit, double relative_tolerance, int& steps, const GoOn& go_on) {
     set_noise();
@@ -115,7 +115,7 @@ class shared_intrinsics {
 
   /// Excludes observations that are inconsistent with the estimate, and restores those that are consistent again.
   void update_outliers() {
-    constexpr double gates[] = {13.816, 16.266};  // the chi-squared quantiles of 99.9 %, for two and three coordinates
+    constexpr double gates[] = {13.816, 16.266};  // the 99.9 % quantiles of chi-squared, for two and three coordinates
     set_noise();
     const std::vector<view_type> views = make_views(now_);
     for (std::size_t k = 0; k != observations_.size(); ++k) {
@@ -125,7 +125,7 @@ class shared_intrinsics {
     keep_connected();
   }
 
-  /// Root mean square of the entries of the whitened residuals.
+  /// Returns the root mean square of the entries of the whitened residuals.
   [[nodiscard]] double rms() const { return residual_rms(now_.camera, now_.poses, now_.points); }
   [[nodiscard]] double residual_rms(const Camera& camera, std::span<const se3> poses,
                                     std::span<const vec3> points) const {
@@ -141,7 +141,7 @@ class shared_intrinsics {
     return entries > 0.0 ? std::sqrt(sum / entries) : 0.0;
   }
 
-  /// The covariance of the parameters at the current estimate; returns false if they are not determined.
+  /// Computes the covariance of the parameters at the current estimate; returns false if they are not determined.
   template <class Matrix>
   [[nodiscard]] bool covariance(Matrix& out) {
     out = zeros<Matrix>();
@@ -151,7 +151,7 @@ class shared_intrinsics {
     const Eigen::Index size = reduced_.rows(), first = size - count_;
     const Eigen::LLT<Eigen::MatrixXd, Eigen::Lower> factor(reduced_);
     if (factor.info() != Eigen::Success || !(factor.rcond() > 1e-14)) return false;
-    Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(size, count_);  // of the inverse
+    Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(size, count_);  // rows of the inverse
     for (int i = 0; i != count_; ++i) rows(first + i, i) = 1.0;
     factor.solveInPlace(rows);
     basis_type spread = zeros<basis_type>();
@@ -192,8 +192,8 @@ class shared_intrinsics {
   }
   /// Sets the standard deviation of the residuals, estimated from their median.
   void set_noise() {
-    constexpr double medians[] = {1.386, 2.366};  // of chi-squared, for two and three coordinates
-    constexpr double least = 0.01;  // lower limit for noise-free data, so that rounding does not count as noise
+    constexpr double medians[] = {1.386, 2.366};  // medians of chi-squared, for two and three coordinates
+    constexpr double least = 0.01;  // lower limit, so that rounding errors of noise-free data do not count as noise
     const std::vector<view_type> views = make_views(now_);
     std::vector<double> shares;
     for (std::size_t k = 0; k != observations_.size(); ++k)
@@ -209,7 +209,7 @@ class shared_intrinsics {
   }
 
   /// Excludes images with too few observations, points with fewer than two observations or not determined by them, and
-  /// everything outside the largest connected component.
+  /// all images and points outside the largest connected component.
   void keep_connected() {
     for (out& o : out_)
       if (o == out::alone) o = out::no;
@@ -251,7 +251,7 @@ class shared_intrinsics {
       }
     }
   }
-  /// Connected components of images that share points: for each image, the first image of its component.
+  /// Returns the connected components of images that share points: for each image, the first image of its component.
   [[nodiscard]] std::vector<std::uint32_t> parts() const {
     std::vector<std::uint32_t> first(now_.poses.size());
     for (std::uint32_t i = 0; i != first.size(); ++i) first[i] = i;
@@ -298,7 +298,7 @@ class shared_intrinsics {
     const bundle_observation& o = observations_[k];
     auto r = residual_.residual(views[o.pose], points[o.point], o);
     if (r && !std::isnan(o.right))
-      (*r)[2] -= o.depth_weight * (*r)[0];  // the depth alone: bf times the difference of inverse depths
+      (*r)[2] -= o.depth_weight * (*r)[0];  // only the depth error: bf times the difference of inverse depths
     return r ? o.information * squared_norm(*r) : std::numeric_limits<double>::infinity();
   }
   [[nodiscard]] double total_cost(const estimate& e) const {
@@ -312,13 +312,13 @@ class shared_intrinsics {
   /// The contribution of an observation to the normal equations.
   struct seen {
     bool takes_part = false;
-    std::uint32_t row = none;  ///< of its image's unknowns
+    std::uint32_t row = none;  ///< first row of its image's unknowns
     block_63 pose_point;
-    vec6 gradient;  ///< by the image
+    vec6 gradient;  ///< with respect to the image pose
   };
   /// The sum of the contributions of a point's observations.
   struct point_part {
-    bool is_determined = false;  ///< by these observations
+    bool is_determined = false;  ///< true if determined by these observations
     mat3 own = zeros<mat3>();
     vec3 gradient = zeros<vec3>();
     block_t3 theta_point = zeros<block_t3>();
@@ -329,7 +329,7 @@ class shared_intrinsics {
     std::vector<seen> by;
     block_t3 theta_point;
     theta_vector theta_gradient;
-    mat3 inverse;  ///< of its own block
+    mat3 inverse;  ///< inverse of its own block
     vec3 gradient;
   };
 
@@ -374,7 +374,7 @@ class shared_intrinsics {
     part.is_determined = rows_.size() >= 2;
   }
 
-  /// Adds `part` to a matrix, its first entry at (row, column); only the used entries of theta.
+  /// Adds `part` to a matrix, starting at (row, column); only the used entries of theta.
   template <int R, int C>
   void add(Eigen::MatrixXd& to, Eigen::Index row, Eigen::Index column, const matrix<R, C>& part) const {
     const int rows = row == pose_rows_ ? count_ : R, columns = column == pose_rows_ ? count_ : C;
@@ -421,14 +421,15 @@ class shared_intrinsics {
     return true;
   }
 
-  /// The 1-norm: the largest column sum of magnitudes; multiplied by that of the inverse, the condition number.
+  /// Returns the 1-norm: the largest column sum of magnitudes. Its product with the 1-norm of the inverse is the
+  /// condition number.
   [[nodiscard]] static double one_norm(const mat3& m) {
     double most = 0.0;
     for (int c = 0; c != 3; ++c) most = std::max(most, std::abs(m(0, c)) + std::abs(m(1, c)) + std::abs(m(2, c)));
     return most;
   }
 
-  /// Subtracts the terms that involve the unknowns of `point_`; the lower half of the system.
+  /// Subtracts the terms that involve the unknowns of `point_` from the lower triangle of the system.
   void subtract_eliminated() {
     const Eigen::Index theta = pose_rows_;
     const block_t3 theta_inverse = point_.theta_point * point_.inverse;
@@ -474,7 +475,7 @@ class shared_intrinsics {
         reduced_(r, c) = direct_(r, c) * (r == c ? 1.0 + damping : 1.0) - removed_(r, c);
   }
 
-  /// The estimate after a damped step from the linearisation; empty if there is none, or if the camera is invalid.
+  /// Returns the estimate after a damped step; empty if there is no step, or if the camera would be invalid.
   [[nodiscard]] std::optional<estimate> step(double damping) {
     reduce(damping);
     const Eigen::LLT<Eigen::MatrixXd, Eigen::Lower> factor(reduced_);
@@ -502,7 +503,7 @@ class shared_intrinsics {
 
   /// The derivatives of one residual.
   struct jacobians {
-    std::uint32_t row;  ///< of its image's unknowns
+    std::uint32_t row;  ///< first row of its image's unknowns
     double weight;
     matrix<3, 6> by_pose;
     by_theta_type by_theta;
@@ -510,21 +511,21 @@ class shared_intrinsics {
 
   residual_type residual_;
   double noise_ = 1.0;  ///< standard deviation of the whitened residuals
-  huber loss_{2.447};   ///< the chi-squared gate of two coordinates, times the noise
+  huber loss_{2.447};   ///< square root of the chi-squared gate for two coordinates, times the noise
   estimate now_;
   basis_type basis_ = zeros<basis_type>();        ///< derivatives of the parameters, one column per unknown
-  int count_ = 0;                                 ///< of the unknowns of the camera
-  std::vector<bundle_observation> observations_;  ///< by point
+  int count_ = 0;                                 ///< number of unknowns of the camera
+  std::vector<bundle_observation> observations_;  ///< ordered by point
   std::vector<std::size_t> begins_;               ///< start of each point's observations, followed by the end
-  std::vector<out> out_;                          ///< by observation
-  std::vector<std::uint32_t> row_of_;             ///< by image: its first unknown; `none` if its pose is fixed
+  std::vector<out> out_;                          ///< reason for the exclusion of each observation
+  std::vector<std::uint32_t> row_of_;             ///< for each image: its first unknown; `none` if its pose is fixed
   Eigen::Index pose_rows_ = 0;
 
   std::vector<view_type> views_;
-  std::vector<seen> seen_;                      ///< by observation, at the last linearisation
-  std::vector<point_part> parts_;               ///< by point, at the last linearisation
-  std::vector<jacobians> rows_;                 ///< of the residuals of the most recently linearised point
-  Eigen::MatrixXd direct_, reduced_, removed_;  ///< lower halves; `direct_`: without elimination and damping
+  std::vector<seen> seen_;                      ///< contribution of each observation at the last linearisation
+  std::vector<point_part> parts_;               ///< contribution of each point at the last linearisation
+  std::vector<jacobians> rows_;                 ///< for the residuals of the most recently linearised point
+  Eigen::MatrixXd direct_, reduced_, removed_;  ///< lower triangles; `direct_`: before elimination and damping
   std::vector<double> gradient_;
   eliminated point_;
 };

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Derivatives of a `camera_frame_residual` with respect to the camera and to the point in the world.
+/// Derivatives of a `camera_frame_residual` with respect to the camera and to the point in the world frame.
 #pragma once
 
 #include <optional>
@@ -10,7 +10,7 @@
 
 namespace orbis::optimize::detail {
 
-/// `linearize`, derived from `linearize_in_camera`.
+/// Implements `linearize` by `linearize_in_camera`.
 template <class R>
 [[nodiscard]] std::optional<matrix<R::dimension>> linearize_through_camera(
     const R& residual, const typename R::view& view, const vec3& point, const typename R::observation& o,

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Loads and stores of eight rows of four numbers as columns of eight.
+/// Loads and stores eight rows of four numbers as columns of eight.
 #pragma once
 
 #include <orbis/core/simd/shuffle.hpp>
@@ -9,7 +9,8 @@
 
 namespace orbis::optimize::detail {
 
-/// Reads the first `Columns` numbers, three or four, of eight rows of four: number k of all rows goes to `out[k]`.
+/// Reads the first `Columns` (three or four) numbers of eight rows of four: the k-th numbers of all rows are written to
+/// `out[k]`.
 template <int Columns, simd::target Target>
 ORBIS_ALWAYS_INLINE void load_transposed(const double* const* from, simd::vec<double, 8, Target>* out) {
   static_assert(Columns == 3 || Columns == 4);
@@ -83,14 +84,14 @@ ORBIS_ALWAYS_INLINE void for_each_row(const simd::vec<double, 8, Target>& a, con
   }
 }
 
-/// Writes four columns of eight numbers as eight rows of four: row i goes to `to[i] + offset`.
+/// Writes four columns of eight numbers as eight rows of four: row i is written to `to[i] + offset`.
 template <simd::target Target>
 ORBIS_ALWAYS_INLINE void store_transposed(const simd::vec<double, 8, Target>& a, const simd::vec<double, 8, Target>& b,
                                           const simd::vec<double, 8, Target>& c, const simd::vec<double, 8, Target>& d,
                                           double* const* to, int offset) {
   for_each_row(a, b, c, d, [&](int i, const auto& row) ORBIS_INLINE_LAMBDA { row.store(to[i] + offset); });
 }
-/// Adds the rows to memory; rows may coincide.
+/// Like `store_transposed`, but adds the rows to memory; destinations may coincide.
 template <simd::target Target>
 ORBIS_ALWAYS_INLINE void add_transposed(const simd::vec<double, 8, Target>& a, const simd::vec<double, 8, Target>& b,
                                         const simd::vec<double, 8, Target>& c, const simd::vec<double, 8, Target>& d,

@@ -11,7 +11,7 @@ namespace orbis::optimize::detail {
 
 /// Takes at most `steps` steps from `state`. `sum_up(state)` returns the normal equations at a state, with the sum of
 /// squares as their `cost`; `step(state, equations)` returns the next state, or empty if there is none. Stops when a
-/// step does not lower the cost by more than rounding. Empty if the initial cost is not finite.
+/// step does not reduce the cost by more than the rounding error. Returns empty if the initial cost is not finite.
 template <class State, class SumUp, class Step>
 [[nodiscard]] std::optional<State> descend(State state, int steps, const SumUp& sum_up, const Step& step) {
   auto here = sum_up(state);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The relative motion of two views up to scale, and normal equations of Sampson distances for it.
+/// The relative motion of two views up to scale, and the normal equations of Sampson distances for this motion.
 #pragma once
 
 #include <cmath>
@@ -11,7 +11,7 @@
 
 namespace orbis::optimize::detail {
 
-/// Two orthonormal columns that are orthogonal to the unit vector `p`; discontinuous only at p.z() == 0.
+/// Returns two orthonormal columns that are orthogonal to the unit vector `p`; discontinuous only at p.z() == 0.
 /// Source: T. Duff et al., "Building an orthonormal basis, revisited", JCGT 6(1), 2017.
 [[nodiscard]] inline matrix<3, 2> tangent_basis(const vec3& p) {
   const double sign = std::copysign(1.0, p.z());
@@ -27,8 +27,8 @@ namespace orbis::optimize::detail {
   return columns;
 }
 
-/// The unit vector at a distance of `d` radians from the unit vector `p` along a great circle. `d` is in
-/// `tangent_basis(p)`, which is the derivative with respect to `d` at 0.
+/// Returns the unit vector at a distance of |d| radians from the unit vector `p` along a great circle. `d` is in
+/// coordinates of `tangent_basis(p)`, which is also the derivative with respect to `d` at 0.
 [[nodiscard]] inline vec3 step_on_sphere(const vec3& p, const vec2& d) {
   const double angle = std::sqrt(d.x() * d.x() + d.y() * d.y());
   const double factor = angle < 1e-8 ? 1.0 : std::sin(angle) / angle, along = std::cos(angle);
@@ -57,13 +57,14 @@ struct epipolar_motion {
   vec3 direction;
   mat3 e;
   epipolar_motion(const so3& r, const vec3& t) : rotation{r}, direction{t}, e{hat<double>(t) * r.rotation_matrix()} {}
-  /// The motion after a step: `exp(d.head<3>())` on the left of the rotation, the rest on the sphere of directions.
+  /// Returns the motion after a step: `exp(d.head<3>())` on the left of the rotation, the rest on the sphere of
+  /// directions.
   [[nodiscard]] epipolar_motion moved(const matrix<5>& d) const {
     return {so3::exp(head<3>(d)) * rotation, step_on_sphere(direction, tail<2>(d))};
   }
 };
 
-/// The squared Sampson distance of a match in units of its metric.
+/// Returns the squared Sampson distance of a match in units of its metric.
 [[nodiscard]] inline double squared_sampson(const mat3& e, const image_match& m) {
   const vec3 first = m.first.direction(), second = m.second.direction();
   const vec3 line = e * first, other = transposed(e) * second;
@@ -119,9 +120,9 @@ struct epipolar_equations {
     matrix<5, 5> h;
     matrix<5> g;
   };
-  /// The equations for a step of the motion (`epipolar_motion::moved`). @pre mirrored
+  /// Returns the equations for a step of the motion (`epipolar_motion::moved`). @pre `mirror` was called
   [[nodiscard]] motion_equations by_motion(const epipolar_motion& m) const {
-    // Derivatives of the entries of E = [t]x R by exp(phi) R and by a step of t on the sphere.
+    // Derivatives of the entries of E = [t]x R with respect to phi in exp(phi) R and to a step of t on the sphere.
     matrix<9, 5> by_step;
     const matrix<3, 2> basis = tangent_basis(m.direction);
     for (int j = 0; j != 5; ++j) {

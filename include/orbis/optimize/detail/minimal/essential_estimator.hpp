@@ -31,7 +31,7 @@
 
 namespace orbis::optimize::detail {
 
-/// The four poses `T_second_first` (translations of length 1) that an essential matrix may represent.
+/// Returns the four poses `T_second_first` (translations of length 1) that an essential matrix may represent.
 [[nodiscard]] inline std::array<se3, 4> decompose_essential(const mat3& essential) {
   auto [u, values, v] = svd<3>(essential);
   if (determinant(u) < 0.0) set_column(u, 2, -column_of(u, 2));
@@ -133,8 +133,9 @@ class essential_estimator {
   std::size_t stride_ = 0;
 };
 
-/// The number of inliers that a pure rotation of the camera explains. The rotation is estimated with weights that
-/// decrease with the error, because the inliers contain wrong matches that are close to their epipolar lines by chance.
+/// Returns the number of inliers that a pure rotation of the camera explains. The rotation is estimated with weights
+/// that decrease with the error, because the inliers include wrong matches that are close to their epipolar lines by
+/// chance.
 [[nodiscard]] inline std::size_t count_rotation_inliers(const std::vector<image_match>& matches,
                                                         std::span<const std::uint32_t> inliers,
                                                         double squared_threshold) {

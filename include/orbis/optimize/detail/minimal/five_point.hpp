@@ -2,9 +2,9 @@
 /// @file
 /// The essential matrices of five pairs of rays.
 ///
-/// The five epipolar constraints leave the matrices `x X + y Y + z Z + W`. An essential matrix is singular and has two
-/// equal singular values, which gives ten cubic equations in x, y and z. Elimination leaves a polynomial of degree ten
-/// in z. Newton's method on the cubics recovers the accuracy lost in the elimination.
+/// The five epipolar constraints are satisfied by the matrices `x X + y Y + z Z + W`. An essential matrix is singular
+/// and has two equal singular values, which gives ten cubic equations in x, y and z. Elimination yields a polynomial of
+/// degree ten in z. Newton's method on the cubics recovers the accuracy lost in the elimination.
 ///
 /// Source: D. Nister, "An efficient solution to the five-point relative pose problem", PAMI 26(6), 2004.
 #pragma once
@@ -22,7 +22,7 @@
 
 namespace orbis::optimize::detail {
 
-/// Up to ten essential matrices, each of Frobenius norm the square root of 2.
+/// Up to ten essential matrices, each with Frobenius norm sqrt(2).
 class five_point_solutions {
  public:
   [[nodiscard]] std::size_t size() const noexcept { return size_; }
@@ -39,8 +39,7 @@ class five_point_solutions {
   std::size_t size_ = 0;
 };
 
-/// Polynomials in x, y, z: those of degree 1 as coefficients of x y z 1, those of degrees 2 and 3 in the order of these
-/// tables.
+/// Polynomials in x, y and z: degree 1 as coefficients of x, y, z and 1; degrees 2 and 3 in the order of these tables.
 namespace epipolar_cubics {
 
 using linear = std::array<double, 4>;
@@ -56,7 +55,7 @@ inline constexpr std::array<exponents, 20> cubic_terms{
     {{3, 0, 0}, {0, 3, 0}, {2, 1, 0}, {1, 2, 0}, {2, 0, 1}, {2, 0, 0}, {0, 2, 1}, {0, 2, 0}, {1, 1, 1}, {1, 1, 0},
      {1, 0, 2}, {1, 0, 1}, {1, 0, 0}, {0, 1, 2}, {0, 1, 1}, {0, 1, 0}, {0, 0, 3}, {0, 0, 2}, {0, 0, 1}, {0, 0, 0}}};
 
-/// The index in `terms` of the product of the i-th term of `a` and the j-th of `b`.
+/// Returns the index in `terms` of the product of the i-th term of `a` and the j-th term of `b`.
 template <std::size_t A, std::size_t B, std::size_t N>
 [[nodiscard]] consteval std::array<std::array<std::uint8_t, B>, A> product_table(
     const std::array<exponents, A>& a, const std::array<exponents, B>& b, const std::array<exponents, N>& terms) {
@@ -81,7 +80,7 @@ inline void add_product(cubic& sum, const quadric& a, const linear& b) noexcept 
     for (std::size_t j = 0; j != 4; ++j) sum[quadric_products[i][j]] += a[i] * b[j];
 }
 
-/// The ten cubics that the entries of an essential matrix satisfy.
+/// Returns the ten cubics that the entries of an essential matrix satisfy.
 [[nodiscard]] inline std::array<cubic, 10> constraints(const std::array<std::array<linear, 3>, 3>& e) {
   std::array<cubic, 10> all{};
   // The determinant.
@@ -145,7 +144,7 @@ inline void add_product(cubic& sum, const quadric& a, const linear& b) noexcept 
     if (error == 0.0 || !all_finite(p)) break;
   }
   p = previous;
-  const double size = 1.0 + squared_norm(p);  // of the matrix
+  const double size = 1.0 + squared_norm(p);  // magnitude of the matrix
   return last <= 1e-16 * size * size * size;
 }
 
@@ -191,7 +190,7 @@ inline void add_product(cubic& sum, const quadric& a, const linear& b) noexcept 
   return true;
 }
 
-/// Solves for the first ten terms: afterwards row i is `term i + rest = 0`. Returns false if the system is singular.
+/// Solves for the first ten terms: row i then represents `term i + rest = 0`. Returns false if the system is singular.
 [[nodiscard]] inline bool eliminate(std::array<cubic, 10>& rows) {
   for (std::size_t k = 0; k != 10; ++k) {
     std::size_t best = k;
@@ -212,10 +211,10 @@ inline void add_product(cubic& sum, const quadric& a, const linear& b) noexcept 
 
 }  // namespace epipolar_cubics
 
-/// All essential matrices with `second[i]^T E first[i] = 0`, for rays of any length. Empty if the rays do not determine
-/// at most ten of them (for example all rays in one plane through the centre, or a repeated ray), or are not finite.
-/// Rays that differ only by a rotation are not a failure: every translation then gives a matrix. Constant time, no
-/// allocation.
+/// Returns all essential matrices with `second[i]^T E first[i] = 0`, for rays of any length. Empty if there are
+/// infinitely many (for example if all rays are in one plane through the centre, or a ray is repeated), or if the rays
+/// are not finite. Rays that differ only by a rotation are not a failure: every translation then gives a matrix. O(1),
+/// no allocation.
 [[nodiscard]] inline five_point_solutions five_point(const std::array<vec3, 5>& first,
                                                      const std::array<vec3, 5>& second) {
   namespace poly = epipolar_cubics;
@@ -237,14 +236,14 @@ inline void add_product(cubic& sum, const quadric& a, const linear& b) noexcept 
   const std::array<poly::cubic, 10> cubics = poly::constraints(e);
   std::array<poly::cubic, 10> c = cubics;
   if (!poly::eliminate(c)) return solutions;
-  // Rows 4 to 9 express x^2 z, x^2, y^2 z, y^2, x y z, x y in the rest; each pair, one minus z times the other, leaves
-  // x p(z) + y q(z) + r(z) = 0 with p and q of degree 3, r of degree 4.
+  // Rows 4 to 9 express x^2 z, x^2, y^2 z, y^2, x y z and x y in terms of the rest; for each pair, one row minus z
+  // times the other gives x p(z) + y q(z) + r(z) = 0 with p and q of degree 3 and r of degree 4.
   std::array<std::array<std::array<double, 5>, 3>, 3> b{};  // coefficients of z^k
   for (std::size_t i = 0; i != 3; ++i) {
     const std::size_t above = 4 + 2 * i;
     for (std::size_t part = 0; part != 3; ++part) {
       const std::size_t from = 10 + 3 * part, degree = part == 2 ? 3 : 2;
-      for (std::size_t k = 0; k <= degree; ++k) {  // columns have descending powers
+      for (std::size_t k = 0; k <= degree; ++k) {  // columns are in order of descending powers
         b[i][part][k] += c[above][from + degree - k];
         b[i][part][k + 1] -= c[above + 1][from + degree - k];
       }

@@ -21,8 +21,8 @@
 
 namespace orbis::optimize::detail {
 
-/// The homography of four pairs of points, by projective bases, normalised to norm 1. Empty if three points are
-/// collinear, or if some points would be behind a camera.
+/// Returns the homography of four pairs of points, computed from projective bases and normalised to norm 1. Empty if
+/// three points are collinear, or if some points would be behind a camera.
 [[nodiscard]] inline std::optional<mat3> homography_of_four(const std::array<vec2, 4>& first,
                                                             const std::array<vec2, 4>& second) {
   mat3 bases[2];
@@ -32,7 +32,7 @@ namespace orbis::optimize::detail {
     const auto cross = [&](std::size_t a, std::size_t b, std::size_t c) {
       return (p[b].x() - p[a].x()) * (p[c].y() - p[a].y()) - (p[b].y() - p[a].y()) * (p[c].x() - p[a].x());
     };
-    // The fourth point as a combination of the other three, by triangle areas.
+    // Express the fourth point as a combination of the other three by triangle areas.
     weights[k] = vec3(cross(3, 1, 2), cross(0, 3, 2), cross(0, 1, 3));
     const double area = cross(0, 1, 2);
     const double extent = squared_norm(p[1] - p[0]) + squared_norm(p[2] - p[0]) + squared_norm(p[3] - p[0]);
@@ -41,22 +41,22 @@ namespace orbis::optimize::detail {
     for (int i = 0; i != 3; ++i) set_column(bases[k], i, weights[k][i] * homogeneous(p[static_cast<std::size_t>(i)]));
   }
   for (int i = 0; i != 3; ++i)
-    if (!(weights[1][i] / weights[0][i] > 0.0)) return std::nullopt;  // on both sides of the plane
+    if (!(weights[1][i] / weights[0][i] > 0.0)) return std::nullopt;  // some points are behind a camera
   mat3 out = bases[1] * inverse(bases[0]);
   out /= norm(out);
   if (!all_finite(out)) return std::nullopt;
   return out;
 }
 
-/// Normal equations of transfer errors for D in (I + D) H, whose last entry is 0; the lower triangle of `h`. `cost` is
-/// the sum of squares.
+/// Normal equations of transfer errors for D in (I + D) H, where the last entry of D is 0. Only the lower triangle of
+/// `h` is used. `cost` is the sum of squares.
 struct homography_equations {
   matrix<8, 8> h = zeros<matrix<8, 8>>();
   matrix<8> g = zeros<matrix<8>>();
   double cost = 0.0;
 
-  /// Adds the error `r` of a point whose derivative with respect to the point before its projection is `by_point`; that
-  /// point changes by `by_d * D * moved`.
+  /// Adds the error `r` of a point. `by_point` is its derivative with respect to the point before projection, which
+  /// changes by `by_d * D * moved`.
   void add(const vec2& r, const matrix<2, 3>& by_point, const mat3& by_d, const vec3& moved) {
     const matrix<2, 3> a = by_point * by_d;
     matrix<2, 8> j;
@@ -67,7 +67,7 @@ struct homography_equations {
     }
     cost += squared_norm(r);
   }
-  /// I + D of a Gauss-Newton step; empty if the step does not exist.
+  /// Returns I + D for a Gauss-Newton step; empty if there is no step.
   [[nodiscard]] std::optional<mat3> step() const {
     small_cholesky<8> factors;
     if (!factors.set(h) || !(factors.factor(1e-9) > 0.0)) return std::nullopt;
@@ -79,7 +79,7 @@ struct homography_equations {
   }
 };
 
-/// The derivative of `xy`, the projection of a point to z = 1, with respect to the point.
+/// Returns the derivative of `xy`, the projection of a point to z = 1, with respect to the point.
 [[nodiscard]] inline matrix<2, 3> derivative_of_projection(const vec2& xy, double inverse_z) {
   matrix<2, 3> projection;
   projection << inverse_z, 0.0, -xy.x() * inverse_z, 0.0, inverse_z, -xy.y() * inverse_z;

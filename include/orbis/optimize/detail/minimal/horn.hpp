@@ -2,10 +2,10 @@
 /// @file
 /// Absolute orientation in closed form.
 ///
-/// Sources: B. K. P. Horn, "Closed-form solution of absolute orientation using unit quaternions", JOSA A 4 (1987); the
-/// scale is the least-squares one of S. Umeyama, PAMI 13 (1991); the largest eigenvalue is computed from the
-/// characteristic polynomial as by D. Theobald, "Rapid calculation of RMSDs using a quaternion-based characteristic
-/// polynomial", Acta Crystallographica A 61 (2005).
+/// Sources: B. K. P. Horn, "Closed-form solution of absolute orientation using unit quaternions", JOSA A 4 (1987); S.
+/// Umeyama, PAMI 13 (1991), for the least-squares scale; D. Theobald, "Rapid calculation of RMSDs using a
+/// quaternion-based characteristic polynomial", Acta Crystallographica A 61 (2005), for the largest eigenvalue from the
+/// characteristic polynomial.
 #pragma once
 
 #include <array>
@@ -21,15 +21,15 @@
 
 namespace orbis::optimize::detail {
 
-/// A rotation and the trace of the matrix that it rotates.
+/// A rotation and the trace of the rotated matrix.
 struct best_rotation {
   so3::quaternion quaternion;
   double trace = 0.0;
 };
 
-/// The rotation that best maps the points a to the points b, given `m`, the sum of `a b^T` over pairs of centred
-/// points: the eigenvector of the largest eigenvalue of Horn's symmetric 4x4 matrix. That eigenvalue is the trace.
-/// Empty if two rotations are equally good: the points are collinear or coincide.
+/// Returns the rotation that best maps the points a to the points b, given `m`, the sum of `a b^T` over pairs of
+/// centred points: the eigenvector of the largest eigenvalue of Horn's symmetric 4x4 matrix. This eigenvalue is the
+/// trace. Empty if two rotations are equally good: the points are collinear or coincide.
 [[nodiscard]] inline std::optional<best_rotation> find_best_rotation(const mat3& m, double relative_gap) {
   const double size = norm(m);
   if (!(size > 0.0) || !std::isfinite(size)) return std::nullopt;
@@ -40,7 +40,8 @@ struct best_rotation {
   const double a10 = s(1, 2) - s(2, 1), a20 = s(2, 0) - s(0, 2), a30 = s(0, 1) - s(1, 0);
   const double a21 = s(0, 1) + s(1, 0), a31 = s(2, 0) + s(0, 2), a32 = s(1, 2) + s(2, 1);
 
-  // The characteristic polynomial is x^4 - 2 |s|^2 x^2 - 8 det(s) x + det(a); by minors of pairs of rows.
+  // The characteristic polynomial is x^4 - 2 |s|^2 x^2 - 8 det(s) x + det(a); det(a) is computed from minors of pairs
+  // of rows.
   const auto minors = [](double p0, double p1, double p2, double p3, double q0, double q1, double q2, double q3) {
     return std::array{p0 * q1 - p1 * q0, p0 * q2 - p2 * q0, p0 * q3 - p3 * q0,
                       p1 * q2 - p2 * q1, p1 * q3 - p3 * q1, p2 * q3 - p3 * q2};
@@ -91,8 +92,8 @@ struct best_rotation {
                        eigen.values[3] * size};
 }
 
-/// The transform that best maps the first points of n pairs with these moments to the second ones; empty if they do not
-/// determine a rotation.
+/// Returns the transform that best maps the first points of n pairs with these moments to the second points; empty if
+/// the moments do not determine a rotation.
 [[nodiscard]] inline std::optional<sim3> transform_between(const pair_moments& moments, std::size_t n,
                                                            bool with_scale) {
   const double spread = std::sqrt(moments.from_spread) * std::sqrt(moments.to_spread);
@@ -108,7 +109,7 @@ struct best_rotation {
   return sim3(rotation, moments.to_mean - scale * (rotation * moments.from_mean), scale);
 }
 
-/// The transform between weighted pairs; empty if the points do not determine a rotation.
+/// Returns the transform between weighted pairs; empty if the points do not determine a rotation.
 template <class Pair>
 [[nodiscard]] std::optional<sim3> align_pairs(std::size_t n, const Pair& pair, bool with_scale) {
   return transform_between(compute_moments(n, pair), n, with_scale);

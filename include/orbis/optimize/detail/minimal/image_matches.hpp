@@ -18,7 +18,7 @@
 namespace orbis::optimize::detail {
 
 /// The point (x, y) of a pixel at z = 1, and the derivative of the pixel with respect to that point, made upper
-/// triangular by a rotation: it converts distances at z = 1 to pixels.
+/// triangular by a rotation, which converts distances at z = 1 to pixels.
 struct metric_ray {
   double x = 0.0, y = 0.0;
   double xx = 1.0, xy = 0.0, yy = 1.0;
@@ -51,7 +51,7 @@ struct image_match {
   std::uint32_t original = 0;
 };
 
-/// The usable matches, in an order that depends only on the seed.
+/// Returns the usable matches, in an order that depends only on the seed.
 template <camera::camera_model Camera>
 [[nodiscard]] std::vector<image_match> read_matches(std::span<const vec2> first, std::span<const vec2> second,
                                                     const Camera& camera, std::uint64_t seed) {

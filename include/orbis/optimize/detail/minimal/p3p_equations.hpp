@@ -3,13 +3,13 @@
 /// The equations of the perspective three-point problem.
 ///
 /// With unit rays `y_i` and depths `l_i` along them, the three distances between the points give `l^T M_ij l = a_ij`.
-/// Two homogeneous combinations of these are conics with up to four common points. Their pencil contains a degenerate
-/// conic, a pair of lines, given by one real root of a cubic. On each line a quadratic equation remains. Newton's
-/// method on the depths recovers the accuracy lost in these steps.
+/// Two homogeneous combinations of these equations are conics with up to four common points. Their pencil contains a
+/// degenerate conic, a pair of lines, given by a real root of a cubic. On each line, a quadratic equation remains.
+/// Newton's method on the depths recovers the accuracy lost in these steps.
 ///
-/// Sources: the problem is Grunert's of 1841; the conics are those of M. Persson, K. Nordberg, "Lambda Twist: an
-/// accurate fast robust perspective three point (P3P) solver", ECCV 2018; a degenerate conic is split into its lines by
-/// its adjugate as in J. Richter-Gebert, "Perspectives on Projective Geometry", 2011, section 11.1.
+/// Sources: J. A. Grunert, 1841, for the problem; M. Persson, K. Nordberg, "Lambda Twist: an accurate fast robust
+/// perspective three point (P3P) solver", ECCV 2018, for the conics; J. Richter-Gebert, "Perspectives on Projective
+/// Geometry", 2011, section 11.1, for the decomposition of a degenerate conic into lines by its adjugate.
 #pragma once
 
 #include <array>
@@ -21,15 +21,15 @@
 
 namespace orbis::optimize::detail {
 
-/// A real root of `c3 x^3 + c2 x^2 + c1 x + c0`; of three real roots the best separated one.
+/// Returns a real root of `c3 x^3 + c2 x^2 + c1 x + c0`; if there are three, the best separated one.
 /// @pre |c3| >= |c0|
 [[nodiscard]] inline double real_root_of_cubic(double c3, double c2, double c1, double c0) {
-  if (c3 == 0.0) return 0.0;  // then c0 is 0 as well
+  if (c3 == 0.0) return 0.0;  // then c0 is also 0
   const double a = c2 / c3, b = c1 / c3, c = c0 / c3;
   const double q = (a * a - 3.0 * b) / 9.0;
   const double r = (2.0 * a * a * a - 9.0 * a * b + 27.0 * c) / 54.0;
   double x;
-  if (r * r < q * q * q) {  // three real roots: take the outer one away from the other two
+  if (r * r < q * q * q) {  // three real roots: take the outer root that is farther from the middle one
     const double root_q = std::sqrt(q);
     const double cosine = std::fmin(1.0, std::fabs(r) / (q * root_q));
     x = -2.0 * std::copysign(root_q, r) * std::cos(std::acos(cosine) / 3.0) - a / 3.0;
@@ -60,14 +60,14 @@ struct conic {
   }
 };
 
-/// The trace of the product of two conics.
+/// Returns the trace of the product of two conics.
 [[nodiscard]] inline double contraction(const conic& a, const conic& b) noexcept {
   return a.xx * b.xx + a.yy * b.yy + a.zz * b.zz + 2.0 * (a.xy * b.xy + a.xz * b.xz + a.yz * b.yz);
 }
 
 /// Computes the two lines of a degenerate conic; returns false if they are complex.
 [[nodiscard]] inline bool split_conic(const conic& c, vec3& line, vec3& other) {
-  const conic adjugate = c.adjugate();  // -v v^T, v half the cross product of the lines
+  const conic adjugate = c.adjugate();  // -v v^T, where v is half the cross product of the lines
   vec3 v;
   double square;
   if (adjugate.xx <= adjugate.yy && adjugate.xx <= adjugate.zz) {
@@ -86,7 +86,7 @@ struct conic {
     return false;
   else
     v = zeros<vec3>();  // the same line twice
-  // C + [v]x is the outer product of the lines: each row is a multiple of one, each column of the other.
+  // C + [v]x is the outer product of the lines: each row is a multiple of one line, each column of the other.
   const double m[3][3] = {
       {c.xx, c.xy - v.z(), c.xz + v.y()}, {c.xy + v.z(), c.yy, c.yz - v.x()}, {c.xz - v.y(), c.yz + v.x(), c.zz}};
   std::size_t row = 0, column = 0;
@@ -113,13 +113,13 @@ inline void polish_depths(vec3& l, const std::array<double, 3>& cosines, const s
     const double r13 = l(0) * l(0) + l(2) * l(2) - 2.0 * b13 * l(0) * l(2) - a13;
     const double r23 = l(1) * l(1) + l(2) * l(2) - 2.0 * b23 * l(1) * l(2) - a23;
     if (std::fabs(r12) + std::fabs(r13) + std::fabs(r23) < small) return;
-    // Half of the derivative is [a b 0; c 0 d; 0 e f].
+    // Half the Jacobian is [a b 0; c 0 d; 0 e f].
     const double a = l(0) - b12 * l(1), b = l(1) - b12 * l(0), c = l(0) - b13 * l(2);
     const double d = l(2) - b13 * l(0), e = l(1) - b23 * l(2), f = l(2) - b23 * l(1);
     const double determinant = -a * d * e - b * c * f;
     const double length = squared_norm(l);
     if (determinant * determinant < 1e-28 * length * length * length)
-      return;  // a double root: no further improvement possible
+      return;  // a double root: no further improvement is possible
     const double scale = 0.5 / determinant;
     l(0) -= scale * (b * d * r23 - d * e * r12 - b * f * r13);
     l(1) -= scale * (a * f * r13 - c * f * r12 - a * d * r23);
@@ -158,7 +158,7 @@ void for_each_p3p(const std::array<vec3, 3>& points_world, const std::array<vec3
                    first.yy + g * second.yy, first.yz + g * second.yz, first.zz + g * second.zz};
   std::array<vec3, 2> lines;
   if (!split_conic(pair, lines[0], lines[1])) return;
-  // On the lines first = -g second; use the one that is not small.
+  // On the lines, first = -g second; use the conic that is not small.
   const conic& q = std::fabs(g) <= 1.0 ? second : first;
 
   // The inverse of [d12 d13 normal], by rows.
@@ -169,7 +169,7 @@ void for_each_p3p(const std::array<vec3, 3>& points_world, const std::array<vec3
   const double size = std::sqrt(extent);
 
   for (const vec3& n : lines) {
-    // Two vectors that span the line, by eliminating the coordinate of the largest coefficient.
+    // Find two vectors that span the line by eliminating the coordinate with the largest coefficient.
     const vec3 magnitude = magnitudes(n);
     vec3 u, v;
     if (magnitude.x() >= magnitude.y() && magnitude.x() >= magnitude.z()) {
@@ -182,7 +182,7 @@ void for_each_p3p(const std::array<vec3, 3>& points_world, const std::array<vec3
       u = vec3(1.0, 0.0, -n.x() / n.z());
       v = vec3(0.0, 1.0, -n.y() / n.z());
     }
-    // (cu u + cv v) on the conic: qa cu^2 + 2 qb cu cv + qc cv^2 = 0, in homogeneous coordinates.
+    // Points (cu u + cv v) on the conic satisfy qa cu^2 + 2 qb cu cv + qc cv^2 = 0, in homogeneous coordinates.
     const vec3 qu = q.times(u), qv = q.times(v);
     const double qa = dot(u, qu), qb = dot(u, qv), qc = dot(v, qv);
     const double discriminant = qb * qb - qa * qc;

@@ -27,20 +27,20 @@
 
 namespace orbis::optimize::detail {
 
-// The two loops of PnP over its matches: reprojection errors and normal equations. Every instruction set gives the same
+// The two loops of PnP over the matches: reprojection errors and normal equations. Every instruction set gives the same
 // bits.
 
-/// Squared errors of 32 matches. `columns` are the lists of coordinates, `stride` apart; `pose` is the rotation by
-/// rows, with the translation as a fourth column.
+/// Computes the squared errors of 32 matches. `columns` are the lists of coordinates, `stride` apart; `pose` is the
+/// rotation row by row, with the translation as a fourth column.
 using match_errors = void(const float* columns, std::size_t stride, const float* pose, float* out);
 
-/// The normal equations of four times `groups` matches: the lower triangle of H by rows (21 numbers), g (6) and the sum
-/// of squared errors, as four partial sums each.
+/// Computes the normal equations of `groups` groups of four matches: the lower triangle of H row by row (21 values), g
+/// (6) and the sum of squared errors, as four partial sums each.
 using match_equations = void(const double* columns, std::size_t stride, std::size_t groups, const double* pose,
                              double* out);
 inline constexpr int equation_sums = 28;
 
-/// Row `row` of the pose times the point.
+/// Returns the product of row `row` of the pose and the point.
 template <class V, class S>
 [[nodiscard]] ORBIS_ALWAYS_INLINE V moved(const S* row, const V& x, const V& y, const V& z) noexcept {
   return ((row[3] + row[0] * x) + row[1] * y) + row[2] * z;
@@ -112,7 +112,8 @@ struct match_kernels {
   match_equations* equations = simd::kernel<match_equations_kernel, match_equations>();
 };
 
-/// The normal equations of half the sum of squares for a motion on the left of the pose; `cost` is the sum of squares.
+/// The normal equations for a motion on the left of the pose, which minimise half the sum of squares; `cost` is the sum
+/// of squares.
 struct pose_equations {
   mat6 h;
   vec6 g;
@@ -126,14 +127,15 @@ template <class SumUp>
     so3 rotation;
     centred_pose pose;
   };
-  const so3 rotation(start.rotation);  // those of samples are orthonormal only to slightly more than rounding
+  // Rotations from samples are orthonormal only to slightly more than the rounding error.
+  const so3 rotation(start.rotation);
   const auto equations = [&](const state& s) {
     pose_equations e;
     sum_up(s.pose, e);
     return e;
   };
   const auto step = [](const state& s, const pose_equations& e) -> std::optional<state> {
-    // A very small damping keeps directions that the matches do not determine unchanged.
+    // A very small damping leaves the pose unchanged in directions that the matches do not determine.
     mat6 damped = e.h;
     change_diagonal(damped, 1.0 + 1e-9, 1e-12 * max_entry(diagonal(e.h)));
     small_cholesky<6> factors;
@@ -149,7 +151,7 @@ template <class SumUp>
   return found->pose;
 }
 
-/// P3P with reprojection errors in pixels.
+/// The RANSAC estimator for P3P, with reprojection errors in pixels.
 template <class Matches>
 class pnp_estimator {
  public:
@@ -159,7 +161,7 @@ class pnp_estimator {
   };
   static constexpr std::size_t sample_size = 3;
 
-  /// Up to four models.
+  /// Up to four candidate models.
   struct candidates {
     std::array<model, 4> models;
     std::size_t size = 0;
@@ -219,7 +221,8 @@ class pnp_estimator {
   }
 
  private:
-  /// Copies the given matches contiguously and pads with matches of zero weight; returns the number of groups of four.
+  /// Copies the given matches to contiguous memory, padded with matches of zero weight; returns the number of groups of
+  /// four.
   [[nodiscard]] std::size_t gather(std::span<const std::uint32_t> inliers) const {
     const std::size_t groups = (inliers.size() + 3) / 4;
     auto& g = matches_.gathered;
@@ -256,12 +259,12 @@ class pnp_estimator {
   match_kernels kernels_{};
 };
 
-/// The reason why the points determine no pose; empty if they determine one.
+/// Returns the reason why the points do not determine a pose; empty if they do.
 [[nodiscard]] inline std::string pnp_degeneracy(const pnp_matches& matches) {
   mat3 covariance = zeros<mat3>();
   for (const vec3& p : matches.points) covariance += p * transposed(p);
   const vec3 spread = eigen_of_symmetric<3>(covariance).values;
-  // Relative to the rounding of the points about the world origin.
+  // Relative to the rounding error of the points, which depends on their distance from the world origin.
   const double rounding = 1e-30 * squared_norm(matches.centre) * static_cast<double>(matches.size());
   if (!(spread[2] > rounding)) return "all points coincide";
   if (!(spread[1] > 1e-12 * spread[2])) return "all points are collinear";

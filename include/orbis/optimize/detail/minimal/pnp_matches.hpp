@@ -4,8 +4,8 @@
 ///
 /// A pixel is stored as the point (x, y) of its ray at z = 1, and the derivative of the pixel with respect to that
 /// point, made upper triangular by a rotation. The error in pixels is this matrix times the difference at z = 1: exact
-/// without distortion, and correct to first order with it, which suffices to rank poses. The loops over the matches
-/// thus do not depend on the camera's type.
+/// without distortion, and correct to first order with distortion, which is sufficient to rank poses. The loops over
+/// the matches are therefore independent of the camera type.
 #pragma once
 
 #include <cmath>
@@ -21,22 +21,22 @@
 
 namespace orbis::optimize::detail {
 
-/// Transform from the world, relative to the centre of the points, to the camera.
+/// The transform from the world frame, relative to the centre of the points, to the camera frame.
 struct centred_pose {
   mat3 rotation = identity<mat3>();
   vec3 translation = zeros<vec3>();
 };
 
-/// Number of coordinates of a match, each in a separate list: X Y Z, x y, and the three entries of the derivative.
+/// Number of coordinates of a match, each in a separate list: X, Y, Z, x, y and the three entries of the derivative.
 inline constexpr std::size_t match_coordinates = 8;
 
-/// The usable matches of two lists, in an order that depends only on the seed.
+/// The usable matches between two lists, in an order that depends only on the seed.
 struct pnp_matches {
   std::vector<std::uint32_t> original;  ///< index of the match in the caller's lists
-  std::vector<vec3> points;             ///< relative to the centre
+  std::vector<vec3> points;             ///< points relative to their centre
   std::vector<vec3> rays;               ///< unit vectors
   std::vector<double> columns;          ///< eight lists, `stride` apart
-  std::vector<float> float_columns;     ///< the same as float
+  std::vector<float> float_columns;     ///< the same values as float
   std::vector<double> gathered;         ///< the matches of one refinement
   std::size_t stride = 0;               ///< size, rounded up to whole blocks
   vec3 centre = zeros<vec3>();
@@ -66,7 +66,7 @@ struct pnp_matches {
       matrix<2, 3> by_point;
       const auto ray = camera.unproject(pixels[i]);
       if (!ray || !camera.project(*ray, by_point)) continue;
-      // R of the QR decomposition of the derivative with respect to x and y.
+      // Compute R of the QR decomposition of the derivative with respect to x and y.
       const double length = std::hypot(by_point(0, 0), by_point(1, 0));
       const double along = (by_point(0, 0) * by_point(0, 1) + by_point(1, 0) * by_point(1, 1)) / length;
       const double across = (by_point(0, 0) * by_point(1, 1) - by_point(1, 0) * by_point(0, 1)) / length;

@@ -22,7 +22,8 @@
 
 namespace orbis::optimize::detail {
 
-/// The squared distance of a transferred ray from the observed one, in units of the metric; infinite behind the camera.
+/// Returns the squared distance of a transferred ray from the observed one, in units of the metric; infinite behind the
+/// camera.
 [[nodiscard]] inline double squared_transfer(const vec3& p, const metric_ray& seen) {
   if (!(p.z() > 0.0)) return std::numeric_limits<double>::infinity();
   const double dx = p.x() / p.z() - seen.x, dy = p.y() / p.z() - seen.y;
@@ -33,7 +34,7 @@ namespace orbis::optimize::detail {
 class ray_homography_estimator {
  public:
   struct model {
-    mat3 forward, backward;  ///< both with positive z for rays that the homography transfers to the front
+    mat3 forward, backward;  ///< both give positive z for rays that are transferred to the front of the camera
   };
   static constexpr std::size_t sample_size = 4;
 
@@ -53,7 +54,7 @@ class ray_homography_estimator {
     return {make_model(*h, matches_[s[0]].first.direction())};
   }
 
-  /// The mean of the errors of both transfers.
+  /// Returns the mean of the errors of both transfers.
   [[nodiscard]] double squared_error(const model& m, std::size_t i) const {
     const image_match& x = matches_[i];
     return 0.5 * (squared_transfer(m.forward * x.first.direction(), x.second) +
@@ -78,7 +79,7 @@ class ray_homography_estimator {
   }
 
  private:
-  /// A model from a homography; empty if it is singular.
+  /// Creates a model from a homography; empty if the homography is singular.
   [[nodiscard]] static std::optional<model> make_model(const mat3& h, const vec3& in_front) {
     model m{h / norm(h), inverse(h)};
     if ((m.forward * in_front).z() < 0.0) m.forward = -m.forward;

@@ -10,8 +10,8 @@
 
 namespace orbis::optimize::detail {
 
-/// The root of a polynomial between `low` and `high`, where it has different signs: Newton's method, with bisection if
-/// a step would leave the interval. `c[i]` is the coefficient of x^i.
+/// Returns the root of a polynomial between `low` and `high`, where it has opposite signs: Newton's method, with
+/// bisection if a step would leave the interval. `c[i]` is the coefficient of x^i.
 [[nodiscard]] inline double bracketed_root(const double* c, std::size_t degree, double low, double high,
                                            double at_low) {
   double x = 0.5 * (low + high);
@@ -31,12 +31,12 @@ namespace orbis::optimize::detail {
   return x;
 }
 
-/// Computes the roots of a polynomial within [-1, 1], ascending; returns their number. Between two roots of its
-/// derivative a polynomial has at most one root. A root of even multiplicity is reported once, and a nearby root may be
-/// reported as well.
+/// Computes the roots of a polynomial within [-1, 1], ascending; returns their number. Between two adjacent roots of
+/// its derivative, a polynomial has at most one root. A root of even multiplicity is reported once, and a nearby root
+/// may be reported as well.
 template <std::size_t Degree>
 std::size_t roots_in_unit_interval(const std::array<double, Degree + 1>& c, std::array<double, Degree>& roots) {
-  // The coefficients of all derivatives, starting with the linear one, each divided by a factorial.
+  // The coefficients of all derivatives, starting with the linear one, each scaled by a power of 1 / Degree.
   std::array<std::array<double, Degree + 1>, Degree + 1> derivatives{};
   derivatives[Degree] = c;
   for (std::size_t d = Degree; d > 1; --d)
@@ -62,7 +62,7 @@ std::size_t roots_in_unit_interval(const std::array<double, Degree + 1>& c, std:
       else if ((at_low < 0.0) != (at_high < 0.0) && at_low != 0.0 && at_high != 0.0)
         found[number++] = bracketed_root(p.data(), d, low, high, at_low);
       else if (d == Degree && i != 0 && number < d && (number == 0 || found[number - 1] != low)) {
-        // An extremum close to zero: a double root up to rounding.
+        // An extremum close to zero is a double root up to rounding.
         double size = 0.0;
         for (std::size_t k = d + 1; k-- != 0;) size = size * std::fabs(low) + std::fabs(p[k]);
         if (std::fabs(at_low) < 1e-11 * size) found[number++] = low;

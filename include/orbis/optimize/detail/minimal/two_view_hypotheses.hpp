@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Hypotheses for the motion between two views: their support among the matches, and the choice between them.
+/// Hypotheses for the motion between two views, and their support among the matches.
 ///
-/// Distances are in units of the matches' metric, their standard deviation.
+/// Distances are in units of the metric of the matches, which is their standard deviation.
 #pragma once
 
 #include <algorithm>
@@ -30,19 +30,19 @@
 
 namespace orbis::optimize::detail {
 
-/// Chi-squared, 95 %, for distances from a line and from a point.
+/// 95 % quantiles of chi-squared, for distances from a line and from a point.
 inline constexpr double line_gate = 3.841, point_gate = 5.991;
 
 [[nodiscard]] inline double square(double x) { return x * x; }
 
-/// The weight of Geman and McClure's loss, in units of its scale.
+/// Returns the weight of the Geman-McClure loss; the argument is in units of its squared scale.
 [[nodiscard]] inline double geman_mcclure_weight(double squared) {
   const double w = 1.0 / (1.0 + squared);
   return w * w;
 }
 
-/// The camera rotation with the largest support among the matches, by weights that decrease with the distance at
-/// successively smaller scales. The identity if there is none.
+/// Returns the camera rotation with the largest support among the matches, estimated with weights that decrease with
+/// the distance, at successively smaller scales. Returns the identity if there is none.
 [[nodiscard]] inline so3 dominant_rotation(const std::vector<image_match>& matches) {
   so3 rotation;
   for (const double scale : {100.0, 50.0, 25.0, 12.0, 6.0, 4.0, 3.0, 3.0, 3.0}) {
@@ -60,7 +60,8 @@ inline constexpr double line_gate = 3.841, point_gate = 5.991;
   return rotation;
 }
 
-/// Minimises Sampson distances by Gauss-Newton with weights that decrease with the distance, at successive scales.
+/// Minimises Sampson distances by Gauss-Newton with weights that decrease with the distance, at successively smaller
+/// scales.
 [[nodiscard]] inline std::optional<epipolar_motion> refined_motion(const std::vector<image_match>& matches,
                                                                    epipolar_motion motion,
                                                                    std::span<const double> scales,
@@ -88,22 +89,22 @@ inline constexpr double line_gate = 3.841, point_gate = 5.991;
 /// Agreement of a match with a motion.
 enum class agreement : std::uint8_t {
   none,    ///< does not agree
-  far,     ///< agrees, at a distance indistinguishable from infinity
-  near,    ///< agrees, in front of both cameras
+  far,     ///< agrees, with a point at a distance indistinguishable from infinity
+  near,    ///< agrees, with a point in front of both cameras
   behind,  ///< rays coplanar with the translation, but not intersecting in front of both cameras
 };
 
-/// Support of a motion. `score`: sum of the gate minus the squared distance over the matches that agree.
+/// Support of a motion. `score`: sum over the agreeing matches of the gate minus the squared distance.
 struct motion_support {
   double score = 0.0;
   std::size_t far = 0, near = 0, behind = 0;
   [[nodiscard]] std::size_t inliers() const noexcept { return far + near; }
 };
 
-/// Minimum parallax, in standard deviations, that distinguishes a point from one at infinity.
+/// Minimum parallax, in standard deviations, that distinguishes a point from a point at infinity.
 inline constexpr double least_disparity = 4.0;
 
-/// The squared distance between the observed position of a ray and its position at infinite depth.
+/// Returns the squared distance between the observed position of a ray and its position at infinite depth.
 [[nodiscard]] inline double squared_disparity(const mat3& rotation, const image_match& m) {
   return squared_transfer(rotation * m.first.direction(), m.second);
 }
@@ -119,7 +120,7 @@ inline constexpr double least_disparity = 4.0;
   return dot(cross(v, t), normal) > 0.0 && dot(cross(u, t), normal) > 0.0 ? agreement::near : agreement::behind;
 }
 
-/// Contribution of a match to the score of a motion.
+/// Returns the contribution of a match to the score of a motion.
 [[nodiscard]] inline double score_match(const mat3& rotation, const epipolar_motion& motion, const image_match& m) {
   double squared = 0.0;
   const agreement a = classify_match(rotation, motion.direction, motion.e, m, squared);
@@ -143,8 +144,8 @@ inline constexpr double least_disparity = 4.0;
   return sum;
 }
 
-/// The scores of a homography and of an essential matrix: the sum over both images of the gate of a point minus the
-/// squared distance, for distances within the model's own gate.
+/// The scores of a homography and of an essential matrix: the sum, over matches and both images, of the gate for a
+/// point minus the squared distance, for distances within the model's own gate.
 /// Source: R. Mur-Artal, J. M. M. Montiel, J. D. Tardos, "ORB-SLAM", T-RO 31 (2015), equations 1 and 2.
 struct model_scores {
   double homography = 0.0, essential = 0.0;
@@ -166,7 +167,8 @@ struct model_scores {
   return sum;
 }
 
-/// Evenly distributed directions on a hemisphere (Fibonacci lattice); the other half has the same essential matrices.
+/// Returns evenly distributed directions on a hemisphere (Fibonacci lattice); the other hemisphere gives the same
+/// essential matrices.
 template <std::size_t N>
 [[nodiscard]] std::array<vec3, N> hemisphere() {
   std::array<vec3, N> out;

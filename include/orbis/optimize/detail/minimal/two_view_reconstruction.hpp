@@ -40,7 +40,7 @@ class two_view_search {
 
   explicit two_view_search(const std::vector<Match>& matches) : matches_{matches} {}
 
-  /// Refines a motion and adds all four motions of its essential matrix.
+  /// Refines a motion and adds all four motions of the resulting essential matrix.
   void add(const epipolar_motion& start) {
     constexpr std::array scales{3.0, 3.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0};
     const auto refined = refined_motion(matches_, start, scales);
@@ -50,8 +50,8 @@ class two_view_search {
       all_.push_back({m, measure_support(matches_, m)});
     }
   }
-  /// Returns true if one motion of a plane explains the plane's matches clearly better than `best`, i.e. if `best`
-  /// mixes the plane with another moving object.
+  /// Returns true if one of the plane's possible motions explains the plane's matches clearly better than `best`, i.e.
+  /// if `best` is a mixture of the motion of the plane and that of another object.
   [[nodiscard]] static bool contradicts(const std::vector<Match>& plane, const std::vector<epipolar_motion>& motions,
                                         const epipolar_motion& best) {
     constexpr std::array scales{3.0, 2.0, 2.0, 2.0, 2.0, 2.0};
@@ -66,7 +66,7 @@ class two_view_search {
       return refined && score(refined->e) > enough;
     });
   }
-  /// Searches for additional motions, starting from directions of translation over the whole sphere, each with the best
+  /// Searches for additional motions, starting from translation directions over the whole sphere, each with the best
   /// rotation.
   void add_sampled_motions(const so3& turn) {
     constexpr std::array scales{20.0, 20.0, 10.0, 10.0, 5.0, 5.0};
@@ -77,16 +77,16 @@ class two_view_search {
         add(*rough);
   }
 
-  /// The motion with the highest score; null if there is none.
+  /// Returns the motion with the highest score; null if there is none.
   [[nodiscard]] const hypothesis* best() const {
     const auto found = std::max_element(all_.begin(), all_.end(), [](const hypothesis& a, const hypothesis& b) {
       return a.support.score < b.support.score;
     });
     return found == all_.end() ? nullptr : &*found;
   }
-  /// Returns true if a motion different from `best` explains the matches about equally well: the test of two models
-  /// that may both be wrong. It sums the log-likelihood ratios of the matches in favour of `best`, and divides by the
-  /// standard deviation of the sum.
+  /// Returns true if a motion different from `best` explains the matches about equally well: a test between two models
+  /// that may both be wrong. The test statistic is the sum of the matches' log-likelihood ratios in favour of `best`,
+  /// divided by the standard deviation of the sum.
   /// Source: Q. Vuong, "Likelihood ratio tests for model selection and non-nested hypotheses", Econometrica 57 (1989).
   [[nodiscard]] bool has_rival(const hypothesis& best) const {
     const mat3 rotation = best.motion.rotation.rotation_matrix();
@@ -99,7 +99,7 @@ class two_view_search {
         sum += more;
         squares += more * more;
       }
-      constexpr double least = 50.0, deviations = 4.5;  // scores are twice a logarithm
+      constexpr double least = 50.0, deviations = 4.5;  // scores are twice a log-likelihood
       return !(sum >= least && sum >= deviations * std::sqrt(squares));
     });
   }
@@ -107,7 +107,7 @@ class two_view_search {
  private:
   /// Returns true if two refined motions are equal within tolerance.
   [[nodiscard]] static bool same(const epipolar_motion& a, const epipolar_motion& b) {
-    constexpr double turned = 0.02, apart = 0.1;  // radians; tolerances of rotation and direction
+    constexpr double turned = 0.02, apart = 0.1;  // tolerances of rotation and direction, radians
     return (a.rotation.inverse() * b.rotation).angle() < turned &&
            angle_between_directions(a.direction, b.direction) < apart;
   }
@@ -126,7 +126,7 @@ class two_view_search {
 template <class Match>
 struct two_view_inliers {
   std::vector<const Match*> all, near;
-  double rms = 0.0;    ///< Sampson distance
+  double rms = 0.0;    ///< root mean square Sampson distance
   double sigma = 0.0;  ///< standard deviation of a match
   double rotation_deviation = 0.0, direction_deviation = 0.0;
 
@@ -145,15 +145,15 @@ struct two_view_inliers {
     rotation_deviation = direction_deviation = std::numeric_limits<double>::infinity();
     if (all.empty()) return;
     rms = std::sqrt(rms / static_cast<double>(all.size()));
-    // Does not trust residuals far below the given standard deviation.
+    // Residuals far below the given standard deviation are not trusted.
     sigma = std::max(0.5, 1.4826 * std::sqrt(median(squares)));
     estimate_deviations(motion);
   }
 
  private:
   /// Uses the larger of two estimates: one from the noise of matches with independent errors, and one from the change
-  /// of the motion when the matches of a part of the image are left out (delete-a-group jackknife). The latter covers
-  /// correlated errors: those of neighbours, of moving objects, and of the rows of a rolling shutter.
+  /// of the motion when the matches in a part of the image are left out (delete-a-group jackknife). The latter covers
+  /// correlated errors: those of neighbouring matches, of moving objects, and of the rows of a rolling shutter.
   void estimate_deviations(const epipolar_motion& motion) {
     constexpr std::size_t side = 3, parts = side * side;
     std::vector<const Match*> order = all;
@@ -201,7 +201,7 @@ struct two_view_inliers {
   }
 
  public:
-  /// The median of some values. @pre not empty
+  /// Returns the median; changes the order of the values. @pre !values.empty()
   [[nodiscard]] static double median(std::vector<double>& values) {
     const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
     std::nth_element(values.begin(), middle, values.end());
@@ -222,7 +222,7 @@ result<two_view_reconstruction> reconstruction_of_matches(const std::vector<Matc
     return fail(errc::no_data, where,
                 "only " + of(usable, n) + " matches are usable; " + std::to_string(least) + " are needed");
 
-  // The cheapest case first: pure rotation.
+  // Test the cheapest case first: pure rotation.
   const so3 turn = dominant_rotation(matches);
   const mat3 turned = turn.rotation_matrix();
   const auto is_still = [&](const Match& m, double sigma) {
@@ -248,7 +248,7 @@ result<two_view_reconstruction> reconstruction_of_matches(const std::vector<Matc
   of_planes.model_cost = 200.0;
   const auto plane = ransac(ray_homography_estimator(matches), of_planes);
 
-  // The motions of both models: those of the model with the lower score are also rivals.
+  // Add the motions of both models: those of the model with the lower score are also rivals.
   two_view_search<Match> search(matches);
   const se3 first_of_four = decompose_essential(essential->model)[0];
   search.add({first_of_four.rotation(), first_of_four.translation()});
@@ -267,7 +267,7 @@ result<two_view_reconstruction> reconstruction_of_matches(const std::vector<Matc
     for (const std::uint32_t i : plane->inliers) of_plane.push_back(matches[i]);
   }
   const auto* best = search.best();
-  if (best == nullptr) return refuse("no motion can be refined");
+  if (best == nullptr) return refuse("no motion could be refined");
   constexpr const char* two = "two motions explain the matches about equally well";
   if (search.has_rival(*best)) return refuse(two);
 
@@ -306,14 +306,14 @@ result<two_view_reconstruction> reconstruction_of_matches(const std::vector<Matc
   }
   two_view_reconstruction out;
   out.parallax = two_view_inliers<Match>::median(angles);
-  if (!(out.parallax >= options.min_parallax)) return refuse("too little parallax between the rays of a point");
+  if (!(out.parallax >= options.min_parallax)) return refuse("the median parallax is too small");
 
   // Only a motion that would be accepted is compared with all others.
   const double score = best->support.score;
   search.add_sampled_motions(turn);
   best = search.best();
   if (best->support.score > 1.02 * score || search.has_rival(*best)) return refuse(two);
-  constexpr const char* shared = "two motions share the matches";
+  constexpr const char* shared = "the matches belong to two different motions";
   if (5 * of_plane.size() > 2 * inliers.all.size() &&
       two_view_search<Match>::contradicts(of_plane, plane_motions, motion))
     return refuse(shared);

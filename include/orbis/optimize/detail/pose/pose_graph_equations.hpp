@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The normal equations of a pose graph: linearisation, factorisation, solution.
+/// The normal equations of a pose graph: linearisation, factorisation, and solution.
 #pragma once
 
 #include <cstddef>
@@ -31,7 +31,7 @@ class pose_graph_equations {
   [[nodiscard]] const Eigen::VectorXd& gradient() const { return gradient_; }
   [[nodiscard]] const Eigen::VectorXd& diagonal() const { return diagonal_; }
 
-  /// Initialises with these vertices. Analyses the graph if it differs from that of the last call.
+  /// Initialises with these vertices. Analyses the graph if it differs from that of the previous call.
   template <class Edges>
   [[nodiscard]] pose_graph_finding begin(std::span<const T> vertices, const Edges& edges,
                                          const pose_graph_options& options) {
@@ -65,7 +65,7 @@ class pose_graph_equations {
     });
   }
 
-  /// `x^T H x`.
+  /// Returns `x^T H x`.
   [[nodiscard]] double curvature(const Eigen::VectorXd& x) const {
     const auto part = [&](std::size_t u) { return segment<size>(x, static_cast<Eigen::Index>(size * u)); };
     double sum = 0.0;
@@ -75,11 +75,11 @@ class pose_graph_equations {
     return sum;
   }
 
-  /// Factorises `H + diag(damping)`; an empty `damping` is 0. Returns false if it is not positive definite.
+  /// Factorises `H + diag(damping)`; an empty `damping` means 0. Returns false if the matrix is not positive definite.
   [[nodiscard]] bool factor(const Eigen::VectorXd& damping) {
     return cholesky_.factor(on_diagonal_, off_diagonal_, {damping.data(), static_cast<std::size_t>(damping.size())});
   }
-  /// The undetermined vertex after `factor` has returned false.
+  /// The undetermined vertex, after `factor` has returned false.
   [[nodiscard]] std::uint32_t failed_vertex() const { return structure_.vertices[cholesky_.failed_block()]; }
   /// Replaces a right-hand side by the solution.
   void solve(Eigen::VectorXd& x) { cholesky_.solve({x.data(), static_cast<std::size_t>(x.size())}); }
@@ -112,7 +112,7 @@ class pose_graph_equations {
 
  private:
   static constexpr int size = T::dof;
-  static constexpr std::size_t grain = 256;  ///< of loops over bundles and vertices
+  static constexpr std::size_t grain = 256;  ///< grain size of loops over bundles and vertices
   using block = matrix<size, size>;
   using vector = matrix<size>;
 
@@ -153,7 +153,7 @@ class pose_graph_equations {
     return cost;
   }
 
-  /// Sums the contributions of the bundles at an unknown.
+  /// Sums the contributions of all bundles at an unknown.
   void gather(std::size_t u) {
     block hessian = zeros<block>();
     vector gradient = zeros<vector>();
@@ -183,10 +183,10 @@ class pose_graph_equations {
   block_cholesky<size> cholesky_;
   std::vector<T> estimate_, tried_;
   double cost_ = 0.0, tried_cost_ = 0.0;
-  std::vector<contribution> contributions_;  // of each bundle
+  std::vector<contribution> contributions_;  // contribution of each bundle
   std::vector<double> chunk_costs_;          // summed in order, so that every policy gives the same result
-  std::vector<block> on_diagonal_;           // the normal equations
-  std::vector<block> off_diagonal_;          // of the bundles between two unknowns
+  std::vector<block> on_diagonal_;           // diagonal blocks of the normal equations
+  std::vector<block> off_diagonal_;          // blocks of the bundles between two unknowns
   Eigen::VectorXd gradient_, diagonal_;
 };
 

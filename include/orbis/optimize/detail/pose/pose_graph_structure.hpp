@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Validation of pose graphs, and the structure of their normal equations: the vertices and edges that share blocks.
+/// Validation of pose graphs, and the structure of their normal equations: which vertices and edges share blocks.
 #pragma once
 
 #include <algorithm>
@@ -21,12 +21,12 @@ namespace orbis::optimize::detail {
 
 /// The result of a check.
 struct pose_graph_finding {
-  pose_graph_status status = pose_graph_status::converged;  ///< no failure
+  pose_graph_status status = pose_graph_status::converged;  ///< `converged` means no failure
   std::size_t where = 0;
 };
 
-/// Returns true if a matrix is symmetric and positive definite, independent of the units of its rows; optionally
-/// accepts semidefinite ones.
+/// Returns true if a matrix is symmetric and positive definite, independent of the units of its rows; optionally also
+/// accepts semidefinite matrices.
 template <int N>
 [[nodiscard]] bool is_information(const matrix<N, N>& given, bool semidefinite) {
   if (!all_finite(given)) return false;
@@ -75,23 +75,24 @@ template <int Dimension, class T, class Edges>
 
 /// All edges between the same two vertices, at least one of which is movable.
 struct edge_bundle {
-  std::uint32_t from = 0, to = 0;      ///< vertices, in the direction of the bundle's first edge
-  std::uint32_t begin = 0, count = 0;  ///< into `pose_graph_structure::bundled`
+  std::uint32_t from = 0, to = 0;      ///< the vertices, in the direction of the bundle's first edge
+  std::uint32_t begin = 0, count = 0;  ///< range in `pose_graph_structure::bundled`
 };
 
-/// The unknowns and blocks of a graph. Reused while the edges connect the same vertices.
+/// The unknowns and blocks of a graph. Reused as long as the edges connect the same vertices.
 class pose_graph_structure {
  public:
   static constexpr std::uint32_t held = std::numeric_limits<std::uint32_t>::max();
 
-  std::vector<std::uint32_t> unknown;               ///< of each vertex: its number among the movable ones, or `held`
-  std::vector<std::uint32_t> vertices;              ///< of each unknown
-  std::vector<edge_bundle> bundles;                 ///< those between two unknowns first
-  std::vector<std::uint32_t> bundled;               ///< edges by bundle, in their order
-  std::vector<block_place> places;                  ///< of the bundles between two unknowns, in their order
-  std::vector<std::uint32_t> first_touch, touches;  ///< by unknown: 2 * bundle + (1 at the bundle's `to`)
+  std::vector<std::uint32_t> unknown;               ///< for each vertex: its index among the movable ones, or `held`
+  std::vector<std::uint32_t> vertices;              ///< the vertex of each unknown
+  std::vector<edge_bundle> bundles;                 ///< bundles between two unknowns come first
+  std::vector<std::uint32_t> bundled;               ///< indices of the edges, ordered by bundle
+  std::vector<block_place> places;                  ///< of the bundles between two unknowns, in the order of `bundles`
+  std::vector<std::uint32_t> first_touch, touches;  ///< for each unknown: 2 * bundle, plus 1 at the bundle's `to`
 
-  /// Determines the unknowns, and the blocks if the graph differs from that of the last call (then `changed` is true).
+  /// Determines the unknowns and, if the graph differs from that of the previous call, the blocks (`changed` is then
+  /// true).
   /// @pre the edges refer to existing vertices
   template <class Edges>
   [[nodiscard]] pose_graph_finding update(std::size_t vertex_count, const Edges& edges,

@@ -23,17 +23,17 @@ namespace orbis::optimize::detail {
 struct alignas(64) pose_lanes {
   static constexpr std::size_t capacity = 1024;
   using row = std::array<double, capacity>;
-  row x, y, z;       ///< the point
-  row u, v, right;   ///< its pixel
-  row depth_weight;  ///< 0 where the depth is unknown
+  row x, y, z;       ///< coordinates of the point
+  row u, v, right;   ///< pixel and right coordinate of the observation
+  row depth_weight;  ///< 0 if the depth is unknown
   row information;   ///< 0 for unusable observations
-  row active;        ///< the information of the inliers, 0 for outliers
+  row active;        ///< information of inliers, 0 for outliers
 };
 
 /// The normal equations of a pose `T_camera_world` with steps on the left, `exp(xi) * T`.
 struct pose_sums {
-  /// H: the lower triangle for the translation, by rows; the block of translation and rotation; the lower triangle for
-  /// the rotation.
+  /// H: the lower triangle for the translation, row by row; the block for translation and rotation; the lower triangle
+  /// for the rotation.
   std::array<double, 6> translation{};
   std::array<double, 9> corner{};
   std::array<double, 6> rotation{};
@@ -78,8 +78,8 @@ ORBIS_ALWAYS_INLINE void see(const pose_lanes& in, std::size_t i, const L& infor
   b.projection.valid = b.projection.valid & (b.chi2 <= L(std::numeric_limits<double>::max()));
 }
 
-/// Computes the equations of the first `count` observations, a multiple of eight. A point without a projection costs as
-/// much as one at the gate, so that losing points never makes a step cheaper.
+/// Computes the equations of the first `count` observations, a multiple of eight. A point without a projection has the
+/// cost of a point at the gate, so that losing points never reduces the cost of a step.
 template <simd::target Target, class Camera>
 ORBIS_ALWAYS_INLINE void sum_pose(const pose_lanes& in, std::size_t count, const Camera& camera, const pose_at& at,
                                   const huber& loss, pose_sums& out) {
@@ -102,7 +102,7 @@ ORBIS_ALWAYS_INLINE void sum_pose(const pose_lanes& in, std::size_t count, const
     total = total + select(valid, cost, select(active, lost, L(0.0)));
     weight = weight * information;
 
-    // M = w J^T J and v = w J^T r for steps of the point; then applies the chain rule for a step of the pose.
+    // Compute M = w J^T J and v = w J^T r for a step of the point, then apply the chain rule for a step of the pose.
     const auto& j = b.projection.j;
     const L j20 = b.depth_weight * j[0][0];
     const L j22 = b.depth_weight * (j[0][2] + at.bf * b.inverse_z * b.inverse_z);
@@ -144,7 +144,7 @@ ORBIS_ALWAYS_INLINE void sum_pose(const pose_lanes& in, std::size_t count, const
     t3 = t3 + m02;
     t4 = t4 + m12;
     t5 = t5 + m22;
-    // Rows of the corner: p x (row of M). The rotation's block: p x (column of the corner).
+    // Rows of the mixed block: p x (row of M). Rotation block: p x (column of the mixed block).
     const L n00 = y * m02, n10 = y * m12, n20 = y * m22;
     L a00 = n00, a02(0.0), a10 = n10, a12 = x * m11, a11, a01;
     if constexpr (aligned) {
@@ -191,8 +191,8 @@ ORBIS_ALWAYS_INLINE void sum_pose(const pose_lanes& in, std::size_t count, const
   out.cost = 0.5 * sum(total);
 }
 
-/// Computes the chi-squared errors of the first `count` observations, including outliers; infinite without a projection
-/// or without information.
+/// Computes the chi-squared errors of the first `count` observations, including outliers; infinite for points without a
+/// projection or without information.
 template <simd::target Target, class Camera>
 ORBIS_ALWAYS_INLINE void judge_pose(const pose_lanes& in, std::size_t count, const Camera& camera, const pose_at& at,
                                     double* chi2) {

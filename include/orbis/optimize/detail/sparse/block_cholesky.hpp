@@ -23,7 +23,7 @@
 
 namespace orbis::optimize::detail {
 
-/// Analyses the structure once; factorising and solving for any values then allocates nothing. Every processor gives
+/// Analyses the structure once; factorisation and solution for any values then allocate nothing. Every processor gives
 /// the same bits. Not thread-safe.
 template <int B>
 requires(B >= 1) class block_cholesky {
@@ -31,19 +31,19 @@ requires(B >= 1) class block_cholesky {
   using block = matrix<B, B>;
 
   /// Analyses matrices of `size` blocks per side with blocks on the diagonal and at `places`.
-  /// @pre every place is below `size` and off the diagonal, and no place is repeated
+  /// @pre every place has indices less than `size` and is off the diagonal, and no place is repeated
   void analyze(std::size_t size, std::span<const block_place> places);
 
   [[nodiscard]] const block_symbolic& symbolic() const { return symbolic_; }
 
   /// Factorises the matrix with `diagonal[i]` at (i, i), `damping` added to its diagonal, and `off_diagonal[k]` at
   /// `places[k]`. Returns false if the matrix is not positive definite: a pivot is not above `tolerance` times the
-  /// entry of the matrix, or not finite; see `failed_block`.
+  /// diagonal entry of the matrix, or not finite; see `failed_block`.
   /// @pre sizes as analysed; `damping` empty or one per row
   [[nodiscard]] bool factor(std::span<const block> diagonal, std::span<const block> off_diagonal,
                             std::span<const double> damping = {}, double tolerance = 1e-14);
 
-  /// The block whose pivot was not positive after `factor` has returned false.
+  /// The block whose pivot was not positive, after `factor` has returned false.
   [[nodiscard]] std::uint32_t failed_block() const { return failed_block_; }
 
   /// Solves in place: replaces the right-hand side in `x` by the solution. @pre the last `factor` returned true
@@ -54,7 +54,7 @@ requires(B >= 1) class block_cholesky {
 
   struct panel {
     std::size_t begin = 0;
-    std::size_t stride = 0;  ///< between columns
+    std::size_t stride = 0;  ///< distance between columns
   };
   /// Storage position of a block off the diagonal.
   struct target {
@@ -65,7 +65,7 @@ requires(B >= 1) class block_cholesky {
   [[nodiscard]] static std::ptrdiff_t offset(std::size_t k) { return static_cast<std::ptrdiff_t>(width * k); }
   [[nodiscard]] double* panel_data(std::size_t s) { return values_.data() + panels_[s].begin; }
 
-  /// The index in `values_` of block (row, column) of the factor, in the order of elimination.
+  /// Returns the index in `values_` of block (row, column) of the factor, in the order of elimination.
   [[nodiscard]] std::size_t at(std::uint32_t row, std::uint32_t column) const {
     const std::uint32_t s = symbolic_.supernode_of[column];
     const supernode& node = symbolic_.supernodes[s];
@@ -100,7 +100,7 @@ requires(B >= 1) class block_cholesky {
     for (std::size_t c = 0; c != width; ++c) std::copy_n(from.data() + width * c, width, to + c * stride);
   }
 
-  /// Finds for each row of the factor its block row in the panel of `s`.
+  /// Finds, for each row of the factor, its block row in the panel of `s`.
   void find_places(std::size_t s) {
     const supernode& node = symbolic_.supernodes[s];
     for (std::uint32_t c = 0; c != node.columns; ++c) place_of_row_[node.first + c] = c;
@@ -124,7 +124,7 @@ requires(B >= 1) class block_cholesky {
     }
   }
 
-  /// `to -= from`, N columns of `height` rows.
+  /// Computes `to -= from` for N columns of `height` rows.
   void subtract(const double* from, std::size_t height, double* to, std::size_t stride) const {
     for (std::size_t c = 0; c != width; ++c)
       for (std::size_t r = 0; r != height; ++r) to[c * stride + r] -= from[c * product_stride_ + r];
@@ -175,7 +175,7 @@ requires(B >= 1) class block_cholesky {
     const std::size_t stride = panels_[s].stride;
     const std::size_t height = width * (node.columns + node.rows);
     double* const x = ordered_.data() + offset(node.first);
-    double* const change = product_.data();  // of everything below the current column
+    double* const change = product_.data();  // change of all rows below the current column
     std::fill_n(change, height, 0.0);
     for (std::size_t c = 0; c != node.columns; ++c) {
       const double* const top = panel_data(s) + width * c * stride;
@@ -198,7 +198,7 @@ requires(B >= 1) class block_cholesky {
     const supernode& node = symbolic_.supernodes[s];
     const std::size_t stride = panels_[s].stride;
     const std::size_t height = width * (node.columns + node.rows);
-    double* const x = product_.data();  // of the panel's rows
+    double* const x = product_.data();  // solution for the panel's rows
     std::copy_n(ordered_.begin() + offset(node.first), width * node.columns, x);
     const std::span<const std::uint32_t> rows = symbolic_.rows_of(node);
     for (std::size_t i = 0; i != rows.size(); ++i)
@@ -224,9 +224,9 @@ requires(B >= 1) class block_cholesky {
   std::vector<panel> panels_;
   std::vector<target> targets_;
   std::vector<double> values_;   // the panels, column-major
-  std::vector<double> product_;  // of panels, before it is subtracted
+  std::vector<double> product_;  // product of panels, before it is subtracted
   std::size_t product_stride_ = 0;
-  std::vector<double> inverse_diagonal_;  // of the factor
+  std::vector<double> inverse_diagonal_;  // reciprocals of the diagonal of the factor
   std::vector<double> ordered_;           // the right-hand side in the order of elimination
   std::vector<std::uint32_t> place_of_row_;
   std::uint32_t failed_block_ = 0;

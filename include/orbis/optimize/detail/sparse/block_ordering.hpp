@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A fill-reducing order for the elimination of the blocks of a sparse symmetric matrix.
+/// A fill-reducing elimination order for the blocks of a sparse symmetric matrix.
 ///
 /// Source: P. R. Amestoy, T. A. Davis, I. S. Duff, "An approximate minimum degree ordering algorithm",
 /// SIAM J. Matrix Anal. Appl. 17(4), 1996.
@@ -23,11 +23,11 @@ struct block_place {
   friend bool operator==(const block_place&, const block_place&) = default;
 };
 
-/// The neighbours of every block: `neighbors(i)` are those that share a place with i.
+/// The neighbours of every block: `neighbors(i)` are the blocks that share a place with i.
 class block_adjacency {
  public:
   block_adjacency() = default;
-  /// @pre every place is below `size` and off the diagonal; O(size + places)
+  /// Builds the lists. O(size + places). @pre every place has indices less than `size` and is off the diagonal
   block_adjacency(std::size_t size, std::span<const block_place> places) : first_(size + 1, 0) {
     for (const block_place& p : places) {
       assert(p.row < size && p.column < size && p.row != p.column);
@@ -53,7 +53,8 @@ class block_adjacency {
 };
 
 /// The quotient graph during an elimination. A node is a variable (not yet eliminated; it may represent several with
-/// the same neighbours), an element (eliminated; its list is the resulting clique), or gone: absorbed by another node.
+/// the same neighbours), an element (eliminated; its list is the resulting clique), or `gone` (absorbed by another
+/// node).
 class quotient_graph {
  public:
   explicit quotient_graph(const block_adjacency& graph)
@@ -121,7 +122,7 @@ class quotient_graph {
       bucket_[degree_[i]] = next_[i];
     if (next_[i] != none) previous_[next_[i]] = previous_[i];
   }
-  /// Marks `i` as eliminated together with `into`.
+  /// Records that `i` is eliminated together with `into`.
   void merge(std::uint32_t i, std::uint32_t into) {
     merged_[last_merged_[into]] = i;
     last_merged_[into] = last_merged_[i];
@@ -224,7 +225,7 @@ class quotient_graph {
       own.variables = elements_end + 1;
       own.end = own.variables + kept;
       if (outside == 0) {
-        merge(i, pivot);  // no neighbours outside the clique: eliminated with the pivot
+        merge(i, pivot);  // no neighbours outside the clique: eliminate it with the pivot
         continue;
       }
       const std::uint64_t bound = std::min<std::uint64_t>(std::uint64_t{degree_[i]} + others, others + outside);
@@ -273,7 +274,7 @@ class quotient_graph {
   std::uint32_t size_;
   std::vector<std::uint32_t> weight_;  ///< number of blocks that a node represents
   std::vector<range> list_;
-  std::vector<std::uint32_t> degree_;  ///< of variables: an upper bound of the blocks that elimination would connect
+  std::vector<std::uint32_t> degree_;  ///< of variables: upper bound on the number of blocks connected by elimination
   std::vector<kind> state_;
   std::vector<std::uint64_t> remains_;  ///< of elements: 1 + weight outside the clique; of variables: membership
   std::vector<std::uint32_t> bucket_, next_, previous_;  ///< variables by degree
@@ -286,8 +287,8 @@ class quotient_graph {
   std::uint32_t lowest_ = 0;
 };
 
-/// An approximate minimum degree elimination order: `order[k]` is the k-th block to eliminate. Deterministic; about
-/// O(places) for meshes and pose graphs.
+/// Returns an approximate minimum degree elimination order: `order[k]` is the k-th block to eliminate. Deterministic;
+/// about O(places) for meshes and pose graphs.
 [[nodiscard]] inline std::vector<std::uint32_t> minimum_degree_order(const block_adjacency& graph) {
   return quotient_graph{graph}.eliminate_all();
 }

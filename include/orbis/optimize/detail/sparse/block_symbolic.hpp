@@ -24,11 +24,11 @@ namespace orbis::optimize::detail {
 struct supernode {
   std::uint32_t first = 0;     ///< first block column, in the order of elimination
   std::uint32_t columns = 0;   ///< number of block columns
-  std::size_t rows_begin = 0;  ///< into `block_symbolic::rows`: the block rows below the panel's own, ascending
+  std::size_t rows_begin = 0;  ///< index in `block_symbolic::rows` of the first block row below its own, ascending
   std::uint32_t rows = 0;      ///< number of block rows
 };
 
-/// The rows `[begin, end)` of the panel of supernode `source` are in the columns of another supernode and update it.
+/// The rows `[begin, end)` of supernode `source`'s panel are in the columns of another supernode and update that one.
 struct supernode_update {
   std::uint32_t source = 0;
   std::uint32_t begin = 0, end = 0;  ///< positions in the source's rows
@@ -36,13 +36,13 @@ struct supernode_update {
 
 /// The structure of a factor `L` with `P A P^T = L L^T`.
 struct block_symbolic {
-  std::vector<std::uint32_t> order;     ///< `order[k]`: the block of A that becomes the k-th of the factor
+  std::vector<std::uint32_t> order;     ///< `order[k]`: the block of A that becomes the k-th block of the factor
   std::vector<std::uint32_t> position;  ///< inverse of `order`
   std::vector<supernode> supernodes;    ///< in the order of elimination
   std::vector<std::uint32_t> rows;
-  std::vector<std::uint32_t> supernode_of;  ///< of each block column of the factor
-  std::vector<supernode_update> updates;    ///< by target, then by source
-  std::vector<std::size_t> first_update;    ///< of each supernode, as target; one extra entry at the end
+  std::vector<std::uint32_t> supernode_of;  ///< supernode of each block column of the factor
+  std::vector<supernode_update> updates;    ///< ordered by target, then by source
+  std::vector<std::size_t> first_update;    ///< first update of each supernode as target; one extra entry at the end
   std::size_t factor_blocks = 0;  ///< number of blocks in the lower triangle of the panels, including explicit zeros
 
   [[nodiscard]] std::size_t size() const { return order.size(); }
@@ -56,7 +56,7 @@ struct block_symbolic {
 
 inline constexpr std::uint32_t no_block = std::numeric_limits<std::uint32_t>::max();
 
-/// The parent of each column: the first nonzero row below it.
+/// Returns the parent of each column: its first nonzero row below the diagonal.
 [[nodiscard]] inline std::vector<std::uint32_t> elimination_tree(const block_adjacency& graph,
                                                                  const std::vector<std::uint32_t>& order,
                                                                  const std::vector<std::uint32_t>& position) {
@@ -75,7 +75,7 @@ inline constexpr std::uint32_t no_block = std::numeric_limits<std::uint32_t>::ma
   return parent;
 }
 
-/// A postorder of the columns: every subtree is consecutive and children precede their parent.
+/// Returns a postorder of the columns: every subtree is consecutive, and children precede their parent.
 [[nodiscard]] inline std::vector<std::uint32_t> postorder(const std::vector<std::uint32_t>& parent) {
   const std::size_t n = parent.size();
   std::vector<std::uint32_t> child(n, no_block), sibling(n, no_block), stack, result;
@@ -102,7 +102,7 @@ inline constexpr std::uint32_t no_block = std::numeric_limits<std::uint32_t>::ma
   return result;
 }
 
-/// Number of blocks in each column of the factor, including the diagonal.
+/// Returns the number of blocks in each column of the factor, including the diagonal.
 [[nodiscard]] inline std::vector<std::uint32_t> column_counts(const block_adjacency& graph,
                                                               const block_symbolic& symbolic,
                                                               const std::vector<std::uint32_t>& parent) {
@@ -118,7 +118,7 @@ inline constexpr std::uint32_t no_block = std::numeric_limits<std::uint32_t>::ma
   return count;
 }
 
-/// Returns true if one panel, in which `zeros` of `blocks` blocks are zero, is faster than two.
+/// Returns true if one panel with `zeros` zero blocks among `blocks` blocks is faster than two panels.
 [[nodiscard]] inline bool worth_merging(std::size_t columns, std::size_t zeros, std::size_t blocks) {
   const double share = static_cast<double>(zeros) / static_cast<double>(blocks);
   return zeros == 0 || (columns <= 4 && share < 0.4) || (columns <= 12 && share < 0.15) || share < 0.05;
@@ -129,7 +129,7 @@ inline void group_columns(block_symbolic& symbolic, const std::vector<std::uint3
                           const std::vector<std::uint32_t>& count) {
   struct group {
     std::uint32_t first, last;
-    std::size_t rows;  ///< below the last column
+    std::size_t rows;  ///< number of rows below the last column
     std::size_t zeros;
   };
   const auto blocks = [](std::size_t columns, std::size_t rows) {
@@ -138,7 +138,7 @@ inline void group_columns(block_symbolic& symbolic, const std::vector<std::uint3
   std::vector<group> groups;
   for (std::uint32_t k = 0; k != parent.size(); ++k) {
     groups.push_back({k, k, count[k] - std::size_t{1}, 0});
-    while (groups.size() > 1) {  // merge with the last child, which ends where this begins
+    while (groups.size() > 1) {  // merge with the last child, which ends where this one begins
       const group& top = groups.back();
       const group& child = groups[groups.size() - 2];
       if (parent[child.last] == no_block || parent[child.last] > top.last) break;
@@ -213,7 +213,7 @@ inline void find_updates(block_symbolic& symbolic) {
 }
 
 /// Computes the structure of the factor of a matrix with blocks at `places` and on the diagonal.
-/// @pre every place is below `size` and off the diagonal
+/// @pre every place has indices less than `size` and is off the diagonal
 [[nodiscard]] inline block_symbolic analyze_blocks(std::size_t size, std::span<const block_place> places) {
   const block_adjacency graph{size, places};
   block_symbolic symbolic;

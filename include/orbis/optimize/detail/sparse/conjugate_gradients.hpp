@@ -20,7 +20,7 @@
 
 namespace orbis::optimize::detail {
 
-/// Conjugate gradients, preconditioned with the inverses of the diagonal blocks. One iteration costs O(blocks). Reuses
+/// Conjugate gradients, preconditioned with the inverses of the diagonal blocks. One iteration takes O(blocks). Reuses
 /// its memory; refers to the blocks passed to `factor` until the last `solve`. Not thread-safe.
 template <int B>
 class block_conjugate_gradients {
@@ -40,7 +40,7 @@ class block_conjugate_gradients {
   }
 
   /// Sets the matrix; returns false if a diagonal block is not positive definite.
-  /// @pre the spans outlive the calls of `solve`
+  /// @pre the spans outlive the calls to `solve`
   [[nodiscard]] bool factor(std::span<const block> diagonal, std::span<const block> off_diagonal) {
     assert(diagonal.size() == size_ && off_diagonal.size() == places_.size());
     diagonal_ = diagonal;
@@ -59,7 +59,7 @@ class block_conjugate_gradients {
   [[nodiscard]] std::uint32_t failed_block() const { return failed_block_; }
 
   /// Replaces the right-hand side by an approximate solution. If the matrix turns out not to be positive definite, the
-  /// result is the iterate before that was detected.
+  /// result is the last iterate before this was detected.
   void solve(std::span<double> x) {
     assert(x.size() == B * size_);
     residual_.assign(x.begin(), x.end());

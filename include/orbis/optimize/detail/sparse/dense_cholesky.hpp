@@ -14,8 +14,8 @@
 
 namespace orbis::optimize::detail {
 
-/// Left-looking factorisation in panels of eight columns. n^3 / 3 multiplications; allocates nothing for a matrix of
-/// the same size as before. Every processor gives the same bits. Not thread-safe.
+/// Left-looking factorisation in panels of eight columns. Takes n^3 / 3 multiplications; allocates nothing for a matrix
+/// of the same size as the previous one. Every processor gives the same bits. Not thread-safe.
 class dense_cholesky {
  public:
   /// Resizes to an n x n matrix of zeros.
@@ -30,12 +30,13 @@ class dense_cholesky {
   }
   [[nodiscard]] std::size_t size() const { return size_; }
 
-  /// Entry (row, column) of the matrix, of which only the lower triangle is read; after `factor`, of the factor.
+  /// Returns entry (row, column) of the matrix, of which only the lower triangle is read; after `factor`, of the
+  /// factor.
   [[nodiscard]] double& operator()(std::size_t row, std::size_t column) { return values_[column * stride_ + row]; }
   [[nodiscard]] double* column(std::size_t c) { return values_.data() + c * stride_; }
 
   /// Replaces the matrix by its factor. Returns false if it is not positive definite: a pivot is not above `tolerance`
-  /// times the entry of the matrix, or not finite; see `failed_row`.
+  /// times the diagonal entry of the matrix, or not finite; see `failed_row`.
   [[nodiscard]] bool factor(double tolerance = 1e-14) {
     for (std::size_t i = size_; i != stride_; ++i) (*this)(i, i) = 1.0;
     for (std::size_t i = 0; i != stride_; ++i) given_[i] = (*this)(i, i);
@@ -61,7 +62,7 @@ class dense_cholesky {
     return true;
   }
 
-  /// The row whose pivot was not positive after `factor` has returned false.
+  /// The row whose pivot was not positive, after `factor` has returned false.
   [[nodiscard]] std::size_t failed_row() const { return failed_row_; }
 
   /// Solves in place: replaces the right-hand side in `x` by the solution. @pre the last `factor` returned true

@@ -13,22 +13,22 @@
 
 namespace orbis::optimize::detail {
 
-/// The number of rows beyond the last that a kernel may read and write: padding after the end of a panel.
+/// The number of rows beyond the last that a kernel may read and write, which are padding at the end of a panel.
 inline constexpr std::size_t panel_slack = 16;
 
-/// `out = A B^T`: A has `rows` rows, B has N; both have `depth` columns `stride` apart. `out` has N columns,
+/// Computes `out = A B^T`: A has `rows` rows, B has N; both have `depth` columns, `stride` apart. `out` has N columns,
 /// `out_stride` apart, and room for `rows` rounded up to `panel_slack`.
 using panel_product = void(const double* a, const double* b, std::size_t stride, std::size_t rows, std::size_t depth,
                            double* out, std::size_t out_stride);
 
-/// `X = X L^-T` for the `rows` rows of X below the N x N lower triangle L, both in columns `stride` apart;
-/// `inverse_diagonal` has 1 / L(j, j). Writes nothing beyond `rows`.
+/// Computes `X = X L^-T` for the `rows` rows of X below the N x N lower triangle L, both in columns `stride` apart;
+/// `inverse_diagonal` contains 1 / L(j, j). Writes nothing beyond `rows`.
 using panel_solve = void(const double* l, const double* inverse_diagonal, std::size_t stride, double* x,
                          std::size_t rows);
 
 template <int N>
 struct panel_product_kernel {
-  /// The number of columns of a product that are computed at once, as sums in registers, followed by the remainder.
+  /// The number of columns of a product that are computed at a time, as sums in registers, followed by the remainder.
   static constexpr int columns = N <= 9 ? N : 8;
 
   template <simd::target Target>

@@ -45,7 +45,7 @@ class reduced_solver {
   }
 
   /// Sets the blocks; returns false if the matrix is not positive definite.
-  /// @pre the spans outlive the calls of `solve`
+  /// @pre the spans outlive the calls to `solve`
   [[nodiscard]] bool factor(std::span<const block> diagonal, std::span<const block> off_diagonal) {
     if (kind_ == kind::sparse) return sparse_.factor(diagonal, off_diagonal);
     if (kind_ == kind::iterative) return iterative_.factor(diagonal, off_diagonal);
@@ -63,7 +63,7 @@ class reduced_solver {
         put(places_[k].column, places_[k].row, transposed(off_diagonal[k]));
     return dense_.factor();
   }
-  /// A block row where the matrix is not positive definite, after `factor` has returned false.
+  /// A block row in which the matrix is not positive definite, after `factor` has returned false.
   [[nodiscard]] std::uint32_t failed_block() const {
     if (kind_ == kind::sparse) return sparse_.failed_block();
     if (kind_ == kind::iterative) return iterative_.failed_block();
@@ -76,7 +76,7 @@ class reduced_solver {
     if (kind_ == kind::sparse) sparse_.solve(x);
     if (kind_ == kind::iterative) iterative_.solve(x);
   }
-  /// Iterations of the iterative solver so far.
+  /// The number of iterations of the iterative solver so far.
   [[nodiscard]] int iterations() const { return iterative_.iterations(); }
 
  private:
