@@ -29,7 +29,7 @@ check(NOT err MATCHES "rolling shutter")
 app(0 demo --plain --sensor mono --frames 20 --load-map room.map --localize-only --deterministic --out again)
 summary(found ${WORK}/again tracked)
 check(found EQUAL 20)
-app_fails(2 "room.map: the map was made without depth" demo --plain --frames 20 --load-map room.map --out out)
+app_fails(2 "room.map: the map was built without depth" demo --plain --frames 20 --load-map room.map --out out)
 
 # A trajectory in a unit of its own is compared after scaling.
 file(MAKE_DIRECTORY ${WORK}/eval)

@@ -100,7 +100,7 @@ TEST_CASE("Rays in a file are rays, and where there is none there is no depth") 
 TEST_CASE("A file that is cut off says in which section") {
   const std::string bytes = slam::map_bytes(test::random_map(2, 60, 3));
   CHECK(fault_of("") == "some.map: not an orbis map: it does not begin with \"orbismap\"");
-  CHECK(fault_of(bytes.substr(0, 10)) == "some.map: ends before its version");
+  CHECK(fault_of(bytes.substr(0, 10)) == "some.map: the file ends before its version");
   CHECK(fault_of(bytes.substr(0, 20)) == "some.map: section \"size\" is missing: the file ends at byte 20");
   CHECK(fault_of(bytes.substr(0, 100)) ==
         "some.map: section \"kfrm\" from byte 60 is cut off: the file ends at byte 100");
@@ -109,7 +109,7 @@ TEST_CASE("A file that is cut off says in which section") {
     REQUIRE_FALSE(cut.has_value());
     REQUIRE(cut.error().code == errc::malformed);
   }
-  CHECK(fault_of(bytes + "x") == "some.map: unexpected data after its end at byte " + std::to_string(bytes.size()));
+  CHECK(fault_of(bytes + "x") == "some.map: unexpected data after the end at byte " + std::to_string(bytes.size()));
 }
 
 TEST_CASE("A file with one wrong bit says in which section") {

@@ -169,7 +169,7 @@ TEST_CASE("A map without depth is loaded by a system without depth only, which i
   const auto refused = with_depth.load_map(file);
   REQUIRE(!refused);
   CHECK(refused.error().code == errc::unsupported);
-  CHECK(refused.error().message == "the map was made without depth; its unit of length is not the metre");
+  CHECK(refused.error().message == "the map was built without depth; its unit of length is not the metre");
 }
 
 TEST_CASE("A drive with one camera has the shape of the truth") {
