@@ -22,8 +22,8 @@
 
 namespace examples {
 
-/// The error of a command line in one line. An unknown option is named before a missing argument, which may be a
-/// consequence.
+/// One-line description of a command-line error. If an argument is missing and an option is unknown, reports the option,
+/// which may be the cause.
 [[nodiscard]] inline std::string describe_usage(const CLI::App& cli, const CLI::ParseError& e) {
   std::string what = e.what();
   if (dynamic_cast<const CLI::RequiredError*>(&e) != nullptr)

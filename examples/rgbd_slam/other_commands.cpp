@@ -53,7 +53,7 @@ orbis::result<posed_frames> frames_with_poses(const frame_source& source, const 
   if (source.truth_has_positions_only)
     return orbis::fail(
         orbis::errc::unsupported, s.input.string(),
-        "all orientations of the ground truth are equal (0 0 0 1), as in files with positions only, which "
+        "all orientations in the ground truth are equal (0 0 0 1), as in files with positions only, which "
         "cannot place depth images; use run");
   console.stage("reading");
   const auto shutter = source.camera.shutter.value_or(orbis::camera::shutter{});
@@ -105,7 +105,7 @@ orbis::result<mapped> map_recording(const frame_source& source, const settings& 
   r.world = world;
   if (orbis::eval::has_equal_orientations(source.ground_truth))
     console.warn(r.warnings.emplace_back(
-        "all orientations of the ground truth are equal: if the camera turned, the map is wrong; use run"));
+        "all orientations in the ground truth are equal: if the camera turned, the map is wrong; use run"));
   for (const std::string& note : mapping_notes(*posed, world)) console.warn(r.warnings.emplace_back(note));
   r.truth_note = "Mapped with the poses of the ground truth.";
   return mapped{std::move(r), *std::move(map), posed->trajectory()};
