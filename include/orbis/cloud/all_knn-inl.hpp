@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The functions of all_knn.hpp.
+/// Definitions of the functions in all_knn.hpp.
 #pragma once
 
 #include <algorithm>
@@ -32,7 +32,7 @@ neighbor_table find_all_knn(const Policy& policy, const point_view& points, std:
         tree, kernels, out.width, begin, end,
         [&](std::size_t l, std::size_t i) { return row_of(tree.members[l * leaf_width + i]); }, [](std::size_t) {});
   });
-  // Each point that was left out takes the first of its copies as neighbours.
+  // The neighbours of a point that was left out are the first of its copies.
   for (const surplus_copy& copy : tree.left_out) {
     const auto row = row_of(copy.index);
     for (std::size_t n = 0; n != row.size(); ++n) row[n] = {tree.members[copy.kept + n], 0.0F};
@@ -56,7 +56,7 @@ neighbor_table find_all_knn(const Policy& policy, const point_view& points, std:
 }
 
 /// Mean of the roots of the `wanted` smallest of `found`, excluding the smallest (the point itself); `sum` holds the
-/// known part of their sum. Infinity if fewer were found, because their squares overflow.
+/// known part of their sum. Infinity if fewer were found, which happens if their squares overflow.
 [[nodiscard]] inline float mean_of_nearest(const nearest_sum& sum, std::span<float> found, std::size_t wanted) {
   if (found.size() < wanted) return std::numeric_limits<float>::infinity();
   const auto divisor = static_cast<double>(wanted - 1);
@@ -71,7 +71,7 @@ template <execution_policy Policy>
 std::vector<float> find_mean_distances(const Policy& policy, const point_view& points, std::size_t k) {
   std::vector<float> means(points.size(), std::numeric_limits<float>::quiet_NaN());
   const leaf_hierarchy tree = make_leaves(policy, points, std::min(k, means.size()) + 1);
-  const std::size_t wanted = std::min(k, std::max<std::size_t>(tree.finite, 1) - 1) + 1;  // with the point itself
+  const std::size_t wanted = std::min(k, std::max<std::size_t>(tree.finite, 1) - 1) + 1;  // including the point itself
   if (wanted < 2) return means;
   for (const surplus_copy& copy : tree.left_out) means[copy.index] = 0;
   const knn_kernels kernels;

@@ -21,11 +21,11 @@ namespace orbis::cloud {
 struct neighbor_table {
   static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
 
-  std::size_t width = 0;              ///< neighbours of each finite point
-  std::size_t points = 0;             ///< number of points of the cloud, finite or not, and of rows
-  std::vector<neighbor<float>> rows;  ///< `width` per point; index `none` in the rows of non-finite points
+  std::size_t width = 0;              ///< number of neighbours of each finite point
+  std::size_t points = 0;             ///< number of points in the cloud, finite or not; also the number of rows
+  std::vector<neighbor<float>> rows;  ///< `width` entries per point; index `none` for non-finite points
 
-  /// The neighbours of point `i`; none if it is not finite.
+  /// Returns the neighbours of point `i`; empty if the point is not finite.
   [[nodiscard]] std::span<const neighbor<float>> operator[](std::size_t i) const noexcept {
     if (width == 0 || rows[i * width].index == none) return {};
     return std::span{rows}.subspan(i * width, width);
@@ -46,7 +46,7 @@ template <execution_policy Policy>
 /// squared distances are ordered by index, so the result is the same for every policy and processor. Identical points
 /// are neighbours of each other.
 ///
-/// Coordinates are converted to float, and distances are computed in float. O(n (log n + k log k)), also with many
+/// Coordinates are converted to float, and distances are computed in float. O(n (log n + k log k)), even with many
 /// identical points. Memory: 8 k bytes per point for the result, 40 bytes per point during the call, and 12 more if the
 /// points are not contiguous floats.
 /// @pre k > 0, fewer than 2^32 - 1 points
@@ -57,11 +57,11 @@ template <execution_policy Policy, point_range Points>
 }
 
 /// Computes for each point the mean distance in metres to its `k` nearest other points, or to all others if there are
-/// fewer than `k`. NaN for non-finite points and for a single finite point.
+/// fewer than `k`. The result is NaN for non-finite points, and for a finite point that is the only one.
 ///
 /// Coordinates are converted to float. Squared distances are float; roots and sums are double, in ascending order; the
 /// mean is float. The result equals, bit for bit, the mean distances of the usual statistical outlier filter. O(n log
-/// n) for fixed k, also with many identical points; the same result for every policy and processor. Memory: about 40
+/// n) for fixed k, even with many identical points; the same result for every policy and processor. Memory: about 40
 /// bytes per point, and 0.45 k + 42 kilobytes per thread.
 /// @pre k > 0, fewer than 2^32 points
 template <execution_policy Policy, point_range Points>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The functions of cluster.hpp.
+/// Definitions of the functions in cluster.hpp.
 #pragma once
 
 #include <algorithm>
@@ -24,8 +24,8 @@ namespace detail {
 inline constexpr std::size_t most_box_levels = 8;  // 2^32 points need seven
 
 /// Calls `sink.add(place, squared distance)` for the points within `sink.bound_squared()` of `q`, near leaves first,
-/// until it returns false. The bound may shrink during the search. A place is the index of a point in `members`. @pre q
-/// is finite
+/// until `add` returns false. The bound may shrink during the search. A place is the index of a point in `members`.
+/// @pre q is finite
 template <class Sink>
 void visit_near(const leaf_hierarchy& tree, const knn_kernels& kernels, const std::array<float, 3>& q, Sink& sink) {
   struct box_to_visit {
@@ -60,7 +60,7 @@ void visit_near(const leaf_hierarchy& tree, const knn_kernels& kernels, const st
     for (; mask != 0; mask &= mask - 1) {
       const auto n = static_cast<std::size_t>(std::countr_zero(mask));
       const std::size_t child = next.index * leaf_width + n;
-      if (child >= children) break;  // if the bound is infinite
+      if (child >= children) break;  // reached if the bound is infinite
       open[count++] = {distance[n], level, static_cast<std::uint32_t>(child)};
       if (open[count - 1].distance > open[first].distance) continue;
       std::swap(open[count - 1], open[first]);  // keep the nearest at the bottom until the loop ends
@@ -69,7 +69,7 @@ void visit_near(const leaf_hierarchy& tree, const knn_kernels& kernels, const st
   }
 }
 
-/// Place of the point nearest to a query, and its squared distance.
+/// Place and squared distance of the point nearest to a query.
 struct nearest_place {
   std::uint32_t place = std::numeric_limits<std::uint32_t>::max();
   float distance_squared = std::numeric_limits<float>::infinity();
@@ -119,10 +119,10 @@ class disjoint_sets {
       if (at(a).compare_exchange_strong(expected, b, std::memory_order_relaxed)) return;
     }
   }
-  /// Returns the set of each element; sets are numbered by their smallest elements. `count`: number of sets.
+  /// Returns the set index of each element; sets are in the order of their smallest elements. `count`: number of sets.
   [[nodiscard]] std::vector<std::uint32_t> numbered(std::uint32_t& count) && {
     count = 0;
-    for (std::size_t i = 0; i != parent_.size(); ++i)  // the parent is smaller, and has its number already
+    for (std::size_t i = 0; i != parent_.size(); ++i)  // the parent is smaller and already numbered
       parent_[i] = parent_[i] == i ? count++ : parent_[parent_[i]];
     return std::move(parent_);
   }
@@ -146,12 +146,12 @@ class disjoint_sets {
   return std::min<std::size_t>(200, std::max<std::size_t>(30, points / 250));
 }
 
-/// Connected components of the neighbour graph, numbered by their first vertices.
+/// Connected components of the neighbour graph, in the order of their first vertices.
 struct linked_components {
   std::vector<std::uint32_t> component;  ///< by vertex
   std::vector<std::uint32_t> sizes;      ///< by component
   std::vector<char> goes;                ///< by component: 1 if it is removed
-  std::size_t min_size = 0;              ///< the value that was applied
+  std::size_t min_size = 0;              ///< the `min_size` that was applied
 
   [[nodiscard]] bool is_small(std::uint32_t i) const noexcept { return sizes[component[i]] < min_size; }
 };
@@ -201,7 +201,7 @@ template <execution_policy Policy>
     const std::uint32_t i = small_ones[s];
     const nearest_place main = find_nearest(graph.tree(), kernels, graph.position(i), is_main);
     assert(main.found());
-    double within = 0;  // mean length of its links
+    double within = 0;  // mean length of the links of the component
     double links = 0;
     for_each_link(i, [&](std::uint32_t, float length) {
       within += length;
@@ -214,20 +214,20 @@ template <execution_policy Policy>
   });
   for (const std::uint32_t i : small_ones) out.goes[out.component[i]] = 1;
   for (std::size_t s = 0; s != small_ones.size(); ++s) {
-    if (apart[s] == 0) out.goes[out.component[small_ones[s]]] = 0;  // one point near the surface keeps it all
+    if (apart[s] == 0) out.goes[out.component[small_ones[s]]] = 0;  // one point near the surface keeps all points
   }
   return out;
 }
 
-/// Numbers components in the order of their first points. `vertex(i)`: vertex of point `i` of the cloud, negative if it
-/// has none. `stays(i)`: true if a point without a vertex is nevertheless an inlier.
+/// Orders components by their first points. `vertex(i)`: vertex of point `i` of the cloud, negative if it has none.
+/// `stays(i)`: true if a point without a vertex is nevertheless an inlier.
 template <class Vertex, class Stays>
 [[nodiscard]] cluster_result numbered(const linked_components& found, std::size_t count, const Vertex& vertex,
                                       const Stays& stays) {
   cluster_result out;
   out.min_size = found.min_size;
   out.component.assign(count, cluster_result::none);
-  std::vector<std::uint32_t> number(found.sizes.size(), cluster_result::none);  // by component of the graph
+  std::vector<std::uint32_t> number(found.sizes.size(), cluster_result::none);  // index by component of the graph
   for (std::size_t i = 0; i != count; ++i) {
     const std::int64_t v = vertex(i);
     if (v < 0) continue;

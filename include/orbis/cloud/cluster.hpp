@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Filter of small isolated groups of points: dense enough to pass every density test, but far from the surface.
+/// Removal of small isolated groups of points: dense enough to pass every density test, but far from the surface.
 ///
-/// Points are linked with neighbours that are no further away than a few times their spacing; linked points form
-/// components. A component is removed if it is small and separated from the large ones by many local spacings.
+/// Points are linked to neighbours within a few times their spacing; linked points form components. A component is
+/// removed if it is small and separated from the large ones by many local spacings.
 #pragma once
 
 #include <cassert>
@@ -20,26 +20,26 @@
 namespace orbis::cloud {
 
 struct cluster_options {
-  std::size_t neighbors = 12;  ///< neighbours of each point that can be linked with it; > 0
+  std::size_t neighbors = 12;  ///< number of nearest neighbours of each point that can be linked to it; > 0
   /// Maximum length of a link, in multiples of the spacing (mean distance to the neighbours) of both points.
   double reach = 3.0;
-  /// Components of fewer points are small. 0: 1/250 of the points, at least 30 and at most 200.
+  /// Components with fewer points count as small. 0: 1/250 of the number of points, at least 30 and at most 200.
   std::size_t min_size = 0;
-  /// Minimum distance from a removed small component to every large one, in multiples of the local spacing: the spacing
-  /// of the large component at its nearest point, or that within the small one if it is wider.
+  /// Minimum distance of a removed small component from every large one, in multiples of the local spacing: the spacing
+  /// of the large component at its nearest point, or that of the small component if it is larger.
   double min_gap = 6.0;
   cloud::non_finite non_finite = cloud::non_finite::drop;
 };
 
-/// The components, and which of them are removed.
+/// Result of the cluster filter: inliers, components, and the removed components.
 struct cluster_result {
   static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
 
   std::vector<std::uint32_t> inliers;    ///< indices, ascending
-  std::vector<std::uint32_t> component;  ///< per point, numbered by first point; `none` if in no component
+  std::vector<std::uint32_t> component;  ///< component of each point, in order of first point; `none`: no component
   std::vector<std::uint32_t> sizes;      ///< number of points of each component
   std::vector<char> removed;             ///< per component: nonzero if it is removed
-  std::size_t min_size = 0;              ///< the value that was applied
+  std::size_t min_size = 0;              ///< the `min_size` that was applied
 };
 
 namespace detail {
@@ -59,8 +59,9 @@ template <execution_policy Policy, point_range Points>
   return detail::filter_clusters(detail::as_parallel(policy), detail::viewed_points{points}, options);
 }
 
-/// Returns the indices, ascending, of all points except those in a small component of the neighbour graph far from
-/// every large one. Returns all points if no component is large. O(n (log n + k)); the same result for every policy.
+/// Returns the indices, ascending, of all points except those in small components of the neighbour graph that are far
+/// from every large component. Returns all points if no component is large. O(n (log n + k)); the same result for every
+/// policy.
 /// @pre neighbors > 0, reach >= 0, min_gap >= 0, fewer than 2^32 - 1 points
 template <execution_policy Policy, point_range Points>
 [[nodiscard]] std::vector<std::uint32_t> cluster_inliers(const Policy& policy, const Points& points,

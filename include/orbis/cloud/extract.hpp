@@ -16,13 +16,13 @@
 
 namespace orbis::cloud {
 
-/// Treatment of non-finite points by a filter. They never count in its statistics.
+/// Treatment of non-finite points by a filter. Its statistics never include them.
 enum class non_finite {
-  drop,  ///< they are outliers
-  keep   ///< they are inliers, so that an organised cloud keeps its holes
+  drop,  ///< they count as outliers
+  keep   ///< they count as inliers, so that an organised cloud keeps its structure
 };
 
-/// Copies the points with the given indices, in their order, and their colours if there are any.
+/// Copies the points with the given indices, in the order of the indices, and their colours if there are any.
 /// @pre every index < cloud.size()
 [[nodiscard]] inline point_cloud extract(const point_cloud& cloud, std::span<const std::uint32_t> indices) {
   point_cloud out;
@@ -36,7 +36,7 @@ enum class non_finite {
   return out;
 }
 
-/// An axis-aligned box, its faces included; unlimited by default.
+/// An axis-aligned box, including its faces; unlimited by default.
 struct pass_through_options {
   vec3 low = filled<vec3>(-std::numeric_limits<double>::infinity());  ///< metres
   vec3 high = filled<vec3>(std::numeric_limits<double>::infinity());  ///< metres

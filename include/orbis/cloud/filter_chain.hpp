@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A sequence of filters with their parameters, as the automatic selection chooses it.
+/// A sequence of filters with their parameters, as chosen by the automatic selection.
 #pragma once
 
 #include <cstddef>
@@ -19,17 +19,17 @@
 
 namespace orbis::cloud {
 
-/// The kinds of filter.
+/// Kinds of filters, with the criterion by which they remove points.
 enum class filter_mode {
-  none,                   ///< all (finite) points stay
-  ray_evidence,           ///< removes points that depth rays of other views pass through
+  none,                   ///< keeps all (finite) points
+  ray_evidence,           ///< depth rays of other views pass through the point
   statistical,            ///< mean neighbour distance above mu + alpha sigma
   radius,                 ///< fewer than a minimum number of neighbours within a radius
   log_statistical,        ///< log mean neighbour distance relative to its median over the cloud
   range_log_statistical,  ///< log mean neighbour distance relative to a line over log range
   local_log_statistical,  ///< log mean neighbour distance relative to that of the surroundings
-  isolation,              ///< groups of a few points that are far from all others in units of the usual spacing
-  cluster                 ///< small components of the neighbour graph far from the large ones
+  isolation,              ///< groups of a few points that are far from all others relative to the usual spacing
+  cluster                 ///< small components of the neighbour graph that are far from the large ones
 };
 
 [[nodiscard]] constexpr std::string_view to_string(filter_mode mode) noexcept {
@@ -47,7 +47,7 @@ enum class filter_mode {
   return "unknown";
 }
 
-/// The usual log spacing as a function of range: `intercept + slope * log(range)`.
+/// Usual log spacing as a function of range: `intercept + slope * log(range)`.
 struct log_line {
   double intercept = 0;
   double slope = 0;
@@ -58,26 +58,26 @@ struct log_line {
 /// view measured. Stray pixels (`remove_stray_pixels`) do not count as measurements. Needs the views.
 struct ray_step {
   ray_evidence_options evidence{.resolve_ghosts = false, .ratio = 0.5};
-  std::vector<std::uint32_t> distrusted{};  ///< numbers of the views that do not count as evidence
-  bool need_support = false;                ///< the cloud was made from these views, so each point is in at least one
+  std::vector<std::uint32_t> distrusted{};  ///< indices of the views that do not count as evidence
+  bool need_support = false;                ///< removes points without support; for clouds built from these views
 };
 
-/// Criteria for neighbours that form a surface; density tests spare points on a surface.
+/// Criteria for neighbours that form a surface; density tests keep points on surfaces.
 struct surface_test {
   double flatness = 0.15;   ///< maximum `off_plane` of a plane
   double same_scale = 0.7;  ///< neighbours denser by more than this (log) do not support a point
-  std::size_t support = 3;  ///< supporting neighbours required of the nearest 8, unless the point is in a plane
+  std::size_t support = 3;  ///< supporting neighbours required among the nearest 8, unless the point is in a plane
 };
 
 /// Removes points whose log spacing exceeds the usual one by more than the threshold, unless they lie on a surface.
 struct density_step {
   filter_mode mode = filter_mode::log_statistical;  ///< or range_log_statistical, local_log_statistical
-  std::size_t neighbors = 8;                        ///< neighbours over which the spacing is averaged; > 0
+  std::size_t neighbors = 8;                        ///< number of neighbours over which the spacing is averaged; > 0
   log_line usual{};      ///< log spacing of the bulk as a function of log range; slope 0: constant
   double offset = 0;     ///< offset of the bulk from its surroundings in the local mode
   double threshold = 0;  ///< outliers: log spacing - usual > threshold
   surface_test surface{};
-  /// Log spacing of surfaces as a function of log range, at which neighbours count as a surface; empty: `usual`.
+  /// Log spacing on surfaces as a function of log range; neighbours with it count as a surface. Empty: `usual`.
   std::optional<log_line> surface_spacing{};
 
   [[nodiscard]] const log_line& surface_line() const noexcept { return surface_spacing ? *surface_spacing : usual; }
@@ -86,7 +86,7 @@ struct density_step {
 /// Removes groups of fewer than `min_size` points whose distance to other points exceeds `reach` times the usual
 /// spacing, or the spacing of the surroundings if that is larger.
 struct isolation_step {
-  std::size_t neighbors = 8;  ///< neighbours over which the spacing is averaged; > 0
+  std::size_t neighbors = 8;  ///< number of neighbours over which the spacing is averaged; > 0
   log_line usual{};           ///< log spacing of the bulk as a function of log range; slope 0: constant
   double offset = 0;          ///< offset of the bulk from its surroundings, log
   double reach = 2.5;
@@ -114,7 +114,7 @@ using filter_chain = std::vector<filter_step>;
         } else if constexpr (std::is_same_v<S, statistical_options>) {
           return filter_mode::statistical;
         } else {
-          static_assert(std::is_same_v<S, radius_options>, "a kind of step that has no mode");
+          static_assert(std::is_same_v<S, radius_options>, "step type without a mode");
           return filter_mode::radius;
         }
       },

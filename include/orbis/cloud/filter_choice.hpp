@@ -19,12 +19,13 @@ namespace orbis::cloud {
 class view_samples;
 
 struct select_options {
-  std::size_t neighbors = 8;            ///< neighbours over which a point's spacing is averaged; > 0
-  std::optional<vec3> sensor_origin{};  ///< position from which all points were seen, metres
-  /// Distance of each point from the sensor that saw it, metres; overrides sensor_origin. Points with a non-finite
+  std::size_t neighbors = 8;            ///< number of neighbours over which a point's spacing is averaged; > 0
+  std::optional<vec3> sensor_origin{};  ///< position from which all points were measured, metres
+  /// Distance of each point from the sensor that measured it, metres; overrides sensor_origin. Points with a non-finite
   /// range are not tested by range.
   std::span<const float> ranges{};
-  /// Samples of the views, in their order, drawn earlier with the default options. They save one pass over each view.
+  /// Samples of the views, in the order of the views, drawn earlier with the default options. They save one pass over
+  /// each view.
   const view_samples* samples = nullptr;
   cloud::non_finite non_finite = cloud::non_finite::drop;
 };
@@ -36,36 +37,36 @@ struct density_evidence {
   double right_scale = 0;      ///< width of the bulk above its median
   double surface_end = 0;      ///< beyond this log spacing, most points do not lie on surfaces
   double valley_position = 0;  ///< position of the deepest valley before a later peak
-  double valley_ratio = 0;     ///< later peak over valley; 1.6 and more indicates two populations
+  double valley_ratio = 0;     ///< ratio of the later peak to the valley; 1.6 or more indicates two populations
   double shoulder = 0;         ///< share of the points between the bulk and the threshold at the valley
-  double threshold = 0;        ///< the chosen threshold
+  double threshold = 0;        ///< threshold that was chosen
   double removed = 0;          ///< share of the points that the test removes; 0: the test is not part of the chain
 };
 
 /// Measurements on which a choice is based. Lengths in metres; shares are of all finite points.
 struct filter_evidence {
-  std::size_t points = 0;             ///< number of points
-  std::size_t finite = 0;             ///< number of finite points
-  std::size_t judged = 0;             ///< finite, with a finite range if any has one, not identical to all neighbours
-  double median_spacing = 0;          ///< median over the points of the mean neighbour distance
-  double left_scale = 0;              ///< width of the bulk below its median with the chosen reference, log
-  double right_scale = 0;             ///< width of the bulk above its median, log
-  double global_scale = 0;            ///< width with one reference for all points, log
-  std::optional<double> range_scale;  ///< width with the reference over range, if ranges are known
-  double local_scale = 0;             ///< width with the surroundings as the reference
+  std::size_t points = 0;                   ///< number of points
+  std::size_t finite = 0;                   ///< number of finite points
+  std::size_t judged = 0;                   ///< finite, with a finite range if any point has one, and spacing > 0
+  double median_spacing = 0;                ///< median over the points of the mean neighbour distance
+  double left_scale = 0;                    ///< width of the bulk below its median with the chosen reference, log
+  double right_scale = 0;                   ///< width of the bulk above its median, log
+  double global_scale = 0;                  ///< width with one reference for all points, log
+  std::optional<double> range_scale;        ///< width with the reference over range, if ranges are known
+  double local_scale = 0;                   ///< width with the surroundings as the reference
   std::vector<density_evidence> density{};  ///< one entry per test performed
-  double isolated = 0;                      ///< share removed as groups of a few points
-  double clustered = 0;                     ///< share removed as small clusters
-  std::size_t views = 0;                    ///< depth images that could be used as evidence
-  double worst_conflict = 0;                ///< share by which the worst view contradicts the others
-  double usual_conflict = 0;                ///< the usual share by which a view contradicts the others
+  double isolated = 0;                      ///< share of points removed as isolated groups
+  double clustered = 0;                     ///< share of points removed as small clusters
+  std::size_t views = 0;                    ///< number of depth images usable as evidence
+  double worst_conflict = 0;                ///< largest conflict of a view with the other views, 0 to 1
+  double usual_conflict = 0;                ///< median conflict of a trusted view with the other views, 0 to 1
   double passed_through = 0;                ///< share of points that rays pass through
   double unsupported = 0;                   ///< share of points that no trusted view measured
 };
 
 /// The chosen filters with their parameters, and the reason.
 struct filter_choice {
-  filter_chain chain{};  ///< empty: all (finite) points stay
+  filter_chain chain{};  ///< empty: all (finite) points are kept
   filter_evidence evidence{};
   std::string reason{};  ///< findings and conclusion, as text
 };

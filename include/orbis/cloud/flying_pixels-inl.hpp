@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The functions of flying_pixels.hpp.
+/// Definitions of the functions in flying_pixels.hpp.
 #pragma once
 
 #include <algorithm>
@@ -17,7 +17,7 @@ namespace orbis::cloud {
 
 namespace detail {
 
-/// Inverse depths of sixteen neighbouring pixels, and of the pixels `reach` and twice `reach` away on either side.
+/// Inverse depths of sixteen adjacent pixels, and of the pixels at distances `reach` and 2 `reach` on either side.
 struct flying_lines {
   const float* center;
   const float* before;
@@ -33,7 +33,7 @@ struct flying_limits {
   float margin;
 };
 
-/// Largest difference of inverse depths that noise explains.
+/// Largest difference of inverse depths that noise can explain.
 ORBIS_ALWAYS_INLINE float flying_tolerance(float w, const flying_limits& limits) noexcept {
   const float quantised = limits.resolution * (w * w);
   return quantised < limits.noise ? limits.noise : quantised;
@@ -50,8 +50,8 @@ ORBIS_ALWAYS_INLINE float masked(float x, std::uint32_t mask) noexcept {
   return std::bit_cast<float>(std::bit_cast<std::uint32_t>(x) & mask);
 }
 
-/// Sets `flags[i]` if pixel i lies between the two surfaces next to it. The loops are vectorised by compilers. No
-/// product is added to anything, so no operations are fused, and the result is the same on every processor.
+/// Sets `flags[i]` if pixel i lies between the two surfaces next to it. Compilers vectorise the loops. No sum contains
+/// a product, so no operations are fused, and the result is the same on every processor.
 struct flag_between {
   template <simd::target>
   static ORBIS_ALWAYS_INLINE void run(const flying_lines& l, const flying_limits& limits, std::uint32_t* flags) {
@@ -60,7 +60,7 @@ struct flag_between {
       const float a = l.before[i];
       const float b = l.after[i];
       // Slopes over `reach` pixels; an unmeasured surface takes the slope of the other side. Values outside the image
-      // are NaN, as are differences with them: no comparison is true.
+      // are NaN, as are differences with them, so all comparisons are false.
       const std::uint32_t a_known = exceeds(a, 0.0F) & differ(l.before_that[i], 0.0F);
       const std::uint32_t b_known = exceeds(b, 0.0F) & differ(l.after_that[i], 0.0F);
       const float a_own = masked(a - l.before_that[i], a_known);
@@ -69,7 +69,7 @@ struct flag_between {
       const float b_slope = b_own - masked(a_own, ~b_known);
       const float a_here = a + a_slope;
       const float b_here = b + b_slope;
-      // Each surface is somewhere between flat and extrapolated.
+      // Each surface may continue flat, extrapolated, or anywhere in between.
       const float a_low = a < a_here ? a : a_here;
       const float a_high = a_here < a ? a : a_here;
       const float b_low = b < b_here ? b : b_here;
@@ -77,7 +77,7 @@ struct flag_between {
       const float tolerance = flying_tolerance(w, limits);
       const float share = limits.margin * std::abs(a - b);
       const float clear = tolerance < share ? share : tolerance;
-      // A difference that the slopes themselves explain over that distance is not an edge.
+      // A difference that the slopes explain over this distance is not an edge.
       const float steep = std::abs(a_slope) + std::abs(b_slope);
       const float far_apart = limits.jump * tolerance;
       const float jump = far_apart < steep ? steep : far_apart;
@@ -90,7 +90,7 @@ struct flag_between {
   }
 };
 
-/// Number of the eight neighbours of the pixel at `center` that have the same depth as it.
+/// Number of the eight neighbours of the pixel at `center` with the same depth.
 [[nodiscard]] inline int flying_support(const float* center, std::ptrdiff_t stride, float tolerance) noexcept {
   int count = -1;  // the pixel itself
   for (std::ptrdiff_t y = -1; y <= 1; ++y) {

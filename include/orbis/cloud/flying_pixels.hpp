@@ -8,7 +8,7 @@
 /// depth. A pixel is flying if the surfaces on its two sides, each extrapolated to the pixel along its own slope,
 /// differ by a jump, and the pixel lies between the two, clear of both. It is kept if enough of the pixels around it
 /// have the same depth, as on a thin real object. A missing measurement counts as infinitely far, because the shadow
-/// next to a near surface is an edge, too.
+/// next to a near surface is also an edge.
 ///
 /// Sources: M. Reynolds, J. Dobos, L. Peel, T. Weyrich, G. J. Brostow, "Capturing time-of-flight data with
 /// confidence", CVPR 2011; A. Sabov, J. Krueger, "Identification and correction of flying pixels in range
@@ -30,29 +30,29 @@
 namespace orbis::cloud {
 
 struct flying_pixel_options {
-  /// Distance in pixels at which the surfaces on either side are read: the widest transition that is recognised as a
-  /// whole. 1 ... 8
+  /// Distance in pixels at which the surfaces on either side are sampled, which is also the maximum width of a
+  /// transition that is detected completely. 1 ... 8
   int reach = 2;
-  double noise = 1.425e-3;    ///< deviation of inverse depth, sigma_z / z^2, 1 / metre; the default is a Kinect's
-  double resolution = 0.001;  ///< smallest depth difference that counts, metres
+  double noise = 1.425e-3;    ///< standard deviation of inverse depth, sigma_z / z^2, 1 / metre; default: a Kinect's
+  double resolution = 0.001;  ///< smallest significant depth difference, metres
   double sigmas = 4.0;        ///< minimum distance from a surface, in multiples of the noise or the resolution
-  double jump = 3.0;          ///< minimum size of an edge, in multiples of that distance
+  double jump = 3.0;          ///< minimum size of an edge, in multiples of the minimum distance above
   double margin = 0.05;       ///< minimum distance from a surface, as a fraction of the jump
-  int support = 4;            ///< a pixel is kept if this many of its eight neighbours have its depth
+  int support = 4;            ///< a pixel is kept if at least this number of its eight neighbours have the same depth
 };
 
 /// Counts of the examined and the removed pixels.
 struct flying_pixel_count {
-  std::size_t valid = 0;    ///< pixels with a depth
+  std::size_t valid = 0;    ///< number of pixels with a depth
   std::size_t removed = 0;  ///< number of flying pixels among them
   friend bool operator==(const flying_pixel_count&, const flying_pixel_count&) = default;
 };
 
-/// Memory that successive calls can share: nothing is allocated after the first call for images of one size. Not
+/// Buffers that successive calls can share: nothing is allocated after the first call for images of one size. Not
 /// thread-safe.
 class flying_pixel_workspace {
  public:
-  /// Returns inverse depth with a border of `border` unknown pixels (NaN).
+  /// Returns the buffer for inverse depth, with a border of `border` unknown pixels (NaN).
   image_view<float> inverse(int width, int height, int border) {
     const int padded_width = width + 2 * border + lanes;
     const int padded_height = height + 2 * border;
@@ -69,7 +69,7 @@ class flying_pixel_workspace {
     counts_.assign(static_cast<std::size_t>(height), {});
     return counts_;
   }
-  static constexpr int lanes = 16;  ///< pixels tested at once
+  static constexpr int lanes = 16;  ///< number of pixels tested at once
 
  private:
   image<float> inverse_;
@@ -101,7 +101,7 @@ flying_pixel_count read_without_flying_pixels(const Policy& policy, const depth_
 
 }  // namespace detail
 
-/// Writes the depth in metres to `out`, 0 where it is missing or the pixel is flying. `out` may be the memory that
+/// Writes the depth in metres to `out`, 0 where depth is missing or the pixel is flying. `out` may be the memory that
 /// `depth` reads, if that holds metres. O(width * height); the same result for every policy and processor.
 /// @pre out is as large as depth; reach is 1 ... 8
 template <execution_policy Policy, camera::depth_source Depth>
@@ -113,7 +113,7 @@ flying_pixel_count remove_flying_pixels(const Policy& policy, const Depth& depth
                                             workspace);
 }
 
-/// Removes flying pixels as above, with temporary memory.
+/// Removes flying pixels as above, with temporary buffers.
 template <execution_policy Policy, camera::depth_source Depth>
 flying_pixel_count remove_flying_pixels(const Policy& policy, const Depth& depth, image_view<float> out,
                                         const flying_pixel_options& options = {}) {

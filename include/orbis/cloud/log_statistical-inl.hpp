@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The functions of log_statistical.hpp.
+/// Definitions of the functions in log_statistical.hpp.
 #pragma once
 
 #include <algorithm>
@@ -25,7 +25,7 @@ ORBIS_INLINE log_statistical_result log_statistical_decision(std::vector<float> 
   out.judged = values.size();
   out.threshold = options.threshold;
   if (!values.empty()) {
-    // The logarithm preserves order, so only the median itself needs one.
+    // The logarithm preserves order, so it is computed for the median only.
     float* const middle = values.data() + (values.size() - 1) / 2;
     std::nth_element(values.data(), middle, values.data() + values.size());
     out.median = std::log(double{*middle});

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Filter of points whose surroundings are sparser than usual by a factor.
+/// Removal of points whose surroundings are sparser than usual by a given factor.
 ///
 /// Mean neighbour distances are spread over orders of magnitude, with a long tail of outliers that biases mean and
 /// standard deviation. Their logarithms relative to the median are robust, and the threshold is a factor, independent
@@ -22,22 +22,22 @@ namespace orbis::cloud {
 
 struct log_statistical_options {
   std::size_t neighbors = 8;  ///< k, not counting the point itself; > 0
-  double threshold = 1.6;     ///< natural logarithm: outliers are exp(threshold) times sparser than the median
+  double threshold = 1.6;     ///< natural logarithm; outliers are over exp(threshold) times sparser than the median
   cloud::non_finite non_finite = cloud::non_finite::drop;
 };
 
-/// Decision of the filter, and the statistics it is based on.
+/// Decision of the filter, and the statistics on which it is based.
 struct log_statistical_result {
   std::vector<std::uint32_t> inliers;  ///< indices, ascending
-  std::vector<float> mean_distance;    ///< per point, metres; NaN for a non-finite or single point
-  std::size_t judged = 0;  ///< number of points with a positive, finite mean distance, which have a logarithm
-  double median = 0;       ///< median of their logarithms
-  double threshold = 0;    ///< log(mean distance) - median above this is an outlier
+  std::vector<float> mean_distance;    ///< per point, metres; NaN for non-finite points and a single point
+  std::size_t judged = 0;              ///< number of points with a positive, finite mean distance
+  double median = 0;                   ///< median of the logarithms of these distances
+  double threshold = 0;                ///< points with log(mean distance) - median above this are outliers
   double threshold_distance = std::numeric_limits<double>::infinity();  ///< the threshold as a mean distance, metres
 };
 
-/// Decides on known mean distances: see `log_statistical_inliers`. `non_finite` decides on points without one (NaN).
-/// O(n).
+/// Classifies points by known mean distances, see `log_statistical_inliers`. `non_finite` applies to points without one
+/// (NaN). O(n).
 [[nodiscard]] log_statistical_result log_statistical_decision(std::vector<float> mean_distance,
                                                               const log_statistical_options& options = {});
 

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Nearest neighbours by nanoflann's k-d tree, over any range of points, in place.
+/// Nearest-neighbour search with nanoflann's k-d tree on any range of points, without copying the points.
 ///
-/// Works with nanoflann 1.4 and later. Results go to a custom sink and the search parameters are written `{}`, which
-/// avoids the renaming of `SearchParams` in 1.5 and the changed result set interface of 1.6.
+/// Works with nanoflann 1.4 and later. Results go to a custom sink and the search parameters are passed as `{}`, so the
+/// renaming of `SearchParams` in 1.5 and the changed result set interface in 1.6 have no effect.
 #pragma once
 
 #include <algorithm>
@@ -47,26 +47,26 @@ class nanoflann_search {
   /// Number of points in the tree.
   [[nodiscard]] std::size_t size() const noexcept { return data_.kdtree_get_point_count(); }
 
-  /// Finds the `min(k, size())` points nearest to `q`, nearest first, equal distances by index. A point of the cloud
-  /// equal to `q` is found as well. If several points are at exactly the k-th distance, the choice between them is
-  /// deterministic. Can be called from several threads at once. @pre q is finite
+  /// Finds the `min(k, size())` points nearest to `q`, nearest first, then by index. A point of the cloud equal to `q`
+  /// is found as well. If several points are at exactly the k-th distance, the choice between them is deterministic.
+  /// Can be called from several threads at once. @pre q is finite
   void knn(const query& q, std::size_t k, std::vector<neighbor<scalar>>& out) const {
     out.clear();
     if (k != 0) find(q, nearest_sink{k, out}, out);
   }
-  /// Finds all points within `r` metres of `q`, the border included, nearest first. @pre q is finite, r >= 0
+  /// Finds all points at most `r` metres from `q`, nearest first. @pre q is finite, r >= 0
   void radius(const query& q, scalar r, std::vector<neighbor<scalar>>& out) const {
     out.clear();
     find(q, radius_sink{r * r, out}, out);
   }
 
  private:
-  /// Keeps the `k` nearest points added, with squared distances, in a max-heap. @pre k > 0
+  /// Keeps the `k` nearest of the added points, with squared distances, in a max-heap. @pre k > 0
   struct nearest_sink {
     std::size_t k;
     std::vector<neighbor<scalar>>& out;
 
-    /// Squared distance beyond which points need not be added.
+    /// Squared distance above which points need not be added.
     [[nodiscard]] scalar bound_squared() const noexcept {
       return out.size() < k ? std::numeric_limits<scalar>::infinity() : out.front().distance;
     }

@@ -16,7 +16,7 @@ struct neighbor {
   friend bool operator==(const neighbor&, const neighbor&) = default;
 };
 
-/// Order of neighbours in results: nearest first, equal distances by index.
+/// Order of neighbours in results: nearest first, then by index.
 template <std::floating_point S>
 [[nodiscard]] constexpr bool is_nearer(const neighbor<S>& a, const neighbor<S>& b) noexcept {
   return a.distance < b.distance || (a.distance == b.distance && a.index < b.index);

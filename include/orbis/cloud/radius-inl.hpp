@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The functions of radius.hpp.
+/// Definitions of the functions in radius.hpp.
 #pragma once
 
 #include <algorithm>
@@ -19,7 +19,7 @@ namespace orbis::cloud {
 
 namespace detail {
 
-/// Decides for the points of one leaf at a time if enough points lie within a radius.
+/// Decides, one leaf at a time, whether enough points lie within a radius of each point of the leaf.
 class crowd_search {
  public:
   /// `enough`: minimum number of points, including the point itself.
@@ -37,7 +37,7 @@ class crowd_search {
   void visit_leaf(std::size_t l, F&& f) {
     const std::size_t size = tree_->leaf_size(l);
     const box3 box = tree_->levels[0][l / leaf_width].child(l % leaf_width);
-    // No two points of a box are further apart than its corners, also after rounding.
+    // No two points of a box are further apart than its corners, even after rounding.
     const bool all_near = squared_distance(box.low, box.high) <= bound_;
     bool gathered = false;
     bool usable = !found_.empty();
@@ -70,7 +70,7 @@ class crowd_search {
   [[nodiscard]] std::size_t within(std::size_t l, const std::array<float, 3>& q) const {
     std::array<float, leaf_width> distance;
     const std::uint32_t mask = kernels_.distances(tree_->leaves[l], q, bound_, distance.data());
-    const std::uint32_t there = (1U << tree_->leaf_size(l)) - 1;  // masks padding if the bound is infinite
+    const std::uint32_t there = (1U << tree_->leaf_size(l)) - 1;  // masks out the padding if the bound is infinite
     return static_cast<std::size_t>(std::popcount(mask & there));
   }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Radius outlier removal: filter of points with too few neighbours within a radius.
+/// Radius outlier removal: removes points with too few neighbours within a radius.
 #pragma once
 
 #include <cassert>
@@ -16,7 +16,7 @@
 namespace orbis::cloud {
 
 struct radius_options {
-  double radius = 0.05;           ///< metres, the border included; >= 0
+  double radius = 0.05;           ///< metres, inclusive; >= 0
   std::size_t min_neighbors = 5;  ///< not counting the point itself
   cloud::non_finite non_finite = cloud::non_finite::drop;
 };
@@ -31,7 +31,7 @@ template <execution_policy Policy>
 }  // namespace detail
 
 /// Returns the indices, ascending, of the points with at least `min_neighbors` other points within `radius`. O(n (log n
-/// + min_neighbors)), also with many identical points; the same result for every policy and processor. Coordinates are
+/// + min_neighbors)), even with many identical points; the same result for every policy and processor. Coordinates are
 /// converted to float; squared distances are computed in float.
 /// @pre radius >= 0, fewer than 2^32 points
 template <execution_policy Policy, point_range Points>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The functions of ray_evidence.hpp.
+/// Definitions of the functions in ray_evidence.hpp.
 #pragma once
 
 #include <ranges>

@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Ray evidence: filter of points that depth rays of other views pass through.
+/// Ray evidence: removal of points that depth rays of other views pass through.
 ///
 /// Points left by a moving object, a wrong pose or a stray measurement can be as dense and as smooth as any surface; a
-/// filter that uses only the points cannot detect them. The depth images can: a measurement means that there is a
-/// surface at its end and free space before it. The same idea carves space in occupancy grids (A. Elfes, 1989) and
-/// checks multi-view stereo for violations of free space (P. Merrell et al., "Real-time visibility-based fusion of
-/// depth maps", ICCV 2007).
+/// filter that uses only the points cannot detect them. Depth images can: a measurement indicates a surface at the end
+/// of its ray and free space before it. The same idea carves space in occupancy grids (A. Elfes, 1989) and checks
+/// multi-view stereo for violations of free space (P. Merrell et al., "Real-time visibility-based fusion of depth
+/// maps", ICCV 2007).
 ///
-/// Users of orbis::compiled that call `ray_evidence_scores` or `ray_evidence_inliers` include ray_evidence-inl.hpp.
+/// Users of orbis::compiled that call `ray_evidence_scores` or `ray_evidence_inliers` must include
+/// ray_evidence-inl.hpp.
 #pragma once
 
 #include <cstddef>
@@ -27,16 +28,17 @@ namespace orbis::cloud {
 /// Let a point be at depth z in a view, m = margin + margin_growth z^2, and consider the depths in the window around
 /// its pixel. The view passes *through* the point if every pixel of the window has a depth and the nearest exceeds z by
 /// more than m + slant (farthest - nearest). It *supports* the point if the nearest, the farthest or the middle depth
-/// is within m of z. Otherwise it gives no evidence. The view that measured the point, if among `views`, supports it.
+/// is within m of z. Otherwise it provides no evidence. The view that measured the point, if among `views`, supports
+/// it.
 ///
-/// Since rays end at the first surface, this detects only the front one of two surfaces that exclude each other. With
-/// `resolve_ghosts` every view is therefore read a second time, part by part: if its rays pass through points with more
-/// support than the points at which they end, for example because its pose is wrong, that part of the view does not
-/// count (`ray_evidence_counter::review`).
+/// Since rays end at the first surface, this detects only the front one of two mutually exclusive surfaces. With
+/// `resolve_ghosts` every view is therefore read a second time, part by part: if the rays of a part pass through points
+/// with more support than the points at which they end, for example because the pose of the view is wrong, that part
+/// does not count (`ray_evidence_counter::review`).
 ///
 /// Non-finite points get no counts; views with a non-finite pose contribute none. The counts are the same under every
-/// policy. `on_progress` is called after each view of each round; if it cancels, the counts up to then are returned.
-/// O(views (pixels + points in the frustum)); 28 bytes per point.
+/// policy. `on_progress` is called after each view of each round; if it cancels, the counts so far are returned.
+/// O(views (pixels + points in the frustum)). Memory: 28 bytes per point.
 /// @pre views' images have the camera's size; fewer than 2^32 points
 template <execution_policy Policy, point_range Points, posed_depth_range Views, camera::camera_model Camera>
 [[nodiscard]] std::vector<ray_evidence> ray_evidence_scores(const Policy& policy, const Points& points,
@@ -44,7 +46,7 @@ template <execution_policy Policy, point_range Points, posed_depth_range Views, 
                                                             const ray_evidence_options& options = {},
                                                             progress on_progress = {});
 
-/// Decision of the filter, and the counts it is based on.
+/// Decision of the filter, and the counts on which it is based.
 struct ray_evidence_result {
   std::vector<std::uint32_t> inliers;  ///< indices, ascending
   std::vector<ray_evidence> scores;    ///< per point
@@ -57,7 +59,7 @@ struct ray_evidence_result {
   return against >= options.min_through && against > options.ratio * e.supported;
 }
 
-/// Decides on known counts. Points without counts are inliers. O(n).
+/// Classifies points by known counts. Points without counts are inliers. O(n).
 [[nodiscard]] ray_evidence_result ray_evidence_decision(std::vector<ray_evidence> scores,
                                                         const ray_evidence_options& options = {});
 

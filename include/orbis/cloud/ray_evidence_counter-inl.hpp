@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The functions of ray_evidence_counter.hpp.
+/// Definitions of the functions in ray_evidence_counter.hpp.
 #pragma once
 
 #include <atomic>
@@ -15,8 +15,8 @@
 namespace orbis::cloud {
 namespace detail {
 
-/// Copies the finite points into blocks in the order of `leaf_order`. O(n), 16 bytes per point, also during the call;
-/// the same result for every policy. Coordinates are converted to float. @pre fewer than 2^32 points
+/// Copies the finite points into blocks in the order of `leaf_order`. O(n), 16 bytes per point, including temporary
+/// memory; the same result for every policy. Coordinates are converted to float. @pre fewer than 2^32 points
 template <execution_policy Policy>
 [[nodiscard]] point_blocks make_point_blocks(const Policy& policy, const point_view& points) {
   constexpr std::size_t size = point_blocks::block_size;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
 /// Incremental counting, view by view, of rays that pass through the points of a cloud and rays that end there; the
-/// input of the decision in `ray_evidence.hpp`. Users of orbis::compiled include ray_evidence_counter-inl.hpp.
+/// input of the decision in `ray_evidence.hpp`. Users of orbis::compiled must include ray_evidence_counter-inl.hpp.
 #pragma once
 
 #include <algorithm>
@@ -39,23 +39,23 @@ template <class R>
 concept posed_depth_range =
     std::ranges::forward_range<R> && std::ranges::sized_range<R> && posed_depth<std::ranges::range_value_t<R>>;
 
-/// Options of counting and of the decision.
+/// Options for counting rays and for the decision.
 struct ray_evidence_options {
   int window = 1;                ///< radius in pixels of the window of depths around a pixel; >= 0
   float margin = 0.02F;          ///< allowance for noise and small pose errors, metres:
   float margin_growth = 0.005F;  ///< margin + margin_growth z^2 at depth z; 1 / metres
   float slant = 1.0F;      ///< fraction of the window's depth range added to the margin for rays that pass through
-  float min_depth = 0.0F;  ///< a view gives no evidence on points at or below this depth, metres
-  float max_depth = std::numeric_limits<float>::max();  ///< nor those beyond this
-  bool resolve_ghosts = true;  ///< read the views a second time to find parts that most others contradict
-  float ghost_reach = 0.3F;    ///< maximum distance in front of a measurement of a surface that contradicts it, metres
+  float min_depth = 0.0F;  ///< a view provides no evidence on points at or below this depth, metres
+  float max_depth = std::numeric_limits<float>::max();  ///< nor on points beyond this depth, metres
+  bool resolve_ghosts = true;     ///< read the views a second time to find parts that most other views contradict
+  float ghost_reach = 0.3F;       ///< maximum distance of a contradicting surface in front of a measurement, metres
   std::uint16_t min_through = 2;  ///< an outlier has at least this many views against it,
-  double ratio = 1.0;             ///< and more than this multiple of the views that support it
+  double ratio = 1.0;             ///< and more than this factor times the number of views that support it
 };
 
 /// Counts for one point: views whose rays pass through it, views that measured a surface at it, and views whose support
-/// was refuted by the others. All other views do not see the point, or see a surface in front of it. Counts saturate at
-/// 65535.
+/// was refuted by the others. The remaining views do not see the point or see a surface in front of it. Counts saturate
+/// at 65535.
 struct ray_evidence {
   std::uint16_t through = 0;
   std::uint16_t supported = 0;
@@ -63,7 +63,7 @@ struct ray_evidence {
   friend bool operator==(const ray_evidence&, const ray_evidence&) = default;
 };
 
-/// Counts of a cloud's points, updated view by view, for growing maps. Holds a copy of the finite points, in blocks.
+/// Ray evidence counts for a cloud's points, updated view by view, for growing maps. Holds a copy of the finite points.
 template <camera::camera_model Camera>
 class ray_evidence_counter {
  public:
@@ -86,14 +86,14 @@ class ray_evidence_counter {
   template <execution_policy Policy>
   void add(const Policy& policy, const detail::depth_windows& windows, const se3& T_world_camera);
   /// Subtracts the counts of a view. O(pixels + points in front of the camera).
-  /// @pre it was added, and not removed since; fewer than 65536 views were added; there was no review
+  /// @pre the view was added and has not been removed since; fewer than 65536 views were added; there was no review
   template <execution_policy Policy, posed_depth View>
   void remove(const Policy& policy, const View& view);
 
   /// Finds the parts of a view that the others contradict, and discards their counts. Call it once for each view after
   /// all were added. Parts are tiles of `tile_size` pixels a side. A tile is contradicted if its rays pass through
   /// points, at most `ghost_reach` before their ends, that together have at least 1.5 times the support of the points
-  /// that the tile itself supports (its own support not counted). Its evidence no longer counts, and the points it
+  /// that the tile itself supports (excluding its own support). Its evidence no longer counts, and the points it
   /// supports are refuted. O(pixels + points in front of the camera).
   template <execution_policy Policy, posed_depth View>
   void review(const Policy& policy, const View& view);
@@ -114,8 +114,8 @@ class ray_evidence_counter {
     return static_cast<std::uint16_t>(a > b ? a - b : 0);
   }
 
-  /// Calls `f(first, seen, verdict)` for the blocks for which the view may have evidence; `first` is the place of the
-  /// block's first point.
+  /// Calls `f(first, seen, verdict)` for the blocks for which the view may have evidence; `first` is the position of
+  /// the block's first point.
   template <execution_policy Policy, class F>
   void for_each_seen_block(const Policy& policy, const detail::ray_view& view, F&& f);
 
@@ -125,7 +125,7 @@ class ray_evidence_counter {
   detail::point_blocks blocks_;
   std::vector<std::uint16_t> through_;  ///< in the order of the blocks
   std::vector<std::uint16_t> supported_;
-  std::vector<std::uint16_t> through_dropped_;  ///< of the contradicted parts of views; empty before the first review
+  std::vector<std::uint16_t> through_dropped_;  ///< from contradicted parts of views; empty before the first review
   std::vector<std::uint16_t> refuted_;
   detail::depth_windows windows_;
   detail::block_test<Camera> test_;

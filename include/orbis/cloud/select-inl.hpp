@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The functions of select.hpp.
+/// Definitions of the functions in select.hpp.
 #pragma once
 
 #include <algorithm>
@@ -76,7 +76,7 @@ automatic_result choose_and_filter(const Policy& policy, const point_view& point
   }
   if (choice.evidence.judged < enough) {
     if (reasons.empty())
-      reasons.push_back(joined({"too few points (", std::to_string(choice.evidence.judged), ") to judge"}));
+      reasons.push_back(joined({"too few points (", std::to_string(choice.evidence.judged), ") to evaluate"}));
     choice.reason = reasons.front();
   } else {
     judge_points(policy, around, options, choice, reasons);
@@ -89,7 +89,7 @@ automatic_result choose_and_filter(const Policy& policy, const point_view& point
   return out;
 }
 
-/// Wraps a function object as the `view_judge` of a choice.
+/// Wraps a function object as a `view_judge`.
 template <class F>
 [[nodiscard]] view_judge make_view_judge(const F& judge) {
   return {&judge,

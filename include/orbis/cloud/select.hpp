@@ -8,12 +8,12 @@
 ///    value for all points, a line over the logarithm of the range (a depth camera's points thin out with range), or,
 ///    for clouds of uneven density, the value of the surroundings. Outliers appear as a second population of points
 ///    that lie on no surface; the threshold is placed in the valley before it. Without such a population, only points
-///    far outside the bulk are removed: a clean cloud stays as it is.
-/// 3. *Connection*: isolated groups of a few points, and small clusters far from the surface.
+///    far outside the bulk are removed, so that a clean cloud does not change.
+/// 3. *Connectivity*: isolated groups of a few points and small clusters far from the surface are removed.
 ///
 /// A step is part of the chosen chain only if it removes points.
 ///
-/// The library orbis::compiled contains the part that uses points alone; callers with views include select-inl.hpp.
+/// The library orbis::compiled contains the selection from points alone; to pass views, include select-inl.hpp.
 #pragma once
 
 #include <cassert>
@@ -34,7 +34,7 @@
 
 namespace orbis::cloud {
 
-/// Indices of the inliers, ascending, and the choice that led to them.
+/// Indices of the inliers, ascending, and the filters that selected them.
 struct automatic_result {
   std::vector<std::uint32_t> inliers;
   filter_choice choice;
@@ -45,7 +45,7 @@ namespace detail {
 /// Type-erased callback that evaluates points against views. Returns false if cancelled.
 struct view_judge {
   const void* context = nullptr;
-  /// Clears `left` for the points that the views exclude, and adds a step and its reason; null without views.
+  /// Sets `left` to 0 for the points that the views exclude, and adds a step and its reason; null without views.
   bool (*run)(const void* context, std::span<char> left, filter_choice& choice,
               std::vector<std::string>& reasons) = nullptr;
 };
@@ -73,14 +73,14 @@ struct known_ranges {
 
 }  // namespace detail
 
-/// Selects filters from the points and from the depth images that the cloud was made from, or that show the same place.
-/// Returns the points that the chosen filters keep. The images detect false points in front of their measurements, such
-/// as moving objects or the effect of wrong poses, which do not show in the density.
+/// Selects filters from the points and from depth images, from which the cloud was built or which show the same scene.
+/// Returns the points that the chosen filters keep. The images reveal false points in front of their measurements, such
+/// as points on moving objects or from wrong poses, which the density does not reveal.
 ///
 /// Deterministic and the same for every policy. `on_progress` counts the views; if it cancels, the chain is empty, the
-/// reason is "cancelled", and all points stay. O(n log n + views (pixels + n)).
-/// @pre neighbors > 0; ranges is empty or as long as points; views' images have the camera's size; samples, if there
-/// are any, are of these views
+/// reason is "cancelled", and all points are kept. O(n log n + views (pixels + n)).
+/// @pre neighbors > 0; ranges is empty or as long as points; views' images have the camera's size; samples, if given,
+/// are from these views
 template <execution_policy Policy, point_range Points, posed_depth_range Views, camera::camera_model Camera>
 [[nodiscard]] automatic_result filter_automatically(const Policy& policy, const Points& points, const Views& views,
                                                     const Camera& camera, const select_options& options = {},
@@ -98,7 +98,7 @@ template <execution_policy Policy, point_range Points>
                                    detail::known_ranges{threads, points, options}.all, options, {});
 }
 
-/// Selects filters: `filter_automatically` without the inliers.
+/// Selects filters as `filter_automatically` does, but does not compute the inliers.
 template <execution_policy Policy, point_range Points>
 [[nodiscard]] filter_choice select_filter(const Policy& policy, const Points& points,
                                           const select_options& options = {}) {

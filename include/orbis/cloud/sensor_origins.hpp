@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Sensor positions of a cloud's points.
+/// Positions of the sensors that measured the points of a cloud.
 #pragma once
 
 #include <cassert>
@@ -22,7 +22,7 @@
 namespace orbis::cloud {
 
 /// Additional properties of a cloud type: a customisation point whose primary template is empty. A specialisation may
-/// define `static std::optional<vec3> sensor_origin(const C&)`, the position from which all its points were seen,
+/// define `static std::optional<vec3> sensor_origin(const C&)`, the position from which all its points were measured,
 /// metres, in the frame of the points.
 template <class C>
 struct cloud_traits {};
@@ -34,13 +34,13 @@ concept cloud_with_sensor_origin = requires(const std::remove_cvref_t<C>& cloud)
 };
 
 /// Sensor origin of a cloud, in the frame of its points. The most specific source is used: `ranges`, else `common`,
-/// else the origin stated by the cloud itself (`cloud_traits`).
+/// else the origin that the cloud itself specifies (`cloud_traits`).
 struct sensor_origins {
   std::optional<vec3> common{};     ///< origin of all points, metres
   std::span<const float> ranges{};  ///< distance of each point from its sensor, metres; empty or as long as the cloud
 };
 
-/// Returns the origin stated by a cloud itself.
+/// Returns the origin that a cloud itself specifies.
 template <class C>
 [[nodiscard]] std::optional<vec3> stated_sensor_origin([[maybe_unused]] const C& cloud) {
   if constexpr (cloud_with_sensor_origin<C>) {
@@ -50,8 +50,9 @@ template <class C>
   }
 }
 
-/// Computes for each point its distance in metres from its sensor. NaN if that is unknown, and for non-finite points,
-/// origins or given ranges and for negative ranges. O(n); the same result for every policy.
+/// Computes for each point its distance in metres from its sensor. The result is NaN if the distance is unknown, if the
+/// point, origin or given range is not finite, or if the given range is negative. O(n); the same result for every
+/// policy.
 /// @pre `ranges` of `origins` is empty or as long as `points`
 template <execution_policy Policy, point_range Points>
 [[nodiscard]] std::vector<float> sensor_ranges(const Policy& policy, const Points& points,

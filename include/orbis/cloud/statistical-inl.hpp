@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The functions of statistical.hpp.
+/// Definitions of the functions in statistical.hpp.
 #pragma once
 
 #include <algorithm>
@@ -23,7 +23,7 @@ ORBIS_INLINE statistical_result statistical_decision(std::vector<float> mean_dis
   for (const float d : mean_distance) {
     if (std::isnan(d)) continue;
     sum += d;
-    sum_of_squares += d * d;  // a float product, as in PCL's definition
+    sum_of_squares += d * d;  // a float product, as in PCL
     ++n;
   }
   statistical_result out;
@@ -61,12 +61,12 @@ ORBIS_INLINE range_statistical_result range_statistical_decision(std::span<const
   if (out.judged > 0) {
     const auto count = static_cast<double>(out.judged);
     out.mean = sum / count;
-    double squares = 0;  // deviations from the mean: no cancellation
+    double squares = 0;  // from deviations from the mean, to avoid cancellation
     for (const float u : out.normalised) {
       if (std::isfinite(u)) squares += (u - out.mean) * (u - out.mean);
     }
     if (out.judged > 1) out.standard_deviation = std::sqrt(squares / (count - 1));
-    constexpr double rounding = 1 + 0x1p-20;  // rounding of the scores: equal ones are all inliers
+    constexpr double rounding = 1 + 0x1p-20;  // allows for rounding of the scores, so that equal scores are all inliers
     out.threshold = out.mean * rounding + options.sigma_multiplier * out.standard_deviation;
   }
   out.inliers = detail::indices_where(mean_distance.size(), [&](std::size_t i) {

@@ -21,7 +21,7 @@ namespace orbis::cloud {
 
 namespace detail {
 
-/// Depths of the eight pixels around a pixel; opposite ones are at i and 7 - i; 0 outside the image.
+/// Depths of the eight pixels around a pixel, 0 outside the image; opposite pixels are at i and 7 - i.
 template <camera::depth_source Depth>
 [[nodiscard]] std::array<float, 8> depths_around(const Depth& depth, int x, int y) {
   std::array<float, 8> out{};
@@ -37,13 +37,13 @@ template <camera::depth_source Depth>
   return out;
 }
 
-/// Returns true if two of the surrounding pixels agree with depth `z`, or if the mean of two opposite ones does. The
-/// mean is needed because on a surface seen at a grazing angle no two pixels have the same depth.
+/// Returns true if at least two of the surrounding pixels agree with depth `z`, or if the mean of two opposite ones
+/// does. The mean is needed because on a surface seen at a grazing angle no two pixels have the same depth.
 [[nodiscard]] inline bool agrees_with_neighbors(float z, const std::array<float, 8>& around, float margin) noexcept {
   int agree = 0;
   for (const float other : around) agree += other > 0 && std::abs(other - z) <= margin ? 1 : 0;
   if (agree >= 2) return true;
-  constexpr float widest = 0.15F;  // part of z; opposite pixels further apart lie on two surfaces
+  constexpr float widest = 0.15F;  // fraction of z; opposite pixels further apart lie on two surfaces
   for (std::size_t i = 0; i != 4; ++i) {
     const float a = around[i];
     const float b = around[7 - i];
@@ -54,12 +54,12 @@ template <camera::depth_source Depth>
 
 }  // namespace detail
 
-/// Measurements of views as world points, from a grid over each image, without stray pixels. Callers that already
-/// iterate over the views before a cloud is filtered can draw the samples then: see select_options::samples. 16 bytes
-/// per sample, at most `across * across` samples per view.
+/// Measurements of views as world points, sampled on a grid over each image, excluding stray pixels. Callers that
+/// iterate over the views before a cloud is filtered can draw the samples in the same pass, see
+/// select_options::samples. Memory: 16 bytes per sample, at most `across * across` samples per view.
 class view_samples {
  public:
-  static constexpr std::uint32_t tiles = 4;  ///< tiles of each image, across and down
+  static constexpr std::uint32_t tiles = 4;  ///< number of tiles of each image along either axis
 
   /// Two depths agree if they differ by at most `margin + margin_growth z^2` (see ray_evidence_options). @pre across >
   /// 0
@@ -90,14 +90,14 @@ class view_samples {
       }
     }
   }
-  /// Adds a view without samples.
+  /// Adds a view but draws no samples.
   void skip() noexcept { ++views_; }
 
   /// Number of views that were added or skipped.
   [[nodiscard]] std::uint32_t views() const noexcept { return views_; }
-  /// Sampled points in the world, metres, in the order of the views.
+  /// Sampled points in the world frame, metres, in the order of the views.
   [[nodiscard]] const std::vector<vec3f>& points() const noexcept { return points_; }
-  /// For each point, the number of its view times tiles^2, plus the tile of the image.
+  /// For each point, the index of its view times tiles^2, plus the index of the tile in the image.
   [[nodiscard]] std::span<const std::uint32_t> tiles_by_point() const noexcept { return tile_; }
   [[deprecated("use tiles_by_point")]] [[nodiscard]] std::span<const std::uint32_t> tile_of() const noexcept {
     return tile_;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The functions of voxel_grid.hpp.
+/// Definitions of the functions in voxel_grid.hpp.
 #pragma once
 
 #include <orbis/cloud/detail/voxels/fold_voxels.hpp>

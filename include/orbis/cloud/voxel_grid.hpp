@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// One point for each occupied voxel.
+/// Downsampling to one point per occupied voxel.
 #pragma once
 
 #include <cassert>
@@ -18,12 +18,12 @@
 namespace orbis::cloud {
 
 struct voxel_grid_options {
-  double size = 0.01;  ///< edge of a voxel, metres; > 0
+  double size = 0.01;  ///< edge length of a voxel, metres; > 0
 };
 
 namespace detail {
 
-/// Number type for computing cells: double represents all coordinates that a cloud can have.
+/// Scalar type for computing cells: float for float coordinates, otherwise double.
 template <point_range Points>
 using voxel_scalar =
     std::conditional_t<std::is_same_v<point_scalar_t<std::ranges::range_value_t<Points>>, float>, float, double>;
@@ -38,7 +38,7 @@ template <execution_policy Policy, std::floating_point S>
 /// Returns one point for each occupied voxel, in the order in which the voxels first occur: the centroid of its points,
 /// with the mean of their colours if `colors` is not empty. The result is the same for every policy. Skips non-finite
 /// points and points more than 2^31 voxels from the origin. O(n). Temporary memory: about 20 bytes per point, 25 with
-/// colours, and 25 MB; on one thread and for at most 2^17 points only the 25 MB.
+/// colours, and 25 MB; only the 25 MB for at most 2^17 points on one thread.
 ///
 /// Coordinates are summed in double in the order of the points. If many voxels are occupied, the points are first
 /// partitioned so that the voxels of each part fit into the cache.

@@ -4,8 +4,8 @@
 ///
 /// All sums are integers: the position of a measurement in its voxel in units of 1/1024 of the edge, its colour, and
 /// its range in millimetres. Such sums do not depend on the order of addition, and subtraction is exact. The surfaces
-/// that depth cameras see are thin, so voxels are stored in bricks of 8^3, each with the sums of its occupied voxels
-/// only.
+/// that depth cameras see are thin, so voxels are stored in bricks of 8^3 voxels, each of which holds sums for its
+/// occupied voxels only.
 #pragma once
 
 #include <algorithm>
@@ -35,7 +35,7 @@ namespace orbis::cloud {
 
 namespace detail {
 
-/// A position in a grid of bricks.
+/// Position of a measurement in a grid of bricks.
 struct brick_place {
   voxel_key brick;
   std::uint16_t cell;                   ///< x + 8 y + 64 z
@@ -65,8 +65,8 @@ struct brick_place {
 
 }  // namespace detail
 
-/// Measurements grouped into runs, each within one brick, as input of `voxel_sums`; a part of a larger set. Its memory
-/// is reused.
+/// A part of a set of measurements, grouped into runs within one brick each, as input for `voxel_sums`. Reuses its
+/// memory.
 class voxel_measurements {
  public:
   /// @pre size > 0, metres
@@ -78,7 +78,7 @@ class voxel_measurements {
     without_voxel_ = 0;
   }
   /// Adds a measurement (world frame, metres) with the distance in metres from which it was made. Non-finite
-  /// measurements, and those more than 2^31 voxels from the origin, have no voxel and are only counted.
+  /// measurements, and those more than 2^31 voxels from the origin, have no voxel; they are counted but not stored.
   void push(const vec3& point, const rgb8& color, float range) {
     detail::brick_place at;
     if (!detail::locate(point, steps_per_metre_, at)) {
@@ -117,7 +117,7 @@ class voxel_measurements {
 };
 
 /// The mean of the measurements in each voxel. It depends only on the measurements added and not yet removed, not on
-/// their order, the number of threads or the history. About 50 bytes per voxel.
+/// their order, the number of threads or earlier measurements. About 50 bytes per voxel.
 class voxel_sums {
   [[nodiscard]] auto key_by_number() const {
     return [this](std::uint32_t number) -> const detail::voxel_key& { return bricks_[number].key; };
@@ -133,7 +133,7 @@ class voxel_sums {
     apply<true>(policy, parts);
   }
   /// Removes measurements that were added. Frees voxels without measurements and bricks without voxels. O(n). @pre they
-  /// were added, and not removed since; not after `finish`
+  /// were added and have not been removed since; not after `finish`
   template <execution_policy Policy>
   void remove(const Policy& policy, std::span<voxel_measurements> parts) {
     apply<false>(policy, parts);
@@ -158,13 +158,13 @@ class voxel_sums {
     return bytes;
   }
 
-  /// Place of every voxel in the order of `cloud`: by brick, then by voxel, along z, y, x. Valid until the next change.
-  /// O(bricks log bricks).
+  /// Position of every voxel in the order of `cloud`: sorted by brick, then by voxel, along z, y, x. Valid until the
+  /// next change. O(bricks log bricks).
   class order {
    private:
     friend class voxel_sums;
-    std::vector<std::uint32_t> bricks_;  ///< numbers, in order
-    std::vector<std::size_t> first_;     ///< per brick number, the place of its first voxel
+    std::vector<std::uint32_t> bricks_;  ///< brick indices, in order
+    std::vector<std::size_t> first_;     ///< per brick index, the position of its first voxel
   };
   [[nodiscard]] order in_order() const {
     order out;
@@ -189,7 +189,7 @@ class voxel_sums {
   class choice {
    public:
     choice() = default;
-    /// Looks up points one after the other; fast if most lie in the same brick as the previous one.
+    /// Looks up points one after the other; fast if most points are in the same brick as the previous one.
     class reader {
      public:
       explicit reader(const choice& of) noexcept : of_{&of} {}
@@ -211,13 +211,13 @@ class voxel_sums {
       const choice* of_;
       bool asked_ = false;
       detail::voxel_key brick_{};  ///< of the last point
-      std::uint32_t number_ = 0;   ///< number of that brick
+      std::uint32_t number_ = 0;   ///< index of that brick
     };
 
    private:
     friend class voxel_sums;
     const voxel_sums* sums_ = nullptr;
-    std::vector<std::array<std::uint64_t, 8>> chosen_;  ///< by brick number, one bit per cell
+    std::vector<std::array<std::uint64_t, 8>> chosen_;  ///< by brick index, one bit per cell
   };
   /// Creates a subset. `chosen`: per voxel, in the order of `cloud`, nonzero if it is chosen. O(voxels + bricks log
   /// bricks).
@@ -244,7 +244,7 @@ class voxel_sums {
     for_each_voxel(
         policy, places, [&](std::size_t place, const detail::voxel_key& voxel, const detail::voxel_sum& sum) {
           for (std::size_t a = 0; a != 3; ++a) {
-            // An offset represents the middle of its 1/1024.
+            // An offset represents the middle of an interval of 1/1024 of the edge.
             const double within = (sum.offset[a] / static_cast<double>(sum.count) + 0.5) / 1024.0;
             out.points[place][static_cast<Eigen::Index>(a)] = static_cast<float>((voxel[a] + within) * size_);
           }
@@ -289,7 +289,7 @@ class voxel_sums {
     });
   }
 
-  /// Returns the number of the brick with this key; adds the brick if it does not exist.
+  /// Returns the index of the brick with this key; adds the brick if it does not exist.
   std::uint32_t brick_at(const detail::voxel_key& key) {
     const auto number = free_.empty() ? static_cast<std::uint32_t>(bricks_.size()) : free_.back();
     if (const std::uint32_t found = index_.find_or_insert(key, number, key_by_number()); found != number) return found;
@@ -359,11 +359,11 @@ class voxel_sums {
     std::uint32_t next;  ///< next run of the same brick
   };
   double size_;
-  bool finished_ = false;  ///< the sums were freed
+  bool finished_ = false;  ///< true if the sums were freed
   std::size_t occupied_ = 0;
   std::vector<brick> bricks_;
-  std::vector<std::uint32_t> free_;                                ///< numbers of unused bricks
-  number_index<detail::voxel_key, detail::voxel_key_hash> index_;  ///< numbers of the bricks by key
+  std::vector<std::uint32_t> free_;                                ///< indices of unused bricks
+  number_index<detail::voxel_key, detail::voxel_key_hash> index_;  ///< brick indices by key
   std::vector<std::uint32_t> touched_;                             ///< scratch memory, reused
   std::vector<chained_run> chained_;
 };

@@ -20,7 +20,7 @@
 
 namespace orbis::cloud::detail {
 
-/// Converts any policy to the one for which algorithms are compiled; the result is the same for all policies.
+/// Converts any policy to the policy type for which algorithms are compiled; results are the same for all policies.
 template <execution_policy Policy>
 [[nodiscard]] parallel_policy as_parallel(const Policy& policy) noexcept(noexcept(policy.threads())) {
   if constexpr (std::same_as<Policy, parallel_policy>)
@@ -61,13 +61,13 @@ class basic_point_view {
 
 using point_view = basic_point_view<float>;
 
-/// A point type that stores its coordinates itself, not a pointer to them.
+/// A point type that stores its coordinates directly, not through a pointer.
 template <class P>
 concept indexed_storage = std::is_bounded_array_v<P> || requires {
   std::tuple_size<P>::value;
 } ||(requires { P::SizeAtCompileTime; } && std::same_as<P, typename P::PlainObject>);
 
-/// Addresses of a point's coordinates; null if it computes them or stores another number type.
+/// Addresses of a point's coordinates; null if the point computes them or stores another number type.
 template <std::floating_point S, point_like P>
 [[nodiscard]] std::array<const S*, 3> stored_coordinates(const P& p) noexcept {
   if constexpr (requires { typename point_traits<P>::is_default; }) {
@@ -86,8 +86,8 @@ template <std::floating_point S, point_like P>
   return {};
 }
 
-/// Adapts a user's points to `basic_point_view`: in place if they store numbers of type `S` contiguously, otherwise
-/// copied (12 bytes per point for float).
+/// Adapts a user's points to `basic_point_view`: in place if they store numbers of type `S` contiguously, otherwise as
+/// a copy (12 bytes per point for float).
 template <std::floating_point S>
 class basic_viewed_points {
  public:
@@ -114,8 +114,8 @@ class basic_viewed_points {
   [[nodiscard]] operator const basic_point_view<S>&() const noexcept { return view_; }
 
  private:
-  /// Returns true if the coordinates exist and are inside the point itself. Those of a packed struct, for example,
-  /// would be copies.
+  /// Returns true if the coordinates exist and are stored inside the point. The coordinates of a packed struct, for
+  /// example, would be copies.
   template <class P>
   [[nodiscard]] static bool holds_coordinates(const P& point, const std::array<const S*, 3>& axis) noexcept {
     const auto begin = reinterpret_cast<std::uintptr_t>(std::addressof(point));

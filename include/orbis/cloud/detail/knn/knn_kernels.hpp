@@ -3,7 +3,7 @@
 /// Inner loops of the all-points neighbour search.
 ///
 /// Distances to boxes are computed by the same operations in the same order as distances to points. Rounding is
-/// monotonic, so the distance to a box never exceeds that to a point in it, and no neighbour is lost by rounding.
+/// monotonic, so the distance to a box never exceeds that to a point in the box, and rounding loses no neighbour.
 #pragma once
 
 #include <array>
@@ -22,9 +22,9 @@
 
 namespace orbis::cloud::detail {
 
-/// Allocates at cache-line boundaries. On many processors, a stored register that straddles two cache lines cannot be
-/// read again until it has reached the cache. Rows whose first registers are read soon after writing therefore begin at
-/// a cache line.
+/// Allocates at cache-line boundaries. On many processors, a stored vector that straddles two cache lines cannot be
+/// read again until it has reached the cache. Rows whose first vectors are read soon after they are written therefore
+/// begin at a cache line.
 template <class T>
 struct line_allocator {
   using value_type = T;
@@ -68,7 +68,7 @@ struct nearby_leaves {
   [[nodiscard]] bool has_room() const noexcept { return count + 2 * leaf_width <= stride; }
   /// Returns sixteen boxes. @pre first is a multiple of sixteen
   [[nodiscard]] box_axes row(std::size_t first) const noexcept { return {boxes.data() + first, stride}; }
-  /// Fills the last row up with boxes at infinity.
+  /// Pads the last row with boxes at infinity.
   void finish() noexcept {
     constexpr float inf = std::numeric_limits<float>::infinity();
     for (std::size_t i = count; i % leaf_width != 0; ++i) {
@@ -80,13 +80,13 @@ struct nearby_leaves {
   }
 };
 
-/// Partial result on the `wanted` smallest of some squared distances.
+/// Partial result for the `wanted` smallest of some squared distances.
 struct nearest_sum {
-  double roots = 0;           ///< sum of their roots, up to `roots_slack`; negative if unknown
+  double roots = 0;           ///< sum of the roots, with relative error up to `roots_slack`; negative if unknown
   float largest_squared = 0;  ///< the largest of them
 };
 
-/// Upper bound of the relative error of `nearest_sum::roots`: the error of roots from Newton's method and of
+/// Upper bound on the relative error of `nearest_sum::roots`: the error of roots from Newton's method and of
 /// corrections summed in float.
 [[nodiscard]] inline double roots_slack(std::size_t wanted) noexcept {
   return 0x1p-40 + 0x1p-46 * static_cast<double>(wanted);
@@ -123,7 +123,7 @@ template <simd::vector V>
                         q.z - V::load(leaf.axis[2].data() + at));
 }
 
-/// Computes the squared distances from a box to sixteen others; returns a bit mask of those within `bound`.
+/// Computes the squared distances from a box to sixteen other boxes; returns a bit mask of the boxes within `bound`.
 struct near_boxes {
   template <simd::target Target>
   static ORBIS_ALWAYS_INLINE std::uint32_t run(const box_axes& boxes, const box3& query, float bound, float* distance) {
@@ -139,7 +139,7 @@ struct near_boxes {
   }
 };
 
-/// Computes the squared distances from a point to those of a leaf; returns a bit mask of those within `bound`.
+/// Computes the squared distances from a point to those of a leaf; returns a bit mask of the distances within `bound`.
 struct leaf_distances {
   template <simd::target Target>
   static ORBIS_ALWAYS_INLINE std::uint32_t run(const point_row& leaf, const std::array<float, 3>& query, float bound,
@@ -156,8 +156,8 @@ struct leaf_distances {
   }
 };
 
-/// Writes the squared distances within `bound` from a point to those of a leaf contiguously; returns their number. May
-/// write up to sixteen values.
+/// Writes the squared distances from a point to the points of a leaf, if they are within `bound`, contiguously; returns
+/// their number. May write up to sixteen values.
 struct near_in_leaf {
   template <simd::vector V>
   static ORBIS_ALWAYS_INLINE std::size_t keep(const point_row& leaf, const spread_point<V>& q, const V& bound,
@@ -180,7 +180,7 @@ struct near_in_leaf {
   }
 };
 
-/// Writes the numbers of the leaves of `near` whose boxes are within `bound` of a point; returns their number. May
+/// Writes the indices of the leaves of `near` whose boxes are within `bound` of a point; returns their number. May
 /// write sixteen more values.
 struct chosen_leaves {
   template <simd::vector V, simd::vector Numbers>
@@ -197,9 +197,9 @@ struct chosen_leaves {
   }
 };
 
-/// Writes the squared distances within `bound` from a point to those of the chosen leaves, followed by sixteen times
-/// infinity. Returns their number. Ends early if there are more than `capacity`; writes at most `capacity + 3 *
-/// leaf_width` values.
+/// Writes the squared distances from a point to the points of the chosen leaves, if they are within `bound`, followed
+/// by sixteen infinities. Returns their number. Ends early if there are more than `capacity`; writes at most `capacity
+/// + 3 * leaf_width` values.
 struct near_in_leaves {
   template <simd::vector V>
   static ORBIS_ALWAYS_INLINE std::size_t collect(const point_row* leaves, const std::uint32_t* chosen,
@@ -296,7 +296,7 @@ class lane_counter {
 };
 
 /// Computes the sum of the roots of the `wanted` smallest distances, and the largest of them.
-/// @pre 0 < wanted <= count, no distance above `bound`, and sixteen times infinity after them
+/// @pre 0 < wanted <= count, no distance above `bound`, and sixteen infinities after the distances
 struct sum_nearest {
   /// Adds -1 to the lanes of `count` in which `v` is greater than `other`.
   template <simd::vector V, simd::vector Numbers>
@@ -306,7 +306,7 @@ struct sum_nearest {
     else
       count += select(V(other) < v, Numbers(-1), Numbers(0));
   }
-  /// Returns the `rank`-th smallest (from 1) of sixteen values by counting the smaller ones for each of them.
+  /// Returns the `rank`-th smallest (from 1) of sixteen values by counting, for each value, the smaller ones.
   template <simd::target Target>
   static ORBIS_ALWAYS_INLINE float ranked(const float* values, std::size_t rank) noexcept {
     using lanes = simd::vec<float, leaf_width, Target>;
@@ -338,8 +338,8 @@ struct sum_nearest {
   }
 
   /// Adds the roots of the lanes of `v` selected by `in`, in double. With fused multiply-add, the roots have twice the
-  /// precision of float: s = v / sqrt(v) by Newton's method, and the remainder v - s^2 as a correction. `tiny`: lanes
-  /// whose remainders would underflow.
+  /// precision of float: s = v / sqrt(v) by Newton's method, and the remainder v - s^2 as a correction. `tiny` marks
+  /// lanes whose remainders would underflow.
   template <simd::target Target>
   struct root_sum {
     using lanes = simd::native_vec<float, Target>;
@@ -358,7 +358,7 @@ struct sum_nearest {
         const mask usual = in & (all >= lanes(0x1p-70F));
         tiny = tiny | (simd::and_not(in, usual) & (all > zero));
         const lanes v = select(usual, all, zero);
-        // Initial value from halving and negating the exponent; each step squares its error.
+        // The initial value halves and negates the exponent; each step squares the error.
         using bits = simd::native_vec<std::int32_t, Target>;
         const lanes half_v = half * v;
         lanes y = simd::bits_as<float>(bits(0x5f375a86) - (simd::bits_as<std::int32_t>(v) >> 1));
@@ -405,7 +405,7 @@ struct sum_nearest {
     };
     const auto largest = [&]() ORBIS_INLINE_LAMBDA {
       if (count <= leaf_width) return ranked<Target>(found, wanted);
-      // With fewer lanes, or if more values than these are common, guessing is faster.
+      // With fewer lanes, or if there are usually more values, guessing is faster.
       if constexpr (lanes::count == leaf_width)
         if (wanted <= leaf_width && count <= 2 * leaf_width) return ranked_of_two<Target>(found, count, wanted);
       const rank_bracket bracket = bracket_rank(bound, count, wanted, count_within, count_three);
@@ -455,8 +455,9 @@ struct sum_nearest_each {
   }
 
  private:
-  /// If the found distances fit into two registers, all except the largest fit into one. Both steps have a high latency
-  /// for one point but a high throughput for several points in sequence. Returns the mask of the remaining points.
+  /// Handles points whose distances fit into two registers: all distances below the `wanted`-th smallest then fit into
+  /// one. Both steps have a high latency for one point but a high throughput for several points in sequence. Returns
+  /// the mask of the remaining points.
   template <simd::target Target>
   static ORBIS_ALWAYS_INLINE std::uint32_t sum_few(const float* found, std::size_t stride, std::uint32_t points,
                                                    const std::uint32_t* counts, std::size_t wanted, nearest_sum* out) {
@@ -508,7 +509,7 @@ struct gather_leaves {
     using lanes = simd::native_vec<float, Target>;
     using numbers = simd::native_vec<std::uint32_t, Target>;
     float* const to = near.boxes.data();
-    if constexpr (Target::needs == simd::level::portable) {  // compresses lanes one by one
+    if constexpr (Target::needs == simd::level::portable) {  // the portable target compresses lanes one by one
       for (; wanted != 0; wanted &= wanted - 1) {
         const auto i = static_cast<std::size_t>(std::countr_zero(wanted));
         for (std::size_t a = 0; a != 3; ++a) {

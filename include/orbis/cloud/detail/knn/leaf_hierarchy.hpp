@@ -22,7 +22,7 @@ namespace orbis::cloud::detail {
 
 inline constexpr std::size_t leaf_width = 16;
 
-/// Points of one leaf, axis by axis; unused places are at infinity.
+/// Points of one leaf, axis by axis; unused entries are at infinity.
 struct alignas(64) point_row {
   std::array<std::array<float, leaf_width>, 3> axis;
 };
@@ -32,7 +32,7 @@ struct box3 {
   std::array<float, 3> high;
 };
 
-/// Boxes of sixteen children, axis by axis; unused places are at infinity.
+/// Boxes of sixteen children, axis by axis; unused entries are at infinity.
 struct alignas(64) box_row {
   std::array<std::array<float, leaf_width>, 3> low;
   std::array<std::array<float, leaf_width>, 3> high;
@@ -49,7 +49,7 @@ struct curve_block {
   std::array<std::uint32_t, size> key;
 };
 
-/// Spreads ten bits, with two zeros after each.
+/// Spreads ten bits: inserts two zeros after each bit.
 [[nodiscard]] constexpr std::uint32_t spread_ten_bits(std::uint32_t x) noexcept {
   x = (x | x << 16U) & 0x030000ffU;
   x = (x | x << 8U) & 0x0300f00fU;
@@ -91,9 +91,10 @@ struct fill_curve_keys {
   }
 };
 
-/// Order of the points in the leaves: along a Hilbert curve through a grid of 2^10 cells a side; if many points share a
-/// cell, recursively along a finer curve within it. The leaves thus adapt to any uneven density. Each level divides the
-/// extent by a thousand, and float has room for 28 levels: O(n) on usual clouds, at most 28 times that.
+/// Order of the points in the leaves: along a Hilbert curve through a grid with 2^10 cells per side; if many points
+/// share a cell, recursively along a finer curve within it. The leaves thus adapt to any uneven density. Each level
+/// divides the extent by about a thousand, and the range of float allows 28 levels: O(n) on usual clouds, at most 28
+/// times as long otherwise.
 class leaf_order {
  public:
   struct entry {
@@ -106,7 +107,7 @@ class leaf_order {
   };
 
   /// Orders the finite points. Of identical points in a crowded cell, only `most_copies` are kept, because a search
-  /// needs no more. `there`: per point, nonzero if it is included; empty for all.
+  /// needs no more. `there`: per point, nonzero if it is included; empty to include all.
   template <execution_policy Policy>
   leaf_order(const Policy& policy, const point_view& points, std::size_t most_copies, std::span<const char> there = {})
       : points_{points}, most_copies_{most_copies} {
@@ -125,7 +126,7 @@ class leaf_order {
   [[nodiscard]] std::span<const entry> entries() const noexcept { return entries_; }
   /// Frees the memory of the entries.
   void drop_entries() noexcept { std::vector<entry>{}.swap(entries_); }
-  /// Entries that were left out, in ascending order. Each has at least `most_copies` copies in the order.
+  /// Entries that were left out, in ascending order. Each has at least `most_copies` identical points in the order.
   [[nodiscard]] std::span<const range> left_out() const noexcept { return left_out_; }
   [[nodiscard]] std::array<float, 3> position(std::uint32_t i) const noexcept { return points_[i]; }
 
@@ -152,7 +153,7 @@ class leaf_order {
       if (end - begin > most_copies_) left_out_.push_back({begin + most_copies_, end});
       return;
     }
-    // The extreme points are in different cells, so that each level makes progress.
+    // With this scale the extreme points are in different cells, so each level makes progress.
     const double scale = ((1U << bits) - 1) / extent;
     auto* const fill_keys = simd::kernel<fill_curve_keys, void(curve_block&)>();
     for_each_chunk(policy, end - begin, 16 * block, [&](std::size_t from, std::size_t to) {
@@ -179,7 +180,7 @@ class leaf_order {
     }
   }
 
-  /// Sorts by key, stably.
+  /// Sorts by key; the sort is stable.
   void sort(std::size_t begin, std::size_t end) {
     const auto first = entries_.begin() + static_cast<std::ptrdiff_t>(begin);
     const auto last = entries_.begin() + static_cast<std::ptrdiff_t>(end);
@@ -215,17 +216,17 @@ class leaf_order {
   std::vector<range> left_out_;
 };
 
-/// A point that is in no leaf because enough identical points are.
+/// A point that is in no leaf because the leaves hold enough identical points.
 struct surplus_copy {
   std::uint32_t index;
   std::uint32_t kept;  ///< position in `members` of the first identical point in a leaf
 };
 
-/// The leaves of a cloud and their bounding boxes. About 18 bytes per point, also during construction.
+/// The leaves of a cloud and their bounding boxes. About 18 bytes per point, even during construction.
 struct leaf_hierarchy {
   std::vector<point_row> leaves;
   std::vector<std::vector<box_row>> levels;  ///< [0]: boxes of the leaves; the last one is a single row
-  std::vector<std::uint32_t> members;        ///< indices of the points, leaf after leaf; the last leaf is padded with 0
+  std::vector<std::uint32_t> members;        ///< indices of the points, leaf by leaf; the last leaf is padded with 0
   std::vector<surplus_copy> left_out;        ///< identical points beyond `most_copies`, in no leaf
   std::size_t in_leaves = 0;                 ///< number of points in the leaves
   std::size_t finite = 0;                    ///< number of points in the leaves or left out
@@ -246,7 +247,7 @@ struct leaf_hierarchy {
   return row;
 }
 
-/// Builds the hierarchy. `there`: per point, nonzero if it is included; empty for all.
+/// Builds the hierarchy. `there`: per point, nonzero if it is included; empty to include all.
 /// @pre most_copies > 0, fewer than 2^32 points; there is empty or as long as points
 template <execution_policy Policy>
 [[nodiscard]] leaf_hierarchy make_leaves(const Policy& policy, const point_view& points, std::size_t most_copies,

@@ -19,7 +19,7 @@
 
 namespace orbis::cloud::detail {
 
-/// A row of boxes that is not yet visited.
+/// A row of boxes that has not been visited yet.
 struct open_row {
   std::uint32_t level;
   std::uint32_t row;
@@ -52,7 +52,7 @@ struct open_row {
   return true;
 }
 
-/// Calls `f(member, squared distance)` for every point within squared distance `bound` of `q`, until it returns false.
+/// Calls `f(member, squared distance)` for every point within squared distance `bound` of `q`, until `f` returns false.
 /// `open` is scratch.
 template <class F>
 void for_each_within(const leaf_hierarchy& tree, const knn_kernels& kernels, const std::array<float, 3>& q, float bound,
@@ -68,7 +68,7 @@ void for_each_within(const leaf_hierarchy& tree, const knn_kernels& kernels, con
     std::uint32_t mask = kernels.near_boxes(tree.levels[next.level][next.row], box, bound, distance.data());
     for (; mask != 0; mask &= mask - 1) {
       const std::size_t child = next.row * leaf_width + static_cast<std::size_t>(std::countr_zero(mask));
-      if (child >= children) break;  // if the bound is infinite
+      if (child >= children) break;  // reached if the bound is infinite
       if (next.level != 0) {
         open.push_back({next.level - 1, static_cast<std::uint32_t>(child)});
         continue;
@@ -82,14 +82,14 @@ void for_each_within(const leaf_hierarchy& tree, const knn_kernels& kernels, con
   }
 }
 
-/// Finds the squared distances from each point, in the order of the curve, to its `wanted` nearest points, itself
-/// included.
+/// Finds the squared distances from each point, in the order of the curve, to its `wanted` nearest points, including
+/// itself.
 ///
 /// Consecutive points share candidates: the leaves within a little more than the distance that sufficed for the
-/// previous points. Each point takes the candidates within a little less than that. The result is complete if it holds
-/// at least `wanted` points. Otherwise, as for outliers and at jumps of the density, the point is searched for
-/// separately within the distance that suffices for its neighbours on the curve. If that distance is too large to be
-/// useful, leaves are visited in ascending order of distance. A bad guess thus only costs time.
+/// previous points. Each point takes the candidates within a slightly smaller distance. The result is complete if it
+/// holds at least `wanted` points. Otherwise, as for outliers and at jumps in density, a separate search is made for
+/// the point within the distance that suffices for its neighbours on the curve. If that distance is too large to be
+/// useful, leaves are visited in ascending order of distance. A bad guess thus costs only time.
 ///
 /// Source of the search by ascending box distance: G. R. Hjaltason, H. Samet, "Distance browsing in spatial databases",
 /// ACM TODS 24, 1999.
@@ -115,9 +115,9 @@ class nearest_search {
         reach_{1.5F * hoped_} {}
 
   /// Searches for the points of one leaf, then calls `f(i, found, bound)` for the i-th point, in any order. `found`
-  /// holds squared distances up to `bound`, including the nearest; fewer than `wanted` if squared distances overflow;
-  /// sixteen times infinity follow. `f` may reorder them, and returns the `wanted`-th smallest. `found_places` returns
-  /// their places.
+  /// holds squared distances up to `bound`, including the nearest, followed by sixteen infinities; it holds fewer than
+  /// `wanted` if squared distances overflow. `f` may reorder `found`, and returns the `wanted`-th smallest.
+  /// `found_places` returns their places.
   template <class F>
   void visit_leaf(std::size_t l, F&& f) {
     search_leaf(l, [&](std::size_t first, std::size_t last, const box3& box) {
@@ -125,8 +125,8 @@ class nearest_search {
       for (std::size_t i = first; i != last; ++i) largest_[i] = f(i, found_distances(i), bounds_[i]);
     });
   }
-  /// Like `visit_leaf`, but sums up the nearest distances itself and calls `f(i, found, sum)`. `sum` is meaningless if
-  /// fewer than `wanted` were found.
+  /// Like `visit_leaf`, but also sums the nearest distances and calls `f(i, found, sum)`. `sum` is meaningless if fewer
+  /// than `wanted` were found.
   template <class F>
   void visit_sums(std::size_t l, F&& f) {
     std::array<nearest_sum, leaf_width> sums;
@@ -181,14 +181,14 @@ class nearest_search {
   };
   static constexpr float infinity = std::numeric_limits<float>::infinity();
   static constexpr float most = std::numeric_limits<float>::max();
-  static constexpr float most_spread = 32;  ///< squared, relative to `usual_`, of points that share candidates
+  static constexpr float most_spread = 32;  ///< of points that share candidates; squared, relative to `usual_`
   static constexpr float spare = 1.3F;      ///< factor by which the search radius for near rows exceeds that of a leaf
 
   [[nodiscard]] std::array<float, 3> query(std::size_t l, std::size_t i) const noexcept {
     const point_row& leaf = tree_->leaves[l];
     return {leaf.axis[0][i], leaf.axis[1][i], leaf.axis[2][i]};
   }
-  /// Extends a box to a point unless the box becomes too large for sharing candidates to pay off.
+  /// Extends a box to include a point, unless the box becomes too large for sharing candidates to pay off.
   [[nodiscard]] bool grow(box3& box, const std::array<float, 3>& p) const noexcept {
     box3 grown;
     for (std::size_t a = 0; a != 3; ++a) {
@@ -248,7 +248,7 @@ class nearest_search {
     has_places_[i] = result.has_places;
   }
   /// Gathers the shared candidates of the points within a box, up to squared distance `reach`. If there are too many,
-  /// gathers none and returns false.
+  /// gathers no candidates and returns false.
   bool share(std::size_t l, const box3& box, float reach) {
     const bool shared = gather_shared(l, box, reach);
     shared_reach_ = shared ? reach : -1.0F;
@@ -326,7 +326,7 @@ class nearest_search {
     for (;;) {
       result = search_near(own_, l, i, bound);
       if (result.count <= capacity_) return result;
-      // Too many: the points seen so far include enough nearer ones.
+      // Too many points were found, but they include enough nearer ones.
       bound = kernels_.sum_nearest(found, result.count, wanted_, bound).largest_squared;
       if (bound == result.bound) return search_outwards(q, found);
     }
@@ -385,7 +385,7 @@ class nearest_search {
   nearby_leaves own_;                                                   ///< candidates of one point
   nearby_leaves near_rows_;                                             ///< rows of leaves near the row near_rows_of_
   std::size_t near_rows_of_ = std::numeric_limits<std::size_t>::max();  ///< no row at first
-  float near_rows_reach_ = -1;      ///< squared distance up to which they are complete; negative if unknown
+  float near_rows_reach_ = -1;      ///< squared distance up to which near rows are complete; negative if unknown
   float too_many_rows_ = infinity;  ///< smallest squared distance at which the row had too many near rows
   line_vector<std::uint32_t> chosen_;
   line_vector<float> found_;
@@ -397,8 +397,8 @@ class nearest_search {
   std::array<float, leaf_width> bounds_{};
   std::array<bool, leaf_width> has_places_{};
   std::array<float, leaf_width> largest_{};  ///< squared distance to the `wanted`-th nearest
-  float hoped_;  ///< factor of `usual_` that should suffice; its scatter falls with the number of neighbours
-  float reach_;  ///< factor of `usual_` that should suffice in any case
+  float hoped_;  ///< factor of `usual_` that should suffice; scatter decreases with the number of neighbours
+  float reach_;  ///< factor of `usual_` that should always suffice
   float shared_reach_ = -1;  ///< squared distance from the run's box up to which `shared_` is complete
   float usual_ = -1;         ///< squared distance to the `wanted`-th nearest; negative if not yet known
 };

@@ -25,20 +25,20 @@
 
 namespace orbis::cloud::detail {
 
-/// The rows of `all_knn`, with the points to which they belong. Points are identified by *places*, their numbers along
-/// the curve of `leaf_order`, from 0 to size() - 1; identical points that are in no leaf come last. Store per-point
-/// data by place, so that data of neighbours is close in memory.
+/// The rows of `all_knn`, with the points to which they belong. Points are identified by *places*, their positions
+/// along the curve of `leaf_order`, from 0 to size() - 1; identical points that are in no leaf come last. Store
+/// per-point data by place, so that the data of neighbours are close in memory.
 ///
 /// The points of a leaf have their neighbours in few leaves. These are listed once, and a neighbour is encoded in one
 /// byte: index in the list, and point in the leaf. With more than 16 listed leaves a neighbour takes two bytes; with
-/// more than 256 it is a place. Distances are recomputed. About k + 3 bytes per point of a surface, and 18 for its
-/// position and index; a `neighbor_table` takes 8 k.
+/// more than 256 it is a place. Distances are recomputed. About k + 3 bytes per point on a surface, and 18 for the
+/// point's position and index; a `neighbor_table` takes 8 k.
 class neighbor_graph {
  public:
   neighbor_graph() = default;
-  /// Finds the `min(k, points - 1)` nearest other points of every point of `tree`. O(n k log k), the same for every
-  /// policy; 4 bytes per index of the cloud during construction. @pre k > 0; `tree` was made for k + 1 copies; indices
-  /// below `count`
+  /// Finds the `min(k, points - 1)` nearest other points of every point of `tree`. O(n k log k); the result is the same
+  /// for every policy. 4 bytes per point of the cloud during construction. @pre k > 0; `tree` was built for k + 1
+  /// copies; indices below `count`
   template <execution_policy Policy>
   neighbor_graph(const Policy& policy, leaf_hierarchy tree, std::size_t count, std::size_t k)
       : tree_{std::move(tree)}, width_{std::min(k, std::max<std::size_t>(tree_.finite, 1) - 1)} {
@@ -123,7 +123,7 @@ class neighbor_graph {
     }
   }
   /// Computes for each place the mean distance to its first `k` neighbours, or to all if there are fewer, metres; NaN
-  /// without neighbours. O(n k). @pre k > 0
+  /// if there are no neighbours. O(n k). @pre k > 0
   template <execution_policy Policy>
   [[nodiscard]] std::vector<float> mean_distance(const Policy& policy, std::size_t k) const {
     const std::size_t count = std::min(k, width_);
@@ -152,7 +152,7 @@ class neighbor_graph {
   static constexpr std::size_t short_list = 16;
   static constexpr std::size_t long_list = 256;
   static constexpr std::uint32_t leaf_bits = leaf_width;
-  static_assert(leaf_width == 16, "four bits identify a point of a leaf");
+  static_assert(leaf_width == 16, "four bits identify a point in a leaf");
 
   [[nodiscard]] bool is_in_leaf(std::size_t place) const noexcept { return place < tree_.in_leaves; }
   [[nodiscard]] const surplus_copy& copy(std::size_t place) const noexcept {

@@ -47,12 +47,12 @@ struct find_ranks {
   }
 };
 
-/// Sorts points by squared distance, ties by index. Reuses its memory.
+/// Sorts points by squared distance, then by index. Reuses its memory.
 class rank_sorter {
  public:
   void clear() noexcept { count_ = 0; }
   [[nodiscard]] std::size_t size() const noexcept { return count_; }
-  /// Adds a point. @pre distance_squared >= 0: the order of bits is that of values
+  /// Adds a point. @pre distance_squared >= 0: the bit patterns then have the order of the values
   void add(std::uint32_t index, float distance_squared) {
     if (count_ + 2 * room > keys_.size()) grow();
     std::memcpy(&keys_[count_], &distance_squared, sizeof distance_squared);
@@ -65,14 +65,14 @@ class rank_sorter {
     std::memcpy(keys_.data(), squared.data(), squared.size_bytes());
     for (std::size_t i = 0; i != count_; ++i) indices_[i] = members[places[i]];
   }
-  /// Calls `f(rank, index, distance_squared)` for all points, nearest first, until it returns false.
+  /// Calls `f(rank, index, distance_squared)` for all points, nearest first, until `f` returns false.
   template <class F>
   void for_each(F&& f) {
     if (count_ == 0) return;
     if (count_ <= most_ranked) {
       find_ranks_(keys_.data(), count_, ranks_.data());
       for (std::size_t i = 0; i != count_; ++i) sorted_[static_cast<std::size_t>(ranks_[i])] = pack(i);
-      // Sorts equal distances by index. They are few, and scalar reads can follow the preceding scalar writes without
+      // Sorts equal distances by index. There are few, and scalar reads can follow the preceding scalar writes without
       // delay.
       std::uint64_t before = sorted_[0];
       for (std::size_t i = 1; i < count_; ++i) {
@@ -121,8 +121,8 @@ class rank_sorter {
   std::vector<std::uint64_t> sorted_;
 };
 
-/// Writes the nearest gathered points, without the point itself, as a row. Returns the squared distance to the last of
-/// them.
+/// Writes the nearest gathered points, excluding the point itself, as a row. Returns the squared distance to the last
+/// one.
 inline float write_row(rank_sorter& gathered, std::uint32_t self, std::span<neighbor<float>> row) {
   std::size_t written = 0;
   float last = 0.0F, last_squared = 0.0F;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Selection by counting: interval that contains the value of a given rank.
+/// Selection by counting: narrows an interval that contains the value of a given rank.
 #pragma once
 
 #include <algorithm>
@@ -11,8 +11,8 @@
 
 namespace orbis::cloud::detail {
 
-/// Interval (low, high] of the `wanted`-th smallest value. `at_low` values do not exceed `low`; `at_high` values do not
-/// exceed `high`.
+/// Interval (low, high] that contains the `wanted`-th smallest value. `at_low` values do not exceed `low`; `at_high`
+/// values do not exceed `high`.
 struct rank_bracket {
   float low;
   float high;
@@ -26,7 +26,7 @@ struct rank_bracket {
       low = at, at_low = count;
     }
   }
-  /// Chooses a value inside the interval; false if there is none.
+  /// Chooses a value inside the interval; returns false if there is none.
   [[nodiscard]] bool pick(int tries, std::size_t wanted, float& at) const noexcept {
     const float floor = std::max(low, 0.0F);
     if (tries < 6) {
@@ -57,7 +57,7 @@ template <class Count, class CountThree>
                                                         const Count& count_within, const CountThree& count_three) {
   rank_bracket bracket{-1.0F, bound, 0, count};
   if (count <= 16) return bracket;
-  // In most cases three guesses, one slightly low and one slightly high, leave few values between.
+  // In most cases, three guesses, one of them slightly low and one slightly high, leave few values in between.
   constexpr std::size_t margin = 11;
   const std::array<float, 3> at{guess_ranked(bound, std::max(wanted, margin + 1) - margin, count),
                                 guess_ranked(bound, wanted, count),

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Squared distances with the same bits under every compiler flag.
+/// Squared distances that are bit-identical under every compiler flag.
 #pragma once
 
 #include <array>

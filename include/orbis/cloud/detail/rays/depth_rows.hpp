@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Loops over rows of depths for `depth_windows.hpp`, auto-vectorised and compiled for several targets. Only a division
-/// is rounded, so that all targets give the same bits.
+/// Loops over rows of depths for `depth_windows.hpp`, auto-vectorised and compiled for several targets. Division is the
+/// only operation that rounds, so that all targets give bit-identical results.
 #pragma once
 
 #include <concepts>
@@ -14,8 +14,8 @@
 
 namespace orbis::cloud::detail {
 
-/// Calls `f(i)` for the first `n` numbers, sixteen at a time as far as possible: compilers vectorise loops of known
-/// length at -O2.
+/// Calls `f(i)` for i = 0 ... n - 1, in groups of sixteen as far as possible: compilers vectorise loops of known length
+/// at -O2.
 template <class F>
 [[gnu::always_inline]] inline void for_each_by_16(std::size_t n, F&& f) {
   std::size_t i = 0;
@@ -43,7 +43,7 @@ struct replace_zeros {
     for_each_by_16(n, [&](std::size_t i) ORBIS_INLINE_LAMBDA { x[i] = x[i] > 0.0F ? x[i] : value; });
   }
 };
-/// Converts a row of stored depths to metres, 0 if missing, as `camera::depth_view` does.
+/// Converts a row of stored depths to metres, 0 where depth is missing, as `camera::depth_view` does.
 struct stored_to_metres {
   template <simd::target>
   static ORBIS_ALWAYS_INLINE void run(const std::uint16_t* stored, double scale, float least, float most,
@@ -57,7 +57,7 @@ struct stored_to_metres {
   }
 };
 
-/// The loops, compiled for the best available instruction set. AVX-512 brings no gain: they are limited by memory.
+/// The loops, compiled for the best available instruction set. AVX-512 brings no gain: memory is the bottleneck.
 struct depth_row_kernels {
   void (*widen_range)(float*, float*, const float*, const float*, std::size_t) =
       simd::kernel<detail::widen_range, void(float*, float*, const float*, const float*, std::size_t), simd::avx2>();
@@ -67,7 +67,7 @@ struct depth_row_kernels {
       stored_to_metres, void(const std::uint16_t*, double, float, float, float*, std::size_t), simd::avx2>();
 };
 
-/// Reads a row of any depth image in metres, 0 if missing.
+/// Reads a row of any depth image in metres; 0 where depth is missing.
 template <camera::depth_source Depth>
 void read_depth_row(const depth_row_kernels& kernels, const Depth& depth, int y, float* out) {
   const auto width = static_cast<std::size_t>(depth.width());

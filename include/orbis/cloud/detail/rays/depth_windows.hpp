@@ -19,10 +19,10 @@ namespace orbis::cloud::detail {
 class depth_windows {
  public:
   static constexpr int tile = 16;
-  /// Marks a missing depth; compares as nearer than any depth.
+  /// Marks a missing depth; less than any depth.
   static constexpr float none = -std::numeric_limits<float>::infinity();
 
-  /// Reads an image. `radius`: the window has 2 radius + 1 pixels a side. `nearest` is `none` if any pixel of the
+  /// Reads an image. `radius`: the window has 2 radius + 1 pixels per side. `nearest` is `none` if any pixel of the
   /// window is outside the image or has no depth, because an unmeasured surface may be nearer. O(width * height *
   /// radius). @pre radius >= 0
   template <execution_policy Policy, camera::depth_source Depth>
@@ -38,7 +38,7 @@ class depth_windows {
   [[nodiscard]] const float* farthest() const noexcept { return farthest_.data(); }
   /// Row-major; `none` if the pixel itself has no depth.
   [[nodiscard]] const float* middle() const noexcept { return middle_.data(); }
-  /// Farthest depth in the windows of the tiles `[x0, x1] x [y0, y1]`. @pre they exist
+  /// Farthest depth in the windows of the tiles `[x0, x1] x [y0, y1]`. @pre the tiles exist
   [[nodiscard]] float farthest_of_tiles(int x0, int y0, int x1, int y1) const noexcept {
     float out = none;
     for (int y = y0; y <= y1; ++y) {

@@ -13,7 +13,7 @@
 namespace orbis::cloud::detail {
 
 /// The finite points of a cloud in the order of a space-filling curve, axis by axis. `block_size` consecutive points
-/// form a block, `group_size` blocks a group. The last block is padded with NaN.
+/// form a block, and `group_size` blocks form a group. The last block is padded with NaN.
 struct point_blocks {
   static constexpr std::size_t block_size = 128;
   static constexpr std::size_t group_size = 16;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Inner loops of `ray_evidence.hpp`. Every operation is rounded, so that all targets give the same bits.
+/// Inner loops of `ray_evidence.hpp`. Every operation is rounded, so that results are bit-identical on all targets.
 #pragma once
 
 #include <array>
@@ -22,7 +22,7 @@ namespace orbis::cloud::detail {
 struct seen_block {
   static constexpr std::size_t size = point_blocks::block_size;
   alignas(64) std::array<std::int32_t, size> pixel;  ///< y * width + x; negative: outside the image
-  alignas(64) std::array<float, size> depth;         ///< of the point, metres; undefined outside the image
+  alignas(64) std::array<float, size> depth;         ///< depth of the point, metres; undefined outside the image
 };
 
 /// Evidence of a view for a block's points; bit i of word w is point 16 w + i.
@@ -137,8 +137,8 @@ struct judge_by_windows {
   }
 };
 
-/// Increments the counters of the points selected by the bits in `words`, up to the maximum value; or decrements them.
-/// @pre to decrement, none of them is zero
+/// Increments the counters of the points selected by the bits in `words`, up to the maximum value, or decrements them.
+/// @pre to decrement, no selected counter is zero
 template <bool Add>
 struct count_points {
   template <simd::target Target>

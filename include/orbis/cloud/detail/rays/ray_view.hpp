@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// One posed depth image as `ray_evidence.hpp` uses it, and a test for blocks of points on which it has no evidence.
+/// One posed depth image as `ray_evidence.hpp` uses it, and a test for blocks of points on which the image has no
+/// evidence.
 #pragma once
 
 #include <algorithm>
@@ -21,12 +22,12 @@
 
 namespace orbis::cloud::detail {
 
-/// Parameters of a view in the form its kernels use.
+/// Parameters of a view in the form that the kernels use.
 struct ray_view {
   std::array<std::array<float, 3>, 3> rotation{};  ///< camera from world, row by row
-  std::array<float, 3> origin{};                   ///< camera position in the world, metres, rounded to float,
+  std::array<float, 3> origin{};                   ///< camera position in the world frame, metres, rounded to float,
   std::array<float, 3> origin_rest{};              ///< and the rounding error, since coordinates may be large
-  float fx = 0, fy = 0, cx = 0, cy = 0;            ///< pinhole parameters; half a pixel is added to cx and cy
+  float fx = 0, fy = 0, cx = 0, cy = 0;            ///< pinhole parameters; cx and cy include an additional half pixel
   int width = 0;
   int height = 0;
   float min_depth = 0;  ///< exclusive lower limit of the depth of tested points, metres
@@ -51,7 +52,7 @@ inline void place(ray_view& view, const se3& T_world_camera) {
   }
 }
 
-/// Upper bound of the angle between the optical axis and the ray farthest from it, radians; empty if unknown.
+/// Upper bound on the angle between the optical axis and the ray farthest from it, radians; empty if unknown.
 template <camera::camera_model Camera>
 [[nodiscard]] std::optional<double> view_angle(const Camera& camera) {
   constexpr int steps = 32;
@@ -76,7 +77,7 @@ class block_test {
     if constexpr (!std::same_as<Camera, camera::pinhole>) angle_ = view_angle(camera);
   }
 
-  /// Sets the view of the following tests. @pre the pose is finite
+  /// Sets the view for the following tests. @pre the pose is finite
   void place(const se3& T_world_camera, const ray_view& view, const depth_windows& windows) {
     rotation_ = transposed(T_world_camera.rotation_matrix());
     absolute_ = magnitudes(rotation_);
@@ -122,7 +123,7 @@ class block_test {
     const auto [left, right] = pixels(low.x(), high.x(), k.fx, k.cx);
     const auto [top, bottom] = pixels(low.y(), high.y(), k.fy, k.cy);
     if (right < 0 || bottom < 0 || left > k.width - 1 || top > k.height - 1) return true;
-    // Skip the block if all depths around it are nearer than it.
+    // Skip the block if all depths around it are nearer than the block.
     const auto tile_of = [](double pixel, int size) {
       return static_cast<int>(std::clamp(pixel, 0.0, size - 1.0)) / depth_windows::tile;
     };

@@ -30,8 +30,8 @@
 
 namespace orbis::cloud::detail {
 
-/// Counts for each depth of a row the agreeing depths of the eight around it. Most depths agree with at least two,
-/// which is tested vectorised. Reads sixteen depths beyond the rows.
+/// For each depth of a row, counts how many of the eight surrounding depths agree with it. Most depths agree with at
+/// least two, which is tested with vector operations. Reads sixteen depths beyond the rows.
 struct count_agreeing_depths {
   using signature = void(const float*, const float*, const float*, float, float, float*, std::size_t);
   template <simd::target Target>
@@ -61,9 +61,9 @@ struct count_agreeing_depths {
 };
 
 /// Writes the depth image in metres with stray pixels replaced. A pixel is stray if fewer than two of the pixels around
-/// it agree with it within `margin + margin_growth z^2`. It gets their median, or no depth if fewer than five have one.
-/// A stray pixel would support itself and suppress the evidence of the rays around it. O(pixels). `out` is resized if
-/// its size differs.
+/// it agree with it within `margin + margin_growth z^2`. It gets the median of their depths, or no depth if fewer than
+/// five of them have one. Otherwise a stray pixel would support itself and suppress the evidence of the rays around it.
+/// O(pixels). `out` is resized if its size differs.
 template <execution_policy Policy, camera::depth_source Depth>
 void remove_stray_pixels(const Policy& policy, const Depth& depth, float margin, float margin_growth,
                          image<float>& out) {
@@ -71,12 +71,12 @@ void remove_stray_pixels(const Policy& policy, const Depth& depth, float margin,
   const depth_row_kernels kernels;
   const auto count_agreeing = simd::kernel<count_agreeing_depths, count_agreeing_depths::signature, simd::avx2>();
   const auto width = static_cast<std::size_t>(depth.width());
-  constexpr std::size_t beside = 16;                           // the kernel reads this many depths beyond a row
-  const std::size_t stride = beside + (width + 31) / 16 * 16;  // of padded rows
+  constexpr std::size_t beside = 16;                           // number of depths that the kernel reads beyond a row
+  const std::size_t stride = beside + (width + 31) / 16 * 16;  // stride of padded rows
   for_each_chunk(policy, static_cast<std::size_t>(depth.height()), 16, [&](std::size_t begin, std::size_t end) {
-    std::vector<float> rows(4 * stride, 0.0F);  // three rows of depths without neighbours, and the counts
+    std::vector<float> rows(4 * stride, 0.0F);  // three rows of depths, padded with 0, and the counts
     const auto row = [&](std::size_t y) { return rows.data() + y % 3 * stride + beside; };
-    const auto read = [&](std::size_t y) {  // y + 1, so that it is never negative
+    const auto read = [&](std::size_t y) {  // `y` is the row + 1, so that it is never negative
       if (y == 0 || y > static_cast<std::size_t>(depth.height()))
         std::fill_n(row(y), width, 0.0F);
       else
@@ -135,25 +135,25 @@ struct no_view_action {
 
 struct view_trust_options {
   double conflict = 0.1;  ///< a view is distrusted if its conflict exceeds this
-  double excess = 3;      ///< and exceeds this multiple of the usual conflict
-  int samples = 20;       ///< samples across and down each view; > 0
-  std::size_t least = 4;  ///< with fewer views, none is distrusted
+  double excess = 3;      ///< and exceeds this factor times the usual conflict
+  int samples = 20;       ///< number of samples along either axis of each view; > 0
+  std::size_t least = 4;  ///< minimum number of views; with fewer, no view is distrusted
 };
 
-/// Views that contradict the others, by number, ascending, with measures of conflict.
+/// Indices, ascending, of the views that contradict the others, with measures of conflict.
 struct view_trust {
   std::vector<std::uint32_t> distrusted;
   double worst_conflict = 0;  ///< largest conflict of a view with the others, 0 to 1
-  double usual_conflict = 0;  ///< the median over the trusted views
+  double usual_conflict = 0;  ///< median conflict of the trusted views
 };
 
 /// Mutual evidence of two views: the number of samples in a tile of one view that the other one passes through or
 /// supports.
 struct view_verdict {
   std::uint32_t other;
-  std::uint32_t rank;  ///< pseudo-random, decides which verdicts are kept if there are too many
+  std::uint32_t rank;  ///< pseudo-random; decides which verdicts are kept if there are too many
   std::uint16_t through;
-  std::uint16_t all;  ///< passed through or supported
+  std::uint16_t all;  ///< samples passed through or supported
   [[nodiscard]] double conflict() const noexcept { return static_cast<double>(through) / all; }
 };
 
@@ -162,12 +162,12 @@ struct view_verdict {
   return static_cast<std::uint32_t>(mix64((std::uint64_t{of} << 32U | by) ^ mix64(tile)) >> 32U);
 }
 
-/// Verdicts that involve one view. All are kept for up to 128 views. With more views the same number is kept, those of
-/// lowest rank, which is an unbiased sample. Memory thus grows linearly with the number of views, and a view that
-/// overlaps with few others loses no verdicts.
+/// Verdicts that involve one view. With up to 128 views, all are kept; with more views, only the same number of
+/// verdicts with the lowest ranks, which are an unbiased sample. Memory thus grows linearly with the number of views,
+/// and a view that overlaps with few others loses no verdicts.
 class view_verdicts {
  public:
-  static constexpr std::size_t most = std::size_t{128} * 2 * 16;  ///< 16 tiles of each view and of the other
+  static constexpr std::size_t most = std::size_t{128} * 2 * 16;  ///< 16 tiles of this view and of the other view
 
   /// O(log most).
   void add(const view_verdict& verdict) {
@@ -188,8 +188,8 @@ class view_verdicts {
   std::vector<view_verdict> kept_;  // a heap with the highest rank in front once it is full
 };
 
-/// Median of the conflicts of a view with the views not left out; 0 if there are too few. `verdicts`: those that
-/// involve the view.
+/// Median of the conflicts of a view with the views that are not left out; 0 if there are too few. `verdicts`: the
+/// verdicts that involve the view.
 [[nodiscard]] inline double median_conflict(std::span<const view_verdict> verdicts, std::span<const char> left_out) {
   std::vector<double> values;
   for (const view_verdict& c : verdicts) {
@@ -200,13 +200,13 @@ class view_verdicts {
 }
 
 /// Finds views with wrong poses by comparing the views with each other. A sample of the pixels of each view is tested
-/// by all others (`ray_evidence`), tile by tile. A wrong pose is contradicted all over the image, a moving object only
-/// in a part of it, so the median over the tiles decides. The worst view is left out repeatedly until none stands out;
-/// if that would be half of them, all are trusted. Deterministic. Calls `also(view, cleaned view, its windows)` for
-/// each view, so that callers with further computations need no second pass: views may be costly to read. `samples`:
-/// samples of the views, if drawn before; otherwise each view is read a second time. O(views (pixels + samples of all
-/// views)), and O(views) memory.
-/// @pre views' images have the camera's size; the samples are of these views
+/// by all others (`ray_evidence`), tile by tile. A view with a wrong pose is contradicted all over its image, a view
+/// with a moving object only in a part, so the median over the tiles decides. The worst view is left out repeatedly
+/// until no view stands out; if this would leave out half of the views, all are trusted. Deterministic. Calls
+/// `also(view, cleaned view, its windows)` for each view, so that callers with further computations need no second
+/// pass: views may be costly to read. `samples`: samples drawn from the views earlier, if any; otherwise each view is
+/// read a second time. O(views (pixels + samples of all views)), and O(views) memory.
+/// @pre views' images have the camera's size; the samples are from these views
 template <execution_policy Policy, posed_depth_range Views, camera::camera_model Camera, class Also = no_view_action>
 [[nodiscard]] view_trust find_distrusted_views(const Policy& policy, const Views& views, const Camera& camera,
                                                const ray_evidence_options& evidence = {},
@@ -234,7 +234,7 @@ template <execution_policy Policy, posed_depth_range Views, camera::camera_model
     for (const auto& view : views) drawn.add(camera, view);
   const view_samples& asked = samples != nullptr ? *samples : drawn;
   assert(asked.views() == count);
-  const std::span<const std::uint32_t> place = asked.tiles_by_point();  // numbers of view and tile
+  const std::span<const std::uint32_t> place = asked.tiles_by_point();  // indices of view and tile
 
   std::vector<view_verdicts> verdicts(count);
   ray_evidence_counter<Camera> counter{policy, asked.points(), camera, evidence};
@@ -245,7 +245,7 @@ template <execution_policy Policy, posed_depth_range Views, camera::camera_model
     windows.take(policy, cleaned.depth, evidence.window);
     also(view, cleaned, windows);
     counter.add(policy, windows, cleaned.T_world_camera);
-    std::vector<ray_evidence> scores = counter.scores();  // of all views so far
+    std::vector<ray_evidence> scores = counter.scores();  // scores of all views so far
     for (std::size_t begin = 0; begin != place.size();) {
       std::size_t end = begin;
       const std::uint32_t of = place[begin] / (tiles * tiles);
@@ -286,7 +286,7 @@ template <execution_policy Policy, posed_depth_range Views, camera::camera_model
     if (conflicts[worst] <= options.conflict || conflicts[worst] <= options.excess * out.usual_conflict) break;
     left_out[worst] = 1;
     out.distrusted.push_back(worst);
-    if (2 * out.distrusted.size() >= count) {  // the views do not show which half is right
+    if (2 * out.distrusted.size() >= count) {  // the views do not show which half is correct
       out.distrusted.clear();
       break;
     }

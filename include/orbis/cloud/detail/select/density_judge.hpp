@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Threshold of a density test: in a valley between two populations of points that do not lie on surfaces.
+/// Finds the threshold of a density test, in the valley between two populations of points that are not on surfaces.
 #pragma once
 
 #include <algorithm>
@@ -27,7 +27,7 @@ namespace orbis::cloud::detail {
 /// A reference for the usual spacing, and the spread of the cloud around it.
 struct reference {
   density_step step;
-  bulk width;  ///< of the residuals, whose median is 0
+  bulk width;  ///< width of the residuals, whose median is 0
 };
 
 /// Width of the bulk used to compare references.
@@ -46,17 +46,17 @@ void center(const Policy& policy, surroundings& around, reference& r) {
   r.width.median = 0;
 }
 
-/// Options of a test.
+/// Options of a density test.
 struct threshold_options {
   double lowest = 0.55;         ///< lower limit of the threshold
-  double without_valley = 1.6;  ///< threshold for a single population, if its bulk is not wider
-  bool shoulders = true;     ///< detect a shoulder on the bulk, as flying pixels form, instead of a separate population
-  double least_ratio = 1.6;  ///< minimum ratio of a valley
-  bool needs_valley = false;  ///< without a valley remove nothing
+  double without_valley = 1.6;  ///< threshold for a single population whose bulk is not wider
+  bool shoulders = true;        ///< also detect a shoulder of the bulk, which flying pixels form
+  double least_ratio = 1.6;     ///< minimum `ratio` of a valley
+  bool needs_valley = false;    ///< true to remove nothing if there is no valley
 };
 
-/// Finds the threshold of a density test. Sparse points on surfaces are not outliers, regardless of their number:
-/// regions seen from afar or at a grazing angle. The histogram therefore contains only the other points, and the
+/// Finds the threshold of a density test. Sparse points on surfaces, such as regions seen from afar or at a grazing
+/// angle, are not outliers, regardless of their number. The histogram therefore contains only the other points, and the
 /// threshold exceeds the spacing above which more than 40 % of the sparser points lie on surfaces.
 template <execution_policy Policy>
 [[nodiscard]] density_evidence find_threshold(const Policy& policy, surroundings& around, const reference& r,
@@ -134,7 +134,7 @@ template <execution_policy Policy>
 void judge_points(const Policy& policy, surroundings& around, const select_options& options, filter_choice& choice,
                   std::vector<std::string>& reasons) {
   filter_evidence& evidence = choice.evidence;
-  // Choice of the reference: the narrower bulk wins, with a bonus for the simpler one.
+  // Choose the reference with the narrower bulk, with a bonus for the simpler one.
   reference global;
   global.step.neighbors = options.neighbors;
   center(policy, around, global);

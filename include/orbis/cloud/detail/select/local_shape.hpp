@@ -45,7 +45,7 @@ struct smallest_of_columns {
       for (std::size_t row = 0; row != rows; ++row) {
         lanes v = lanes::load(table + row * columns + x);
         largest = max(v, largest);
-        for (lanes& s : smallest) {  // shifts the larger ones out
+        for (lanes& s : smallest) {  // shifts out the larger values
           const lanes low = min(v, s);
           v = max(v, s);
           s = low;
@@ -58,13 +58,13 @@ struct smallest_of_columns {
 };
 
 /// Computes for each place the usual value in its surroundings: the 35 % quantile over its 12 nearest neighbours,
-/// repeated in rounds to reach beyond the neighbours. Non-finite values (NaN) and those of points without neighbours
-/// are unchanged and ignored. O(n rounds), the same for every policy.
+/// repeated in several rounds to reach beyond the neighbours. Non-finite values (NaN) and those of points without
+/// neighbours are unchanged and ignored. O(n rounds); the result is the same for every policy.
 /// @pre values has an entry for each place
 template <execution_policy Policy>
 [[nodiscard]] std::vector<float> smoothed_over_neighbors(const Policy& policy, const neighbor_graph& graph,
                                                          std::span<const float> values, int rounds = 4) {
-  static constexpr float inf = std::numeric_limits<float>::infinity();  // for values that do not count
+  static constexpr float inf = std::numeric_limits<float>::infinity();  // marks values to ignore
   constexpr std::size_t neighbors = smallest_of_columns::most_rows, columns = smallest_of_columns::columns;
   const auto quantile_rank = [](std::size_t count) {
     return static_cast<std::size_t>(0.35 * static_cast<double>(count - 1) + 0.5);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Statistics of density: natural logarithm of a point's spacing relative to its surroundings or to the spacing that
-/// the sensor's range explains.
+/// Density statistics: natural logarithm of a point's spacing relative to its surroundings or to the spacing expected
+/// at its range.
 #pragma once
 
 #include <algorithm>
@@ -32,7 +32,7 @@ template <std::ranges::contiguous_range Values>
   return static_cast<double>(*at);
 }
 
-/// Returns the weighted median; 0 if empty. Entries are value and weight.
+/// Returns the weighted median; 0 if empty. Entries are pairs of value and weight.
 [[nodiscard]] inline double weighted_median(std::vector<std::array<double, 2>> entries) {
   std::sort(entries.begin(), entries.end());
   double total = 0;
@@ -45,12 +45,11 @@ template <std::ranges::contiguous_range Values>
   return 0;
 }
 
-/// Fits the Theil-Sen line through the 40 % quantiles of log spacing in 24 bins of log range. Bins are weighted by
-/// their numbers of points, so that ranges with few points other than outliers do not bend the line. Empty if fewer
-/// than four bins are populated. Spacing can only grow with range, and no faster than the noise: the slope is clipped
-/// to 0 ... 2.5. Points with a non-finite spacing or range do not count. O(n), 4 bytes per point. @pre one range for
-/// each spacing
-/// Source: P. K. Sen, "Estimates of the regression coefficient based on Kendall's tau", JASA 63, 1968.
+/// Fits a Theil-Sen line through the 40 % quantiles of log spacing in 24 bins of log range. Bins are weighted by their
+/// numbers of points, so that ranges with few points apart from outliers do not distort the line. Empty if fewer than
+/// four bins are populated. The slope is clipped to 0 ... 2.5, because spacing can only grow with range, and no faster
+/// than the noise. Points with a non-finite spacing or range are ignored. O(n), 4 bytes per point. @pre one range for
+/// each spacing Source: P. K. Sen, "Estimates of the regression coefficient based on Kendall's tau", JASA 63, 1968.
 [[nodiscard]] inline std::optional<log_line> fit_log_line(std::span<const float> log_spacing,
                                                           std::span<const float> log_range) {
   constexpr std::size_t bins = 24;
@@ -62,7 +61,7 @@ template <std::ranges::contiguous_range Values>
   std::size_t count = 0;
   for_each_point([&](float, float) { ++count; });
   if (count == 0) return std::nullopt;
-  std::vector<float> values;  // ranges at first
+  std::vector<float> values;  // holds ranges first
   values.reserve(count);
   for_each_point([&](float, float range) { values.push_back(range); });
   const double low = quantile(values, 0.01);
@@ -70,7 +69,7 @@ template <std::ranges::contiguous_range Values>
   if (!(width > 1e-6)) return std::nullopt;
   const auto bin_of = [&](double range) {
     const double bin = (range - low) / width;
-    return bin >= 0 && bin < bins ? static_cast<std::size_t>(bin) : bins;  // the last one holds the rest
+    return bin >= 0 && bin < bins ? static_cast<std::size_t>(bin) : bins;  // the last bin holds the rest
   };
   std::array<std::size_t, bins + 2> begin{};
   for_each_point([&](float, float range) { ++begin[bin_of(range) + 1]; });
@@ -103,8 +102,8 @@ template <std::ranges::contiguous_range Values>
   return line;
 }
 
-/// Location and width of the bulk of some values: the median, and on either side 1.4826 times the median distance of
-/// the values on that side from it (the standard deviation of a normal distribution).
+/// Location and width of the bulk of some values: the median, and for either side 1.4826 times the median distance of
+/// the values on that side from the median (for a normal distribution, the standard deviation).
 struct bulk {
   double median = 0;
   double left_scale = 0;
@@ -114,7 +113,7 @@ struct bulk {
   bulk out;
   out.median = quantile(values, 0.5);
   if (values.empty()) return out;
-  // Ranks of distances follow from ranks of values, counted from the other end on the left; no distances are stored.
+  // Ranks of distances follow from ranks of values (on the left, from the other end), so no distances are stored.
   const auto median = static_cast<float>(out.median);
   float* const begin = values.data();
   float* const end = begin + values.size();
@@ -135,7 +134,7 @@ struct bulk {
 /// Deepest valley in the upper tail of a distribution.
 struct valley {
   double position = 0;  ///< distance above the median
-  double ratio = 0;     ///< height of the later peak over that of the valley
+  double ratio = 0;     ///< height of the later peak / height of the valley
 };
 /// Finds the position in [lowest, 3.2] of the smoothed histogram of `values - median` with the largest ratio of the
 /// highest later peak to its own height. O(n).

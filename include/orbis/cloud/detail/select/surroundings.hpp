@@ -27,12 +27,13 @@
 
 namespace orbis::cloud::detail {
 
-/// Values of a subset of the points 0 ... n - 1. A quarter of a byte per point and four bytes per value; twice that
-/// while values are added.
+/// Values for a subset of the points 0 ... n - 1. Takes 0.25 bytes per point and 4 bytes per value; twice as much while
+/// values are added.
 class sparse_values {
  public:
   /// Adds `value(i)` for each i < count that has no value yet and for which `wanted(i)` is true. Both functions are
-  /// called from several threads. O(count), the same for every policy. @pre count is the same in all calls
+  /// called from several threads. O(count); the result is the same for every policy. @pre count is the same in all
+  /// calls
   template <execution_policy Policy, class Wanted, class Value>
   void add(const Policy& policy, std::size_t count, const Wanted& wanted, const Value& value) {
     const sparse_values before = *this;
@@ -78,17 +79,17 @@ class sparse_values {
 };
 
 /// The remaining points of a cloud with their neighbours. Points are identified by the places of a `neighbor_graph`;
-/// all data is stored by place. Log spacings are NaN for points without one: single points, or points identical to all
-/// their neighbours. About 45 bytes per point.
+/// all data are stored by place. Log spacings are NaN for single points and for points identical to all their
+/// neighbours. About 45 bytes per point.
 class surroundings {
  public:
-  static constexpr std::size_t width = 12;       ///< neighbours in the graph; more if more are averaged
-  static constexpr std::size_t shape_width = 8;  ///< neighbours whose shape is analysed
+  static constexpr std::size_t width = 12;       ///< number of neighbours in the graph; more if more are averaged
+  static constexpr std::size_t shape_width = 8;  ///< number of neighbours whose shape is analysed
   static constexpr float bulk_end = 0.3F;        ///< log spacing above usual up to which the shape is not analysed
 
-  /// Builds the neighbour graph. `left`: per point, nonzero if it is present; non-finite points are not. `ranges`:
-  /// metres, per point of the cloud, non-finite or negative if unknown; empty if all are unknown. The ranges
-  /// must outlive this object.
+  /// Builds the neighbour graph. `left`: per point, nonzero if it is present; non-finite points never are. `ranges`:
+  /// metres, per point of the cloud, non-finite or negative if unknown; empty if all are unknown. The ranges must
+  /// outlive this object.
   template <execution_policy Policy>
   surroundings(const Policy& policy, const point_view& points, std::span<const char> left,
                std::span<const float> ranges, std::size_t neighbors)
@@ -124,7 +125,7 @@ class surroundings {
   template <execution_policy Policy>
   [[nodiscard]] std::vector<float> residuals(const Policy& policy, const density_step& step) {
     const bool is_local = step.mode == filter_mode::local_log_statistical;
-    const auto local = is_local ? local_spacing(policy) : std::span<const float>{};  // first, as it needs memory
+    const auto local = is_local ? local_spacing(policy) : std::span<const float>{};  // first, because it allocates
     std::vector<float> out(size());
     if (is_local) {
       for (std::size_t i = 0; i != size(); ++i) out[i] = log_spacing_[i] - local[i] - static_cast<float>(step.offset);
@@ -141,8 +142,9 @@ class surroundings {
         policy, size(), [&](std::size_t i) { return residual[i] >= bulk_end || !is_bulk(line, i); },
         [&](std::size_t i) { return static_cast<float>(off_plane_at(i)); });
   }
-  /// Returns true if the point lies in a plane with its neighbours, or next to enough points that do at its own scale.
-  /// @pre its shape and that of its sparse neighbours was computed with the same line
+  /// Returns true if the point lies in a plane with its neighbours, or next to enough points of similar spacing that
+  /// do.
+  /// @pre the shapes of the point and of its sparse neighbours were computed with the same line
   [[nodiscard]] bool on_surface(std::size_t i, const surface_test& test, const log_line& line) const {
     const auto is_flat = [&](std::size_t j) { return double{flat_.at(j)} < test.flatness; };
     if (is_flat(i)) return true;
@@ -195,7 +197,7 @@ class surroundings {
   [[nodiscard]] bool is_bulk(const log_line& line, std::size_t i) const noexcept {
     return log_spacing_[i] - usual(line, i) < bulk_end;
   }
-  /// Computes all data that depends on the points only.
+  /// Computes all data that depend only on the points.
   template <execution_policy Policy>
   void measure(const Policy& policy, leaf_hierarchy tree, std::size_t points, std::size_t neighbors) {
     graph_ = neighbor_graph{policy, std::move(tree), points, std::max(width, neighbors)};

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Evidence of views about a cloud, as a step of a chain.
+/// Evaluates the evidence of views about a cloud, as a step of a filter chain.
 #pragma once
 
 #include <algorithm>
@@ -31,7 +31,7 @@ struct ray_removals {
   std::size_t unsupported = 0;
 };
 
-/// Clears `left` for the points that the counts exclude.
+/// Sets `left` to 0 for the points that the counts exclude.
 [[nodiscard]] inline ray_removals remove_by_rays(const std::vector<ray_evidence>& scores, const ray_step& step,
                                                  std::span<char> left) {
   ray_removals out;
@@ -46,7 +46,7 @@ struct ray_removals {
   return out;
 }
 
-/// Clears `left` for the points that the views exclude. If cancelled, removes nothing.
+/// Sets `left` to 0 for the points that the views exclude. If cancelled, removes nothing.
 template <execution_policy Policy, posed_depth_range Views, camera::camera_model Camera>
 ray_removals apply_rays(const Policy& policy, const point_view& points, const ray_step& step, const Views& views,
                         const Camera& camera, std::span<char> left, bool& cancelled, progress on_progress) {
@@ -62,7 +62,7 @@ ray_removals apply_rays(const Policy& policy, const point_view& points, const ra
   return cancelled ? ray_removals{} : remove_by_rays(counter.scores(), step, left);
 }
 
-/// Tests whether a cloud was made from given views: nearly every point of a sample is in one of them.
+/// Tests whether a cloud was built from the given views: nearly every point of a sample is supported by a view.
 template <camera::camera_model Camera>
 class source_view_test {
  public:
@@ -75,7 +75,7 @@ class source_view_test {
   void add(const Policy& policy, const View& view) {
     counter_.add(policy, view);
   }
-  /// Returns true if the cloud was made from the views. @pre all views were added
+  /// Returns true if the cloud was built from the views. @pre all views were added
   [[nodiscard]] bool passed() const {
     const std::vector<ray_evidence> scores = counter_.scores();
     const auto supported = std::ranges::count_if(scores, [](const ray_evidence& e) { return e.supported > 0; });
@@ -96,7 +96,7 @@ class source_view_test {
   ray_evidence_counter<Camera> counter_;
 };
 
-/// Evaluates a cloud against its views, clears `left` for the points that they exclude, and adds the step and its
+/// Evaluates a cloud against its views, sets `left` to 0 for the points that they exclude, and adds the step and its
 /// reason. Returns false if cancelled.
 template <execution_policy Policy, posed_depth_range Views, camera::camera_model Camera>
 [[nodiscard]] bool judge_views(const Policy& policy, const point_view& points, const Views& views, const Camera& camera,

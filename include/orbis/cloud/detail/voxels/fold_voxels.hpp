@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Gathers the points of every occupied voxel in the order of the cloud.
+/// Accumulates the points of every occupied voxel in the order of the cloud.
 #pragma once
 
 #include <algorithm>
@@ -36,7 +36,7 @@ struct voxel_summary {
 
 /// Accumulation of points into voxels. Each voxel has a record, initially `empty`, to which its points are added in the
 /// order of the cloud. After `resize(count)`, `put(number, summary)` is called once for each voxel, concurrently for
-/// different voxels; they are numbered in the order in which they first occur.
+/// different voxels; `number` is the index of the voxel in the order of first occurrence.
 template <bool Colored>
 struct centroid_fold {
   struct plain_record {
@@ -124,9 +124,9 @@ template <std::floating_point S, bool Colored>
   return true;
 }
 
-/// A cloud partitioned so that each part holds all points of its voxels in their order, usually with few enough voxels
-/// for their table to stay in the cache. A part is a pseudo-random selection of cubes of 8^3 voxels, so that neighbours
-/// in the cloud are mostly neighbours in a part.
+/// A cloud partitioned so that each part holds all points of its voxels, in their original order, and usually few
+/// enough voxels for a table that fits into the cache. A part is a pseudo-random selection of cubes of 8^3 voxels, so
+/// that neighbours in the cloud are mostly neighbours in a part.
 ///
 /// Source: Shatdal, Kant, Naughton, "Cache conscious algorithms for relational query processing", VLDB 1994
 /// (partitioning before hashing).
@@ -150,7 +150,7 @@ class voxel_parts {
     std::unique_ptr<rgb8[]> colors;
     if constexpr (Colored) colors = std::make_unique_for_overwrite<rgb8[]>(starts_.back());
     std::vector<std::uint32_t> voxels(parts());
-    // Few chunks, because each has its own table.
+    // Use few chunks, because each has its own table.
     const std::size_t chunks = policy.threads() <= 1 ? 1 : std::size_t{8} * policy.threads();
     const std::size_t width = std::max<std::size_t>(1, parts() / chunks);
     for_each_chunk(policy, parts(), width, [&](std::size_t begin, std::size_t end) {
@@ -180,7 +180,7 @@ class voxel_parts {
 
  private:
   static constexpr std::size_t points_of_part = 2048;
-  static constexpr std::size_t usual_voxels = 2 * points_of_part;  ///< usual maximum for a part
+  static constexpr std::size_t usual_voxels = 2 * points_of_part;  ///< usual maximum number of voxels of a part
   static constexpr std::size_t grain = std::size_t{1} << 15U;
   static constexpr std::uint16_t no_part = 0xffff;
   static constexpr std::uint16_t first_of_voxel = 0xfffe;
@@ -192,7 +192,7 @@ class voxel_parts {
     std::uint32_t index;
   };
 
-  /// Assigns numbers to voxels in the order of their first points.
+  /// Assigns indices to voxels in the order of their first points.
   class first_points {
    public:
     template <execution_policy Policy>
@@ -298,13 +298,13 @@ class voxel_parts {
   std::size_t count_;
   std::size_t bits_;
   std::vector<std::uint32_t> starts_;         ///< start of each part in the entries, and the end
-  std::unique_ptr<std::uint16_t[]> part_of_;  ///< part of each point; at the end also a mark
+  std::unique_ptr<std::uint16_t[]> part_of_;  ///< part of each point; finally also a mark
   table_memory<entry> memory_;
   entry* entries_ = nullptr;
 };
 
 /// Estimates the number of occupied voxels from a sample of the points, erring on the high side, but at most the number
-/// of points. With f1 sampled voxels found once and f2 found twice, at least f1^2 / (2 f2) voxels were not found, and
+/// of points. If the sample contains f1 voxels once and f2 voxels twice, it misses at least f1^2 / (2 f2) voxels, and
 /// about twice that number if the numbers of points per voxel vary. @pre the cloud is not empty
 ///
 /// Source: A. Chao, "Nonparametric estimation of the number of classes in a population", Scandinavian Journal of
@@ -339,9 +339,9 @@ template <std::floating_point S>
   return twice == 0 ? at_most : std::min(at_most, 2 * table.rows().size() + once * once / twice);
 }
 
-/// Gathers the points of every voxel, see `centroid_fold`; the same result for every policy. Skips points without a
-/// cell. O(n). Memory: for at most 2^17 points on one thread, a table for them, else 20 bytes per point, 25 with
-/// colours; temporarily also a table that turns out to be too small, or that of the largest part.
+/// Accumulates the points of every voxel, see `centroid_fold`; the same result for every policy. Skips points without a
+/// cell. O(n). Memory: for at most 2^17 points on one thread, one table; otherwise 20 bytes per point, 25 with colours,
+/// and temporarily a table that turns out to be too small or the table of the largest part.
 /// @pre size > 0, fewer than 2^32 - 1 points
 template <execution_policy Policy, std::floating_point S, bool Colored>
 void fold_voxels(const Policy& policy, const basic_point_view<S>& points, double size, centroid_fold<Colored> fold) {

@@ -27,7 +27,7 @@ struct voxel_item {
   std::uint32_t range;  ///< millimetres
 };
 
-/// Sums of the measurements of a voxel. Uses 32-bit words; a 64-bit member would enlarge it by a tenth.
+/// Sums of the measurements of a voxel. Uses 32-bit words, because a 64-bit member would enlarge it by a tenth.
 struct voxel_sum {
   std::array<std::uint32_t, 2> range_words{};  ///< low, high
   std::array<std::uint32_t, 3> offset{};
@@ -127,8 +127,8 @@ class voxel_brick {
   static constexpr std::uint32_t most = 1U << 22U;
   static constexpr std::size_t slack = 16;
 
-  /// Ranks of the occupied cells; other entries are undefined. Counting bits for each measurement is slow on processors
-  /// without a population count instruction.
+  /// Ranks of the occupied cells; other entries are undefined. The table avoids a bit count for each measurement, which
+  /// is slow on processors without a population count instruction.
   using rank_table = std::array<std::uint16_t, 512>;
   [[nodiscard]] rank_table all_ranks() const {
     rank_table out;  // NOLINT: partly uninitialised by design
@@ -151,7 +151,7 @@ class voxel_brick {
       count += static_cast<std::size_t>(std::popcount(mask[w]));
     }
   }
-  /// Makes room for additional cells in place, working backwards from the end.
+  /// Makes room for additional cells in place, from the end backwards.
   void widen(const cell_mask& mask) {
     const cell_mask old = mask_;
     std::size_t from = sums_.size();

@@ -34,7 +34,7 @@ struct voxel_cells {
   }
 };
 
-/// Hash of a cell in 32 bits, the upper ones best mixed; for scalars or lanes.
+/// 32-bit hash of a cell, with the best mixing in the upper bits; for scalars or lanes.
 template <class U>
 [[nodiscard]] ORBIS_ALWAYS_INLINE constexpr U mixed_cell(const U& x, const U& y, const U& z) noexcept {
   // Distant cells may differ in their upper bits only, which a product would lose.

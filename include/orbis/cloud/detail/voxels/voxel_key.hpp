@@ -29,7 +29,7 @@ struct voxel_key_hash {
   return is_cell(key[0]) && is_cell(key[1]) && is_cell(key[2]);
 }
 
-/// Returns true if two keys are equal. The comparison of `std::array` calls memcmp.
+/// Returns true if two keys are equal. The comparison operator of `std::array` would call memcmp.
 [[nodiscard]] constexpr bool same_key(const voxel_key& a, const voxel_key& b) noexcept {
   return ((a[0] ^ b[0]) | (a[1] ^ b[1]) | (a[2] ^ b[2])) == 0;
 }

@@ -17,11 +17,11 @@
 
 namespace orbis::cloud::detail {
 
-/// Rows by key. A row is contiguous: an access to a known voxel costs one or two cache misses in addition to the one
-/// for its slot. Open addressing with linear probing, at most half full.
+/// A hash table of rows by key. A row is contiguous: an access to a known voxel costs one or two cache misses in
+/// addition to the one for its slot. Open addressing with linear probing, at most half full.
 ///
-/// The branch on new voxels would be hard to predict, so an update does the same for new and known ones: it reads a
-/// row, which is row 0 for an empty slot, and writes one, which is then the next free row.
+/// The branch on new voxels would be hard to predict, so an update does the same for new and known voxels: it reads a
+/// row (row 0 for an empty slot) and writes a row (the next free one for an empty slot).
 template <class Record>
 class voxel_table {
   static_assert(std::is_trivially_copyable_v<Record> && std::is_trivially_default_constructible_v<Record>);
@@ -36,7 +36,7 @@ class voxel_table {
   /// Creates an empty table. New rows begin with the record `empty`.
   explicit voxel_table(const Record& empty) : empty_{empty} { clear(0); }
 
-  /// Removes all rows and makes room for `expected` ones. Keeps the memory.
+  /// Removes all rows and makes room for `expected` rows. Keeps the memory.
   void clear(std::size_t expected) {
     size_ = 0;
     make_room(std::max(expected, fewest));
@@ -45,7 +45,7 @@ class voxel_table {
   void reserve_more(std::size_t count, std::size_t limit) {
     const std::size_t needed = size_ + count;
     if (needed <= most_) return;
-    salt_ *= 0x9e3779b1U;  // with the same hash order all rows would cluster
+    salt_ *= 0x9e3779b1U;  // if the hash order stayed the same, all rows would cluster
     make_room(std::max(needed, std::min(2 * most_, limit)));
     for (std::size_t r = 1; r <= size_; ++r) slots_[free_slot(mixed_key(rows_[r].key))] = static_cast<std::uint32_t>(r);
   }
@@ -55,8 +55,8 @@ class voxel_table {
     for (const std::uint32_t hash : hashes) __builtin_prefetch(&slots_[first_slot(hash)]);
     for (const std::uint32_t hash : hashes) __builtin_prefetch(&rows_[slots_[first_slot(hash)]]);
   }
-  /// Calls `add(record)` on the record of a key, or on that of a new row with `first`. The record is a copy that is
-  /// stored afterwards. @pre hash == mixed_key(key), there is room for one more row
+  /// Calls `add(record)` with the record of a key, or with that of a new row created by point `first`. `record` is a
+  /// copy that is stored afterwards. @pre hash == mixed_key(key), there is room for one more row
   template <class Add>
   void update(const voxel_key& key, std::uint32_t hash, std::uint32_t first, const Add& add) {
     std::size_t i = first_slot(hash);
@@ -95,7 +95,7 @@ class voxel_table {
       rows_ = std::move(rows);
       capacity_ = most;
     }
-    const std::size_t slots = std::min(std::bit_ceil(2 * most), std::size_t{1} << 32U);  // one per hash at most
+    const std::size_t slots = std::min(std::bit_ceil(2 * most), std::size_t{1} << 32U);  // at most one per hash
     slots_.assign(slots, 0);
     most_ = most;
     mask_ = slots - 1;
@@ -104,7 +104,7 @@ class voxel_table {
 
   Record empty_;
   std::unique_ptr<row[]> rows_;       ///< row 0, the template of new rows, followed by size_ rows
-  std::vector<std::uint32_t> slots_;  ///< 2^(32 - shift_) row numbers, 0 for none
+  std::vector<std::uint32_t> slots_;  ///< 2^(32 - shift_) row indices, 0: empty
   std::size_t size_ = 0, most_ = 0, capacity_ = 0, mask_ = 0;
   std::uint32_t salt_ = 1;  ///< odd
   unsigned shift_ = 0;
