@@ -39,7 +39,7 @@ class store_reader {
   [[nodiscard]] const brick_store<T>& store() const noexcept { return *store_; }
 
  private:
-  /// Upper bound of the size of the smallest node that contains both `k` and the last octant.
+  /// Upper bound on the size of the smallest node that contains both `k` and the last octant.
   [[nodiscard]] std::uint32_t distance(const voxel_key& k) const noexcept {
     return (k.x ^ at_.x) | (k.y ^ at_.y) | (k.z ^ at_.z);
   }
@@ -72,7 +72,7 @@ class store_reader {
 
 namespace orbis::octree {
 
-/// Requirements of queries on a map: a sensor model, a store and a grid. See occupancy_octree.
+/// A map that can be queried: it has a sensor model, a store and a grid. See occupancy_octree.
 template <class M>
 concept octree_map = sensor_model<typename M::model> && requires(const M& map) {
   { map.store() } -> std::same_as<const detail::brick_store<typename M::model::value_type>&>;
@@ -85,7 +85,7 @@ template <sensor_model Model>
   return v ? std::optional{to_probability(*v)} : std::nullopt;
 }
 
-/// Queries of a map at points or voxels near each other: along a ray, on a surface, in a scan. A place near the
+/// Queries of a map at points or voxels near each other: along a ray, on a surface, in a scan. A position near the
 /// previous one is found without a search. The map must outlive the accessor and must not change; use one accessor per
 /// thread.
 ///

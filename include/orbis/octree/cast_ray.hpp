@@ -25,11 +25,11 @@ enum class ray_end {
   hit,           ///< an occupied voxel
   unknown,       ///< an unknown voxel
   out_of_range,  ///< the centre of the voxel is beyond the range
-  out_of_grid,   ///< the ray leaves the grid, or starts outside
+  out_of_grid,   ///< the ray leaves the grid, or starts outside it
   no_direction   ///< the direction is zero or not finite
 };
 
-/// End of a cast ray.
+/// The voxel at which a cast ray ended, and the reason.
 struct ray_hit {
   ray_end end = ray_end::out_of_grid;
   voxel_key key;               ///< the voxel in which the ray ended
@@ -54,8 +54,8 @@ class ray_caster {
   ray_caster(const detail::brick_store<value_type>& store, const voxel_grid& grid, const ray_options& options) noexcept
       : reader_{store}, grid_{grid}, options_{options} {}
 
-  /// Walks from `origin` along `direction` (any length) to the first voxel that is occupied, unknown (unless ignored)
-  /// or out of range. O(voxels along the ray), with few operations per voxel.
+  /// Follows the ray from `origin` along `direction` (any length) to the first voxel that is occupied, unknown (unless
+  /// ignored) or out of range. O(voxels along the ray), with few operations per voxel.
   [[nodiscard]] ray_hit operator()(const detail::float3& origin, detail::float3 direction) noexcept {
     const auto start = grid_.key(origin);
     if (!start) return {};
@@ -73,7 +73,7 @@ class ray_caster {
     detail::skipping_traversal ray{cursor};
     const double safe = surely_in_range(origin);
     for (;;) {
-      // Leap to the face of a node in which no voxel can stop the ray.
+      // Skip to the face of a node in which no voxel can stop the ray.
       std::uint32_t cells = passable_cells(ray.key());
       if (cells == 0) {
         if (const auto stop = stop_at(ray.key())) return ended(*stop, ray.key());
@@ -105,8 +105,8 @@ class ray_caster {
 
  private:
   using chunk = typename detail::brick_store<value_type>::chunk;
-  /// Cached data of a chunk, stored or not. The mask of passable bricks is computed once enough rays have visited the
-  /// chunk.
+  /// Cached data for a chunk, whether or not the chunk is stored. The mask of passable bricks is computed once enough
+  /// rays have visited the chunk.
   struct seen_chunk {
     std::uint64_t name = ~std::uint64_t{0};
     std::uint64_t passable = 0;  ///< passable bricks, in Morton order
@@ -193,11 +193,11 @@ class ray_caster {
   voxel_grid grid_;
   ray_options options_;
   std::array<seen_chunk, chunks_kept> seen_{};
-  std::size_t here_ = 0;  ///< index of the last chunk read
+  std::size_t here_ = 0;  ///< index of the chunk read last
 };
 
-/// Casts many rays: sets `out[i]` to the end of the ray from `origins[i]` along `directions[i]`; the same under every
-/// policy. `origins` may be a single point. Allocates nothing.
+/// Casts many rays: sets `out[i]` to the end of the ray from `origins[i]` along `directions[i]`. The result is the same
+/// under every policy. `origins` may be a single point. Allocates nothing.
 /// @pre origins (unless a point), directions and out have the same size
 template <execution_policy Policy, octree_map Map, class Origins, point_range Directions>
 requires point_range<Origins> || point_like<Origins>

@@ -27,9 +27,10 @@ namespace orbis::octree {
 ///   log.for_each_since(seen, [&](const voxel_key& octant, std::uint64_t mask) { send(octant, mask); });
 /// @endcode
 ///
-/// 24 bytes per recorded octant and revision, up to a capacity. Beyond the capacity the oldest entries are merged into
-/// one entry per octant, a few with each new entry. Memory is thus bounded by the capacity and the number of octants
-/// that have ever changed, and record() has no long pauses. Const members can be called from several threads at once.
+/// Takes 24 bytes per recorded octant and revision, up to a capacity. Beyond the capacity the oldest entries are merged
+/// into one entry per octant, a few with each new entry. Memory is thus bounded by the capacity and the number of
+/// octants that have ever changed, and record() has no long pauses. Const members can be called from several threads at
+/// once.
 class change_log {
  public:
   /// Returns the current revision; 0 before the first begin_revision().
@@ -40,8 +41,9 @@ class change_log {
     return ++revision_;
   }
 
-  /// Records that voxels of the octant that contains `k` changed in this revision: those whose bits are set, in Morton
-  /// order. Can be called repeatedly for an octant. Amortised O(1), as long as no revision exceeds twice the capacity.
+  /// Records that voxels of the octant that contains `k` changed in this revision: those whose bits are set in `mask`,
+  /// in Morton order. Can be called repeatedly for an octant. Amortised O(1), as long as no revision exceeds twice the
+  /// capacity.
   /// @pre revision() != 0; coordinates < 2^21
   void record(const voxel_key& k, std::uint64_t mask) {
     assert(revision_ != 0);
@@ -88,7 +90,7 @@ class change_log {
   /// Oldest revision for which queries are complete, see forget_before(), clear() and stop(). A reader that has
   /// processed only an older one needs the whole map.
   [[nodiscard]] std::uint64_t complete_since() const noexcept { return complete_since_; }
-  /// Oldest revision for which queries are exact; for older ones the masks may contain additional voxels but miss none.
+  /// Oldest revision for which queries are exact; for older revisions the masks may contain additional voxels.
   [[nodiscard]] std::uint64_t exact_since() const noexcept { return exact_since_; }
 
   /// Sets the number of entries (octants and revisions) above which the oldest are merged. The current revision is
@@ -171,7 +173,7 @@ class change_log {
     std::size_t size_ = 0;
   };
 
-  /// Number of entries of revisions up to `revision`.
+  /// Number of entries with revisions up to `revision`.
   [[nodiscard]] std::size_t first_after(std::uint64_t revision) const noexcept {
     std::size_t low = 0, high = entries_.size();
     while (low != high) {
@@ -184,7 +186,7 @@ class change_log {
     return low;
   }
 
-  /// Sorts entries by octant and merges those of the same octant.
+  /// Sorts entries by octant and merges those for the same octant.
   static void unite(std::vector<entry>& entries) {
     std::sort(entries.begin(), entries.end(), [](const entry& a, const entry& b) { return a.octant < b.octant; });
     auto out = entries.begin();
@@ -207,7 +209,7 @@ class change_log {
     entries_.truncate(first + newest.size());
     limit_ = std::max(2 * capacity_, 2 * entries_.size());
   }
-  /// Moves the oldest entry to the merged entries, unless it is of the current revision.
+  /// Moves the oldest entry to the merged entries, unless it belongs to the current revision.
   bool merge_oldest() {
     if (entries_.empty() || entries_[0].revision == revision_) return false;
     const entry oldest = entries_[0];

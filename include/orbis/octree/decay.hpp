@@ -17,7 +17,7 @@
 
 namespace orbis::octree {
 
-/// Limit of the decay of a value: log-odds 0, or the value nearest to it with the same state.
+/// Value to which `v` decays: log-odds 0, or the value nearest to 0 with the same state.
 template <sensor_model M>
 [[nodiscard]] inline typename M::value_type resting_value(typename M::value_type v) noexcept {
   using T = typename M::value_type;
@@ -25,7 +25,7 @@ template <sensor_model M>
   return M::occupancy_threshold > 0 ? T{0} : largest_free_value<M>();
 }
 
-/// Exponential decay: log-odds halve in every `half_life`. Two applications equal one for the sum of the times, up to
+/// Exponential decay: log-odds halve every `half_life`. Two applications equal one with the sum of the times, up to
 /// rounding. Free voxels never become occupied, or vice versa.
 /// @pre half_life > 0, elapsed >= 0
 template <sensor_model M = log_odds<>>

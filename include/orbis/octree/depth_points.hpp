@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// World points of a depth image.
+/// Points of a depth image in the world frame.
 #pragma once
 
 #include <algorithm>
@@ -23,13 +23,13 @@
 
 namespace orbis::octree {
 
-/// Rays of a camera's pixels, as in camera::ray_table, with x and y stored separately. The x of a pinhole's ray depends
-/// only on the column and the y only on the row, so that no table is needed. Reused for all frames of the same camera.
+/// Rays of a camera's pixels, as in camera::ray_table, with x and y stored separately. For a pinhole camera, x depends
+/// only on the column and y only on the row, so no table is needed. Reuse one object for all frames of the same camera.
 class pixel_rays {
  public:
   static constexpr int padding = 16;  ///< readable values after the end of a row
 
-  /// Sets the rays to those of `camera`; does nothing if it compares equal (`==`) to the current one.
+  /// Sets the rays to those of `camera`; does nothing if `camera` compares equal (`==`) to the current camera.
   template <camera::camera_model Camera>
   void fit(const Camera& camera) {
     if constexpr (std::same_as<Camera, camera::any_camera>) {
@@ -60,7 +60,7 @@ class pixel_rays {
   [[nodiscard]] bool separable() const noexcept { return separable_; }
   /// Version number; changes with the rays.
   [[nodiscard]] unsigned version() const noexcept { return version_; }
-  /// Focal length of the approximate projection: the pixel of a ray is about `focal * (x, y) + center`; exactly, if
+  /// Focal length of the approximate projection: the pixel of a ray is about `focal * (x, y) + center`; exact if
   /// separable.
   [[nodiscard]] const vec2& focal() const noexcept { return focal_; }
   [[nodiscard]] const vec2& center() const noexcept { return center_; }
@@ -109,7 +109,7 @@ class pixel_rays {
   bool separable_ = false;
 };
 
-/// Appends the world points (metres) of the pixels of `depth` that have a measurement and a valid ray to `points`, row
+/// Appends to `points` the world points (metres) of all pixels of `depth` that have a measurement and a valid ray, row
 /// by row.
 /// @pre depth and camera have the same size
 template <camera::depth_source Depth>
@@ -126,8 +126,8 @@ void append_world_points(const Depth& depth, const pixel_rays& rays, const se3& 
       points.emplace_back(p[0], p[1], p[2]);
     }
 }
-/// The same; computes the camera's rays in every call, which takes longer than the points if it has a distortion. For
-/// several images, keep a pixel_rays.
+/// As above, but computes the camera's rays in every call; with lens distortion this takes longer than computing the
+/// points. For several images, keep a pixel_rays.
 template <camera::depth_source Depth, camera::camera_model Camera>
 void append_world_points(const Depth& depth, const Camera& camera, const se3& T_world_camera,
                          std::vector<vec3f>& points) {

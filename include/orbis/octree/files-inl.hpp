@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The functions of files.hpp.
+/// Definitions of the functions in files.hpp.
 #pragma once
 
 #include <algorithm>

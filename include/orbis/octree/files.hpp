@@ -3,8 +3,8 @@
 /// Reading and writing of OctoMap's files: `.bt` (free or occupied, 2 bits per child) and `.ot` (log-odds as float32).
 ///
 /// The files are byte-identical to those of OctoMap for the same map, including the pruning. Reading takes at most 8 KB
-/// plus 400 bytes per byte of the file, also for damaged files. The library orbis::compiled contains these functions
-/// for maps with the model log_odds<>; for other models include files-inl.hpp.
+/// plus 400 bytes of memory per byte of the file, even for damaged files. The library orbis::compiled contains these
+/// functions for maps with the model log_odds<>; for other models include files-inl.hpp.
 #pragma once
 
 #include <cstddef>
@@ -18,7 +18,7 @@
 
 namespace orbis::octree {
 
-/// Returns the bytes of a `.bt` file: every voxel free or occupied, whichever is likelier; pruned.
+/// Returns the bytes of a `.bt` file: every voxel is free or occupied, whichever is likelier, and the tree is pruned.
 /// @pre map.tree_depth() == default_tree_depth
 template <octomap_model Model>
 [[nodiscard]] std::string bt_bytes(const occupancy_octree<Model>& map);
@@ -37,13 +37,13 @@ template <octomap_model Model>
 template <octomap_model Model>
 [[nodiscard]] result<void> write_ot(const occupancy_octree<Model>& map, const std::filesystem::path& path);
 
-/// Reads the bytes of a `.bt` file; `where` is their name in error messages. Leaves get the model's bounds. Errors:
-/// malformed (damaged, truncated, not a `.bt` file), unsupported (another type of tree).
+/// Reads the bytes of a `.bt` file; `where` is the name of the bytes in error messages. Leaves get the log-odds at the
+/// model's bounds. Errors: malformed (damaged, truncated, not a `.bt` file), unsupported (another type of tree).
 template <octomap_model Model = log_odds<>>
 [[nodiscard]] result<occupancy_octree<Model>> read_bt(std::span<const std::byte> bytes,
                                                       const std::string& where = "bytes");
 
-/// Reads the bytes of an `.ot` file. Skips inner values, which follow from the leaves.
+/// Reads the bytes of an `.ot` file. Skips the values of inner nodes, which follow from the leaves.
 template <octomap_model Model = log_odds<>>
 [[nodiscard]] result<occupancy_octree<Model>> read_ot(std::span<const std::byte> bytes,
                                                       const std::string& where = "bytes");

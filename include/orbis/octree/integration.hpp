@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Options and summary of the integration of a scan.
+/// Options for integrating a scan, and a summary of the result.
 #pragma once
 
 #include <cstddef>
@@ -15,9 +15,9 @@ enum class ray_mode {
 };
 
 struct integration_options {
-  /// Maximum distance from the sensor, metres. A point further away contributes only its ray up to this distance, as
-  /// free. A point at exactly this distance is within range. OctoMap's "no limit", a negative range, corresponds to
-  /// infinity.
+  /// Maximum distance from the sensor, metres. For a point further away, only the ray up to this distance is
+  /// integrated, as free space. A point at exactly this distance is within range. OctoMap's "no limit", a negative
+  /// range, corresponds to infinity.
   /// @pre >= 0
   double max_range = std::numeric_limits<double>::infinity();
   ray_mode mode = ray_mode::every_ray;
@@ -26,11 +26,11 @@ struct integration_options {
 /// Counts of points and voxels of an integrated scan. In mode `discretized`, `used` and `truncated` count voxels that
 /// hold points instead of points; points that share a voxel count once.
 struct integration_summary {
-  std::size_t used = 0;       ///< points within range
-  std::size_t truncated = 0;  ///< points beyond the range
-  std::size_t rejected = 0;   ///< points that are NaN, infinite, or too far outside the grid
-  std::size_t free = 0;       ///< voxels observed free; for a map, without voxels that are already free and saturated
-  std::size_t occupied = 0;   ///< voxels observed occupied
+  std::size_t used = 0;       ///< number of points within range
+  std::size_t truncated = 0;  ///< number of points beyond the range
+  std::size_t rejected = 0;   ///< number of points that are NaN, infinite, or too far outside the grid
+  std::size_t free = 0;       ///< number of voxels observed free; for a map, excluding those already saturated free
+  std::size_t occupied = 0;   ///< number of voxels observed occupied
 };
 
 }  // namespace orbis::octree

@@ -16,14 +16,14 @@
 
 namespace orbis::octree {
 
-/// Tree depth of OctoMap and the default of orbis, and the maximum depth.
+/// Default tree depth, which is that of OctoMap, and maximum tree depth.
 ///
 /// The *level* of a node counts from the bottom: 0 is a voxel; in general it is `tree depth - depth`. Stored data
-/// refers only to levels and thus does not depend on the extent of the grid.
+/// contain only levels and thus do not depend on the extent of the grid.
 inline constexpr int default_tree_depth = 16;
 inline constexpr int max_tree_depth = 21;
 
-/// Position of a voxel in the grid: 0 ... cells() - 1 along each axis; the world's origin is the lower corner of the
+/// Position of a voxel in the grid: 0 ... cells() - 1 along each axis; the world's origin is at the lower corner of the
 /// middle voxel, (32768, 32768, 32768) at depth 16. A node is identified by its lowest voxel.
 struct voxel_key {
   std::uint32_t x = 0, y = 0, z = 0;
@@ -45,7 +45,7 @@ struct voxel_key {
   return {k.x & outside, k.y & outside, k.z & outside};
 }
 
-/// The regular grid of voxels.
+/// A regular grid of voxels.
 class voxel_grid {
  public:
   /// `resolution`: the edge of a voxel, metres. `depth`: the grid is 2^depth voxels wide, centred at
@@ -108,8 +108,8 @@ class voxel_grid {
 
 // -- the Morton curve
 
-/// Position of voxel `k` along the Morton curve: the interleaved bits of x, y and z, x lowest; 63 bits. The six lowest
-/// bits are the voxel's position in its octant of 4x4x4 voxels; the others are the octant's code.
+/// Position of voxel `k` along the Morton curve: the interleaved bits of x, y and z (x lowest), 63 bits in total. The
+/// six lowest bits are the voxel's position in its octant of 4x4x4 voxels; the others are the octant's code.
 ///
 /// G. M. Morton, "A computer oriented geodetic data base and a new technique in file sequencing", IBM, 1966.
 /// @pre coordinates < 2^21
@@ -125,7 +125,7 @@ class voxel_grid {
   return spread(k.x) | spread(k.y) << 1U | spread(k.z) << 2U;
 }
 
-/// Voxel at a position of the Morton curve. @pre code < 2^63
+/// Voxel at a position along the Morton curve. @pre code < 2^63
 [[nodiscard]] constexpr voxel_key morton_key(std::uint64_t code) noexcept {
   const auto gather = [](std::uint64_t v) {
     v &= 0x1249249249249249ULL;

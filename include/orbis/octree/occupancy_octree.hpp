@@ -71,7 +71,7 @@ struct octree_leaf {
 /// @endcode
 ///
 /// Const members can be called from several threads at once. A copy shares all memory with the original (copy on write)
-/// and costs O(pages of 4 KB): readers on other threads take a copy between two insertions and use it while the writer
+/// and takes O(pages of 4 KB): readers on other threads take a copy between two insertions and use it while the writer
 /// continues.
 template <sensor_model Model = log_odds<>>
 class occupancy_octree {
@@ -97,7 +97,7 @@ class occupancy_octree {
 
   /// Integrates a scan: `points` in the world frame (metres), seen from `origin`. Every voxel crossed by rays is
   /// observed free once, and every voxel that contains points is observed occupied once, regardless of the numbers of
-  /// rays and points; if both apply, it is observed occupied. Coordinates are rounded to float first. The result does
+  /// rays and points; if both apply, it is observed occupied. Coordinates are first rounded to float. The result does
   /// not depend on the policy or on the order of the points. Points that are non-finite or outside the grid are counted
   /// as rejected; if the origin is non-finite, all are. In mode every_ray, a scan with many points per voxel, such as
   /// one from a depth image, takes little more time than the image: O(points + voxels near surfaces). Other scans take
@@ -111,9 +111,9 @@ class occupancy_octree {
   integration_summary integrate(const Points& points, const Origin& origin, const integration_options& options = {}) {
     return integrate(seq, points, origin, options);
   }
-  /// Integrates a depth image (depths in metres along the optical axis). The result equals that of the image's world
-  /// points (see append_world_points) seen from the camera's centre, but is computed many times faster. O(pixels +
-  /// voxels near surfaces).
+  /// Integrates a depth image (depths in metres along the optical axis). The result equals that of integrating the
+  /// image's world points (see append_world_points), seen from the camera's centre, but is computed many times faster.
+  /// O(pixels + voxels near surfaces).
   /// @pre depth and camera have the same size
   template <execution_policy Policy, camera::depth_source Depth, camera::camera_model Camera>
   integration_summary integrate(const Policy& policy, const Depth& depth, const Camera& camera,
@@ -126,8 +126,8 @@ class occupancy_octree {
     return integrate(seq, depth, camera, T_world_camera, options);
   }
 
-  /// Applies the voxels of a scan that was marked before, for example on another thread (see scan_marker): `integrate`
-  /// is marking and applying. Returns the numbers of voxels observed free and occupied. O(bricks observed).
+  /// Applies the voxels of a scan that was marked before, for example on another thread (see scan_marker); `integrate`
+  /// marks and applies in one call. Returns the numbers of voxels observed free and occupied. O(bricks observed).
   /// @pre the scan was marked for this grid
   integration_summary apply(const scan& voxels);
 
@@ -142,7 +142,7 @@ class occupancy_octree {
 
   /// Sets all voxels of a node to one value. `key`: the node's lowest voxel; `depth`: depth of the node in the tree (0:
   /// the root, tree_depth(): one voxel). O(1).
-  /// @pre the node is unknown as a whole; key is a multiple of the node's size
+  /// @pre all voxels of the node are unknown; key is a multiple of the node's size
   void set_unknown_node(const voxel_key& key, int depth, value_type value) {
     begin_change();
     store_.set_node(key, tree_depth() - depth, without_sign_of_zero(value));
@@ -226,7 +226,7 @@ class occupancy_octree {
     store_.erase_large(large);
     return bricks.size() + large.size();
   }
-  /// Merges equal uniform bricks into larger leaves. This saves memory and changes no value. Inside bricks, pruning is
+  /// Merges equal uniform bricks into larger leaves. This saves memory and changes no value. Within bricks, pruning is
   /// always immediate. A later change splits a leaf again. O(bricks).
   void prune();
 
@@ -247,8 +247,8 @@ class occupancy_octree {
 
   // -- queries
 
-  /// Returns the value stored at `p` (metres); empty if unknown or outside the grid. O(1), as are the queries for one
-  /// place below.
+  /// Returns the value stored at `p` (metres), empty if unknown or outside the grid. O(1), as are the single-voxel
+  /// queries below.
   template <point_like P>
   [[nodiscard]] std::optional<value_type> value(const P& p) const {
     const auto key = grid_.key(p);
@@ -263,8 +263,8 @@ class occupancy_octree {
   template <class P>
   requires point_like<P> || std::same_as<P, voxel_key>
   [[nodiscard]] std::optional<double> probability(const P& p) const { return probability_at<Model>(value(p)); }
-  /// Returns an object with these queries that is several times faster for places near each other. Use one per thread;
-  /// valid until the map changes.
+  /// Returns an object with these queries that is several times faster for positions near each other. Use one per
+  /// thread; valid until the map changes.
   [[nodiscard]] octree_accessor<Model> accessor() const noexcept { return {store_, grid_}; }
   /// Returns the state of `p`.
   template <class P>
@@ -276,8 +276,8 @@ class occupancy_octree {
   }
 
   /// Finds the first voxel along a ray that is occupied, or unknown unless `ignore_unknown`. `origin` in metres,
-  /// `direction` of any length, `max_range` in metres (infinite or <= 0: no limit). The voxel equals that of OctoMap's
-  /// `castRay`. See ray_hit, and cast_rays for many rays. O(voxels along the ray).
+  /// `direction` of any length, `max_range` in metres (infinite or <= 0: no limit). The voxel is the same as that of
+  /// OctoMap's `castRay`. See ray_hit, and cast_rays for many rays. O(voxels along the ray).
   template <point_like Origin, point_like Direction>
   [[nodiscard]] ray_hit cast_ray(const Origin& origin, const Direction& direction,
                                  double max_range = std::numeric_limits<double>::infinity(),
@@ -298,14 +298,14 @@ class occupancy_octree {
   [[nodiscard]] std::size_t num_leaves() const { return counts().leaves; }
   [[nodiscard]] std::size_t num_occupied_leaves() const { return counts().occupied_leaves; }
   [[nodiscard]] std::size_t num_free_leaves() const { return counts().free_leaves; }
-  /// Number of nodes of the pruned octree, inner nodes and leaves.
+  /// Number of nodes of the pruned octree, including inner nodes and leaves.
   [[nodiscard]] std::size_t size() const { return counts().nodes; }
   [[nodiscard]] bool empty() const noexcept { return store_.empty(); }
 
   /// Smallest box around all known voxels; empty if there are none.
   [[nodiscard]] std::optional<bounding_box> bounds() const;
 
-  /// Heap memory in bytes: of the map (including memory shared with copies), and of the reused scan buffers.
+  /// Heap memory in bytes of the map (including memory shared with copies), and of the reused scan buffers.
   [[nodiscard]] std::size_t memory_bytes() const noexcept { return store_.memory_bytes() + track_.log.memory_bytes(); }
   [[nodiscard]] std::size_t buffer_bytes() const noexcept { return scratch_.memory_bytes(); }
 
@@ -316,9 +316,9 @@ class occupancy_octree {
   integration_summary integrate_depth(const parallel_policy& policy, const detail::depth_scan& scan,
                                       const se3& T_world_camera, const integration_options& options);
 
-  /// The change log. Copies of a map start without one, and a map that is moved takes its log along. A map that is
-  /// assigned to, or moved from, has changed as a whole, and its own log becomes incomplete: readers refer to revisions
-  /// of this log, and those of another log would be meaningless.
+  /// The change log. Copies of a map start without one, and a map that is moved takes its log along. If a map is
+  /// assigned to or moved from, its whole content changes and its own log becomes incomplete: readers hold revisions of
+  /// this log, and the revisions of another log would be meaningless to them.
   struct tracking {
     change_log log;
     bool on = false;

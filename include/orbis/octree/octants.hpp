@@ -16,7 +16,7 @@ namespace orbis::octree {
 /// The 64 voxels of an octant; bit i is the voxel at position i of the Morton curve, as in change_log.
 struct octant_states {
   std::uint64_t known = 0;
-  std::uint64_t occupied = 0;  ///< subset of the known ones
+  std::uint64_t occupied = 0;  ///< subset of the known voxels
 
   [[nodiscard]] constexpr std::uint64_t free() const noexcept { return known & ~occupied; }
   friend constexpr bool operator==(const octant_states&, const octant_states&) = default;
@@ -69,7 +69,8 @@ class octant_reader {
 
 /// Calls `visit(lowest voxel, level, states)` for every octant (level 2) with a voxel in `box` and at least one known
 /// voxel, and for every such leaf larger than 8x8x8 voxels (level > 3), all of whose octants have these states.
-/// Unordered. O(blocks of 32x32x32 voxels with bricks + large leaves + octants in the box that are not uniform).
+/// The order is unspecified. O(blocks of 32x32x32 voxels with bricks + large leaves + octants in the box that are not
+/// uniform).
 template <octree_map Map, std::invocable<const voxel_key&, int, const octant_states&> Visit>
 void for_each_octant(const Map& map, const key_box& box, Visit&& visit) {
   using model = typename Map::model;

@@ -18,7 +18,7 @@
 
 namespace orbis::octree {
 
-/// A ball; centre and radius in metres. @pre radius >= 0
+/// A solid sphere; centre and radius in metres. @pre radius >= 0
 struct sphere {
   vec3 center = zeros<vec3>();
   double radius = 0.0;
@@ -51,7 +51,7 @@ struct capsule {
   return squared_norm(s.center - nearest) <= s.radius * s.radius;
 }
 namespace detail {
-/// Exact test, used below.
+/// Exact test for the cases that `touches` below cannot decide otherwise.
 [[nodiscard]] inline bool touches_exactly(const capsule& c, const bounding_box& b) noexcept {
   const vec3 along = c.b - c.a;
   // The squared distance of a + t (b - a) from the box is convex in t, and its slope is linear between the parameters
@@ -82,10 +82,10 @@ namespace detail {
 }  // namespace detail
 
 [[nodiscard]] inline bool touches(const capsule& c, const bounding_box& b) noexcept {
-  // Most boxes are farther from the segment than their circumscribed ball, or nearer than their inscribed ball.
+  // The circumscribed and the inscribed ball of the box decide most cases.
   const vec3 middle = 0.5 * (b.min + b.max), half = b.max - middle, along = c.b - c.a, from = middle - c.a;
   const double squares = squared_norm(along), product = dot(from, along);
-  // Point of the segment nearest to the centre of the box: its start, its end, or between.
+  // Point of the segment nearest to the centre of the box: the start, the end, or a point in between.
   const double share = product <= 0.0 ? 0.0 : product >= squares ? 1.0 : product / squares;
   const double apart = squared_norm(from - share * along);
   const double outside = (c.radius + 1.7320508075688773 * max_entry(half)) * (1.0 + 1e-9);
@@ -93,8 +93,8 @@ namespace detail {
   const double inside = (c.radius + min_entry(half)) * (1.0 - 1e-9);
   if (apart < inside * inside) return true;
   // That point of the segment may be near enough to the box; otherwise the plane through the nearest point of the box,
-  // perpendicular to the line between the two, may separate both ends from the box. For a ball one of both holds, up to
-  // rounding.
+  // perpendicular to the line between the two, may separate both ends from the box. If `c` is a ball, one of the two
+  // holds, up to rounding.
   const vec3 point = c.a + share * along, nearest = clamped(point, b), way = point - nearest;
   const double squared = squared_norm(way), reach = c.radius * c.radius;
   if (squared < reach * (1.0 - 1e-9)) return true;
@@ -104,7 +104,7 @@ namespace detail {
 }
 
 /// A shape for overlap tests: `bounds_of(shape)` returns a box around it, `touches(shape, box)` returns true if it has
-/// a point in common with a box. Define user shapes in their own namespace.
+/// a point in common with a box. For a custom shape, define both functions in its namespace.
 template <class S>
 concept overlap_shape = requires(const S& shape, const bounding_box& box) {
   { bounds_of(shape) } -> std::convertible_to<bounding_box>;
@@ -112,12 +112,12 @@ concept overlap_shape = requires(const S& shape, const bounding_box& box) {
 };
 
 struct overlap_options {
-  occupancy unknown = occupancy::free;  ///< state that unknown space and all space outside the grid counts as
+  occupancy unknown = occupancy::free;  ///< state assumed for unknown space and all space outside the grid
 };
 
 namespace detail {
 
-/// Descends the tree at the shape as long as a blocking voxel is possible.
+/// Descends the tree around the shape, into nodes that may contain a blocking voxel.
 template <sensor_model Model, overlap_shape Shape>
 class overlap_search {
  public:
@@ -131,7 +131,7 @@ class overlap_search {
     const double edge = grid_.resolution() * (grid_.cells() / 2);
     const bool is_inside = all_at_most(filled<vec3>(-edge), bounds.min) && all_at_most(bounds.max, filled<vec3>(edge));
     if (unknown_blocks_ && !is_inside) return true;
-    // The box is extended by one voxel to include faces that only touch.
+    // The box is extended by one voxel to include voxels that only touch it.
     const auto keys =
         keys_between(grid_, shifted(bounds.min, -grid_.resolution()), shifted(bounds.max, grid_.resolution()));
     if (!keys) return false;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The functions of scan.hpp.
+/// Definitions of the functions in scan.hpp.
 #pragma once
 
 #include <algorithm>

@@ -29,8 +29,8 @@ class scan_masks;
 }  // namespace detail
 
 /// The voxels that one scan observes free and occupied: two disjoint sets, as bit masks of octants of 4x4x4 voxels,
-/// grouped by bricks of 8x8x8. A mask is stored only if it is neither empty nor a completely free octant. A depth image
-/// of 640x480 pixels takes about 10 kB at 5 cm and 100 kB at 2 cm.
+/// grouped by bricks of 8x8x8. A mask is stored only if it is neither empty nor that of a completely free octant. A
+/// depth image of 640x480 pixels takes about 10 kB at 5 cm and 100 kB at 2 cm.
 class scan {
  public:
   /// One brick. In the 8-bit masks, bit i is octant i.
@@ -48,7 +48,7 @@ class scan {
     std::array<std::uint64_t, 8> occupied{};
   };
 
-  /// The bricks in ascending order of name, without duplicates.
+  /// Returns the bricks in ascending order of name, without duplicates.
   [[nodiscard]] std::span<const part> parts() const noexcept { return parts_; }
   [[nodiscard]] std::span<const std::uint64_t> words() const noexcept { return words_; }
   [[nodiscard]] bool empty() const noexcept { return parts_.empty(); }
@@ -85,7 +85,7 @@ class scan {
   [[nodiscard]] std::size_t bytes() const noexcept {
     return parts_.capacity() * sizeof(part) + words_.capacity() * sizeof(std::uint64_t);
   }
-  /// Removes all voxels, keeps the memory.
+  /// Removes all voxels but keeps the memory.
   void clear() noexcept {
     parts_.clear();
     words_.clear();
@@ -105,13 +105,13 @@ class scan {
 using scan_voxels [[deprecated("use octree::scan")]] = scan;
 
 /// Finds the voxels that `occupancy_octree::integrate` would observe free and occupied, without a map; see
-/// occupancy_octree::apply and scan_history::set. Reuses its
-/// buffers: marking allocates nothing once they have grown. Use one marker per thread.
+/// occupancy_octree::apply and scan_history::set. Reuses its buffers: marking allocates nothing once the buffers have
+/// grown. Use one marker per thread.
 class scan_marker {
  public:
   /// Marks a depth image (metres along the optical axis). Unlike `integrate`, includes saturated voxels, so that the
-  /// scan can be applied to any map. The same voxels for every policy. The summary has the counts of `integrate`.
-  /// O(pixels + voxels near surfaces + bricks).
+  /// scan can be applied to any map. The voxels are the same for every policy. The summary has the same counts as that
+  /// of `integrate`. O(pixels + voxels near surfaces + bricks).
   /// @pre depth and camera have the same size
   template <execution_policy Policy, camera::depth_source Depth, camera::camera_model Camera>
   integration_summary mark(const Policy& policy, const voxel_grid& grid, const Depth& depth, const Camera& camera,

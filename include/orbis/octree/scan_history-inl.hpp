@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The functions of scan_history.hpp.
+/// Definitions of the functions in scan_history.hpp.
 #pragma once
 
 #include <algorithm>
@@ -17,7 +17,7 @@
 namespace orbis::octree {
 namespace detail {
 
-/// Mask of the voxels in which two octants differ; unknown voxels hold 0.
+/// Mask of the voxels in which two octants differ. @pre unknown voxels hold 0
 template <class T>
 [[nodiscard]] std::uint64_t difference(const block<T>& a, const block<T>& b) noexcept {
   std::uint64_t different = a.known ^ b.known;
@@ -26,7 +26,7 @@ template <class T>
 }
 
 /// Replays the stale octants of a brick from an empty state with every scan of `b.uses` in turn; `voxels_of(scan)`
-/// returns the scan's voxels. Only reads the store. O(scans that use the brick).
+/// returns the scan's voxels. Does not change the store. O(scans that use the brick).
 /// @pre no leaf of the store is larger than a brick
 template <sensor_model Model, class VoxelsOf>
 void replay_brick(const brick_store<typename Model::value_type>& store, const used_brick& b, const VoxelsOf& voxels_of,
@@ -57,7 +57,7 @@ void replay_brick(const brick_store<typename Model::value_type>& store, const us
   }
 }
 
-/// Stores the octants of a replayed brick that differ from the stored ones, and records the changes. Returns true if
+/// Stores the octants of a replayed brick that differ from those in the store, and records the changes. Returns true if
 /// any voxel of the brick is known afterwards.
 template <class T>
 bool store_replayed(brick_store<T>& store, std::uint64_t name, const replayed_brick<T>& replayed, change_log* log) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
 /// A map that follows its scans: when a scan changes, is removed or arrives late, the map becomes bit-identical to one
-/// made from all scans in order.
+/// built from all scans in order.
 ///
 /// Log-odds are clamped, so the order of scans matters, and a scan cannot be subtracted, because clamping loses
 /// information. Instead, the history keeps the voxels that each scan observed free and occupied, and replays the
@@ -33,9 +33,9 @@
 
 namespace orbis::octree {
 
-/// Limits of one call of replay. When a limit is reached, the remaining octants stay stale for the next call.
+/// Limits of one call to replay. When a limit is reached, the remaining octants stay stale for the next call.
 struct replay_limits {
-  std::chrono::nanoseconds time = std::chrono::nanoseconds::max();  ///< checked after every few dozen bricks
+  std::chrono::nanoseconds time = std::chrono::nanoseconds::max();  ///< checked after each few dozen bricks
   std::size_t bricks = std::numeric_limits<std::size_t>::max();
 };
 
@@ -43,7 +43,7 @@ struct replay_limits {
 template <class M>
 concept replayable_octree = octree_map<M> && std::same_as<M, occupancy_octree<typename M::model>>;
 
-/// A map and the scans it is made from, ordered by a caller-defined number: the index of the frame.
+/// A map and the scans from which it is built, ordered by the frame index that the caller assigns to each scan.
 ///
 /// @code
 ///   orbis::octree::scan_history<> history{0.05};
@@ -56,7 +56,7 @@ concept replayable_octree = octree_map<M> && std::same_as<M, occupancy_octree<ty
 ///
 /// A scan that is newer than all others is applied immediately. Other changes make octants stale; they keep their
 /// values until `replay` updates them. When no octant is stale, the map is bit-identical to the one that `integrate`
-/// makes from all scans in the order of their frames, independent of the history of calls, limits and policies.
+/// builds from all scans in the order of their frames, independent of the history of calls, limits and policies.
 ///
 /// Not thread-safe, but other threads may read a copy of the map at the same time.
 template <replayable_octree Octree = occupancy_octree<>>
@@ -109,11 +109,11 @@ class scan_history {
     set(frame, marked_);
     return summary;
   }
-  /// Sets the scan of `frame` to voxels that were marked earlier, for example on another thread. O(bricks observed
-  /// before and now x log(scans that use a brick)).
+  /// Sets the scan of `frame` to voxels that were marked earlier, for example on another thread. O(b log s) for b
+  /// bricks observed before or now and s scans that use a brick.
   /// @pre `voxels` were marked for this grid
   void set(std::uint64_t frame, const scan& voxels);
-  /// Removes a scan; the octants it observed become stale. Returns true if it existed. O(its bricks + scans).
+  /// Removes a scan; the octants that it observed become stale. Returns true if it existed. O(its bricks + scans).
   bool remove(std::uint64_t frame);
   /// Returns the voxels of a scan, valid until it changes; null if the scan does not exist. O(log scans).
   [[nodiscard]] const scan* find_scan(std::uint64_t frame) const noexcept;
@@ -125,15 +125,15 @@ class scan_history {
 
   /// Number of bricks with stale octants.
   [[nodiscard]] std::size_t stale_bricks() const noexcept { return uses_.stale().size(); }
-  /// Replays stale octants, the longest stale first, as one revision of the change log. Returns the number of bricks
-  /// replayed: at least one, if any is stale, regardless of the time limit. The map is the same under every policy.
-  /// Allocates nothing once its buffers have grown. O(bricks x scans that use each).
+  /// Replays stale octants, those stale for longest first, as one revision of the change log. Returns the number of
+  /// bricks replayed: at least one, if any is stale, regardless of the time limit. The map is the same under every
+  /// policy. Allocates nothing once its buffers have grown. O(bricks x scans that use each).
   template <execution_policy Policy>
   std::size_t replay(const Policy& policy, const replay_limits& limits = {}) {
     return replay_stale(detail::as_parallel(policy), limits);
   }
 
-  /// Heap memory in bytes of the scans and the per-brick lists of scans, without the map. O(bricks + scans).
+  /// Heap memory in bytes of the scans and the per-brick lists of scans, excluding the map. O(bricks + scans).
   [[nodiscard]] std::size_t bytes() const noexcept;
   /// Memory in bytes of the buffers for marking and replaying.
   [[nodiscard]] std::size_t buffer_bytes() const noexcept {
@@ -142,7 +142,7 @@ class scan_history {
 
  private:
   using value_type = typename Octree::value_type;
-  static constexpr std::size_t batch = 64;  ///< bricks that one thread replays before they are stored
+  static constexpr std::size_t batch = 64;  ///< number of bricks that one thread replays before they are stored
 
   struct entry {
     std::uint64_t frame = 0;
@@ -155,9 +155,9 @@ class scan_history {
 
   [[nodiscard]] static bool is_before(const place& p, std::uint64_t frame) noexcept { return p.frame < frame; }
   [[nodiscard]] typename std::vector<place>::iterator find(std::uint64_t frame) noexcept;
-  /// Returns the number of the scan of `frame`; creates one if needed.
+  /// Returns the index of the scan of `frame`; creates the scan if needed.
   [[nodiscard]] std::uint32_t make_scan(std::uint64_t frame);
-  /// Position (existing or for insertion) of the scan of `frame` among those that use a brick.
+  /// Position (existing or for insertion) of the scan of `frame` among the scans that use a brick.
   [[nodiscard]] std::vector<detail::brick_use>::iterator find_place(std::vector<detail::brick_use>& uses,
                                                                     std::uint64_t frame) const noexcept;
   /// Updates the bricks' lists of scans from the old voxels of scan `number` to `after`. If the scan is the newest of a
@@ -170,9 +170,9 @@ class scan_history {
   void replay_first(const parallel_policy& policy, detail::brick_store<value_type>& store, change_log* log,
                     std::size_t count);
   Octree map_;
-  std::vector<entry> scans_;         ///< by number
-  std::vector<std::uint32_t> free_;  ///< unused numbers
-  std::vector<place> order_;         ///< by frame
+  std::vector<entry> scans_;         ///< by scan index
+  std::vector<std::uint32_t> free_;  ///< unused scan indices
+  std::vector<place> order_;         ///< sorted by frame
   detail::brick_uses uses_;
 
   scan_marker marker_;

@@ -18,8 +18,8 @@
 
 namespace orbis::octree::detail {
 
-/// Natural logarithm of `x`, within three units in the last place of a double, so that its float equals that of
-/// std::log (except for about one value in ten million, which rounds differently).
+/// Natural logarithm of `x`, within three units in the last place of a double, so that after rounding to float it
+/// equals that of std::log (except for about one value in ten million).
 ///
 /// `x = m * 2^e` with `m` in [0.7, 1.41]; `log(m) = 2 atanh(s)` for `s = (m - 1) / (m + 1)`, by the series `s + s^3 / 3
 /// + s^5 / 5 + ...`, |s| < 0.172. For constants; std::log is faster at run time.
@@ -136,10 +136,10 @@ template <sensor_model M>
 
 // -- models from probabilities
 
-/// The probabilities of OctoMap's constants.
+/// The probabilities that correspond to OctoMap's constants.
 struct octomap_probabilities {
-  static constexpr double hit = 0.7;   ///< that a voxel is occupied if a ray ends in it
-  static constexpr double miss = 0.4;  ///< that a voxel is occupied if a ray crosses it
+  static constexpr double hit = 0.7;   ///< probability that a voxel is occupied if a ray ends in it
+  static constexpr double miss = 0.4;  ///< probability that a voxel is occupied if a ray crosses it
   static constexpr double clamp_min = 0.1192;
   static constexpr double clamp_max = 0.971;
   static constexpr double occupancy_threshold = 0.5;

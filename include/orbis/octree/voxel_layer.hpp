@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A sparse layer of payload for a map: colours, labels or counts, with at most one value per voxel, addressed by the
-/// keys of the map.
+/// A sparse payload layer for a map, such as colours, labels or counts: at most one value per voxel, addressed by the
+/// map's voxel keys.
 #pragma once
 
 #include <algorithm>
@@ -22,7 +22,7 @@
 
 namespace orbis::octree {
 
-/// A payload type: plain bytes that copies of a map can share. Its default value is that of a voxel without data.
+/// A payload type: trivially copyable, so that copies of a layer can share it. The default value means "no data".
 template <class T>
 concept voxel_payload = std::copyable<T> && std::default_initializable<T> && std::is_trivially_copyable_v<T>;
 
@@ -37,9 +37,9 @@ class rgb_mean {
     sum_[2] = static_cast<std::uint16_t>(sum_[2] + color.b);
     ++count_;
   }
-  /// Number of observations in the mean, 257 at most.
+  /// Number of observations in the mean, at most 257.
   [[nodiscard]] std::uint32_t count() const noexcept { return count_; }
-  /// Returns the mean, rounded; black without observations.
+  /// Returns the mean, rounded; black if there are no observations.
   [[nodiscard]] rgb8 color() const noexcept {
     const std::uint32_t n = count_ == 0 ? 1U : count_;
     const auto mean = [&](std::uint32_t sum) { return static_cast<std::uint8_t>((sum + n / 2) / n); };
@@ -58,9 +58,9 @@ class rgb_mean {
   std::uint16_t count_ = 0;
 };
 
-/// Values in octants of 4x4x4 voxels. Uses the memory of 64 values for each octant with at least one value. A copy
-/// shares all data with the original until one of them changes. A reference to a value is valid until the value is
-/// erased or the layer is copied or destroyed.
+/// Payload values of voxels, stored in octants of 4x4x4 voxels. Uses the memory of 64 values for each octant with at
+/// least one value. A copy shares all data with the original until one of them changes. A reference to a value is valid
+/// until the value is erased or the layer is copied or destroyed.
 ///
 /// @code
 ///   orbis::octree::voxel_layer<orbis::octree::rgb_mean> colors;
@@ -82,7 +82,7 @@ class voxel_layer {
     const octant& o = octants_[i];
     return (o.known >> (code & 63U) & 1U) != 0 ? &o.value[code & 63U] : nullptr;
   }
-  /// Returns the value of voxel `k`; inserts a value-initialised one if needed.
+  /// Returns the value of voxel `k`; inserts a value-initialised one if the voxel has none.
   [[nodiscard]] T& make(const voxel_key& k) {
     const std::uint64_t code = morton_code(k);
     const std::uint32_t i = index_.find(code >> 6U);
@@ -106,8 +106,8 @@ class voxel_layer {
     return erased;
   }
 
-  /// Calls `visit(key, value)` for every voxel with a value, along the Morton curve: the order does not depend on the
-  /// history of the layer. O(octants log octants + values).
+  /// Calls `visit(key, value)` for every voxel with a value, in Morton order, independent of the history of the layer.
+  /// O(octants log octants + values).
   template <std::invocable<const voxel_key&, const T&> Visit>
   void for_each(Visit&& visit) const {
     std::vector<std::pair<std::uint64_t, const octant*>> order;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Readers of the nodes of OctoMap's files into bricks. See octomap_writers.hpp for the format of nodes.
+/// Readers that parse the nodes of OctoMap's files into bricks. See octomap_writers.hpp for the node format.
 #pragma once
 
 #include <algorithm>
@@ -23,7 +23,7 @@ namespace orbis::octree::detail {
   return (v | v >> 4U) & 0xffU;
 }
 
-/// Common base of the two readers: the remaining bytes, and the destination.
+/// Common base of the two readers: the remaining bytes and the destination.
 struct node_reader {
   brick_store<float>& store;
   std::span<const std::byte> left;
@@ -40,7 +40,7 @@ inline constexpr const char* ends_early = "the data ends early";
 inline constexpr const char* no_children = "inner node without children";
 inline constexpr const char* too_deep = "node below the deepest level";
 
-/// Reads `.bt` nodes. Leaves get the model's bounds.
+/// Reads `.bt` nodes. Leaves get the log-odds at the model's bounds.
 template <octomap_model Model>
 class bt_reader : public node_reader {
  public:
@@ -119,7 +119,7 @@ class bt_reader : public node_reader {
   }
 };
 
-/// Reads `.ot` nodes. Skips inner values, which follow from the leaves. -0 becomes 0.
+/// Reads `.ot` nodes. Skips the values of inner nodes, which follow from the leaves. -0 becomes 0.
 class ot_reader : public node_reader {
  public:
   /// Reads the node at `level` that starts at `key`, and all nodes below it. On failure returns false and sets

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Writers of the nodes of OctoMap's files in preorder, from the bricks, one mask of 64 voxels at a time.
+/// Writers of the nodes of OctoMap's files: in preorder, from the bricks, one mask of 64 voxels at a time.
 ///
-/// A `.bt` node is two bits per child (0 unknown, 1 free, 2 occupied, 3 an inner node); an `.ot` node is a value and a
-/// bit per child. The content of a node depends on the nodes below it: its space is reserved while its children are
-/// written, then filled in, or released if the node became a leaf.
+/// A `.bt` node has two bits per child (0 unknown, 1 free, 2 occupied, 3 an inner node); an `.ot` node has a value and
+/// one bit per child. The content of a node depends on the nodes below it: its space is reserved while its children are
+/// written, and then filled in, or released if the node became a leaf.
 #pragma once
 
 #include <algorithm>
@@ -27,18 +27,18 @@
 
 namespace orbis::octree::detail {
 
-/// A growing byte buffer. It grows in place if the system can move pages.
+/// A growing byte buffer, which grows in place if the system can move pages.
 class node_buffer {
  public:
   [[nodiscard]] std::size_t size() const noexcept { return size_; }
   [[nodiscard]] std::string_view view() const noexcept { return {bytes_.get(), size_}; }
-  /// Makes room for `n` bytes and returns their address.
+  /// Reserves room for `n` bytes and returns its address.
   char* room(std::size_t n) {
     if (capacity_ - size_ < n) grow(n);
     return bytes_.get() + size_;
   }
   [[nodiscard]] char* at(std::size_t place) noexcept { return bytes_.get() + place; }
-  /// Sets the size: forward over bytes written into room(), or back.
+  /// Sets the size: forward past the bytes written into room(), or back.
   void set_size(std::size_t n) noexcept { size_ = n; }
   void set_end(const char* end) noexcept { size_ = static_cast<std::size_t>(end - bytes_.get()); }
 
@@ -60,7 +60,7 @@ class node_buffer {
   std::size_t capacity_ = 0;
 };
 
-/// Nodes of a file, without its header.
+/// Nodes of a file, excluding the header.
 struct octomap_nodes {
   node_buffer bytes;
   std::size_t nodes = 0;
@@ -79,10 +79,10 @@ inline void put_bytes16(char* out, unsigned v) noexcept {
   out[1] = static_cast<char>(v >> 8U);
 }
 
-/// Writes `.bt` nodes: the tree of the likelier states, free or occupied, pruned as OctoMap does.
+/// Writes `.bt` nodes: the tree of the likelier states, free or occupied, pruned as in OctoMap.
 ///
-/// OctoMap prunes level by level from the bottom and stops at the first level without a node to prune; only in that
-/// case can eight equal leaves stay unpruned. This writer reproduces that.
+/// OctoMap prunes level by level from the bottom and stops at the first level without a node to prune; only because of
+/// this stop can eight equal leaves remain. This writer reproduces it.
 template <octomap_model Model>
 class bt_writer {
  public:
@@ -215,7 +215,7 @@ class bt_writer {
   int root_level_;
   node_buffer out_;
   std::size_t nodes_ = 0;
-  unsigned pruned_levels_ = 0;  ///< bit l: a node at level l became a leaf, or could have
+  unsigned pruned_levels_ = 0;  ///< bit l: a node at level l became a leaf or could have become one
   int stop_level_ = max_tree_depth + 1;
 };
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Index of the scans that observe each brick, and queue of the octants to replay.
+/// Index of the scans that observe each brick, and a queue of the octants to replay.
 #pragma once
 
 #include <array>
@@ -17,20 +17,20 @@
 
 namespace orbis::octree::detail {
 
-/// Octants of a brick as the scans define them, and the voxels in which they differ from the stored ones.
+/// Octants of a brick as computed from the scans, and the voxels in which they differ from the stored octants.
 template <class T>
 struct replayed_brick {
   std::array<block<T>, 8> octants;
   std::array<std::uint64_t, 8> changed{};  ///< zero for octants that were not replayed
 };
 
-/// One scan's part of a brick: the scan's number and the part's index in octree::scan::parts().
+/// A scan's observations of a brick: the index of the scan, and the index of the part in octree::scan::parts().
 struct brick_use {
   std::uint32_t scan, part;
 };
 
-/// A brick, the scans that observe it in order, and its stale octants (bit i: octant i), which do not yet hold the
-/// result of these scans.
+/// A brick, the scans that observe it, in order, and its stale octants (bit i: octant i), which do not hold the result
+/// of these scans yet.
 struct used_brick {
   std::uint64_t name = 0;
   std::uint8_t stale = 0;
@@ -41,7 +41,7 @@ struct used_brick {
 /// no longer stale; its memory is reused.
 class brick_uses {
  public:
-  /// Returns the number of a brick, adding it if needed; valid until the brick is removed. O(1).
+  /// Returns the index of a brick, adding the brick if needed; valid until the brick is removed. O(1).
   [[nodiscard]] std::uint32_t find_or_add(std::uint64_t name) {
     const std::uint32_t found = index_.find(name);
     if (found != hash_index::none) return found;
@@ -67,7 +67,7 @@ class brick_uses {
     if (b.stale == 0) queue_.push_back(number);
     b.stale = static_cast<std::uint8_t>(b.stale | octants);
   }
-  /// Bricks with stale octants, the longest stale first.
+  /// Bricks with stale octants, those stale for longest first.
   [[nodiscard]] std::span<const std::uint32_t> stale() const noexcept { return std::span{queue_}.subspan(done_); }
   /// Marks the first `count` stale bricks as up to date.
   void finish(std::size_t count) {
@@ -97,8 +97,8 @@ class brick_uses {
  private:
   hash_index index_;
   std::vector<used_brick> bricks_;
-  std::vector<std::uint32_t> free_;   ///< unused numbers
-  std::vector<std::uint32_t> queue_;  ///< numbers of stale bricks, starting at done_
+  std::vector<std::uint32_t> free_;   ///< unused brick indices
+  std::vector<std::uint32_t> queue_;  ///< indices of stale bricks, starting at done_
   std::size_t done_ = 0;
 };
 

@@ -40,7 +40,7 @@ class point_integrator {
   /// Marks the scan of points seen from `origin`. In mode every_ray, voxels that a miss would not change according to
   /// `saturated` may be missing from the free ones, see depth_integrator::mark. The summary's voxel counts stay zero.
   /// Marks nothing if the origin is not finite; traverses no rays if it is outside the grid. O(points + voxels at
-  /// surfaces), or O(points x voxels along a ray) for few points per voxel.
+  /// surfaces), or O(points x voxels along a ray) if there are few points per voxel.
   template <execution_policy Policy>
   integration_summary mark(const Policy& policy, const voxel_grid& grid, const point_source& point,
                            const float3& origin, const integration_options& options,
@@ -73,7 +73,7 @@ class point_integrator {
   }
 
   /// Second half of mode `discretized`: marks the rays to the centres of the voxels that are occupied in `ends`.
-  /// @pre `ends` is not this marker's own
+  /// @pre `ends` does not belong to this object
   template <execution_policy Policy>
   integration_summary mark_centers(const Policy& policy, const voxel_grid& grid, const scan_masks& ends,
                                    const float3& origin, const integration_options& options) {
@@ -112,14 +112,14 @@ class point_integrator {
   /// Results and scratch memory of one thread.
   struct worker {
     scan_masks masks;
-    scan_masks ends;  ///< mode discretized: voxels that contain points, as occupied
+    scan_masks ends;  ///< mode discretized: voxels that contain points, marked as occupied
     integration_summary summary;
     ray_rasterizer sweep;
     point_batch batch;
     std::size_t batched = 0;  ///< number of centres waiting in the batch
     batch_keys keys;
     ray_batch rays;
-    std::array<std::uint64_t, 1024> seen;  ///< recently marked voxels, in which points of the next image row often end
+    std::array<std::uint64_t, 1024> seen;  ///< recently marked voxels, in which rays of the next image row often end
 
     void clear() noexcept {
       seen.fill(~std::uint64_t{0});
@@ -150,7 +150,7 @@ class point_integrator {
       summary.rejected += count - used - cut;
       ray_batch::bits fresh;
       from.fresh_hits(rays, count, fresh);
-      // A voxel as one number. Its presence in `seen` is unpredictable, so the code has no branches.
+      // Packs a voxel into one number. Whether it is in `seen` is unpredictable, so the code has no branches.
       constexpr unsigned bits = 21;
       static_assert(max_tree_depth <= bits);
       std::array<std::uint64_t, ray_batch::capacity> unseen;
@@ -175,7 +175,7 @@ class point_integrator {
     }
     /// Adds the points [begin, end) in mode discretized.
     void add_ends(const voxel_grid& grid, std::size_t begin, std::size_t end, const point_source& point) {
-      scan_brick* brick = nullptr;  // of the last point; neighbours are mostly in the same brick
+      scan_brick* brick = nullptr;  // brick of the last point; neighbours are mostly in the same brick
       while (begin != end) {
         const std::size_t n = std::min(end - begin, point_batch::capacity);
         point.load(begin, n, batch);
@@ -211,7 +211,7 @@ class point_integrator {
   };
 
   void prepare(unsigned threads, std::size_t count) {
-    // With fewer rays, a thread costs more for merging its masks than it saves.
+    // With fewer rays, merging the masks of a thread takes longer than the thread saves.
     const std::size_t useful = 1 + count / 4096;
     const std::size_t count_of_workers = std::clamp<std::size_t>(threads, 1, useful);
     if (workers_.size() < count_of_workers) workers_.resize(count_of_workers);
@@ -232,7 +232,7 @@ class point_integrator {
     });
     for (worker& w : active_) w.add_batched(from);
   }
-  /// Marks a scan by the plan of organised_ or dense_; empty on failure.
+  /// Marks a scan according to the plan of organised_ or dense_; empty on failure.
   template <class Marker, class Policy>
   std::optional<integration_summary> mark_by(Marker& marker, const Policy& policy, const sensor& from,
                                              const point_source& point, const saturated_voxels& saturated) {
@@ -285,7 +285,7 @@ class point_integrator {
 
   organised_rays organised_;
   dense_rays dense_;
-  std::vector<worker> workers_ = std::vector<worker>(1);  ///< never shrinks, to keep the memory
+  std::vector<worker> workers_ = std::vector<worker>(1);  ///< never shrinks, so that memory is kept
   std::span<worker> active_;                              ///< workers of the current scan
 };
 

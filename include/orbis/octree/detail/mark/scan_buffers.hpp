@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Reusable buffers of the algorithms that find the voxels of a scan.
+/// Reusable buffers for the algorithms that find the voxels of a scan.
 #pragma once
 
 #include <cassert>
@@ -22,7 +22,7 @@ namespace orbis::octree::detail {
 
 struct scan_buffers {
   point_integrator points;
-  std::unique_ptr<depth_integrator> depth;  ///< made by the first image: programs without images do not compile it
+  std::unique_ptr<depth_integrator> depth;  ///< created by the first image; other programs do not compile it
   scan_masks masks;
 
   [[nodiscard]] std::size_t memory_bytes() const noexcept {
@@ -31,7 +31,7 @@ struct scan_buffers {
   }
 };
 
-/// Marks a depth image, in either mode. Returns masks stored in `buffers`; writes the counts of pixels to `summary`.
+/// Marks a depth image in either mode. Returns masks stored in `buffers`; writes the pixel counts to `summary`.
 template <class Policy>
 const scan_masks& mark_depth(const Policy& policy, scan_buffers& buffers, const voxel_grid& grid,
                              const depth_scan& scan, const se3& T_world_camera, const integration_options& options,
@@ -52,7 +52,7 @@ const scan_masks& mark_depth(const Policy& policy, scan_buffers& buffers, const 
     }
     return masks;
   }
-  // The range test applies to a voxel's centre, not to its points.
+  // The range test applies to the centre of a voxel, not to the points in it.
   integration_options unlimited = options;
   unlimited.max_range = std::numeric_limits<double>::infinity();
   const std::size_t rejected = buffers.depth->mark_ends(policy, grid, scan, T_world_camera, unlimited, masks).rejected;

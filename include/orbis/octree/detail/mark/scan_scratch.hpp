@@ -21,7 +21,7 @@ struct scan_buffers_deleter {
   void operator()(void* buffers) const { destroy(buffers); }
 };
 
-/// Owns the buffers of a scan, created on first use. A copy creates its own.
+/// Owns the buffers of a scan, which are created on first use. A copy does not share the buffers but creates new ones.
 class scan_scratch {
  public:
   scan_scratch() = default;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
 /// Storage of a map. A hash table finds chunks of 4x4x4 bricks. A brick has eight octants of 4x4x4 voxels. An octant is
-/// unknown, uniform (one value: this is the pruning), or stored as indices into its distinct values. Leaves larger than
-/// a brick are stored separately, and are split when a voxel inside changes.
+/// unknown, uniform (one value, the equivalent of pruning), or stored as indices into its distinct values. Leaves
+/// larger than a brick are stored separately, and are split when a voxel inside changes.
 #pragma once
 
 #include <algorithm>
@@ -31,7 +31,7 @@ template <class T>
 struct brick {
   std::uint64_t name = 0;    ///< see node_name
   std::uint8_t uniform = 0;  ///< bit i: octant i has one value, value[i]
-  std::uint8_t dense = 0;    ///< bit i: octant i is stored voxel by voxel, in record at[i]
+  std::uint8_t dense = 0;    ///< bit i: octant i is stored voxel by voxel in record at[i]
   std::array<std::uint32_t, 8> at{};
   std::array<T, 8> value{};  ///< the largest value in octant i, if any is known
 
@@ -66,7 +66,7 @@ class brick_store {
     const std::uint32_t i = index_.find(node_name(k, chunk_level));
     return i == none ? nullptr : &chunks_[i];
   }
-  /// Returns the brick at a place of a chunk, or null.
+  /// Returns the brick at a place in a chunk, or null.
   [[nodiscard]] const brick<T>* find(const chunk& c, std::uint32_t place) const noexcept {
     return c.at[place] == none ? nullptr : &bricks_[c.at[place]];
   }
@@ -83,7 +83,7 @@ class brick_store {
     const auto* const leaf = large_.find(k);
     return leaf != nullptr ? std::optional{std::pair{leaf->value, named_level(leaf->name)}} : std::nullopt;
   }
-  /// Returns that leaf's value, valid until the store changes, or null.
+  /// Returns the value of the leaf larger than a brick that contains `k`, valid until the store changes, or null.
   [[nodiscard]] const T* find_large_value(const voxel_key& k) const noexcept {
     const auto* const leaf = large_.find(k);
     return leaf != nullptr ? &leaf->value : nullptr;
@@ -117,7 +117,7 @@ class brick_store {
     if ((b.dense >> i & 1U) == 0) return 0;
     return pools_.read(b.at[i], [](const auto& r) { return r.known; });
   }
-  /// Mask of the known voxels of octant `i` of `b` for whose value `wanted` is true.
+  /// Mask of the known voxels of octant `i` of `b` whose values satisfy `wanted`.
   template <std::predicate<T> Wanted>
   [[nodiscard]] std::uint64_t voxels_where(const brick<T>& b, std::uint32_t i, Wanted&& wanted) const noexcept {
     if ((b.uniform >> i & 1U) != 0) return wanted(b.value[i]) ? ~std::uint64_t{0} : 0;
@@ -149,7 +149,7 @@ class brick_store {
         if (c.at[place] != none) visit(bricks_[c.at[place]]);
     });
   }
-  /// Calls `visit(name, value)` for every leaf larger than a brick, unordered.
+  /// Calls `visit(name, value)` for every leaf larger than a brick, in unspecified order.
   template <class Visit>
   void for_each_large(Visit&& visit) const {
     for (std::size_t i = 0; i != large_.size(); ++i) visit(large_[i].name, large_[i].value);
@@ -195,7 +195,7 @@ class brick_store {
       b.value[i] = std::max(b.value[i], voxels.value[static_cast<std::size_t>(std::countr_zero(rest))]);
   }
   /// Stores the voxels `known` with the values of palette `p` as octant `i` of `b`.
-  /// @pre p.count <= max_palette, its values are distinct and each is used by a known voxel
+  /// @pre p.count <= max_palette, the values of p are distinct and each is used by a known voxel
   void write_octant(brick<T>& b, std::uint32_t i, std::uint64_t known, const palette<T>& p) {
     if (known == 0) {
       drop_record(b, i);
@@ -293,7 +293,7 @@ class brick_store {
   void clear() { *this = {}; }
 
  private:
-  /// Gives octant `i` of `b` its own record in a pool; replaces an existing one.
+  /// Allocates a record in a pool for octant `i` of `b`; replaces an existing one.
   void make_record(brick<T>& b, std::uint32_t i, unsigned number) {
     const auto bit = static_cast<std::uint8_t>(1U << i);
     if ((b.dense & bit) != 0 && octant_pools<T>::pool_number(b.at[i]) == number) return;
@@ -380,7 +380,7 @@ class brick_store {
     }
   }
 
-  hash_index index_;  ///< of chunks
+  hash_index index_;  ///< chunk indices by name
   cow_pages<chunk> chunks_;
   cow_pages<brick<T>> bricks_;
   std::vector<std::uint32_t> free_bricks_;

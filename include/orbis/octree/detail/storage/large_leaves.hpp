@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Leaves larger than a brick. There are few of them; they are looked up by the name of each larger node that contains
-/// a voxel.
+/// Leaves larger than a brick. There are only a few; a look-up tries the names of the nodes above a brick that contain
+/// the voxel.
 #pragma once
 
 #include <array>
@@ -43,7 +43,7 @@ class large_leaves {
 
   [[nodiscard]] bool empty() const noexcept { return leaves_.empty(); }
   [[nodiscard]] std::size_t size() const noexcept { return leaves_.size(); }
-  /// Returns the i-th leaf, unordered. @pre i < size()
+  /// Returns the i-th leaf, in unspecified order. @pre i < size()
   [[nodiscard]] const leaf& operator[](std::size_t i) const noexcept { return leaves_[i]; }
   /// Returns the leaf that contains `k`, or null. O(levels with leaves).
   [[nodiscard]] const leaf* find(const voxel_key& k) const noexcept {
@@ -62,7 +62,7 @@ class large_leaves {
     levels_ |= 1U << level;
   }
   void set_value(std::size_t i, T value) { leaves_.writable(i).value = value; }
-  /// Removes the leaf with this name, if it exists; the last one takes its place.
+  /// Removes the leaf with this name, if it exists; the last leaf takes its position.
   void erase(std::uint64_t name) {
     const std::uint32_t i = index_.find(name);
     if (i == hash_index::none) return;

@@ -19,7 +19,7 @@
 
 namespace orbis::octree {
 
-/// Numbers of nodes of the pruned octree.
+/// Node counts of the pruned octree.
 struct octree_counts {
   std::size_t nodes = 0;  ///< inner nodes and leaves
   std::size_t leaves = 0;
@@ -42,7 +42,7 @@ inline constexpr std::uint64_t low_bits = 0x0101010101010101;  ///< the first vo
 struct octant_leaves {
   std::uint64_t first;      ///< lowest voxel of each leaf
   std::uint64_t large;      ///< subset of these that are leaves of 2x2x2 voxels
-  std::size_t inner_nodes;  ///< the octant, and its groups of 2x2x2 voxels that are not leaves
+  std::size_t inner_nodes;  ///< the octant, and those of its groups of 2x2x2 voxels that are not leaves
 };
 template <class T>
 [[nodiscard]] octant_leaves find_leaves(const octant_view<T>& o) noexcept {
@@ -61,7 +61,7 @@ template <class T>
   const std::uint64_t inner = bytes_with_any(o.known) & ~large;
   return {(o.known & inner * 0xff) | large, large, 1 + count_ones(inner)};
 }
-/// Lowest voxel of each place of an octant.
+/// Offset of the voxel at each place in an octant.
 inline constexpr auto octant_offsets = [] {
   std::array<voxel_key, 64> offsets{};
   for (std::uint32_t i = 0; i != 64; ++i) offsets[i] = voxel_in_brick(i);
@@ -72,15 +72,15 @@ inline constexpr auto octant_offsets = [] {
   return {octant.x + k.x, octant.y + k.y, octant.z + k.z};
 }
 
-/// Calls `on_leaf(key, level, value)` for leaves of at least an octant, and `on_octant(key, brick, i)` for the other
-/// octants, which returns the number of inner nodes in that octant. Returns the number of inner nodes.
+/// Calls `on_leaf(key, level, value)` for leaves of at least an octant, and `on_octant(key, brick, i)`, which returns
+/// the number of inner nodes in the octant, for the other octants. Returns the total number of inner nodes.
 template <class T, class OnLeaf, class OnOctant>
 std::size_t walk_octants(const std::vector<tree_part<T>>& parts, int root_level, OnLeaf&& on_leaf,
                          OnOctant&& on_octant) {
   std::size_t inner = 0;
   for (std::size_t i = 0; i != parts.size(); ++i) {
     const tree_part<T>& part = parts[i];
-    // The ancestors of the part, except those it shares with the previous part.
+    // Count the ancestors of the part, except those shared with the previous part.
     const auto differing = static_cast<int>(i == 0 ? 0 : std::bit_width(part.order ^ parts[i - 1].order));
     const int lowest_common = i == 0 ? root_level + 1 : brick_level + (differing + 2) / 3;
     inner += static_cast<std::size_t>(lowest_common - 1 - part.level);

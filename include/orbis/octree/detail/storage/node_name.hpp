@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Names and orders of nodes. All orders are Morton orders (x lowest, then y, then z): the eight children of a node are
-/// contiguous, a byte of a 64-bit mask is a node of 2x2x2 voxels, and a mask is an octant of 4x4x4.
+/// Names of nodes, and their order. All orders are Morton orders (x lowest, then y, then z): the eight children of a
+/// node are contiguous, a byte of a 64-bit mask is a node of 2x2x2 voxels, and a mask is an octant of 4x4x4.
 #pragma once
 
 #include <cstdint>
@@ -10,28 +10,28 @@
 
 namespace orbis::octree::detail {
 
-/// Levels at which the form of storage changes: an octant of 4x4x4 voxels, a brick of eight octants, a chunk of 4x4x4
+/// Levels at which the storage format changes: an octant of 4x4x4 voxels, a brick of eight octants, a chunk of 4x4x4
 /// bricks.
 inline constexpr int octant_level = 2;
 inline constexpr int brick_level = 3;
 inline constexpr int chunk_level = 5;
 
-/// Moves bits 0, 1, 2 to 0, 3, 6.
+/// Moves bits 0, 1, 2 to bits 0, 3, 6.
 [[nodiscard]] constexpr std::uint32_t spread3(std::uint32_t v) noexcept {
   return (v & 1U) | (v & 2U) << 2U | (v & 4U) << 4U;
 }
-/// Place of a voxel in its brick: bits 0-5 within the octant, bits 6-8 the octant.
+/// Place of a voxel in its brick: bits 0-5 are the place in the octant, bits 6-8 the octant.
 [[nodiscard]] constexpr std::uint32_t place_in_brick(const voxel_key& k) noexcept {
   return spread3(k.x) | spread3(k.y) << 1U | spread3(k.z) << 2U;
 }
 /// Place of a voxel in its octant.
 [[nodiscard]] constexpr std::uint32_t place_in_octant(const voxel_key& k) noexcept { return place_in_brick(k) & 63U; }
-/// Lowest voxel, relative to the brick, of a place in a brick.
+/// Voxel at a place in a brick, relative to the lowest voxel of the brick.
 [[nodiscard]] constexpr voxel_key voxel_in_brick(std::uint32_t place) noexcept {
   const auto gather = [](std::uint32_t v) { return (v & 1U) | (v >> 2U & 2U) | (v >> 4U & 4U); };
   return {gather(place), gather(place >> 1U), gather(place >> 2U)};
 }
-/// Place of a brick in its chunk, and the lowest voxel of a place relative to the chunk.
+/// Place of a brick in its chunk, and the lowest voxel of the brick at a place, relative to the chunk.
 [[nodiscard]] constexpr std::uint32_t place_in_chunk(const voxel_key& k) noexcept {
   return place_in_brick({k.x >> 3U & 3U, k.y >> 3U & 3U, k.z >> 3U & 3U});
 }

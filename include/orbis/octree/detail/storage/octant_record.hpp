@@ -26,7 +26,7 @@ struct octant_view {
   unsigned bits = 0;
   const T* value = nullptr;
 
-  /// Value of a place. @pre it is known
+  /// Value of the voxel at a place. @pre the voxel is known
   [[nodiscard]] T at(std::uint32_t place) const noexcept {
     unsigned index = 0;
     for (unsigned j = 0; j != bits; ++j) index |= static_cast<unsigned>(plane[j] >> place & 1U) << j;
@@ -34,7 +34,7 @@ struct octant_view {
   }
 };
 
-/// An octant with up to 2^Bits values.
+/// An octant with up to 2^Bits distinct values.
 template <class T, unsigned Bits>
 struct packed_octant {
   std::uint64_t known = 0;
@@ -77,7 +77,7 @@ struct packed_octant {
     return changed;
   }
 };
-/// Bit j of every place.
+/// Mask j holds bit j of every place.
 inline constexpr std::array<std::uint64_t, 6> place_planes{0xaaaaaaaaaaaaaaaa, 0xcccccccccccccccc, 0xf0f0f0f0f0f0f0f0,
                                                            0xff00ff00ff00ff00, 0xffff0000ffff0000, 0xffffffff00000000};
 /// An octant with more distinct values than palettes can hold.
@@ -116,8 +116,8 @@ struct plain_octant {
   }
 };
 
-/// Records of octants, identified by numbers: 3 bits for the pool, 29 for the position in it. Pool p < 6 holds octants
-/// with up to 2^p values, pool `plain` those with more. Copies share pages until one of them is modified.
+/// Records of octants, identified by 3 bits for the pool and 29 for the position in it. Pool p < 6 holds octants with
+/// up to 2^p distinct values, pool `plain` those with more. Copies share pages until one of them is modified.
 template <class T>
 class octant_pools {
  public:
@@ -135,7 +135,7 @@ class octant_pools {
   void write(std::uint32_t record, Use&& use) {
     with_pool(*this, pool_number(record), [&](auto& p) { use(p.items.writable(place_in_pool(record))); });
   }
-  /// Returns an unused record of the pool with this number.
+  /// Returns an unused record of the pool with index `number`.
   [[nodiscard]] std::uint32_t add(unsigned number) {
     return number << 29U | with_pool(*this, number, [](auto& p) {
              if (p.free.empty()) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
 /// 64 voxels as indices into their few distinct values. Log-odds result from a few additions and two bounds, so
-/// neighbours mostly share values: an octant of a map takes a quarter of the memory of its floats, without loss.
+/// neighbouring voxels mostly share values: an octant takes a quarter of the memory of its floats, without loss.
 #pragma once
 
 #include <array>
@@ -44,7 +44,7 @@ struct palette {
   }
 };
 
-/// Mask of the voxels whose index is `i`, for indices with `bits` planes.
+/// Mask of the voxels whose index is `i`, for indices with `Bits` planes.
 template <unsigned Bits>
 [[nodiscard]] constexpr std::uint64_t voxels_of_index(const std::uint64_t* plane, unsigned i) noexcept {
   std::uint64_t where = ~std::uint64_t{0};

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Vectorised conversion of 64 voxels to and from indices into their values: definitions of the functions of
-/// packed_block.hpp.
+/// Vectorised conversion of 64 voxels to and from indices into their values: the functions of packed_block.hpp.
 #pragma once
 
 #include <algorithm>

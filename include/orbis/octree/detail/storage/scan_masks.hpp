@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// One scan as sets of crossed and hit voxels. Uses bit masks per brick, so that marking a voxel a thousand times costs
-/// a thousand `or` operations and no memory.
+/// One scan as sets of crossed and hit voxels. Uses bit masks per brick, so that marking a voxel a thousand times takes
+/// a thousand `or` operations but no additional memory.
 #pragma once
 
 #include <array>
@@ -22,8 +22,8 @@ struct scan_brick {
   std::array<std::uint64_t, 8> occupied{};
 };
 
-/// The voxels that a scan observes. Reused between scans; memory is freed only if a scan needs much less than a
-/// previous one.
+/// The voxels that a scan observes. Reused between scans; memory is freed only if a scan needs much less than an
+/// earlier one.
 class scan_masks {
  public:
   [[nodiscard]] const std::vector<scan_brick>& bricks() const noexcept { return bricks_; }
@@ -79,11 +79,11 @@ class scan_masks {
 
   hash_index index_;
   std::vector<scan_brick> bricks_;
-  std::size_t last_ = 0;  ///< the last brick used; consecutive voxels are mostly in the same one
+  std::size_t last_ = 0;  ///< the last brick used; consecutive voxels are mostly in the same brick
 };
 
-/// Callback that sets the bits of the voxels of a named brick that a miss would not change. It is type-erased, so that
-/// no algorithm is compiled for each map type. Can be called from several threads.
+/// Callback that sets the bits of the voxels in a named brick that a miss would not change. It is type-erased, so that
+/// the algorithms need not be compiled for each map type. Can be called from several threads.
 struct saturated_voxels {
   using words = std::array<std::uint64_t, 8>;
 
@@ -95,7 +95,7 @@ struct saturated_voxels {
   }
 };
 
-/// Calls `visit(place)` for the place in the brick of every bit set in `masks`.
+/// Calls `visit(place)` for every bit set in `masks`; `place` is the voxel's place in the brick.
 template <class Visit>
 void for_each_place(const std::array<std::uint64_t, 8>& masks, Visit&& visit) {
   for (std::uint32_t octant = 0; octant != 8; ++octant)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A pruned octree down to its bricks, as a sorted list, for algorithms that visit the whole tree.
+/// A pruned octree down to its bricks as a sorted list, for algorithms that visit the whole tree.
 #pragma once
 
 #include <algorithm>
@@ -18,8 +18,8 @@ struct tree_part {
   std::uint64_t order;      ///< Morton order of its lowest brick
   voxel_key key;            ///< its lowest voxel
   int level;                ///< brick_level or more
-  const brick<T>* content;  ///< null: a leaf
-  T value;                  ///< value of a leaf
+  const brick<T>* content;  ///< null: the part is a leaf
+  T value;                  ///< value of the leaf
 };
 
 /// Returns the bricks and larger leaves of a store in Morton order. O(bricks).
@@ -42,12 +42,12 @@ template <class T>
   return parts;
 }
 
-/// Repeatedly merges every eight equal leaves that fill their parent. The root is not merged. `parts` are in Morton
-/// order.
+/// Repeatedly merges groups of eight equal leaves that fill their parent. The root is not merged. @pre `parts` are in
+/// Morton order
 template <class T>
 void merge_parts(std::vector<tree_part<T>>& parts, int root_level) {
-  // Merged parts overwrite those already read. Eight leaves of one size that end with a parent's last child are its
-  // children.
+  // Merged parts overwrite parts already read. Eight leaves of one size that end with a parent's last child are the
+  // children of that parent.
   std::size_t size = 0;
   for (std::size_t i = 0; i != parts.size(); ++i) {
     parts[size++] = parts[i];
@@ -69,7 +69,7 @@ void merge_parts(std::vector<tree_part<T>>& parts, int root_level) {
 }
 
 /// Returns the parts of a store's pruned octree: its leaves of at least the size of a brick, and the bricks that have
-/// smaller ones. O(bricks).
+/// smaller leaves. O(bricks).
 template <class T>
 [[nodiscard]] std::vector<tree_part<T>> tree_parts(const brick_store<T>& store, int root_level) {
   std::vector<tree_part<T>> parts = stored_parts(store);
@@ -79,14 +79,14 @@ template <class T>
 
 /// Walks the part of a tree above its bricks, children before parents. `Visitor` has `open()`, which begins an inner
 /// node and returns a collector of its children with `add(i, child)`; `close(level, collected)`, which returns the
-/// value that the parent passes to `add`; and `content(part)`, which returns such a value for a part.
+/// value that is passed to the parent's `add`; and `content(part)`, which returns such a value for a part.
 template <class T, class Visitor>
 class upper_walk {
  public:
   upper_walk(const std::vector<tree_part<T>>& parts, Visitor& visitor)
       : next_{parts.data()}, end_{parts.data() + parts.size()}, visitor_{visitor} {}
 
-  /// Walks a node. @pre the remaining parts begin with those inside one node at `level`, which are visited
+  /// Walks a node. @pre the remaining parts begin with those inside one node at `level`, which this call visits
   auto walk(int level) {
     if (next_->level == level) return visitor_.content(*next_++);
     const auto shift = 3 * static_cast<unsigned>(level - 1 - brick_level);

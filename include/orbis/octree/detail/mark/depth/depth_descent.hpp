@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Descent through the octree that finds the voxels that the rays of a view observe free.
+/// Descent through the octree to find the voxels that the rays of a view observe free.
 #pragma once
 
 #include <algorithm>
@@ -33,7 +33,7 @@ struct descent_worker {
   }
 };
 
-/// Processing of nodes by one thread. `Rays`: see depth_rays. `Saturated`: see depth_integrator::mark.
+/// Processes nodes on one thread. `Rays`: see depth_rays. `Saturated`: see depth_integrator::mark.
 template <class Rays, class Saturated>
 struct depth_descent {
   using words = std::array<std::uint64_t, 8>;
@@ -44,7 +44,7 @@ struct depth_descent {
   const Rays& rays;
   const scan_masks& hits;  ///< voxels that contain ends of rays
   const Saturated& saturated;
-  bool on_face;  ///< the camera's centre is close to a face of its voxel
+  bool on_face;  ///< true if the camera's centre is close to a face of its voxel
 
   /// Finds the free voxels of the node at `level` > brick_level whose lowest voxel is `k`.
   void descend(const voxel_key& k, const float3& center, int level, bool inside) const {
@@ -95,7 +95,7 @@ struct depth_descent {
     for (std::size_t i = 0; i != 8; ++i) any |= free[i] &= ~skip[i];
     if (any != 0) own.bricks.push_back({name, free});
   }
-  /// Skips the camera's own voxel, and its neighbours if the camera is on a face; they are handled separately.
+  /// Skips the camera's own voxel, and its neighbours if the camera is on a face; these voxels are handled separately.
   void skip_camera(const voxel_key& k, words& skip) const {
     const voxel_key& from = *sensor.key;
     const std::uint32_t around = on_face ? 1 : 0;
@@ -173,7 +173,7 @@ struct depth_descent {
   }
   [[nodiscard]] bool test_box(const voxel_test& test, const pixel_box& box, float near_z) const {
     if ((box.u1 - box.u0) * (box.v1 - box.v0) < 1024) return rays.test(test, box, near_z, own.unsure);
-    // For a voxel near the camera, most rays of its box pass it, so the box is tested tile by tile.
+    // Most rays of the box of a voxel near the camera miss the voxel, so the box is tested tile by tile.
     constexpr std::int32_t size = 128;
     for (std::int32_t v = box.v0 & -size; v <= box.v1; v += size)
       for (std::int32_t u = box.u0 & -size; u <= box.u1; u += size)
@@ -199,7 +199,7 @@ template <execution_policy Policy, class Rays, class Saturated>
 void descend_nodes(const Policy& policy, const view_frame& frame, const depth_sensor& sensor, const Rays& rays,
                    bool on_face, scan_masks& masks, const Saturated& saturated, std::vector<descent_worker>& workers) {
   const std::size_t count = std::clamp<std::size_t>(policy.threads(), 1, std::max<std::size_t>(1, frame.nodes.size()));
-  if (workers.size() < count) workers.resize(count);  // never shrinks, to keep the memory
+  if (workers.size() < count) workers.resize(count);  // never shrinks, so that memory is kept
   std::atomic<std::size_t> next{0};
   for_each_index(policy, count, 1, [&](std::size_t i) {
     workers[i].bricks.clear();

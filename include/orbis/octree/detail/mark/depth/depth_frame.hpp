@@ -23,7 +23,7 @@
 
 namespace orbis::octree::detail {
 
-/// The view of a depth image: one ray per pixel. Fill `ends` and, for cameras other than pinholes, `map`; then call
+/// The view of a depth image: one ray per pixel. Fill `ends` and, for cameras other than pinholes, `map`, and then call
 /// set_scene. See mark_image for the remaining steps.
 struct depth_frame : view_frame {
   using sample_kernel = unsigned(const depth_scene&, const endpoint_image&, const child_offsets&, const float3&,
@@ -37,7 +37,7 @@ struct depth_frame : view_frame {
   direction_index map;  ///< for cameras other than pinholes
   std::vector<descent_worker> workers;
 
-  /// Computes the parameters of the tests. `ray_error`: maximum deviation of rays from those of their pixels, at z = 1.
+  /// Computes the parameters of the tests. `ray_error`: maximum deviation of rays from their pixels' rays, at z = 1.
   /// @pre `ends` and, if needed, `map` belong to the image
   void set_scene(const depth_sensor& sensor, float ray_error = 0.0F) {
     const pixel_rays& rays = ends.rays();
@@ -56,7 +56,7 @@ struct depth_frame : view_frame {
     }
     set_spacing(half_diagonal());
   }
-  /// Returns true if the rays are dense enough for testing voxels to be faster than walking rays. With less than one
+  /// Returns true if the rays are so dense that testing voxels is faster than walking along rays. With less than one
   /// pixel per half voxel edge, most voxels would have to be tested individually.
   [[nodiscard]] bool is_dense(const end_counts& counts) const {
     return is_dense(counts.sum_z / static_cast<double>(counts.used + counts.truncated),
@@ -103,7 +103,7 @@ struct depth_rays {
     const auto& tile = frame.map.tile_at(u, v, size);
     return tile.x0 <= tile.x1 && t.may_cross(tile.x0, tile.x1, tile.y0, tile.y1);
   }
-  /// Returns true if the walk of a ray for which `test` was undecided visits the voxel.
+  /// Returns true if the traversal of a ray for which `test` was undecided visits the voxel.
   [[nodiscard]] bool visits(std::uint32_t number, const voxel_key& voxel) const {
     const auto [u, v] = frame.ends.pixel(number);
     return crosses(sensor, find_endpoint(ends, u, v), voxel);

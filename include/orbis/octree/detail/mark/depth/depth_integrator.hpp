@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Finds the voxels that a depth image observes free and occupied. The voxels are found one by one by projection
-/// instead of ray by ray, and are exactly those that the traversal of every ray finds.
+/// Finds the voxels that a depth image observes free and occupied. Voxels are found by projecting them into the image,
+/// not by walking along rays, and are exactly the voxels that the traversal of every ray finds.
 #pragma once
 
 #include <cstddef>
@@ -21,7 +21,7 @@
 
 namespace orbis::octree::detail {
 
-/// World points of the pixels of a depth image, row by row, as a source of points; NaN for pixels without a point.
+/// World points of the pixels of a depth image, row by row, as a point source; NaN for pixels without a point.
 struct pixel_points {
   const depth_scan& scan;
   const pixel_rays& rays;
@@ -47,21 +47,21 @@ inline void load_points(const pixel_points& points, std::size_t begin, std::size
 
 /// Marks the voxels of depth images. Reuses its memory between images.
 ///
-/// The octree is descended from a node around all rays. Nodes that no ray reaches are dropped, and nodes whose voxels
-/// are all certainly crossed are filled; a min/max pyramid of the ray ends decides both. The remaining voxels are at
-/// surfaces and at the border of the view: such a voxel is free if the ray of one of its pixels crosses it. If rounding
-/// could change the result, the exact traversal of that ray decides.
+/// The descent through the octree starts at a node around all rays. Nodes that no ray reaches are dropped, and nodes
+/// whose voxels are all certainly crossed are filled; a min/max pyramid of the ray ends decides both. The remaining
+/// voxels are at surfaces and at the border of the view: such a voxel is free if the ray of one of its pixels crosses
+/// it. If rounding could change the result, the exact traversal of that ray decides.
 class depth_integrator {
  public:
-  /// Marks the voxels in `masks` that the every_ray integration of the image's world points marks (see
-  /// append_world_points). Voxels that a miss would not change according to `saturated` may be missing from the free
-  /// ones, and an occupied voxel may or may not be free as well. The summary's voxel counts stay zero. The same voxels
-  /// under every policy.
+  /// Marks in `masks` the voxels that integrating the image's world points (see append_world_points) in mode every_ray
+  /// marks. Voxels that a miss would not change according to `saturated` may be missing from the free ones, and an
+  /// occupied voxel may also be marked free. The summary's voxel counts stay zero. The voxels are the same under every
+  /// policy.
   ///
   /// If the rays are too sparse for this method, or too close to the border of the grid, marks only the occupied voxels
   /// and sets `needs_rays`: the caller must mark the rays to the pixels, see `points`.
   ///
-  /// `saturated(name, mask)` sets the bits of such voxels of a named brick; it can be called from several threads.
+  /// `saturated(name, mask)` sets the bits of these voxels in the named brick; it can be called from several threads.
   /// O(pixels + bricks seen + voxels at surfaces).
   /// @pre depth and camera have the same size
   template <execution_policy Policy>
@@ -93,7 +93,7 @@ class depth_integrator {
     return {.used = ends.used, .truncated = ends.truncated, .rejected = ends.rejected};
   }
 
-  /// Returns the world points of the image that was marked last. Valid as long as `scan`, and until the next image.
+  /// Returns the world points of the last marked image. Valid as long as `scan`, and until the next image.
   [[nodiscard]] pixel_points points(const depth_scan& scan, const se3& T_world_camera) const {
     return {scan, frame_.ends.rays(), camera::float_pose{T_world_camera}};
   }
@@ -127,7 +127,7 @@ class depth_integrator {
     const auto [x, y] = frame_.ends.rays().at(u, v);
     return sensor.end(x, y, scan.depth(u, v));
   }
-  /// Walks the rays outside the map's angular limits, and removes their ends.
+  /// Traverses the rays outside the map's angular limits, and removes their ends.
   void walk_outer(const depth_sensor& sensor, const depth_scan& scan, scan_masks& masks) {
     for (const auto& [u, v] : frame_.map.outer()) {
       if (!(frame_.ends.z(v)[u] > 0.0F)) continue;

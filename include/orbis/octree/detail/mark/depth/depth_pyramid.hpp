@@ -3,7 +3,7 @@
 /// Nearest and farthest ray end in any box of pixels, in four look-ups.
 ///
 /// The min/max mipmaps of A. Tevs, I. Ihrke, H.-P. Seidel, "Maximum mipmaps for fast, accurate, and
-/// scalable dynamic height field rendering", I3D 2008, with cells that overlap.
+/// scalable dynamic height field rendering", I3D 2008, with overlapping cells.
 #pragma once
 
 #include <algorithm>
@@ -19,16 +19,16 @@
 namespace orbis::octree::detail {
 
 /// Function pointer to a kernel's code, selected when the object is constructed. The kernel is compiled only in
-/// translation units that construct objects, not in all that include the class with the member.
+/// translation units that construct objects, not in every one that includes the class with this member.
 template <class Kernel, class Signature, simd::target... Targets>
 struct chosen_kernel {
   Signature* run = simd::kernel<Kernel, Signature, Targets...>();
 
-  operator Signature*() const noexcept { return run; }  // converts for calls
+  operator Signature*() const noexcept { return run; }  // enables calls through the object
 };
 
 /// Combines two cells of the pyramid. The upper half of a cell is the farthest depth in it, rounded up; the lower half
-/// is 65535 minus the nearest one, rounded down. Both are thus maxima.
+/// is 65535 minus the nearest depth, rounded down. Both halves are thus maxima.
 [[nodiscard]] constexpr std::uint32_t larger_halves(std::uint32_t a, std::uint32_t b) noexcept {
   return std::max(a & 0xffff0000U, b & 0xffff0000U) | std::max(a & 0xffffU, b & 0xffffU);
 }
@@ -40,7 +40,7 @@ template <class Cells>
 }
 
 /// Reduces two rows of depths to one row of cells of 2x2 pixels. `strict` counts a missing depth as 0; `some` ignores
-/// it (0 if all are missing). Reads up to 16 values past those of the last cell.
+/// it (0 if all are missing). Reads up to 16 values beyond the last cell.
 struct first_cells_kernel {
   template <simd::target Target>
   static ORBIS_ALWAYS_INLINE void run(const float* upper, const float* lower, float scale, int cells,
@@ -86,23 +86,23 @@ struct overlap_kernel {
 };
 
 /// Level k >= 1 has cells of 2^k x 2^k pixels; its entry (i, j) covers the cells i, i + 1 of the rows j, j + 1. A box
-/// that touches at most four cells in a row is covered by the entries of its first and its second-to-last cell.
+/// that touches at most four cells in a row is covered by the entries of its first cell and its second-to-last cell.
 ///
-/// There are three kinds of entries with different definitions of the nearest end. Kind 0: the nearest pixel, 0 if any
-/// has no end. Kind 1: the pixels with an end of every aligned tile of 2x2, 0 if none has one. Kind 2: the same with
-/// tiles of 4x4.
+/// There are three kinds of entries with different definitions of the nearest end. Kind 0: the nearest end of all
+/// pixels, 0 if any pixel has no end. Kind 1: pixels without an end are ignored unless their whole aligned tile of 2x2
+/// pixels has none, which gives 0. Kind 2: as kind 1, with tiles of 4x4 pixels.
 class depth_pyramid {
  public:
   static constexpr int max_levels = 16;
 
-  /// Builds the pyramid. `row(v)`: depths at which the rays of image row v end, 0 if they have no end, followed by 16
-  /// zeros. `max_z`: the largest of them. O(pixels).
+  /// Builds the pyramid. `row(v)`: depths at which the rays of image row v end, 0 where a ray has no end, followed by
+  /// 16 zeros. `max_z`: the largest depth. O(pixels).
   template <class Row>
   void build(int width, int height, float max_z, Row&& row) {
     lay_out(width, height);
     if (width == 0 || height == 0) return;
     scale_ = max_z > 0.0F ? 65533.0F / max_z : 1.0F;
-    // Tiles that extend beyond the image: at the bottom, the last row counts twice; at the right, ends are missing.
+    // Tiles that extend beyond the image: the last row counts twice at the bottom; ends are missing on the right.
     for (int j = 0; j != height_[1]; ++j)
       first_(row(2 * j), row(std::min(2 * j + 1, height - 1)), scale_, width_[1], strict_.data() + j * row_size_,
              some_.data() + j * row_size_);
@@ -136,7 +136,7 @@ class depth_pyramid {
   /// Factor from depths to the values of entries.
   [[nodiscard]] float scale() const noexcept { return scale_; }
   [[nodiscard]] int levels() const noexcept { return levels_; }
-  /// Offset of each level's entries within a kind, and its row length.
+  /// Offset of each level's entries within a kind, and row length of each level.
   [[nodiscard]] const std::array<std::int32_t, max_levels>& begin() const noexcept { return begin_; }
   [[nodiscard]] const std::array<std::int32_t, max_levels>& width() const noexcept { return width_; }
   [[nodiscard]] const std::uint32_t* data() const noexcept { return cells_.data(); }

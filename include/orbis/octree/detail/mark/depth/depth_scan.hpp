@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A type-erased depth image and camera, so that the marking of depth images is compiled once.
+/// A type-erased depth image and camera, so that the code that marks depth images is compiled once.
 #pragma once
 
 #include <concepts>
@@ -24,7 +24,7 @@ struct other_depth {
   [[nodiscard]] float operator()(int u, int v) const { return read(source, u, v); }
 };
 
-/// Refers to the image and the camera passed to its constructor. Reading a pixel costs a switch over the types.
+/// Refers to the image and the camera passed to its constructor. Reading a pixel takes one switch over the types.
 class depth_scan {
  public:
   template <camera::depth_source Depth, camera::camera_model Camera>
@@ -47,7 +47,7 @@ class depth_scan {
   [[nodiscard]] float depth(int u, int v) const {
     return visit([&](const auto& image) { return image(u, v); });
   }
-  /// Sets `rays` to those of the camera.
+  /// Sets `rays` to the rays of the camera.
   void fit(pixel_rays& rays) const { fit_(camera_, rays); }
 
  private:

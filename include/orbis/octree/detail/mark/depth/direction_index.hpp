@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Index from regions of directions to the pixels that see them, for cameras of any model. It is computed from the rays
-/// of the pixels only, without using the projection.
+/// Index from regions of directions to the pixels that see them, for any camera model. It is computed only from the
+/// rays of the pixels, without the projection.
 #pragma once
 
 #include <algorithm>
@@ -18,20 +18,20 @@
 
 namespace orbis::octree::detail {
 
-/// The plane z = 1 divided into cells of about 8x8 pixels. A cell stores the deviations of its rays' pixels from `focal
-/// * (x, y) + center`, and how densely rays cover it. Cells are combined into larger ones: entry (i, j) of level k
-/// represents the cells i, i + 1 of the rows j, j + 1 of 2^k x 2^k cells each, so that one entry covers any region that
-/// is at most one cell of its level wide.
+/// The plane z = 1 divided into cells of about 8x8 pixels. A cell stores the deviations of the pixels of its rays from
+/// `focal * (x, y) + center`, and the spacing of the rays in it. Cells are combined into larger ones: entry (i, j) of
+/// level k represents the cells i, i + 1 of the rows j, j + 1 of 2^k x 2^k cells each, so that one entry covers any
+/// region that is at most one cell of its level wide.
 class direction_index {
  public:
   static constexpr int max_levels = 16;
-  /// Rays further than this from the optical axis, in x or y at z = 1, are left out.
+  /// Rays further than this from the optical axis, in x or y at z = 1, are excluded.
   static constexpr float widest = 3.0F;
 
   struct entry {
     float least_u = infinity, most_u = -infinity;  ///< pixel minus its affine estimate
     float least_v = infinity, most_v = -infinity;
-    /// Maximum distance (at z = 1) of a point of the cells from a ray; infinite if unknown.
+    /// Maximum distance (at z = 1) from a point in the cells to the nearest ray; infinite if unknown.
     float spacing = 0.0F;
     std::array<float, 3> unused{};
 
@@ -79,7 +79,7 @@ class direction_index {
   [[nodiscard]] float max_y() const noexcept { return max_y_; }
   [[nodiscard]] const vec2f& focal() const noexcept { return focal_; }
   [[nodiscard]] const vec2f& center() const noexcept { return center_; }
-  /// Pixels whose rays are left out.
+  /// Pixels whose rays are excluded.
   [[nodiscard]] const std::vector<std::array<std::int32_t, 2>>& outer() const noexcept { return outer_; }
 
   /// Bounds of the rays of the aligned tile of `size` x `size` pixels at (u, v). @pre size is 16, 32, 64 or 128
@@ -88,7 +88,7 @@ class direction_index {
     return tiles_[k - 4][static_cast<std::size_t>((v >> k) * tile_columns(k) + (u >> k))];
   }
 
-  /// Cells per unit of x and y.
+  /// Number of cells per unit of x and of y.
   [[nodiscard]] float per_x() const noexcept { return per_x_; }
   [[nodiscard]] float per_y() const noexcept { return per_y_; }
   [[nodiscard]] int levels() const noexcept { return levels_; }
@@ -123,12 +123,12 @@ class direction_index {
     return static_cast<std::int32_t>(std::clamp(at, 0.0F, static_cast<float>(count - 1)));
   }
 
-  /// Computes the bounds of the rays, and the linear fits of pixels over rays.
+  /// Computes the bounds of the rays, and linear fits of pixel coordinates to ray coordinates.
   void find_affine(const pixel_rays& rays) {
     min_x_ = min_y_ = infinity;
     max_x_ = max_y_ = -infinity;
     double n = 0.0;
-    std::array<double, 4> sum_u{}, sum_v{};  // of ray, pixel, ray^2, ray * pixel
+    std::array<double, 4> sum_u{}, sum_v{};  // sums of ray, pixel, ray^2, ray * pixel
     const auto add = [](std::array<double, 4>& s, double ray, double pixel) {
       s[0] += ray;
       s[1] += pixel;
@@ -185,12 +185,13 @@ class direction_index {
         cells_[k].spacing = b.u1 < 0 ? infinity : max_spacing(rays, i, j, b.u0, b.u1, b.v0, b.v1);
       }
   }
-  /// Maximum distance of a point of cell (i, j), whose rays are all in the given box of pixels, from a ray.
+  /// Maximum distance from a point in cell (i, j) to the nearest ray. All rays of the cell are in the given box of
+  /// pixels.
   ///
-  /// If the rays of a rectangle's left column are left of the cell, those of its right column right of it, and likewise
-  /// above and below, the rectangle's border encloses every point of the cell. Each point is therefore in one of the
-  /// triangles between neighbouring rays, and no point of a triangle is farther from its nearest corner than the
-  /// longest edge divided by the root of three.
+  /// If the rays of the left column of a rectangle of pixels are to the left of the cell, those of the right column to
+  /// the right, and likewise above and below, the border of the rectangle encloses every point of the cell. Each point
+  /// is therefore in one of the triangles between neighbouring rays, and no point of a triangle is farther from its
+  /// nearest corner than the longest edge divided by the square root of three.
   [[nodiscard]] float max_spacing(const pixel_rays& rays, int i, int j, int u0, int u1, int v0, int v1) const {
     const float x0 = min_x_ + static_cast<float>(i) / per_x_, x1 = min_x_ + static_cast<float>(i + 1) / per_x_;
     const float y0 = min_y_ + static_cast<float>(j) / per_y_, y1 = min_y_ + static_cast<float>(j + 1) / per_y_;

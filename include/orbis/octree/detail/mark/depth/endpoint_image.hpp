@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Ends of the rays of a depth image: depth along the optical axis, and voxel.
+/// Ends of the rays of a depth image: their depth along the optical axis and their voxel.
 #pragma once
 
 #include <algorithm>
@@ -58,13 +58,13 @@ class endpoint_image {
     }
     return counts;
   }
-  /// Begins an image of this size. Returns the depths of its rows and the padding, for the caller to fill in.
+  /// Starts an image of this size. Returns the depths of its rows, including padding, for the caller to fill in.
   [[nodiscard]] std::span<float> lay_out(int width, int height) {
     resize(width, height);
     return z_;
   }
-  /// Reduces that image to the part that starts at pixel `first`, which is the image of `camera`.
-  /// @pre there are no ends elsewhere; at least 16 columns remain on the right
+  /// Reduces the image to the part that starts at pixel index `first`, which is the image of `camera`.
+  /// @pre there are no ends outside this part; at least 16 columns remain on the right
   void crop(const camera::pinhole& camera, std::uint32_t first) {
     rays_.fit(camera);
     first_ = first;
@@ -73,13 +73,13 @@ class endpoint_image {
   [[nodiscard]] const pixel_rays& rays() const noexcept { return rays_; }
   /// Removes the end of a pixel's ray.
   void clear(int u, int v) noexcept { z_[first_ + number(u, v)] = 0.0F; }
-  /// Depths (metres) at which the rays of row `v` end, 0 without an end; padded with zeros.
+  /// Depths (metres) at which the rays of row `v` end, 0 where a ray has no end; padded with zeros.
   [[nodiscard]] const float* z(int v) const noexcept {
     return z_.data() + first_ + static_cast<std::size_t>(v) * stride_;
   }
   /// Offset between rows of `z`.
   [[nodiscard]] std::size_t stride() const noexcept { return stride_; }
-  /// Number of a pixel. See `pixel` for the inverse.
+  /// Index of a pixel. See `pixel` for the inverse.
   [[nodiscard]] std::uint32_t number(int u, int v) const noexcept {
     return static_cast<std::uint32_t>(static_cast<std::size_t>(v) * stride_ + static_cast<std::size_t>(u));
   }
@@ -97,12 +97,12 @@ class endpoint_image {
   using fresh_kernel = unsigned(const std::array<const std::int32_t*, 3>&, const std::array<const std::int32_t*, 3>&,
                                 int);
   static constexpr std::size_t rows_per_chunk = 32;
-  static constexpr std::size_t margin = 16;  // before and after a row of keys
+  static constexpr std::size_t margin = 16;  // space before and after a row of keys
 
   struct worker {
     scan_masks masks;
     end_counts counts;
-    std::vector<std::int32_t> keys;  ///< keys of this row and the previous one, x, y and z each
+    std::vector<std::int32_t> keys;  ///< keys of this row and of the previous row, each as x, y and z
     std::size_t row_size = 0;
     std::uint64_t name = 0;
     scan_brick* brick = nullptr;
@@ -152,13 +152,13 @@ class endpoint_image {
       }
   }
 
-  /// Reads the depths of row `v` in metres, 0 without a measurement.
+  /// Reads the depths of row `v` in metres, 0 where there is no measurement.
   template <class Depth>
   void metres(const Depth& depth, int v, float* z) const {
     if constexpr (requires { stored_type(depth); }) {
       using stored = decltype(stored_type(depth));
       const auto scale = static_cast<float>(depth.scale());
-      // Rounding a quotient of floats to double first does not change it.
+      // Rounding a quotient of floats to double before float gives the same result.
       if (static_cast<double>(scale) == depth.scale()) {
         simd::kernel<to_metres_kernel<stored>, void(const metres_row<stored>&), simd::avx2>()(
             {depth.pixels().row(v).data(), z, rays_.width(), scale, depth.min_depth(), depth.max_depth()});

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// End of the ray of a pixel, and of the rays of a row of pixels.
+/// Ends of the rays of single pixels and of rows of pixels.
 #pragma once
 
 #include <algorithm>
@@ -28,7 +28,7 @@ struct ray_endpoint {
   enum class fate { none, used, truncated, rejected };
   fate what = fate::none;
   float3 point{};   ///< end point, metres
-  voxel_key key{};  ///< voxel of the end
+  voxel_key key{};  ///< voxel that contains the end
   float z = 0.0F;   ///< depth of the end along the optical axis, up to a few roundings
 };
 
@@ -45,7 +45,7 @@ struct depth_sensor {
     if (is_finite(pose.centre)) key = grid.key(pose.centre);
   }
 
-  /// Returns the end of the ray through (x, y, 1) with measured depth `z`, by the rules of point_integrator.
+  /// Returns the end of the ray through (x, y, 1) with measured depth `z`, as point_integrator computes it.
   [[nodiscard]] ray_endpoint end(float x, float y, float z) const noexcept {
     if (!(z > 0.0F) || std::isnan(x)) return {};
     ray_endpoint e{.what = ray_endpoint::fate::used, .point = camera::world_point(pose, x, y, z), .key = {}, .z = z};
@@ -74,7 +74,7 @@ struct depth_sensor {
   }
 
  private:
-  /// Largest float whose root (in double) is at most `range`.
+  /// Largest float whose square root (in double) is at most `range`.
   [[nodiscard]] static float largest_square(double range) noexcept {
     constexpr float most = std::numeric_limits<float>::infinity();
     if (std::isinf(range)) return most;
@@ -90,8 +90,8 @@ struct end_row {
   int width = 0;
   const float* x = nullptr;
   const float* y = nullptr;
-  bool one_y = false;  ///< y is a single value
-  float* z = nullptr;  ///< in: metres, 0 if missing; out: depth of the ray's end, 0 if the ray does not count
+  bool one_y = false;  ///< true if y is a single value
+  float* z = nullptr;  ///< in: metres, 0 if missing; out: depth of the ray's end, 0 if the ray is ignored
   std::array<std::int32_t*, 3> key{};  ///< out: voxels of used ends, -1 for other pixels
 };
 
@@ -100,7 +100,7 @@ struct end_counts {
   std::size_t used = 0, truncated = 0, rejected = 0;
   bool leaves = false;  ///< true if a ray ends outside the voxel of the camera's centre
   float max_z = 0.0F;
-  double sum_z = 0.0;  ///< over the rays that count; up to rounding
+  double sum_z = 0.0;  ///< sum over the used and truncated rays; up to rounding
 
   void add(const end_counts& o) noexcept {
     used += o.used;
@@ -134,7 +134,7 @@ struct find_ends_kernel {
       const floats z = floats::load(row.z + u), x = floats::load(row.x + u);
       const floats y = row.one_y ? floats(*row.y) : floats::load(row.y + u);
       const mask valid = (z > 0.0F) & (x == x);
-      // The same arithmetic as camera::world_point.
+      // This is the same arithmetic as in camera::world_point.
       const floats cx = x * z, cy = y * z;
       const auto along = [&](std::size_t i) ORBIS_INLINE_LAMBDA {
         const std::array<float, 3>& r = s.pose.rows[i];
@@ -146,7 +146,7 @@ struct find_ends_kernel {
       const mask within = square <= s.max_square;
       mask good = valid;
       if (any(and_not(valid, within))) {
-        // The root of a float, computed in double and rounded, equals the root computed in float.
+        // The square root of a float, computed in double and rounded, equals the root computed in float.
         const floats scale = sqrt(square);
         px = select(within, px, o[0] + dx / scale * range);
         py = select(within, py, o[1] + dy / scale * range);
@@ -185,8 +185,8 @@ struct find_ends_kernel {
   }
 };
 
-/// Returns a mask for 16 pixels; bit i: the voxel of pixel `u + i` differs from those of the previous pixel and of the
-/// pixel above. `key[i][-1]` and `above[i]` must be readable; pixels without a voxel have -1.
+/// Returns a mask for 16 pixels; bit i is set if the voxel of pixel `u + i` differs from that of the previous pixel and
+/// from that of the pixel above. `key[i][-1]` and `above[i]` must be readable; pixels without a voxel have -1.
 struct fresh_keys_kernel {
   template <simd::target Target>
   static ORBIS_ALWAYS_INLINE unsigned run(const std::array<const std::int32_t*, 3>& key,
@@ -210,8 +210,8 @@ struct fresh_keys_kernel {
 template <class T>
 T stored_type(const camera::depth_view<T>&);
 
-/// Conversion of a row of stored depths to metres, 0 without a measurement; see depth_view::operator(). `metres` has
-/// room for 15 more values.
+/// Conversion of a row of stored depths to metres, 0 where there is no measurement; see depth_view::operator().
+/// `metres` has room for 15 more values.
 template <class T>
 struct metres_row {
   const T* stored;

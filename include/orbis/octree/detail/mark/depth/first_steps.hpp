@@ -18,8 +18,8 @@
 
 namespace orbis::octree::detail {
 
-/// Finds the neighbours of the sensor's voxel that rays in a range of directions may pass through before they leave all
-/// these neighbours: each axis then has at most one step.
+/// Finds the neighbours of the sensor's voxel through which rays in a range of directions may pass before they leave
+/// this neighbourhood; a ray takes at most one step along each axis there.
 class first_step_order {
  public:
   explicit first_step_order(const depth_sensor& sensor) noexcept
@@ -56,13 +56,14 @@ class first_step_order {
   };
 
   [[nodiscard]] static std::uint32_t voxels(const std::array<axis_range, 3>& axes, unsigned down) noexcept {
-    // True if a face across i, at distance `a`, may come before one across j.
+    // Returns true if a face across i, at distance `a`, may come before a face across j, at distance `b`.
     const auto may_precede = [&](std::size_t i, double a, std::size_t j, double b) {
-      if (a == 0.0 && b == 0.0) return i > j;  // the walk finds them equal for every ray
+      if (a == 0.0 && b == 0.0) return i > j;  // a tie for every ray; the later axis comes first
       const double room = 1e-9 * (std::fabs(a) * axes[j].most + std::fabs(b) * axes[i].most);
       return a * (a < 0.0 ? axes[j].most : axes[j].least) - b * (b < 0.0 ? axes[i].least : axes[i].most) <= room;
     };
-    std::array<unsigned, 3> before_first{}, before_second{};  // bit j of entry i: the first face across i may be
+    // Bit j of entry i: the first face across i may come before the first, or the second, face across j.
+    std::array<unsigned, 3> before_first{}, before_second{};
     for (std::size_t i = 0; i != 3; ++i)
       for (std::size_t j = 0; j != 3; ++j) {
         const unsigned bit = 1U << j;
@@ -87,12 +88,12 @@ class first_step_order {
   scan_origin source_;
 };
 
-/// Finds those of the 26 neighbours of the sensor's voxel that rays pass through.
+/// Determines through which of the 26 neighbours of the sensor's voxel rays pass.
 class first_voxels {
  public:
   explicit first_voxels(const depth_sensor& sensor) noexcept : sensor_{sensor} {}
 
-  /// Walks the first steps of a ray.
+  /// Takes the first steps of a ray.
   void add(const ray_endpoint& e) noexcept {
     const voxel_key& from = *sensor_.key;
     if (e.key == from) return;
@@ -109,8 +110,8 @@ class first_voxels {
       seen_ |= 1U << (x + 3 * y + 9 * z);
     }
   }
-  /// Adds the rays of a box of cells of a view. `directions(box)`: range of their directions in the world, see
-  /// first_step_order; `for_each(box, use)` calls `use` with the ray_endpoint of each ray until it returns false.
+  /// Adds the rays of a box of cells of a view. `directions(box)`: range of their directions in the world frame, see
+  /// first_step_order; `for_each(box, use)` calls `use` with the ray_endpoint of each ray until `use` returns false.
   template <class Directions, class ForEach>
   void add(const first_step_order& order, const pixel_box& box, const Directions& directions, const ForEach& for_each) {
     const auto [low, high] = directions(box);
@@ -121,7 +122,7 @@ class first_voxels {
     for_each(box, [&](const ray_endpoint& e) {
       add(e);
       any = true;
-      return is_cell;  // for a larger box one ray is usually representative
+      return is_cell;  // one ray usually represents a larger box
     });
     if (is_cell || !any || (may & ~seen_) == 0) return;
     const std::int32_t u = (box.u0 + box.u1) / 2, v = (box.v0 + box.v1) / 2;

@@ -19,45 +19,45 @@
 
 namespace orbis::octree::detail {
 
-/// Parameters of the tests of nodes for a frame. Positions are relative to the camera's centre.
+/// Parameters of the node tests for a frame. Positions are relative to the camera's centre.
 ///
 /// The relevant rays are those from the centre to the world points, rounded to float; the tests use the rays of the
-/// pixels, and nodes with rounded centres. With u = 2^-24 and c a node's centre:
+/// pixels and rounded node centres. With u = 2^-24 and c a node's centre:
 /// - the sum that yields a world point p has an error of at most 10 u |p - t|_1 + u |t|_1, and relative to the node the
 ///   first part shrinks with the distance;
 /// - rotating c with the rotation rounded to float has an error of 7 u |c|_1, in addition to the 2 u |c|_1 of c itself,
 ///   and each step down the octree adds u |c|_1: less than 25 u |c|_1 from a root of 16 levels;
-/// - the walk has its direction in float: u |c|_1; the error of its sums in double is negligible;
+/// - the direction of the traversal is a float vector: u |c|_1; the error of the sums in double is negligible;
 /// - the ray of a pinhole's pixel may be computed as (pixel - c) / f in float: 5 u |c|_1.
 /// The total is less than 45 u |c|_1 + 2 u |t|_1: `margin` is 64 u |c|_1 + 8 u |t|_1.
 struct depth_scene {
-  float3 x_axis{}, y_axis{}, z_axis{};               ///< axes of the camera, in the world
+  float3 x_axis{}, y_axis{}, z_axis{};               ///< axes of the camera, in the world frame
   float fx = 1, fy = 1, cx = 0, cy = 0;              ///< pixel = f * ray + c
   float per_fx = 1, per_fy = 1;                      ///< 1 / f
   float last_u = 0, last_v = 0;                      ///< last column and row
   float min_x = 0, max_x = 0, min_y = 0, max_y = 0;  ///< bounds of all rays
-  float margin_0 = 0, margin_1 = 0;                  ///< metres; and per metre of |c|_1
+  float margin_0 = 0, margin_1 = 0;                  ///< constant part in metres; part per metre of |c|_1
   float pixel_margin = 0.01F;                        ///< allowance for the rounding of pixels
   float near_z = 0;                                  ///< nodes that come closer than this are not projected
-  /// Maximum depth at which a ball inside a voxel certainly contains the ray of a pixel, of an aligned tile of 2x2
-  /// pixels' rays, or of 4x4; for pinholes, see dense().
+  /// Maximum depth at which a ball inside a voxel certainly contains the ray of a pixel, or a ray of an aligned tile of
+  /// 2x2 or 4x4 pixels; for pinholes, see dense().
   std::array<float, 3> dense_z{};
   float ball = 0, ball_slope = 0;        ///< the ball's radius exceeds `ball - ball_slope * z`
   float voxel = 0;                       ///< metres
   const direction_index* map = nullptr;  ///< for cameras other than pinholes
   const depth_pyramid* pyramid = nullptr;
-  /// Multiples of the ray spacing (at z = 1) within which all rays of a tile of 1, 2x2 or 4x4 pixels lie that contains
-  /// the ray nearest to a direction.
+  /// For tiles of 1, 2x2 and 4x4 pixels that contain the ray nearest to a direction: maximum distance of the tile's
+  /// rays from the direction, in multiples of the ray spacing (at z = 1).
   std::array<float, 3> tiles{1.02F, 3.06F, 7.14F};
 
-  /// dense_z for a ray spacing of `spacing`.
+  /// Returns dense_z for the given ray spacing.
   [[nodiscard]] float dense(std::size_t kind, float spacing) const noexcept {
     return ball / (tiles[kind] * spacing + ball_slope);
   }
   [[nodiscard]] float margin(float l1) const noexcept { return margin_0 + margin_1 * l1; }
 };
 
-/// A box of pixels, its last row and column included.
+/// A box of pixels, including its last row and column.
 struct pixel_box {
   std::int32_t u0, u1, v0, v1;
 };
@@ -68,7 +68,7 @@ struct child_offsets {
   alignas(32) std::array<float, 8> world_x{}, world_y{}, world_z{};  ///< in the world frame
   float half = 0;                                                    ///< half a child's edge
   float half_z = 0;                                                  ///< half of a child's extent along z
-  std::array<float, 4> half_side{};  ///< half of its extent across the sides of the view
+  std::array<float, 4> half_side{};  ///< half of a child's extent across the sides of the view
 
   child_offsets() = default;
   child_offsets(const depth_scene& s, float half_edge) : half{half_edge} {
@@ -97,8 +97,8 @@ struct child_offsets {
 /// Classification of a node's eight children.
 struct children {
   alignas(32) std::array<float, 8> x, y, z;                ///< centres in the camera frame
-  alignas(32) std::array<std::int32_t, 8> u0, u1, v0, v1;  ///< pixels whose rays may touch them
-  alignas(32) std::array<float, 8> near_z;                 ///< rays that end before this depth do not touch them
+  alignas(32) std::array<std::int32_t, 8> u0, u1, v0, v1;  ///< pixels whose rays may touch the child
+  alignas(32) std::array<float, 8> near_z;                 ///< rays that end before this depth do not touch the child
   unsigned live = 0;                                       ///< bit i: a ray may touch child i
   unsigned full = 0;    ///< bit i: every voxel of child i is certainly crossed by a ray
   unsigned inside = 0;  ///< bit i: child i projects into the image
@@ -112,7 +112,7 @@ template <class V>
 }
 
 /// Classifies the children of the node whose centre is `c` in the camera frame. `inside`: the node projects into the
-/// image. The result is correct on every target; targets may differ in which children stay undecided.
+/// image. The result is correct on every target; targets may differ in the children that stay undecided.
 struct classify_children_kernel {
   template <simd::target Target>
   static ORBIS_ALWAYS_INLINE void run(const depth_scene& s, const child_offsets& o, const float3& c, bool inside,
@@ -142,7 +142,7 @@ struct classify_children_kernel {
     out.live = out.full = out.inside = 0;
     if (none(live)) return;
 
-    // Pixels to which a child may project: that of its centre, plus or minus its extent across that ray.
+    // Pixels to which a child may project: the pixel of its centre, plus or minus its extent across the centre's ray.
     const mask projects = near > s.near_z;
     const floats near_1 = select(projects, near, floats(1.0F)), z_1 = select(projects, z, floats(1.0F));
     const floats inverse = 1.0F / (near_1 * z_1), per_z = inverse * near_1, per_near = inverse * z_1;
@@ -174,7 +174,7 @@ struct classify_children_kernel {
     u1 = select(projects, u1, floats(s.last_u));
     v1 = select(projects, v1, floats(s.last_v));
     const mask inner = projects & (u0 >= 0.0F) & (v0 >= 0.0F) & (u1 <= s.last_u) & (v1 <= s.last_v);
-    // Rounded up and down; the numbers are >= -1.
+    // Round up and down; the results are >= -1.
     const auto first = [](const floats& p, float last) ORBIS_INLINE_LAMBDA {
       return -simd::convert<std::int32_t>(floor(-min(max(p, floats(0.0F)), floats(last + 1.0F))));
     };
@@ -194,7 +194,7 @@ struct classify_children_kernel {
     d.store(out.v0.data());
     e.store(out.v1.data());
 
-    // Level at which the box spans at most four cells: the logarithm of a third, rounded up.
+    // Level at which the box spans at most four cells: the logarithm of a third of its extent, rounded up.
     const depth_pyramid& pyramid = *s.pyramid;
     const floats third = simd::convert<float>(max(b - a, e - d)) * (1.0F / 3.0F);
     const integers level = min(max(log2_rounded_up(third), integers(1)), integers(pyramid.levels()));
@@ -205,7 +205,7 @@ struct classify_children_kernel {
     const integers width = of_level(pyramid.width().data()), family(static_cast<std::int32_t>(pyramid.family()));
     integers begin = of_level(pyramid.begin().data());
     begin += select(far < dense_z[1], family, zero);
-    begin += select(far < dense_z[2], family, zero);  // implies the one before
+    begin += select(far < dense_z[2], family, zero);  // implies the condition above
     const integers i0 = a >> level, i1 = max(i0, (b >> level) - integers(1));
     const integers j0 = d >> level, j1 = max(j0, (e >> level) - integers(1));
     const integers row0 = begin + j0 * width, row1 = begin + j1 * width;
@@ -220,7 +220,7 @@ struct classify_children_kernel {
     live = live & (farthest >= near * pyramid.scale()) & (farthest > 0.0F);
     const mask filled = (nearest > far * pyramid.scale()) & (far < dense_z[0]);
     out.live = simd::bits(live);
-    // With a map, the spacing decides if rays cover a whole child.
+    // With a map, the spacing of its entries decides whether rays cover a whole child.
     const bool mapped = s.map != nullptr;
     out.inside = mapped ? 0 : out.live & simd::bits(inner);
     out.full = (mapped ? out.live & simd::bits(projects) : out.inside) & simd::bits(filled);

@@ -29,10 +29,10 @@ struct view_extent {
   float min_x, max_x, min_y, max_y;
 };
 
-/// Reuses its memory between views. Call set_view, build `pyramid`, call list_nodes.
+/// Reuses its memory between views. Call set_view, build `pyramid`, and then call list_nodes.
 struct view_frame {
   using classify_kernel = void(const depth_scene&, const child_offsets&, const float3&, bool, children&);
-  static constexpr int list_level = 5;  ///< level of the nodes that threads distribute among them
+  static constexpr int list_level = 5;  ///< level of the nodes that are distributed to the threads
 
   struct node {
     voxel_key key;
@@ -40,15 +40,15 @@ struct view_frame {
     bool inside;    ///< projects into the image
   };
 
-  // Kernels of eight lanes are no faster on AVX-512.
+  // Kernels with eight lanes are no faster on AVX-512.
   chosen_kernel<classify_children_kernel, classify_kernel, simd::avx2> classify;
   depth_pyramid pyramid;
   depth_scene scene;
   std::vector<child_offsets> offsets;  ///< per level, offsets of a node's children at that level
   std::vector<node> nodes;             ///< nodes at list_level that rays may touch
 
-  /// Computes those parameters of the tests that depend on the view; the caller sets those that depend on the rays.
-  /// `ray_error`: maximum deviation of rays from their assumed directions, at z = 1.
+  /// Computes the test parameters that depend on the view; the caller sets those that depend on the rays. `ray_error`:
+  /// maximum deviation of rays from their assumed directions, at z = 1.
   void set_view(const depth_sensor& sensor, const view_extent& e, float ray_error = 0.0F) {
     depth_scene& s = scene;
     const auto& rows = sensor.pose.rows;
@@ -98,7 +98,7 @@ struct view_frame {
     return {edge(box.u0, -room, scene.cx, scene.per_fx), edge(box.u1, room, scene.cx, scene.per_fx),
             edge(box.v0, -room, scene.cy, scene.per_fy), edge(box.v1, room, scene.cy, scene.per_fy)};
   }
-  /// Smallest and greatest coordinates of the rays' directions in the world.
+  /// Smallest and greatest coordinates of the rays' directions in the world frame.
   [[nodiscard]] std::pair<float3, float3> directions(const pixel_box& box, float room) const noexcept {
     const auto [x0, x1, y0, y1] = bounds(box, room);
     std::pair<float3, float3> range;
@@ -114,12 +114,12 @@ struct view_frame {
   [[nodiscard]] float half_diagonal() const noexcept {
     return 0.5F * std::sqrt(1.0F / (scene.fx * scene.fx) + 1.0F / (scene.fy * scene.fy));
   }
-  /// Sets the maximum distance of a direction of the view from a ray, except for pixels without an end.
+  /// Sets the maximum distance from a direction in the view to the nearest ray, apart from pixels without an end.
   void set_spacing(float spacing) noexcept {
     for (std::size_t kind = 0; kind != 3; ++kind) scene.dense_z[kind] = scene.dense(kind, spacing);
   }
-  /// Lowest and highest voxel of a box around all rays; empty if the box is close to the border of the grid, where
-  /// walks may end early.
+  /// Lowest and highest voxel of a box around all rays; empty if the box is close to the border of the grid, where ray
+  /// traversals may end early.
   [[nodiscard]] std::optional<std::pair<voxel_key, voxel_key>> ray_bounds(const depth_sensor& sensor,
                                                                           float max_z) const {
     std::array<std::array<std::uint32_t, 2>, 3> range;
@@ -143,8 +143,8 @@ struct view_frame {
     return std::pair{voxel_key{range[0][0], range[1][0], range[2][0]},
                      voxel_key{range[0][1], range[1][1], range[2][1]}};
   }
-  /// Returns true if the camera's centre is so close to a face of its voxel that for many rays rounding decides through
-  /// which side they leave it.
+  /// Returns true if the camera's centre is so close to a face of its voxel that rounding decides through which face
+  /// many rays leave the voxel.
   [[nodiscard]] bool is_on_face(const depth_sensor& sensor) const {
     const double close = 64.0 * static_cast<double>(scene.margin(scene.voxel));
     const voxel_key& k = *sensor.key;

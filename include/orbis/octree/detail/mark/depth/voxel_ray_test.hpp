@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Classification of the rays of a depth image that cross a voxel: certainly, certainly not, or undecided.
+/// Classification of the rays of a depth image by whether they cross a voxel: certainly, certainly not, or undecided.
 #pragma once
 
 #include <algorithm>
@@ -44,14 +44,14 @@ namespace orbis::octree::detail {
 /// A line in direction g crosses a cube with centre c and half edge h if no axis across an edge separates them: |c x
 /// g|_i <= h (|g_j| + |g_k|) for all i (S. Gottschalk, M. C. Lin, D. Manocha, "OBBTree", SIGGRAPH 1996). A ray that
 /// ends at z g has left the cube if that point is beyond a far face, and has not reached it if the point is before a
-/// near one. No division is needed.
+/// near face. No division is needed.
 ///
-/// Directions have an error of at most margin / |c| of their length (see depth_scene), which is `slack`, in addition to
+/// Directions have a relative error of at most margin / |c| (see depth_scene). It is covered by `slack`, in addition to
 /// twice the margin in h. The axes are flipped so that c has no negative coordinate.
 struct voxel_test {
   float3 centre{}, x_axis{}, y_axis{}, z_axis{};  ///< relative to the camera's centre; flipped
   float half = 0, inner_half = 0, outer_half = 0, slack = 0, margin = 0, margin_1 = 0;
-  float3 before{};  ///< maximum distance before the centre at which a ray may end, along each axis: half, or no limit
+  float3 before{};  ///< per axis, maximum distance before the centre at which a ray may end: half, or infinity
 
   voxel_test(const depth_scene& s, const float3& c, float half_edge) noexcept
       : half{half_edge}, margin{s.margin(std::fabs(c[0]) + std::fabs(c[1]) + std::fabs(c[2]))}, margin_1{s.margin_1} {
@@ -61,7 +61,7 @@ struct voxel_test {
       x_axis[i] = std::copysign(1.0F, c[i]) * s.x_axis[i];
       y_axis[i] = std::copysign(1.0F, c[i]) * s.y_axis[i];
       z_axis[i] = std::copysign(1.0F, c[i]) * s.z_axis[i];
-      // There is no near face within the camera's own slab.
+      // There is no near face if the voxel is in the camera's slab along this axis.
       before[i] = centre[i] < half + 2.0F * margin ? std::numeric_limits<float>::infinity() : half;
       l1 += centre[i];
     }
@@ -123,7 +123,7 @@ struct voxel_crossing {
 };
 
 /// Tests the rays `of` through (x, y, 1), which end at depth `z` > 0, against a voxel. Correct on every target; targets
-/// may differ in which rays stay undecided.
+/// may differ in the rays that stay undecided.
 template <class V>
 [[nodiscard]] ORBIS_ALWAYS_INLINE voxel_crossing<V> test_rays(const voxel_test& t, const V& x, const V& y, const V& z,
                                                               const typename V::mask_type& of) noexcept {
@@ -150,8 +150,8 @@ template <class V>
   return out;
 }
 
-/// Returns true if a ray of the box certainly crosses the voxel. Otherwise appends the numbers of the pixels whose rays
-/// may cross it to `unsure`, see endpoint_image::number. Skips rays that end before `near_z`.
+/// Returns true if a ray of the box certainly crosses the voxel. Otherwise appends to `unsure` the indices of the
+/// pixels whose rays may cross it, see endpoint_image::number. Skips rays that end before `near_z`.
 struct test_pixels_kernel {
   template <simd::target Target>
   static ORBIS_ALWAYS_INLINE bool run(const endpoint_image& ends, const voxel_test& t, const pixel_box& box,
@@ -180,11 +180,11 @@ struct test_pixels_kernel {
   }
 };
 
-/// Positions in a voxel's projection at which rays are sampled, and their distance from its centre in edges.
+/// Positions in a voxel's projection at which rays are sampled, and their distance from the centre in voxel edges.
 inline constexpr std::array<std::array<float, 2>, 5> sample_places{{{0, 0}, {-1, -1}, {1, -1}, {-1, 1}, {1, 1}}};
 inline constexpr float sample_spread = 0.3F;
 
-/// For each child, the deepest of a few pixels close to its centre. z < 0: not requested
+/// For each child, the deepest of a few pixels close to its centre. z < 0: the child was not requested
 template <class Floats, class Integers>
 struct sampled_pixels {
   Floats z{-1.0F};
@@ -196,7 +196,7 @@ struct sampled_pixels {
                                      const Depth& depth_at) noexcept {
     using mask = typename Floats::mask_type;
     const mask asked = mask::from_bits(wanted), projects = Floats::load(c.near_z.data()) > s.near_z;
-    const mask at_middle = s.map != nullptr ? mask::first(8) : !projects;  // of the pixels that may see it
+    const mask at_middle = s.map != nullptr ? mask::first(8) : !projects;  // middle of pixels that may see the child
     const Floats per_z = select(projects, 1.0F / Floats::load(c.z.data()), Floats(0.0F));
     const Integers u0 = Integers::load(c.u0.data()), u1 = Integers::load(c.u1.data());
     const Integers v0 = Integers::load(c.v0.data()), v1 = Integers::load(c.v1.data());
@@ -222,8 +222,8 @@ struct sampled_pixels {
   }
 };
 
-/// Returns the children that are certainly crossed by one given ray each, through (x, y, 1) to depth `z`. `world`: the
-/// parent's centre relative to the camera's. z <= 0: no ray
+/// Returns the children that are certainly crossed by the ray given for each child, through (x, y, 1) to depth `z`.
+/// `world`: the parent's centre relative to the camera's. z <= 0: no ray
 template <class Floats>
 [[nodiscard]] ORBIS_ALWAYS_INLINE auto children_crossed(const depth_scene& s, const child_offsets& o,
                                                         const float3& world, const Floats& x, const Floats& y,

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
 /// Finds the voxels that the rays of an organised point cloud cross. The points of such a cloud are the pixels of a
-/// depth image in their order; this is detected from the points. The voxels are found as for the depth image.
+/// depth image, in pixel order; this is detected from the points. The voxels are found as for a depth image.
 #pragma once
 
 #include <algorithm>
@@ -26,20 +26,20 @@
 
 namespace orbis::octree::detail {
 
-/// Image in which rays are placed.
+/// Image into whose pixels rays are sorted.
 struct pixel_placement {
   static constexpr std::int32_t nowhere = -1;
 
   float3 origin{};
-  std::array<float3, 3> axes{};  ///< x, y and z of the camera, in the world
+  std::array<float3, 3> axes{};  ///< x, y and z axes of the camera, in the world frame
   float fx = 1, fy = 1, cx = 0, cy = 0;
   float last_u = 0, last_v = 0;    ///< last column and row
   float error_u = 0, error_v = 0;  ///< maximum distance of a ray from the centre of its pixel
-  float far = 0;  ///< rays that end deeper are walked, because the voxels around them have no other rays
+  float far = 0;  ///< rays that end deeper are traversed, because no other rays cross the voxels around them
   std::int32_t stride = 0;
 };
 
-/// Part of the image in which rays were placed, and their greatest depth; max_z = 0: none.
+/// Part of the image in which rays were placed, and their greatest depth; max_z = 0: no rays.
 struct placed_part {
   float max_z = 0.0F;
   float u0 = std::numeric_limits<float>::infinity(), u1 = -u0, v0 = u0, v1 = u1;
@@ -52,7 +52,7 @@ struct placed_part {
 };
 
 /// Places the first `count` rays of a batch: stores their pixels, as row * stride + column, and the depths at which
-/// they end, in whole vectors. Sets bit i of `left_out` if ray i is not at the centre of a pixel, or ends too far away.
+/// they end, in whole vectors. Sets bit i of `left_out` if ray i is not at the centre of a pixel or ends too far away.
 struct place_in_pixels_kernel {
   template <simd::target Target>
   static ORBIS_ALWAYS_INLINE placed_part run(const pixel_placement& t, const ray_batch& rays, std::size_t count,
@@ -95,20 +95,20 @@ using place_in_pixels = placed_part(const pixel_placement&, const ray_batch&, st
 /// Collects the rays of a scan and marks their voxels. Reuses its memory between scans.
 class organised_rays {
  public:
-  /// Decides whether the scan's points are the pixels of a depth image that is dense enough for this method, and
-  /// prepares it if so. O(1). `limit`: maximum length of rays, metres
+  /// Decides whether the scan's points are the pixels of a depth image that is dense enough for this method, and if so
+  /// prepares the method. O(1). `limit`: maximum length of rays, metres
   template <class Point>
   [[nodiscard]] bool plan(const voxel_grid& grid, const float3& origin, std::size_t count, Point&& point,
                           double limit) {
     if (count < fewest_rays || count > most_rays || !fit_.fit(origin, count, point, limit)) return false;
     voxel_ = grid.resolution();
-    // If scattered pixels have no points, the remaining ones are further apart; contiguous holes matter less. For
+    // If scattered pixels have no points, the remaining points are further apart; contiguous holes matter less. For
     // sparse images dense_rays is better, because its cells contain several rays.
     if (fit_.filled() < 0.4) return false;
     const double filled = std::min(1.0, 1.25 * fit_.filled());
     return depth_frame::is_dense(fit_.mean_z(), voxel_, focal() * std::sqrt(filled));
   }
-  /// Begins a planned scan, which `workers` threads add.
+  /// Starts a planned scan, to which `workers` threads add rays.
   void start(const float3& origin, std::size_t count, std::size_t workers) {
     const camera::pinhole& camera = fit_.camera();
     ends_ = frame_.ends.lay_out(camera.width(), camera.height());
@@ -137,7 +137,7 @@ class organised_rays {
     place_ = simd::kernel<place_in_pixels_kernel, place_in_pixels>();
   }
   /// Adds the rays of a batch of `count` points, the first of which is point `first` of the scan. The rays that must be
-  /// walked instead remain in `rays`. Can be called by several workers at once.
+  /// traversed one by one remain in `rays`. Can be called by several workers at once.
   /// @pre `count` is a multiple of a vector's size, except for the last batch of the scan
   void add(std::size_t worker, ray_batch& rays, std::size_t first, std::size_t count) {
     ray_batch::bits left_out;
@@ -147,7 +147,7 @@ class organised_rays {
   /// Marks the voxels of the added rays. Voxels that a miss would not change according to `saturated` may be missing,
   /// see depth_integrator::mark, as may those that are occupied in `masks`. Returns false, and marks nothing, if rays
   /// come too close to the border of the grid, or if many rays share a pixel. `end_of(i)`: the ray_endpoint of the i-th
-  /// point. (Has the signature of dense_rays::mark, which uses the ranges.)
+  /// point. (The signature is that of dense_rays::mark, which uses the range.)
   template <execution_policy Policy, class Range, class EndOf, class Saturated>
   [[nodiscard]] bool mark(const Policy& policy, const depth_sensor& scan, Range&&, const EndOf& end_of,
                           scan_masks& masks, const Saturated& saturated) {
@@ -185,16 +185,16 @@ class organised_rays {
 
   /// The smaller focal length determines the largest distance between rays.
   [[nodiscard]] double focal() const { return std::min(fit_.camera().k().fx, fit_.camera().k().fy); }
-  /// Error of rays beyond the allowance of depth_scene. That allowance includes 10 u |c|_1 for the rounding of points,
-  /// which must not be counted twice, and 19 u |c|_1 in reserve. A ray may deviate along x and along y, so by sqrt(2)
-  /// times the error in total; the float coordinates have errors of about 7 u, plus the rounding of cx and cy.
+  /// Error of rays in excess of the allowance of depth_scene. The allowance includes 10 u |c|_1 for the rounding of
+  /// points, which must not be counted twice, and 19 u |c|_1 in reserve. A ray may deviate along both x and y, so by
+  /// sqrt(2) times the error in total; the float coordinates have errors of about 7 u, plus the rounding of cx and cy.
   [[nodiscard]] float ray_error() const {
     constexpr double u = 0x1p-24;
     const auto& k = fit_.camera().k();
     const double centre = std::max(k.cx / k.fx, k.cy / k.fy);
     return static_cast<float>(std::max(0.0, 1.5 * fit_.error() + (7.0 + 3.0 * centre - 29.0) * u));
   }
-  /// Crops the image to the part in which rays were placed. Returns the number of the pixel that becomes the first one.
+  /// Crops the image to the part in which rays were placed. Returns the index of the pixel that becomes the first one.
   std::uint32_t crop(const placed_part& p) {
     camera::intrinsics k = fit_.camera().k();
     k.width = static_cast<int>(p.u1 - p.u0) + 1;
@@ -205,8 +205,8 @@ class organised_rays {
     frame_.ends.crop(camera::pinhole{k}, first);
     return first;
   }
-  /// Stores the depth and the number of each pixel's first ray; additional rays go to `second_`. One thread per band of
-  /// rows.
+  /// Stores the depth and the index of each pixel's first ray; additional rays go to `second_`. Uses one thread per
+  /// band of rows.
   template <class Policy>
   void fill_image(const Policy& policy) {
     const std::size_t bands = parts_.size();
@@ -251,12 +251,12 @@ class organised_rays {
   se3 pose_;
   pixel_placement placement_;
   place_in_pixels* place_ = nullptr;
-  std::span<float> ends_;                           ///< of the frame, before it is cropped
-  std::size_t count_ = 0;                           ///< rays
+  std::span<float> ends_;                           ///< ends of the frame, before it is cropped
+  std::size_t count_ = 0;                           ///< number of rays
   std::vector<std::int32_t> pixel_;                 ///< pixel of each ray
-  std::vector<float> z_;                            ///< depth of its end
-  std::vector<placed_part> parts_;                  ///< of each worker's rays
-  std::vector<std::uint32_t> numbers_;              ///< number of each pixel's ray, if it has one
+  std::vector<float> z_;                            ///< depth of the end of each ray
+  std::vector<placed_part> parts_;                  ///< part of the image for each worker's rays
+  std::vector<std::uint32_t> numbers_;              ///< index of each pixel's ray, if it has one
   std::vector<std::vector<std::uint32_t>> second_;  ///< per band of rows: additional rays of occupied pixels
 };
 

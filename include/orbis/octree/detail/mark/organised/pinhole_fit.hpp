@@ -20,10 +20,10 @@
 
 namespace orbis::octree::detail {
 
-/// Estimates the rotation and the intrinsics of a pinhole camera from a cloud whose points are its pixels, in order
-/// along the rows or the columns of the image; pixels may be missing, including whole rows. The camera's centre is
-/// known. Points of one row lie in a plane through the centre, so the rows determine the x axis; the constant distance
-/// between pixels at z = 1 then determines the z axis and the spacing. The result is refined by least squares
+/// Estimates the rotation and the intrinsics of a pinhole camera from a cloud whose points are the camera's pixels, in
+/// order along the rows or the columns of the image; pixels may be missing, including whole rows. The camera's centre
+/// is known. Points of one row lie in a plane through the centre, so the rows determine the x axis; the constant
+/// distance between pixels at z = 1 then determines the z axis and the spacing. The result is refined by least squares
 /// (Gauss-Newton). Reads about a thousand points, independent of the cloud's size. Reuses its memory.
 class pinhole_fit {
  public:
@@ -37,7 +37,7 @@ class pinhole_fit {
     };
     if (!take_runs(count, direction) || !find_x_axis() || !find_columns() || !find_rows()) return false;
     find_center();
-    // Pixel numbers far from the centre may initially be wrong by one.
+    // Pixel coordinates far from the centre may initially be off by one.
     for (int step = 0; step != 4; ++step)
       if ((step % 2 == 0 && !number_pixels()) || !refine()) return false;
     return set_image(count) && set_error() && verify(count, direction);
@@ -46,7 +46,7 @@ class pinhole_fit {
   [[nodiscard]] const camera::pinhole& camera() const noexcept { return camera_; }
   /// R_world_camera.
   [[nodiscard]] so3 rotation() const { return so3{mat3(transposed(axes_))}; }
-  /// Maximum deviation of the rays of points from those of their pixels, at z = 1, along x and along y.
+  /// Maximum deviation of the rays of points from the rays of their pixels, at z = 1, along x and along y.
   [[nodiscard]] double error() const noexcept { return error_; }
   /// Approximate share of the image's pixels with points, for the smallest possible image.
   [[nodiscard]] double filled() const noexcept { return filled_; }
@@ -68,7 +68,7 @@ class pinhole_fit {
     std::array<vec3, run_length> d;  ///< unit vectors
     vec3 normal;
     double length;                    ///< length of the first ray, metres
-    double x_gap = 0.0, x_way = 0.0;  ///< at z = 1: smallest distance between neighbours; from the first to the last
+    double x_gap = 0.0, x_way = 0.0;  ///< at z = 1: smallest distance between neighbours; distance from first to last
     double y = 0.0;
   };
   /// A ray and its pixel.
@@ -77,7 +77,7 @@ class pinhole_fit {
     double u, v;
   };
 
-  /// Collects runs within single rows, from the whole cloud.
+  /// Collects runs within single rows, distributed over the whole cloud.
   template <class Direction>
   bool take_runs(std::size_t count, const Direction& direction) {
     runs_.clear();
@@ -147,7 +147,7 @@ class pinhole_fit {
     });
     return runs_.size() >= most_runs / 4;
   }
-  /// Finds the column spacing and the z axis: if the z axis is rotated by t about x, a row seen at y has its points
+  /// Finds the column spacing and the z axis: if the z axis is rotated by t about x, the points of a row seen at y are
   /// (cos t - y sin t) times as far apart as at z = 1.
   bool find_columns() {
     gaps_.clear();
@@ -185,7 +185,7 @@ class pinhole_fit {
     fx_ = 1.0 / std::hypot(a, b);
     return project();
   }
-  /// Finds the row spacing: the largest length of which all distances between rows are multiples.
+  /// Finds the row spacing: the largest length that divides all distances between rows.
   bool find_rows() {
     std::sort(runs_.begin(), runs_.end(), [](const run& a, const run& b) { return a.y < b.y; });
     gaps_.clear();
@@ -230,7 +230,7 @@ class pinhole_fit {
       cy_ = -fy_ * y;
     }
   }
-  /// Assigns pixels to the first and the last points of the runs. Removes points that fit no pixel, if they are few.
+  /// Assigns pixels to the first and last points of the runs. Removes points that fit no pixel if there are only a few.
   bool number_pixels() {
     pixels_.clear();
     for (const run& r : runs_)
@@ -259,7 +259,7 @@ class pinhole_fit {
       h += outer_product(ju, ju) + outer_product(jv, jv);
       g += ju * ru + jv * rv;
     }
-    // In a very narrow view, rotation and shift are indistinguishable, and any solution will do.
+    // In a very narrow view, rotation and shift are indistinguishable, so any solution is acceptable.
     const auto solved = solve_semidefinite(h, matrix<7>(-g));
     if (!solved || !all_finite(*solved)) return false;
     const matrix<7>& step = *solved;
@@ -271,8 +271,8 @@ class pinhole_fit {
     cy_ += step[6];
     return fx_ > 0.0 && fy_ > 0.0;
   }
-  /// Sets the image, with a margin around the pixels of the sample. Fails for very wide views, for which floats are too
-  /// coarse.
+  /// Sets the image size, with a margin around the pixels of the sample. Fails for very wide views, for which float is
+  /// not precise enough.
   bool set_image(std::size_t count) {
     double u0 = pixels_.front().u, u1 = u0, v0 = pixels_.front().v, v1 = v0, z = 0.0;
     for (const pixel& p : pixels_) {
@@ -292,14 +292,14 @@ class pinhole_fit {
     camera_ = camera::pinhole{static_cast<int>(width), static_cast<int>(height), fx_, fy_, cx_, cy_};
     return true;
   }
-  /// Sets the error from the residuals between rays and pixels, which are the rounding of the points, and at least the
-  /// precision of float.
+  /// Sets the error from the residuals between rays and pixels, which result from the rounding of the points; it is at
+  /// least the precision of float.
   bool set_error() {
     const double mean = std::sqrt(square_ / (2.0 * static_cast<double>(pixels_.size())));
     error_ = std::max(5e-7 * std::max(1.0, 0.5 * (1.0 + slope_ * slope_)), 8.0 * mean);
     return error_ < most_error && error_ * std::max(fx_, fy_) < 0.05;
   }
-  /// Verifies the camera with other points, and computes the share of the image's pixels with points.
+  /// Verifies the camera with other points, and computes the share of the image's pixels that have points.
   template <class Direction>
   [[nodiscard]] bool verify(std::size_t count, const Direction& direction) {
     std::size_t tried = 0, good = 0;
@@ -326,8 +326,8 @@ class pinhole_fit {
   mat3 axes_ = identity<mat3>();  ///< R_camera_world
   double fx_ = 0.0, fy_ = 0.0, cx_ = 0.0, cy_ = 0.0;
   double square_ = 0.0;  ///< sum of squared residuals, at z = 1
-  double size_ = 0.0;    ///< size in pixels of the image without the margin
-  double slope_ = 0.0;   ///< largest slope of its sides
+  double size_ = 0.0;    ///< size in pixels of the image, excluding the margin
+  double slope_ = 0.0;   ///< largest slope of the sides of the image
   double error_ = 0.0, mean_z_ = 0.0, filled_ = 0.0;
   camera::pinhole camera_;
 };

@@ -43,7 +43,7 @@ struct ray_batch {
     (is_hit ? hit : cut)[i >> 6U] |= std::uint64_t{1} << (i & 63U);
   }
   void clear() noexcept { hit = cut = {}; }
-  /// Removes all rays except those of `left`.
+  /// Removes all rays except those in `left`.
   void keep(const bits& left) noexcept {
     for (std::size_t w = 0; w != left.size(); ++w) {
       hit[w] &= left[w];
@@ -68,7 +68,7 @@ struct ray_lanes {
   using integers = simd::native_vec<std::int32_t, Target>;
   using mask = typename floats::mask_type;
   std::array<floats, 3> ray;  ///< from the origin to the end
-  mask leaves;                ///< rays that end outside the origin's voxel; the others visit no voxel
+  mask leaves;                ///< rays that end outside the origin's voxel; the other rays visit no voxel
 
   ORBIS_ALWAYS_INLINE ray_lanes(const ray_batch& rays, const float3& origin, std::size_t i) noexcept {
     for (std::size_t axis = 0; axis != 3; ++axis)
@@ -107,7 +107,7 @@ struct limit_rays_kernel {
     const double per_metre = 1.0 / f.grid.resolution(), half = 0.5 * f.grid.cells();
     const auto per_metre_f = static_cast<float>(per_metre), half_f = static_cast<float>(half);
     const doubles limit(max_range);
-    constexpr double less = 1.0 - 0x1p-50;  // below one by more than the rounding of a square and of a root
+    constexpr double less = 1.0 - 0x1p-50;  // less than 1 by more than the rounding errors of a square and a root
     for (std::size_t i = 0; i < count; i += n) {
       const auto along = [&](std::size_t axis)
                              ORBIS_INLINE_LAMBDA { return floats::load(at[axis] + i) - floats(f.origin[axis]); };
@@ -157,7 +157,7 @@ struct fresh_hits_kernel {
       if (i != 0) changed = simd::bits((differs(0) | differs(1) | differs(2)) != integers(0));
       fresh[i >> 6U] |= changed << (i & 63U);
     }
-    // A ray after one that is not a hit counts as well.
+    // A hit that follows a ray without a hit counts as well.
     std::uint64_t before = 0;
     for (std::size_t w = 0; w != fresh.size(); ++w) {
       const std::uint64_t follows = rays.hit[w] << 1U | before;

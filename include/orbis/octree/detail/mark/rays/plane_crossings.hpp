@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
 /// Computes the crossings of rays from one voxel with a stack of planes of voxel faces, several rays at a time, and the
-/// resulting masks of bricks.
+/// resulting brick masks.
 #pragma once
 
 #include <algorithm>
@@ -25,7 +25,7 @@ struct queued_rays {
   std::vector<std::int32_t> planes;
   std::vector<std::uint32_t> id;
 
-  /// Makes room for `count` rays, and for a full vector after any of them.
+  /// Makes room for `count` rays, and for reading a full vector at any of them.
   void fit(std::size_t count) {
     if (planes.size() >= count + lanes) return;
     u.resize(count + lanes);
@@ -41,8 +41,9 @@ struct queued_rays {
 };
 
 /// Consecutive planes and the layers of voxels between them, each a byte map in tiles of 8x8. A tile is one cache line
-/// and one layer of a brick. A byte of a plane is set if a ray passes through there: the voxels on both sides are
-/// crossed. A byte of a layer is set for a voxel that a ray enters and leaves between two planes.
+/// and one layer of a brick. A byte of a plane is set if a ray passes through that cell of the plane, which means that
+/// the voxels on both sides are crossed. A byte of a layer is set for a voxel that a ray enters and leaves between two
+/// planes.
 struct plane_stack {
   static constexpr unsigned fraction = 22;     ///< fraction bits of a coordinate; ten bits are left for the cell
   static constexpr std::uint32_t doubt = 12;   ///< maximum error of a coordinate, in units of 2^-22 cells
@@ -56,14 +57,14 @@ struct plane_stack {
   unsigned log2_width = 0;  ///< width of a map in tiles; u is the fast axis
   std::int32_t low_u = 0;   ///< the map's first cell
   std::int32_t low_v = 0;
-  std::int32_t first = 0;  ///< number of the first plane; plane 0 is at the start of the rays and needs no marks
+  std::int32_t first = 0;  ///< index of the first plane; plane 0 is at the start of the rays and needs no marks
   std::int32_t count = 0;  ///< number of planes
 
-  /// Number of the cell (u, v).
+  /// Index of cell (u, v).
   [[nodiscard]] std::uint32_t cell(std::int32_t u, std::int32_t v) const noexcept {
     return at(static_cast<std::uint32_t>(u - low_u), static_cast<std::uint32_t>(v - low_v));
   }
-  /// Number of a cell with u and v relative to the map's first cell.
+  /// Index of a cell with u and v relative to the map's first cell.
   [[nodiscard]] std::uint32_t at(std::uint32_t u, std::uint32_t v) const noexcept {
     return ((v >> 3U << log2_width | u >> 3U) << 6U) | (v & 7U) << 3U | (u & 7U);
   }
@@ -87,7 +88,7 @@ struct mark_crossings_kernel {
     static_assert(n <= queued_rays::lanes);
     alignas(64) std::array<std::int32_t, 20 * n> between;  // cells of layers, written later
 
-    // Bits of a cell's number that come from u and from v.
+    // Bits of a cell's index that come from u and from v.
     const auto of_u = static_cast<std::int32_t>(w.at((8U << w.log2_width) - 1, 0));
     const integers bits_u(of_u), bits_v(~of_u), tile_columns(of_u & ~7);
     const words tile_rows(~((64U << w.log2_width) - 1));
@@ -110,7 +111,7 @@ struct mark_crossings_kernel {
       const doubles du_cells = doubles::load(rays.du.data() + r), dv_cells = doubles::load(rays.dv.data() + r);
       const auto start = [&](const double* at, std::int32_t low, const doubles& d) ORBIS_INLINE_LAMBDA {
         const doubles x = doubles::load(at) - double(low) + double(w.first) * d;
-        // The values reach 2^32; half of that is subtracted for the conversion to signed numbers.
+        // The values reach 2^32, so 2^31 is subtracted for the conversion to signed numbers.
         const doubles fixed = floor(x * scale + double{plane_stack::doubt}) - 2147483648.0;
         return simd::bits_as<std::uint32_t>(simd::convert<std::int32_t>(fixed)) ^ words(0x80000000U);
       };
@@ -149,14 +150,14 @@ struct mark_crossings_kernel {
         const integers part_u = part_of(u), part_v = part_of(v);
         const integers cell = cell_at(u, v), changed = cell ^ last;
         const mask both = ((changed & bits_u) != integers(0)) & ((changed & bits_v) != integers(0));
-        // The face crossed first is the one further back, in units of the ray's speed.
+        // The ray crosses first the face that is further back, measured in units of the ray's speed.
         const floats behind_u = simd::convert<float>(part_u ^ flip_u) * fv;
         const floats behind_v = simd::convert<float>(part_v ^ flip_v) * fu;
         const floats order = behind_u - behind_v;
         const mask unsure = alive & (is_close(part_u, part_v) | (both & (abs(order) <= order_doubt)));
         doubtful_lanes = doubtful_lanes | unsure;
         alive = and_not(alive, unsure);
-        // On AVX-512 compressing costs less than a branch that is predicted wrongly.
+        // On AVX-512 compressing costs less than a mispredicted branch.
         if (const mask through = both & alive; Target::bytes == 64 || any(through)) {
           const integers corner = last ^ (changed & select(order > 0.0F, bits_u, bits_v));
           waiting += simd::compress_store(between.data() + waiting, corner + layer, through);
@@ -176,7 +177,7 @@ struct mark_crossings_kernel {
 
  private:
   /// Marks the bytes of some cells. The indices are kept in registers: loads from memory would wait for the preceding
-  /// stores, whose addresses often agree in the lowest twelve bits.
+  /// stores, because the addresses often agree in the lowest twelve bits.
   template <class Cells>
   static ORBIS_ALWAYS_INLINE void mark(std::uint8_t* map, const Cells& cells) noexcept {
     const auto pairs = simd::bits_as<std::uint64_t>(cells);

@@ -43,7 +43,7 @@ struct load_triples_kernel {
   }
 
  private:
-  /// Every third of 3 N numbers, starting with number K.
+  /// Every third of 3 N numbers, starting at index K.
   template <std::size_t K, class V, std::size_t... I>
   static ORBIS_ALWAYS_INLINE V coordinate(const V& a, const V& b, const V& c, std::index_sequence<I...>) noexcept {
     constexpr std::size_t n = sizeof...(I);
@@ -58,7 +58,8 @@ inline void load_points(const point_view& points, std::size_t begin, std::size_t
   load_triples(points.xyz + 3 * begin, count, batch);
 }
 
-/// Points of any storage, read in batches and one by one. Type-erased, so that the marking of rays is compiled once.
+/// Points in any kind of storage, read in batches or one by one. Type-erased, so that the code that marks rays is
+/// compiled once.
 class point_source {
  public:
   /// Refers to `points`: point_view, or a type with the same members and overload of load_points.
@@ -83,8 +84,8 @@ class point_source {
   void (*load_)(const void*, std::size_t, std::size_t, point_batch&);
 };
 
-/// Voxels of a batch of points, in order, possibly without consecutive duplicates; and the number of points in no
-/// voxel.
+/// Voxels of a batch of points, in order, possibly without consecutive duplicates, and the number of points outside all
+/// voxels.
 struct batch_keys {
   alignas(64) std::array<std::uint32_t, point_batch::capacity + 16> x, y, z;
   std::size_t count = 0;
@@ -103,7 +104,7 @@ template <class Floats, class Mask>
 }
 
 /// Computes the voxels along one axis in float arithmetic; clears `sure` if the result is uncertain. The product has an
-/// error of two roundings, so a voxel is certain at a distance of four roundings from its faces.
+/// error of two roundings, so a voxel is certain if the point is at least four roundings away from its faces.
 template <class Floats, class Mask>
 [[nodiscard]] ORBIS_ALWAYS_INLINE auto likely_keys(const Floats& at, float per_metre, float half, Mask& sure) noexcept {
   const Floats cells = at * per_metre, whole = floor(cells), above = cells - whole, size = abs(cells);
@@ -120,7 +121,7 @@ struct find_keys_kernel {
     constexpr std::size_t n = floats::count;
     const double per_metre = 1.0 / grid.resolution(), half = 0.5 * grid.cells();
     const integers middle(static_cast<std::int32_t>(half)), none(-1);
-    // All keys, shifted by one, so that the previous key of each can be read; the first has none.
+    // All keys, shifted by one, so that the key before each key can be read; the first key has none.
     alignas(64) std::array<std::array<std::int32_t, point_batch::capacity + 32>, 3> all;
     for (auto& axis : all) axis[15] = -1;
     std::size_t used = 0, inside_count = 0;

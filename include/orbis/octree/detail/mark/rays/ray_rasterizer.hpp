@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Rasterises many rays from one point: finds exactly the voxels of traverse_ray, many times faster.
+/// Rasterises many rays from one point: finds exactly the same voxels as traverse_ray, many times faster.
 ///
 /// A traversal compares the distances at which a ray leaves its voxel along x, y and z. Only the outcomes of these
-/// comparisons matter. Instead of stepping along each ray, this computes its crossings with the planes of voxel faces
-/// perpendicular to its main axis with known error, slab by slab for all rays, in maps that fit into the cache. If the
-/// error could change an outcome, the ray is traversed step by step.
+/// comparisons matter. Instead of stepping along each ray, the rasteriser computes the ray's crossings with the planes
+/// of voxel faces perpendicular to its main axis, with known error, slab by slab for all rays, in maps that fit into
+/// the cache. If the error could change an outcome, the ray is traversed step by step.
 #pragma once
 
 #include <algorithm>
@@ -31,7 +31,7 @@ namespace orbis::octree::detail {
 /// of the length of the rays.
 class ray_rasterizer {
  public:
-  /// Begins a scan from `origin` in voxel `from`.
+  /// Starts a scan from `origin` in voxel `from`.
   void start(const voxel_grid& grid, const float3& origin, const voxel_key& from) {
     grid_ = &grid;
     source_ = {grid, origin, from};
@@ -43,7 +43,7 @@ class ray_rasterizer {
   }
 
   /// Marks the voxels in `masks` that traverse_ray visits for the first `count` rays of a batch, immediately or when
-  /// `flush` is called. May also mark the end of a ray that is a hit, because such a voxel counts as occupied in any
+  /// `flush` is called. May also mark the end of a ray that is a hit, because that voxel counts as occupied in any
   /// case.
   void add(const ray_batch& rays, std::size_t count, scan_masks& masks) {
     for (std::size_t i = 0; i < count; i += ray_batch::lanes) {
@@ -85,7 +85,7 @@ class ray_rasterizer {
  private:
   static constexpr std::size_t max_waiting = 1U << 14U;  ///< maximum number of rays rasterised at once
   static constexpr double max_width = 448.0;             ///< maximum planned width of a map, in cells
-  static constexpr std::int32_t slab = 16;               ///< layers rasterised at once: two bricks
+  static constexpr std::int32_t slab = 16;               ///< number of layers rasterised at once: two bricks
 
   struct waiting_ray {
     double u, du, v, dv;
@@ -115,7 +115,7 @@ class ray_rasterizer {
     fallback_.clear();
   }
 
-  /// Queues a prepared ray; immediately marks the voxels that no plane marks.
+  /// Queues a prepared ray, and immediately marks the voxels that no plane marks.
   void take(std::size_t lane, const float3& end, bool cut, scan_masks& masks) {
     const ray_setup& r = setup_;
     const std::int32_t kind = r.kind[lane], planes = r.planes[lane];
@@ -289,7 +289,7 @@ class ray_rasterizer {
   std::vector<std::uint32_t> counts_, buckets_;
   std::vector<bounds> bounds_;
   std::vector<std::uint32_t> doubtful_;
-  std::vector<float3> fallback_;  ///< ends of rays that need the exact traversal
+  std::vector<float3> fallback_;  ///< ends of the rays that need the exact traversal
   setup_kernel* set_up_ = nullptr;
   crossings_kernel* mark_crossings_ = nullptr;
 };

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Setup of rays as straight lines through planes of voxel faces, eight rays at a time.
+/// Preparation of rays as straight lines through planes of voxel faces, eight rays at a time.
 #pragma once
 
 #include <algorithm>
@@ -16,9 +16,9 @@
 
 namespace orbis::octree::detail {
 
-/// Eight rays as lines over their main axis, see queued_rays. The kind of a ray: eight times its main axis, plus four
-/// if it is descending along it, one if it is descending along axis u, two if it is descending along v. Cells and
-/// planes are counted in steps from the start of the ray.
+/// Eight rays as linear functions of the position along their main axis, see queued_rays. The kind of a ray is eight
+/// times its main axis, plus four if the ray descends along it, plus one if it descends along axis u, plus two if it
+/// descends along axis v. Cells and planes are counted in steps from the start of the ray.
 struct ray_setup {
   static constexpr std::size_t lanes = ray_batch::lanes;
   static constexpr std::int32_t kinds = 24;
@@ -28,8 +28,8 @@ struct ray_setup {
   alignas(64) std::array<std::int32_t, lanes> planes;          ///< number of planes that the ray crosses
   alignas(64) std::array<std::int32_t, lanes> cell_u, cell_v;  ///< cell after the last plane
   // Bit i refers to ray i.
-  std::uint32_t done = 0;    ///< rays that are decided; the others must be traversed step by step
-  std::uint32_t step_u = 0;  ///< crosses a face across u between the last two planes
+  std::uint32_t done = 0;    ///< rays with a certain result; the others must be traversed step by step
+  std::uint32_t step_u = 0;  ///< the ray crosses a face across u between the last two planes
   std::uint32_t step_v = 0;
   std::uint32_t step_u_first = 0;  ///< the face across u comes first
   std::uint32_t end_u = 0;         ///< the same between the last plane and the end
@@ -41,7 +41,7 @@ struct ray_setup {
   }
   [[nodiscard]] static constexpr std::size_t axis_u(std::size_t axis) noexcept { return axis == 0 ? 1 : 0; }
   [[nodiscard]] static constexpr std::size_t axis_v(std::size_t axis) noexcept { return axis == 2 ? 1 : 2; }
-  /// Per axis: 1 if the rays are descending along it, else 0.
+  /// Returns for each axis 1 if rays of this kind descend along it, otherwise 0.
   [[nodiscard]] static constexpr std::array<std::size_t, 3> down(std::int32_t kind) noexcept {
     std::array<std::size_t, 3> is{};
     const auto bit = [&](int i) { return static_cast<std::size_t>(kind >> i & 1); };
@@ -52,7 +52,7 @@ struct ray_setup {
   }
 };
 
-/// Upper bound in voxels of the difference between the arithmetic of a traversal and that of this header.
+/// Upper bound, in voxels, on the difference between the results of a traversal and those of this header.
 inline constexpr double ray_doubt = 1e-8;
 /// Rays that cross more planes are traversed step by step.
 inline constexpr std::int32_t max_ray_planes = 4096;

@@ -19,19 +19,19 @@
 
 namespace orbis::octree::detail {
 
-/// A point in OctoMap's precision.
+/// A point with the precision that OctoMap uses.
 using float3 = std::array<float, 3>;
 
 [[nodiscard]] inline float3 difference(const float3& a, const float3& b) noexcept {
   return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
 }
-/// Length of `v`: the sum of squares in float, its root in double.
+/// Length of `v`, with the sum of squares in float and the square root in double.
 [[nodiscard]] inline double length(const float3& v) noexcept {
   const float squares = rounded_product(v[0], v[0]) + rounded_product(v[1], v[1]) + rounded_product(v[2], v[2]);
   return std::sqrt(static_cast<double>(squares));
 }
 
-/// State of a walk: the voxel, and for each axis the ray parameter (metres) at which the ray leaves it.
+/// State of a ray traversal: the voxel, and for each axis the ray parameter (metres) at which the ray leaves the voxel.
 struct ray_traversal {
   std::array<std::uint32_t, 3> at{};
   std::array<std::int32_t, 3> step{};
@@ -72,7 +72,7 @@ struct ray_traversal {
     return cursor;
   }
 
-  /// The axis whose face comes next.
+  /// Axis of the next face.
   [[nodiscard]] std::size_t axis() const noexcept {
     if (next[0] < next[1]) return next[0] < next[2] ? 0 : 2;
     return next[1] < next[2] ? 1 : 2;
@@ -88,8 +88,8 @@ struct ray_traversal {
   [[nodiscard]] voxel_key key() const noexcept { return {at[0], at[1], at[2]}; }
 };
 
-/// Calls `visit(key)` for the voxels that a ray from `origin` to `end` crosses, including the origin's but not the
-/// end's; no call if both are in one voxel.
+/// Calls `visit(key)` for the voxels that a ray from `origin` to `end` crosses, including the voxel of the origin but
+/// not that of the end; makes no call if both are in one voxel.
 /// @pre from and to are the keys of origin and end
 template <class Visit>
 void traverse_ray(const voxel_grid& grid, const float3& origin, const voxel_key& from, const float3& end,
@@ -103,7 +103,7 @@ void traverse_ray(const voxel_grid& grid, const float3& origin, const voxel_key&
     if (!cursor->can_step(axis)) return;
     cursor->advance(axis);
     if (cursor->key() == to) return;
-    // Rounding may have missed the end voxel; then the length stops the walk.
+    // Due to rounding, the traversal may miss the end voxel; it then ends at the length of the ray.
     if (std::min(std::min(cursor->next[0], cursor->next[1]), cursor->next[2]) > cursor->reach) return;
     visit(cursor->key());
   }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Adapters from a scan's points to floats in memory, the input format of integration.
+/// Adapters from the points of a scan to floats in memory, the input format for integration.
 #pragma once
 
 #include <array>

@@ -15,17 +15,17 @@ namespace orbis::octree::detail {
 
 /// Common data of all rays of a scan.
 ///
-/// An origin on an edge or a corner of its voxel makes rays cross several faces at once, in an order that only the
-/// arithmetic of the walk determines. These first steps are taken individually (`first_steps`), and all data of a ray
-/// is relative to the voxel after them.
+/// If the origin is on an edge or a corner of its voxel, rays cross several faces at once, in an order that depends
+/// only on the arithmetic of the traversal. These first steps are taken individually (`first_steps`), and all data of a
+/// ray are relative to the voxel after these steps.
 struct scan_origin {
   float3 origin{};
   std::array<std::int32_t, 3> from{};  ///< voxel of the origin
   double edge = 0.0;                   ///< edge of a voxel, metres
   double per_metre = 0.0;
   // Per axis, in the positive and in the negative direction:
-  std::array<std::array<double, 3>, 2> face{};           ///< from the origin to the first face, metres
-  std::array<std::array<double, 3>, 2> first{};          ///< to the first face that counts, in voxels
+  std::array<std::array<double, 3>, 2> face{};           ///< distance from the origin to the first face, metres
+  std::array<std::array<double, 3>, 2> first{};          ///< distance to the first face that is not skipped, in voxels
   std::array<std::array<std::int32_t, 3>, 2> skipped{};  ///< number of skipped steps: 0 or 1
   bool on_edge = false;                                  ///< true if any steps are skipped
 
@@ -62,8 +62,8 @@ struct scan_origin {
 };
 
 /// Takes the skipped steps of a ray. Returns a mask; bit (dx + 1) + 3 (dy + 1) + 9 (dz + 1) is set if the ray passes
-/// through the voxel at offset (dx, dy, dz) from the origin's; the last voxel is excluded. Returns 0 if the ray crosses
-/// another face first.
+/// through the voxel at offset (dx, dy, dz) from the origin's voxel, excluding the last voxel. Returns 0 if the ray
+/// crosses another face first.
 [[nodiscard]] inline std::uint32_t first_steps(const scan_origin& source, const float3& end,
                                                const std::array<std::size_t, 3>& down) noexcept {
   float3 direction = difference(end, source.origin);

@@ -21,7 +21,7 @@ namespace orbis::octree::detail {
   return std::min(static_cast<std::size_t>(place / static_cast<double>(stretches)), last);
 }
 /// Returns the length of the ray to a point, at most `limit` (metres), and stores its direction (length 1) in
-/// `direction`. Empty if there is no such ray: the point is the origin, not finite or very far away.
+/// `direction`. Empty if the point is the origin, not finite or very far away.
 [[nodiscard]] inline std::optional<double> length_of_ray(const float3& origin, const float3& p, double limit,
                                                          vec3& direction) {
   for (std::size_t axis = 0; axis != 3; ++axis)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A ray traversal that leaves whole nodes in one step.
+/// A ray traversal that crosses whole nodes in one step.
 #pragma once
 
 #include <array>
@@ -11,8 +11,8 @@
 
 namespace orbis::octree::detail {
 
-/// The walk of `ray_traversal`, with steps over whole nodes. The parameters of the next steps along each axis are
-/// precomputed, in the same order of summation, so that the number of steps before the node's face is looked up instead
+/// Takes the same steps as `ray_traversal`, but whole nodes at once. The parameters of the next steps along each axis
+/// are precomputed in the same order of summation, so that the number of steps up to a node's face is looked up instead
 /// of traversed.
 class skipping_traversal {
  public:
@@ -29,7 +29,7 @@ class skipping_traversal {
 
   struct crossing {
     std::size_t axis;
-    double parameter;  ///< parameter of the ray at the face
+    double parameter;  ///< ray parameter at the face
   };
   /// Takes one step.
   crossing step() noexcept {
@@ -38,10 +38,10 @@ class skipping_traversal {
     if (++used_[face.axis] == count - 1) renew();
     return face;
   }
-  /// Exit of the ray from the node of edge `cells` that contains it.
+  /// Exit of the ray from the current node with edge `cells`.
   struct node_exit {
     crossing face;
-    std::array<std::uint32_t, 3> steps;  ///< steps to leave the node along each axis alone
+    std::array<std::uint32_t, 3> steps;  ///< number of steps to leave the node along each axis separately
   };
   /// Finds the exit from the current node. @pre cells is a power of two, at most 32
   [[nodiscard]] node_exit find_node_exit(std::uint32_t cells) noexcept {
@@ -61,8 +61,8 @@ class skipping_traversal {
   void take(const node_exit& way) noexcept {
     const double end = way.face.parameter;
     const auto take_along = [&](std::size_t i) {
-      // Steps are `delta` apart up to rounding, so only the one next to the face must be examined. The first is less
-      // than one step before the ray and the last is not before the face, so clamping is not needed.
+      // Steps are `delta` apart up to rounding, so only the step next to the face must be examined. The first is less
+      // than one step before the ray and the last is not before the face, so no clamping is needed.
       const double* const next = ahead_[i].data() + used_[i];
       const double near = (end - next[0]) * per_step_[i] + 0.5;
       const auto sure = static_cast<std::uint32_t>(static_cast<std::int32_t>(near));
@@ -79,7 +79,7 @@ class skipping_traversal {
  private:
   static constexpr std::uint32_t count = 64;
 
-  /// Returns the face that comes first; at ties that of the last axis, as in ray_traversal.
+  /// Returns the face that the ray crosses first; ties go to the last axis, as in ray_traversal.
   [[nodiscard]] static crossing first(double x, double y, double z) noexcept {
     const bool is_x = x < y && x < z, is_z = !(y < z) || (x < y && !is_x);
     const double parameter = x < y ? x : y;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Rays of a scan, sorted into cells of direction.
+/// Rays of a scan, sorted into cells by direction.
 #pragma once
 
 #include <algorithm>
@@ -18,15 +18,15 @@
 
 namespace orbis::octree::detail {
 
-/// A ray in its window: through (x, y, 1), to depth z; and the number of the ray.
+/// A ray in the coordinates of its window, through (x, y, 1) to depth z, and the index of the ray.
 struct binned_ray {
   float x, y, z;
   std::uint32_t number;
 };
 static_assert(sizeof(binned_ray) == 16);
 
-/// Rays of one window. Per cell: the deepest end (0 if the cell is empty), the number of its ray, and the start of the
-/// cell's rays among the sorted ones. `rays` are all rays by number.
+/// Rays of one window. Per cell: the deepest end (0 if the cell is empty), the index of its ray, and the start of the
+/// cell's rays among the sorted rays. `rays` are all rays by index.
 struct window_rays {
   const float* z = nullptr;
   const std::int32_t* deepest = nullptr;
@@ -71,8 +71,8 @@ struct window_tables {
   }
 };
 
-/// Places the first `count` rays of a batch: writes them to `out` in window coordinates, numbered starting at `first`.
-/// `out` needs room for a multiple of 16.
+/// Places the first `count` rays of a batch: writes them to `out` in window coordinates, with indices starting at
+/// `first`. `out` needs room for a multiple of 16 rays.
 struct place_rays_kernel {
   template <simd::target Target>
   static ORBIS_ALWAYS_INLINE void run(const window_tables& t, const ray_batch& rays, std::size_t count,
@@ -132,10 +132,10 @@ using place_kernel = void(const window_tables&, const ray_batch&, std::size_t, s
 class binned_rays {
  public:
   static constexpr std::size_t most_rays = std::size_t{1} << 24U;
-  /// Maximum number of rays per cell and worker, which limits the rays to test per voxel.
+  /// Maximum number of rays per cell and worker, to limit the number of rays to test per voxel.
   static constexpr std::uint32_t most_in_cell = 255;
 
-  /// Begins a scan of `count` points, which `workers` threads add.
+  /// Starts a scan of `count` points, to which `workers` threads add rays.
   void start(const direction_windows& windows, const float3& origin, std::size_t count, std::size_t workers) {
     tables_ = {windows, origin};
     cells_ = windows.cells;
@@ -152,7 +152,7 @@ class binned_rays {
     place_ = simd::kernel<place_rays_kernel, place_kernel>();
   }
   /// Adds the rays of a batch of `count` points, the first of which is point `first` of the scan. The rays that must be
-  /// walked instead remain in `rays`. Can be called by several workers at once. @pre no other worker adds points
+  /// traversed one by one remain in `rays`. Can be called by several workers at once. @pre no other worker adds points
   /// between `first` and the next multiple of 256
   void add(std::size_t worker, ray_batch& rays, std::size_t first, std::size_t count) {
     ray_places places;
@@ -227,7 +227,7 @@ class binned_rays {
  private:
   struct worker_bins {
     /// One packed number per cell: the number of rays (8 bits), the index of the deepest one (24), and its depth (32).
-    /// Larger numbers are deeper rays. All are zero between scans.
+    /// Larger numbers represent deeper rays. All numbers are zero between scans.
     std::vector<std::uint64_t> bins;
     std::vector<std::uint32_t> first;  ///< position of this worker's first ray in each cell
     float max_z = 0.0F;

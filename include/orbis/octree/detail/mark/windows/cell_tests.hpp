@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Tests of the rays in cells of direction against a voxel.
+/// Tests of rays, sorted into cells by direction, against a voxel.
 #pragma once
 
 #include <algorithm>
@@ -37,7 +37,7 @@ struct sample_cells_kernel {
   }
 };
 
-/// Like test_pixels_kernel, for the rays of a box of cells. Appends numbers of rays to `unsure`.
+/// Like test_pixels_kernel, for the rays of a box of cells. Appends ray indices to `unsure`.
 struct test_cells_kernel {
   template <simd::target Target>
   static ORBIS_ALWAYS_INLINE bool run(const depth_scene& s, const window_rays& w, const voxel_test& t,
@@ -85,7 +85,7 @@ struct test_cells_kernel {
         if (none(wanted)) continue;
         const floats x = x_steps + (static_cast<float>(u) - s.cx) * s.per_fx;
         std::uint64_t may = simd::bits(wanted & cells.may_cross(x, y, z));
-        while (may != 0) {  // contiguous cells together
+        while (may != 0) {  // handles contiguous cells together
           const auto first = static_cast<std::ptrdiff_t>(std::countr_zero(may));
           const auto after = first + static_cast<std::ptrdiff_t>(std::countr_one(may >> first));
           may &= ~std::uint64_t{0} << (after & 63) & (after == 64 ? 0 : ~std::uint64_t{0});
@@ -107,15 +107,15 @@ struct test_cells_kernel {
   }
 
  private:
-  /// Finds the cells of directions that may contain rays that cross the voxel, see voxel_test::may_cross and test_rays.
-  /// (x, y): centre of a cell, z: depth of its deepest ray.
+  /// Finds the cells that may contain rays that cross the voxel, see voxel_test::may_cross and test_rays. (x, y):
+  /// centre of a cell, z: depth of its deepest ray.
   struct tile_test {
     const voxel_test& t;
     float3 spread{}, reach{}, width{};
     float length = 0;
 
     tile_test(const depth_scene& s, const voxel_test& test) noexcept : t{test} {
-      const float half = s.pixel_margin;  // of a cell, in cells, with an allowance for rounding
+      const float half = s.pixel_margin;  // half the edge of a cell, in cells, with an allowance for rounding
       for (std::size_t i = 0; i != 3; ++i)
         spread[i] = half * (std::fabs(t.x_axis[i]) * s.per_fx + std::fabs(t.y_axis[i]) * s.per_fy);
       length = spread[0] + spread[1] + spread[2];
@@ -135,7 +135,7 @@ struct test_cells_kernel {
       auto may = V::mask_type::first(V::count);
       for (std::size_t i = 0; i != 3; ++i) {
         may = may & (ray.off(i, centre) <= multiply_add(t.outer_half, ray.width(i), loose + width[i]));
-        // Not all rays may end before the voxel.
+        // At least one ray must not end before the voxel.
         may = may & (multiply_add(z, ray.direction[i] + spread[i], close - centre[i]) + t.before[i] >= 0.0F);
       }
       return may;

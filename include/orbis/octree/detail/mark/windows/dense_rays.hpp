@@ -49,7 +49,7 @@ struct window_frame : view_frame {
     set_view(sensor,
              {focal, focal, -w.min_x * focal - 0.5F, -w.min_y * focal - 0.5F, w.width, w.height, w.min_x,
               w.min_x + static_cast<float>(w.width) * cell, w.min_y, w.min_y + static_cast<float>(w.height) * cell});
-    // A cell's rays can be anywhere in it.
+    // The rays of a cell can be anywhere in the cell.
     scene.pixel_margin += 0.5F + 4e-6F * focal;
     scene.tiles = {2.05F, 4.1F, 8.2F};
     set_spacing(half_diagonal());
@@ -84,8 +84,8 @@ struct cell_rays {
 /// Collects the rays of a scan and marks their voxels. Reuses its memory between scans.
 class dense_rays {
  public:
-  /// Decides from a sample of the scan's points whether the rays are dense enough for this method, and prepares it if
-  /// so. O(1). `limit`: maximum length of rays, metres
+  /// Decides from a sample of the scan's points whether the rays are dense enough for this method, and if so prepares
+  /// it. O(1). `limit`: maximum length of rays, metres
   template <class Point>
   [[nodiscard]] bool plan(const voxel_grid& grid, const float3& origin, std::size_t count, Point&& point,
                           double limit) {
@@ -96,7 +96,7 @@ class dense_rays {
     windows_.fit(sample_, rays, cell_edge * grid.resolution() / sample_.length, fewest_in_cell, most_in_cell);
     return is_worthwhile(grid.resolution());
   }
-  /// Begins a planned scan, which `workers` threads add.
+  /// Starts a planned scan, to which `workers` threads add rays.
   void start(const float3& origin, std::size_t count, std::size_t workers) {
     rays_.start(windows_, origin, count, workers);
   }
@@ -145,7 +145,7 @@ class dense_rays {
  private:
   static constexpr std::size_t fewest_rays = 4096;
   static constexpr std::size_t most_sampled = 1024;
-  static constexpr double cell_edge = 0.25;  ///< edge in voxels of a cell at the ends of the rays
+  static constexpr double cell_edge = 0.25;  ///< edge of a cell at the ends of the rays, in voxels
   static constexpr double fewest_in_cell = 2.0, most_in_cell = 16.0;  ///< average number of rays per cell
 
   template <class EndOf>
@@ -166,11 +166,12 @@ class dense_rays {
     }
     around.mark(masks);
   }
-  /// Compares measured costs in nanoseconds per ray. A walk has a constant cost per plane of voxels that the ray
+  /// Compares measured costs in nanoseconds per ray. A traversal has a constant cost per plane of voxels that the ray
   /// crosses. This method has a constant cost per ray; the fewer rays per voxel, the more voxels must be tested
   /// individually.
   [[nodiscard]] bool is_worthwhile(double voxel) const {
-    const double planes = sample_.length / voxel, apart = windows_.spacing * planes;  // apart: voxels, at the ends
+    // `apart`: spacing of the rays at their ends, in voxels.
+    const double planes = sample_.length / voxel, apart = windows_.spacing * planes;
     return 6.0 + 300.0 * apart * apart < 20.0 + 0.5 * planes;
   }
   template <class Point>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Directions of a scan's rays, as windows on the faces of a cube around its origin.
+/// Directions of the rays of a scan, as windows on the faces of a cube around the origin.
 #pragma once
 
 #include <algorithm>
@@ -22,21 +22,21 @@ namespace orbis::octree::detail {
 struct direction_window {
   static constexpr std::int32_t padding = 16;  ///< minimum number of empty cells after a row
 
-  std::array<float3, 3> axes{};  ///< x, y and z of the window, in the world
+  std::array<float3, 3> axes{};  ///< x, y and z axes of the window, in the world frame
   float min_x = 0, min_y = 0;    ///< start of the first cell, at z = 1
   std::int32_t width = 0, height = 0;
   std::int32_t stride = 0;  ///< offset between rows
-  std::uint32_t begin = 0;  ///< number of the first cell
+  std::uint32_t begin = 0;  ///< index of the first cell
 };
 
-/// Statistics of the rays of a sample of a scan's points.
+/// Statistics of the rays to a sample of a scan's points.
 struct sampled_rays {
-  std::vector<vec3> directions;  ///< of length 1
-  double length = 0.0;           ///< mean, metres
+  std::vector<vec3> directions;  ///< unit vectors
+  double length = 0.0;           ///< mean length, metres
 };
 
 /// Windows that contain nearly all of a scan's rays. The cube is rotated so that the rays of a camera pass through the
-/// middle of one face, with the image sides parallel to its sides.
+/// middle of one face, with the image sides parallel to the sides of the face.
 struct direction_windows {
   static constexpr std::size_t faces = 6;
   static constexpr std::uint32_t most_cells = 1U << 22U;
@@ -44,13 +44,13 @@ struct direction_windows {
   std::array<direction_window, faces> window{};
   double spacing = 1;       ///< spacing of the rays at z = 1, if they are spread evenly over the windows
   float cell = 1;           ///< edge of a cell, at z = 1
-  std::uint32_t cells = 0;  ///< number of cells of all windows
+  std::uint32_t cells = 0;  ///< total number of cells of all windows
 
   /// Chooses windows for `count` rays, based on a sample. The cells have edge `wanted` (at z = 1), adjusted so that
   /// they contain between `fewest` and `most` rays on average. O(sample)
   void fit(const sampled_rays& sample, std::size_t count, double wanted, double fewest, double most) {
     const mat3 turned = cube_rotation(sample.directions);
-    std::array<float3, 3> axes;  // of the cube, in the world
+    std::array<float3, 3> axes;  // axes of the cube, in the world frame
     for (int i = 0; i != 3; ++i)
       for (int k = 0; k != 3; ++k)
         axes[static_cast<std::size_t>(i)][static_cast<std::size_t>(k)] = static_cast<float>(turned(i, k));
@@ -103,12 +103,12 @@ struct direction_windows {
       cells += static_cast<std::uint32_t>(w.stride) * static_cast<std::uint32_t>(w.height) + direction_window::padding;
     }
   }
-  /// Cube axes that are x and y on the faces of an axis.
+  /// Cube axes that are the x and y axes of the faces perpendicular to `axis`.
   [[nodiscard]] static constexpr int axis_x(int axis) noexcept { return axis == 0 ? 1 : 0; }
   [[nodiscard]] static constexpr int axis_y(int axis) noexcept { return axis == 2 ? 1 : 2; }
 
  private:
-  /// Rotation from the world to the cube; arbitrary for rays in all directions.
+  /// Rotation from the world frame to the cube; arbitrary if the rays point in all directions.
   [[nodiscard]] static mat3 cube_rotation(const std::vector<vec3>& directions) {
     vec3 mean = zeros<vec3>();
     mat3 moments = zeros<mat3>();
@@ -122,7 +122,7 @@ struct direction_windows {
     const mat3 across = identity<mat3>() - mean * transposed(mean);
     const symmetric_eigen<3> spread = eigen_of_symmetric<3>(across * moments * across);
     vec3 x = across * column_of(spread.vectors, 2);
-    if (squared_norm(x) < 0.5) x = mean.unitOrthogonal();  // parallel rays up to rounding: any side will do
+    if (squared_norm(x) < 0.5) x = mean.unitOrthogonal();  // the rays are parallel up to rounding: any direction works
     x.normalize();
     mat3 turned;
     turned << transposed(x), transposed(cross(mean, x)), transposed(mean);
