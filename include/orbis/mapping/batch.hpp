@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A map from posed keyframes in one batch: dense cloud, filtered cloud, octrees.
+/// Builds a map from posed keyframes in one batch: dense cloud, filtered cloud, octrees.
 #pragma once
 
 #include <chrono>
@@ -40,17 +40,17 @@ struct map_options {
   dense_options dense{};
   /// Removes moved objects from the depth images before they become points: cells that rays of the keyframes just
   /// before and after pass through, see moving_filter. (A filter by ray evidence uses the rays of the original images.)
-  /// For depth images that are not a depth_view<std::uint16_t>, depths beyond 16 m are ignored. Empty: moved objects
-  /// are left to the filter.
+  /// For depth images that are not a depth_view<std::uint16_t>, depths beyond 16 m are ignored. Empty: only the filter
+  /// removes moved objects.
   std::optional<moving_filter_options> moving{};
   filter_options filter{};
-  double resolution = 0.05;                   ///< of the octrees, metres; > 0
-  octree::integration_options integration{};  ///< of every keyframe's depth image
-  bool unfiltered_octree = true;              ///< also build the octree of the cloud before the filter
+  double resolution = 0.05;                   ///< voxel size of the octrees, metres; > 0
+  octree::integration_options integration{};  ///< options for every keyframe's depth image
+  bool unfiltered_octree = true;              ///< also build the octree of the unfiltered cloud
 };
 
-/// A map such as `octree::occupancy_octree`: constructible from its resolution in metres, and with depth images of this
-/// camera integrated into it.
+/// A map such as `octree::occupancy_octree`: constructible from a resolution in metres, and able to integrate depth
+/// images of this camera.
 template <class M, class Camera>
 concept depth_map = std::constructible_from<M, double> && std::movable<M> &&
     requires(M& map, const camera::depth_view<float>& depth, const Camera& camera, const se3& T_world_camera,
@@ -60,25 +60,25 @@ concept depth_map = std::constructible_from<M, double> && std::movable<M> &&
 
 /// Pixels removed from the depth images because they show moved objects.
 struct moving_count {
-  std::size_t keyframes = 0;  ///< that lost pixels
-  std::size_t pixels = 0;     ///< of the whole images, regardless of the stride
+  std::size_t keyframes = 0;  ///< number of keyframes with removed pixels
+  std::size_t pixels = 0;     ///< number of removed pixels in the full images, regardless of the stride
 };
 
 /// The map and a report of how it was built.
 template <class Octree>
 struct built_map {
   point_cloud cloud{};                        ///< points of all keyframes, in the world frame
-  cloud::flying_pixel_count flying_pixels{};  ///< removed before points were made, if requested
-  moving_count moving{};                      ///< removed before that, if requested
+  cloud::flying_pixel_count flying_pixels{};  ///< flying pixels removed before points were computed, if requested
+  moving_count moving{};                      ///< moved objects removed before the flying pixels, if requested
   std::vector<std::uint32_t> inliers{};       ///< indices into `cloud` of the points that the filter kept, ascending
   filter_report filter{};
   std::optional<Octree> unfiltered_octree{};
-  Octree octree;                    ///< of the points that the filter kept, each observed from its own keyframe
-  std::vector<double> insert_ms{};  ///< per keyframe, insertion into `octree`
-  std::vector<double> insert_ms_unfiltered{};  ///< per keyframe, insertion into `unfiltered_octree`, if it is built
-  std::size_t skipped = 0;                     ///< keyframes without a finite pose
+  Octree octree;                    ///< built from the points that the filter kept, each observed from its own keyframe
+  std::vector<double> insert_ms{};  ///< time taken to insert each keyframe into `octree`
+  std::vector<double> insert_ms_unfiltered{};  ///< the same for `unfiltered_octree`, if it is built
+  std::size_t skipped = 0;                     ///< number of keyframes without a finite pose
 
-  /// A copy of the points that the filter kept.
+  /// Returns a copy of the points that the filter kept.
   [[nodiscard]] point_cloud filtered_cloud() const { return cloud::extract(cloud, inliers); }
 };
 
@@ -109,10 +109,10 @@ class static_depth {
   image<mapping::depth_pixel<Depth>> copy_;
 };
 
-/// The steps of `build_map`. `into.wants(k, whole)` returns true if it lacks this keyframe's depth image; `whole` is
-/// false if moved objects were removed from the image. `into.scan(k, depth)` takes one depth image before the cloud is
-/// filtered; `into.unfiltered()` returns the map of these. `into.filtered(cloud, kept, depths, ms, progress)` returns
-/// the map after filtering: `depths(use)` calls `use(k, depth)` with the remaining pixels of each depth image.
+/// The steps of `build_map`. `into.wants(k, whole)` returns true if `into` lacks this keyframe's depth image; `whole`
+/// is false if moved objects were removed from the image. `into.scan(k, depth)` takes one depth image before the cloud
+/// is filtered; `into.unfiltered()` returns the map of these images. `into.filtered(cloud, kept, depths, ms, progress)`
+/// returns the map after filtering: `depths(use)` calls `use(k, depth)` with the remaining pixels of each depth image.
 template <class Octree, execution_policy Policy, keyframe_range Keyframes, camera::camera_model Camera, class Into>
 [[nodiscard]] result<built_map<Octree>> build_map_into(const Policy& policy, const Keyframes& keyframes,
                                                        const Camera& camera, const map_options& options,
@@ -153,7 +153,7 @@ template <class Octree, execution_policy Policy, keyframe_range Keyframes, camer
   const std::size_t total = (2U + looks) * std::ranges::size(keyframes);
   std::size_t done = 0;
 
-  // One pass for everything that is made from a single keyframe: depth images are expensive to obtain.
+  // One pass for everything that is computed from single keyframes, because depth images are expensive to obtain.
   using keyframe_type = std::ranges::range_value_t<Keyframes>;
   using depth_type = std::remove_cvref_t<decltype(std::declval<const keyframe_type&>().depth)>;
   using pixel = mapping::depth_pixel<depth_type>;
@@ -165,7 +165,7 @@ template <class Octree, execution_policy Policy, keyframe_range Keyframes, camer
   keyframe_points points;
   static_depth<depth_type> standing;
   cloud::view_samples samples;
-  // Per keyframe that is not skipped; `place`: their positions in the range.
+  // One entry per keyframe that is not skipped; `place` is the keyframe's position in the range.
   std::vector<std::vector<removed_cell>> moved;
   std::vector<std::size_t> place;
   image<pixel> masked(camera.width(), camera.height());
@@ -236,7 +236,7 @@ template <class Octree, execution_policy Policy, keyframe_range Keyframes, camer
   map.cloud = dense.cloud(policy);
   std::vector<float> ranges = dense.ranges(policy);
   dense.finish();
-  // Only now, so that callers can return the memory of the pass to the system.
+  // Reported only after the memory of the pass was freed, so that callers can return it to the system.
   if (!on_progress(done, total)) return fail(errc::cancelled, {}, "cancelled");
   bool cancelled = false;
   const auto while_filtering = [&](std::size_t views_done, std::size_t) {
@@ -344,7 +344,7 @@ struct live_octree {
     std::vector<std::uint64_t> frames;
     for (const keyframe_position& p : poses) frames.push_back(p.frame);
     const auto start = std::chrono::steady_clock::now();
-    // The images in the live map are already without flying pixels and moved objects.
+    // Flying pixels and moved objects are already removed from the images in the live map.
     auto edited = ignore_write_failure(live.edit_depths(
         policy, frames,
         [&](std::size_t number, const auto& depth, const image_view<std::uint16_t>& pixels) {
@@ -372,18 +372,19 @@ struct live_octree {
 }  // namespace detail
 
 /// Removes moved objects from the depth images, if requested, adds the keyframes to a cloud, filters it, and integrates
-/// each keyframe's depth image without the pixels whose point of the cloud the filter removed
-/// (`dense_cloud::masked_depth`), with rays from the keyframe's pose. Filtering the whole cloud compares points of
-/// different keyframes; the automatic filter also uses the points that rays of the keyframes' depth images pass
-/// through. The octrees are bit for bit those that a `live_map` builds from the same depth images and poses.
+/// each keyframe's depth image, with rays from the keyframe's pose and without the pixels whose points the filter
+/// removed (`dense_cloud::masked_depth`). Filtering the whole cloud compares points of different keyframes; the
+/// automatic filter also uses the points that rays of the keyframes' depth images pass through. The octrees are
+/// bit-identical to those that a `live_map` builds from the same depth images and poses.
 ///
 /// The range is traversed twice and, depending on the filter, up to three times more. At most
-/// `options.moving->keyframes` + 1 of its values are kept at a time if that is set, otherwise one. Values must
-/// therefore be copyable, or be returned again by the range, and remain valid while they are kept.
+/// `options.moving->keyframes` + 1 of its values are kept at a time if `options.moving` is set, otherwise one. Values
+/// must therefore be copyable, or the range must return a new value for each access; they must remain valid while they
+/// are kept.
 ///
 /// Keyframes whose pose is not finite are skipped and counted. Errors: `no_data` if there is no keyframe;
-/// `invalid_argument` if an image's size is not the camera's, or an option is out of range; `cancelled`. The same
-/// result for every policy. `on_progress` counts the keyframes of all passes.
+/// `invalid_argument` if the size of an image differs from the camera's, or an option is out of range; `cancelled`. The
+/// result is the same for every policy. `on_progress` counts the keyframes of all passes.
 template <class Octree = octree::occupancy_octree<>, execution_policy Policy, keyframe_range Keyframes,
           camera::camera_model Camera>
 requires depth_map<Octree, Camera>
@@ -394,16 +395,16 @@ requires depth_map<Octree, Camera>
   return detail::build_map_into<Octree>(policy, keyframes, camera, options, on_progress, into);
 }
 
-/// As above, with a live map that grew while these keyframes were made: moves its keyframes to their current poses,
-/// adds missing ones, hides others, and then applies the result of the filter. The octrees are bit for bit those of the
-/// function above. Keyframes have a member `frame`, their index in the live map, and are in ascending order of it. The
-/// times in the result are those of passing images to the map, without replaying; after the filter, their mean.
-/// `options.resolution` and `options.integration` are those of the live map, and the unfiltered octree is always built.
-/// Errors, in addition: `invalid_argument` if the frame numbers are not ascending; those of the live map, except if
-/// images stay in memory because they cannot be written to their file. After an error the live map may contain some of
-/// the new images and poses already; calling the function again corrects it. @pre the images in the live map are those
-/// that `keyframe_points::masked` returns with `point_options(options.dense)`, except for keyframes that are
-/// `live_map::is_filtered`, which are added again
+/// As above, with a live map that grew while these keyframes were recorded: moves its keyframes to their current poses,
+/// adds missing ones, hides others, and then applies the result of the filter. The octrees are bit-identical to those
+/// of the function above. Each keyframe has a member `frame`, its index in the live map; the range is in ascending
+/// order of `frame`. The times in the result are those for passing images to the map, excluding replay; those after the
+/// filter are a mean. `options.resolution` and `options.integration` are those of the live map, and the unfiltered
+/// octree is always built. Additional errors: `invalid_argument` if the frame numbers are not ascending; those of the
+/// live map, except if images stay in memory because they cannot be written to their file. After an error the live map
+/// may contain some of the new images and poses already; calling the function again corrects it. @pre the images in the
+/// live map are those that `keyframe_points::masked` returns with `point_options(options.dense)`, except for keyframes
+/// that are `live_map::is_filtered`, which are added again
 template <execution_policy Policy, keyframe_range Keyframes, octree::replayable_octree Octree,
           camera::camera_model Camera, depth_history Depths>
 requires requires(const std::ranges::range_value_t<Keyframes>& k) {

@@ -33,8 +33,8 @@ struct dense_options {
   int stride = 2;           ///< every stride-th pixel of every stride-th row; > 0
   float min_depth = 0.0F;   ///< metres along the optical axis
   float max_depth = 4.0F;   ///< metres along the optical axis
-  double voxel_size = 0.0;  ///< metres; points in one voxel become their centroid. 0: every point is kept
-  /// Removal of pixels between two surfaces before they become points; empty: none is removed.
+  double voxel_size = 0.0;  ///< metres; points in a voxel are replaced by their centroid. 0: every point is kept
+  /// Removal of pixels between two surfaces before they become points; empty: no removal.
   std::optional<cloud::flying_pixel_options> flying_pixels{};
 };
 
@@ -58,9 +58,10 @@ class dense_cloud {
     assert(options.stride > 0 && options.voxel_size >= 0);
   }
 
-  /// Adds a keyframe's points; returns the number of measurements. The keyframe's number is the count of those added
-  /// before it. Colours are kept if every keyframe has them. O(pixels). @pre the images have the size of the ray table;
-  /// the pose is finite; with a voxel size, fewer than 2^22 measurements in a voxel; not after `finish`
+  /// Adds a keyframe's points; returns the number of measurements. The index of the keyframe (`number` below) is the
+  /// number of keyframes added before it. Colours are kept if every keyframe has them. O(pixels). @pre the images have
+  /// the size of the ray table; the pose is finite; with a voxel size, fewer than 2^22 measurements in a voxel; not
+  /// after `finish`
   template <execution_policy Policy, keyframe_like Keyframe>
   std::size_t add_keyframe(const Policy& policy, const Keyframe& k) {
     assert(!finished_);
@@ -91,10 +92,11 @@ class dense_cloud {
     put(policy, k, number);
   }
   /// Moves all keyframes whose pose has changed since they were last placed: in any bit or, with a `tolerance` (metres,
-  /// >= 0), far enough that a point of their view, which ends at `max_depth`, moves by more than the tolerance (in any
-  /// bit if `max_depth` is not finite). Returns their number. `keyframes`: all that were added, in that order; removed
-  /// ones are skipped. O(keyframes + pixels of those that moved), plus O(pixels of one image) with a tolerance. @pre
-  /// the number of keyframes is the number of those added; the poses are finite; not after `finish`
+  /// >= 0), far enough that a point in their view, up to `max_depth`, moves by more than the tolerance (in any bit if
+  /// `max_depth` is not finite). Returns the number of moved keyframes. `keyframes`: all keyframes added so far, in the
+  /// order in which they were added; removed ones are skipped. O(keyframes + pixels of those that moved), plus O(pixels
+  /// of one image) with a tolerance. @pre `keyframes` has one entry per added keyframe; the poses are finite; not after
+  /// `finish`
   template <execution_policy Policy, keyframe_range Keyframes>
   std::size_t reassemble(const Policy& policy, const Keyframes& keyframes, double tolerance = 0.0) {
     assert(std::ranges::size(keyframes) == frames_.size() && tolerance >= 0 && !finished_);
@@ -122,8 +124,8 @@ class dense_cloud {
   }
   /// Number of points.
   [[nodiscard]] std::size_t size() const noexcept { return merging() ? voxels_.size() : size_; }
-  /// The current cloud in the world frame: voxel by voxel in the order of `cloud::voxel_sums`, or keyframe by keyframe.
-  /// O(size()), and O(bricks log bricks) with a voxel size. @pre not after `finish`
+  /// Returns the current cloud in the world frame: voxel by voxel in the order of `cloud::voxel_sums`, or keyframe by
+  /// keyframe. O(size()), and O(bricks log bricks) with a voxel size. @pre not after `finish`
   template <execution_policy Policy = sequential_policy>
   [[nodiscard]] point_cloud cloud(const Policy& policy = {}) const {
     assert(!finished_);
@@ -136,9 +138,9 @@ class dense_cloud {
     }
     return out;
   }
-  /// The distance (metres) from which each point of the cloud was observed; with a voxel size, the mean of the
-  /// measurements in the voxel, to the millimetre. (A mean can be updated when a keyframe is removed; a minimum could
-  /// not.) O(size()). @pre not after `finish`
+  /// Returns the distance (metres) from which each point of the cloud was observed; with a voxel size, the mean over
+  /// the measurements in the voxel, to the nearest millimetre. (A mean can be updated when a keyframe is removed; a
+  /// minimum could not.) O(size()). @pre not after `finish`
   template <execution_policy Policy = sequential_policy>
   [[nodiscard]] std::vector<float> ranges(const Policy& policy = {}) const {
     assert(!finished_);
@@ -147,15 +149,15 @@ class dense_cloud {
     for (const frame& f : frames_) out.insert(out.end(), f.ranges.begin(), f.ranges.end());
     return out;
   }
-  /// Ends all changes. Call it after the last use of `cloud` and `ranges`; no keyframe may be added, removed or moved
-  /// afterwards. Frees the memory for these. With a voxel size a few bytes for each voxel remain, for `select`,
-  /// `masked_depth` and `measurements`; without one nothing is freed. O(bricks).
+  /// Finalises the cloud and frees the memory that changes, `cloud` and `ranges` need. Call it after their last use; no
+  /// keyframe may be added, removed or moved afterwards. With a voxel size a few bytes for each voxel remain, for
+  /// `select`, `masked_depth` and `measurements`; without one nothing is freed. O(bricks).
   void finish() {
     finished_ = true;
     voxels_.finish();
     std::vector<cloud::voxel_measurements>{}.swap(parts_);
   }
-  /// Number of examined pixels of the keyframes' whole images, and of those removed.
+  /// Numbers of examined and removed pixels in the full images of all keyframes.
   [[nodiscard]] cloud::flying_pixel_count flying_pixels() const noexcept {
     cloud::flying_pixel_count sum;
     for (const frame& f : frames_) {
@@ -164,7 +166,7 @@ class dense_cloud {
     }
     return sum;
   }
-  /// Memory in use without the ray table, bytes.
+  /// Memory in use, excluding the ray table, bytes.
   [[nodiscard]] std::size_t memory_bytes() const noexcept {
     std::size_t bytes = voxels_.memory_bytes() + frames_.capacity() * sizeof(frame);
     for (const cloud::voxel_measurements& part : parts_) bytes += part.memory_bytes();
@@ -188,7 +190,7 @@ class dense_cloud {
     std::optional<cloud::voxel_sums::choice> voxels_;  ///< used if points are merged
     std::vector<std::size_t> first_of_frame_;
   };
-  /// `kept`: one entry for each point of the cloud, not 0 to keep it.
+  /// Creates a selection. `kept`: one entry for each point of the cloud, nonzero to keep the point.
   [[nodiscard]] selection select(std::vector<char> kept) const {
     assert(kept.size() == size());
     selection out;
@@ -205,16 +207,16 @@ class dense_cloud {
     return out;
   }
   /// The whole depth image of keyframe `number` (every pixel, regardless of the stride; the stored values, see
-  /// `view_like`) with 0 in the pixels that the cloud leaves out: those with a depth out of range, flying pixels if
-  /// they are removed, and pixels that belong to a point that is not in `kept`. A pixel between the strides belongs to
-  /// the point in its voxel, or otherwise to the point of its block of stride x stride pixels if their depths agree
-  /// within 3 cm and 2 % per pixel between them; a pixel that belongs to no point is left out. O(pixels).
+  /// `view_like`) with 0 in the pixels that the cloud excludes: those with a depth out of range, flying pixels if they
+  /// are removed, and pixels that belong to a point that is not in `kept`. A pixel between the strides belongs to the
+  /// point in its voxel, or otherwise to the point of its block of stride x stride pixels if their depths agree within
+  /// 3 cm and 2 % per pixel between them; a pixel that belongs to no point is excluded. O(pixels).
   /// @pre as for `measurements`
   template <execution_policy Policy, keyframe_like Keyframe>
   [[nodiscard]] auto masked_depth(const Policy& policy, const Keyframe& k, std::size_t number,
                                   const selection& kept = {}) const {
     assert(contains(number));
-    keyframe_points reader;  // const functions share no memory
+    keyframe_points reader;  // const functions must not share buffers
     auto out = reader.masked(policy, k.depth, rays_, point_options(options_));
     if (kept.is_everything()) return out;
     const auto whole = out;
@@ -223,9 +225,9 @@ class dense_cloud {
                   number, kept, out.view());
     return out;
   }
-  /// The second half of `masked_depth`: sets to 0 the pixels of `out`, a copy of the stored values of `depth`, that
-  /// belong to no point of the cloud or to one that is not kept. O(pixels). @pre contains(number), and `depth` is its
-  /// image after `keyframe_points::masked`
+  /// The second half of `masked_depth`: sets pixels of `out`, a copy of the stored values of `depth`, to 0 if they
+  /// belong to no point of the cloud or to a point that is not kept. O(pixels). @pre contains(number), and `depth` is
+  /// its image after `keyframe_points::masked`
   template <execution_policy Policy, camera::depth_source Depth>
   void remove_points(const Policy& policy, const Depth& depth, std::size_t number, const selection& kept,
                      image_view<depth_pixel<Depth>> out) const {
@@ -234,7 +236,7 @@ class dense_cloud {
     keyframe_point_options points = point_options(options_);
     points.flying_pixels.reset();  // already removed
     const se3& T_world_camera = frames_[number].T_world_camera;
-    keyframe_points reader;  // const functions share no memory
+    keyframe_points reader;  // const functions must not share buffers
     if (!kept.voxels_) {
       image<std::uint8_t> block_kept((rays_.width() + options_.stride - 1) / options_.stride,
                                      (rays_.height() + options_.stride - 1) / options_.stride);
@@ -264,7 +266,7 @@ class dense_cloud {
           if (!is_kept.value_or(false)) out(x, y) = 0;
         });
   }
-  /// The measurements of keyframe `number` in the world frame, at its latest pose, whose point of the cloud is in
+  /// Returns the measurements of keyframe `number`, in the world frame at its latest pose, whose cloud point is in
   /// `kept`. Reads only the images of `k`. O(pixels). @pre contains(number), and its images are those of `k`
   template <execution_policy Policy, keyframe_like Keyframe>
   [[nodiscard]] std::vector<vec3f> measurements(const Policy& policy, const Keyframe& k, std::size_t number,
@@ -281,7 +283,7 @@ class dense_cloud {
       }
       return out;
     }
-    keyframe_points reader;  // const functions share no memory
+    keyframe_points reader;  // const functions must not share buffers
     std::vector<std::vector<vec3f>> parts(reader.parts(rays_, options_.stride));
     std::vector<cloud::voxel_sums::choice::reader> readers;
     if (!all) readers.assign(parts.size(), cloud::voxel_sums::choice::reader{*kept.voxels_});
@@ -378,10 +380,10 @@ class dense_cloud {
   cloud::voxel_sums voxels_;
   std::vector<frame> frames_;
   bool finished_ = false;
-  std::size_t size_ = 0;     ///< points, if they are not merged
+  std::size_t size_ = 0;     ///< number of points, if points are not merged
   std::size_t present_ = 0;  ///< number of keyframes
   std::size_t colored_ = 0;  ///< number of keyframes with colours
-  // Members to reuse their memory.
+  // Members only so that their memory is reused.
   keyframe_points reader_;
   std::vector<cloud::voxel_measurements> parts_;
   std::vector<plain_points> plain_;

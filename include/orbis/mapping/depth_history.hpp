@@ -11,18 +11,18 @@
 
 namespace orbis::mapping {
 
-/// Stores depth images by the index of their frame, and returns them exactly.
+/// Stores depth images by frame index, and returns them without loss.
 ///
-/// `put(frame, pixels)` stores a copy, and replaces an image of the same frame. After an error, either the image is
-/// nevertheless stored, or `get` fails for it afterwards.
+/// `put(frame, pixels)` stores a copy, and replaces an existing image of the same frame. After an error, either the
+/// image is nevertheless stored, or `get` fails for this frame.
 ///
-/// `get(frame, out)` copies the image to `out`, whose size changes to the image's. If it is const, several threads may
-/// call it concurrently.
+/// `get(frame, out)` copies the image to `out`, which is resized to the size of the image. If `get` is const, several
+/// threads may call it concurrently.
 ///
 /// `erase(frame)` removes the image, if it exists.
 ///
-/// It may have a `mask(frame, pixels)` (`masks_depth`): `get` then returns `pixels`, which are those of the last `put`
-/// of this frame with 0 in pixels that a filter removed. Without it, `put` replaces the image.
+/// A store may also have `mask(frame, pixels)`, see `masks_depth`. `pixels` are those of the last `put` of this frame,
+/// with 0 in pixels that a filter removed; `get` then returns `pixels`. Without `mask`, `put` replaces the image.
 template <class S>
 concept depth_history = std::movable<S> &&
     requires(S& store, std::uint64_t frame, image_view<const std::uint16_t> pixels, image<std::uint16_t>& out) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Depth images of many keyframes in little memory: compressed without loss, and spilled to a file beyond a budget.
+/// Compact store of the depth images of many keyframes: lossless compression, and a spill file beyond a budget.
 ///
 /// @code
 ///   mapping::depth_store depths{{.memory_budget = 64 << 20, .spill_file = "depths.tmp"}};
@@ -30,23 +30,23 @@
 namespace orbis::mapping {
 
 struct depth_store_options {
-  /// Memory budget of the compressed images, bytes, without masks, which stay in memory. The least recently used ones
-  /// are spilled first.
+  /// Memory budget for the compressed images in bytes, excluding masks, which stay in memory. The least recently used
+  /// images are spilled first.
   std::size_t memory_budget = std::size_t{64} << 20U;
-  /// Path of a file that does not exist yet, in an existing folder. It is created when it is first needed and unlinked
+  /// Path of a file that does not exist yet, in an existing folder. The file is created when first needed and unlinked
   /// immediately, so that it is deleted with the store or when the process ends. Empty: everything stays in memory.
   std::filesystem::path spill_file{};
 };
 
-/// Depth images by number, stored exactly.
+/// Depth images by frame index, stored losslessly.
 ///
-/// An image takes .05 to .2 of its 16 bits per pixel, from real and simulated sensors, because a depth camera that
-/// measures disparity has few distinct depths (`detail/depth/depth_codec.hpp`). An image of pure noise is not
+/// An image from a real or simulated sensor takes 0.05 to 0.2 of its original 16 bits per pixel, because a depth camera
+/// that measures disparity produces few distinct depths (`detail/depth/depth_codec.hpp`). An image of pure noise is not
 /// compressed. Pixels are plain numbers; the caller defines their scale and meaning. Depth in `float` metres is not
 /// supported; its lowest bits are noise, which does not compress. Pixels can be removed later, and restored, without
 /// compressing the image again.
 ///
-/// Any number of threads may call const members, including `get`, while none calls another one. Movable.
+/// Any number of threads may call const members, including `get`, while no thread calls a non-const member. Movable.
 class depth_store {
  public:
   explicit depth_store(depth_store_options options = {})
@@ -54,10 +54,10 @@ class depth_store {
     if (!options.spill_file.empty()) spills_ = true;
   }
 
-  /// Stores `depth` under the number `frame`, and replaces an image with that number. Error: write_failed if an image
-  /// could not be written to the spill file: the disk is full, the folder does not exist, or the file exists already.
-  /// In that case nothing is lost: this image and the others stay in memory, beyond the budget, and the next call tries
-  /// again. Linear in the pixels, about 2 ms for 640 x 480.
+  /// Stores `depth` for `frame`, and replaces an existing image of this frame. Error: write_failed if an image could
+  /// not be written to the spill file: the disk is full, the folder does not exist, or the file exists already. In that
+  /// case nothing is lost: this image and the others stay in memory, beyond the budget, and the next call tries again.
+  /// Linear in the number of pixels, about 2 ms for 640 x 480.
   result<void> put(std::uint64_t frame, image_view<const std::uint16_t> depth) {
     const std::span<const std::byte> packed = encoder_.encode(depth);
     erase(frame);
@@ -70,9 +70,10 @@ class depth_store {
     return keep_budget();
   }
 
-  /// Removes pixels from the image of `frame`, instead of those removed by an earlier call: the ones that are 0 in
-  /// `depth`. Only the runs of pixels without depth are stored, in memory, beyond the budget. Errors: not_found;
-  /// invalid_argument if `depth` has another size than the image. Linear in the pixels, about 0.2 ms for 640 x 480.
+  /// Removes the pixels that are 0 in `depth` from the image of `frame`, in place of those removed by an earlier call.
+  /// Only the runs of pixels without depth are stored; they stay in memory, in addition to the budget. Errors:
+  /// not_found; invalid_argument if the size of `depth` differs from that of the image. Linear in the number of pixels,
+  /// about 0.2 ms for 640 x 480.
   /// @pre the other pixels of `depth` are those of the image
   result<void> mask(std::uint64_t frame, image_view<const std::uint16_t> depth) {
     const auto at = entries_.find(frame);
@@ -89,15 +90,15 @@ class depth_store {
     return {};
   }
 
-  /// Copies the image of `frame`, with 0 in removed pixels, to `out`, whose size changes to the image's. A spilled
-  /// image stays in the file. Errors: not_found; unreadable or malformed if the spill file fails or is damaged (`out`
-  /// is then empty). Linear in the pixels, about 1 ms for 640 x 480.
+  /// Copies the image of `frame`, with 0 in removed pixels, to `out`, which is resized to the size of the image. A
+  /// spilled image stays in the file. Errors: not_found; unreadable or malformed if the spill file fails or is damaged
+  /// (`out` is then empty). Linear in the number of pixels, about 1 ms for 640 x 480.
   result<void> get(std::uint64_t frame, image<std::uint16_t>& out) const {
     auto done = get_whole(frame, out);
     if (done) detail::set_zeros(entries_.find(frame)->second.zeros, out.view());
     return done;
   }
-  /// The same with the removed pixels.
+  /// As `get`, but includes the removed pixels.
   result<void> get_whole(std::uint64_t frame, image<std::uint16_t>& out) const {
     const auto at = entries_.find(frame);
     if (at == entries_.end()) return not_stored(frame);
@@ -161,8 +162,8 @@ class depth_store {
     const auto bytes = file_.read(*e.spilled);
     return bytes ? decoder.decode(*bytes, out.view()) : result<void>{fail(bytes.error())};
   }
-  /// Returns true if every pixel is 0 or that of the image, which is not an error if it cannot be read. It does not
-  /// count as a use, so that the same images are spilled with and without assertions.
+  /// Returns true if every pixel is 0 or equals that of the image, or if the image cannot be read. Does not count as a
+  /// use of the image, so that the same images are spilled with and without assertions.
   [[nodiscard]] bool is_part_of_image(const entry& e, image_view<const std::uint16_t> depth) const {
     image<std::uint16_t> whole;
     if (!decode(e, whole)) return true;
@@ -202,7 +203,7 @@ class depth_store {
   bool spills_ = false;
   detail::depth_encoder encoder_;
   std::unordered_map<std::uint64_t, entry> entries_;
-  std::vector<use> oldest_;  // of some time ago, the oldest at the back; searched before a new one is made
+  std::vector<use> oldest_;  // a past list of uses, the oldest at the back; searched before a new list is made
   std::size_t bytes_in_memory_ = 0, bytes_spilled_ = 0, bytes_of_masks_ = 0;
   alignas(8) mutable std::uint64_t uses_ = 0;
 };

@@ -36,7 +36,7 @@ enum class filter_kind {
   radius,
   log_statistical,
   cluster,
-  ray_evidence  ///< by the keyframes' depth images; without depth images every point is kept
+  ray_evidence  ///< uses the keyframes' depth images; without depth images every point is kept
 };
 
 struct filter_options {
@@ -49,11 +49,11 @@ struct filter_options {
   cloud::ray_evidence_options ray_evidence{};
 };
 
-/// Report of a filter: its steps, thresholds, and reason.
+/// Report of a filter run: steps, thresholds and reason.
 struct filter_report {
   cloud::filter_chain mode{};  ///< its steps; `to_string` gives their names, such as "log-statistical+cluster"
   std::string reason{};
-  std::size_t points = 0;  ///< before filtering
+  std::size_t points = 0;  ///< number of points before filtering
   std::size_t removed = 0;
   double seconds = 0;
   std::optional<cloud::filter_choice> choice{};  ///< set if the filter was selected automatically
@@ -78,8 +78,8 @@ namespace detail {
   return all;
 }
 
-/// `automatically(select_options)` is the automatic filter, `by_rays(ray_evidence_options)` returns the inliers by ray
-/// evidence.
+/// `automatically(select_options)` runs the automatic filter, `by_rays(ray_evidence_options)` returns the inliers by
+/// ray evidence.
 template <execution_policy Policy, point_range Points, class Automatic, class ByRays>
 [[nodiscard]] filtered_indices filter_by_kind(const Policy& policy, const Points& points, std::span<const float> ranges,
                                               const filter_options& options, Automatic&& automatically,
@@ -135,7 +135,7 @@ template <execution_policy Policy, point_range Points, class Automatic, class By
       report.reason = "requested; " +
                       std::to_string(std::count(result.removed.begin(), result.removed.end(), char{1})) + " of " +
                       std::to_string(result.sizes.size()) + " components are smaller than " +
-                      std::to_string(result.min_size) + " points and apart from the others";
+                      std::to_string(result.min_size) + " points and far from the others";
       break;
     }
     case filter_kind::ray_evidence:
@@ -161,7 +161,7 @@ template <execution_policy Policy, point_range Points>
       [&](const cloud::ray_evidence_options&) { return detail::all_indices(std::ranges::size(points)); });
   if (options.kind == filter_kind::ray_evidence) {
     out.report.mode.clear();
-    out.report.reason = "requested ray evidence, but there are no depth images: every point is kept";
+    out.report.reason = "ray evidence was requested, but there are no depth images: every point is kept";
   }
   return out;
 }
@@ -172,8 +172,8 @@ template <execution_policy Policy, point_range Points>
   return options.kind == filter_kind::automatic ? 1 : 0;
 }
 
-/// The same; the automatic filter also uses the views that the points come from. `on_progress` counts the views, in
-/// each pass (`view_passes`); if it cancels, all points are kept. @pre the images have the camera's size
+/// As above; the automatic filter also uses the views that the points come from. `on_progress` counts the views in each
+/// pass (`view_passes`); if it cancels, all points are kept. @pre the images have the camera's size
 template <execution_policy Policy, point_range Points, cloud::posed_depth_range Views, camera::camera_model Camera>
 [[nodiscard]] filtered_indices filter_points(const Policy& policy, const Points& points, std::span<const float> ranges,
                                              const Views& views, const Camera& camera,

@@ -12,11 +12,11 @@
 
 namespace orbis::mapping {
 
-/// A depth image in place, the colour image registered to it, and the camera pose. The caller owns the images.
+/// A depth image, the colour image registered to it, and the camera pose. The caller owns the images.
 template <camera::depth_source Depth = camera::depth_view<std::uint16_t>>
 struct keyframe {
   Depth depth;
-  image_view<const rgb8> color;  ///< empty, or of the size of `depth`
+  image_view<const rgb8> color;  ///< empty, or as large as `depth`
   se3 T_world_camera;
 };
 

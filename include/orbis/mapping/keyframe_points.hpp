@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The points of a keyframe's depth image in the world frame, with filtering of pixels.
+/// The points of a keyframe's depth image in the world frame, with pixel filtering.
 #pragma once
 
 #include <algorithm>
@@ -27,23 +27,23 @@ struct keyframe_point_options {
   int stride = 1;          ///< every stride-th pixel of every stride-th row; > 0
   float min_depth = 0.0F;  ///< metres along the optical axis
   float max_depth = 4.0F;  ///< metres along the optical axis
-  /// Removal of pixels between two surfaces; empty: none is removed.
+  /// Removal of pixels between two surfaces; empty: no removal.
   std::optional<cloud::flying_pixel_options> flying_pixels{};
 };
 
-/// Reads depth images. Reuses the memory of its filter.
+/// Converts depth images to points. Reuses the memory of its filter.
 class keyframe_points {
  public:
-  /// Number of parts in which an image is read.
+  /// Number of parts into which `read` divides an image.
   [[nodiscard]] static std::size_t parts(const camera::ray_table& rays, int stride) noexcept {
     return static_cast<std::size_t>((rays.height() + stride * rows_of_part - 1) / (stride * rows_of_part));
   }
 
   /// Calls `f(part, x, y, point, range)` for the pixels with a valid depth and a ray: the point in the world frame
-  /// (`camera::world_point`, a `vec3f`), and its distance from the camera, metres. Within a part in the order of the
-  /// pixels; parts may be on different threads. The same image, options and pose give the same bits with every
-  /// compiler. Returns the number of pixels of the whole image that the filter examined and removed. O(pixels). @pre
-  /// depth and rays have the same size; options.stride > 0
+  /// (`camera::world_point`, a `vec3f`), and its distance from the camera, metres. Within a part, calls are in the
+  /// order of the pixels; parts may run on different threads. The same image, options and pose give bit-identical
+  /// results with every compiler. Returns the number of pixels of the whole image that the filter examined and removed.
+  /// O(pixels). @pre depth and rays have the same size; options.stride > 0
   template <execution_policy Policy, camera::depth_source Depth, class F>
   cloud::flying_pixel_count read(const Policy& policy, const Depth& depth, const camera::ray_table& rays,
                                  const keyframe_point_options& options, const se3& T_world_camera, F&& f) {
@@ -56,8 +56,9 @@ class keyframe_points {
     read_all(policy, depth, rays, options, T_world_camera, f);
     return {};
   }
-  /// A copy of the depth image (see `view_like`) with 0 in every pixel that would not become a point, regardless of the
-  /// stride: the result of `dense_cloud::masked_depth` before a filter of the cloud. O(pixels). @pre as for `read`
+  /// Returns a copy of the depth image (see `view_like`) with 0 in every pixel that would not become a point,
+  /// regardless of the stride: the result of `dense_cloud::masked_depth` before a filter of the cloud. O(pixels). @pre
+  /// as for `read`
   template <execution_policy Policy, camera::depth_source Depth>
   [[nodiscard]] image<depth_pixel<Depth>> masked(const Policy& policy, const Depth& depth,
                                                  const camera::ray_table& rays, const keyframe_point_options& options) {
@@ -65,8 +66,8 @@ class keyframe_points {
     static_cast<void>(mask(policy, depth, rays, options, out.view()));
     return out;
   }
-  /// The same into `out`, which may be the pixels of `depth` itself. Returns the number of pixels that the filter of
-  /// flying pixels examined and removed. @pre `out` has the size of `depth`
+  /// As above, but writes to `out`, which may be the pixels of `depth` itself. Returns the numbers of pixels that the
+  /// flying-pixel filter examined and removed. @pre `out` has the size of `depth`
   template <execution_policy Policy, camera::depth_source Depth>
   cloud::flying_pixel_count mask(const Policy& policy, const Depth& depth, const camera::ray_table& rays,
                                  const keyframe_point_options& options, image_view<depth_pixel<Depth>> out) {
@@ -88,7 +89,7 @@ class keyframe_points {
     keep(depth);
     return {};
   }
-  /// The point of one pixel in the world frame, with the same bits as `read`; empty if it has none.
+  /// Returns the point of one pixel in the world frame, bit-identical to that of `read`; empty if it has none.
   /// @pre the pixel is inside the image; depth and rays have the same size
   template <camera::depth_source Depth>
   [[nodiscard]] static std::optional<vec3f> point_at(const Depth& depth, int x, int y, const camera::ray_table& rays,
@@ -111,7 +112,7 @@ class keyframe_points {
   [[nodiscard]] static float squared_norm(const vec3f& p) noexcept {
     return (rounded_product(p[0], p[0]) + rounded_product(p[1], p[1])) + rounded_product(p[2], p[2]);
   }
-  /// Removes flying pixels into `filtered_`.
+  /// Removes flying pixels and writes the result to `filtered_`.
   template <execution_policy Policy, camera::depth_source Depth>
   cloud::flying_pixel_count remove_flying(const Policy& policy, const Depth& depth, const camera::ray_table& rays,
                                           const keyframe_point_options& options) {

@@ -52,8 +52,8 @@ namespace detail {
 }  // namespace detail
 
 struct live_map_options {
-  double resolution = 0.05;                   ///< the edge of a voxel, metres; > 0
-  octree::integration_options integration{};  ///< of every depth image
+  double resolution = 0.05;                   ///< edge length of a voxel, metres; > 0
+  octree::integration_options integration{};  ///< options for every depth image
   /// Tolerance in voxels: a keyframe is moved in the map when its pose moves a point of its view by more than this. 0:
   /// when any bit of the pose changes, so that the map corresponds to the current poses whenever nothing is pending. >=
   /// 0
@@ -76,36 +76,37 @@ concept keyframe_position_like = requires(const P& p) {
   { p.T_world_camera } -> std::convertible_to<se3>;
 };
 
-/// Treatment of keyframes that are not among the given poses: they keep their poses, or are removed from the map until
-/// they get a pose again, such as those of another map of the atlas.
+/// Treatment of keyframes without a given pose: they keep their poses, or are removed from the map until they get a
+/// pose again, such as the keyframes of another map of the atlas.
 enum class unlisted { keep, hide };
 
 /// State of a keyframe's depth image: as the camera measured it, or without pixels removed by a filter.
 enum class completeness { complete, filtered };
 
-/// Limits of one call of live_map::correct.
+/// Limits of one call to live_map::correct.
 struct correction_limits {
-  /// Time limit; a keyframe, or a few dozen bricks, in progress are finished first.
+  /// Time limit; the keyframe or the few dozen bricks in progress are finished first.
   std::chrono::nanoseconds time = std::chrono::nanoseconds::max();
   std::optional<vec3> robot{};  ///< position in the world frame; keyframes near it are moved first
 };
 
-/// Result of a call of live_map::correct.
+/// Result of a call to live_map::correct.
 struct correction_progress {
-  std::size_t keyframes = 0;  ///< moved
-  std::size_t bricks = 0;     ///< updated
-  bool done = false;          ///< true if nothing is left to do
+  std::size_t keyframes = 0;  ///< number of moved keyframes
+  std::size_t bricks = 0;     ///< number of updated bricks
+  bool done = false;          ///< true if nothing is pending
 };
 
-/// An occupancy octree of the depth images of keyframes. It stores the observations of each keyframe (see
+/// An occupancy octree built from the depth images of keyframes. It stores the observations of each keyframe (see
 /// octree::scan_history) and its depth image (in `Depths`), so that a keyframe can be moved, changed and removed.
 ///
-/// When nothing is pending, the map is bit for bit the one that `integrate` builds from the depth images in the order
-/// of their frames, each from the pose that it was marked with (`used_pose`): with tolerance 0 and after `finish` from
-/// the current poses, otherwise from poses within the tolerance. It depends neither on policies nor on time limits.
+/// When nothing is pending, the map is bit-identical to the one that `integrate` builds from the depth images in the
+/// order of their frames, each from the pose that it was marked with (`used_pose`): with tolerance 0 and after `finish`
+/// from the current poses, otherwise from poses within the tolerance. It depends neither on policies nor on time
+/// limits.
 ///
-/// For one thread at a time; live_map_thread.hpp has a map with its own thread. With orbis::compiled, an octree of
-/// another model than log_odds<> needs octree/scan_history-inl.hpp as well.
+/// Not thread-safe; live_map_thread.hpp provides a map with its own thread. With orbis::compiled, an octree with a
+/// model other than log_odds<> also needs octree/scan_history-inl.hpp.
 template <octree::replayable_octree Octree, camera::camera_model Camera, depth_history Depths = depth_store>
 class live_map {
  public:
@@ -144,9 +145,9 @@ class live_map {
     if (!kept) return fail(std::move(kept.error()));
     return summary;
   }
-  /// Removes pixels from the depth image of a keyframe, in place of those removed before: a later result of a filter,
-  /// which sets the removed pixels to 0. The map follows with `correct`. Errors: not_found; that of `Depths::mask`, or
-  /// of `put` if it has none.
+  /// Removes pixels from the depth image of a keyframe, in place of those removed before, for a later result of a
+  /// filter. Removed pixels are 0 in `depth`. The map follows with `correct`. Errors: not_found; that of
+  /// `Depths::mask`, or of `Depths::put` if there is no `mask`.
   /// @pre depth has the camera's size; its other pixels are those of the keyframe's image, `whole` in add_keyframe
   template <execution_policy Policy>
   result<void> set_depth(const Policy& policy, std::uint64_t frame, const depth_view& depth) {
@@ -158,11 +159,11 @@ class live_map {
   }
   /// Removes pixels from the depth images of several keyframes: `remove_pixels(i, depth, pixels)` sets the pixels to
   /// remove from the image of `frames[i]` to 0 in `pixels`, a copy of the stored values of `depth`; it is called on
-  /// several threads. Keyframes are changed in groups of one per thread, or the whole group is unchanged if it throws.
-  /// The map follows with `correct`. Stops when `on_progress`, which counts the keyframes, returns false. Errors:
-  /// not_found, before anything is changed; that of `Depths::get`, whose keyframe is removed while the rest of its
-  /// group is unchanged; that of set_depth, after all keyframes are processed; cancelled. For each keyframe O(pixels),
-  /// Depths::get and mask, and marking. @pre no frame is listed twice
+  /// several threads. Keyframes are changed in groups of one per thread; if `remove_pixels` throws, the whole group is
+  /// unchanged. The map follows with `correct`. Stops when `on_progress`, which counts the keyframes, returns false.
+  /// Errors: not_found, before anything is changed; that of `Depths::get`, in which case the keyframe is removed and
+  /// the rest of its group is unchanged; that of set_depth, after all keyframes are processed; cancelled. For each
+  /// keyframe O(pixels), Depths::get and mask, and marking. @pre no frame is listed twice
   template <execution_policy Policy, class RemovePixels>
   result<void> edit_depths(const Policy& policy, std::span<const std::uint64_t> frames,
                            const RemovePixels& remove_pixels, progress on_progress = {}) {
@@ -201,7 +202,7 @@ class live_map {
     }
     return kept;
   }
-  /// Adds a frame between keyframes whose pose was measured relative to `keyframe`: it is marked from there, at the
+  /// Adds a frame between keyframes whose pose was measured relative to `keyframe`: it is marked relative to the
   /// keyframe's pose in the map. It makes the map denser in time but is not kept for corrections: it is removed from
   /// the map when there are more than `max_frames`, when its keyframe moves, is hidden or removed, and with `finish`.
   /// Accepts any depth source. Returns false if `max_frames` is 0, the keyframe is not in the map, the pose is not
@@ -214,13 +215,13 @@ class live_map {
     if (options_.max_frames == 0 || k == nullptr || !k->used || find(frame) != nullptr || !if_finite(T_keyframe_camera))
       return false;
     std::erase_if(frames_, [&](const transient& t) { return t.frame == frame; });
-    // Drops several at a time: the bricks that they share are replayed once.
+    // Drop several at a time, so that the bricks they share are replayed only once.
     if (frames_.size() >= options_.max_frames) drop_oldest_frames(1 + options_.max_frames / 4);
     history_.set(policy, frame, depth, camera_, *k->used * T_keyframe_camera, options_.integration);
     frames_.push_back({frame, keyframe});
     return true;
   }
-  /// Removes a culled keyframe; the map follows with `correct`. Returns false if there is none. O(its bricks).
+  /// Removes a culled keyframe; the map follows with `correct`. Returns false if it does not exist. O(its bricks).
   bool remove(std::uint64_t frame) {
     entry* const k = find(frame);
     if (k == nullptr) return false;
@@ -233,7 +234,7 @@ class live_map {
   // -- corrections
 
   /// Sets the current poses of keyframes, in any order; the map follows with `correct`. Frames that are not keyframes
-  /// of the map are skipped; a pose that is not finite hides its keyframe. Returns the number of keyframes that wait to
+  /// of the map are skipped; a pose that is not finite hides its keyframe. Returns the number of keyframes waiting to
   /// be moved. O(poses x log keyframes), about 0.1 us each.
   template <std::ranges::input_range Poses>
   requires keyframe_position_like<std::ranges::range_value_t<Poses>> std::size_t set_poses(
@@ -250,11 +251,11 @@ class live_map {
         if (k.listed != round_) want(k, std::nullopt);
     return waiting_;
   }
-  /// Moves keyframes whose poses are out of tolerance to their current poses, starting with those whose view moved most
-  /// and that are close to the robot, and updates the map, until the time limit. Every call makes progress if anything
-  /// is pending. Error: that of `Depths::get`. The keyframe whose image is lost is removed; the next call continues
-  /// with the others. O(keyframes) and, for each keyframe that is moved, marking and replaying; O(1) if nothing is
-  /// pending.
+  /// Moves keyframes whose poses are out of tolerance to their current poses, and updates the map, until the time
+  /// limit. Keyframes whose views moved far and that are close to the robot come first. Every call makes progress if
+  /// anything is pending. Error: that of `Depths::get`. The keyframe whose image is lost is removed; the next call
+  /// continues with the others. O(keyframes) and, for each keyframe that is moved, marking and replaying; O(1) if
+  /// nothing is pending.
   template <execution_policy Policy>
   result<correction_progress> correct(const Policy& policy, const correction_limits& limits = {}) {
     correction_progress progress;
@@ -306,14 +307,14 @@ class live_map {
     }
     return all;
   }
-  /// Amount of pending work: keyframes that wait to be moved plus bricks that are out of date. O(1).
+  /// Amount of pending work: number of keyframes waiting to be moved plus number of stale bricks. O(1).
   [[nodiscard]] std::size_t pending() const noexcept { return waiting_ + history_.stale_bricks(); }
 
   // -- queries
 
-  /// The current map; readable at any time.
+  /// Returns the current map, which can be read at any time.
   [[nodiscard]] const Octree& map() const noexcept { return history_.map(); }
-  /// A copy for readers on other threads; it shares memory with the map and clones on change. O(pages of 4 KB).
+  /// A copy for readers on other threads; it shares memory with the map (copy on write). O(pages of 4 KB).
   [[nodiscard]] Octree snapshot() const { return history_.map(); }
   /// Log of changed voxels, see octree::scan_history::changes.
   [[nodiscard]] const octree::change_log& changes() const noexcept { return history_.changes(); }
@@ -321,17 +322,17 @@ class live_map {
   [[nodiscard]] const Camera& camera() const noexcept { return camera_; }
   [[nodiscard]] const live_map_options& options() const noexcept { return options_; }
   [[nodiscard]] const Depths& depths() const noexcept { return depths_; }
-  /// Number of keyframes, in the map or hidden; number of frames between them in the map.
+  /// Number of keyframes, in the map or hidden, and number of frames between keyframes in the map.
   [[nodiscard]] std::size_t size() const noexcept { return keyframes_.size(); }
   [[nodiscard]] std::size_t frames() const noexcept { return frames_.size(); }
   [[nodiscard]] bool contains(std::uint64_t frame) const noexcept { return find(frame) != nullptr; }
-  /// The pose that a keyframe was marked with; empty if it is not in the map. O(log keyframes).
+  /// Returns the pose with which a keyframe was marked; empty if it is not in the map. O(log keyframes).
   [[nodiscard]] std::optional<se3> used_pose(std::uint64_t frame) const {
     const entry* const k = find(frame);
     return k == nullptr ? std::nullopt : k->used;
   }
-  /// The latest pose given for a keyframe, to which `correct` moves it; empty if it is hidden or not a keyframe. O(log
-  /// keyframes).
+  /// Returns the latest pose given for a keyframe, to which `correct` moves it; empty if it is hidden or not a
+  /// keyframe. O(log keyframes).
   [[nodiscard]] std::optional<se3> wanted_pose(std::uint64_t frame) const {
     const entry* const k = find(frame);
     return k == nullptr ? std::nullopt : k->wanted;
@@ -342,7 +343,7 @@ class live_map {
     const entry* const k = find(frame);
     return k != nullptr && k->filtered;
   }
-  /// Bytes on the heap, without those of `Depths`. O(bricks + keyframes).
+  /// Heap memory in bytes, excluding that of `Depths`. O(bricks + keyframes).
   [[nodiscard]] std::size_t bytes() const noexcept {
     std::size_t n = history_.bytes() + history_.buffer_bytes() + map().memory_bytes() + map().buffer_bytes() +
                     keyframes_.capacity() * sizeof(entry) + frames_.capacity() * sizeof(transient) +
@@ -360,12 +361,12 @@ class live_map {
     std::uint64_t frame = 0;
     std::optional<se3> used;    ///< pose in the map
     std::optional<se3> wanted;  ///< target pose; empty: not in the map
-    double scale = 1.0;         ///< of its depth image, see camera::depth_view
+    double scale = 1.0;         ///< scale of its depth image, see camera::depth_view
     float min_depth = 0.0F, max_depth = 0.0F;
-    double reach = 0.0;  ///< largest depth used, metres
+    double reach = 0.0;  ///< largest depth in its image, metres
     bool waiting = false;
     bool filtered = false;
-    std::uint64_t listed = 0;  ///< the last call of set_poses that listed it
+    std::uint64_t listed = 0;  ///< index of the last call to set_poses that listed it
   };
   struct transient {
     std::uint64_t frame, keyframe;
@@ -374,7 +375,7 @@ class live_map {
     double urgency;
     std::uint64_t frame;
   };
-  /// Memory of one thread for marking a keyframe.
+  /// Buffers of one thread for marking a keyframe.
   struct worker {
     image<std::uint16_t> depth, edited;
     result<void> read;
@@ -454,7 +455,7 @@ class live_map {
     set_waiting(k, !k.used || (tolerance > 0 ? frustum_.displacement(*k.used, *pose, k.reach) > tolerance
                                              : differ(*k.used, *pose)));
   }
-  /// Lists the waiting keyframes, the most urgent first; equal ones in the order of their frames.
+  /// Lists the waiting keyframes, the most urgent first; equally urgent ones are in the order of their frames.
   void list_by_priority(const std::optional<vec3>& robot) {
     queue_.clear();
     if (waiting_ == 0) return;
@@ -536,11 +537,11 @@ class live_map {
   detail::view_frustum frustum_;
   Depths depths_;
   octree::scan_history<Octree> history_;
-  std::vector<entry> keyframes_;   ///< by frame
+  std::vector<entry> keyframes_;   ///< sorted by frame
   std::vector<transient> frames_;  ///< in order of arrival
   std::size_t waiting_ = 0;        ///< number of waiting keyframes
   std::size_t moved_since_replay_ = 0;
-  std::uint64_t round_ = 0;  ///< number of calls of set_poses
+  std::uint64_t round_ = 0;  ///< number of calls to set_poses
   std::vector<ranked> queue_;
   std::vector<std::uint64_t> group_;  ///< keyframes that are moved together
   std::vector<worker> workers_;

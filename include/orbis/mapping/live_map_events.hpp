@@ -15,14 +15,14 @@
 
 namespace orbis::mapping {
 
-/// The map at one moment. It is immutable.
+/// An immutable snapshot of the map.
 template <class Octree>
 struct live_map_snapshot {
   Octree map;
-  std::uint64_t revision = 0;  ///< of the change log
-  std::size_t keyframes = 0;   ///< added and not removed
-  std::size_t frames = 0;      ///< between keyframes, in the map
-  std::size_t pending = 0;     ///< keyframes and bricks that wait for a correction; 0: the map is up to date
+  std::uint64_t revision = 0;  ///< revision of the change log
+  std::size_t keyframes = 0;   ///< number of keyframes added and not removed
+  std::size_t frames = 0;      ///< number of frames between keyframes in the map
+  std::size_t pending = 0;     ///< keyframes and bricks waiting for a correction; 0: the map is up to date
 };
 
 /// Use of a depth image.
@@ -35,8 +35,8 @@ enum class depth_use : std::uint8_t {
 struct insertion_event {
   std::uint64_t frame = 0;
   bool is_keyframe = false;
-  double milliseconds = 0.0;        ///< wall time: `prepare`, moved objects, marking, storing the depth image
-  double delay_milliseconds = 0.0;  ///< from the call that added it until it is visible to readers
+  double milliseconds = 0.0;        ///< wall time of `prepare`, moved objects, marking and storing the depth image
+  double delay_milliseconds = 0.0;  ///< time from the call that added the image until readers can see it
   std::size_t waiting = 0;          ///< keyframes and frames still waiting
 };
 /// A depth image was dropped because too many were waiting.
@@ -51,15 +51,15 @@ struct refusal_event {
 };
 /// All corrections of keyframes and bricks are complete.
 struct live_correction_event {
-  std::size_t keyframes = 0;  ///< moved
-  std::size_t bricks = 0;     ///< updated
-  double milliseconds = 0.0;  ///< wall time of the correction, without insertions between its parts
+  std::size_t keyframes = 0;  ///< number of moved keyframes
+  std::size_t bricks = 0;     ///< number of updated bricks
+  double milliseconds = 0.0;  ///< wall time of the correction, excluding insertions between its parts
 };
 
 /// Poses of the keyframes from the SLAM system.
 struct keyframe_poses {
   std::vector<keyframe_position> poses{};  ///< the current ones; other keyframes are hidden
-  std::vector<std::uint64_t> removed{};    ///< frames of keyframes that will never get a pose again
+  std::vector<std::uint64_t> removed{};    ///< frame indices of keyframes that will never get a pose again
 };
 
 /// Callbacks; any of them may be empty. All except `overflowed` are called on the map's thread; the constructor calls
@@ -67,10 +67,10 @@ struct keyframe_poses {
 /// thread ends that thread, see live_map_thread::failure.
 template <class Octree>
 struct live_map_listeners {
-  std::function<void()> started{};  ///< called first, on the map's thread: to name it, or to lower its priority
+  std::function<void()> started{};  ///< called first on the map's thread, to name the thread or lower its priority
   /// Fills in the current poses and returns true, or returns false if the poses have not changed since the last call;
   /// with `always`, always fills them in. Hidden keyframes keep their depth images, which costs memory, because they
-  /// may return with their map of the atlas. List culled keyframes in `removed` to drop them from the map.
+  /// may return with their map of the atlas. List culled keyframes in `removed` to remove them from the map.
   std::function<bool(keyframe_poses& now, bool always)> poll_poses{};
   /// May change a depth image before it is inserted: a filter sets the pixels that it removes to 0. Called on the map's
   /// thread, so that no other thread waits for it.
@@ -85,8 +85,9 @@ struct live_map_listeners {
   std::function<void(const error&)> failed{};
 };
 
-/// A `live_map_listeners::poll_poses` that reads the keyframe poses of a SLAM system. The system must outlive the map's
-/// thread. Culled keyframes stay hidden in the map; `live_map_thread::remove` frees their memory.
+/// Returns a callback for `live_map_listeners::poll_poses` that reads the keyframe poses of a SLAM system. The system
+/// must outlive the map's thread. Culled keyframes stay hidden in the map; `live_map_thread::remove` frees their
+/// memory.
 template <class Slam>
 [[nodiscard]] auto follow_keyframes(const Slam& slam) {
   return [&slam, seen = typename Slam::revision_type{}](keyframe_poses& now, bool always) mutable {
@@ -101,12 +102,12 @@ template <class Slam>
 void follow_keyframes(const Slam&&) = delete;
 
 struct live_map_counters {
-  std::size_t keyframes = 0;          ///< inserted
-  std::size_t frames = 0;             ///< inserted, between keyframes
-  std::size_t dropped_keyframes = 0;  ///< dropped because too many were waiting
-  std::size_t dropped_frames = 0;     ///< the same, between keyframes
-  std::size_t refused_frames = 0;     ///< rejected by the map
-  std::size_t corrections = 0;        ///< finished
+  std::size_t keyframes = 0;          ///< number of inserted keyframes
+  std::size_t frames = 0;             ///< number of inserted frames between keyframes
+  std::size_t dropped_keyframes = 0;  ///< keyframes dropped because too many were waiting
+  std::size_t dropped_frames = 0;     ///< frames between keyframes dropped for the same reason
+  std::size_t refused_frames = 0;     ///< frames rejected by the map
+  std::size_t corrections = 0;        ///< number of finished corrections
   std::size_t most_waiting = 0;       ///< maximum number of waiting depth images
 };
 

@@ -51,22 +51,22 @@ namespace orbis::mapping {
 
 struct live_map_thread_options {
   live_map_options map{};
-  unsigned threads = 1;          ///< threads that work on the map, including its own; > 0
+  unsigned threads = 1;          ///< number of threads that work on the map, including its own; > 0
   std::size_t max_waiting = 16;  ///< maximum number of waiting keyframes and frames; > 0
   /// Maximum time that `add_keyframe` waits for room if only keyframes are waiting; afterwards the keyframe is dropped.
   std::chrono::milliseconds patience{100};
-  /// Duration of a correction before keyframes that arrived meanwhile are inserted.
+  /// Duration of a slice of a correction, after which keyframes that have arrived in the meantime are inserted.
   std::chrono::microseconds correction_slice{5000};
-  std::chrono::milliseconds poll_interval{30};  ///< between two calls of live_map_listeners::poll_poses
-  /// Removal of moved objects, see moving_filter; empty: none. If set, poses are also polled before each keyframe, and
-  /// the keyframe is inserted at its pose of that moment.
+  std::chrono::milliseconds poll_interval{30};  ///< interval between calls to live_map_listeners::poll_poses
+  /// Removal of moved objects, see moving_filter; empty: no removal. If set, poses are also polled before each
+  /// keyframe, and the keyframe is inserted at its pose of that moment.
   std::optional<moving_filter_options> moving{};
 };
 
 /// A live_map with a thread and a bounded queue. Requests are processed in order; corrections run in slices while no
-/// request waits, and one slice after each insertion. If the queue is full, frames between keyframes are dropped first,
-/// the oldest of them; then `add_keyframe` waits for a while; then the keyframe is dropped. All drops are counted and
-/// reported. Poses that arrive faster than they are processed are merged.
+/// request is waiting, and one slice after each insertion. If the queue is full, frames between keyframes are dropped
+/// first, the oldest one first; then `add_keyframe` waits for a while; then the keyframe is dropped. All drops are
+/// counted and reported. Poses that arrive faster than they are processed are merged.
 ///
 /// All member functions are thread-safe, except that `stop` and the destructor must be called from one thread only.
 template <octree::replayable_octree Octree, camera::camera_model Camera, depth_history Depths = depth_store>
@@ -89,14 +89,14 @@ class live_map_thread {
   }
   live_map_thread(const live_map_thread&) = delete;
   live_map_thread& operator=(const live_map_thread&) = delete;
-  /// Waits for the running step; drops waiting requests.
+  /// Waits for the current step to finish; drops waiting requests.
   ~live_map_thread() { stop(); }
 
   // -- input
 
   /// Adds a keyframe, see live_map::add_keyframe; the image is copied, and passed to `prepare` on the map's thread.
-  /// Returns false if it was dropped: too many keyframes wait, or the thread ended. O(pixels), and waits at most
-  /// `patience`. @pre depth has the camera's size
+  /// Returns false if the keyframe was dropped: too many keyframes are waiting, or the thread has ended. O(pixels);
+  /// waits at most `patience`. @pre depth has the camera's size
   bool add_keyframe(std::uint64_t frame, const depth_view& depth, const se3& T_world_camera) {
     return add_scan({.kind = job::keyframe, .frame = frame, .T = T_world_camera}, depth);
   }
@@ -119,7 +119,7 @@ class live_map_thread {
 
   // -- output
 
-  /// The latest snapshot. Never waits for the map: the lock is held for copying a pointer. O(1).
+  /// The latest snapshot. Never waits for the map: the lock is held only while a pointer is copied. O(1).
   [[nodiscard]] std::shared_ptr<const snapshot_type> latest() const {
     const std::lock_guard lock{published_mutex_};
     return latest_;
@@ -133,9 +133,9 @@ class live_map_thread {
     const std::lock_guard lock{mutex_};
     return counters_;
   }
-  /// The reason why the thread ended by itself, if it did: an exception of a listener or of `Depths`, or out of memory.
-  /// It was also reported to `failed`. Waiting requests are then dropped, waiting calls return, no further input is
-  /// accepted, and the snapshots no longer change. Code: errc::exception.
+  /// The error that ended the thread, if any: an exception from a listener or from `Depths`, or lack of memory. It was
+  /// also reported to `failed`. Waiting requests are then dropped, waiting calls return, no further input is accepted,
+  /// and the snapshots no longer change. Code: errc::exception.
   [[nodiscard]] std::optional<error> failure() const {
     const std::lock_guard lock{mutex_};
     return failure_;
@@ -143,8 +143,8 @@ class live_map_thread {
 
   // -- waiting
 
-  /// Waits until all requests are processed and nothing waits for a correction, or the thread ended. Must not be called
-  /// by callbacks.
+  /// Waits until all requests are processed and no correction is pending, or the thread has ended. Must not be called
+  /// from callbacks.
   void wait() {
     if (listeners_.poll_poses) push({.kind = job::poll});  // poses may have moved since the last poll
     wait_until_idle();
@@ -154,8 +154,8 @@ class live_map_thread {
     push({.kind = job::finish});
     wait_until_idle();
   }
-  /// Requests that the thread ends after its running step; waiting calls return. Does not wait; call `stop` later. May
-  /// be called from any thread.
+  /// Asks the thread to end after its current step; waiting calls return. Does not wait; call `stop` later. May be
+  /// called from any thread.
   void request_stop() {
     {
       const std::lock_guard lock{mutex_};
@@ -164,7 +164,7 @@ class live_map_thread {
     changed_.notify_all();
   }
   /// Ends the thread, and returns the map to the caller; drops waiting requests. After a failure the map may only be
-  /// destroyed: a step was interrupted. Must not be called by callbacks.
+  /// destroyed, because a step was interrupted. Must not be called from callbacks.
   map_type& stop() {
     request_stop();
     if (thread_.joinable()) thread_.join();
@@ -212,7 +212,7 @@ class live_map_thread {
         dropped = jobs_.pop_frame();
         if (!dropped && j.kind != job::between)
           changed_.wait_for(lock, options_.patience, [&] { return ends_ || !is_full(); });
-        if (!dropped && is_full()) dropped = jobs_.pop_frame();  // one that arrived while this one waited
+        if (!dropped && is_full()) dropped = jobs_.pop_frame();  // one that arrived while this one was waiting
       }
       if (ends_) return false;
       added = !is_full();
@@ -322,12 +322,12 @@ class live_map_thread {
       case job::keyframe: {
         bool judged = moving_.has_value();
         if (moving_ && listeners_.poll_poses) {
-          // Keyframes are compared at poses of one moment: the current ones, including that of the new keyframe.
+          // Keyframes are compared at poses of the same moment: the current ones, including that of the new keyframe.
           const keyframe_poses& now = poll(true);
           const auto at = std::ranges::find(now.poses, j.frame, &keyframe_position::frame);
           judged = at != now.poses.end();
           if (judged) j.T = at->T_world_camera;
-          if (!judged) moving_->forget(j.frame);  // its data may be of another image
+          if (!judged) moving_->forget(j.frame);  // its data may belong to another image
           if (std::ranges::find(now.removed, j.frame) != now.removed.end()) break;
         }
         const auto added = judged ? moving_->add_keyframe(policy_, map_, j.frame, depth, j.T)
@@ -350,7 +350,7 @@ class live_map_thread {
       case job::finish:
         if (listeners_.poll_poses) poll();
         revise(std::chrono::nanoseconds::max());
-        for (;;) {  // an error removes a keyframe
+        for (;;) {  // each error removes a keyframe
           const auto finished = map_.finish(policy_);
           correction_.milliseconds += detail::milliseconds_since(start);
           if (finished) {
@@ -382,11 +382,11 @@ class live_map_thread {
     map_.set_poses(polled_.poses, unlisted::hide);
     return polled_;
   }
-  /// Number of recent keyframes that have not yet been compared with the newest one.
+  /// Number of recent keyframes that have not been compared with the newest one yet.
   [[nodiscard]] std::size_t due() const noexcept { return moving_ ? moving_->due() : 0; }
   void revise(std::chrono::nanoseconds time) {
     const auto start = clock::now();
-    while (due() != 0) {  // at least one, however short the time is
+    while (due() != 0) {  // at least one, regardless of the time limit
       if (const auto revised = moving_->revise(policy_, map_); !revised) report(revised.error());
       if (clock::now() - start >= time) return;
     }
@@ -455,8 +455,8 @@ class live_map_thread {
   mutable std::mutex mutex_;
   mutable std::condition_variable changed_;
   detail::map_jobs jobs_;
-  std::vector<image<std::uint16_t>> spare_;  ///< images whose memory is reused
-  std::size_t pending_ = 0;                  ///< of the map
+  std::vector<image<std::uint16_t>> spare_;  ///< images kept so that their memory is reused
+  std::size_t pending_ = 0;                  ///< pending work of the map
   bool busy_ = false;
   bool ends_ = false;
   std::optional<error> failure_;
@@ -466,9 +466,9 @@ class live_map_thread {
   mutable std::mutex published_mutex_;
   std::shared_ptr<const snapshot_type> latest_, settled_;
 
-  map_type map_;  ///< belongs to the thread, as do those below
+  map_type map_;  ///< used only by the thread, like the members below
   std::optional<moving_filter<Camera>> moving_;
-  keyframe_poses polled_;  ///< of the last poll
+  keyframe_poses polled_;  ///< result of the last poll
   bool poll_always_ = true;
   live_correction_event correction_;
   std::thread thread_;

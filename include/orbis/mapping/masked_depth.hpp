@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Depth images with removed pixels, in the form of the original image.
+/// Depth images with removed pixels, in the pixel format of the original image.
 #pragma once
 
 #include <orbis/camera/depth.hpp>

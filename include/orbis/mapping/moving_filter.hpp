@@ -35,10 +35,10 @@ namespace orbis::mapping {
 /// Compares the last keyframes of a live map with each other, and applies the result to the map: a later keyframe whose
 /// rays pass through a surface of an earlier one removes it, and one that shows it again restores it. A keyframe is
 /// inserted first; the others are compared with it afterwards, one at a time, so that no insertion waits for the
-/// comparison. The result is a depth image with fewer pixels (`live_map::set_depth`), so that the map remains that of
-/// these images and the keyframes' poses. Keyframes are compared at the latest poses given to the map
-/// (`live_map::wanted_pose`), because those are of one moment; in the map, a keyframe that waits for a correction is
-/// still at an earlier one.
+/// comparison. The result is a depth image with fewer pixels (`live_map::set_depth`); the map still corresponds to the
+/// depth images and poses of its keyframes. Keyframes are compared at the latest poses given to the map
+/// (`live_map::wanted_pose`), because these belong to the same moment; in the map, a keyframe waiting for a correction
+/// is still at an earlier pose.
 ///
 /// Stores the last keyframes' depth images: 3.5 bytes per pixel for each. Memory is reused from keyframe to keyframe.
 template <camera::camera_model Camera>
@@ -50,10 +50,10 @@ class moving_filter {
   explicit moving_filter(Camera camera, const moving_filter_options& options = {})
       : judge_{std::move(camera), options} {}
 
-  /// live_map::add_keyframe without the pixels that rays of the last keyframes pass through. Afterwards the last
+  /// Calls live_map::add_keyframe without the pixels that rays of the last keyframes pass through. Afterwards the last
   /// keyframes are due for re-evaluation, see revise. A keyframe with a pose that is not finite is added to the map
-  /// unchanged. The same for every policy. Errors: those of live_map::add_keyframe and set_depth. O(pixels + cells x
-  /// keyframes), and marking. @pre as for live_map::add_keyframe; `map` is always the same
+  /// unchanged. The result is the same for every policy. Errors: those of live_map::add_keyframe and set_depth.
+  /// O(pixels + cells x keyframes), and marking. @pre as for live_map::add_keyframe; all calls pass the same `map`
   template <execution_policy Policy, octree::replayable_octree Octree, depth_history Depths>
   result<octree::integration_summary> add_keyframe(const Policy& policy, live_map<Octree, Camera, Depths>& map,
                                                    std::uint64_t frame, const depth_view& depth,
@@ -77,7 +77,7 @@ class moving_filter {
     if (added && !settled) return fail(std::move(settled.error()));
     return added;
   }
-  /// Number of the last keyframes that have not been compared with all others in the window. O(keyframes).
+  /// Number of recent keyframes that have not been compared with all others in the window. O(keyframes).
   [[nodiscard]] std::size_t due() const noexcept {
     return static_cast<std::size_t>(std::ranges::count_if(judge_.views(), [](const auto& v) { return is_due(v); }));
   }
@@ -115,7 +115,7 @@ class moving_filter {
     return [&map](const view& v) { return map.wanted_pose(v.frame); };
   }
   [[nodiscard]] bool leaves_next(const view& v) const { return judge_.is_full() && &v == &judge_.views().front(); }
-  /// Evaluates a keyframe of the map, and updates its image there if enough of it differs.
+  /// Evaluates a keyframe of the map, and updates its image there if enough of its cells differ.
   template <class Policy, class Map>
   result<void> change(const Policy& policy, Map& map, view& v) {
     const std::size_t differ = judge_.judge(v);

@@ -12,12 +12,12 @@ namespace orbis::mapping {
 struct moving_filter_options {
   /// Number of most recent keyframes that are compared with each other, > 0; older ones do not change.
   std::size_t keyframes = 8;
-  /// Two depths z are equal if they differ by less than margin + margin_growth z^2, which covers noise and small pose
-  /// errors. Metres; 1 / metres.
+  /// Two depths z count as equal if they differ by less than margin + margin_growth z^2, which covers noise and small
+  /// pose errors. Units: metres, 1 / metres.
   float margin = 0.03F;
   float margin_growth = 0.0075F;
   /// A ray passes through a point only if the end of the ray is farther away by the margin plus this factor times the
-  /// range of depths around that end: rays that graze a surface prove nothing.
+  /// range of depths around that end: rays that graze a surface are not evidence.
   float slant = 1.0F;
   int min_through = 1;  ///< a cell is removed if the rays of at least this number of keyframes pass through it, > 0,
   double ratio = 1.0;   ///< and of more than this factor times the number of keyframes that show it

@@ -32,7 +32,7 @@
 
 namespace orbis::mapping {
 
-/// A pixel that is known to be moving or static.
+/// A pixel that is known to be on a moving or static object.
 struct marked_pixel {
   float x = 0.0F, y = 0.0F;
   bool moves = false;
@@ -46,13 +46,12 @@ struct moving_region_options {
 };
 
 /// Grows marked pixels along the surfaces of a depth image, moving and static ones at the same time: a cell moves if
-/// its nearest mark moves. Surfaces end at depth discontinuities. A keyframe without moving objects can be integrated
+/// its nearest mark moves. Surfaces end at depth discontinuities. The remaining pixels of a keyframe can be integrated
 /// into a map. Tracking detects moving objects in front of the camera immediately (`slam::tracked_feature::moving`),
 /// including a person walking along with the camera, whom no later ray passes through; `moving_filter` detects moved
 /// objects that tracking has missed.
 ///
-/// Works on cells of 4x4 pixels. Reuses its memory: allocates nothing after the first few images. For one thread at a
-/// time.
+/// Works on cells of 4x4 pixels. Reuses its memory: allocates nothing after the first few images. Not thread-safe.
 template <camera::camera_model Camera>
 class moving_regions {
  public:
@@ -61,7 +60,7 @@ class moving_regions {
       : options_{options}, grid_{camera} {}
 
   /// Finds the moving regions. Returns true if there are any. O(pixels + cells log cells); returns immediately if no
-  /// mark moves. @pre the image has the camera's size
+  /// mark is moving. @pre the image has the camera's size
   template <camera::depth_source Depth>
   [[nodiscard]] bool find(const Depth& depth, std::span<const marked_pixel> marks) {
     removed_.clear();
@@ -86,12 +85,12 @@ class moving_regions {
 
  private:
   enum class label : std::uint8_t { unknown, stands, moves };
-  /// A cell reached from a mark on its surface.
+  /// A cell reached from a mark along a surface.
   struct step {
     float way;  ///< metres
     std::uint32_t cell;
     label what;
-    [[nodiscard]] friend bool operator<(const step& a, const step& b) noexcept {  // the nearest is the last in a heap
+    [[nodiscard]] friend bool operator<(const step& a, const step& b) noexcept {  // the nearest is first in a heap
       return a.way > b.way || (a.way == b.way && a.cell > b.cell);
     }
   };
@@ -111,7 +110,7 @@ class moving_regions {
   }
 
   /// Calls `visit(neighbour)` for the adjacent cells on the same surface. Returns true if all adjacent cells with depth
-  /// are.
+  /// are on that surface.
   template <class Visit>
   bool around(std::size_t cell, const Visit& visit) const {
     const int x = static_cast<int>(cell) % grid_.across, y = static_cast<int>(cell) / grid_.across;
@@ -171,7 +170,7 @@ class moving_regions {
   moving_region_options options_;
   moving_filter_options same_surface_;
   detail::cell_grid grid_;
-  std::vector<float> depth_;  ///< of each cell's nearest pixel, metres; 0: none
+  std::vector<float> depth_;  ///< depth of each cell's nearest pixel, metres; 0: no depth
   std::vector<label> label_;
   std::vector<step> open_;
   std::vector<detail::removed_cell> removed_;

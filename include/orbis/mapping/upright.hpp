@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The upward direction in a depth image, so that a map can begin upright.
+/// The upward direction in a depth image, so that a map can start gravity-aligned.
 ///
 /// @code
 ///   const mapping::upright_view view = mapping::find_upright(frame.depth_metres(), camera::ray_table{camera});
@@ -32,11 +32,11 @@ namespace detail {
 
 struct found_up {
   vec3 up;              ///< unit vector
-  double fixing = 0.0;  ///< weight of the normals that determine it, in the direction in which it is known least
-  double along = 0.0;   ///< weight of the normals along it
+  double fixing = 0.0;  ///< weight of the normals that determine `up`, in the direction in which it is least certain
+  double along = 0.0;   ///< weight of the normals along `up`
 };
 
-/// Weight of a normal at an angle of sine `off`; 1 at 0, and 0 at `reach` and above (Tukey's biweight).
+/// Weight of a normal at an angle with sine `off`; 1 at 0, and 0 at `reach` and above (Tukey's biweight).
 [[nodiscard]] inline double biweight(double off, double reach) noexcept {
   const double t = off / reach;
   const double u = 1.0 - t * t;
@@ -46,7 +46,7 @@ struct found_up {
 /// Weights of the normals along and across the direction `up`.
 struct up_ballot {
   double along = 0.0, across = 0.0;  ///< weights
-  mat3 spread = zeros<mat3>();       ///< of the normals across, minus that of the normals along it
+  mat3 spread = zeros<mat3>();       ///< scatter of the normals across, minus that of the normals along `up`
 
   up_ballot(std::span<const vec3> normals, const vec3& up, double reach) {
     for (const vec3& n : normals) {
@@ -62,8 +62,8 @@ struct up_ballot {
   }
 };
 
-/// The direction within `max_tilt` radians of -y that most normals are along or perpendicular to; empty if no normal
-/// is, or if rotating the direction fits equally well. O(normals), for a few thousand directions.
+/// The direction within `max_tilt` radians of -y that most normals are along or perpendicular to; empty if there is no
+/// such normal, or if a rotated direction fits equally well. O(normals) for each of a few thousand directions.
 [[nodiscard]] inline std::optional<found_up> vote_for_up(std::span<const vec3> normals, double max_tilt) {
   constexpr double degree = std::numbers::pi / 180.0;
   const double wide = std::sin(10.0 * degree);
@@ -114,13 +114,13 @@ struct up_ballot {
 namespace detail {
 
 struct planar_blocks {
-  std::vector<vec3> normals;   ///< of the flat blocks, in the camera frame, towards the camera
-  std::size_t with_depth = 0;  ///< blocks with depth in most pixels, flat or not
+  std::vector<vec3> normals;   ///< normals of the flat blocks, in the camera frame, towards the camera
+  std::size_t with_depth = 0;  ///< number of blocks with depth in most pixels, flat or not
 };
 
 /// Fits a plane to each block of a grid of about 27 by 20 blocks. On a plane `n . p = 1` the inverse depth is linear in
-/// the ray: `1 / z = n . (x, y, 1)`. Blocks whose inverse depths deviate by more than a few thousandths, two percent at
-/// far range, are not flat: the noise of depth grows with depth.
+/// the ray: `1 / z = n . (x, y, 1)`. Blocks whose inverse depths deviate by more than a few thousandths, or by 2 % at
+/// long range, are not flat; the threshold grows with depth because the depth noise does.
 template <camera::depth_source Depth>
 [[nodiscard]] planar_blocks find_planar_blocks(const Depth& depth, const camera::ray_table& rays) {
   constexpr int blocks_across = 27;
@@ -167,12 +167,12 @@ template <camera::depth_source Depth>
 
 }  // namespace detail
 
-/// Source of the upward direction.
+/// Information from which the upward direction was determined.
 enum class upright_source {
   gravity,  ///< measured, and passed by the caller
   floor,    ///< a floor, tables or a ceiling in the depth image, with or without walls
   walls,    ///< at least two walls in different directions, and too little floor
-  assumed   ///< none: the camera is assumed to be level, its -y axis up
+  assumed   ///< no information: the camera is assumed to be level, its -y axis up
 };
 
 /// The name of a source: "gravity", "floor", "walls", "assumed".
@@ -207,8 +207,8 @@ struct upright_view {
 };
 
 /// The rotation to a world with z up in which x is the horizontal part of the viewing direction; `up_camera`: a unit
-/// vector in the camera frame. For a camera that looks straight up or down, x is the direction of the top of its image,
-/// or of the bottom.
+/// vector in the camera frame. For a camera that looks straight down, x points to the top of its image; straight up, to
+/// the bottom.
 [[nodiscard]] inline so3 upright_rotation(const vec3& up_camera) {
   vec3 ahead = vec3(0.0, 0.0, 1.0) - up_camera.z() * up_camera;
   if (norm(ahead) < 1e-3) {
@@ -219,14 +219,14 @@ struct upright_view {
   return so3{rows(ahead, cross(up_camera, ahead), up_camera)};
 }
 
-/// The upright world of a depth image: from gravity if it is given, otherwise from planes.
+/// Finds the upright world of a depth image: from gravity if it is given, otherwise from planes.
 ///
 /// Planes are fitted to a few hundred blocks of a grid, in inverse depth, where a plane is linear and the noise of a
 /// disparity sensor is uniform. Each block votes for the directions along its normal (a floor, a table, a ceiling) and
 /// perpendicular to it (a wall); directions beyond `max_tilt` are excluded, and those far from the camera's -y axis
 /// have less weight. The best direction is refined by least squares over the blocks that agree: the eigenvector of the
 /// smallest eigenvalue of `sum(wall normals n n^T) - sum(floor normals n n^T)`. If the image does not determine a
-/// direction (nothing flat, one wall only), the camera is assumed to be level, and `source` is `assumed`.
+/// direction (no flat surface, or only one wall), the camera is assumed to be level, and `source` is `assumed`.
 ///
 /// The voting of normals for an orthogonal frame is based on J. Straub, O. Freifeld, G. Rosman, J. J. Leonard, J. W.
 /// Fisher III, "The Manhattan frame model: Manhattan world inference in the space of surface normals", T-PAMI 40, 2018;

@@ -3,15 +3,16 @@
 /// Lossless compression of 16-bit depth images.
 ///
 /// A. D. Wilson, "Fast lossless depth image compression", ISS 2017 (RVL): run lengths and, between the runs, folded
-/// differences, written in groups of bits, each with a bit that indicates whether the number continues. In RVL, runs
-/// consist of pixels without depth, and the prediction of a pixel is the previous one. Here
+/// differences, written in groups of bits, each with a bit that indicates whether another group follows. In RVL, runs
+/// consist of pixels without depth, and a pixel is predicted by the previous one. In this codec,
 ///
 /// - a pixel is coded by its *rank* among the distinct depths of the image. A depth camera that measures disparity has
-///   only a few hundred of them, centimetres apart at far range: ranks turn the sensor's steps into equal ones.
-/// - the prediction uses the three pixels above and before it, as in M. J. Weinberger, G. Seroussi, G. Sapiro, "The
-///   LOCO-I lossless image compression algorithm", IEEE Transactions on Image Processing 9(8), 2000, section III.A.
+///   only a few hundred of them, centimetres apart at long range; in ranks, all steps of the sensor are equal.
+/// - the prediction of a pixel uses the adjacent pixels to the west, north and north-west, as in M. J. Weinberger, G.
+///   Seroussi, G. Sapiro, "The LOCO-I lossless image compression algorithm", IEEE Transactions on Image Processing
+///   9(8), 2000, section III.A.
 /// - a run consists of pixels, with depth or without (0), that equal their prediction.
-/// - a group has one bit of a run, or two of a difference, because both are small.
+/// - a group has one bit for a run and two bits for a difference, because both numbers are small.
 #pragma once
 
 #include <algorithm>
@@ -29,17 +30,17 @@
 
 namespace orbis::mapping::detail {
 
-/// Coding of the pixels of a compressed image: its first byte.
+/// Coding of the pixels, stored in the first byte of a compressed image.
 enum class depth_coding : std::uint8_t {
   plain,  ///< two bytes each, little-endian: images that do not compress
   runs    ///< the number of distinct depths, the steps between them, then alternating runs and differences
 };
 
-/// The predicted rank of a pixel from the ranks of its neighbours to the west, north and north-west. 0: no depth.
+/// Predicts the rank of a pixel from the ranks of its neighbours to the west, north and north-west. 0: no depth.
 [[nodiscard]] inline std::int32_t expected_rank(std::int32_t west, std::int32_t north,
                                                 std::int32_t north_west) noexcept {
   if (west == 0 || north == 0 || north_west == 0) return west != 0 ? west : north;
-  // Values instead of std::clamp's references, so that the compiler emits no branch: it would be unpredictable.
+  // Uses values, not std::clamp's references, so that the compiler emits no branch, which would be unpredictable.
   const std::int32_t low = west < north ? west : north, high = west < north ? north : west;
   const std::int32_t plane = west + north - north_west, above = plane < low ? low : plane;
   return above < high ? above : high;
@@ -70,7 +71,7 @@ class group_writer {
   }
   /// Returns true if the buffer was too small; in that case the output is incomplete.
   [[nodiscard]] bool is_full() const noexcept { return full_; }
-  /// End of the written bytes.
+  /// Writes the remaining bits. Returns the end of the written bytes.
   [[nodiscard]] std::byte* finish() noexcept {
     const std::ptrdiff_t bytes = (used_ + 7) / 8;
     bits_ <<= 32U - used_;
@@ -96,7 +97,7 @@ class group_writer {
 class group_reader {
  public:
   explicit group_reader(std::span<const std::byte> from) noexcept : from_{from} {}
-  /// The next number; zeros after the end.
+  /// Returns the next number; zeros after the end of the data.
   template <unsigned Bits>
   [[nodiscard]] std::uint32_t get() noexcept {
     std::uint32_t value = 0, group = 0;
@@ -137,7 +138,7 @@ inline constexpr unsigned run_bits = 1, step_bits = 2;
 /// Compresses depth images. Reuses its buffers, about 2 bytes per pixel and 130 kB.
 class depth_encoder {
  public:
-  /// The compressed image, valid until the next call; at most 1 byte longer than the pixels. Linear.
+  /// Returns the compressed image, valid until the next call; at most 1 byte longer than the pixels. Linear.
   [[nodiscard]] std::span<const std::byte> encode(image_view<const std::uint16_t> depth) {
     const std::size_t plain =
         1 + 2 * static_cast<std::size_t>(depth.width()) * static_cast<std::size_t>(depth.height());
@@ -150,13 +151,13 @@ class depth_encoder {
     return out.first(plain);
   }
 
-  /// Bytes on the heap.
+  /// Heap memory in bytes.
   [[nodiscard]] std::size_t bytes() const noexcept {
     return out_.capacity() + (rank_of_.capacity() + above_.capacity() + here_.capacity()) * sizeof(std::uint16_t);
   }
 
  private:
-  /// Number of bytes written; 0: `out` is too small.
+  /// Returns the number of bytes written, 0 if `out` is too small.
   [[nodiscard]] std::size_t write_runs(image_view<const std::uint16_t> depth, std::span<std::byte> out) {
     out[0] = static_cast<std::byte>(depth_coding::runs);
     group_writer to{out.subspan(1)};
@@ -164,7 +165,7 @@ class depth_encoder {
     above_.assign(static_cast<std::size_t>(depth.width()), 0);
     here_ = above_;
     std::uint32_t run = 0;
-    std::int32_t last = 0;  // last value written
+    std::int32_t last = 0;  // value written last
     for (int y = 0; y != depth.height() && !to.is_full(); ++y, above_.swap(here_)) {
       const std::uint16_t *const from = depth.row(y).data(), *const above = above_.data();
       std::uint16_t* const here = here_.data();
@@ -223,17 +224,17 @@ class depth_encoder {
 /// Decompresses depth images. Reuses its buffers: two bytes for each distinct depth, and 4 bytes per column.
 class depth_decoder {
  public:
-  /// Decompresses the image into `out`, which has its size. Error: malformed; `out` is then unspecified. Safe for any
-  /// bytes. Linear.
+  /// Decompresses an image into `out`, which must have the size of the image. Error: malformed; the content of `out` is
+  /// then unspecified. Safe for any input bytes. Linear.
   [[nodiscard]] result<void> decode(std::span<const std::byte> bytes, image_view<std::uint16_t> out) {
-    if (bytes.empty()) return damaged("it has no bytes");
+    if (bytes.empty()) return damaged("is empty");
     const auto coding = static_cast<depth_coding>(bytes.front());
     bytes = bytes.subspan(1);
     if (coding == depth_coding::plain) return read_plain(bytes, out);
-    if (coding != depth_coding::runs) return damaged("its coding is unknown");
-    if (out.empty()) return damaged("its length is wrong");  // an image without pixels is written plain
+    if (coding != depth_coding::runs) return damaged("has an unknown coding");
+    if (out.empty()) return damaged("has the wrong length");  // an image without pixels is stored as `plain`
     group_reader from{bytes};
-    if (!read_depths(from)) return damaged("its list of depths is wrong");
+    if (!read_depths(from)) return damaged("has an invalid list of depths");
     return read_runs(from, out);
   }
 
@@ -244,7 +245,7 @@ class depth_decoder {
 
   [[nodiscard]] static result<void> read_plain(std::span<const std::byte> bytes, image_view<std::uint16_t> out) {
     const auto columns = static_cast<std::size_t>(out.width());
-    if (bytes.size() != 2 * columns * static_cast<std::size_t>(out.height())) return damaged("its length is wrong");
+    if (bytes.size() != 2 * columns * static_cast<std::size_t>(out.height())) return damaged("has the wrong length");
     for (int y = 0; y != out.height(); ++y)
       for (std::uint16_t& v : out.row(y)) {
         v = static_cast<std::uint16_t>(std::to_integer<unsigned>(bytes[0]) | std::to_integer<unsigned>(bytes[1]) << 8U);
@@ -299,7 +300,7 @@ class depth_decoder {
       }
       for (int x = 0; x != out.width(); ++x) to[x] = depths_[here[x]];
     }
-    if (run != 0 || !from.is_at_end()) return damaged("it has too few or too many bytes for its pixels");
+    if (run != 0 || !from.is_at_end()) return damaged("has too few or too many bytes for its pixels");
     return {};
   }
 
@@ -307,7 +308,7 @@ class depth_decoder {
   std::vector<std::uint16_t> above_, here_;  // ranks of two rows
 };
 
-/// The zeros of an image: lengths of alternating runs of other pixels and of zeros, row by row. O(pixels).
+/// Encodes the zeros of an image: lengths of alternating runs of nonzero and zero pixels, row by row. O(pixels).
 [[nodiscard]] inline std::vector<std::byte> encode_zeros(image_view<const std::uint16_t> image) {
   std::vector<std::uint32_t> runs(1, 0);
   bool is_zero = false;
@@ -326,7 +327,8 @@ class depth_decoder {
   out.shrink_to_fit();
   return out;
 }
-/// Sets the pixels of an image of the same size to 0 that were 0 in the image of `zeros`. O(pixels).
+/// Sets to 0 the pixels that were 0 in the image from which `zeros` was encoded. O(pixels). @pre the images have the
+/// same size
 inline void set_zeros(std::span<const std::byte> zeros, image_view<std::uint16_t> image) {
   if (zeros.empty()) return;
   group_reader from{zeros};

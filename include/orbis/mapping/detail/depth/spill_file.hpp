@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A file for data beyond the memory budget. It is unlinked as soon as it is open, so nothing of it remains, however
-/// the program ends.
+/// A file for data beyond the memory budget. It is unlinked as soon as it is open, so it never outlives the program,
+/// even after a crash.
 #pragma once
 
 #include <algorithm>
@@ -31,7 +31,7 @@ namespace orbis::mapping::detail {
 /// Unused ranges of a file; adjacent ones are joined.
 class free_ranges {
  public:
-  /// Allocates a range of `size` bytes and returns its start: a hole in which it fits, otherwise the end of the file.
+  /// Allocates a range of `size` bytes and returns its start: in a large enough hole, otherwise at the end of the file.
   [[nodiscard]] std::uint64_t take(std::uint64_t size) {
     for (auto hole = holes_.begin(); hole != holes_.end(); ++hole) {
       if (hole->second < size) continue;
@@ -69,8 +69,8 @@ class free_ranges {
   std::uint64_t end_ = 0;
 };
 
-/// Records of bytes in a nameless file, each with a checksum in memory. Any number of threads may read concurrently
-/// while none writes.
+/// Byte records in an unlinked temporary file, with their checksums in memory. Any number of threads may read
+/// concurrently while no thread writes.
 class spill_file {
  public:
   struct record {
@@ -144,7 +144,7 @@ class spill_file {
     const std::uint64_t end = ranges_.end();
     ranges_.give(r.start, r.size);
 #ifdef ORBIS_HAS_POSIX_FILES
-    // Returns space to the disk; if that fails, later records reuse it.
+    // Return space to the file system; if that fails, later records reuse it.
     if (ranges_.end() < end) static_cast<void>(::ftruncate(file_, static_cast<::off_t>(ranges_.end())) == 0);
 #else
     static_cast<void>(end);

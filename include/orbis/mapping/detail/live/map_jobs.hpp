@@ -24,7 +24,7 @@ struct map_job {
   kind_type kind = keyframe;
   std::uint64_t frame = 0;
   std::uint64_t keyframe_of = 0;
-  se3 T{};  ///< T_world_camera of a keyframe, T_keyframe_camera of a frame between
+  se3 T{};  ///< T_world_camera of a keyframe, T_keyframe_camera of a frame between keyframes
   image<std::uint16_t> pixels{};
   double scale = 1.0;
   float min_depth = 0.0F, max_depth = 0.0F;
@@ -35,8 +35,8 @@ struct map_job {
   [[nodiscard]] bool has_image() const noexcept { return kind <= between; }
 };
 
-/// A queue. Bounding the number of images in it bounds the queue: between two images, at most one pose per keyframe is
-/// kept, and at most one removal.
+/// A job queue. A bound on the number of images bounds the whole queue: between two images, it holds at most one pose
+/// and one removal per keyframe.
 class map_jobs {
  public:
   [[nodiscard]] bool empty() const noexcept { return jobs_.empty(); }
@@ -44,8 +44,9 @@ class map_jobs {
   /// Number of jobs with an image.
   [[nodiscard]] std::size_t images() const noexcept { return images_; }
 
-  /// Appends a job. Poses are merged into waiting poses at the end of the queue (only removals may come after those),
-  /// and a removal that is waiting is not added again: the resulting map is the same. O(poses log poses).
+  /// Appends a job. Poses are merged into poses already waiting at the end of the queue (only removals may follow
+  /// them), and a removal that is already waiting is not added again; the resulting map is the same. O(poses log
+  /// poses).
   void push(map_job j) {
     if (j.kind == map_job::positions || j.kind == map_job::removal)
       for (auto at = jobs_.rbegin(); at != jobs_.rend(); ++at) {
@@ -93,7 +94,7 @@ class map_jobs {
  private:
   /// Sets `earlier` to the combined effect of `earlier` followed by `later`.
   static void merge(map_job& earlier, map_job later) {
-    if (later.others == unlisted::hide) {  // names all keyframes: replaces everything before
+    if (later.others == unlisted::hide) {  // lists all keyframes: replaces all earlier poses
       earlier.poses = std::move(later.poses);
       earlier.others = unlisted::hide;
       return;

@@ -18,13 +18,13 @@
 
 namespace orbis::mapping::detail {
 
-/// A pyramid with eight sides around all rays of a camera, in the camera frame: its corners at z = 1.
+/// An eight-sided pyramid around all rays of a camera, stored as its corners at z = 1 in the camera frame.
 class view_frustum {
  public:
   /// Encloses the rays of all pixels. O(pixels).
   template <camera::camera_model Camera>
   explicit view_frustum(const Camera& camera) {
-    // Every pixel: border pixels of a fisheye image may have no ray.
+    // All pixels, not only those at the border, which may have no ray in a fisheye image.
     for (int v = 0; v != camera.height(); ++v)
       for (int u = 0; u != camera.width(); ++u)
         if (const auto ray = camera.unproject(vec2{u, v})) include(ray->template head<2>());
@@ -36,15 +36,15 @@ class view_frustum {
     close();
   }
 
-  /// The largest distance by which a change of the pose moves a point of the frustum from the camera to the depth
-  /// `reach` (metres along the optical axis). A change moves points by an affine function, whose norm is largest at a
-  /// corner: of the nine corners, one is the camera's centre. Infinite if the reach or a pose is not finite. O(1).
+  /// Returns the largest distance by which a change of the pose moves a point of the frustum up to depth `reach`
+  /// (metres along the optical axis). The displacement is an affine function of the point, so its norm is largest at
+  /// one of the nine corners, which include the camera's centre. Infinite if the reach or a pose is not finite. O(1).
   [[nodiscard]] double displacement(const se3& T_world_before, const se3& T_world_after, double reach) const {
     double largest = norm(T_world_after.translation() - T_world_before.translation());
     for (const vec3& c : corners_) {
       const vec3 far = reach * c;
       const double moved = norm(T_world_after * far - T_world_before * far);
-      if (!std::isfinite(moved)) return std::numeric_limits<double>::infinity();  // a maximum would drop NaN
+      if (!std::isfinite(moved)) return std::numeric_limits<double>::infinity();  // std::max would drop NaN
       largest = std::max(largest, moved);
     }
     return largest;
@@ -61,8 +61,8 @@ class view_frustum {
   /// Extends the pyramid to a ray: x and y at z = 1.
   void include(vec2 ray) {
     if (!all_finite(ray)) return;
-    // Depth along the axis constrains rays almost perpendicular to it only weakly: rays beyond 80 degrees count as if
-    // they were at 80 degrees.
+    // Depth along the axis hardly limits the length of rays almost perpendicular to it: rays beyond 80 degrees count as
+    // if they were at 80 degrees.
     constexpr double widest = 5.67;
     const double off_axis = norm(ray);
     if (off_axis > widest) ray *= widest / off_axis;
@@ -89,7 +89,7 @@ class view_frustum {
 
 /// The largest depth of an image, metres; 0 if no pixel is valid. O(pixels).
 [[nodiscard]] inline double largest_depth(const camera::depth_view<std::uint16_t>& depth) {
-  // Depth is monotonic in the stored value: finds the largest valid stored value without a division per pixel.
+  // Depth is monotonic in the stored value, so no division per pixel is needed to find the largest valid one.
   const double most = static_cast<double>(depth.max_depth()) * depth.scale();
   std::uint16_t largest = 0;
   for (int y = 0; y != depth.height(); ++y)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A depth image in cells of 4x4 pixels, with tests of the rays of one image against another.
+/// A depth image in cells of 4x4 pixels, with tests of the rays of one image against the points of another.
 #pragma once
 
 #include <algorithm>
@@ -25,10 +25,10 @@ namespace orbis::mapping::detail {
 
 /// The cells of a camera's images, and the rays through their centres.
 struct cell_grid {
-  static constexpr int edge = 4;  ///< of a cell, pixels
+  static constexpr int edge = 4;  ///< edge of a cell, pixels
 
   int across = 0, down = 0;
-  std::vector<vec2f> rays;  ///< at z = 1; NaN if the camera has none
+  std::vector<vec2f> rays;  ///< at z = 1; NaN if the camera has no ray there
 
   template <camera::camera_model Camera>
   explicit cell_grid(const Camera& camera)
@@ -46,21 +46,22 @@ struct cell_grid {
 /// Result of comparing a point with a view: rays of the view pass through it, the view shows it, or neither.
 enum class visibility : std::uint8_t { nothing, through, shown };
 
-/// The nearest depth of each cell, which represents it; and around each corner of cells, the range of the depths in the
-/// four adjacent cells: a window of 8x8 pixels, so that a point projected a pixel or two off finds the same range.
+/// Stores the nearest depth of each cell, which represents the cell, and for each cell corner the range of depths in
+/// the four adjacent cells: a window of 8x8 pixels, so that a projection error of a pixel or two does not change the
+/// range.
 class depth_cells {
  public:
   [[nodiscard]] std::size_t size() const noexcept { return nearest_.size(); }
   /// The depth of a cell's nearest pixel, metres; 0 if it has none.
   [[nodiscard]] float depth(std::size_t cell) const noexcept { return nearest_[cell]; }
 
-  /// Reads an image. O(pixels). @pre the image is of the grid's camera
+  /// Reads an image. O(pixels). @pre the image is from the grid's camera
   template <execution_policy Policy>
   void take(const Policy& policy, const camera::depth_view<std::uint16_t>& depth, const cell_grid& grid) {
     nearest_.resize(grid.size());
     farthest_.resize(grid.size());
     measured_.resize(grid.size());
-    // Depth is monotonic in the stored value: cells are computed from stored values.
+    // Depth is monotonic in the stored value, so cells are computed from stored values.
     const double scale = depth.scale();
     const auto least =
         static_cast<std::uint16_t>(std::clamp(std::ceil(static_cast<double>(depth.min_depth()) * scale), 1.0, 65535.0));
@@ -111,9 +112,9 @@ class depth_cells {
     });
   }
 
-  /// Calls `visit(cell, visibility)` for the cells that `view` shows or looks through. `margin(z)`: tolerance for noise
-  /// at that depth, metres; `slant`: for rays that pass through, a window's range of depths times this factor is added
-  /// to the margin. O(cells).
+  /// Calls `visit(cell, visibility)` for the cells that `view` shows or whose rays pass through them. `margin(z)`:
+  /// tolerance for noise at that depth, metres; `slant`: for rays that pass through, a window's range of depths times
+  /// this factor is added to the margin. O(cells).
   template <execution_policy Policy, camera::camera_model Camera, class Margin, class Visit>
   void ask(const Policy& policy, const depth_cells& view, const cell_grid& grid, const Camera& camera,
            const se3& T_view_this, float slant, const Margin& margin, const Visit& visit) const {
@@ -138,11 +139,11 @@ class depth_cells {
 
  private:
   struct window {
-    float nearest = 0.0F, farthest = -1e9F;  // metres; without any depth the range is empty
-    bool covered = false;                    // most of its pixels have a depth
+    float nearest = 0.0F, farthest = -1e9F;  // metres; the range is empty if there is no depth
+    bool covered = false;                    // true if most of its pixels have a depth
   };
 
-  /// The window around the point's pixel; null if it is not in the image.
+  /// Returns the window around the point's pixel; null if the pixel is outside the image.
   template <camera::camera_model Camera>
   [[nodiscard]] const window* window_at(const cell_grid& grid, const Camera& camera,
                                         const std::array<float, 3>& p) const {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Detects cells of the last keyframes' depth images that show moved objects, by the rays of the other keyframes.
+/// Detects cells in the last keyframes' depth images that show moved objects, using the rays of the other keyframes.
 #pragma once
 
 #include <algorithm>
@@ -28,7 +28,7 @@ namespace orbis::mapping::detail {
 /// A cell that is removed from a depth image.
 struct removed_cell {
   std::uint32_t cell = 0;
-  float depth = 0.0F;  ///< of its nearest pixel, metres
+  float depth = 0.0F;  ///< depth of its nearest pixel, metres
 };
 
 /// Sets the pixels of these cells to 0 in `pixels`, a copy of the stored values of `depth`, and those pixels of
@@ -45,7 +45,7 @@ std::size_t remove_cells(const Depth& depth, const std::vector<removed_cell>& ce
     const int x0 = (static_cast<int>(c.cell) % across - 1) * edge, y0 = (static_cast<int>(c.cell) / across - 1) * edge;
     for (int y = std::max(0, y0); y < std::min(depth.height(), y0 + 3 * edge); ++y)
       for (int x = std::max(0, x0); x < std::min(depth.width(), x0 + 3 * edge); ++x) {
-        // Where a surface is oblique, the other pixels of a cell are well behind the nearest one.
+        // On an oblique surface, the other pixels of a cell are much farther away than the nearest one.
         const bool own = x >= x0 + edge && x < x0 + 2 * edge && y >= y0 + edge && y < y0 + 2 * edge;
         const float z = depth(x, y);
         if (!(z >= low && z <= (own ? own_high : high)) || pixels(x, y) == 0) continue;
@@ -56,7 +56,7 @@ std::size_t remove_cells(const Depth& depth, const std::vector<removed_cell>& ce
   return removed;
 }
 
-/// The last keyframes, and the evidence of their rays about each other. See moving_filter.
+/// The last keyframes, and the evidence that their rays provide about each other. See moving_filter.
 template <camera::camera_model Camera>
 class moving_judge {
  public:
@@ -70,9 +70,9 @@ class moving_judge {
     depth_cells cells;
     std::vector<std::uint8_t> through;  ///< number of other views whose rays pass through each cell
     std::vector<std::uint8_t> shown;    ///< number of other views that show the cell as well
-    std::vector<std::uint8_t> removed;  ///< 1: removed, as of the last call of `accept`
-    bool due = false;                   ///< it has not been compared with the newest view
-    bool unjudged = false;              ///< evidence has arrived since its last evaluation
+    std::vector<std::uint8_t> removed;  ///< 1: removed by the verdict of the last call to `accept`
+    bool due = false;                   ///< true if it has not been compared with the newest view
+    bool unjudged = false;              ///< true if evidence has arrived since the last evaluation
 
     [[nodiscard]] depth_view depth() const { return depth_view{pixels.view(), scale, min_depth, max_depth}; }
     [[nodiscard]] std::vector<removed_cell> removed_cells() const {
@@ -91,8 +91,9 @@ class moving_judge {
   }
 
   /// Adds a keyframe, in place of the oldest if the window is full, and compares the others with it: `pose_of(view)`
-  /// returns their poses, or none. The other views are due afterwards, see ask_newest. The same for every policy.
-  /// O(pixels + cells x keyframes). @pre a finite pose; depth has the camera's size; no other view is due
+  /// returns the pose of a view, if it has one. The other views are due afterwards, see ask_newest. The result is the
+  /// same for every policy. O(pixels + cells x keyframes). @pre the pose is finite; depth has the camera's size; no
+  /// other view is due
   template <execution_policy Policy, class PoseOf>
   view& add(const Policy& policy, std::uint64_t frame, const depth_view& depth, const se3& T_world_camera,
             const PoseOf& pose_of) {
@@ -116,7 +117,7 @@ class moving_judge {
     }
     return now;
   }
-  /// Compares the newest keyframe with another view, if that is due. O(cells).
+  /// Compares the newest keyframe with another view, if the comparison is due. O(cells).
   template <execution_policy Policy, class PoseOf>
   void ask_newest(const Policy& policy, view& about, const PoseOf& pose_of) {
     if (!std::exchange(about.due, false)) return;
@@ -124,8 +125,8 @@ class moving_judge {
     const std::optional<se3> by = pose_of(newest), of = pose_of(std::as_const(about));
     if (by && of) ask(policy, about, newest, by->inverse() * *of);
   }
-  /// Evaluates a view by the current evidence; returns the number of cells that differ from the last accepted verdict.
-  /// O(cells).
+  /// Evaluates a view using the current evidence; returns the number of cells that differ from the last accepted
+  /// verdict. O(cells).
   [[nodiscard]] std::size_t judge(view& v) {
     v.unjudged = false;
     const int across = grid_.across, down = grid_.down;
@@ -138,7 +139,7 @@ class moving_judge {
       for (int x = 0; x != across; ++x) {
         const auto i = static_cast<std::size_t>(y * across + x);
         if (passed(i)) {
-          // A single cell is noise, or the edge of an object.
+          // A single cell may be noise or the edge of an object.
           int beside = 0;
           for (int dy = -1; dy <= 1; ++dy)
             for (int dx = -1; dx <= 1; ++dx)
@@ -153,7 +154,7 @@ class moving_judge {
     for (std::size_t i = 0; i != verdict_.size(); ++i) differ += verdict_[i] != v.removed[i] ? 1 : 0;
     return differ;
   }
-  /// Accepts the last verdict, which is about this view.
+  /// Accepts the last verdict. @pre it is about this view
   void accept(view& v) const { v.removed = verdict_; }
   /// The view's depth image without the removed cells. Valid until the next call.
   [[nodiscard]] depth_view masked(const view& v) {
@@ -176,7 +177,7 @@ class moving_judge {
   [[nodiscard]] const moving_filter_options& options() const noexcept { return options_; }
 
  private:
-  /// A view for a new keyframe, in the memory of the oldest if the window is full.
+  /// Returns a view for a new keyframe, which reuses the memory of the oldest view if the window is full.
   [[nodiscard]] view& make_view() {
     view next;
     if (views_.size() == options_.keyframes) {
@@ -207,7 +208,8 @@ class moving_judge {
     else
       with_model(camera_);
   }
-  /// Removes the cells adjacent to removed ones, if they are of the same surface and the evidence does not keep them.
+  /// Removes the cells adjacent to removed ones if they belong to the same surface and the evidence does not support
+  /// them.
   void grow(const view& v) {
     const int across = grid_.across, down = grid_.down;
     grown_.clear();
@@ -231,7 +233,7 @@ class moving_judge {
   cell_grid grid_;
   std::deque<view> views_;
   std::vector<view> spare_;
-  std::vector<std::uint8_t> verdict_;  ///< the last one computed
+  std::vector<std::uint8_t> verdict_;  ///< verdict computed last
   std::vector<std::size_t> grown_;
   image<std::uint16_t> masked_;
 };

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Moved objects in keyframes that are traversed once, in order.
+/// Detection of moved objects in keyframes that are traversed once, in order.
 #pragma once
 
 #include <cassert>
@@ -23,8 +23,8 @@
 
 namespace orbis::mapping::detail {
 
-/// A depth image in the form that moving_judge reads: itself, or a copy in quarters of a millimetre, without depths
-/// beyond 16 m. `copy` stores the pixels.
+/// Returns a depth image in the format that moving_judge reads: the image itself, or a copy in units of 0.25 mm,
+/// excluding depths beyond 16 m. `copy` stores the pixels.
 template <camera::depth_source Depth>
 [[nodiscard]] camera::depth_view<std::uint16_t> stored_depths(const Depth& depth, image<std::uint16_t>& copy) {
   if constexpr (std::same_as<Depth, camera::depth_view<std::uint16_t>>) {
@@ -42,8 +42,9 @@ template <camera::depth_source Depth>
   }
 }
 
-/// Delays keyframes until those before and after have been compared with them, and returns them in order, together with
-/// the cells that show moved objects: at most `options.keyframes` + 1 are kept. Without options, none is evaluated.
+/// Delays keyframes until the keyframes before and after have been compared with them, and returns them in order,
+/// together with the cells that show moved objects. Keeps at most `options.keyframes` + 1 keyframes. Without options,
+/// no keyframe is evaluated.
 template <camera::camera_model Camera, keyframe_like Keyframe>
 class moving_window {
  public:
@@ -79,7 +80,7 @@ class moving_window {
       for (auto& view : judge_->views())
         if (!at(view.frame).is_judged) record_verdict(view);
   }
-  /// The next keyframe with a final verdict, if there is one.
+  /// Returns the next keyframe with a final verdict, if there is one.
   [[nodiscard]] std::optional<judged_keyframe> pop() {
     if (kept_.empty() || !kept_.front().is_judged) return std::nullopt;
     judged_keyframe out = std::move(kept_.front().item);
