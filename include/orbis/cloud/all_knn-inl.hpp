@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Definitions of the functions in all_knn.hpp.
+/// Implementation of all_knn.hpp.
 #pragma once
 
 #include <algorithm>

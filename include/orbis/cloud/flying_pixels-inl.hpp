@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Definitions of the functions in flying_pixels.hpp.
+/// Implementation of flying_pixels.hpp.
 #pragma once
 
 #include <algorithm>

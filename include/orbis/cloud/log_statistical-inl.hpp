@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Definitions of the functions in log_statistical.hpp.
+/// Implementation of log_statistical.hpp.
 #pragma once
 
 #include <algorithm>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Definitions of the functions in radius.hpp.
+/// Implementation of radius.hpp.
 #pragma once
 
 #include <algorithm>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Definitions of the functions in ray_evidence.hpp.
+/// Implementation of ray_evidence.hpp.
 #pragma once
 
 #include <ranges>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Definitions of the functions in statistical.hpp.
+/// Implementation of statistical.hpp.
 #pragma once
 
 #include <algorithm>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Definitions of the functions in voxel_grid.hpp.
+/// Implementation of voxel_grid.hpp.
 #pragma once
 
 #include <orbis/cloud/detail/voxels/fold_voxels.hpp>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Function definitions of bal.hpp.
+/// Implementation of bal.hpp.
 #pragma once
 
 #include <charconv>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Function definitions of camera_file.hpp.
+/// Implementation of camera_file.hpp.
 #pragma once
 
 #include <algorithm>

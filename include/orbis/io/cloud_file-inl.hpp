@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Function definitions of cloud_file.hpp.
+/// Implementation of cloud_file.hpp.
 #pragma once
 
 #include <algorithm>

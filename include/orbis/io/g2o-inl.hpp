@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Function definitions of g2o.hpp.
+/// Implementation of g2o.hpp.
 #pragma once
 
 #include <charconv>

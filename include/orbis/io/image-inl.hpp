@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Function definitions of image.hpp.
+/// Implementation of image.hpp.
 #pragma once
 
 #include <orbis/core/file.hpp>

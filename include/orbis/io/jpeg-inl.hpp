@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Function definitions of jpeg.hpp.
+/// Implementation of jpeg.hpp.
 #pragma once
 
 #include <cassert>

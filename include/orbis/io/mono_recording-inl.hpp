@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Function definitions of mono_recording.hpp.
+/// Implementation of mono_recording.hpp.
 #pragma once
 
 #include <cassert>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Function definitions of pcd.hpp.
+/// Implementation of pcd.hpp.
 #pragma once
 
 #include <algorithm>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Function definitions of ply.hpp.
+/// Implementation of ply.hpp.
 #pragma once
 
 #include <algorithm>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Function definitions of png.hpp.
+/// Implementation of png.hpp.
 #pragma once
 
 #include <bit>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Function definitions of recording.hpp.
+/// Implementation of recording.hpp.
 #pragma once
 
 #include <cassert>

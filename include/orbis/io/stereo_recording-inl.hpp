@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Function definitions of stereo_recording.hpp.
+/// Implementation of stereo_recording.hpp.
 #pragma once
 
 #include <algorithm>

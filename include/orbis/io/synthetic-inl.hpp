@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Function definitions of synthetic.hpp.
+/// Implementation of synthetic.hpp.
 #pragma once
 
 #include <cassert>

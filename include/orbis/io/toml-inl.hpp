@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Function definitions of toml.hpp.
+/// Implementation of toml.hpp.
 #pragma once
 
 #include <algorithm>

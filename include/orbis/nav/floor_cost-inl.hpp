@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Function definitions of floor_cost.hpp.
+/// Implementation of floor_cost.hpp.
 #pragma once
 
 #include <algorithm>

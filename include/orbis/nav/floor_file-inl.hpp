@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Function definitions of floor_file.hpp.
+/// Implementation of floor_file.hpp.
 #pragma once
 
 #include <array>

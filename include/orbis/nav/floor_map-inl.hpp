@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Function definitions of floor_map.hpp.
+/// Implementation of floor_map.hpp.
 #pragma once
 
 #include <algorithm>

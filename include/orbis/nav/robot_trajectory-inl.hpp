@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Function definitions of robot_trajectory.hpp.
+/// Implementation of robot_trajectory.hpp.
 #pragma once
 
 #include <limits>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Function definitions of squared_distances.hpp.
+/// Implementation of squared_distances.hpp.
 #pragma once
 
 #include <cmath>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Definitions of the functions in files.hpp.
+/// Implementation of files.hpp.
 #pragma once
 
 #include <algorithm>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Definitions of the functions in occupancy_octree.hpp.
+/// Implementation of occupancy_octree.hpp.
 #pragma once
 
 #include <orbis/octree/detail/mark/point_integrator.hpp>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Definitions of the functions in scan.hpp.
+/// Implementation of scan.hpp.
 #pragma once
 
 #include <algorithm>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Definitions of the functions in scan_history.hpp.
+/// Implementation of scan_history.hpp.
 #pragma once
 
 #include <algorithm>
