@@ -3,6 +3,7 @@
 // Start and end of a program: exit codes, errors in one line, and no exception or signal that ends it without them.
 #pragma once
 
+#include <cmath>
 #include <csignal>
 #include <cstdio>
 #include <exception>
@@ -39,6 +40,11 @@ namespace examples {
 [[nodiscard]] inline std::optional<int> parse(CLI::App& cli, int argc, char** argv) {
   try {
     cli.parse(argc, argv);
+    for (const CLI::Option* option : cli.get_options())  // CLI11's limits are comparisons, which NaN passes
+      if (option->get_type_name().starts_with("FLOAT"))
+        for (const std::string& text : option->results())
+          if (double value = 0; CLI::detail::lexical_cast(text, value) && std::isnan(value))
+            throw CLI::ValidationError{option->get_name(), orbis::in_quotes(text) + " is not a number"};
     return std::nullopt;
   } catch (const CLI::ParseError& e) {
     if (e.get_exit_code() == 0) return cli.exit(e);
