@@ -6,6 +6,8 @@
 #include <malloc.h>
 #endif
 
+#include <opencv2/core.hpp>
+
 #include "../common/memory.hpp"
 #include "../common/program.hpp"
 #include "command_line.hpp"
@@ -24,6 +26,11 @@ void set_up_memory() {
   mallopt(M_TRIM_THRESHOLD, 8 << 20);
   mallopt(M_ARENA_MAX, 2);
 #endif
+  // OpenCV reports a lack of memory by an exception of its own.
+  cv::redirectError([](int status, const char*, const char*, const char*, int, void*) {
+    if (status == cv::Error::StsNoMem) throw std::bad_alloc{};
+    return 0;
+  });
 }
 
 }  // namespace
