@@ -11,7 +11,9 @@
 #include <thread>
 #include <utility>
 
+#include <poll.h>
 #include <pthread.h>
+#include <unistd.h>
 
 namespace app::interrupts {
 namespace {
@@ -58,6 +60,14 @@ sigset_t watched() {
   for (;;) std::raise(signal);
 }
 
+/// Prints on standard error unless that would block, as it does for a pipe that nobody reads: further signals must be
+/// handled. A stream's lock may be held by a thread that is blocked, so that no stream is used.
+void print_without_blocking(const std::string& text) {
+  pollfd out{STDERR_FILENO, POLLOUT, 0};
+  if (::poll(&out, 1, 0) == 1 && (out.revents & POLLOUT) != 0)
+    static_cast<void>(!::write(STDERR_FILENO, text.data(), text.size()));
+}
+
 [[noreturn]] void wait_for_signals(const sigset_t& set) {
   // `timeout` sends its signal to its child and then to the whole group: the same signal twice within a tenth of a
   // second counts once.
@@ -73,8 +83,7 @@ sigset_t watched() {
       s.first = signal;
       s.first_at = now;
       if (s.is_dispensable) s.give_up_at = now;
-      std::fputs(s.notice.c_str(), stderr);
-      std::fflush(stderr);
+      print_without_blocking(s.notice);
       if (s.on_stop) s.on_stop();
       continue;
     }

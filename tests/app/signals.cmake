@@ -84,6 +84,20 @@ check(seconds LESS 12)
 must_exist(${WORK}/live trajectory.txt summary.json report.html)
 must_not_be_half_written(${WORK}/live)
 
+# Nobody reads the messages, and the pipe is full: the second signal still ends the run.
+execute_process(COMMAND bash -c "
+  ( head -c 65236 /dev/zero >&2; exec '${APP}' run room --out unread --resolution 0.1 ) 2> >(sleep 30) >/dev/null &
+  run=$!
+  for i in $(seq 500); do ls -A unread 2>/dev/null | grep -q rgbd_slam && break; sleep 0.02; done
+  sleep 1
+  kill -INT $run; sleep 0.3; kill -INT $run
+  for i in $(seq 100); do kill -0 $run 2>/dev/null || exit 0; sleep 0.1; done
+  kill -9 $run
+  exit 1" WORKING_DIRECTORY ${WORK} RESULT_VARIABLE code OUTPUT_QUIET ERROR_QUIET)
+check(code EQUAL 0)
+file(GLOB hidden ${WORK}/unread/.rgbd_slam-*)
+check(NOT hidden)
+
 # Too little memory for the map.
 execute_process(COMMAND bash -c "ulimit -v 200000 && \"${APP}\" --help" RESULT_VARIABLE result OUTPUT_QUIET ERROR_QUIET)
 if(result EQUAL 0)
@@ -95,5 +109,18 @@ if(result EQUAL 0)
     must_exist(${WORK}/small${how} trajectory.txt summary.json report.html)
     must_not_be_half_written(${WORK}/small${how})
     check(NOT EXISTS ${WORK}/small${how}/map.bt)
+  endforeach()
+  # Too little for the pictures, which OpenCV draws.
+  foreach(limit RANGE 72000 112000 8000)
+    execute_process(COMMAND bash -c "ulimit -v ${limit}; exec \"$@\"" limited ${APP} run room --frames 4 --quiet
+                            --deterministic --threads 2 --out tight_${limit}
+                    WORKING_DIRECTORY ${WORK} RESULT_VARIABLE code OUTPUT_QUIET ERROR_VARIABLE err)
+    check(NOT err MATCHES "OpenCV")
+    if(NOT code EQUAL 0)
+      check(code EQUAL 2 AND err MATCHES "^rgbd_slam: [^\n]+\n$")
+    endif()
+    if(err MATCHES "the map is missing")
+      must_exist(${WORK}/tight_${limit} trajectory.txt)
+    endif()
   endforeach()
 endif()
