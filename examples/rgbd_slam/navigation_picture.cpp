@@ -85,7 +85,15 @@ orbis::image<rgb8> draw_floor(const navigation_picture& what, const window& w, i
     return cell ? cost_color(costs((*cell)[0], (*cell)[1])) : nothing;
   });
 }
+/// The largest distance in the slice, metres: the floor counts as an obstacle.
+double largest_distance(const navigation_picture& what) {
+  constexpr double least = 0.1;  // more than the noise of the floor
+  const double reach = what.field->reach();
+  const double above_floor = what.floor != nullptr ? what.height - what.floor->floor : reach;
+  return above_floor > least ? std::min(reach, above_floor) : reach;
+}
 orbis::image<rgb8> draw_slice(const navigation_picture& what, const window& w, int width, int height) {
+  const double largest = largest_distance(what);
   return draw(w, width, height, [&](const vec2& xy) {
     const vec3 p{xy.x(), xy.y(), what.height};
     switch (what.map.state(p)) {
@@ -93,7 +101,7 @@ orbis::image<rgb8> draw_slice(const navigation_picture& what, const window& w, i
       case occupancy::unknown: return nothing;
       case occupancy::free: break;
     }
-    return distance_color(what.field->distance(p) / what.field->reach());
+    return distance_color(std::min(what.field->distance(p) / largest, 1.0));
   });
 }
 
@@ -145,8 +153,9 @@ orbis::result<void> write_navigation_picture(const navigation_picture& what, con
     x += most_across + gap;
   }
   if (what.field != nullptr) {
-    std::snprintf(text, sizeof text, "distance to obstacles at a height of %.2f m, 0 to %.1f m", what.height,
-                  what.field->reach());
+    const double largest = largest_distance(what);
+    std::snprintf(text, sizeof text, "distance to obstacles%s at a height of %.2f m, 0 to %.2f m",
+                  largest < what.field->reach() ? " and floor" : "", what.height, largest);
     panel(x, text, draw_slice(what, w, width, height), what.floor == nullptr || !what.drives,
           {{at_obstacle, "at an obstacle"}, {far_off, "far from obstacles"}});
   }
