@@ -4,6 +4,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <utility>
@@ -61,6 +62,16 @@ struct depth_frame : view_frame {
   [[nodiscard]] bool is_dense(const end_counts& counts) const {
     return is_dense(counts.sum_z / static_cast<double>(counts.used + counts.truncated),
                     static_cast<double>(scene.voxel), static_cast<double>(std::max(scene.fx, scene.fy)));
+  }
+  /// Returns true if no ray is nearly parallel to the image plane. Otherwise neighbouring rays are far apart although
+  /// their depths are small, and most voxels between them would have to be tested individually. Cameras whose rays are
+  /// not separable limit the angle by `map`.
+  [[nodiscard]] bool has_moderate_angles() const {
+    constexpr float most = 20.0F;  // tangent of 87 degrees
+    const pixel_rays& rays = ends.rays();
+    if (!rays.separable()) return true;
+    const auto is_moderate = [](float first, float last) { return std::max(std::abs(first), std::abs(last)) <= most; };
+    return is_moderate(rays.x(0)[0], rays.x(0)[rays.width() - 1]) && is_moderate(*rays.y(0), *rays.y(rays.height() - 1));
   }
   [[nodiscard]] static bool is_dense(double mean_z, double voxel, double focal) {
     return mean_z < 0.45 * voxel * focal;

@@ -76,7 +76,7 @@ class depth_integrator {
       if (!frame_.ends.rays().separable()) frame_.map.fit(frame_.ends.rays());
       frame_.set_scene(sensor);
       const auto bounds = frame_.ray_bounds(sensor, ends.max_z);
-      if (bounds && frame_.is_dense(ends))
+      if (bounds && frame_.has_moderate_angles() && frame_.is_dense(ends))
         mark_free(policy, sensor, scan, ends.max_z, *bounds, masks, saturated);
       else
         needs_rays = true;
