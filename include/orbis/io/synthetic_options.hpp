@@ -46,7 +46,7 @@ struct synthetic_path_options {
   double height = 1.35;       ///< height of the camera above the floor, metres
   double pitch = -0.20;       ///< mean pitch, radians; negative looks down
   double overlap = 0.05;      ///< fraction of the time spent at the first view again
-  bool sees_floor = false;    ///< adds a round that looks inward and down at the floor
+  bool sees_floor = false;    ///< adds a lap with the camera pointing inward and down at the floor
   double wobble = 1.0;        ///< scales the slow sway in height, distance, yaw, pitch and roll
   double jitter = 1.0;        ///< scales the hand tremor (millimetres, tenths of degrees)
   synthetic_gait_options gait{};

@@ -149,9 +149,9 @@ class squared_distances : public squared_distance_view {
   /// multiple of 8
   squared_distances(int reach, std::uint32_t cells, bool elsewhere_is_obstacle);
 
-  /// Initialises these cubes to the opposite of all other space: full of obstacles, or free. Only bricks within reach
-  /// of their faces are stored: outside full cubes, inside free ones (see max_added_bricks). @pre before the first
-  /// update; disjoint cubes of level 6 or more, in the grid
+  /// Initialises these cubes to the opposite state of the rest of space (`elsewhere_is_obstacle`). Bricks are stored
+  /// only within reach of the cubes' faces, on the free side: outside full cubes, inside free ones (see
+  /// max_added_bricks). @pre before the first update; disjoint cubes of level 6 or more, in the grid
   void begin(std::span<const voxel_cube> cubes);
   /// Maximum number of bricks that a single cube adds to the field. O(1).
   [[nodiscard]] std::uint64_t max_added_bricks(const voxel_cube& cube) const noexcept;

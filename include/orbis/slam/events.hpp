@@ -44,13 +44,14 @@ enum class correction_kind : std::uint8_t {
 struct correction_event {
   correction_kind kind{};
   map_id map = 0;  ///< the corrected map
-  /// For a loop or merger: the two keyframes at the same place (`from` with its new id). With threads, either may have
+  /// For a loop or a merge: the two keyframes at the same place (`from` with its new id). With threads, either may have
   /// been erased since then (`basic_atlas::current` returns its replacement).
   map_keyframe from{}, to{};
-  map_id merged = 0;          ///< for a merger: the map that was merged into `map`
-  id_offsets offsets{};       ///< for a merger: the offsets added to the ids of `merged`
+  map_id merged = 0;          ///< for a merge: the map that was merged into `map`
+  id_offsets offsets{};       ///< for a merge: the offsets added to the ids of `merged`
   sim3 T_corrected_before{};  ///< the correction at keyframe `from`, in the map's world frame; scale 1 with depth
-  /// For a merger: the change of the world frame of `map` if `merged` is the older map, whose world frame is kept.
+  /// For a merge: the transform from the previous world frame of `map` to its new one if `merged` is the older map,
+  /// whose world frame is kept; otherwise the identity.
   sim3 T_map_before{};
   double milliseconds = 0.0;         ///< wall time
   double locked_milliseconds = 0.0;  ///< the longest single wait of tracking and queries

@@ -99,7 +99,7 @@ struct start_options {
 /// Triangulation of keypoints without a landmark.
 struct triangulation_options {
   std::size_t neighbors = 10;    ///< number of keyframes searched around the new one
-  double min_baseline = 0.03;    ///< minimum distance between two keyframes, metres (without depth: median depths)
+  double min_baseline = 0.03;    ///< minimum keyframe distance: metres; without depth, in units of the median depth
   double min_parallax = 0.05;    ///< minimum angle between two rays, radians
   std::uint32_t distance = 50;   ///< maximum descriptor distance
   float ratio = 0.6F;            ///< maximum ratio of the distance to that of the second-best match

@@ -32,7 +32,7 @@ namespace orbis::io::detail {
   return text;
 }
 
-/// The text without leading and trailing blanks (including CR and LF).
+/// The text without leading and trailing whitespace (spaces, tabs, CR and LF).
 [[nodiscard]] constexpr std::string_view trimmed(std::string_view text) noexcept {
   while (!text.empty() && is_blank(text.front())) text.remove_prefix(1);
   while (!text.empty() && is_blank(text.back())) text.remove_suffix(1);

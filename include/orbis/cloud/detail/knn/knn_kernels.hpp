@@ -295,8 +295,8 @@ class lane_counter {
   std::conditional_t<Target::needs == simd::level::portable, numbers, std::size_t> count_ = 0;
 };
 
-/// Computes the sum of the roots of the `wanted` smallest distances, and the largest of them.
-/// @pre 0 < wanted <= count, no distance above `bound`, and sixteen infinities after the distances
+/// Computes the sum of the square roots of the `wanted` smallest squared distances, and the largest of these squares.
+/// @pre 0 < wanted <= count; no squared distance exceeds `bound`; the distances are padded with sixteen infinite values
 struct sum_nearest {
   /// Adds -1 to the lanes of `count` in which `v` is greater than `other`.
   template <simd::vector V, simd::vector Numbers>

@@ -57,9 +57,9 @@ struct smallest_of_columns {
   }
 };
 
-/// Computes for each place the usual value in its surroundings: the 35 % quantile over its 12 nearest neighbours,
-/// repeated in several rounds to reach beyond the neighbours. Non-finite values (NaN) and those of points without
-/// neighbours are unchanged and ignored. O(n rounds); the result is the same for every policy.
+/// For each place, computes the typical value in its neighbourhood: the 35 % quantile of the values of its 12 nearest
+/// neighbours, repeated in several rounds to extend the neighbourhood. Non-finite values (NaN) and those of points
+/// without neighbours are ignored and left unchanged. O(n rounds); the result is the same for every policy.
 /// @pre values has an entry for each place
 template <execution_policy Policy>
 [[nodiscard]] std::vector<float> smoothed_over_neighbors(const Policy& policy, const neighbor_graph& graph,

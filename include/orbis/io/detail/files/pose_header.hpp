@@ -41,8 +41,8 @@ struct pose_header {
   bool is_comment = false;
   pose_columns columns = usual_columns;
   std::string problem{};   ///< the reason why poses cannot be read from these columns
-  std::size_t before = 0;  ///< number of words in a comment before the name of the time
-  std::size_t names = 0;   ///< number of words from the name of the time on
+  std::size_t before = 0;  ///< number of words of a comment before the name of the time column
+  std::size_t names = 0;   ///< number of words from the name of the time column to the end
 };
 
 /// The name of a column in lower case, without quotes, punctuation and units.

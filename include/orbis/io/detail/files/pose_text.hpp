@@ -84,10 +84,11 @@ struct pose_lines {
   return numbers == 0 || (in_order && numbers == columns && columns >= usual_columns.size());
 }
 
-/// Parses the lines of a trajectory; the header and the first pose determine the layout: EuRoC if the header is that of
-/// EuRoC, or for commas and nanoseconds; KITTI for 12 numbers per line; otherwise TUM. `assumed`: the header for a file
-/// without one. Notes report a line of names that cannot be interpreted, and columns other than the first eight.
-/// Errors: malformed, with the line; unsupported (a header that lists the columns in another order).
+/// Parses the lines of a trajectory. The header and the first pose determine the layout: EuRoC if the header is an
+/// EuRoC header, or if values are separated by commas and times are in nanoseconds; KITTI if each line has 12 numbers;
+/// otherwise TUM. `assumed`: the header of a file without one. Adds notes about a header line that cannot be
+/// interpreted and about columns other than the first eight. Errors: malformed, with the line number; unsupported (a
+/// header that lists the columns in another order).
 inline result<pose_lines> parse_pose_lines(std::string_view text, const std::filesystem::path& where,
                                            pose_header assumed = {}) {
   pose_lines read;

@@ -112,7 +112,7 @@ class depth_cells {
     });
   }
 
-  /// Calls `visit(cell, visibility)` for the cells that `view` shows or whose rays pass through them. `margin(z)`:
+  /// Calls `visit(cell, visibility)` for each cell that `view` shows or that its rays pass through. `margin(z)`:
   /// tolerance for noise at that depth, metres; `slant`: for rays that pass through, a window's range of depths times
   /// this factor is added to the margin. O(cells).
   template <execution_policy Policy, camera::camera_model Camera, class Margin, class Visit>

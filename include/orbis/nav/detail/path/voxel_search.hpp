@@ -143,7 +143,7 @@ class voxel_search {
     double density = 0.0;  ///< 0: not computed
     std::uint32_t parent = from;
     std::uint32_t tried = to;  ///< the last parent whose line was blocked or cost more than expected
-    std::uint32_t barred = 0;  ///< directions of neighbours without a step to this cell; for the goal: exits
+    std::uint32_t barred = 0;  ///< bit mask of neighbours (for the goal: exits) from which no step leads here
     std::uint8_t free = 0;     ///< 0: not tested, 1: no, 2: yes
     trust known = trust::bound;
     bool is_closed = false;

@@ -79,10 +79,10 @@ inline void put_bytes16(char* out, unsigned v) noexcept {
   out[1] = static_cast<char>(v >> 8U);
 }
 
-/// Writes `.bt` nodes: the tree of the likelier states, free or occupied, pruned as in OctoMap.
+/// Writes `.bt` nodes: the maximum-likelihood tree (each leaf free or occupied), pruned as in OctoMap.
 ///
-/// OctoMap prunes level by level from the bottom and stops at the first level without a node to prune; only because of
-/// this stop can eight equal leaves remain. This writer reproduces it.
+/// OctoMap prunes level by level from the bottom and stops at the first level without a node to prune. Eight equal
+/// leaves can remain only because of this early stop, which this writer reproduces.
 template <octomap_model Model>
 class bt_writer {
  public:

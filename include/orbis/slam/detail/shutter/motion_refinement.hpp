@@ -153,7 +153,8 @@ struct moving_pose_equations {
   double cost = 0.0;  ///< half the robust cost
 };
 
-/// Sets the equations for a pose and its twist (h, g of `to`) from equations in powers of the row times.
+/// Assembles the normal equations of a pose and its twist (`to.h`, `to.g`) from sums: the terms of `h[k]` and `g[k]`
+/// are weighted by the k-th power of the negated row time.
 template <class Equations>
 void set_parts(Equations& to, const std::array<mat6, 3>& h, const std::array<vec6, 2>& g) {
   set_block(to.h, 0, 0, h[0]);

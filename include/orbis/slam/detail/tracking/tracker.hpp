@@ -93,8 +93,9 @@ class tracker {
  public:
   tracker(const camera_rig<Camera>& rig, const options& settings) : rig_{rig}, options_{settings} {}
 
-  /// Searches for the points observed by the last frame: its landmarks, and its other points with depth. `last` has its
-  /// current pose, and landmark ids as of its tracking. `predicted`: the expected `T_world_camera`.
+  /// Searches for the points observed by the last frame: its landmarks, and its other points with depth. The pose in
+  /// `last` is up to date; its landmark ids are those from when it was tracked. `predicted`: the expected
+  /// `T_world_camera`.
   std::size_t by_motion(basic_frame<D>& f, const basic_map<D>& m, const basic_frame<D>& last, const se3& predicted,
                         moving_features<Camera, D, Matchers>& moving) const {
     for (const double widening : {1.0, 2.0}) {
