@@ -46,8 +46,10 @@ int run(int argc, char** argv) {
   const orbis::so3::quaternion q{p.data() + 3};  // x y z w
   if (!(q.norm() > 1e-6 && orbis::vec3{p.data()}.norm() + q.norm() < 1e6))
     return report_error(1, "--pose: is not a valid pose");
-  if (!(resolution >= 1e-4 && resolution <= 1e3)) return report_error(1, "--resolution: must be in 0.0001 ... 1000");
-  if (!(scale == 0.0 || (scale >= 1e-3 && scale <= 1e9))) return report_error(1, "--scale: must be in 0.001 ... 1e9");
+  if (!(resolution >= 1e-4 && resolution <= 1e3))
+    return report_error(1, "--resolution: must be between 0.0001 and 1000");
+  if (!(scale == 0.0 || (scale >= 1e-3 && scale <= 1e9)))
+    return report_error(1, "--scale: must be between 0.001 and 1e9");
   for (const std::string& read : {input, camera_name})
     if (examples::is_same_file(output, read)) return report_error(1, examples::overwrite_message(output, read));
   const auto depth = orbis::io::read_depth(input);

@@ -38,8 +38,9 @@ int run(int argc, char** argv) {
       ->capture_default_str();
   cli.add_option("--origin", xyz, "x,y,z of the sensor in metres")->delimiter(',')->expected(3);
   if (const auto code = examples::parse(cli, argc, argv)) return *code;
-  if (!(sigma >= 0 && sigma < 1e6)) return report_error(1, "--sigma: must be in 0 ... 1000000");
-  if (voxel != 0 && !(voxel >= 1e-6 && voxel < 1e6)) return report_error(1, "--voxel: must be 0 or in 1e-6 ... 1e6");
+  if (!(sigma >= 0 && sigma < 1e6)) return report_error(1, "--sigma: must be at least 0 and less than 1000000");
+  if (voxel != 0 && !(voxel >= 1e-6 && voxel < 1e6))
+    return report_error(1, "--voxel: must be 0, or at least 1e-6 and less than 1e6");
   auto eye = xyz.empty() ? std::nullopt : std::optional{orbis::vec3{xyz.data()}};
   if (eye ? !eye->allFinite() : filter == "range-statistical")
     return report_error(1, "--origin: needs a finite position");

@@ -31,7 +31,7 @@ namespace app {
 class live_mapping {
  public:
   using poses = orbis::mapping::keyframe_poses;
-  /// A keyframe of SLAM and the index of its frame.
+  /// A SLAM keyframe and the index of its frame.
   struct made {
     std::uint64_t frame;
     orbis::slam::map_keyframe keyframe;

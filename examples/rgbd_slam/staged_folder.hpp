@@ -9,8 +9,8 @@
 ///   3. if the machine stops in between, the next program that reads or writes one of the folders finishes first
 ///      (`finish`).
 /// Only files with the given names are moved; the hidden folders list them and each other in a folder `private_name`,
-/// so that any program can finish. No other file in the folders is changed, and only hidden folders of ended processes are deleted. Processes
-/// that write into the same folder wait for each other by `flock`.
+/// so that any program can finish. No other file in the folders is changed, and only hidden folders of ended processes
+/// are deleted. Processes that write into the same folder wait for each other by `flock`.
 #pragma once
 
 #include <filesystem>
@@ -45,7 +45,7 @@ struct hidden_folders {
 
 class staged_folder {
  public:
-  /// Begins names that no result may have: those of hidden folders, and of a folder in them for other files than results.
+  /// Reserved prefix of names, which no result may have: of hidden folders, and of the folder in each for other files.
   static constexpr const char* private_name = ".rgbd_slam";
 
   /// Finishes what ended processes have begun to move into place in `folder`, and removes their other hidden folders.

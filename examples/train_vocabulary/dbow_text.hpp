@@ -85,8 +85,8 @@ template <std::size_t Bits = 256>
       !take_number(head, weights_are) || !take_field(head).empty())
     return bad(1, "the first line must contain branching, depth, score and weighting");
   if (branching < 1 || depth < 1) return bad(1, "branching and depth must be at least 1");
-  if (score < 0 || score > 5) return bad(1, "the score must be in 0 ... 5");
-  if (weights_are < 0 || weights_are > 3) return bad(1, "the weighting must be in 0 ... 3");
+  if (score < 0 || score > 5) return bad(1, "the score must be between 0 and 5");
+  if (weights_are < 0 || weights_are > 3) return bad(1, "the weighting must be between 0 and 3");
 
   parent_list<Bits> list;
   std::vector<bool> is_word{false};

@@ -161,7 +161,7 @@ class dbow_yaml_parser {
       } else {
         const std::string_view value = scan_.take_value(false);
         if (key == "weightingType") {
-          if (!number(value, weights_are_) || weights_are_ > 3) return reject("the weighting must be in 0 ... 3");
+          if (!number(value, weights_are_) || weights_are_ > 3) return reject("the weighting must be between 0 and 3");
         } else if (key == "k" || key == "L" || key == "scoringType") {
           std::uint32_t ignored = 0;  // follows from the tree; scores are types
           if (!number(value, ignored)) return reject(orbis::in_quotes(key) + " is not a number");

@@ -110,7 +110,7 @@ int judge(const settings& s) {
 
 int run(int argc, char** argv) {
   settings s;
-  CLI::App cli{"Train, convert and measure vocabularies of visual words", "train_vocabulary"};
+  CLI::App cli{"Train, convert and evaluate visual vocabularies", "train_vocabulary"};
   cli.require_subcommand(1);
   auto* const train_command = cli.add_subcommand("train", "train a vocabulary");
   train_command->add_option("OUT", s.output, "output file")->required();

@@ -96,7 +96,8 @@ class openni_camera final : public camera_device {
       if (last_ && newest_index_ >= *last_) return fail(errc::no_data, name, "end of recording");
       return std::optional<source_frame>{};
     }
-    if (status != openni::STATUS_OK) return fail(errc::unreadable, name, "delivers no more frames (" + reason() + ")");
+    if (status != openni::STATUS_OK)
+      return fail(errc::unreadable, name, "no longer delivers frames (" + reason() + ")");
     openni::VideoFrameRef frame;
     if (streams[ready]->readFrame(&frame) != openni::STATUS_OK || !frame.isValid())
       return fail(errc::unreadable, name, "was disconnected (" + reason() + ")");

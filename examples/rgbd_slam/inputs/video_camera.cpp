@@ -24,7 +24,7 @@ class video_camera final : public camera_device {
   explicit video_camera(cv::VideoCapture reader) : reader_{std::move(reader)} {}
   /// V4L2 itself waits for a frame, for at most ten seconds.
   result<std::optional<source_frame>> next(std::chrono::milliseconds) override {
-    if (!reader_.grab()) return fail(errc::unreadable, name, "delivers no more images; it may be disconnected");
+    if (!reader_.grab()) return fail(errc::unreadable, name, "no longer delivers images; it may be disconnected");
     const double time = opened_at_ + seconds_now<std::chrono::steady_clock>() - opened_;
     cv::Mat image;
     if (!reader_.retrieve(image)) return std::optional<source_frame>{};  // damaged in transfer

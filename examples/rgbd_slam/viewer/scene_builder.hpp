@@ -85,9 +85,9 @@ class scene_builder {
   const viewer_scene& update(const scene_sources& sources);
   /// Like `update`, but always queries immediately.
   const viewer_scene& update_at_once(const scene_sources& sources);
-  /// Like `update_at_once`, but for the last time, after the last frame. Frees the data for following corrections.
+  /// Like `update_at_once`, one last time, after the last frame; then frees the data needed to apply later corrections.
   void finish(const scene_sources& sources);
-  /// Frees the data for following corrections. The scene remains unchanged.
+  /// Frees the data needed to apply later corrections. The scene remains unchanged.
   void forget();
   /// Replaces the voxels of the live map.
   void set_voxels(std::vector<voxel> colored);
