@@ -56,13 +56,17 @@ inline std::size_t remove_distant(std::vector<orbis::vec3f>& points) {
   return removed;
 }
 
-/// Returns true if more than half of the points are within 1e-12 metres of the origin, and do not coincide.
+/// Returns true if more than half of the finite points are within 1e-12 metres of the origin, but not at it.
 [[nodiscard]] inline bool is_too_small(const std::vector<orbis::vec3f>& points) {
   constexpr float least = 1e-12F;
-  const auto near = std::count_if(points.begin(), points.end(),
-                                  [](const orbis::vec3f& p) { return p.cwiseAbs().maxCoeff() < least; });
-  const auto zero = std::count_if(points.begin(), points.end(), [](const orbis::vec3f& p) { return p.isZero(0); });
-  return static_cast<std::size_t>(near - zero) > points.size() / 2;
+  std::size_t finite = 0, near = 0;
+  for (const orbis::vec3f& p : points) {
+    if (!orbis::is_finite(p)) continue;
+    const float largest = p.cwiseAbs().maxCoeff();
+    ++finite;
+    near += largest > 0.0F && largest < least ? 1 : 0;
+  }
+  return near > finite / 2;
 }
 
 struct cloud_near_origin {
