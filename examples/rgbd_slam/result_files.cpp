@@ -135,7 +135,7 @@ std::optional<orbis::error> find_overwritten(const std::vector<fs::path>& target
 
 void finish_earlier_runs(const settings& s) {
   std::error_code ignored;
-  for (const fs::path& path : {s.out, s.save_map, s.floor_map, s.input, s.reference, s.load_map, fs::path{s.camera}})
+  for (const fs::path& path : {s.out, s.save_map, s.floor_map, s.input, s.reference, s.load_map})
     if (!path.empty()) staged_folder::finish(fs::is_directory(path, ignored) ? path : parent_folder(path));
 }
 

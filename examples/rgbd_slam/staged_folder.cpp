@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <memory>
+#include <optional>
 #include <ostream>
 #include <string_view>
 #include <system_error>
@@ -37,8 +38,8 @@ descriptor::~descriptor() {
 namespace {
 
 constexpr std::string_view prefix = ".rgbd_slam-", ready = ".ready";
-// In hidden folders, the replaced files, and lists: the files to move; in the first folder, the other hidden folders; in
-// those, the first one.
+// In hidden folders: the replaced files, and lists of the files to move; in the first folder, of the other hidden
+// folders; in those, of the first one.
 const fs::path own = staged_folder::private_name;
 const fs::path backup = own / "replaced", names_list = own / "names", others_list = own / "others",
                first_list = own / "first";
@@ -149,41 +150,52 @@ result<void> write_list(const fs::path& path, const std::vector<std::string>& te
     for (const std::string& text : texts) out << text << '\0';
   });
 }
-std::vector<std::string> read_list(const fs::path& path) {
-  std::string text = orbis::read_file(path).value_or(std::string{});
+/// Empty if the file does not exist; nullopt if it cannot be read.
+std::optional<std::vector<std::string>> read_list(const fs::path& path) {
+  auto read = orbis::read_file(path);
+  if (!read && read.error().code != orbis::errc::not_found) return std::nullopt;
+  std::string text = std::move(read).value_or(std::string{});
   std::vector<std::string> texts;
   for (std::size_t end = 0; (end = text.find('\0')) != std::string::npos; text.erase(0, end + 1))
     texts.push_back(text.substr(0, end));
   return texts;
 }
 
+/// Those of other users do not count, who may put one into a folder like /tmp, unless the whole folder is theirs.
 bool is_hidden_folder(const fs::path& path) {
-  std::error_code ignored;
-  return path.filename().string().starts_with(prefix) && fs::is_directory(fs::symlink_status(path, ignored));
+  struct stat status {}, parent {};
+  if (!path.filename().string().starts_with(prefix) || ::lstat(path.c_str(), &status) != 0 || !S_ISDIR(status.st_mode))
+    return false;
+  return status.st_uid == ::geteuid() ||
+         (::stat(path.parent_path().c_str(), &parent) == 0 && status.st_uid == parent.st_uid);
 }
 bool is_ready(const fs::path& hidden) { return hidden.filename().string().ends_with(ready); }
 
 /// The first folder of the transaction that a hidden folder takes part in; empty if there is none.
 fs::path first_of(const fs::path& hidden) {
   if (is_ready(hidden)) return hidden;
-  const std::vector<std::string> first = read_list(hidden / first_list);
+  const std::vector<std::string> first = read_list(hidden / first_list).value_or(std::vector<std::string>{});
   return first.size() == 1 && is_ready(first[0]) && is_hidden_folder(first[0]) ? fs::path{first[0]} : fs::path{};
 }
 /// The other hidden folders of a transaction, those that exist.
 std::vector<fs::path> others_of(const fs::path& first) {
   std::vector<fs::path> others;
   std::error_code ignored;
-  for (const fs::path path : read_list(first / others_list))
+  for (const fs::path path : read_list(first / others_list).value_or(std::vector<std::string>{}))
     if (is_hidden_folder(path) && fs::equivalent(first_of(path), first, ignored)) others.push_back(path);
   return others;
 }
 
-/// The hidden folders of ended processes in `folder`, without those that cannot be opened.
-std::vector<fs::path> leftovers_in(const fs::path& folder) {
+std::vector<fs::path> hidden_folders_in(const fs::path& folder) {
   std::vector<fs::path> found;
   std::error_code ec;
   for (fs::directory_iterator it{folder, ec}, end; !ec && it != end; it.increment(ec))
     if (is_hidden_folder(it->path())) found.push_back(it->path());
+  return found;
+}
+/// The hidden folders of ended processes in `folder`, without those that cannot be opened.
+std::vector<fs::path> leftovers_in(const fs::path& folder) {
+  std::vector<fs::path> found = hidden_folders_in(folder);
   std::erase_if(found, [](const fs::path& hidden) {
     const descriptor lock = open_folder(hidden);
     return lock.get() < 0 || ::flock(lock.get(), LOCK_EX | LOCK_NB) != 0;
@@ -198,9 +210,10 @@ bool finish_transaction(const fs::path& first) {
   folders.push_back(first);  // the last to be removed
   std::vector<move> moves;
   for (const fs::path& hidden : folders) {
-    std::vector<std::string> names = read_list(hidden / names_list);
-    std::erase_if(names, [](const fs::path& name) { return name.empty() || name != name.filename(); });
-    for (move& m : moves_to(hidden.parent_path(), hidden, names)) moves.push_back(std::move(m));
+    auto names = read_list(hidden / names_list);
+    if (!names) return false;
+    std::erase_if(*names, [](const fs::path& name) { return name.empty() || name != name.filename(); });
+    for (move& m : moves_to(hidden.parent_path(), hidden, *names)) moves.push_back(std::move(m));
   }
   if (rename_all(moves) != 0) return false;
   std::error_code ignored;
@@ -210,7 +223,8 @@ bool finish_transaction(const fs::path& first) {
 
 /// Finishes or removes the hidden folders of ended processes in `folder`, which is open as `opened`. Locks it and the
 /// folders of the transactions' other files, all at once: if there are more than are locked, starts again with them.
-void clear_leftovers(const fs::path& folder, int opened) {
+/// Returns false if a transaction cannot be finished now: it would overwrite later files.
+bool clear_leftovers(const fs::path& folder, int opened) {
   std::vector<fs::path> folders{folder};
   std::vector<descriptor> descriptors;
   std::unique_ptr<folder_locks> locks;
@@ -235,11 +249,16 @@ void clear_leftovers(const fs::path& folder, int opened) {
         for (const fs::path& other : others_of(first)) add(other);
       }
   }
+  bool is_clear = true;
   for (const fs::path& left : leftovers_in(folder)) {
     const fs::path first = first_of(left);
     std::error_code ignored;
-    if (first.empty() || finish_transaction(first)) fs::remove_all(left, ignored);
+    if (first.empty() ? read_list(left / first_list).has_value() : finish_transaction(first))
+      fs::remove_all(left, ignored);
+    else
+      is_clear = false;
   }
+  return is_clear;
 }
 
 }  // namespace
@@ -247,6 +266,7 @@ void clear_leftovers(const fs::path& folder, int opened) {
 void staged_folder::finish(const fs::path& folder) {
   std::error_code ignored;
   const fs::path whole = fs::canonical(folder, ignored);
+  if (hidden_folders_in(whole).empty()) return;  // without waiting for the lock
   if (const descriptor opened = open_folder(whole); opened.get() >= 0) clear_leftovers(whole, opened.get());
 }
 
@@ -264,7 +284,8 @@ result<staged_folder> staged_folder::open(const fs::path& folder, std::vector<st
     if (!may_be_replaced(made.folder_ / name))
       return failure(folder / name, "is not a regular file and is not replaced");
 
-  clear_leftovers(made.folder_, made.folder_lock_.get());
+  if (!clear_leftovers(made.folder_, made.folder_lock_.get()))
+    return failure(folder, "the results of an earlier run, in a hidden folder, cannot be moved into place");
   const folder_locks lock{{made.folder_lock_.get()}};
   std::string name = (made.folder_ / (std::string{prefix} + "XXXXXX")).string();
   const std::lock_guard registers{hidden.mutex};
@@ -336,7 +357,16 @@ result<void> staged_folder::put_in_place(std::span<staged_folder* const> folders
       moves.push_back(std::move(m));
     }
   const int why = rename_all_in_child(moves);
-  if (why != 0) return failure(folders.front()->folder_, "cannot move the new files into place: " + reason(why));
+  if (why != 0) {  // nobody may finish this, now or after a crash
+    const fs::path unmarked = fs::path{marked}.replace_extension();
+    fs::rename(marked, unmarked, ec);
+    if (!ec) {
+      std::replace(hidden.paths.begin(), hidden.paths.end(), marked, unmarked);
+      first.staging_ = unmarked;
+      ::fsync(first.folder_lock_.get());
+    }
+    return failure(first.folder_, "cannot move the new files into place: " + reason(why));
+  }
   for (const staged_folder* f : folders) ::fsync(f->folder_lock_.get());
   for (staged_folder* f : folders) f->discard();
   return {};
