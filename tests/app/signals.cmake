@@ -112,6 +112,10 @@ if(result EQUAL 0)
   endforeach()
   # Too little for the pictures, which OpenCV draws.
   foreach(limit RANGE 72000 112000 8000)
+    execute_process(COMMAND bash -c "ulimit -v ${limit} && \"${APP}\" --help" RESULT_VARIABLE result OUTPUT_QUIET ERROR_QUIET)
+    if(NOT result EQUAL 0)  # the libraries do not fit
+      continue()
+    endif()
     execute_process(COMMAND bash -c "ulimit -v ${limit}; exec \"$@\"" limited ${APP} run room --frames 4 --quiet
                             --deterministic --threads 2 --out tight_${limit}
                     WORKING_DIRECTORY ${WORK} RESULT_VARIABLE code OUTPUT_QUIET ERROR_VARIABLE err)
