@@ -271,7 +271,7 @@ TEST_CASE("processes that write the same file leave one of their files and nothi
 
 TEST_CASE("a temporary file that an ended process left does not stop the next one") {
   const scratch_folder folder;
-  constexpr int names = 200;  // that this process would use next
+  constexpr int names = 80;  // that this process would use next
   for (int i = 0; i != names; ++i)
     std::ofstream{folder / (".orbis-" + std::to_string(::getpid()) + "-" + std::to_string(i) + ".part")} << "left";
   CHECK(write_text(folder / "file", "text"));

@@ -38,9 +38,7 @@ class temporary_file {
  public:
   /// Creates the file in the folder of `target`. If that fails, `exists()` is false and `errno` holds the reason.
   explicit temporary_file(const std::filesystem::path& target) : folder_{target.parent_path()} {
-    if (create_unnamed()) return;
-    do path_ = next_name();
-    while (!(is_named_ = create()) && errno == EEXIST);  // of an earlier process with the same number
+    if (!create_unnamed()) make_named([&] { return create(); });
   }
   ~temporary_file() {
     close();
@@ -88,6 +86,17 @@ class temporary_file {
     static std::atomic<std::uint32_t> calls{0};
     return folder_ / (".orbis-" + process() + "-" + std::to_string(calls.fetch_add(1)) + ".part");
   }
+  /// Calls `make` with new names in `path_`, until it succeeds or fails for another reason than that the name exists:
+  /// an earlier process with the same number may have left it.
+  template <class Make>
+  bool make_named(const Make& make) {
+    for (int attempt = 0; attempt != 100; ++attempt) {
+      path_ = next_name();
+      is_named_ = make();
+      if (is_named_ || errno != EEXIST) break;
+    }
+    return is_named_;
+  }
 #ifdef O_TMPFILE
   /// Creates a file without a name. Fails where the file system or /proc is missing the means.
   [[nodiscard]] bool create_unnamed() {
@@ -100,11 +109,9 @@ class temporary_file {
   }
   [[nodiscard]] bool give_name() {
     const std::filesystem::path link = std::exchange(path_, {});
-    do path_ = next_name();
-    while (!(is_named_ = ::linkat(AT_FDCWD, link.c_str(), AT_FDCWD, path_.c_str(), AT_SYMLINK_FOLLOW) == 0) &&
-           errno == EEXIST);
     is_unnamed_ = false;
-    return is_named_;
+    return make_named(
+        [&] { return ::linkat(AT_FDCWD, link.c_str(), AT_FDCWD, path_.c_str(), AT_SYMLINK_FOLLOW) == 0; });
   }
 #else
   [[nodiscard]] static bool create_unnamed() { return false; }
