@@ -157,7 +157,8 @@ struct linked_components {
 };
 
 /// Finds the components of a graph and decides which of them to remove. `gone`: by place, nonzero for points to ignore,
-/// or empty. `spacing`: by place, metres. O(links), 4 bytes per vertex.
+/// or empty. `spacing`: by place, metres. O(links), 4 bytes per vertex and
+/// 5 per component.
 template <execution_policy Policy>
 [[nodiscard]] linked_components separate(const Policy& policy, const neighbor_graph& graph, std::span<const char> gone,
                                          std::span<const float> spacing, const cluster_options& options) {

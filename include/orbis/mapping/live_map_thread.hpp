@@ -6,7 +6,7 @@
 ///   using live = orbis::mapping::live_map_thread<orbis::octree::occupancy_octree<>, orbis::camera::pinhole>;
 ///   live map{camera, {.map = {.resolution = 0.05}}};
 ///   map.add_keyframe(frame, depth, T_world_camera);                      // the tracking thread
-///   map.set_poses(poses, orbis::mapping::unlisted::hide);                // after local adjustment, loops, mergers
+///   map.set_poses(poses, orbis::mapping::unlisted::hide);                // after local adjustment, loops, merges
 ///   ...
 ///   const auto seen = map.latest();                                      // any thread
 ///   if (seen->map.state(p) == orbis::octree::occupancy::occupied) ...

@@ -85,14 +85,14 @@ class basic_atlas {
     if (active_ == from) active_ = into;
     return offsets;
   }
-  /// Returns the current id of a keyframe, after mergers of its map. The keyframe may have been erased since (see
-  /// `basic_map::replacement`). The id of a removed map does not change. O(mergers).
+  /// Returns the current id of a keyframe, after merges of its map. The keyframe may have been erased since (see
+  /// `basic_map::replacement`). The id of a removed map does not change. O(merges).
   [[nodiscard]] map_keyframe current(map_keyframe k) const {
     for (auto to = merged_.find(k.map); to != merged_.end(); to = merged_.find(k.map))
       k = {to->second.into, k.keyframe + to->second.offsets.keyframes};
     return k;
   }
-  /// Returns the current id of a landmark, after mergers of its map. @pre l != no_id
+  /// Returns the current id of a landmark, after merges of its map. @pre l != no_id
   [[nodiscard]] landmark_id current(map_id map, landmark_id l) const {
     for (auto to = merged_.find(map); to != merged_.end(); to = merged_.find(map)) {
       map = to->second.into;

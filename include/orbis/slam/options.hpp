@@ -172,7 +172,7 @@ struct place_options {
   bool enabled = true;           ///< off: no loops are closed and no maps merged; relocalisation still works
   std::size_t candidates = 5;    ///< maximum number of keyframes that a new keyframe is compared with
   std::uint32_t apart = 10;      ///< minimum number of keyframes between both ends of a loop, and between two loops
-  bool adjusts_globally = true;  ///< runs global adjustment after each loop closure and merger
+  bool adjusts_globally = true;  ///< runs global adjustment after each loop closure and merge
   loop_options loop{};
   loop_correction_options correction{};
   global_adjustment_options adjustment{};
