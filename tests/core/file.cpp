@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <atomic>
+#include <cerrno>
 #include <csignal>
 #include <cstdint>
 #include <filesystem>
@@ -50,6 +51,7 @@ struct disk_call {
   ::off_t bytes;  ///< in the file at that time
 };
 std::vector<disk_call>* disk_calls = nullptr;
+bool has_proc = true;  ///< false: as on a system on which /proc is not mounted
 #endif
 
 }  // namespace
@@ -66,6 +68,39 @@ extern "C" int rename(const char* from, const char* to) noexcept(noexcept(::rena
   if (struct stat state{}; disk_calls != nullptr && ::stat(from, &state) == 0)
     disk_calls->push_back({disk_call::kind::rename, state.st_ino, state.st_size});
   return static_cast<int>(::syscall(SYS_renameat2, AT_FDCWD, from, AT_FDCWD, to, 0));
+}
+extern "C" int access(const char* path, int mode) noexcept(noexcept(::access(path, mode))) {
+  if (!has_proc && std::string{path}.starts_with("/proc/")) return errno = ENOENT, -1;
+  return static_cast<int>(::syscall(SYS_faccessat, AT_FDCWD, path, mode));
+}
+
+TEST_CASE("without /proc a file has a hidden name until it is complete") {
+  const scratch_folder folder;
+  has_proc = false;
+  std::vector<std::string> names;
+  const auto written = write_file_atomically(folder / "file", [&](std::ostream& out) {
+    out << "text";
+    for (const fs::directory_entry& entry : fs::directory_iterator{folder.path()})
+      names.push_back(entry.path().filename().string());
+  });
+  // An earlier process has left the names that come next.
+  const std::string stem = ".orbis-" + std::to_string(::getpid()) + "-";
+  constexpr unsigned long left = 80;
+  unsigned long next = 0;
+  if (names.size() == 1 && names[0].starts_with(stem)) next = std::stoul(names[0].substr(stem.size())) + 1;
+  for (unsigned long i = next; i != next + left; ++i)
+    std::ofstream{folder / (stem + std::to_string(i) + ".part")} << "left";
+  const auto again = write_text(folder / "file", "new");
+  const auto failed = write_file_atomically(
+      folder / "file", [](std::ostream&) -> result<void> { return fail(errc::write_failed, "", "cannot"); });
+  has_proc = true;
+  REQUIRE(written);
+  REQUIRE(names.size() == 1);
+  CHECK(names[0] == stem + std::to_string(next - 1) + ".part");
+  CHECK(again);
+  CHECK_FALSE(failed);
+  CHECK(read_file(folder / "file").value() == "new");
+  CHECK(folder.files() == left + 1);
 }
 
 TEST_CASE("a file is whole on the disk before it gets its name, and then its name is") {
