@@ -171,18 +171,22 @@ bool is_hidden_folder(const fs::path& path) {
 }
 bool is_ready(const fs::path& hidden) { return hidden.filename().string().ends_with(ready); }
 
-/// The first folder of the transaction that a hidden folder takes part in; empty if there is none.
-fs::path first_of(const fs::path& hidden) {
+/// The first folder of the transaction that a hidden folder takes part in; empty if there is none, nullopt if that
+/// cannot be read.
+std::optional<fs::path> first_of(const fs::path& hidden) {
   if (is_ready(hidden)) return hidden;
-  const std::vector<std::string> first = read_list(hidden / first_list).value_or(std::vector<std::string>{});
-  return first.size() == 1 && is_ready(first[0]) && is_hidden_folder(first[0]) ? fs::path{first[0]} : fs::path{};
+  const auto first = read_list(hidden / first_list);
+  if (!first) return std::nullopt;
+  const fs::path path = first->size() == 1 ? first->front() : std::string{};
+  return is_ready(path) && is_hidden_folder(path) ? path : fs::path{};
 }
 /// The other hidden folders of a transaction, those that exist.
 std::vector<fs::path> others_of(const fs::path& first) {
   std::vector<fs::path> others;
   std::error_code ignored;
   for (const fs::path path : read_list(first / others_list).value_or(std::vector<std::string>{}))
-    if (is_hidden_folder(path) && fs::equivalent(first_of(path), first, ignored)) others.push_back(path);
+    if (is_hidden_folder(path) && fs::equivalent(first_of(path).value_or(fs::path{}), first, ignored))
+      others.push_back(path);
   return others;
 }
 
@@ -244,16 +248,16 @@ bool clear_leftovers(const fs::path& folder, int opened) {
         folders.push_back(hidden.parent_path());
     };
     for (const fs::path& left : leftovers_in(folder))
-      if (const fs::path first = first_of(left); !first.empty()) {
-        add(first);
-        for (const fs::path& other : others_of(first)) add(other);
+      if (const auto first = first_of(left); first && !first->empty()) {
+        add(*first);
+        for (const fs::path& other : others_of(*first)) add(other);
       }
   }
   bool is_clear = true;
   for (const fs::path& left : leftovers_in(folder)) {
-    const fs::path first = first_of(left);
+    const auto first = first_of(left);
     std::error_code ignored;
-    if (first.empty() ? read_list(left / first_list).has_value() : finish_transaction(first))
+    if (first && (first->empty() || finish_transaction(*first)))
       fs::remove_all(left, ignored);
     else
       is_clear = false;
@@ -317,6 +321,16 @@ void staged_folder::discard() noexcept {
   staging_.clear();
 }
 
+std::error_code staged_folder::rename_hidden(const fs::path& to, hidden_folders& hidden) {
+  std::error_code failure;
+  fs::rename(staging_, to, failure);
+  if (failure) return failure;
+  std::replace(hidden.paths.begin(), hidden.paths.end(), staging_, to);
+  staging_ = to;
+  ::fsync(folder_lock_.get());
+  return {};
+}
+
 result<void> staged_folder::put_in_place(std::span<staged_folder* const> folders, hidden_folders& hidden) {
   std::vector<int> numbers;
   for (const staged_folder* f : folders) numbers.push_back(f->folder_lock_.get());
@@ -344,11 +358,9 @@ result<void> staged_folder::put_in_place(std::span<staged_folder* const> folders
     ::fsync(f->folder_lock_.get());
   }
   // From here on, any program can finish.
-  fs::rename(first.staging_, marked, ec);
-  if (ec) return failure(first.folder_, "cannot move the new files into place: " + ec.message());
-  std::replace(hidden.paths.begin(), hidden.paths.end(), first.staging_, marked);
-  first.staging_ = marked;
-  ::fsync(first.folder_lock_.get());
+  const fs::path unmarked = first.staging_;
+  if (const std::error_code why = first.rename_hidden(marked, hidden))
+    return failure(first.folder_, "cannot move the new files into place: " + why.message());
 
   std::vector<move> moves;
   for (const staged_folder* f : folders)
@@ -357,14 +369,8 @@ result<void> staged_folder::put_in_place(std::span<staged_folder* const> folders
       moves.push_back(std::move(m));
     }
   const int why = rename_all_in_child(moves);
-  if (why != 0) {  // nobody may finish this, now or after a crash
-    const fs::path unmarked = fs::path{marked}.replace_extension();
-    fs::rename(marked, unmarked, ec);
-    if (!ec) {
-      std::replace(hidden.paths.begin(), hidden.paths.end(), marked, unmarked);
-      first.staging_ = unmarked;
-      ::fsync(first.folder_lock_.get());
-    }
+  if (why != 0) {
+    static_cast<void>(first.rename_hidden(unmarked, hidden));  // nobody may finish this, now or after a crash
     return failure(first.folder_, "cannot move the new files into place: " + reason(why));
   }
   for (const staged_folder* f : folders) ::fsync(f->folder_lock_.get());

@@ -17,6 +17,7 @@
 #include <mutex>
 #include <span>
 #include <string>
+#include <system_error>
 #include <vector>
 
 #include <orbis/core/result.hpp>
@@ -74,6 +75,8 @@ class staged_folder {
 
  private:
   staged_folder() = default;
+  /// Renames the hidden folder, which an interrupt must still find. @pre hidden.mutex is locked
+  std::error_code rename_hidden(const std::filesystem::path& to, hidden_folders& hidden);
 
   std::filesystem::path folder_, staging_;
   std::vector<std::string> names_;

@@ -2,7 +2,7 @@
 //
 // Loaded before a program (LD_PRELOAD). After ORBIS_TEST_RENAMES files have been moved out of hidden folders, the
 // program and its child processes are killed, or, with ORBIS_TEST_NO_LINKS, one rename fails, on a file system without
-// hard links.
+// hard links. With ORBIS_TEST_KILLED_AFTER_ERROR, they are killed when the failed move has been withdrawn.
 #include <cerrno>
 #include <csignal>
 #include <cstdlib>
@@ -31,6 +31,11 @@ extern "C" int rename(const char* from, const char* to) {
   const char* const allowed = std::getenv("ORBIS_TEST_RENAMES");
   const char* const hidden = std::strstr(from, "/.rgbd_slam-");
   const char* const name = hidden == nullptr ? nullptr : std::strchr(hidden + 1, '/');
+  const std::size_t length = std::strlen(from);
+  if (std::getenv("ORBIS_TEST_KILLED_AFTER_ERROR") != nullptr && length > 6 && std::strcmp(from + length - 6, ".ready") == 0) {
+    original(from, to);
+    kill_all();
+  }
   const bool moves = name != nullptr && std::strchr(name + 1, '/') == nullptr && std::strstr(to, "/.rgbd_slam-") == nullptr;
   if (allowed == nullptr || !moves || renamed++ != std::atoi(allowed)) return original(from, to);
   if (!has_no_links()) kill_all();
