@@ -133,9 +133,10 @@ requires(detail::chain_part<Left> || detail::chain_part<Right>) [[nodiscard]] co
   static_assert(begins_well,
                 "orbis: a matcher begins with a source, such as brute_force(hamming{}), followed by stages");
   static_assert(!begins_well || one_source, "orbis: a matcher has one source, in the first position");
-  static_assert(
-      !begins_well || !one_source || match_stage<Right>,
-      "orbis: the right operand of | must be a matching stage, such as ratio_test{0.7f} or bool(const candidate&)");
+  static_assert(!begins_well || !one_source || match_stage<Right>,
+                "orbis: the right operand of | must be a matching stage, which has const call operators: either "
+                "bool(const candidate&), or void(std::vector<candidate>&, std::span<const keypoint>, "
+                "std::span<const keypoint>, workspace&) with its member type workspace, or no_workspace");
   if constexpr (!begins_well || !one_source || !match_stage<Right>) {
     return detail::no_matcher{};
   } else if constexpr (detail::is_chain<Left>) {
