@@ -242,12 +242,12 @@ orbis::image<rgb8> draw_aslant(const std::vector<voxel>& voxels, const std::vect
   return draw(voxels, frame, how, e, width, height);
 }
 
-orbis::image<rgb8> draw_from_above(const std::vector<voxel>& voxels, const std::vector<voxel>& in_view,
-                                   const view_frame& frame, coloring how, int width, int height) {
+view_from_above draw_from_above(const std::vector<voxel>& voxels, const std::vector<voxel>& in_view,
+                                const view_frame& frame, coloring how, int width, int height) {
   constexpr double degree = std::numbers::pi / 180.0;
   const eye e = look_at(framed(in_view, frame), -90 * degree, 89.9 * degree, 6 * degree, width * oversampling,
                         height * oversampling);
-  return draw(voxels, frame, how, e, width, height);
+  return {draw(voxels, frame, how, e, width, height), e.focal / e.position.z() / oversampling};
 }
 
 }  // namespace app

@@ -161,6 +161,8 @@ result<map_results> write_map(built_map map, const settings& s, const std::files
 
   m.filter_mode = to_string(map.filter.mode);
   m.filter_reason = describe(map.moving) + map.filter.reason;
+  m.moving_pixels = map.moving.pixels;
+  m.moving_keyframes = map.moving.keyframes;
   m.resolution = s.resolution;
   m.unfiltered = describe_tree(*map.unfiltered_octree, bt_bytes_unfiltered);
   m.filtered = describe_tree(map.octree, bt_bytes);

@@ -100,22 +100,30 @@ orbis::result<void> write_map_picture(const std::string& name, const std::string
                                       const view_frame& frame) {
   sheet s{1500, 820};
   s.paste(draw_aslant(voxels, r.map->voxels, frame, colors ? coloring::camera : coloring::height, 880, 700), 20, 100);
-  s.paste(draw_from_above(voxels, r.map->voxels, frame, coloring::height, 560, 620), 920, 130);
+  const view_from_above above = draw_from_above(voxels, r.map->voxels, frame, coloring::height, 560, 620);
+  s.paste(above.picture, 920, 130);
   s.text(title, {60, 44}, ink, 19, 0.0, true);
   char buffer[160];
   std::snprintf(buffer, sizeof buffer, "%s occupied of %s known leaves, finest voxel %g cm, %s as .bt",
                 count_text(numbers.occupied).c_str(), count_text(numbers.leaves).c_str(), 100 * r.map->resolution,
                 bytes_text(numbers.bt_bytes).c_str());
   s.text(buffer, {60, 70}, faint, 13);
+  std::snprintf(buffer, sizeof buffer, "up to a height of %.1f m; blank: nothing was measured", frame.cut);
+  s.text(buffer, {60, 90}, faint, 13);
   s.text("from above, by height", {1200, 118}, faint, 12, 0.5);
   std::snprintf(buffer, sizeof buffer, "%.1f m", frame.cut);
   for (int i = 0; i != 200; ++i) {
     const orbis::rgb8 c = height_color(i / 199.0);
-    s.line({1100.0 + i, 785}, {1100.0 + i, 793}, cv::Scalar(c.r, c.g, c.b), 1.0);
+    s.line({1180.0 + i, 785}, {1180.0 + i, 793}, cv::Scalar(c.r, c.g, c.b), 1.0);
   }
   add_frame_note(s, r, frame);
-  s.text("0", {1092, 794}, faint, 11, 1.0);
-  s.text(buffer, {1308, 794}, faint, 11);
+  s.text("height 0", {1172, 794}, faint, 11, 1.0);
+  s.text(buffer, {1388, 794}, faint, 11);
+  // A scale bar of 1, 2 or 5 times a power of ten, at most about 120 pixels long.
+  const double length = nice_step(100.0 / above.pixels_per_metre, 1), end = 940 + length * above.pixels_per_metre;
+  s.line({940, 789}, {end, 789}, ink, 1.5);
+  for (const double x : {940.0, end}) s.line({x, 785}, {x, 793}, ink, 1.5);
+  s.text(tick_text(length, length) + " m", {end + 8, 794}, faint, 11);
   return s.write(r.folder / name);
 }
 
@@ -126,6 +134,10 @@ orbis::result<void> write_filter_picture(const results& r, const view_frame& fra
   sheet s{1500, 820};
   s.text(r.title + ": the octree before and after the filter", {60, 44}, ink, 19, 0.0, true);
   s.text("filter: " + m.filter_mode + ", removed " + removed_text(m), {60, 70}, faint, 13);
+  if (m.moving_pixels != 0)
+    s.text("people and other moving objects, " + count_text(m.moving_pixels) + " pixels of " +
+               count_text(m.moving_keyframes) + " keyframes, were removed before",
+           {60, 88}, faint, 13);
   const auto panel = [&](int x, const std::string& name, const std::vector<voxel>& voxels, const tree_numbers& numbers,
                          std::size_t points, std::uintmax_t bytes) {
     s.paste(draw_aslant(voxels, m.voxels, frame, how, 720, 600), x, 112);

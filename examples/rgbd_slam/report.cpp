@@ -408,17 +408,20 @@ orbis::result<void> write_report(const results& r, const view_frame& frame) {
   choose(page, "truth", r.against_truth.has_value());
   const std::string note = view_frame_note(frame, length_unit(r));
   const auto picture = orbis::read_file(r.folder / "map.png");
-  const std::string html = filled(page, {{"title", escaped(r.title)},
-                                         {"header", header(r)},
-                                         {"frame_note", note.empty() ? "" : "The view is " + note + "."},
-                                         {"picture", picture ? "data:image/png;base64," + base64(*picture) : "data:,"},
-                                         {"unit", length_unit(r)},
-                                         {"profile_height", r.against_truth ? "185" : "420"},
-                                         {"tables", tables(r, frame)},
-                                         {"tracking_table", r.slam ? time_table(r.slam->tracking_ms) : ""},
-                                         {"insert_table", r.map ? time_table(r.map->insert_ms) : ""},
-                                         {"footer", footer(r)},
-                                         {"data", for_script(script_data(r, frame))}});
+  const std::string html =
+      filled(page, {{"title", escaped(r.title)},
+                    {"header", header(r)},
+                    {"frame_note", note.empty() ? "" : "The view is " + note + "."},
+                    {"picture", picture ? "data:image/png;base64," + base64(*picture) : "data:,"},
+                    {"unit", length_unit(r)},
+                    {"profile_height", r.against_truth ? "185" : "420"},
+                    {"tables", tables(r, frame)},
+                    {"tracking_table", r.slam ? time_table(r.slam->tracking_ms) : ""},
+                    {"insert_title", r.live ? "time to insert a keyframe into the live map, in its own thread"
+                                            : "time to insert a depth image into the octree"},
+                    {"insert_table", r.map ? time_table(r.map->insert_ms) : ""},
+                    {"footer", footer(r)},
+                    {"data", for_script(script_data(r, frame))}});
   return orbis::write_file_atomically(r.folder / "report.html", [&](std::ostream& out) { out << html; });
 }
 

@@ -44,7 +44,8 @@ struct map_results {
   orbis::point_cloud cloud;         ///< before the filter
   std::vector<std::uint32_t> kept;  ///< indices of the points that the filter kept
   std::string filter_mode, filter_reason;
-  std::uintmax_t cloud_bytes = 0, filtered_bytes = 0;  ///< sizes of the files
+  std::size_t moving_pixels = 0, moving_keyframes = 0;  ///< removed pixels of moving objects, and their keyframes
+  std::uintmax_t cloud_bytes = 0, filtered_bytes = 0;   ///< sizes of the files
   double resolution = 0.0;
   tree_numbers unfiltered, filtered;
   std::uintmax_t ot_bytes = 0;
