@@ -109,6 +109,20 @@ file(MAKE_DIRECTORY ${WORK}/nothing)
 app(2 run nothing --out out)
 check(err MATCHES "rgbd_slam: nothing: not a known recording")
 
+# A camera of another size than the images is refused before memory of its size is allocated.
+recording(large_camera)
+file(READ ${WORK}/large_camera/camera.toml camera)
+foreach(parameter width height fx fy)
+  string(REGEX REPLACE "(^|\n)${parameter} = [^\n]*" "\\1${parameter} = 20000" camera "${camera}")
+endforeach()
+file(WRITE ${WORK}/large_camera/camera.toml "${camera}")
+execute_process(COMMAND bash -c "ulimit -v 500000 && \"${APP}\" --help" RESULT_VARIABLE result OUTPUT_QUIET ERROR_QUIET)
+if(result EQUAL 0)
+  execute_process(COMMAND bash -c "ulimit -v 500000; exec \"$@\"" limited ${APP} run large_camera --out out
+                  WORKING_DIRECTORY ${WORK} RESULT_VARIABLE result ERROR_VARIABLE err)
+  check(result EQUAL 2 AND err MATCHES "^rgbd_slam: [^\n]*000000.png: [^\n]*20000x20000[^\n]*\n$")
+endif()
+
 # Voxels of which one frame would fill the memory are refused before they do.
 make_recording(${WORK}/sharp 2 640)
 foreach(command run map)

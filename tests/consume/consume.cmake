@@ -48,10 +48,10 @@ if(WAY STREQUAL "find_package")
   if(BUILD)  # the compiled flavour, as this build has it
     run(${CMAKE_COMMAND} --install ${BUILD} --prefix ${SCRATCH}/with_library)
     foreach(with_io IN ITEMS OFF ON)
-      run(${CMAKE_COMMAND} -S ${PROJECT} -B ${SCRATCH}/mixed_${with_io} ${options} -DWAY=find_package -DMIXED=ON
+      run(${CMAKE_COMMAND} -S ${PROJECT} -B ${SCRATCH}/mixed ${options} -DWAY=find_package -DMIXED=ON
           -DWITH_IO=${with_io} -DCMAKE_PREFIX_PATH=${SCRATCH}/with_library)
-      run(${CMAKE_COMMAND} --build ${SCRATCH}/mixed_${with_io})
-      run(${SCRATCH}/mixed_${with_io}/consumer)
+      run(${CMAKE_COMMAND} --build ${SCRATCH}/mixed)
+      run(${SCRATCH}/mixed/consumer)
     endforeach()
     if(PKG_CONFIG)
       file(GLOB directory ${SCRATCH}/with_library/lib*/pkgconfig ${SCRATCH}/with_library/lib/*/pkgconfig)
