@@ -12,8 +12,8 @@
 
 namespace orbis {
 
-/// Number of set bits in `x`, computed by adding neighbouring fields in parallel: without the POPCNT instruction
-/// `std::popcount` is a call into the compiler's library.
+/// Number of set bits in `x`, computed by adding neighbouring fields in parallel. Without the POPCNT instruction,
+/// `std::popcount` would call a function of the compiler's library.
 [[nodiscard]] constexpr std::uint32_t count_ones(std::uint64_t x) noexcept {
   x -= (x >> 1U) & 0x5555555555555555ULL;
   x = (x & 0x3333333333333333ULL) + ((x >> 2U) & 0x3333333333333333ULL);
@@ -21,9 +21,9 @@ namespace orbis {
   return static_cast<std::uint32_t>((x * 0x0101010101010101ULL) >> 56U);
 }
 
-/// A bit string of any type: trivially copyable, without padding, with a length of a whole number of 64-bit words. Its
-/// bits are the bits of its bytes in memory. `features::binary_descriptor<256>`, `std::array<std::uint64_t, 4>` and, on
-/// a little-endian machine, a 32-byte row of an OpenCV descriptor matrix are the same string.
+/// A bit string of any type: trivially copyable, without padding, and a whole number of 64-bit words long. Its bits are
+/// the bits of its bytes in memory. `features::binary_descriptor<256>`, `std::array<std::uint64_t, 4>` and, on a
+/// little-endian machine, a 32-byte row of an OpenCV descriptor matrix are the same string.
 template <class D>
 concept bit_string = std::is_trivially_copyable_v<D> && std::has_unique_object_representations_v<D> && sizeof(D) % 8 ==
                      0;

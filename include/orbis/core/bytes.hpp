@@ -18,7 +18,7 @@
 
 namespace orbis {
 
-/// The `T` stored at `from` in the byte order `order`.
+/// Reads the `T` that is stored at `from` in the byte order `order`.
 template <class T>
 requires std::is_arithmetic_v<T>
 [[nodiscard]] T load_number(const char* from, std::endian order = std::endian::little) noexcept {
@@ -61,8 +61,8 @@ using crc32c_tables = std::array<std::array<std::uint32_t, 256>, 8>;
 }
 inline constexpr crc32c_tables crc32c_table = make_crc32c_tables();
 
-/// Processes eight bytes at a time with tables. Source: M. Kounavis, F. Berry, "A systematic approach to building high
-/// performance, software-based, CRC generators", ISCC 2005.
+/// Processes eight bytes at a time with lookup tables. Source: M. Kounavis, F. Berry, "A systematic approach to
+/// building high performance, software-based, CRC generators", ISCC 2005.
 inline std::uint32_t crc32c_portable(const std::byte* at, std::size_t size, std::uint32_t c) noexcept {
   for (; size >= 8; size -= 8, at += 8) {
     std::uint32_t next = 0;

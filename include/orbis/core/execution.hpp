@@ -85,7 +85,7 @@ inline void run_on_workers(std::size_t count, std::size_t workers, thread_pool* 
     try {
       for (std::size_t i = 1; i != workers; ++i) others.emplace_back(work);
     } catch (const std::system_error&) {
-      // The system provides no more threads; the existing ones do the work, with the same result.
+      // The system provides no more threads. The existing threads do all of the work, with the same result.
     }
     work();
   }

@@ -28,12 +28,12 @@
 
 namespace orbis::detail {
 
-/// A newly created empty file that replaces the target file by one rename; the destructor removes it unless it was
-/// renamed.
+/// A newly created empty file that replaces the target file with a single rename; the destructor removes it unless it
+/// was renamed.
 ///
-/// Where the system supports it (Linux), the file has no name until then, so that nothing remains if the process is
-/// killed. Otherwise its name is hidden. Names are unique per process and call, so that concurrent writers of the same
-/// file, in one process or in several, do not conflict.
+/// Where the system supports it (Linux), the file has no name before the rename, so that no file remains if the process
+/// is killed. Otherwise its name is hidden. Names are unique per process and call, so that concurrent writers of the
+/// same file, in one process or in several, do not conflict.
 class temporary_file {
  public:
   /// Creates the file in the folder of `target`. If that fails, `exists()` is false and `errno` holds the reason.
@@ -49,7 +49,7 @@ class temporary_file {
   temporary_file& operator=(const temporary_file&) = delete;
 
   [[nodiscard]] bool exists() const noexcept { return is_named_ || is_unnamed_; }
-  /// The path to open the file by, valid until it is renamed.
+  /// The path with which callers open the file; valid until the file is renamed.
   [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }
 
   /// Flushes the file to the disk; returns false and sets `errno` if that fails.
@@ -86,8 +86,8 @@ class temporary_file {
     static std::atomic<std::uint32_t> calls{0};
     return folder_ / (".orbis-" + process() + "-" + std::to_string(calls.fetch_add(1)) + ".part");
   }
-  /// Calls `make` with new names in `path_`, until it succeeds or fails for another reason than that the name exists:
-  /// an earlier process with the same number may have left it.
+  /// Calls `make` with a new name in `path_` until it succeeds, or fails for any reason except that the name exists: an
+  /// earlier process with the same id may have left a file of that name.
   template <class Make>
   bool make_named(const Make& make) {
     for (int attempt = 0; attempt != 100; ++attempt) {
@@ -98,7 +98,7 @@ class temporary_file {
     return is_named_;
   }
 #ifdef O_TMPFILE
-  /// Creates a file without a name. Fails where the file system or /proc is missing the means.
+  /// Creates a file without a name. Fails if the file system does not support such files, or if /proc is not available.
   [[nodiscard]] bool create_unnamed() {
     file_ = ::open(folder_.empty() ? "." : folder_.c_str(), O_WRONLY | O_TMPFILE | O_CLOEXEC, 0666);
     if (file_ < 0) return false;
@@ -185,10 +185,10 @@ namespace orbis {
 /// `path`. If anything fails (including an exception from `write`), the temporary file is removed and `path` is
 /// unchanged. Readers, and the next start after a crash, find the old file or the new one, never a partial file.
 ///
-/// The temporary file has a unique name: two threads or two programs may write the same file at once; the last one
-/// wins. A `path` that is not a regular file (a device, a folder) is not replaced; a symbolic link itself is replaced,
-/// not its target. `write` returns `void`, or `result<void>` to report an error. Errors: write_failed, or those of
-/// `write`.
+/// The temporary file has a unique name: two threads or two programs may write the same file at the same time; the last
+/// one wins. A `path` that is not a regular file (a device, a folder) is not replaced; a symbolic link itself is
+/// replaced, not its target. `write` returns `void`, or `result<void>` to report an error. Errors: write_failed, or
+/// those of `write`.
 template <class Write>
 [[nodiscard]] result<void> write_file_atomically(const std::filesystem::path& path, Write&& write) {
   const auto reason = [] { return std::generic_category().message(errno != 0 ? errno : EIO); };

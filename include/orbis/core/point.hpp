@@ -3,7 +3,7 @@
 /// In-place access to user-defined point types through a trait.
 ///
 /// Any type with members `x`, `y`, `z` (PCL's points, plain structs) and any type indexable with `p[0], p[1], p[2]`
-/// (Eigen vectors, `std::array`, `float[3]`) works without further code. For other types specialise `point_traits`:
+/// (Eigen vectors, `std::array`, `float[3]`) works without further code. For other types, specialise `point_traits`:
 ///
 /// @code
 ///   template <> struct orbis::point_traits<my_point> {

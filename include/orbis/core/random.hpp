@@ -36,11 +36,11 @@ class random_bits {
     return r;
   }
 
-  /// Uniform in [0, 1), 53 bits.
+  /// A uniform random number in [0, 1), a multiple of 2^-53.
   [[nodiscard]] constexpr double uniform() noexcept { return static_cast<double>((*this)() >> 11U) * 0x1.0p-53; }
-  /// Uniform in [lo, hi).
+  /// A uniform random number in [lo, hi).
   [[nodiscard]] constexpr double uniform(double lo, double hi) noexcept { return lo + (hi - lo) * uniform(); }
-  /// Uniform in [0, n), n > 0, by multiplication (Lemire 2019, without rejection: bias < n / 2^32).
+  /// A uniform random integer in [0, n), n > 0, by multiplication (Lemire 2019, without rejection: bias < n / 2^32).
   [[nodiscard]] constexpr std::uint32_t below(std::uint32_t n) noexcept {
     return static_cast<std::uint32_t>((((*this)() >> 32U) * n) >> 32U);
   }

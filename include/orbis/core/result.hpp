@@ -25,7 +25,7 @@ enum class errc {
   no_data,           ///< empty input: cloud, list or trajectory
   degenerate,        ///< geometry does not determine the result
   cancelled,         ///< the progress callback requested cancellation
-  exception          ///< an exception ended the work: out of memory, or thrown by a callback
+  exception          ///< an exception ended the operation: out of memory, or thrown by a callback
 };
 
 /// The name of an error category, e.g. "malformed".
@@ -85,13 +85,13 @@ class [[nodiscard]] result<void> : public tl::expected<void, orbis::error> {
   using base::base;
   result(base&& other) : base{std::move(other)} {}  // NOLINT(google-explicit-constructor)
 
-  /// Throws `tl::bad_expected_access` on error, as for other results.
+  /// Throws `tl::bad_expected_access` on error, as in the other specialisations.
   void value() const {
     if (!has_value()) throw tl::bad_expected_access<orbis::error>(error());
   }
 };
 
-/// Makes an error to return from a function with a `result`: `return fail(errc::malformed, path, "...");`.
+/// Creates an error for a function that returns a `result`: `return fail(errc::malformed, path, "...");`.
 [[nodiscard]] inline tl::unexpected<error> fail(errc code, std::string where, std::string message) {
   return tl::unexpected<error>(error{code, std::move(where), std::move(message)});
 }

@@ -35,7 +35,7 @@ template <std::floating_point S>
 }  // namespace orbis
 
 // Between these two macros, every product and sum is rounded separately, even if the target can fuse them
-// (`-march=native`). Functions between them must not be templates, which would be instantiated elsewhere, under other
+// (`-march=native`). Functions between them must not be templates, which would be instantiated elsewhere, with other
 // options.
 #if defined(__clang__)
 #define ORBIS_BEGIN_UNFUSED _Pragma("float_control(push)") _Pragma("clang fp contract(off)")
@@ -66,7 +66,7 @@ namespace orbis {
   for (int n = 18; n >= 2; n -= 2) sum = 1.0 - sum * (s / static_cast<double>(n * (n + 1)));
   return a * sum;
 }
-/// The cosine of an angle of `turns` full turns; accuracy as for `sin_turns`.
+/// The cosine of an angle of `turns` full turns; as accurate as `sin_turns`.
 [[nodiscard]] inline double cos_turns(double turns) noexcept { return sin_turns(turns + 0.25); }
 
 }  // namespace orbis

@@ -107,7 +107,7 @@ class basic_se3 {
     const S t2 = squared_norm(tail<3>(xi));
     // (t - sin t) / t^3, (t^2 + 2 cos t - 2) / (2 t^4), (2 t - 3 sin t + t cos t) / (2 t^5)
     S a = S(0), b = S(0), c = S(0);
-    if (t2 < S(1)) {  // the closed forms cancel here
+    if (t2 < S(1)) {  // the closed forms lose accuracy by cancellation
       S term = S(1) / S(6);
       for (int n = 0; n != 10; ++n) {  // term = (-t^2)^n / (2 n + 3)!
         a += term;

@@ -37,7 +37,7 @@ template <int N, class S>
   square x = a * std::ldexp(S(1), -doublings);
   square sum = identity<square>();
   square term = identity<square>();
-  for (int n = 2; n != 16; ++n) {  // 0.5^15 / 16! is below the rounding of double
+  for (int n = 2; n != 16; ++n) {  // 0.5^15 / 16! is below the rounding error of double
     term = term * x / static_cast<S>(n);
     sum += term;
   }

@@ -2,8 +2,8 @@
 /// @file
 /// SIMD kernels that are written once and run on every instruction set.
 ///
-/// A kernel is a static member template over the target. It works on `vec<T, N, Target>`, which is split into the
-/// registers of the target. It is compiled for each target and selected at run time:
+/// A kernel is a static member template whose template argument is the target. It works on `vec<T, N, Target>`, which
+/// is split into the registers of the target. It is compiled for each target and selected at run time:
 ///
 /// @code
 ///   struct sum_of_squares {
@@ -21,9 +21,9 @@
 ///   double total = orbis::simd::kernel<sum_of_squares, double(std::span<const double>)>()(values);
 /// @endcode
 ///
-/// Functions that a kernel calls with vectors must be ORBIS_ALWAYS_INLINE, and lambdas in it `[&](auto& v)
-/// ORBIS_INLINE_LAMBDA {...}`: code that is not inlined is compiled for the baseline. Use the same N for all targets if
-/// the order of sums matters; otherwise `native_vec<T, Target>` has one register.
+/// Declare functions that a kernel calls with vectors ORBIS_ALWAYS_INLINE, and write lambdas in a kernel as `[&](auto&
+/// v) ORBIS_INLINE_LAMBDA {...}`: code that is not inlined is compiled for the baseline. Use the same N for all targets
+/// if the order of sums matters; otherwise use `native_vec<T, Target>`, which fills one register.
 ///
 /// | header | contents |
 /// | --- | --- |
@@ -32,7 +32,7 @@
 /// | core/simd/mask.hpp | `mask`, `bits`, `any`, `all`, `popcount` |
 /// | core/simd/vec.hpp | `vec`: memory, arithmetic, comparisons, `select`, `min`, `max`, bits, shifts |
 /// | core/simd/math.hpp | `abs`, `sqrt`, `floor`, approximate roots, sums over lanes |
-/// | core/simd/convert.hpp | conversions between number types, wider and narrower |
+/// | core/simd/convert.hpp | widening and narrowing conversions between number types |
 /// | core/simd/memory.hpp | gather and compress |
 /// | core/simd/shuffle.hpp | constant shuffles, interleaving, table look-up per lane |
 /// | core/simd/integer.hpp | saturated sums, averages, sums of products, bit counts |

@@ -9,8 +9,8 @@
 /// Other code keeps Eigen's operators. If an operand is an Eigen expression or of dynamic size, Eigen's operator is
 /// used.
 ///
-/// Sums of products run from the first entry to the last, as in Eigen for vectors of three; in other cases the last
-/// bits may differ from Eigen's results.
+/// Sums of products run from the first entry to the last, as in Eigen for three-element vectors; in other cases the
+/// last bits may differ from Eigen's results.
 #pragma once
 
 #include <cmath>
@@ -22,8 +22,8 @@
 
 namespace orbis {
 
-/// An `R x C` matrix of `S` with the same layout under every `-m` flag. Sizes that Eigen never aligns remain the plain
-/// Eigen type, so `vec3` *is* `Eigen::Vector3d`.
+/// An `R x C` matrix of `S` whose layout does not depend on `-m` compiler flags. Sizes that Eigen never aligns remain
+/// the plain Eigen type, so `vec3` *is* `Eigen::Vector3d`.
 template <int R, int C = 1, class S = double>
 using matrix =
     Eigen::Matrix<S, R, C,
@@ -507,7 +507,7 @@ requires(R > 0 && C > 0) [[nodiscard]] inline matrix<R, C, T> converted(const Ei
 }
 /// @}
 
-/// @name Eigen expressions and matrices of dynamic size: evaluated by Eigen
+/// @name Eigen expressions and matrices of dynamic size, which Eigen evaluates
 /// @{
 template <class D>
 [[nodiscard]] inline auto transposed(const Eigen::MatrixBase<D>& a) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Persistent threads for a parallel_policy: starting a thread takes about as long as a small loop.
+/// Persistent threads for a parallel_policy, because starting a thread takes about as long as a small loop.
 #pragma once
 
 #include <algorithm>
@@ -19,10 +19,9 @@ namespace orbis {
 /// @code
 ///   orbis::thread_pool pool{4};
 ///   cloud::statistical_filter(orbis::par.on(pool), points);
-/// @endcode
-/// Any number of threads may use the pool. Its threads poll for work for a few microseconds before they sleep. After a
-/// fork, the child process has none of the threads: it may use a pool created before the fork, on the caller's thread
-/// only, but must not destroy it.
+/// @endcode Any number of threads may use the pool. Its threads poll for work for a few microseconds before they sleep.
+/// A fork does not copy the threads: in the child process, a pool created before the fork runs loops on the caller's
+/// thread only, and must not be destroyed.
 class thread_pool {
  public:
   /// `threads` includes the caller's thread, so one fewer is started; 0 means the number of hardware threads. The pool
@@ -48,8 +47,8 @@ class thread_pool {
   /// The number of threads, including the caller's.
   [[nodiscard]] unsigned threads() const noexcept { return static_cast<unsigned>(workers_.size()) + 1; }
 
-  /// Calls `work(context)` on the calling thread and, until it returns there, on up to `helpers` others. Returns when
-  /// all calls have returned. @pre `work` does not throw
+  /// Calls `work(context)` on the calling thread and, until that call returns, on up to `helpers` other threads.
+  /// Returns when all calls have returned. @pre `work` does not throw
   void run(std::size_t helpers, void (*work)(const void*), const void* context) {
     if (helpers == 0 || workers_.empty() || is_busy_.exchange(true, std::memory_order_acquire)) {
       work(context);
@@ -70,7 +69,8 @@ class thread_pool {
   }
 
  private:
-  // Bits of the state: the number of helpers inside the job, open for more helpers, stopped, the job number.
+  // Bit fields of the state: number of helpers in the current job, job accepts more helpers, pool is stopped, job
+  // number.
   static constexpr std::uint64_t inside = 0xffff, open = std::uint64_t{1} << 16U, stopped = std::uint64_t{1} << 17U,
                                  one_job = std::uint64_t{1} << 18U;
   static constexpr int patience = 2000;  ///< number of polls of the state, about 20 us
@@ -99,7 +99,7 @@ class thread_pool {
 
   std::atomic<std::uint64_t> state_{0};
   std::atomic<bool> is_busy_{false};
-  void (*work_)(const void*) = nullptr;  // of the current job; read by the threads inside it
+  void (*work_)(const void*) = nullptr;  // of the current job; read by the threads that work on it
   const void* context_ = nullptr;
   std::size_t helpers_ = 0;
   std::vector<std::jthread> workers_;  // the last member: the threads end before the other members are destroyed

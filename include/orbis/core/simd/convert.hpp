@@ -15,7 +15,7 @@ namespace orbis::simd {
 namespace detail {
 
 #if ORBIS_X86
-/// Widening conversion; g++ 12 would emit several instructions instead of one. V and U have the same number of lanes.
+/// Widening conversion with one instruction, where g++ 12 would emit several. V and U have the same number of lanes.
 template <class U, class V>
 ORBIS_ALWAYS_INLINE void widen_16(U& out, const V& v) noexcept {
   using T = element_of<V>;

@@ -10,8 +10,8 @@
 
 #include <orbis/core/simd/level.hpp>
 
-/// Marks a kernel and every function that it calls with vectors: inlined into the function that is compiled for a
-/// target.
+/// Marks a kernel and every function that it calls with vectors, so that they are inlined into the function that is
+/// compiled for a target.
 #define ORBIS_ALWAYS_INLINE __attribute__((always_inline)) inline
 /// Forces inlining of a lambda in a kernel; write it after the parameters.
 #define ORBIS_INLINE_LAMBDA __attribute__((always_inline))

@@ -17,8 +17,8 @@ namespace orbis::simd {
 namespace detail {
 
 #if ORBIS_X86
-// Intrinsics for registers of 16, 32 and 64 bytes, one for bytes and one for wider numbers. SSE2 is the baseline, so
-// the 16-byte functions need no attribute.
+// Functions for registers of 16, 32 and 64 bytes; each uses one intrinsic for bytes and another for wider numbers. SSE2
+// is the baseline, so the 16-byte functions need no attribute.
 #define ORBIS_SIMD_BINARY(name, of_bytes, of_words)                                                     \
   template <class Out, class A, class B>                                                                \
   ORBIS_ALWAYS_INLINE void name##_16(Out& out, const A& a, const B& b) noexcept {                       \

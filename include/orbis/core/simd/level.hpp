@@ -12,8 +12,8 @@
 ///   }
 /// @endcode
 ///
-/// An object that selects its kernels when it is constructed must be constructed under the limit. The limit is the only
-/// state in this header that threads share; the library itself never sets it.
+/// An object that selects its kernels when it is constructed must be constructed while the limit exists. The limit is
+/// the only state in this header that threads share; the library itself never sets it.
 #pragma once
 
 #include <algorithm>

@@ -22,7 +22,7 @@ struct halves {
   Half low, high;
 };
 
-/// True if masks are bits in a separate mask register: for 64 bytes on x86.
+/// True if masks are bits in a separate mask register, as for registers of 64 bytes on x86.
 template <std::size_t Bytes>
 inline constexpr bool masks_are_bits = ORBIS_X86 != 0 && Bytes == 64;
 

@@ -78,8 +78,9 @@ ORBIS_TARGET_AVX512 inline void gather_64(V& out, const element_of<V>* from, con
 
 }  // namespace detail
 
-/// Lane i is from[at[i]] where m is set, else lane i of `otherwise`, without reading memory. Uses gather instructions
-/// for four- and eight-byte numbers on AVX2 and AVX-512 (a few cycles per lane); otherwise lane by lane.
+/// Lane i is from[at[i]] where m is set, else lane i of `otherwise`; memory is read only for lanes that are set. Uses
+/// gather instructions for four- and eight-byte numbers on AVX2 and AVX-512 (a few cycles per lane); otherwise lane by
+/// lane.
 template <class T, std::size_t N, target Target>
 [[nodiscard]] ORBIS_ALWAYS_INLINE vec<T, N, Target> gather(const T* from, const vec<std::int32_t, N, Target>& at,
                                                            const typename vec<T, N, Target>::mask_type& m,

@@ -20,7 +20,8 @@ namespace orbis::simd {
 
 namespace detail {
 
-// Registers are passed by reference: the calling convention of a function that returns one differs with AVX.
+// Registers are passed by reference, because the calling convention of functions that return a register differs with
+// AVX.
 
 /// Prevents the fusion of a product with a sum on targets that could fuse; see rounded_product.
 template <target Target, class V>
@@ -151,7 +152,7 @@ struct vec {
     store(buffer);
     std::memcpy(p, buffer, n * sizeof(T));
   }
-  /// Lane i is f(i). For constants: a constexpr f costs nothing.
+  /// Lane i is f(i). Use it for constants: a constexpr f has no run-time cost.
   template <class F>
   [[nodiscard]] static ORBIS_ALWAYS_INLINE vec generate(const F& f, std::size_t first = 0) noexcept {
     vec out;

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// One register: the compiler's vector types and the operations that they lack on x86.
+/// Operations on a single register: the compiler's vector types, and the functions that they lack on x86.
 ///
-/// The compilers' vectors provide arithmetic, shifts, comparisons, conversions and constant shuffles. This file
+/// The compilers' vector types provide arithmetic, shifts, comparisons, conversions and constant shuffles. This file
 /// provides the rest, one function each. Every function that needs an instruction set carries its target attribute and
-/// takes registers by reference: a kernel template, which has no attribute, can then name it, and it is inlined once
-/// the template is inlined into a function that has the attribute.
+/// takes registers by reference: a kernel template, which has no attribute, can then call it, and the call is inlined
+/// once the template is inlined into a function that has the attribute.
 #pragma once
 
 #include <cstddef>
@@ -33,7 +33,7 @@ template <std::size_t Size>
 using signed_of_size = std::conditional_t<
     Size == 8, std::int64_t,
     std::conditional_t<Size == 4, std::int32_t, std::conditional_t<Size == 2, std::int16_t, std::int8_t>>>;
-/// An unsigned number of at least `N` bits.
+/// An unsigned integer with at least `N` bits.
 template <std::size_t N>
 using word_of_bits = std::conditional_t<
     (N > 32), std::uint64_t,
@@ -49,8 +49,8 @@ enum class order { equal = 0, less = 1, less_equal = 2, unequal = 4 };
 
 // -- SSE2: 16 bytes ---------------------------------------------------------------------------------------------------
 
-/// Returns `b` where it is larger (smaller) than `a`, else `a`. g++ 12 compiles these into a comparison and a blend if
-/// one of them is a constant.
+/// Returns `b` where it is larger (smaller) than `a`, else `a`. Uses the intrinsic, because g++ 12 compiles the
+/// expression to a comparison and a blend if one operand is a constant.
 template <bool Max, class V>
 ORBIS_ALWAYS_INLINE void extremum_16(V& out, const V& a, const V& b) noexcept {
   if constexpr (sizeof(a[0]) == 8)
@@ -147,8 +147,8 @@ ORBIS_TARGET_AVX2 inline void fused_32(V& out, const V& a, const V& b, const V& 
 }
 
 // -- AVX-512: 64 bytes ------------------------------------------------------------------------------------------------
-// g++ 12 generates element-wise code for a 512-bit comparison whose result is kept; masks are therefore a separate
-// register type. Masked intrinsics replace the unmasked ones for which it emits warnings.
+// g++ 12 generates element-wise code for a 512-bit comparison whose result is stored; masks are therefore a separate
+// register type. Masked intrinsics replace the unmasked ones for which g++ emits warnings.
 
 template <order O, class V, class Word>
 ORBIS_TARGET_AVX512 inline void compare_64(Word& out, const V& a, const V& b) noexcept {
