@@ -20,8 +20,8 @@
 
 namespace orbis::camera {
 
-/// Holds one of the library's camera models as a value; every call dispatches on the model. Hot loops dispatch once:
-/// `camera.visit([&](const auto& model) { ... })`. Satisfies `camera_model`.
+/// Holds one of the library's camera models as a value; every call dispatches on the model. In hot loops, dispatch
+/// once: `camera.visit([&](const auto& model) { ... })`. Satisfies `camera_model`.
 class any_camera {
  public:
   any_camera() = default;

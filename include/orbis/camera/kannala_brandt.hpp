@@ -23,8 +23,8 @@ namespace orbis::camera {
 /// The Kannala-Brandt fisheye model. With `theta` the angle between ray and optical axis, a point projects to a
 /// distance of `theta (1 + k1 theta^2 + k2 theta^4 + k3 theta^6 + k4 theta^8)` focal lengths from the principal point.
 ///
-/// The domain ends where that polynomial stops increasing, at most at 90 degrees, since rays are scaled to z = 1.
-/// Satisfies `camera_model`.
+/// The domain ends where that polynomial stops increasing, or at 90 degrees if that is smaller, because rays are scaled
+/// to z = 1. Satisfies `camera_model`.
 class kannala_brandt {
  public:
   struct coefficients {

@@ -27,7 +27,7 @@ concept double_lanes = requires(const L& x, const double* p) {
   { x* x + 1.0 / x } -> std::same_as<L>;
   select(x < x, x, x);
 };
-/// Type of the mask returned by comparisons of such vectors.
+/// Type of the mask returned by comparisons of these vectors.
 template <double_lanes L>
 using mask_of = decltype(std::declval<L>() < std::declval<L>());
 
@@ -88,7 +88,8 @@ template <double_lanes L>
 }  // namespace detail
 
 /// `project<Jacobian>(camera, x, y, z, out)`: `camera.project` for eight points in the camera frame, up to rounding;
-/// derivatives only if `Jacobian`. If `axis_aligned`, u does not depend on y nor v on x.
+/// computes the derivatives only if `Jacobian` is true. If `axis_aligned` is true, u does not depend on y, and v does
+/// not depend on x.
 template <camera_model Camera>
 struct lanes_of {
   static constexpr bool axis_aligned = false;

@@ -140,7 +140,8 @@ class radial_tangential {
     return j;
   }
 
-  /// The ray that distorts to `target` without tangential distortion, or one on the boundary of the domain.
+  /// The ray that distorts to `target` without tangential distortion. If there is none, a ray near the boundary of the
+  /// domain.
   [[nodiscard]] vec2 radial_start(const vec2& target) const {
     const double distorted = std::sqrt(target.x() * target.x() + target.y() * target.y());
     if (distorted == 0.0) return target;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The RGB-D camera settings that are needed to use its recordings.
+/// The settings of an RGB-D camera that are needed to use its recordings.
 #pragma once
 
 #include <optional>

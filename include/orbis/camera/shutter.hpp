@@ -46,8 +46,8 @@ struct shutter {
 /// Maps a point from the camera frame at time `t` to the camera frame at time 0, if the camera moves by a constant
 /// twist: `exp(t * twist) p` to second order; the remainder is below a thousandth of a pixel for the rotation during
 /// one read-out (a few hundredths of a radian). `twist`: twist of the camera in its own frame, per second, translation
-/// first. `p` represents the point `p / inverse_scale`, and the result has the same scale: with a ray for `p` and its
-/// inverse depth for `inverse_scale`, points at any distance are handled.
+/// first. `p` represents the point `p / inverse_scale`, and the result has the same scale: to handle points at any
+/// distance, pass a ray as `p` and the inverse depth as `inverse_scale`.
 [[nodiscard]] inline vec3 moved_by(const vec6& twist, double t, const vec3& p, double inverse_scale = 1.0) {
   const vec3 w(t * twist[3], t * twist[4], t * twist[5]);
   const vec3 v(inverse_scale * (t * twist[0]), inverse_scale * (t * twist[1]), inverse_scale * (t * twist[2]));

@@ -60,7 +60,7 @@ struct stored_depth<depth_view<T>> : std::type_identity<T> {};
 
 }  // namespace detail
 
-/// Corrects the images of one camera. Reuses its working memory: allocates nothing after the first image. Not
+/// Corrects the images of one camera. Reuses its working memory, and allocates none after the first image. Not
 /// thread-safe.
 template <camera_model Camera>
 class shutter_correction {
@@ -82,7 +82,7 @@ class shutter_correction {
   }
 
   /// Computes the global-shutter depth image at the frame's time. `out` is 0 where nothing was measured, or where the
-  /// measured point is not visible. `T` is the stored type of `depth` if it is a `depth_view` (`out` then has its
+  /// measured point is not visible. `T` is the stored type of `depth` if it is a `depth_view` (`out` then has the same
   /// scale), otherwise `float` (metres). If the camera does not move, or all rows are read at the frame's time, `out`
   /// equals `depth`. Errors: `invalid_argument` if the twist is not finite, or turns the camera by more than 0.3
   /// radians between the frame's time and the time of a row; `out` is then unchanged. O(pixels).
@@ -125,7 +125,7 @@ class shutter_correction {
   /// Computes the colour image that belongs to a corrected depth image: each pixel gets the colour read at the position
   /// where its point was observed; a pixel without depth is treated as a point at a large distance; positions outside
   /// the image are black. If the camera does not move, or all rows are read at the frame's time, the image is copied.
-  /// Errors and preconditions as for `depth`. O(pixels).
+  /// Errors and preconditions: as in `depth`. O(pixels).
   template <depth_source Depth>
   [[nodiscard]] result<void> color(const shutter& s, const vec6& twist, const Depth& corrected,
                                    image_view<const rgb8> color, image_view<rgb8> out) {
@@ -228,7 +228,7 @@ class shutter_correction {
   detail::row_warp<Camera> to_frame_, to_row_;
   image<float> nearest_;  // depth at the frame's time, or no_depth
   image<float> inverse_;  // as read, with a border of one pixel; 0: no depth
-  // Buffers for one row, in whole cells.
+  // Buffers for one row, padded to whole cells.
   std::vector<float> surface_, metres_;  // inverse depth, depth
   std::vector<std::int32_t> index_;
   detail::warped_row warped_;

@@ -10,7 +10,7 @@
 
 namespace orbis::camera {
 
-/// The images of a rectified stereo camera: same size, same pinhole model, corresponding rows.
+/// The images of a rectified stereo camera: same size, same pinhole model, and corresponding points in the same row.
 struct stereo_frame {
   double timestamp = 0.0;  ///< time of both images, seconds
   image<rgb8> left;

@@ -63,9 +63,9 @@ template <std::size_t N>
   return count > 0 ? roots[0] : infinity;
 }
 
-/// Solves `f(x) == target` for `x` in `[0, end)`, where `f(0) == 0` and `f` is increasing; `f` returns value and
-/// derivative. Newton's method within a bracket maintained by bisection. Empty if `target` is not reached. `end` may be
-/// infinite.
+/// Solves `f(x) == target` for `x` in `[0, end)`, where `f(0) == 0` and `f` is increasing; `f` returns the value and
+/// the derivative. Newton's method within a bracket maintained by bisection. Empty if `target` is not reached. `end`
+/// may be infinite.
 template <std::invocable<double> F>
 [[nodiscard]] std::optional<double> invert_growing(F&& f, double target, double end) {
   if (!(target >= 0.0) || !std::isfinite(target)) return std::nullopt;
@@ -83,7 +83,7 @@ template <std::invocable<double> F>
     if (value == target) break;
     (value < target ? lo : hi) = x;
     double next = x - (value - target) / slope;
-    // Test before the bracket: at the root, Newton's step ends on the border of the bracket.
+    // Test for convergence before the bracket: at the root, Newton's step ends on a bound of the bracket.
     if (std::abs(next - x) <= 4.0 * std::numeric_limits<double>::epsilon() * x) return std::clamp(next, lo, hi);
     if (!(next > lo && next < hi)) next = 0.5 * (lo + hi);
     x = next;

@@ -47,8 +47,8 @@ struct warped_pixel {
   double x = 0.0, y = 0.0, ratio = 0.0;
 };
 
-/// Computes the pixel at the frame's time of the point that row `y` observes at the given inverse depth. `ray`: the ray
-/// through the original pixel, at z = 1.
+/// Computes the pixel that observes, at the frame's time, the point that a pixel in row `y` observes at the given
+/// inverse depth. `ray`: the ray through the original pixel, at z = 1.
 template <camera_model Camera>
 [[nodiscard]] std::optional<warped_pixel> warp_to_frame(const Camera& camera, const row_time& time, const vec6& twist,
                                                         const vec3& ray, double y, double inverse_depth) {
@@ -58,8 +58,9 @@ template <camera_model Camera>
   return warped_pixel{pixel->x(), pixel->y(), p.z()};
 }
 
-/// Computes the rolling-shutter pixel of the point that the pixel of `ray` in row `y` observes at the frame's time. Its
-/// row, and hence its time, is found by iteration; empty if the motion is too fast for convergence.
+/// Computes the rolling-shutter pixel that observes the point that a pixel in row `y` observes at the frame's time. Its
+/// row, and hence its time, is found by iteration; empty if the motion is too fast for convergence. `ray`: the ray
+/// through the pixel in row `y`.
 template <camera_model Camera>
 [[nodiscard]] std::optional<warped_pixel> warp_to_row(const Camera& camera, const row_time& time, const vec6& twist,
                                                       const vec3& ray, double y, double inverse_depth) {
@@ -79,12 +80,12 @@ template <camera_model Camera>
 
 enum class warp_direction { to_frame, to_row };
 
-/// Spacing of the nodes of a `row_warp` in pixels; also the number of pixels evaluated at once.
+/// Spacing of the nodes of a `row_warp` in pixels; also the number of pixels that are evaluated together.
 inline constexpr int warp_cell = 16;
 /// Parabolas in inverse depth for the displacement in x, the displacement in y, and the depth ratio.
 using warp_parabolas = std::array<float, 9>;
 
-/// Warped positions of a row of pixels; NaN where undefined. All lengths are whole cells.
+/// Warped positions of a row of pixels; NaN where undefined. All lengths are multiples of a cell.
 struct warped_row {
   std::vector<float> x, y, ratio;
   explicit warped_row(std::size_t size) : x(size), y(size), ratio(size) {}
@@ -148,14 +149,15 @@ class row_warp {
     time_ = time;
     twist_ = twist;
     const double shift = time.largest(camera.height()) * norm(head<3>(twist));
-    constexpr double nearest = 0.25, largest_angle = 0.1;  // metres; angle of the shift, as seen from the point
+    constexpr double nearest = 0.25, largest_angle = 0.1;  // metres; angle that the shift subtends at the point
     most_inverse_ = shift > largest_angle * nearest ? largest_angle / shift : 1.0 / nearest;
     for (std::size_t j = 0; j != down_; ++j)
       for (std::size_t i = 0; i != across_; ++i) nodes_[j * across_ + i] = fit(camera, i, j);
   }
 
-  /// Computes the warped positions of the pixels of row `y` at their inverse depths. Entries without depth may have any
-  /// finite non-negative value. O(pixels). @pre the lengths of `inverse_depth` and `out` are multiples of a cell
+  /// Computes the warped positions of the pixels of row `y` at their inverse depths. Entries of pixels without depth
+  /// may have any finite non-negative value. O(pixels). @pre the lengths of `inverse_depth` and `out` are multiples of
+  /// a cell
   void evaluate(const Camera& camera, int y, std::span<const float> inverse_depth, warped_row& out) {
     const auto* const above = nodes_.data() + static_cast<std::size_t>(y / warp_cell) * across_;
     const auto* const below = above + across_;
@@ -178,7 +180,7 @@ class row_warp {
  private:
   static constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
 
-  [[nodiscard]] static std::size_t nodes(int size) noexcept {  // one row and one pixel past the last
+  [[nodiscard]] static std::size_t nodes(int size) noexcept {  // the last node is past the last pixel
     return static_cast<std::size_t>((size + warp_cell - 1) / warp_cell) + 1;
   }
   [[nodiscard]] static double place(std::size_t node) noexcept { return static_cast<double>(node) * warp_cell; }

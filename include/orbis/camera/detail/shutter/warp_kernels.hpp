@@ -46,9 +46,9 @@ struct read_surface_kernel {
   struct arguments {
     std::size_t count;  ///< whole cells
     int width, height;
-    const float* surface;  ///< inverse depth of the target surface ...
-    const float *x, *y;    ///< ... the position where it was read ...
-    const float* ratio;    ///< ... and the ratio of the depth at that position to the depth at this pixel
+    const float* surface;  ///< inverse depth of the target surface
+    const float *x, *y;    ///< position at which the target surface was observed
+    const float* ratio;    ///< ratio of the depth at that position to the depth at this pixel
     const float* inverse;  ///< inverse depth of the original image, with a border of one zero pixel
     float* metres;         ///< 0 where undefined
   };
@@ -62,7 +62,7 @@ struct read_surface_kernel {
     const lanes right(static_cast<float>(a.width + 1)), bottom(static_cast<float>(a.height + 1));
     const std::int32_t stride = a.width + 2;
     for (std::size_t i = 0; i != a.count; i += warp_cell) {
-      const lanes x = lanes::load(a.x + i) + one, y = lanes::load(a.y + i) + one;  // in the image with a border
+      const lanes x = lanes::load(a.x + i) + one, y = lanes::load(a.y + i) + one;  // in the padded image
       const lanes ratio = lanes::load(a.ratio + i), here = lanes::load(a.surface + i);
       const auto inside = (x > zero) & (x < right) & (y > zero) & (y < bottom) & (here > zero) & (ratio > zero);
       if (none(inside)) {
