@@ -88,7 +88,7 @@ TEST_CASE("a bad field of a camera file is named") {
 
 TEST_CASE("the length of the distortion is checked against the model") {
   CHECK(message(camera_text("distortion", "[1.0, 2.0, 3.0]")) ==
-        "camera.toml: distortion has 3 values, the model radtan takes 4, 5 or 8");
+        "camera.toml: distortion has 3 values; the model radtan takes 4, 5 or 8");
   CHECK(message(camera_text("distortion", "[0, 0, 0, 0, nan]")).find("distortion must be") != std::string::npos);
   CHECK(message(camera_text("distortion", "0.3")).find("distortion must be") != std::string::npos);
   CHECK(message(camera_text("distortion")).find("distortion has 0 values") != std::string::npos);

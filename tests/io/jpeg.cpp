@@ -157,7 +157,7 @@ TEST_CASE("a JPEG header that claims too many pixels allocates nothing") {
   for (const std::size_t k : {5U, 6U, 7U, 8U}) bytes[frame + k] = '\xF0';
   const auto read = io::decode_jpeg(bytes);
   REQUIRE_FALSE(read);
-  CHECK(read.error().message == "damaged JPEG: claims more pixels than the file can hold");
+  CHECK(read.error().message == "damaged JPEG: specifies more pixels than the file can hold");
 }
 
 TEST_CASE("what is written as JPEG is read back") {

@@ -161,7 +161,7 @@ TEST_CASE("the names of images in a plain folder tell their times") {
   SECTION("a list of times has the last word") {
     folder.write("times.txt", "3.5\n4.5\n5.5\n");
     CHECK(times({"000000.png", "000007.png"}) == std::vector<double>{3.5, 4.5});
-    CHECK_THAT(io::open_mono_recording(folder.path()).value().notes()[0], Contains("3 times for 2 images"));
+    CHECK_THAT(io::open_mono_recording(folder.path()).value().notes()[0], Contains("3 time stamps for 2 images"));
     folder.write("times.txt", "3.5\nfour\n");
     CHECK_THAT(message_of(io::open_mono_recording(folder.path())), Contains("times.txt:2: "));
   }
@@ -214,7 +214,7 @@ TEST_CASE("an image of another size than the one camera is refused") {
   folder.write("1.png", io::encode_png(image<rgb8>(8, 7)));
   const auto recording = io::open_mono_recording(folder.path()).value();
   CHECK(recording.frame(0));
-  CHECK_THAT(message_of(recording.frame(1)), Contains("8x7 pixels, the camera 8x6"));
+  CHECK_THAT(message_of(recording.frame(1)), Contains("8x7 pixels, but the camera has 8x6"));
 }
 
 TEST_CASE("the excerpts of KITTI open as one camera's") {

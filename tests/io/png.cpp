@@ -115,7 +115,7 @@ TEST_CASE("a depth image that is not 16-bit grey is refused in words") {
   const auto eight = io::decode_png_depth(io::encode_png(pattern<std::uint8_t>(4, 4)), "d.png");
   REQUIRE_FALSE(eight);
   CHECK(eight.error().code == orbis::errc::unsupported);
-  CHECK(eight.error().to_string() == "d.png: a depth image must be a 16-bit grey PNG, this one is 8-bit grey");
+  CHECK(eight.error().to_string() == "d.png: a depth image must be a 16-bit grey PNG; this one is 8-bit grey");
   const auto color = io::decode_png_depth(io::encode_png(pattern<rgb8>(4, 4)));
   REQUIRE_FALSE(color);
   CHECK(color.error().message.find("colour") != std::string::npos);
@@ -164,7 +164,7 @@ TEST_CASE("a header that claims too many pixels allocates nothing") {
       "\x89PNG\r\n\x1a\n" + png_chunk("IHDR", size + std::string("\x10\0\0\0\0", 5)) + png_chunk("IDAT", "");
   const auto read = io::decode_png_depth(bytes);
   REQUIRE_FALSE(read);
-  CHECK(read.error().message == "damaged PNG: claims more pixels than the file can hold");
+  CHECK(read.error().message == "damaged PNG: specifies more pixels than the file can hold");
 }
 
 TEST_CASE("compressed texts in a PNG take no memory") {

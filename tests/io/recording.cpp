@@ -123,7 +123,7 @@ TEST_CASE("an image that does not exist or has another size is an error on acces
   const auto recording = io::open_recording(folder.path()).value();
   CHECK(recording.frame(0).has_value());
   CHECK(recording.frame(1).error().code == orbis::errc::not_found);
-  CHECK(recording.frame(2).error().message == "the image has 4x4 pixels, the camera 8x6");
+  CHECK(recording.frame(2).error().message == "the image has 4x4 pixels, but the camera has 8x6");
   CHECK(recording.frame(3).error().code == orbis::errc::unsupported);
 }
 

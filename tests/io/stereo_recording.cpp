@@ -140,7 +140,7 @@ TEST_CASE("a format that has its cameras takes no other") {
   const std::string file = is_kitti ? "calib.txt" : "sensor.yaml";
   const camera::camera_settings other{.model = camera::pinhole{8, 6, 9.0, 9.0, 3.5, 2.5}, .baseline = 1.0};
   CHECK_THAT(message_of(io::open_stereo_recording(folder.path(), {.camera = other})),
-             Catch::Matchers::Contains("the two cameras are those of " + file));
+             Catch::Matchers::Contains("the two cameras are those in " + file));
   folder.write("camera.toml", test::tiny_camera);
   const auto recording = io::open_stereo_recording(folder.path()).value();
   REQUIRE(recording.notes().size() == 1);
@@ -274,7 +274,7 @@ TEST_CASE("an image of another size than its camera's is refused") {
   folder.write("image_1/000002.png", io::encode_png(image<rgb8>(8, 7)));
   const auto recording = io::open_stereo_recording(folder.path()).value();
   CHECK(recording.frame(1));
-  CHECK_THAT(message_of(recording.frame(2)), Catch::Matchers::Contains("8x7 pixels, the camera 8x6"));
+  CHECK_THAT(message_of(recording.frame(2)), Catch::Matchers::Contains("8x7 pixels, but the camera has 8x6"));
 }
 
 TEST_CASE("a size that is far from that of the images is refused before there is memory for it") {
@@ -288,7 +288,7 @@ TEST_CASE("a size that is far from that of the images is refused before there is
     folder.write(std::string{camera} + "/sensor.yaml", text);
   }
   CHECK_THAT(message_of(io::open_stereo_recording(folder.path())),
-             Catch::Matchers::Contains("8x6 pixels, the camera 100000x100000"));
+             Catch::Matchers::Contains("8x6 pixels, but the camera has 100000x100000"));
 }
 
 TEST_CASE("the stereo excerpt of KITTI opens as a pair of lists") {

@@ -420,7 +420,7 @@ TEST_CASE("poses without times get those of a file") {
     const auto set = io::set_times(read, folder.write("times.txt", times));
     return set ? std::string{} : set.error().message;
   };
-  CHECK(message("0\n1\n2\n3\n") == "4 times for 5 poses");
+  CHECK(message("0\n1\n2\n3\n") == "4 time stamps for 5 poses");
   CHECK(message("0\n1\n1\n3\n4\n").find("later than the previous one") != std::string::npos);
   CHECK(message("0\n1\n2\n3\nx\n").find("one time") != std::string::npos);
   CHECK(io::set_times(read, folder / "none.txt").error().code == orbis::errc::not_found);
@@ -432,14 +432,14 @@ TEST_CASE("poses without times get those of a file") {
 
 TEST_CASE("units of time that make the spans of two trajectories agree are found") {
   const auto from = [](double begin, double end) { return trajectory{{begin, se3{}}, {end, se3{}}}; };
-  CHECK(io::describe_units(from(0, 2000), from(0, 2)) == "those of the first seem to be milliseconds");
-  CHECK(io::describe_units(from(5, 25), from(6e6, 24e6)) == "those of the second seem to be microseconds");
+  CHECK(io::describe_units(from(0, 2000), from(0, 2)) == "the times of the first seem to be in milliseconds");
+  CHECK(io::describe_units(from(5, 25), from(6e6, 24e6)) == "the times of the second seem to be in microseconds");
   CHECK(io::describe_units(from(1.4e18, 1.4e18 + 2e9), from(1.4e9, 1.4e9 + 2)) ==
-        "those of the first seem to be nanoseconds");
+        "the times of the first seem to be in nanoseconds");
   CHECK(io::describe_units(from(0, 2), from(1, 3)).empty());
   CHECK(io::describe_units(from(0, 2), from(100, 102)).empty());
   CHECK(io::describe_units({}, from(100, 102)).empty());
   CHECK(io::describe_spans(from(0, 2000.5), from(0, 2)) ==
-        "0 to 2000.5 s and 0 to 2 s; those of the first seem to be milliseconds");
+        "0 to 2000.5 s and 0 to 2 s; the times of the first seem to be in milliseconds");
   CHECK(io::describe_spans({}, from(1, 2)) == "no time and 1 to 2 s");
 }

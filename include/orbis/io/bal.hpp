@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Bundle adjustment problems in the text format of "Bundle Adjustment in the Large": the numbers of cameras, points
-/// and observations; for each observation the indices of its camera and point, and the pixel; nine numbers per camera;
-/// three per point. Numbers are separated by any white space.
+/// Bundle adjustment problems in the text format of "Bundle Adjustment in the Large". A file contains the numbers of
+/// cameras, points and observations; the indices of the camera and the point, and the pixel, of each observation; nine
+/// numbers per camera; and three numbers per point. Numbers are separated by any white space.
 ///
 /// Source: S. Agarwal, N. Snavely, S. M. Seitz, R. Szeliski, "Bundle adjustment in the large", ECCV 2010,
 /// and https://grail.cs.washington.edu/projects/bal.
@@ -19,8 +19,8 @@
 namespace orbis::io {
 
 /// Parses a problem; `where` names the source in errors. Time and memory are proportional to the length of the text,
-/// regardless of the numbers in the first line. Errors, with the line: malformed; unsupported (compressed, as are the
-/// files on the project's website).
+/// regardless of the numbers in the first line. Errors, with the line number: malformed; unsupported (compressed, as
+/// are the files on the project's website).
 [[nodiscard]] result<bal_problem> parse_bal(std::string_view text, const std::filesystem::path& where = {});
 
 /// Reads a whole stream; see `parse_bal`. Errors: unreadable, malformed, unsupported.

@@ -141,7 +141,7 @@ ORBIS_INLINE result<camera::camera_settings> parse_camera(std::string_view text,
   const auto list = [&](std::size_t i) { return i < d.size() ? d[i] : 0.0; };
   const auto wrong_length = [&](const char* wanted) {
     return fail(errc::malformed, where.string(),
-                "distortion has " + std::to_string(d.size()) + " values, the model " + model + " takes " + wanted);
+                "distortion has " + std::to_string(d.size()) + " values; the model " + model + " takes " + wanted);
   };
   if (model == "pinhole") {
     if (std::any_of(d.begin(), d.end(), [](double v) { return v != 0.0; })) return wrong_length("none");

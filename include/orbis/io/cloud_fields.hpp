@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A point cloud with all further values that its file stores for each point: intensity, normals, time, labels.
+/// A point cloud with all other values that its file stores for each point: intensity, normals, time, labels.
 #pragma once
 
 #include <algorithm>

@@ -18,8 +18,8 @@
 namespace orbis::io {
 
 /// The graph in `text`; vertices and edges may be in any order. `where` names the source in errors; quaternions of any
-/// positive norm are normalised. Text without lines gives an empty graph. Errors, with the line: malformed; unsupported
-/// (a vertex or edge type other than that of 3D poses).
+/// positive norm are normalised. Text without lines gives an empty graph. Errors, with the line number: malformed;
+/// unsupported (a vertex or edge type other than those for 3D poses).
 [[nodiscard]] result<g2o_graph> parse_g2o(std::string_view text, const std::filesystem::path& where = {});
 
 /// Reads a g2o file; see `parse_g2o`. Errors: not_found, unreadable, malformed, unsupported.

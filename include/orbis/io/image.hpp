@@ -11,8 +11,8 @@
 
 namespace orbis::io {
 
-/// Reads a PNG (8 or 16 bit, grey, palette, with or without alpha) or JPEG as 8-bit colour.
-/// Errors: not_found, unreadable, malformed (damaged, truncated, more than 1 GiB), unsupported (another format).
+/// Reads a PNG (colour, grey or palette; 8 or 16 bits; with or without alpha) or a JPEG as 8-bit colour. Errors:
+/// not_found, unreadable, malformed (damaged, truncated, more than 1 GiB), unsupported (another format).
 [[nodiscard]] result<image<rgb8>> read_color(const std::filesystem::path& path);
 
 /// Reads a 16-bit grey PNG, as stored (no scale applied).

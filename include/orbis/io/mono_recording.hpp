@@ -28,9 +28,10 @@
 
 namespace orbis::io {
 
-/// The supported layouts of recordings of one camera. `automatic`: detected. `tum`: a list `rgb.txt` (or `left.txt`).
-/// `kitti`: `image_0` (or 2, 1, 3) with `calib.txt` and `times.txt`. `asl`: `mav0/cam0`, or a single camera's folder.
-/// `rgbd`: the colour images of recordings that `open_recording` reads. `images`: a plain folder of images.
+/// The supported layouts of recordings of one camera. `automatic`: the layout is detected. `tum`: a list `rgb.txt` (or
+/// `left.txt`). `kitti`: `image_0` (or 2, 1, 3) with `calib.txt` and `times.txt`. `asl`: `mav0/cam0`, or a single
+/// camera's folder. `rgbd`: the colour images of recordings that `open_recording` reads. `images`: a plain folder of
+/// images.
 enum class mono_format { automatic, tum, kitti, asl, rgbd, images };
 
 /// The name of a format: "tum", "kitti", "asl", "rgbd", "images", "auto".
@@ -63,7 +64,7 @@ class mono_recording {
   /// The file of image `i`. @pre i < size()
   [[nodiscard]] const std::filesystem::path& path(std::size_t i) const { return index_.frames[i].color; }
   [[nodiscard]] const camera::camera_settings& camera() const noexcept { return camera_; }
-  /// All poses of the ground truth, not only those at frames; empty if there is none.
+  /// All ground-truth poses, not only those at the times of frames; empty if there is no ground truth.
   [[nodiscard]] const trajectory& ground_truth() const noexcept { return index_.ground_truth; }
   /// The format; never `automatic`.
   [[nodiscard]] mono_format format() const noexcept { return format_; }
@@ -75,7 +76,7 @@ class mono_recording {
   /// Reads frame `i`. Errors: not_found, unreadable, malformed (damaged, or its size differs from the camera's),
   /// unsupported. @pre i < size()
   [[nodiscard]] result<camera::mono_frame> frame(std::size_t i) const;
-  /// Reads only the image of frame `i`. Errors as above. @pre i < size()
+  /// Reads only the image of frame `i`. Errors: those of `frame`. @pre i < size()
   [[nodiscard]] result<image<rgb8>> color(std::size_t i) const;
 
  private:
@@ -88,7 +89,7 @@ class mono_recording {
 [[nodiscard]] mono_format detect_mono_format(const std::filesystem::path& folder);
 
 /// Opens the recording in `folder` as a recording of one camera: reads its lists, poses and camera, but not its images
-/// (except one in a KITTI sequence, for its size). Ignores depth and the images of other cameras.
+/// (except one image of a KITTI sequence, to determine the image size). Ignores depth and the images of other cameras.
 ///
 /// The camera is taken from the first of these that specifies it: the options; `camera.toml` in the folder; the
 /// format's own files, or the folder's name. If none does, the function fails.

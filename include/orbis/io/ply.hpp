@@ -42,8 +42,8 @@ struct ply_options {
 [[nodiscard]] result<point_cloud> parse_ply(std::string_view bytes, const std::string& where = {},
                                             const vec3& origin = zeros<vec3>());
 
-/// Parses a PLY file like `parse_ply`, and all other properties of the vertices except lists. Notes report omitted
-/// data, and colours whose range is not that of their type. Errors: as `parse_ply`.
+/// Parses a PLY file like `parse_ply`, with all other properties of the vertices except lists. Notes report omitted
+/// data, and colours whose range differs from that of their type. Errors: those of `parse_ply`.
 [[nodiscard]] result<cloud_with_fields> parse_ply_with_fields(std::string_view bytes, const std::string& where = {},
                                                               const vec3& origin = zeros<vec3>());
 

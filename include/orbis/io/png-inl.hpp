@@ -39,7 +39,7 @@ ORBIS_INLINE result<image<std::uint16_t>> decode_png_depth(std::string_view byte
   if (!decoder.read_header()) return detail::damaged_png(where, decoder);
   if (!decoder.grey() || decoder.bits() != 16)
     return fail(errc::unsupported, where,
-                "a depth image must be a 16-bit grey PNG, this one is " + std::to_string(decoder.bits()) + "-bit " +
+                "a depth image must be a 16-bit grey PNG; this one is " + std::to_string(decoder.bits()) + "-bit " +
                     (decoder.grey() ? "grey" : "colour, palette or alpha"));
   image<std::uint16_t> pixels(decoder.width(), decoder.height());
   const bool ok = decoder.read_pixels(reinterpret_cast<unsigned char*>(pixels.data()),

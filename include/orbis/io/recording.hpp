@@ -32,9 +32,9 @@ namespace detail {
 class color_registration;
 }
 
-/// The supported layouts. `automatic`: detected. `folders`: colour images in `rgb`, `color`, `colour`, `image` or
-/// `images`, depth images in `depth`, `aligned_depth` or `depth_registered`, paired by the numbers or times in their
-/// names.
+/// The supported layouts. `automatic`: the layout is detected. `folders`: colour images in `rgb`, `color`, `colour`,
+/// `image` or `images`, depth images in `depth`, `aligned_depth` or `depth_registered`, paired by the numbers or times
+/// in their names.
 enum class recording_format { automatic, tum, seven_scenes, icl_nuim, scannet, folders };
 
 /// The name of a format: "tum", "7scenes", "icl", "scannet", "folders", "auto".
@@ -66,7 +66,7 @@ class recording {
   /// Time of the colour image, seconds. @pre i < size()
   [[nodiscard]] double timestamp(std::size_t i) const { return index_.frames[i].timestamp; }
   [[nodiscard]] const camera::camera_settings& camera() const noexcept { return camera_; }
-  /// All poses of the ground truth, not only those at frames; empty if there is none.
+  /// All ground-truth poses, not only those at the times of frames; empty if there is no ground truth.
   [[nodiscard]] const trajectory& ground_truth() const noexcept { return index_.ground_truth; }
   /// The format; never `automatic`.
   [[nodiscard]] recording_format format() const noexcept { return format_; }
@@ -78,7 +78,7 @@ class recording {
   /// Reads frame `i`. Colour and depth have the camera's size. Errors: not_found, unreadable,
   /// malformed (damaged, or its size differs from the camera's), unsupported. @pre i < size()
   [[nodiscard]] result<camera::rgbd_frame> frame(std::size_t i) const;
-  /// Reads only the colour image of frame `i`. Errors as above. @pre i < size()
+  /// Reads only the colour image of frame `i`. Errors: those of `frame`. @pre i < size()
   [[nodiscard]] result<image<rgb8>> color(std::size_t i) const;
 
   /// Single-pass iterator that reads each frame when it reaches it. Iteration ends at the first frame that cannot be
@@ -141,7 +141,7 @@ class recording {
 namespace detail {
 
 /// The index of the recording in `folder`; sets a `format` of `automatic` to the detected one. `fps`: frame rate of
-/// images without time stamps. Errors: as `open_recording`.
+/// images without time stamps. Errors: those of `open_recording`.
 [[nodiscard]] result<recording_index> index_recording(const std::filesystem::path& folder, recording_format& format,
                                                       double max_time_difference, double fps);
 
@@ -151,9 +151,9 @@ namespace detail {
 ///
 /// The camera is taken from the first of these that specifies it: the options; `camera.toml` in the folder; the
 /// format's own files; the data set, for ICL-NUIM (`*.gt.freiburg`) and the TUM benchmark (`rgbd_dataset_freiburg1` ...
-/// in the path), with a note. If none does, the function fails. A time between frames that does not match the camera's
-/// frame rate is noted. Errors: not_found, unreadable, unsupported (no known format), no_data (no frames), malformed
-/// (with file and line), invalid_argument (no camera known).
+/// in the path), with a note. If none does, the function fails. A note reports a time between frames that does not
+/// match the camera's frame rate. Errors: not_found, unreadable, unsupported (no known format), no_data (no frames),
+/// malformed (with file and line), invalid_argument (no camera known).
 [[nodiscard]] result<recording> open_recording(const std::filesystem::path& folder,
                                                const recording_options& options = {});
 

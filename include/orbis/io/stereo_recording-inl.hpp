@@ -26,8 +26,9 @@ namespace detail {
 // A plain folder of stereo images: the lists `left.txt` (or `rgb.txt`) and `right.txt` in the TUM format, or numbered
 // images in `left` (or `rgb`) and `right`; `camera.toml`, and optionally `groundtruth.txt`.
 //
-// Rectified images have one camera, with its `baseline`. Others have a second camera in `camera_right.toml`, and its
-// pose in `T_left_right.txt`: a 4x4 matrix from the right camera's frame to the left camera's frame, metres.
+// Rectified images have one camera, with its `baseline`. Unrectified images have a second camera in
+// `camera_right.toml`, and its pose in `T_left_right.txt`: a 4x4 matrix from the right camera's frame to the left
+// camera's frame, metres.
 
 /// Returns true if `folder` looks like a plain folder of stereo images.
 [[nodiscard]] inline bool is_image_pairs(const std::filesystem::path& folder) {
@@ -154,7 +155,7 @@ ORBIS_INLINE result<stereo_recording> open_stereo_recording(const std::filesyste
   const char* const cameras = format == stereo_format::kitti ? "calib.txt" : "sensor.yaml";
   if (has_cameras && options.camera)
     return fail(errc::invalid_argument, folder.string(),
-                std::string{"the two cameras are those of "} + cameras + "; remove the camera from the options");
+                std::string{"the two cameras are those in "} + cameras + "; remove the camera from the options");
   const auto read_index = [&]() -> result<detail::stereo_index> {
     switch (format) {
       case stereo_format::kitti: return detail::index_kitti(folder);
@@ -170,7 +171,7 @@ ORBIS_INLINE result<stereo_recording> open_stereo_recording(const std::filesyste
   auto index = read_index();
   if (!index) return fail(index.error());
   if (const auto unused = folder / "camera.toml"; has_cameras && detail::present(unused))
-    index->images.notes.push_back(unused.string() + ": not used; the two cameras are those of " + cameras);
+    index->images.notes.push_back(unused.string() + ": not used; the two cameras are those in " + cameras);
   detail::note_interval(index->images, index->fps);
   // Check the size before computing the rectification maps, because a wrong size may exhaust the memory.
   const auto& file = index->images.frames.front().color;

@@ -30,8 +30,8 @@
 
 namespace orbis::io {
 
-/// The supported layouts of stereo recordings. `automatic`: detected. `pairs`: `left.txt` and `right.txt`, or numbered
-/// images in `left` and `right`, with `camera.toml`.
+/// The supported layouts of stereo recordings. `automatic`: the layout is detected. `pairs`: `left.txt` and
+/// `right.txt`, or numbered images in `left` and `right`, with `camera.toml`.
 enum class stereo_format { automatic, kitti, asl, pairs };
 
 /// The name of a format: "kitti", "asl", "pairs", "auto".
@@ -81,7 +81,7 @@ class stereo_recording {
   /// Reads frame `i`. Errors: not_found, unreadable, malformed (damaged, or its size differs from its camera's),
   /// unsupported. @pre i < size()
   [[nodiscard]] result<camera::stereo_frame> frame(std::size_t i) const;
-  /// Reads only the left image of frame `i`. Errors as above. @pre i < size()
+  /// Reads only the left image of frame `i`. Errors: those of `frame`. @pre i < size()
   [[nodiscard]] result<image<rgb8>> left(std::size_t i) const;
 
  private:
@@ -95,11 +95,11 @@ class stereo_recording {
 /// Detects the format of the stereo recording in `folder`; `automatic` if none is recognised.
 [[nodiscard]] stereo_format detect_stereo_format(const std::filesystem::path& folder);
 
-/// Opens the stereo recording in `folder`: reads its lists, poses and cameras, and rectifies the cameras. Of the
-/// images, it reads only the first left one, for its size. Errors: not_found, unreadable, unsupported (no known format,
-/// or a camera of an unknown model), no_data (no pairs), malformed (with file and line; an image whose size differs
-/// from its camera's), invalid_argument (no camera known, a camera option for a format with its own cameras, or cameras
-/// that cannot be rectified).
+/// Opens the stereo recording in `folder`: reads its lists, poses and cameras, and rectifies the cameras. The only
+/// image that it reads is the first left one, to check its size. Errors: not_found, unreadable, unsupported (no known
+/// format, or a camera of an unknown model), no_data (no pairs), malformed (with file and line; an image whose size
+/// differs from its camera's), invalid_argument (no camera known, a camera option for a format with its own cameras, or
+/// cameras that cannot be rectified).
 [[nodiscard]] result<stereo_recording> open_stereo_recording(const std::filesystem::path& folder,
                                                              const stereo_recording_options& options = {});
 

@@ -49,8 +49,8 @@ template <execution_policy Policy>
 }  // namespace detail::synthetic
 
 /// A recording of a hand-held or walking camera moving once around a furnished room, with exact ground truth. Frames
-/// are independent: they may be requested in any order and from several threads, and are byte for byte equal on every
-/// machine (except the pose, whose last bit may differ).
+/// are independent: they may be requested in any order and from several threads, and are identical byte for byte on
+/// every machine (except the pose, whose last bit may differ).
 ///
 /// The floor of the room is at z = 0 with the origin at its centre. A surface's texture is generated when the surface
 /// is first visible, which takes a few tenths of a second for the first frames at 640x480. All textures together take
@@ -59,7 +59,8 @@ class synthetic_recording {
  public:
   class iterator;
 
-  /// @pre frames >= 0, fps > 0, width and height > 0, depth_scale > 0, light > 0, and those of the scene and the path
+  /// @pre frames >= 0, fps > 0, width and height > 0, depth_scale > 0, light > 0, and the preconditions of the scene
+  /// and the path
   explicit synthetic_recording(const synthetic_options& options = {});
 
   [[nodiscard]] std::size_t size() const noexcept { return static_cast<std::size_t>(options_.frames); }
@@ -95,14 +96,14 @@ class synthetic_recording {
   /// Frame `i` as measured by the sensor. Errors: invalid_argument if there is no frame `i`.
   [[nodiscard]] result<camera::rgbd_frame> frame(std::size_t i) const;
 
-  /// Frame `i` as measured by the sensor, rendered on the policy's threads. Errors: as `frame`.
+  /// Frame `i` as measured by the sensor, rendered on the policy's threads. Errors: those of `frame`.
   template <execution_policy Policy>
   [[nodiscard]] result<camera::rgbd_frame> render(const Policy& policy, std::size_t i) const {
     return render_on(detail::synthetic::as_parallel(policy), i);
   }
 
   /// Frame `i` of a stereo camera, whose left camera is `camera()` and whose right camera is displaced by
-  /// `stereo_camera().baseline` to the right. Errors: as `frame`.
+  /// `stereo_camera().baseline` to the right. Errors: those of `frame`.
   [[nodiscard]] result<camera::stereo_frame> stereo_frame(std::size_t i) const;
   template <execution_policy Policy>
   [[nodiscard]] result<camera::stereo_frame> render_stereo(const Policy& policy, std::size_t i) const {
@@ -116,7 +117,7 @@ class synthetic_recording {
     return exact_on(detail::synthetic::as_parallel(policy), i);
   }
 
-  /// Exact depth image of a camera of any model at any pose in the room: depths in metres along the optical axis; 0
+  /// Exact depth image for a camera of any model at any pose in the room: depths in metres along the optical axis; 0
   /// where a pixel has no ray, and everywhere if the camera is outside the room. Ignores moving solids.
   template <execution_policy Policy, camera::camera_model Camera>
   [[nodiscard]] image<float> exact_depth(const Policy& policy, const Camera& camera, const se3& T_world_camera) const {
@@ -124,7 +125,7 @@ class synthetic_recording {
     for_each_index(policy, static_cast<std::size_t>(camera.height()), 1, [&](std::size_t row) {
       const int y = static_cast<int>(row);
       for (int x = 0; x != camera.width(); ++x)
-        if (const auto ray = camera.unproject(vec2{double(x), double(y)}))  // its z is 1: lengths along it are depths
+        if (const auto ray = camera.unproject(vec2{double(x), double(y)}))  // z is 1, so lengths along it are depths
           depth(x, y) = static_cast<float>(depth_along(T_world_camera.translation(), T_world_camera.rotation() * *ray));
     });
     return depth;

@@ -23,9 +23,9 @@ struct synthetic_scene_options {
   double light = 1.0;            ///< illumination: 1 requires the sensor's `exposure`, 0.5 twice that time
 };
 
-/// The gait of a legged robot with the camera on its body: motion in addition to the path, in proportion to the speed
-/// along it. Every step lifts and pitches the body, left and right steps roll it in opposite directions, and each foot
-/// impact makes it vibrate. The strength of the impacts varies between 0.5 and 1.5 times the amplitudes.
+/// The gait of a legged robot with the camera on its body: its motion is added to the path, in proportion to the speed
+/// along the path. Every step lifts and pitches the body, left and right steps roll it in opposite directions, and each
+/// foot impact makes it vibrate. The strength of the impacts varies between 0.5 and 1.5 times the amplitudes.
 struct synthetic_gait_options {
   double step_rate = 0.0;          ///< steps per second; 0: no gait
   double bounce = 0.008;           ///< amplitude of the vertical motion, one oscillation per step, metres
@@ -37,15 +37,15 @@ struct synthetic_gait_options {
   double impact_duration = 0.2;    ///< seconds until the vibration has decayed to 0
 };
 
-/// The motion of the camera. It starts at rest, makes one round (360 degrees of yaw) on an ellipse about the room's
-/// centre while looking outward, and rests at its first view again for the last fraction `overlap` of the time, so that
-/// a loop can be closed. With `sees_floor` it makes a second round on a larger ellipse, looking inward and down.
+/// The motion of the camera. The camera starts at rest, makes one round (360 degrees of yaw) on an ellipse about the
+/// room's centre while looking outward, and rests at its initial pose for the last fraction `overlap` of the time, so
+/// that a loop can be closed. With `sees_floor`, it makes a second round on a larger ellipse, looking inward and down.
 struct synthetic_path_options {
   double semi_axis_x = 0.80;  ///< semi-axis of the ellipse along x, metres
   double semi_axis_y = 0.60;  ///< semi-axis of the ellipse along y, metres
   double height = 1.35;       ///< height of the camera above the floor, metres
   double pitch = -0.20;       ///< mean pitch, radians; negative looks down
-  double overlap = 0.05;      ///< fraction of the time spent at the first view again
+  double overlap = 0.05;      ///< fraction of the time spent at the initial pose after the rounds
   bool sees_floor = false;    ///< adds a lap with the camera pointing inward and down at the floor
   double wobble = 1.0;        ///< scales the slow sway in height, distance, yaw, pitch and roll
   double jitter = 1.0;        ///< scales the hand tremor (millimetres, tenths of degrees)
@@ -65,7 +65,7 @@ struct synthetic_sensor_options {
   double min_depth = 0.4;  ///< metres; smaller depths are not measured
   double max_depth = 4.5;  ///< metres; larger depths are not measured; 0: no limit
 
-  double axial_noise = 1.0;       ///< factor on the published standard deviation
+  double axial_noise = 1.0;       ///< factor applied to the published standard deviation
   double lateral_noise = 0.5;     ///< standard deviation in pixels of the position of a ray near a depth edge
   double flying_pixels = 0.15;    ///< fraction of the pixels on a depth edge with a depth between its two sides
   double disparity_step = 0.125;  ///< resolution of the disparity, pixels of the infrared camera
@@ -73,14 +73,14 @@ struct synthetic_sensor_options {
   double baseline = 0.075;        ///< distance from projector to camera, metres
   double grazing_angle = 1.45;    ///< maximum angle of incidence, radians; pixels start to drop out
                                   ///< 0.15 radians below it
-  bool shadow = true;             ///< no depth where the projector (on the right) does not reach
+  bool shadow = true;             ///< no depth on surfaces that the projector (on the right) does not light
   double dropouts = 0.002;        ///< fraction of pixels without depth at random positions
   double stray_depths = 0.0;      ///< fraction of pixels with a random depth in front of the surface: dust, rain, spray
 
   double stereo_baseline = 0.12;  ///< distance between the cameras of a stereo pair, metres
 
   double colour_noise = 2.0;  ///< standard deviation in grey values
-  int motion_blur = 1;        ///< images averaged over the exposure time; 1: none
+  int motion_blur = 1;        ///< number of images averaged over the exposure time; 1: no blur
   double exposure = 0.015;    ///< seconds, at a `light` of 1; for motion blur
   /// Maximum exposure time in a darker room, seconds. If the required time is f times longer, the colour noise is
   /// increased by sqrt(f) instead.

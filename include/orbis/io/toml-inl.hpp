@@ -40,7 +40,7 @@ namespace detail {
   return true;
 }
 
-/// Returns true if `text`, which follows a date, can follow one: a time, or the end of the value.
+/// Returns true if `text`, the rest of a value after a date, is valid: a time, or the end of the value.
 [[nodiscard]] constexpr bool may_follow_date(std::string_view text) noexcept {
   if (text.empty() || std::string_view{"Tt "}.find(text[0]) == std::string_view::npos) return true;
   const char next = text.size() > 1 ? text[1] : '\n';
@@ -91,7 +91,7 @@ namespace detail {
         if (next != text.size() && static_cast<unsigned char>(text[next]) >= 0x80)
           return "a backslash before a non-ASCII character";
       } else if (!has_lines && text[i] == '\n') {
-        break;  // an error; toml++ stops there too
+        break;  // an error; toml++ stops here, too
       } else if (text[i] == c && (!has_lines || text.substr(i).starts_with(three))) {
         i += has_lines ? 3 : 1;
         for (int more = 0; has_lines && more != 2 && i < text.size() && text[i] == c; ++more)

@@ -14,12 +14,12 @@
 
 namespace orbis::io {
 
-/// Maximum size of a text. toml++ recurses into nested tables, up to one level per dot in the text; with this size, the
-/// stack does not overflow.
+/// Maximum size of a settings text in bytes. toml++ recurses into nested tables, up to one level per dot in the text;
+/// texts up to this size do not overflow the stack.
 inline constexpr std::size_t max_toml_bytes = 16384;
 
-/// Parses `text` as a table. `where` names the source in errors. Errors: malformed, with the line if known (not TOML;
-/// more than `max_toml_bytes`; a list of lists over several lines, whose lines could be table headers).
+/// Parses `text` as a table. `where` names the source in errors. Errors: malformed, with the line number if known (not
+/// TOML; more than `max_toml_bytes`; a list of lists over several lines, whose lines could be table headers).
 /// Limitations, because of defects in toml++: two forms of valid TOML are rejected: keys with quotes after a dot in
 /// inline tables (`x = {a."b" = 1}`), and bare keys that contain a date followed by "T" or a blank, but no time
 /// (`2024-01-01Tx = 1`, `2024-01-01 = 1`).

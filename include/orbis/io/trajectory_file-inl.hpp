@@ -78,8 +78,9 @@ ORBIS_INLINE result<void> set_times(trajectory_reading& read, const std::filesys
   const auto all = detail::parse_times(*text, times);
   if (!all) return fail(all.error());
   if (all->size() != read.poses.size() + read.lost)
-    return fail(errc::malformed, times.string(),
-                std::to_string(all->size()) + " times for " + std::to_string(read.poses.size() + read.lost) + " poses");
+    return fail(
+        errc::malformed, times.string(),
+        std::to_string(all->size()) + " time stamps for " + std::to_string(read.poses.size() + read.lost) + " poses");
   for (stamped_pose& p : read.poses) p.timestamp = (*all)[static_cast<std::size_t>(p.timestamp)];
   return {};
 }
@@ -107,7 +108,7 @@ ORBIS_INLINE std::string describe_units(const trajectory& a, const trajectory& b
   for (const auto& unit : detail::time_units)
     for (const auto& [x, y, which] : {std::tuple{&a, &b, "first"}, std::tuple{&b, &a, "second"}})
       if (unit.seconds != 1.0 && agreement(*x, unit.seconds, *y) > likely)
-        return "those of the " + std::string{which} + " seem to be " + std::string{unit.name};
+        return "the times of the " + std::string{which} + " seem to be in " + std::string{unit.name};
   return {};
 }
 

@@ -15,25 +15,25 @@
 namespace orbis::io {
 
 /// The poses in `text`, stably sorted by time. `where` names the source in errors; quaternions of any positive norm are
-/// normalised. Text without poses gives an empty trajectory. Errors: malformed, with the line (not 8 numbers, NaN or
-/// infinity, a zero quaternion).
+/// normalised. Text without poses gives an empty trajectory. Errors: malformed, with the line number (not 8 numbers,
+/// NaN or infinity, a zero quaternion).
 [[nodiscard]] result<trajectory> parse_trajectory(std::string_view text, const std::filesystem::path& where = {});
 
 /// Reads a trajectory file; see `parse_trajectory`. Errors: not_found, unreadable, malformed.
 [[nodiscard]] result<trajectory> read_trajectory(const std::filesystem::path& path);
 
 /// Parses a trajectory; its first lines determine the layout: EuRoC (the header lists the quaternion with w first, or
-/// none, and fields are separated by commas and times have 19 digits), KITTI (12 numbers) or TUM. Fields are
-/// separated by blanks, commas or semicolons. Accepts `#` comments and a line of column names before the poses; if it
-/// contains time, position and quaternion, other columns may precede them. The first time stamp determines the unit of
-/// time: nanoseconds if the header specifies them and it is a whole number, otherwise by its number of digits (13:
-/// milliseconds, 16: microseconds, 19: nanoseconds, otherwise seconds). Poses with NaN, infinity, or a zero quaternion
-/// or rotation count as lost. Of poses with equal times, the first one is kept; if a later run in the file has other
-/// poses during the time of the first run, only the first run is kept. Notes report all of this. Errors: malformed,
-/// with the line (too few numbers, a quaternion that is too large or almost zero); unsupported (a header that lists the
-/// quaternion before the position, or in another order); degenerate (a quarter of the poses have the time of another
-/// pose and differ from it; with several runs, a quarter of the poses of the first run or more than half of all poses).
-/// O(n log n).
+/// lists no quaternion while fields are separated by commas and times have 19 digits), KITTI (12 numbers) or TUM.
+/// Fields are separated by blanks, commas or semicolons. Accepts `#` comments and a line of column names before the
+/// poses; if it contains time, position and quaternion, other columns may precede them. The first time stamp determines
+/// the unit of time: nanoseconds if the header specifies them and it is a whole number, otherwise by its number of
+/// digits (13: milliseconds, 16: microseconds, 19: nanoseconds, otherwise seconds). Poses with NaN, infinity, or a zero
+/// quaternion or rotation count as lost. Of poses with equal times, the first one is kept; if a later run in the file
+/// has other poses during the time of the first run, only the first run is kept. Notes report all of this. Errors:
+/// malformed, with the line number (too few numbers, a quaternion that is too large or almost zero); unsupported (a
+/// header that lists the quaternion before the position, or in another order); degenerate (a quarter of the poses have
+/// the time of another pose and differ from it; with several runs, a quarter of the poses of the first run or more than
+/// half of all poses). O(n log n).
 [[nodiscard]] result<trajectory_reading> parse_trajectory_file(std::string_view text,
                                                                const std::filesystem::path& where = {});
 
@@ -42,14 +42,15 @@ namespace orbis::io {
 [[nodiscard]] result<trajectory_reading> read_trajectory_file(const std::filesystem::path& path);
 
 /// Sets the times of a trajectory in KITTI's layout from a file with one time per line, ascending. Errors: not_found,
-/// unreadable, malformed (with the line; the numbers of times and poses differ).
+/// unreadable, malformed (an invalid line, with its number, or different numbers of times and poses).
 [[nodiscard]] result<void> set_times(trajectory_reading& read, const std::filesystem::path& times);
 
-/// Time spans of two trajectories for a message: "1403715529 to 1403715531.5 s and 0 to 2 s", with `describe_units`.
+/// Time spans of two trajectories for a message: "1403715529 to 1403715531.5 s and 0 to 2 s", followed by the result of
+/// `describe_units`.
 [[nodiscard]] std::string describe_spans(const trajectory& a, const trajectory& b);
 
-/// The unit in which the times of one of two trajectories seem to be, if the time spans would then agree: "those of the
-/// first seem to be milliseconds"; otherwise empty.
+/// Names the unit in which the times of one of two trajectories seem to be, if the time spans would then agree: "the
+/// times of the first seem to be in milliseconds"; otherwise empty.
 [[nodiscard]] std::string describe_units(const trajectory& a, const trajectory& b);
 
 /// Writes a trajectory file atomically: 9 decimals for the time, 9 significant digits for the rest. Errors:

@@ -64,7 +64,7 @@ inline constexpr time_unit time_units[] = {
   return all;
 }
 
-/// The span of times for messages: "12.5 to 20". @pre !times.empty()
+/// Formats the span of times for a message: "12.5 to 20". @pre !times.empty()
 [[nodiscard]] inline std::string describe_span(const std::vector<double>& times) {
   const auto [first, last] = std::minmax_element(times.begin(), times.end());
   return describe(*first) + " to " + describe(*last);
@@ -92,7 +92,7 @@ inline constexpr time_unit time_units[] = {
 }
 
 /// A warning if the median interval of ascending times is more than 30 times longer or shorter than that of a camera
-/// with `fps` frames per second; empty otherwise. It states the factor by which the times seem to be wrong.
+/// with `fps` frames per second; empty otherwise. The warning states the factor by which the times seem to be wrong.
 [[nodiscard]] inline std::string describe_interval(const std::vector<double>& times, double fps) {
   constexpr double tolerance = 30.0;
   if (times.size() < 3) return {};

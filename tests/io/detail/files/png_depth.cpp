@@ -106,7 +106,7 @@ TEST_CASE("a depth image of zeros that is larger than the limit is an error") {
   CHECK_FALSE(decode_plain_depth(bytes).has_value());
   const auto read = orbis::io::decode_png_depth(bytes);
   REQUIRE_FALSE(read);
-  CHECK(read.error().message == "damaged PNG: claims more pixels than the file can hold");
+  CHECK(read.error().message == "damaged PNG: specifies more pixels than the file can hold");
 }
 
 }  // namespace

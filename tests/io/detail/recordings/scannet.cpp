@@ -163,10 +163,10 @@ TEST_CASE("damaged files of ScanNet are named") {
   CHECK_THAT(message("pose/10.txt", "1 0 0"), Contains("10.txt: a pose is a 4x4 matrix"));
   folder.write("depth/2.png", io::encode_png(image<std::uint16_t>(16, 11, 1)));
   CHECK_THAT(message_of(io::open_recording(folder.path()).value().frame(1)),
-             Contains("16x11 pixels, the camera 16x12"));
+             Contains("16x11 pixels, but the camera has 16x12"));
   folder.write("color/2.png", io::encode_png(image<rgb8>(47, 36)));
   CHECK_THAT(message_of(io::open_recording(folder.path()).value().color(1)),
-             Contains("47x36 pixels, the camera 48x36"));
+             Contains("47x36 pixels, but the camera has 48x36"));
   std::filesystem::remove(folder.path() / "intrinsic" / "intrinsic_color.txt");
   CHECK_THAT(message_of(io::open_recording(folder.path())), Contains("intrinsic_color.txt"));
 }

@@ -74,7 +74,7 @@ TEST_CASE("bad pose matrices are named with their file") {
   const std::string file = (folder / "p.txt").string();
   CHECK(message("1 0 0 0\n0 1 0 nan\n0 0 1 0\n0 0 0 1\n") == file + ":2: a pose with NaN or infinity");
   CHECK(message("1 0 0 0\n0 1 0 0\n0 0 x 0\n0 0 0 1\n") == file + ":3: \"x\" is not a number");
-  CHECK(message("1 0 0 0\n0 1 0 0\n0 0 1 0\n") == file + ": a pose is a 4x4 matrix, 16 numbers");
+  CHECK(message("1 0 0 0\n0 1 0 0\n0 0 1 0\n") == file + ": a pose must be a 4x4 matrix of 16 numbers");
   CHECK(message("1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n5\n") == file + ":5: more than 16 numbers in a pose");
   CHECK(message("1 0 0 0\n0 1 0 0\n0 0 -1 0\n0 0 0 1\n") == file + ": the matrix is not a rigid transform");
   CHECK(message("2 0 0 0\n0 2 0 0\n0 0 2 0\n0 0 0 1\n") == file + ": the matrix is not a rigid transform");

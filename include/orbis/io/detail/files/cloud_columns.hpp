@@ -61,7 +61,7 @@ constexpr std::string_view packed_color_names[] = {"rgb", "rgba"};
          std::ranges::any_of(color_names, [&](const auto& names) { return is_one_of(name, names); });
 }
 
-/// A column of zeros for `points` points. Coordinates from text are stored as double, whatever the declared type.
+/// A column of zeros for `points` points. Coordinates from text are stored as double, regardless of the declared type.
 [[nodiscard]] inline cloud_field make_column(std::string name, scalar_type type, std::size_t count, std::size_t points,
                                              bool text) {
   if (text && is_coordinate(name)) type = scalar_type::float64;
@@ -113,7 +113,8 @@ inline std::string shortened(double value) {
 
 /// Colours from three columns. PLY does not define the range of a channel, so it is inferred from the largest value in
 /// all channels of the same kind (8-bit, wider integer, floating point). Rounding, interpolation and lighting may raise
-/// floating-point values above 1; cameras deliver 12 bits. Notes report a range that is not that of the type.
+/// floating-point values above 1, and cameras may deliver 12-bit values. Notes report a range that differs from that of
+/// the type.
 inline std::vector<rgb8> channel_colors(const std::array<const cloud_field*, 3>& channels, std::size_t size,
                                         std::vector<std::string>& notes) {
   const auto is_byte = [](scalar_type type) { return byte_size(type) == 1; };
@@ -232,7 +233,7 @@ inline result<cloud_with_fields> to_cloud(cloud_columns&& read, const std::strin
 
   if (!colored && !obstacle.empty()) out.notes.push_back("no colours: " + obstacle);
 
-  std::set<std::string> taken{"x", "y", "z"};  // names in the files that are written
+  std::set<std::string> taken{"x", "y", "z"};  // names of fields in output files
   if (colored) taken.insert({"red", "green", "blue", "rgb"});
   if (!out.fields.empty()) taken.insert("alpha");
   for (std::size_t k = 0; k != used.size(); ++k) {

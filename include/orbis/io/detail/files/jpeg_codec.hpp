@@ -2,8 +2,8 @@
 /// @file
 /// A JPEG decoder and encoder for bytes in memory.
 ///
-/// libjpeg reports errors by `longjmp`, with a message and without printing. Functions that call `setjmp` have only
-/// trivial local variables, so that no destructor is skipped.
+/// Errors in libjpeg end in a `longjmp`; their message is stored instead of printed. Functions that call `setjmp` have
+/// only trivial local variables, so that no destructor is skipped.
 #pragma once
 
 #include <algorithm>
@@ -28,7 +28,7 @@ struct jpeg_errors {
   jpeg_error_mgr base{};  // must be first: libjpeg passes a pointer to it back
   std::jmp_buf jump{};
   char message[JMSG_LENGTH_MAX] = "";
-  bool ends_at_warning = false;  ///< treats warnings as errors, for a decoder
+  bool ends_at_warning = false;  ///< treats warnings as errors; for decoders only
 
   /// The error manager to pass to libjpeg. Valid as long as this object is not moved.
   [[nodiscard]] jpeg_error_mgr* manager() {
@@ -44,7 +44,7 @@ struct jpeg_errors {
   [[nodiscard]] static jpeg_errors& of(jpeg_error_mgr* manager) { return *reinterpret_cast<jpeg_errors*>(manager); }
 };
 
-/// A decoder of bytes in memory.
+/// A decoder for a JPEG file in memory.
 class jpeg_decoder {
  public:
   explicit jpeg_decoder(std::string_view bytes) : size_{bytes.size()} {
@@ -74,7 +74,7 @@ class jpeg_decoder {
   jpeg_decoder& operator=(const jpeg_decoder&) = delete;
   ~jpeg_decoder() { jpeg_destroy_decompress(&info_); }
 
-  /// Reads the header. Returns false on an error, see `message`.
+  /// Reads the header. Returns false on an error; see `message`.
   bool read_header() {
     if (setjmp(errors_.jump) != 0) return false;
     jpeg_create_decompress(&info_);
@@ -84,7 +84,7 @@ class jpeg_decoder {
     const std::uint64_t pixels = std::uint64_t{info_.image_width} * info_.image_height;
     const std::uint64_t pixels_of_byte = info_.arith_code != FALSE ? 2048 : 512;
     if (pixels > (std::uint64_t{1} << 28) || (pixels > (1U << 20) && pixels > pixels_of_byte * size_))
-      return give_up("claims more pixels than the file can hold");
+      return give_up("specifies more pixels than the file can hold");
     if (jpeg_has_multiple_scans(&info_) != FALSE) {
       // Each scan processes all pixels again, and may consist of only a few bytes; all coefficients are kept in memory.
       if (pixels > (std::uint64_t{1} << 26)) return give_up("has several scans and too many pixels for them");
@@ -100,7 +100,7 @@ class jpeg_decoder {
     return true;
   }
 
-  /// Decodes to 8-bit colour. Returns false on an error, see `message`. @pre read_header() was true
+  /// Decodes to 8-bit colour. Returns false on an error; see `message`. @pre read_header() was true
   bool read_pixels(rgb8* to) {
     if (setjmp(errors_.jump) != 0) return false;
     info_.out_color_space = JCS_RGB;
@@ -164,7 +164,7 @@ class jpeg_encoder {
   jpeg_encoder& operator=(const jpeg_encoder&) = delete;
   ~jpeg_encoder() { jpeg_destroy_compress(&info_); }
 
-  /// Encodes an image. Returns false on an error, see `out_of_memory` and `message`. Call it once.
+  /// Encodes an image. Returns false on an error; see `out_of_memory` and `message`. Call it once.
   bool write(image_view<const rgb8> pixels, int quality) {
     if (setjmp(errors_.jump) != 0) return false;
     jpeg_create_compress(&info_);

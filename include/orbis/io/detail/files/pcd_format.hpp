@@ -173,7 +173,7 @@ inline cloud_columns make_columns(const pcd_header& header, bool all,
   return read;
 }
 
-/// Reads points from lines of text. Errors: malformed, with the line.
+/// Reads points from lines of text. Errors: malformed, with the line number.
 inline result<cloud_columns> read_pcd_text(std::string_view body, const pcd_header& header, bool all,
                                            const std::string& where) {
   if (header.points > (body.size() + 1) / (2 * header.tokens))  // one digit per number, plus separators
@@ -236,7 +236,7 @@ inline result<cloud_columns> read_pcd_columns(std::string_view bytes, const std:
       return bytes.data() + i * header->point_size + f.offset;
     });
   }
-  // Compressed: all x, then all y, ...
+  // Compressed data is stored by field: all x, then all y, ...
   if (bytes.size() < 8) return ends_early();
   const auto compressed_size = load_number<std::uint32_t>(bytes.data());
   const auto size = load_number<std::uint32_t>(bytes.data() + 4);

@@ -166,7 +166,7 @@ inline result<cloud_columns> read_ply_columns(std::string_view bytes, const std:
   for (const ply_element& element : header->elements) {
     if (read || element.name != "vertex") {
       if (element.count != 0 && !element.properties.empty())
-        others.push_back(std::to_string(element.count) + " of element " + element.name);
+        others.push_back("element " + element.name + " (" + std::to_string(element.count) + ")");
       if (read) continue;
     }
     std::size_t least = 0;

@@ -52,7 +52,7 @@ inline void png_take(png_structp png, png_bytep to, std::size_t count) {
   source->left -= count;
 }
 
-/// A decoder of bytes in memory.
+/// A decoder for a PNG file in memory.
 class png_decoder {
  public:
   explicit png_decoder(std::string_view bytes)
@@ -61,7 +61,7 @@ class png_decoder {
   png_decoder& operator=(const png_decoder&) = delete;
   ~png_decoder() { png_destroy_read_struct(&png_, &info_, nullptr); }
 
-  /// Reads the header. Returns false on an error, see `message`.
+  /// Reads the header. Returns false on an error; see `message`.
   bool read_header() {
     if (size_ < 8 || png_sig_cmp(source_.data, 0, 8) != 0) return give_up("is not a PNG file");
     if (setjmp(trouble_.jump) != 0) return false;
@@ -82,11 +82,11 @@ class png_decoder {
     // Deflate expands a byte to at most 1032 bytes.
     const std::uint64_t raw = std::uint64_t{height_} * (std::uint64_t{png_get_rowbytes(png_, info_)} + 1);
     if (std::uint64_t{width_} * height_ > max_image_pixels || raw > 1032 * std::uint64_t{size_} + 1024)
-      return give_up("claims more pixels than the file can hold");
+      return give_up("specifies more pixels than the file can hold");
     return true;
   }
 
-  /// Decodes into rows of `rowbytes` bytes. Returns false on an error, see `message`. @pre read_header() was true
+  /// Decodes into rows of `rowbytes` bytes. Returns false on an error; see `message`. @pre read_header() was true
   bool read_pixels(unsigned char* to, std::size_t rowbytes, void (*transform)(png_structp)) {
     if (setjmp(trouble_.jump) != 0) return false;
     transform(png_);
@@ -174,7 +174,7 @@ std::string encode_png(image_view<const T> view) {
                      view.stride() * static_cast<std::ptrdiff_t>(sizeof(T)), static_cast<std::uint32_t>(view.width()),
                      static_cast<std::uint32_t>(view.height()), std::same_as<T, std::uint16_t> ? 16 : 8,
                      std::same_as<T, rgb8> ? PNG_COLOR_TYPE_RGB : PNG_COLOR_TYPE_GRAY))
-    throw std::bad_alloc{};  // the only possible failure in memory
+    throw std::bad_alloc{};  // the only possible failure when writing to memory
   return bytes;
 }
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
 /// A decoder for the PNG files of depth cameras that uses libdeflate: it takes half the time of libpng and gives the
-/// same pixels. All other files, and errors, are left to libpng. This header is empty unless ORBIS_LIBDEFLATE is
-/// defined, as in orbis::compiled if the library is found.
+/// same pixels. All other files, including damaged ones, are left to libpng. This header is empty unless
+/// ORBIS_LIBDEFLATE is defined, as in orbis::compiled if the library is found.
 ///
 /// "Portable Network Graphics (PNG) Specification", second edition, W3C 2003: chunks (5), filters (9).
 #pragma once
@@ -53,7 +53,7 @@ struct packed_depth {
       out.pixels.insert(out.pixels.end(), data.begin(), data.end());
     } else if (type == "IEND") {
       return out;
-    } else if ((type[0] & 0x20) == 0) {  // a critical chunk
+    } else if ((type[0] & 0x20) == 0) {  // an unexpected critical chunk
       return std::nullopt;
     }
     was_pixels = type == "IDAT";
@@ -63,7 +63,7 @@ struct packed_depth {
 /// Reverses the filter of a row of 16-bit pixels, given the row above.
 [[nodiscard]] inline bool unfilter_depth_row(unsigned filter, unsigned char* row, const unsigned char* above,
                                              std::size_t width) {
-  const auto each = [&](const auto& predict) {  // from the bytes to the left, above, and above left
+  const auto each = [&](const auto& predict) {  // predicts from the bytes to the left, above, and above left
     for (std::size_t byte = 0; byte != 2; ++byte)
       for (std::size_t i = byte, before = 0, corner = 0; i < 2 * width; i += 2) {
         row[i] = static_cast<unsigned char>(row[i] +

@@ -16,8 +16,9 @@
 
 namespace orbis::io::detail {
 
-/// Removes the next field from the front of a line and returns it. It ends at a comma or else a semicolon if the line
-/// contains one, otherwise at blanks. A separator at the end of the line does not start another field.
+/// Removes the next field from the front of a line and returns it. Fields end at commas if the line contains one,
+/// otherwise at semicolons if it contains one, otherwise at blanks. A separator at the end of the line does not start
+/// another field.
 [[nodiscard]] inline std::string_view next_value(std::string_view& line, char separator) {
   if (separator == ' ') return next_field(line);
   const std::size_t end = std::min(line.find(separator), line.size());
@@ -45,7 +46,7 @@ struct pose_header {
   std::size_t names = 0;   ///< number of words from the name of the time column to the end
 };
 
-/// The name of a column in lower case, without quotes, punctuation and units.
+/// The name of a column in lower case, without quotes, punctuation or units.
 struct column_name {
   std::string text;
   bool nanoseconds = false;
@@ -108,7 +109,7 @@ struct column_name {
   std::vector<column_name> names;
   for (const char separator : {find_separator(line), ' '}) {  // a comment in prose may contain a comma
     names = column_names(line, separator);
-    for (std::size_t i = 0; i != names.size(); ++i)  // in x, y, z, w, x, y, z, the last four
+    for (std::size_t i = 0; i != names.size(); ++i)  // of columns x, y, z, w, x, y, z, the last four
       if (are_components(names, i, "wxyz") && (!header.quaternion || names[*header.quaternion].prefix().empty()))
         header.quaternion = i;
     if (header.quaternion) break;

@@ -19,8 +19,8 @@
 namespace orbis::io::detail {
 
 /// Parses the pose `T_world_camera` from a text with a 4x4 matrix. Its upper left part may deviate from a rotation by a
-/// few parts in a thousand, as in 7-Scenes: the result has the nearest rotation. Errors: malformed, with the line (not
-/// 16 numbers, NaN or infinity, a matrix that deviates from a rigid transform by more than 5 %).
+/// few parts in a thousand, as in 7-Scenes: the result has the nearest rotation. Errors: malformed, with the line
+/// number (not 16 numbers, NaN or infinity, a matrix that deviates from a rigid transform by more than 5 %).
 [[nodiscard]] inline result<se3> parse_pose_matrix(std::string_view text, const std::filesystem::path& path) {
   double m[16];
   std::size_t count = 0, last_line = 0;
@@ -39,7 +39,7 @@ namespace orbis::io::detail {
     return true;
   });
   if (!problem.empty()) return fail(errc::malformed, at_line(path, last_line), problem);
-  if (count != 16) return fail(errc::malformed, path.string(), "a pose is a 4x4 matrix, 16 numbers");
+  if (count != 16) return fail(errc::malformed, path.string(), "a pose must be a 4x4 matrix of 16 numbers");
 
   mat3 r;
   for (int y = 0; y != 3; ++y)

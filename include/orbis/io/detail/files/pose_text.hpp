@@ -64,7 +64,7 @@ struct pose_lines {
   return more_columns || trimmed(line).empty() ? std::string{} : eight;
 }
 
-/// The pose of a line's numbers; empty if the quaternion is zero or too large.
+/// Converts the numbers of a line to a pose; empty if the quaternion is zero or too large.
 [[nodiscard]] inline std::optional<se3> make_pose(const std::array<double, 8>& v, bool w_first) {
   const so3::quaternion q = w_first ? so3::quaternion(v[4], v[5], v[6], v[7]) : so3::quaternion(v[7], v[4], v[5], v[6]);
   if (!(q.norm() > 1e-6) || !std::isfinite(q.norm())) return std::nullopt;
@@ -86,9 +86,9 @@ struct pose_lines {
 
 /// Parses the lines of a trajectory. The header and the first pose determine the layout: EuRoC if the header is an
 /// EuRoC header, or if values are separated by commas and times are in nanoseconds; KITTI if each line has 12 numbers;
-/// otherwise TUM. `assumed`: the header of a file without one. Adds notes about a header line that cannot be
-/// interpreted and about columns other than the first eight. Errors: malformed, with the line number; unsupported (a
-/// header that lists the columns in another order).
+/// otherwise TUM. `assumed`: the header to assume for a file without a header. Adds notes about a header line that
+/// cannot be interpreted and about columns other than the first eight. Errors: malformed, with the line number;
+/// unsupported (a header that lists the columns in another order).
 inline result<pose_lines> parse_pose_lines(std::string_view text, const std::filesystem::path& where,
                                            pose_header assumed = {}) {
   pose_lines read;
@@ -134,8 +134,7 @@ inline result<pose_lines> parse_pose_lines(std::string_view text, const std::fil
       lost = lost || (v[4] == 0.0 && v[5] == 0.0 && v[6] == 0.0 && v[7] == 0.0);
       if (!lost) pose = make_pose(v, header.w_first);
       if (!lost && !pose)
-        return header.w_first ? "a pose has a quaternion, w first, which is neither zero nor too large"
-                              : "the quaternion is zero or too large";
+        return header.w_first ? "the quaternion (w first) is zero or too large" : "the quaternion is zero or too large";
       std::string_view stamp = next_value(line, separator);
       for (std::size_t column = 0; column != header.columns[0]; ++column) stamp = next_value(line, separator);
       const bool is_whole = stamp.find('.') == stamp.npos;
@@ -226,7 +225,7 @@ inline repeated_times keep_first(std::vector<pose_lines::entry>& entries) {
   return removed;
 }
 
-/// Returns true if an entry from index `later` on has a time within the span of the entries before `later`, which
+/// Returns true if an entry from index `later` on has a time within the span of the entries before `later`, whose times
 /// ascend, and a pose that differs from all poses at that time.
 [[nodiscard]] inline bool contradicts(const std::vector<pose_lines::entry>& entries, std::size_t later) {
   const auto begin = entries.begin(), end = begin + static_cast<std::ptrdiff_t>(later);
@@ -256,8 +255,8 @@ inline repeated_times keep_first(std::vector<pose_lines::entry>& entries) {
                                           : "the time stamps are written with too few digits";
 }
 
-/// Sorts the poses by time and keeps the first line of each time. If a later run has another pose during the first run,
-/// only the first run is kept. Errors: degenerate (see `parse_trajectory_file`).
+/// Sorts the poses by time and keeps the first line for each time. If a later run contains other poses for times within
+/// the first run, only the first run is kept. Errors: degenerate (see `parse_trajectory_file`).
 [[nodiscard]] inline result<trajectory_reading> order_poses(pose_lines&& lines, const std::filesystem::path& where) {
   trajectory_reading read{.poses = {}, .layout = lines.layout, .lost = lines.lost, .notes = {}};
   const auto note = [&](const std::string& text) { read.notes.push_back(where.string() + ": " + text); };

@@ -14,7 +14,7 @@
 
 namespace orbis::io::detail {
 
-/// Parses time stamps (`parse_time_stamp`), one per line. Errors: malformed, with the line (not a number, or not
+/// Parses time stamps (`parse_time_stamp`), one per line. Errors: malformed, with the line number (not a number, or not
 /// ascending).
 [[nodiscard]] inline result<std::vector<double>> parse_times(std::string_view text,
                                                              const std::filesystem::path& where) {

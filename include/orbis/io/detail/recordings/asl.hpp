@@ -3,8 +3,8 @@
 /// Recordings in the ASL layout of EuRoC MAV and TUM-VI: `mav0/cam0` and `mav0/cam1`, each with `data.csv`, `data/` and
 /// `sensor.yaml`, and `mav0/state_groundtruth_estimate0` (or `mocap0`).
 ///
-/// Source: M. Burri et al., "The EuRoC micro aerial vehicle datasets", IJRR 35 (2016). Times are in nanoseconds. Poses
-/// are those of a body; `T_BS` in `sensor.yaml` is the pose of a sensor in the body frame.
+/// Source: M. Burri et al., "The EuRoC micro aerial vehicle datasets", IJRR 35 (2016). Times are in nanoseconds. The
+/// poses are those of the body; `T_BS` in `sensor.yaml` is the pose of a sensor in the body frame.
 #pragma once
 
 #include <algorithm>
@@ -99,7 +99,7 @@ struct asl_camera {
 
 /// Parses the ground truth's `data.csv`: nanoseconds, position and quaternion (w first) of the body; further columns
 /// are ignored. Lost poses and repeated times are handled and noted as in `parse_trajectory_file`. Errors: malformed,
-/// with the line; degenerate.
+/// with the line number; degenerate.
 [[nodiscard]] inline result<trajectory_reading> parse_asl_poses(std::string_view text,
                                                                 const std::filesystem::path& where) {
   auto lines = parse_pose_lines(text, where, {.quaternion = 4, .w_first = true, .nanoseconds = true});

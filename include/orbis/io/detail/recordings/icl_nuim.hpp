@@ -37,15 +37,15 @@ inline se3 mirrored_y(const se3& pose) {
   return se3(so3(so3::quaternion(q.w(), -q.x(), q.y(), -q.z())), vec3(t.x(), -t.y(), t.z()));
 }
 
-/// Returns true if `folder` is an ICL-NUIM recording, which the trajectory file identifies, because other recordings
-/// with numbered images have other cameras.
+/// Returns true if `folder` is an ICL-NUIM recording. It must contain the data set's trajectory file, because other
+/// recordings with numbered images have other cameras.
 [[nodiscard]] inline bool is_icl_nuim(const std::filesystem::path& folder) {
   return !present(folder / "rgb.txt") && present(folder / "rgb") && present(folder / "depth") &&
          !icl_ground_truth(folder).empty();
 }
 
-/// The index of an ICL-NUIM recording, with the data set's camera. Whole-numbered time stamps are converted to seconds
-/// at 30 frames per second. Errors: as `index_tum` and `index_image_folders`.
+/// The index of an ICL-NUIM recording, with the data set's camera. Integer time stamps are converted to seconds at 30
+/// frames per second. Errors: those of `index_tum` and `index_image_folders`.
 [[nodiscard]] inline result<recording_index> index_icl_nuim(const std::filesystem::path& folder) {
   constexpr double frames_per_second = 30.0, max_time_difference = 0.5 / frames_per_second;
   auto read = find_association_list(folder).empty()

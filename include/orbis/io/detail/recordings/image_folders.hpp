@@ -78,9 +78,9 @@ namespace orbis::io::detail {
   return associate(color.keys, depth.keys, color.keys_are == image_keys::numbers ? 0.0 : max_time_difference);
 }
 
-/// The index of a recording in such folders. `fps`: frame rate of numbered images. Errors: not_found (a folder),
-/// no_data (no depth images, no pair), invalid_argument (names that do not match), unreadable, malformed (times, ground
-/// truth, with the line).
+/// The index of a recording in a folder of colour images and a folder of depth images. `fps`: frame rate of numbered
+/// images. Errors: not_found (a folder), no_data (no depth images, no pair), invalid_argument (names that do not
+/// match), unreadable, malformed (times, ground truth, with the line number).
 [[nodiscard]] inline result<recording_index> index_image_folders(const std::filesystem::path& folder,
                                                                  double max_time_difference, double fps) {
   const auto color_folder = find_color_folder(folder), depth_folder = find_depth_folder(folder);

@@ -29,7 +29,7 @@
 
 namespace orbis::io::detail {
 
-/// The images directly in `folder`, sorted by name, without hidden files.
+/// The images directly in `folder`, sorted by name, excluding hidden files.
 [[nodiscard]] inline std::vector<std::filesystem::path> images_in(const std::filesystem::path& folder) {
   auto paths = list_folder(folder);
   std::erase_if(paths,
@@ -37,7 +37,7 @@ namespace orbis::io::detail {
   return paths;
 }
 
-/// The meaning of the names of images.
+/// The meaning of image names.
 enum class image_keys { times, numbers, alphabet };
 
 /// Images in ascending order of their keys: times in seconds, frame numbers, or indices in alphabetical order.
@@ -98,7 +98,7 @@ struct name_number {
 
 /// Orders images by their names: `1305031102.1753.png`, `1403636579763555584.png` and `1311868164_20000000.png`
 /// (seconds and nanoseconds) are times, `frame_000123.png` is frame 123. The most common form of the names is used;
-/// images with other names are left out. If no name has such a form, all images keep their alphabetical order.
+/// images with other names are left out. If no name has one of these forms, all images keep their alphabetical order.
 [[nodiscard]] inline keyed_images order_by_name(std::vector<std::filesystem::path> paths) {
   struct image {
     double key = 0.0;
@@ -149,8 +149,8 @@ struct name_number {
   return found;
 }
 
-/// Notes images whose names do not determine their order, and images that are left out because of their names.
-/// `has_times`: the times of the images are known from another source.
+/// Adds notes about images whose names do not determine their order, and about images that are left out because of
+/// their names. `has_times`: the times of the images are known from another source.
 inline void note_order(const std::filesystem::path& folder, const keyed_images& images, bool has_times,
                        std::vector<std::string>& notes) {
   if (images.keys_are == image_keys::alphabet && !has_times)
@@ -161,7 +161,7 @@ inline void note_order(const std::filesystem::path& folder, const keyed_images& 
                     images.others.front().filename().string() + ") are skipped");
 }
 
-/// Notes the folders with images in `folder` that are not among the `used` ones.
+/// Adds a note about folders with images in `folder` that are not among the `used` ones.
 inline void note_unused_folders(const std::filesystem::path& folder, const std::vector<std::filesystem::path>& used,
                                 std::vector<std::string>& notes) {
   std::string unused;
@@ -185,7 +185,7 @@ inline void note_unused_folders(const std::filesystem::path& folder, const std::
   const auto times = parse_times(*text, file);
   if (!times) return fail(times.error());
   if (times->size() != images.size())
-    index.notes.push_back(file.string() + ": " + std::to_string(times->size()) + " times for " +
+    index.notes.push_back(file.string() + ": " + std::to_string(times->size()) + " time stamps for " +
                           std::to_string(images.size()) + " images");
   images.resize(std::min(images.size(), times->size()));
   for (std::size_t i = 0; i != images.size(); ++i) images[i].timestamp = (*times)[i];

@@ -33,7 +33,7 @@
 
 namespace orbis::io::detail {
 
-/// Parses the numbers in a line. Empty unless there are exactly `N`, all of them finite.
+/// Parses the numbers in a line. Empty unless the line consists of exactly `N` finite numbers.
 template <std::size_t N>
 [[nodiscard]] std::optional<std::array<double, N>> parse_numbers(std::string_view line) {
   std::array<double, N> all{};
@@ -89,7 +89,7 @@ struct kitti_calibration {
 }
 
 /// Parses a file of poses: the first three rows of `T_world_camera`, 12 numbers per line. The entry of a lost pose
-/// (`is_lost_pose`) is empty. Errors: malformed, with the line (not 12 numbers, not a rigid transform).
+/// (`is_lost_pose`) is empty. Errors: malformed, with the line number (not 12 numbers, not a rigid transform).
 [[nodiscard]] inline result<std::vector<std::optional<se3>>> parse_kitti_poses(std::string_view text,
                                                                                const std::filesystem::path& where) {
   std::vector<std::optional<se3>> poses;
@@ -112,7 +112,8 @@ struct kitti_calibration {
 
 /// The poses of the camera with the pose `T_first_camera` in the frame of camera 0, from `poses.txt` in the sequence's
 /// folder or from the benchmark's file in `../../poses`; empty if neither exists. Adds the file to those of `index`.
-/// Notes lost poses, and a number of poses that differs from `times`. Errors: unreadable, malformed (with the line).
+/// Adds notes about lost poses, and about a number of poses that differs from the number of `times`. Errors:
+/// unreadable, malformed (with the line number).
 [[nodiscard]] inline result<std::vector<std::optional<se3>>> read_kitti_poses(const std::filesystem::path& folder,
                                                                               const se3& T_first_camera,
                                                                               std::size_t times,
@@ -127,7 +128,7 @@ struct kitti_calibration {
     index.files.push_back(file);
     if (poses->size() != times)
       index.notes.push_back(file.string() + ": " + std::to_string(poses->size()) + " poses for " +
-                            std::to_string(times) + " times");
+                            std::to_string(times) + " time stamps");
     std::size_t lost = 0;
     for (std::optional<se3>& pose : *poses)
       if (pose)

@@ -67,7 +67,7 @@ inline constexpr double mono_pose_distance = 0.020;
   return root.empty() ? root : root / "cam0";
 }
 
-/// The index of one camera in a recording in the ASL layout. Errors: as `index_asl`.
+/// The index of one camera in a recording in the ASL layout. Errors: those of `index_asl`.
 [[nodiscard]] inline result<recording_index> index_asl_camera(const std::filesystem::path& folder) {
   auto where = asl_camera_folder(folder);
   if (where.empty()) where = folder / "mav0" / "cam0";
@@ -96,8 +96,8 @@ inline constexpr double mono_pose_distance = 0.020;
   return kitti_camera(folder) && present(folder / "calib.txt");
 }
 
-/// The index of one camera of a sequence. The poses in the file, those of camera 0, are converted to this camera.
-/// Errors: as `index_kitti`.
+/// The index of one camera of a sequence. The poses in the file are those of camera 0; they are converted to this
+/// camera. Errors: those of `index_kitti`.
 [[nodiscard]] inline result<recording_index> index_kitti_camera(const std::filesystem::path& folder) {
   const auto camera = kitti_camera(folder);
   if (!camera) return fail(errc::not_found, folder.string(), "has no folder image_0, image_1, image_2 or image_3");

@@ -37,14 +37,14 @@ namespace orbis::io::detail {
           "the camera is not known: put a camera.toml into the folder, or specify a camera"};
 }
 
-/// Notes a time between frames that does not match a camera with `fps` frames per second.
+/// Adds a note if the time between frames does not match a camera with `fps` frames per second.
 inline void note_interval(recording_index& index, double fps) {
   if (std::string warning = describe_interval(timestamps(index.frames), fps); !warning.empty())
     index.notes.push_back(std::move(warning));
 }
 
-/// Sets an empty `camera` to the camera of the index, with a note if that camera is guessed, and notes a time between
-/// frames that does not match its frame rate. Errors: invalid_argument (no camera is known).
+/// If `camera` is empty, sets it to the camera of the index, with a note if that camera is guessed. Adds a note if the
+/// time between frames does not match the frame rate of the camera. Errors: invalid_argument (no camera is known).
 [[nodiscard]] inline result<void> complete_camera(const std::filesystem::path& folder,
                                                   std::optional<camera::camera_settings>& camera,
                                                   recording_index& index) {

@@ -26,7 +26,7 @@ template <class T>
   if (!read || (read->width() == width && read->height() == height)) return read;
   return fail(errc::malformed, path.string(),
               "the image has " + std::to_string(read->width()) + "x" + std::to_string(read->height()) +
-                  " pixels, the camera " + std::to_string(width) + "x" + std::to_string(height));
+                  " pixels, but the camera has " + std::to_string(width) + "x" + std::to_string(height));
 }
 
 /// The time stamps of entries (files, frames, poses), seconds.
@@ -82,7 +82,8 @@ inline result<void> check_first_frame(const recording_index& index, const std::f
   return ending == ".png" || ending == ".jpg" || ending == ".jpeg";
 }
 
-/// Returns true if `path` exists. A link exists even if its target does not, so that the error names it.
+/// Returns true if `path` exists. A symbolic link counts as existing even if its target is missing, so that the error
+/// names the link.
 [[nodiscard]] inline bool present(const std::filesystem::path& path) {
   std::error_code ignored;
   return std::filesystem::exists(std::filesystem::symlink_status(path, ignored));

@@ -30,7 +30,7 @@ struct recording_entry {
   std::optional<double> depth_timestamp{};  ///< time of the depth image, seconds, if it differs
 };
 
-/// A recording without its pixels.
+/// A recording without its image data.
 struct recording_index {
   std::vector<recording_entry> frames;  ///< in chronological order, never empty when returned
   trajectory ground_truth;

@@ -89,7 +89,7 @@ inline std::vector<std::filesystem::path> seven_scenes_sequences(const std::file
   return found;
 }
 
-/// Returns true if `folder` looks like a 7-Scenes recording (or a scene with such recordings in seq-XX).
+/// Returns true if `folder` looks like a 7-Scenes recording (or a scene with recordings in folders seq-XX).
 [[nodiscard]] inline bool is_seven_scenes(const std::filesystem::path& folder) {
   return has_seven_scenes_frames(folder) || !seven_scenes_sequences(folder).empty();
 }

@@ -13,7 +13,7 @@
 
 namespace orbis::io::detail {
 
-/// A stereo recording without its pixels.
+/// A stereo recording without its image data.
 struct stereo_index {
   /// In each frame `color` is the left image and `depth` the right one; poses are those of the left camera.
   recording_index images;

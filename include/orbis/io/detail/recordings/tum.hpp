@@ -57,9 +57,9 @@ template <class Entry>
   return entries;
 }
 
-/// Parses a list with one entry per line. `parse(line)` returns an entry, or nothing for an invalid line; `form`
-/// describes an entry. Comments, blank lines, CRLF and a byte order mark are accepted, and a first line without an
-/// entry is a heading. The entries are sorted; other lines and repeated time stamps are skipped and noted. Errors:
+/// Parses a list with one entry per line. `parse(line)` returns an entry, or an empty optional for an invalid line;
+/// `form` describes an entry. Comments, blank lines, CRLF and a byte order mark are accepted, and a first line without
+/// an entry is a heading. The entries are sorted; other lines and repeated time stamps are skipped and noted. Errors:
 /// no_data (no entry; the message quotes the first line).
 template <class Entry, class Parse>
 [[nodiscard]] result<std::vector<Entry>> parse_list(std::string_view text, const std::filesystem::path& list,
@@ -179,7 +179,7 @@ struct associated_files {
       [&](std::string_view line) { return parse_association(line, list.parent_path()); }, notes);
 }
 
-/// Reads `associations.txt`; see `parse_associations`. Errors: as `read_image_list`.
+/// Reads `associations.txt`; see `parse_associations`. Errors: those of `read_image_list`.
 [[nodiscard]] inline result<std::vector<associated_files>> read_associations(const std::filesystem::path& list,
                                                                              std::vector<std::string>& notes) {
   const auto text = read_file(list);
@@ -200,7 +200,7 @@ struct associated_files {
   return {};
 }
 
-/// Converts the times of frames to seconds at `fps` frames per second if they are frame numbers, and notes it.
+/// Converts the times of frames to seconds at `fps` frames per second if they are frame numbers, and adds a note.
 inline void convert_frame_numbers(recording_index& index, double fps) {
   if (!are_frame_numbers(timestamps(index.frames))) return;
   for (recording_entry& frame : index.frames) {
@@ -214,7 +214,7 @@ inline void convert_frame_numbers(recording_index& index, double fps) {
 }
 
 /// Converts the times of the ground truth to seconds at `fps` frames per second if they are frame numbers and more
-/// frames then have a pose, and notes it. @pre the times of the frames are in seconds
+/// frames then have a pose, and adds a note. @pre the times of the frames are in seconds
 inline void convert_numbered_truth(recording_index& index, double max_distance, double fps) {
   if (!are_frame_numbers(timestamps(index.ground_truth))) return;
   const auto known = [&](const trajectory& truth) {
@@ -231,14 +231,14 @@ inline void convert_numbered_truth(recording_index& index, double max_distance, 
 
 /// Reads `groundtruth.txt` of a folder, if it exists, into an index with known frames, and sets their poses
 /// (`attach_ground_truth`). `fps`: frames per second, for poses with frame numbers instead of times. Errors:
-/// unreadable, malformed (with the line), unsupported.
+/// unreadable, malformed (with the line number), unsupported.
 [[nodiscard]] inline result<void> read_ground_truth(const std::filesystem::path& folder, double max_time_difference,
                                                     recording_index& index, double fps) {
   const auto file = folder / "groundtruth.txt";
   if (!present(file)) return {};
   auto truth = read_trajectory_file(file);
   if (truth && truth->layout == trajectory_layout::kitti)
-    return fail(errc::malformed, file.string(), "the poses have no times; a line is timestamp tx ty tz qx qy qz qw");
+    return fail(errc::malformed, file.string(), "the poses have no times; expected timestamp tx ty tz qx qy qz qw");
   if (auto taken = take_ground_truth(std::move(truth), index); !taken) return fail(taken.error());
   index.files.push_back(file);
   convert_numbered_truth(index, max_time_difference, fps);
@@ -281,7 +281,7 @@ inline void guess_tum_camera(const std::filesystem::path& folder, recording_inde
 /// interpolated at the colour images' time stamps. The camera is that of the benchmark's sequences
 /// (`guess_tum_camera`). Time stamps that are all frame numbers are converted to seconds at `fps` frames per second.
 /// Errors: not_found (a list, the first image), unreadable, no_data (empty lists, no pair), malformed (ground truth,
-/// with the line).
+/// with the line number).
 [[nodiscard]] inline result<recording_index> index_tum(const std::filesystem::path& folder,
                                                        double max_time_difference = 0.020, double fps = 30.0) {
   recording_index index;
@@ -340,8 +340,8 @@ inline void guess_tum_camera(const std::filesystem::path& folder, recording_inde
   if (to.frames.empty())
     return fail(errc::no_data, where.string(),
                 "no left image has a right image within " + describe(max_time_difference) +
-                    " s: the left ones have times " + describe_span(left_times) + ", the right ones " +
-                    describe_span(right_times));
+                    " s: the times of the left images are " + describe_span(left_times) +
+                    ", those of the right images " + describe_span(right_times));
   for (const auto& [list, side] : {std::pair{&left, "left"}, std::pair{&right, "right"}})
     if (const std::size_t lonely = list->size() - to.frames.size(); lonely != 0)
       to.notes.push_back(std::to_string(lonely) + " of " + std::to_string(list->size()) + " " + side +

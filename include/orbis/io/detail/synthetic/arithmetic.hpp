@@ -2,11 +2,11 @@
 /// @file
 /// Arithmetic for synthetic pixels: bit-identical on every machine.
 ///
-/// It uses only operations that IEEE 754 defines exactly (+ - * / sqrt, conversions) and integers; sine and cosine are
+/// Only operations are used that IEEE 754 defines exactly (+ - * / sqrt, conversions) and integers; sine and cosine are
 /// those of core/rounded.hpp. A compiler may still fuse a product and a sum into one rounding if the target supports it
 /// (`-march=native`), so every header whose arithmetic affects a pixel disables this for its own functions, between
-/// ORBIS_BEGIN_UNFUSED and ORBIS_END_UNFUSED. Functions in such a region are not templates, because templates would be
-/// compiled elsewhere, with other options.
+/// ORBIS_BEGIN_UNFUSED and ORBIS_END_UNFUSED. Functions between these macros are not templates, because templates would
+/// be compiled elsewhere, with other options.
 #pragma once
 
 #include <cmath>
@@ -43,11 +43,11 @@ struct triple {
   return mix64(seed ^ mix64(index * 0x100000001b3ULL + stream));
 }
 
-/// The 2^-32 fraction of a word's upper half, in [0, 1).
+/// The upper half of a word as a multiple of 2^-32, in [0, 1).
 [[nodiscard]] inline double upper_fraction(std::uint64_t word) noexcept {
   return static_cast<double>(word >> 32U) * 0x1.0p-32;
 }
-/// The 2^-32 fraction of a word's lower half, in [0, 1).
+/// The lower half of a word as a multiple of 2^-32, in [0, 1).
 [[nodiscard]] inline double lower_fraction(std::uint64_t word) noexcept {
   return static_cast<double>(word & 0xffffffffU) * 0x1.0p-32;
 }

@@ -120,7 +120,8 @@ class camera_path {
     const double t = std::clamp(4.0 * std::min(s, 1.0 - s), 0.0, 1.0);
     return t * t * (3.0 - 2.0 * t);
   }
-  /// Completed fraction of the trip at the fraction `s` of the time: acceleration, uniform motion, deceleration, rest.
+  /// Completed fraction of the path after the fraction `s` of the time: acceleration, uniform motion, deceleration,
+  /// rest.
   [[nodiscard]] double progress(double s) const noexcept {
     const double t = std::clamp(s / (1.0 - options_.overlap), 0.0, 1.0);
     constexpr double speed = 1.0 / (1.0 - ramp);
@@ -134,7 +135,7 @@ class camera_path {
     return std::min({1.0, t / ramp, (1.0 - t) / ramp});
   }
 
-  static constexpr double ramp = 0.06;  ///< fraction of the trip for acceleration, and for deceleration
+  static constexpr double ramp = 0.06;  ///< fraction of the path for acceleration, and for deceleration
 
   synthetic_path_options options_;
   std::uint64_t seed_;

@@ -96,7 +96,7 @@ class canvas {
   }
 
   [[nodiscard]] static tint patch_colour(double contrast, random_bits& bits) {
-    // Patches are bright or dark, rarely in between; a third of them are coloured.
+    // Patches are bright or dark, rarely of medium brightness; a third of them are coloured.
     const double level = bits.uniform() < 0.5 ? between(bits, 0.05, 0.40) : between(bits, 0.60, 1.0);
     const double mixed = 0.55 + contrast * (level - 0.55);
     const double colourful = bits.uniform() < 0.35 ? 0.45 : 0.08;

@@ -63,7 +63,7 @@ using face_looks = std::array<face_look, 6>;
 struct painted_solids {
   std::vector<solid> solids;
   std::vector<face_looks> looks;  ///< one per solid
-  std::vector<triple> lamps;      ///< metres, world; each point is lit by the lamp that appears brightest there
+  std::vector<triple> lamps;      ///< metres, world; each point is lit by the lamp that appears brightest at that point
 };
 
 /// Looks of the walls, floor and ceiling of a furnished room.
@@ -89,7 +89,7 @@ struct painted_solids {
   return looks;
 }
 
-/// A furnished room with its looks. The light on the person is that at the initial position.
+/// A furnished room with its looks. The light on the person is computed for the initial position.
 [[nodiscard]] inline painted_solids painted(const scene& room) {
   painted_solids all{room.solids(), {}, {{0.0, 0.0, room.options().height - 0.5}}};
   for (const solid& s : all.solids)

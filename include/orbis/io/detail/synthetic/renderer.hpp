@@ -50,7 +50,7 @@ class renderer {
   [[nodiscard]] int tile_rows() const noexcept { return (k_.height + tile - 1) / tile; }
 
   /// Renders the pixels of one row of tiles into `out`, whose images have the camera's size. If its colour image is
-  /// empty, skips the colours, which are a third of the work.
+  /// empty, skips the colours, which take a third of the time.
   void render_tile_row(int row, exact_view& out) const {
     render_rows(row * tile, std::min(row * tile + tile, k_.height), out);
   }
@@ -82,7 +82,7 @@ class renderer {
   struct candidate {
     solid body;
     std::size_t index;
-    triple origin, right, down, forward;  // of the camera, in the solid's frame
+    triple origin, right, down, forward;  // position and axes of the camera, in the solid's frame
     triple offset, bounds;                // the solid's bounding box, relative to the camera, along the world axes
     double nearest;                       // lower bound of the solid's depth
   };
@@ -146,7 +146,7 @@ class renderer {
   camera_pose pose_;
   camera::intrinsics k_;
   double inverse_fx_, inverse_fy_;
-  std::vector<candidate> seen_;  // the room first, then by depth
+  std::vector<candidate> seen_;  // the room first, then the other solids by depth
 };
 
 }  // namespace orbis::io::detail::synthetic

@@ -25,8 +25,8 @@ namespace orbis::io::detail::synthetic {
 using body_parts = std::array<solid, 7>;
 
 /// An adult, 1.75 m tall and 0.55 m wide, standing at `foot` (metres, world) and facing along `(cos_yaw, sin_yaw)`.
-/// `step`: number of double steps made; its fraction determines the position of arms and legs. The textures depend only
-/// on `seed`.
+/// `step`: number of double steps so far; its fraction determines the position of arms and legs. The textures depend
+/// only on `seed`.
 [[nodiscard]] inline body_parts walking_person(triple foot, double cos_yaw, double sin_yaw, double step,
                                                std::uint64_t seed) noexcept {
   body_parts parts;

@@ -20,7 +20,7 @@ ORBIS_BEGIN_UNFUSED
 
 namespace orbis::io::detail::synthetic {
 
-/// The published standard deviation (metres) at depth `z` (metres).
+/// The published standard deviation of the depth noise (metres) at depth `z` (metres).
 [[nodiscard]] inline double axial_deviation(double z) noexcept { return 0.0012 + 0.0019 * (z - 0.4) * (z - 0.4); }
 
 /// The sensor with the exposure time and noise that automatic exposure would choose. `light`: illumination relative to
@@ -35,7 +35,7 @@ namespace orbis::io::detail::synthetic {
 /// Applies the errors of one frame, row by row; rows are independent of each other.
 class sensor {
  public:
-  /// `focal`: of the registered image, pixels. `key`: different for each frame.
+  /// `focal`: focal length of the registered image, pixels. `key`: different for each frame.
   sensor(const synthetic_sensor_options& options, double focal, double depth_scale, std::uint64_t seed,
          std::uint64_t key) noexcept
       : options_{options}, focal_{focal}, depth_scale_{depth_scale}, seed_{noise_word(seed, 0x73656e73ULL, key)} {
@@ -111,7 +111,8 @@ class sensor {
     return dark;
   }
 
-  /// Measured depth of the ray through (x, y): near a depth edge, it may be a neighbour's or a value in between.
+  /// Measured depth of the ray through (x, y): near a depth edge, it may be the depth of a neighbour, or a value
+  /// between the two.
   [[nodiscard]] double beside_edge(const exact_view& exact, int x, int y, std::uint64_t word) const noexcept {
     const image<float>& depth = exact.depth;
     const float* here = depth.data() + std::ptrdiff_t{y} * depth.width() + x;

@@ -98,8 +98,8 @@ class simulator {
     return f;
   }
 
-  /// The images of two such cameras at `time`, the second one `baseline` metres to the right of the first. `at` and
-  /// `key`: as in `frame`.
+  /// The images of a stereo camera at `time`; its second camera is `baseline` metres to the right of the first. `at`
+  /// and `key`: as in `frame`.
   template <execution_policy Policy, class At>
   [[nodiscard]] camera::stereo_frame stereo(const Policy& policy, const At& at, double time, std::uint64_t key,
                                             double baseline) const {
@@ -147,8 +147,9 @@ class simulator {
     return exposure * ((i + 0.5) / count - 0.5);
   }
 
-  /// Replaces each depth by that of the mean disparity over the integration time, which is centred on the depth image's
-  /// time. At an edge both surfaces contribute in proportion to the time for which the pixel sees them.
+  /// Replaces each depth by the depth that corresponds to the mean disparity over the integration time, which is
+  /// centred on the depth image's time. At an edge both surfaces contribute in proportion to the time for which the
+  /// pixel sees them.
   template <execution_policy Policy, class At>
   void smear(const Policy& policy, const At& at, double time, image<float>& depth) const {
     const int count = sensor_.depth_blur;
