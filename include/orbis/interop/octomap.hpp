@@ -63,14 +63,14 @@ template <octree::octomap_model Model = octree::log_odds<>>
   return detail::read_tree<Model>(tree, [](auto&&...) { return true; });
 }
 /// Converts an `octomap::ColorOcTree` to a map and the colours of its leaves, each as one observation; colours of inner
-/// nodes are ignored. Errors as above, and unsupported for a coloured leaf of more than 32x32x32 voxels, because each
-/// voxel stores its own colour.
+/// nodes are ignored. Errors: those of the overload above, and unsupported for a coloured leaf of more than 32x32x32
+/// voxels, because each voxel stores its own colour.
 template <octree::octomap_model Model = octree::log_odds<>, color_payload Color = octree::rgb_mean>
 [[nodiscard]] result<colored_map<Model, Color>> from_octomap(const octomap::ColorOcTree& tree) {
   octree::voxel_layer<Color> colors;
   const auto paint = [&](const octomap::ColorOcTreeNode& node, const octree::voxel_key& key, int level) {
     if (!node.isColorSet()) return true;
-    constexpr int largest = 5;  // of 32x32x32 voxels
+    constexpr int largest = 5;  // level of a node of 32x32x32 voxels
     if (level > largest) return false;
     const octomap::ColorOcTreeNode::Color c = node.getColor();
     const std::uint32_t cells = octree::node_cells(level);
@@ -87,8 +87,8 @@ template <octree::octomap_model Model = octree::log_odds<>, color_payload Color 
 
 }  // namespace orbis::interop
 
-/// Direct access of `nav` to an `octomap::OcTree`. The tree has no change log, so each `update` of a field compares
-/// everything. Only leaves are read, so inner nodes need not be up to date.
+/// Gives `nav` direct access to an `octomap::OcTree`. The tree has no change log, so each `update` of a distance field
+/// compares the whole tree. Only leaves are read, so inner nodes need not be up to date.
 template <>
 struct orbis::nav::map_access<octomap::OcTree> {
   [[nodiscard]] static octree::voxel_grid grid(const octomap::OcTree& tree) {
@@ -132,7 +132,7 @@ struct orbis::nav::map_access<octomap::OcTree> {
       if (const octomap::OcTreeNode* const c = child(tree, node, i))
         descend(tree, c, octree::child_key(low, i, octree::node_cells(static_cast<int>(level) - 1)), level - 1, visit);
   }
-  /// States of an octant, or of any octant in a larger leaf.
+  /// States of the voxels of an octant. For a larger leaf, the states of any octant in it.
   [[nodiscard]] static octree::octant_states states(const octomap::OcTree& tree, const octomap::OcTreeNode* node) {
     octree::octant_states s;
     const auto add = [&](const octomap::OcTreeNode* leaf, std::uint64_t voxels) {

@@ -70,8 +70,9 @@ class ompl_validity_checker : public ompl::base::StateValidityChecker {
   using StateValidityChecker::isValid;
 
   [[nodiscard]] bool isValid(const ompl::base::State* state) const override { return space_.is_free(position_(state)); }
-  /// For a ball in a 3D space: a lower bound on the distance to the nearest obstacle, metres. It is less than two
-  /// voxels too small, at most the field's reach, and 0 if the ball may touch an obstacle. For other robots: 0. O(1).
+  /// For a ball in a 3D space: a lower bound on the distance to the nearest obstacle, metres. It underestimates the
+  /// distance by less than two voxels, is at most the field's reach, and is 0 if the ball may touch an obstacle. For
+  /// other robots: 0. O(1).
   [[nodiscard]] double clearance(const ompl::base::State* state) const override {
     if constexpr (is_ball)
       return std::max(0.0, space_.field().clearance(position_(state)) - space_.radius());
@@ -125,7 +126,7 @@ class ompl_motion_validator : public ompl::base::MotionValidator {
 };
 
 /// Sets `space` as the state and motion checker of `information`. Call it before `setup()`.
-/// @pre as for ompl_motion_validator
+/// @pre see ompl_motion_validator
 template <nav::planning_space Space>
 void use_planning_space(const ompl::base::SpaceInformationPtr& information, const Space& space) {
   information->setStateValidityChecker(std::make_shared<ompl_validity_checker<Space>>(information, space));

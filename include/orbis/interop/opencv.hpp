@@ -46,7 +46,7 @@ inline constexpr int cv_type = std::same_as<T, std::uint8_t>    ? CV_8UC1
                                                                 : CV_8UC3;
 
 /// A view of the pixels of `mat`; `mat` (or another header for its data) must outlive the view. The caller chooses
-/// `bgr8` or `rgb8` for three bytes, because OpenCV does not record the order. Errors: unsupported, if the type
+/// `bgr8` or `rgb8` for three-byte pixels, because OpenCV does not record the order. Errors: unsupported, if the type
 /// differs, if there are more than two dimensions, or if the row stride is not a multiple of the pixel size. An empty
 /// matrix gives an empty view.
 template <shared_pixel T>
@@ -66,8 +66,8 @@ template <shared_pixel T>
 
 /// A view of the points in `mat`, row by row. S = float: CV_32FC3 of any shape (an organised cloud, a row, a column) or
 /// CV_32FC1 with three columns and one point per row; S = double: CV_64FC3 or CV_64FC1. `mat` (or another header for
-/// its data) must outlive the points. For rows with more than x, y and z, pass `mat.colRange(0, 3)`. An empty matrix
-/// has no points. Errors: unsupported, if the type or the shape differs.
+/// its data) must outlive the points. If rows contain more numbers than x, y and z, pass `mat.colRange(0, 3)`. An empty
+/// matrix has no points. Errors: unsupported, if the type or the shape differs.
 template <std::floating_point S>
 requires(sizeof(S) == 4 || sizeof(S) == 8) [[nodiscard]] result<strided_points<S>> points_in(const cv::Mat& mat) {
   constexpr int depth = sizeof(S) == 4 ? CV_32F : CV_64F;

@@ -89,7 +89,7 @@ class strided_points {
   };
 
   constexpr strided_points() noexcept = default;
-  /// `data`: x of the first point. @pre the buffer holds all points; rows are full
+  /// `data`: address of x of the first point. @pre the buffer holds all points; rows are full
   constexpr strided_points(const S* data, std::size_t size, const point_layout& layout = {}) noexcept
       : data_{data}, size_{size}, layout_{layout} {
     assert(layout.row_length == 0 || size % layout.row_length == 0);

@@ -98,7 +98,7 @@ class tree_reader {
   tree_reader(const Tree& tree, octree::occupancy_octree<Model>& map, SeeLeaf& see_leaf)
       : tree_{tree}, map_{map}, see_leaf_{see_leaf} {}
 
-  /// Reads a node at `level`. Returns false on error, see problem().
+  /// Reads a node at `level`. Returns false on error; see problem().
   [[nodiscard]] bool read(const node& n, const octree::voxel_key& key, int level) {
     if (!tree_.nodeHasChildren(&n)) {
       float value = 0;
