@@ -8,7 +8,7 @@
 #include <orbis/octree.hpp>
 
 int main(int argc, char** argv) {
-  // A depth camera that moves once around in a furnished room, with known poses.
+  // A depth camera that moves once around a furnished room, with known poses.
   const orbis::io::synthetic_recording room{{.frames = 36, .width = 320, .height = 240, .frames_around = 36}};
   const auto camera = room.camera().model;
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// Clouds in geographic coordinates (UTM): the numbers are too large for floats and octrees, so that such a cloud is
-// read relative to an origin within it.
+// Clouds in geographic coordinates (UTM): the coordinates are too large for floats and octrees, so these clouds are
+// read relative to an origin within them.
 #pragma once
 
 #include <algorithm>
@@ -43,8 +43,8 @@ namespace examples {
   return middle;
 }
 
-/// Replaces points beyond `most` metres by NaN: squares of such distances are not numbers of the type float. Returns
-/// their number.
+/// Replaces points at a distance of more than `most` metres by NaN, because the square of the distance exceeds the
+/// range of float. Returns the number of these points.
 inline std::size_t remove_distant(std::vector<orbis::vec3f>& points) {
   constexpr float most = 1e15F;
   std::size_t removed = 0;
@@ -71,7 +71,7 @@ inline std::size_t remove_distant(std::vector<orbis::vec3f>& points) {
 
 struct cloud_near_origin {
   orbis::io::cloud_with_fields read;  ///< coordinates relative to `origin`
-  orbis::vec3 origin;                 ///< in the coordinates of the file; zero if these are small
+  orbis::vec3 origin;                 ///< in the coordinates of the file; zero if the coordinates are small
 };
 
 /// Reads a cloud, relative to its median if that is far from the origin. Errors: those of `io::read_cloud`; unsupported
@@ -88,7 +88,7 @@ struct cloud_near_origin {
     read->notes.push_back(std::to_string(distant) + " points are left out, because they are more than 1e15 m away");
   if (is_too_small(read->cloud.points))
     return orbis::fail(orbis::errc::unsupported, path.string(),
-                       "most points are less than 1e-12 m from the origin: the coordinates must be metres");
+                       "most points are less than 1e-12 m from the origin: the coordinates must be in metres");
   return cloud_near_origin{*std::move(read), origin};
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// Start and end of a program: exit codes, errors in one line, and no exception or signal that ends it without them.
+// Start and end of a program: exit codes, one-line error messages, and handling of exceptions and signals.
 #pragma once
 
 #include <cmath>
@@ -23,8 +23,8 @@
 
 namespace examples {
 
-/// One-line description of a command-line error. If an argument is missing and an option is unknown, reports the option,
-/// which may be the cause.
+/// One-line description of a command-line error. If an argument is missing and an option is unknown, reports the
+/// option, which may be the cause.
 [[nodiscard]] inline std::string describe_usage(const CLI::App& cli, const CLI::ParseError& e) {
   std::string what = e.what();
   if (dynamic_cast<const CLI::RequiredError*>(&e) != nullptr)
@@ -36,7 +36,7 @@ namespace examples {
   return orbis::shortened(what) + " (--help shows the usage)";
 }
 
-/// Parses the command line. Returns the exit code if the program ends with it: --help, or wrong usage (1).
+/// Parses the command line. Returns the exit code if the program must end: 0 after --help, 1 after a usage error.
 [[nodiscard]] inline std::optional<int> parse(CLI::App& cli, int argc, char** argv) {
   try {
     cli.parse(argc, argv);
@@ -52,8 +52,8 @@ namespace examples {
   }
 }
 
-/// Occupies the standard streams that are closed: otherwise the next files that are opened become standard streams, and
-/// messages are written into them. Reading and writing still fail.
+/// Opens /dev/null in place of closed standard streams: otherwise the next files that are opened would become standard
+/// streams, and messages would be written into them. Reading from and writing to these streams still fail.
 inline void occupy_standard_streams() {
 #if __has_include(<fcntl.h>)
   for (const int stream : {0, 1, 2})
@@ -62,8 +62,8 @@ inline void occupy_standard_streams() {
 }
 
 /// Runs `body`, which returns the exit code of the program. The code is 2 if the body throws (memory, threads), or if
-/// standard output cannot be written. A closed pipe and the size limit of files do not end the program; memory is
-/// limited to what is free.
+/// standard output cannot be written. A closed pipe or an exceeded file size limit does not end the program; its memory
+/// is limited (`limit_memory`).
 template <class Body>
 [[nodiscard]] int run_program(const char* program, Body&& body) {
   occupy_standard_streams();

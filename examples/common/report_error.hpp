@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// Prints the errors of the programs in one line.
+// Prints the errors of the programs on one line.
 #pragma once
 
 #include <cstddef>
@@ -13,7 +13,7 @@
 
 namespace examples {
 
-/// The text in one line: control characters are removed and words of more than 200 characters shortened, because input
+/// The text on one line: control characters are removed and words of more than 200 characters shortened, because input
 /// files and arguments may contain both.
 [[nodiscard]] inline std::string one_line(std::string_view text) {
   constexpr std::size_t longest = 200;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// Estimates, before an octree is built, whether its voxels are so small that insertion takes long or exceeds the
+// Estimates, before an octree is built, whether its voxels are so small that insertion takes a long time or exceeds the
 // memory.
 #pragma once
 
@@ -37,11 +37,11 @@ class voxel_estimate {
     return voxels(resolution) >= 2e9 || (memory && bytes(resolution) > static_cast<double>(*memory));
   }
 
-  /// A description: "voxels of 1 mm: `what` has about 0.3 billion of them, 2.4 GB".
+  /// A description: "`what` has about 0.3 billion voxels of 1 mm (2.4 GB)".
   [[nodiscard]] std::string describe(double resolution, const std::string& what) const {
     char text[160];
-    std::snprintf(text, sizeof text, "voxels of %g mm: %s has about %.1f billion of them, %.1f GB", 1000.0 * resolution,
-                  what.c_str(), 1e-9 * voxels(resolution), 1e-9 * bytes(resolution));
+    std::snprintf(text, sizeof text, "%s has about %.1f billion voxels of %g mm (%.1f GB)", what.c_str(),
+                  1e-9 * voxels(resolution), 1000.0 * resolution, 1e-9 * bytes(resolution));
     return text;
   }
 

@@ -38,9 +38,9 @@ int run(int argc, char** argv) {
   CLI::App cli{"Convert a depth image with a camera pose to an occupancy octree", "depth_to_octree"};
   cli.add_option("DEPTH", input, "16-bit grey PNG")->required();
   cli.add_option("MAP", output, "output .bt file")->required();
-  cli.add_option("--pose", p, "camera to world: tx ty tz qx qy qz qw")->expected(7)->capture_default_str();
+  cli.add_option("--pose", p, "camera-to-world pose: tx ty tz qx qy qz qw")->expected(7)->capture_default_str();
   cli.add_option("--camera", camera_name, "camera.toml, preset (tum_fr1 ...), or fx,fy,cx,cy")->capture_default_str();
-  cli.add_option("--scale", scale, "depth units per metre (that of the camera file, or 1000)");
+  cli.add_option("--scale", scale, "depth units per metre (from the camera file, or 1000)");
   cli.add_option("--resolution", resolution, "voxel size in metres")->capture_default_str();
   if (const auto code = examples::parse(cli, argc, argv)) return *code;
   const orbis::so3::quaternion q{p.data() + 3};  // x y z w
@@ -63,7 +63,7 @@ int run(int argc, char** argv) {
   const auto voxels =
       examples::voxels_of_depth(camera->model.k(), [&](std::size_t i) { return depth->pixels()[i] / units; });
   if (voxels.is_too_large(resolution, examples::free_memory()))
-    return report_error(2, "--resolution: " + voxels.describe(resolution, "the image") + ", too many");
+    return report_error(2, "--resolution: " + voxels.describe(resolution, "the image") + ", which is too many");
   if (voxels.takes_long(resolution))
     std::fprintf(stderr, "depth_to_octree: %s; this takes a long time\n",
                  voxels.describe(resolution, "the image").c_str());

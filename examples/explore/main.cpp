@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // explore MAP.bt: autonomous mapping of a synthetic building with three furnished rooms, with known poses. A flying
-// robot repeatedly chooses the view that shows the most unknown space for the shortest path, flies there through known
-// free space, and takes views on the way, until no view shows enough.
+// robot repeatedly chooses a view that shows much unknown space after a short path, flies to it through known free
+// space, and takes views along the path, until no view shows enough unknown space.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -240,7 +240,7 @@ int run(int argc, char** argv) {
   options.gain = {.max_range = range, .pixel_step = std::max(1, width / 40), .bounds = world.bounds()};
   options.min_gain = 0.01;
   std::vector<vec3> done;  // targets whose unknown space was not visible in a view
-  std::string why = "out of views";
+  std::string why = "maximum number of views";
   while (robot.views < budget) {
     if (!robot.back_out()) {
       why = "no free space around the robot";

@@ -70,8 +70,8 @@ struct position_difference {
 /// Computes all vertices that are not fixed from the edges alone, independently of their initial poses. Solves two
 /// linear least-squares problems: first for unconstrained matrices, which are projected to the nearest rotations, then
 /// for the positions. Edges are weighted by their information. Only the options `fixed`, `hold` and
-/// `semidefinite_information` are used. Fixed and held vertices remain unchanged; on failure, all vertices do
-/// (`singular`: vertex `where` is not determined, or has no nearest rotation).
+/// `semidefinite_information` are used. Fixed and held vertices remain unchanged; on failure, all vertices remain
+/// unchanged (`singular`: vertex `where` is not determined, or has no nearest rotation).
 ///
 /// Sources: L. Carlone, R. Tron, K. Daniilidis, F. Dellaert, "Initialization techniques for 3D SLAM: a survey on
 /// rotation estimation and its use in pose graph optimization", ICRA 2015; D. Martinec, T. Pajdla, "Robust rotation and

@@ -42,7 +42,7 @@ void print_json(const settings& s, const orbis::io::g2o_graph& graph, const opti
       r.iterations, r.factorizations, t.set_up, t.linearize, t.factor, t.solve, t.evaluate);
 }
 
-/// Damping that is chosen at run time, in one type, so that the solver is compiled once for each loss.
+/// A damping strategy that is chosen at run time: with a single type, the solver is compiled only once for each loss.
 struct chosen_damping {
   std::string name;
   struct state {

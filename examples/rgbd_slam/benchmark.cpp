@@ -59,7 +59,7 @@ bool is_scene(const fs::path& path) {
 }
 
 /// Adds the recordings in and below `path` in the order of their names, but not recordings inside other recordings.
-/// `seen`: canonical paths of the folders so far.
+/// `seen`: canonical paths of the folders visited so far.
 void find_recordings(const fs::path& path, std::set<fs::path>& seen, std::vector<fs::path>& found) {
   std::error_code failure;
   if (!seen.insert(fs::weakly_canonical(path, failure)).second) return;
@@ -86,7 +86,8 @@ orbis::result<std::vector<found_recording>> chosen_recordings(const settings& s)
     if (!fs::exists(folder, ignored)) return orbis::fail(orbis::errc::not_found, folder.string(), "does not exist");
     std::vector<fs::path> found;
     find_recordings(folder, seen, found);
-    if (found.empty()) return orbis::fail(orbis::errc::no_data, folder.string(), "no new recording in or below it");
+    if (found.empty())
+      return orbis::fail(orbis::errc::no_data, folder.string(), "contains no recordings that are not already listed");
     for (const fs::path& path : found) {
       const fs::path inside = path == folder ? fs::path{} : path.lexically_relative(folder);
       const std::string name = inside.empty() ? fs::weakly_canonical(path).filename().string() : inside.string();
@@ -224,7 +225,7 @@ class runner {
  private:
   static constexpr int not_started = 127;  // exit code
 
-  /// Continues the child process of `parent`. Only makes system calls.
+  /// Runs in the child process after the fork from `parent`, and executes this program again. Makes only system calls.
   [[noreturn]] static void become(char** argv, const char* log, [[maybe_unused]] pid_t parent) {
 #ifdef __linux__
     ::prctl(PR_SET_PDEATHSIG, SIGKILL);
@@ -232,7 +233,7 @@ class runner {
 #endif
     const int file = ::open(log, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
     if (file < 0) ::_exit(not_started);
-    if (file <= STDERR_FILENO) ::fcntl(file, F_SETFD, 0);  // where dup2 may have no effect
+    if (file <= STDERR_FILENO) ::fcntl(file, F_SETFD, 0);  // dup2 may have no effect on this descriptor
     ::dup2(file, STDOUT_FILENO);
     ::dup2(file, STDERR_FILENO);
     ::execv("/proc/self/exe", argv);
@@ -373,8 +374,8 @@ table published_table(const std::vector<row>& rows) {
   return t;
 }
 
-/// The table as text with aligned columns, or as Markdown. The first `left` columns and the last column of failures
-/// contain words.
+/// The table as text with aligned columns, or as Markdown. The first `left` columns, and the last column with the
+/// failures, contain words.
 std::string formatted(const table& t, bool markdown, std::size_t left) {
   std::vector<std::size_t> widths(t.front().size());
   for (const auto& line : t)

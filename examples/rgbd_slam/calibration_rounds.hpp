@@ -21,7 +21,7 @@
 namespace app {
 
 struct calibration_rounds {
-  orbis::slam::calibration<orbis::camera::any_camera> last;   ///< of the last round; held parameters are as given
+  orbis::slam::calibration<orbis::camera::any_camera> last;  ///< result of the last round; held parameters are as given
   std::vector<orbis::slam::calibrated_parameter> parameters;  ///< change over all rounds: `before` is the given value
   orbis::trajectory trajectory;                               ///< trajectory of the last round
   std::optional<lens_comparison> lens;                        ///< comparison in the last round, if requested

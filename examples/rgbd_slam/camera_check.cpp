@@ -70,7 +70,7 @@ std::optional<lens_comparison> compare_lens(const orbis::slam::map& map, const o
 
 std::string describe(const lens_comparison& lens) {
   if (!lens.is_determined)
-    return "the motion does not determine whether the lens has distortion; if so, the estimated focal length "
+    return "the motion does not determine whether the lens has distortion; if it has, the estimated focal length "
            "compensates for it and is wrong";
   char text[240];
   std::snprintf(text, sizeof text,

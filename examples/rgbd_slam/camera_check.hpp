@@ -15,7 +15,7 @@
 
 namespace app {
 
-/// Evidence that another focal length fits the images clearly better than that of the camera, in pixels.
+/// Evidence that another focal length (in pixels) fits the images clearly better than the camera's focal length.
 struct focal_doubt {
   double given, found;
   bool is_sure = true;  ///< false if a lens with distortion would fit the images slightly better
@@ -29,7 +29,7 @@ struct focal_doubt {
 struct lens_comparison {
   double pinhole_focal, lens_focal;  ///< fx of each, pixels
   double pinhole_rms, lens_rms;      ///< RMS reprojection error, in standard deviations
-  bool is_determined;                ///< the motion determines the distortion
+  bool is_determined;                ///< true if the motion determines the distortion
   /// Returns true if the images show distortion.
   [[nodiscard]] bool has_distortion() const;
 };
@@ -47,8 +47,9 @@ struct lens_comparison {
                                                     const orbis::progress& go_on = {});
 /// Returns true if a calibration resulted in a clearly different focal length, even if other parameters were held.
 [[nodiscard]] bool has_other_focal_length(std::span<const orbis::slam::calibrated_parameter> found);
-/// Compares the pinhole calibration with a map, run with the options `how`, with one that includes distortion. Empty if
-/// the camera is not a pinhole camera or the calibration fails. Runs one self-calibration.
+/// Compares the calibration `as_pinhole`, which was run on `map` with the options `how`, with a calibration that
+/// includes distortion. Empty if the camera is not a pinhole camera or the calibration fails. Runs one
+/// self-calibration.
 [[nodiscard]] std::optional<lens_comparison> compare_lens(const orbis::slam::map& map,
                                                           const orbis::camera::any_camera& camera,
                                                           const orbis::slam::calibration_summary& as_pinhole,

@@ -29,7 +29,7 @@ struct camera_file {
 [[nodiscard]] orbis::result<camera_file> read_camera_file(const std::filesystem::path& path);
 
 /// The camera given by the option --camera: `camera.toml`, a file that `read_camera_file` reads, or a preset. Errors:
-/// as `read_camera_file`.
+/// those of `read_camera_file`.
 [[nodiscard]] orbis::result<orbis::camera::camera_settings> named_camera(const std::string& name);
 
 /// The file of another program, with one of the usual names, that describes the camera of the recording in `folder`;

@@ -90,7 +90,7 @@ void add_map_options(CLI::App& cmd, settings& s) {
       ->capture_default_str()
       ->type_name("A");
   count(cmd, "--depth-memory", s.depth_memory,
-        "memory for the compressed depth images of keyframes, in MB, without the masks of removed pixels; images "
+        "memory for the compressed depth images of keyframes, in MB, excluding the masks of removed pixels; images "
         "beyond it are written to an unnamed temporary file in the output folder",
         0, 1'000'000)
       ->capture_default_str();
@@ -128,9 +128,8 @@ void add_plan_options(CLI::App& cmd, settings& s, std::string& from, std::string
            s.robot_height = height;
            s.is_cylinder = true;
          },
-         "height in metres: the robot is an upright cylinder whose base is at the given point; without it, the robot "
-         "is "
-         "a ball around the point")
+         "height of the robot in metres: the robot is then an upright cylinder whose base is at the given point; by "
+         "default, it is a ball around the point")
       ->check(within(0.001, 10.0, " m"))
       ->type_name("M");
   cmd.add_flag(
@@ -241,7 +240,7 @@ void add_slam_options(CLI::App& cmd, settings& s) {
   cmd.add_flag("--map-every-frame", s.map_every_frame,
                "insert every tracked frame into the live map, not only keyframes; the files contain keyframes only");
   if (cmd.get_name() != "live")
-    cmd.add_flag("--realtime", s.realtime, "play frames at the pace of their timestamps, as from a camera");
+    cmd.add_flag("--realtime", s.realtime, "play frames at the rate of their timestamps, as a camera would");
   cmd.add_option("--save-map", s.save_map, "write the landmark map at the end")->check(not_empty)->type_name("FILE");
   cmd.add_option("--load-map", s.load_map, "start with a saved landmark map and continue in its world frame")
       ->check(not_empty)
@@ -266,7 +265,7 @@ void add_viewer_options(CLI::App& cmd, settings& s) {
       ->check(within(0U, 65535U))
       ->capture_default_str()
       ->type_name("N");
-  cmd.add_flag("--viewer-hold", s.viewer_hold, "keep the viewer open after the run, until it is closed or Ctrl-C");
+  cmd.add_flag("--viewer-hold", s.viewer_hold, "keep the viewer open after the run until it is closed, or Ctrl-C");
 }
 
 void add_calibration_options(CLI::App& cmd, settings& s) {
@@ -289,26 +288,28 @@ void add_calibration_options(CLI::App& cmd, settings& s) {
 }
 
 void add_benchmark_options(CLI::App& cmd, settings& s) {
-  cmd.add_option("FOLDER", s.inputs, "recordings, or folders in or below which there are recordings")
+  cmd.add_option("FOLDER", s.inputs, "recordings, or folders that contain recordings at any depth")
       ->required()
       ->type_name("");
   cmd.add_flag(
       "--quick", s.quick,
-      "only the deterministic run of each recording; otherwise three runs with threads follow, in parallel with "
+      "only the deterministic run of each recording; by default, three runs with threads follow, in parallel with "
       "0, 1 and 2 busy loops");
   CLI::Option* json = cmd.add_flag("--json", s.json, "print JSON");
   cmd.add_flag("--markdown", s.markdown, "print tables as Markdown")->excludes(json);
-  cmd.add_option("--out", s.out, "keep the results in this folder: RECORDING/RUN")->check(not_empty)->type_name("DIR");
+  cmd.add_option("--out", s.out, "keep the results in this folder as RECORDING/RUN")
+      ->check(not_empty)
+      ->type_name("DIR");
   add_frame_options(cmd, s);
-  cmd.add_option("--run-config", s.run_config, "options of the runs, as for run --config")
+  cmd.add_option("--run-config", s.run_config, "file with options for the runs, as in run --config")
       ->check(CLI::Validator{CLI::ExistingFile}.description(""))
       ->type_name("FILE");
   cmd.footer(
-      "CPU time and peak memory are those of whole runs, with map and report. Sizes of octrees are those of .bt\n"
-      "files, before and after the filter. Exit code 1 if a run failed; the others go on.");
+      "CPU time and peak memory are measured over whole runs, including map and report. Octree sizes are the sizes\n"
+      "of the .bt files before and after the filter. If a run fails, the others continue and the exit code is 1.");
 }
 
-/// The camera libraries that this program was built with, and without.
+/// Describes the camera support of this program, and the libraries that were missing when it was built.
 std::string build_features() {
   const auto support = [](bool has, const char* what, const char* package) {
     return std::string{what} + (has ? "" : std::string{": not in this build (needs "} + package + ")");
@@ -316,7 +317,7 @@ std::string build_features() {
   return support(has_openni(), "Depth cameras", "libopenni2-dev") + "\n" +
          support(has_video_cameras(), "Video cameras; --sensor stereo: left and right image side by side",
                  "libopencv-videoio-dev") +
-         "\nFrames that arrive while another is tracked are dropped; summary.json counts them.";
+         "\nFrames that arrive while another one is being tracked are dropped; summary.json counts them.";
 }
 
 /// The error if recordings of the sensor do not exist in the requested layout; otherwise empty.
@@ -398,7 +399,7 @@ struct command_line {
   command_line(const command_line&) = delete;  // options refer to members
   command_line& operator=(const command_line&) = delete;
   ~command_line() = default;
-  /// As read_command_line; any number of times.
+  /// Same as read_command_line; may be called any number of times.
   [[nodiscard]] std::variant<settings, exit_code> read(int argc, char** argv);
 
   settings s;
@@ -428,15 +429,15 @@ command_line::command_line() {
   add_slam_options(*run, s);
   add_viewer_options(*run, s);
 
-  demo = cli.add_subcommand("demo", "SLAM on a synthetic room made on the fly, with ground truth");
+  demo = cli.add_subcommand("demo", "SLAM on a synthetic room rendered on the fly, with ground truth");
   add_sensor_option(*demo, s, {"auto", "rgbd", "stereo", "mono"});
   add_frame_options(*demo, s);
   count(*demo, "--width", s.width, "width of the images, pixels; the height is 3/4 of it", 160, 1920)
       ->capture_default_str();
-  demo->add_option("--seed", s.seed, "of the room, the camera's path and the sensor's noise")
+  demo->add_option("--seed", s.seed, "seed of the room, the camera's path and the sensor noise")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
-  demo->add_flag("--plain", s.plain, "record one round, without the person and stray depths");
+  demo->add_flag("--plain", s.plain, "render a single round, without a person and stray depths");
   demo->add_flag("--person", s.person, "with --plain: a person walks through the room");
   demo->add_flag(
       "--walk", s.walk,
@@ -493,8 +494,8 @@ command_line::command_line() {
   for (CLI::App* cmd : {run, live, demo, map})
     cmd->add_option(
            "--gravity", gravity,
-           "direction of gravity at the first frame, in the camera frame (x right, y down, z forward); without "
-           "it, estimated from the depth image")
+           "direction of gravity at the first frame, in the camera frame (x right, y down, z forward); by default, "
+           "it is estimated from the depth image")
         ->check(not_empty)
         ->type_name("X,Y,Z");
   for (CLI::App* cmd : {run, live, demo, map})

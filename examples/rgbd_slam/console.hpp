@@ -27,7 +27,7 @@ class console {
  public:
   using clock = std::chrono::steady_clock;
   explicit console(bool quiet);
-  /// A console for work that may be abandoned; it prints nothing from then on.
+  /// A console for work that may be abandoned; once the work is abandoned, the console prints nothing.
   [[nodiscard]] console for_dispensable() const;
 
   /// Starts a stage and ends the previous one.
@@ -50,7 +50,7 @@ class console {
   }
 
   void warn(const std::string& message);
-  /// Prints "rgbd_slam: where: message" in one line.
+  /// Prints "rgbd_slam: where: message" on one line.
   void error(const orbis::error& e);
   /// Prints a line on stdout, unless quiet; returns false if that fails.
   bool print(const std::string& line);

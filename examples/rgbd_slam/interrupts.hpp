@@ -4,7 +4,7 @@
 ///
 /// Initially, the first signal ends the program. While a run is collecting results, the first signal requests it to
 /// stop and to write its results so far, and the second signal ends the program immediately. Before a signal ends the
-/// program, its temporary files are removed.
+/// program, the program's temporary files are removed.
 ///
 /// Afterwards, a run derives optional results (`begin_dispensable`). A signal during that time abandons them. After an
 /// earlier SIGINT they are completed; after SIGTERM or SIGHUP, whose senders do not wait long, they are abandoned if

@@ -29,7 +29,7 @@ class keyframe_depths {
   ~keyframe_depths() { wait(); }
 
   /// Copies the image; first waits until the previous one is compressed and rethrows an exception of that compression.
-  /// For one thread.
+  /// Call it from one thread only.
   void put(std::uint64_t frame, const orbis::image<std::uint16_t>& depth) {
     finish();
     std::shared_future<void> ahead;

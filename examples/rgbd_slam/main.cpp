@@ -18,15 +18,15 @@
 namespace {
 
 /// Returns large blocks to the system as soon as they are freed, and makes threads share heaps. Otherwise, fragments
-/// left by tracking would be half of the memory during mapping. The heap itself shrinks in steps of several images,
-/// because otherwise every image would cause page faults again.
+/// left by tracking would make up half of the memory during mapping. The heap itself shrinks in steps of several
+/// images, because otherwise every image would cause page faults again.
 void set_up_memory() {
 #ifdef __GLIBC__
   mallopt(M_MMAP_THRESHOLD, 1 << 20);
   mallopt(M_TRIM_THRESHOLD, 8 << 20);
   mallopt(M_ARENA_MAX, 2);
 #endif
-  // OpenCV reports a lack of memory by an exception of its own.
+  // Otherwise, OpenCV would report a lack of memory as a `cv::Exception`.
   cv::redirectError([](int status, const char*, const char*, const char*, int, void*) {
     if (status == cv::Error::StsNoMem) throw std::bad_alloc{};
     return 0;

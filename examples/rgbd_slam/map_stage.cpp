@@ -20,7 +20,7 @@ using orbis::result;
 using orbis::vec3f;
 using tree = orbis::octree::occupancy_octree<>;
 
-/// Returns memory that was freed in small pieces to the system.
+/// Returns freed memory to the system, even if it was freed in small blocks.
 void give_back_memory() {
 #ifdef __GLIBC__
   malloc_trim(0);

@@ -23,9 +23,9 @@ namespace app {
 }
 
 /// Computes the floor map; writes it to `floor_file` if `s.floor_map` (its final path, used in messages) is set; plans
-/// a path between two places that the camera saw, on the floor or, without a floor, for a ball through the air; and
-/// draws navigation.png into `folder`. There is no picture without a floor and a camera. Errors: write_failed (the
-/// picture); for the floor map see `navigation_results::unsaved`.
+/// a path between two places that the camera saw, on the floor or, if there is no floor, through the air for a flying
+/// ball; and draws navigation.png into `folder`, unless there are neither a floor nor camera poses. Errors:
+/// write_failed (the picture); for the floor map see `navigation_results::unsaved`.
 [[nodiscard]] orbis::result<navigation_results> navigate(const orbis::octree::occupancy_octree<>& map,
                                                          const orbis::trajectory& cameras, const settings& s,
                                                          const std::filesystem::path& folder,

@@ -107,7 +107,7 @@ orbis::result<mapped> map_recording(const frame_source& source, const settings& 
     console.warn(r.warnings.emplace_back(
         "all orientations in the ground truth are equal: if the camera turned, the map is wrong; use run"));
   for (const std::string& note : mapping_notes(*posed, world)) console.warn(r.warnings.emplace_back(note));
-  r.truth_note = "Mapped with the poses of the ground truth.";
+  r.truth_note = "Mapped with the ground-truth poses.";
   return mapped{std::move(r), *std::move(map), posed->trajectory()};
 }
 
@@ -133,7 +133,7 @@ orbis::result<void> check_resolution(const std::vector<orbis::vec3f>& points, co
   if (!rays.takes_long(s.resolution)) return {};
   const std::string text = rays.describe(s.resolution, "the space between origin and points");
   if (rays.is_too_large(s.resolution, examples::free_memory()))
-    return orbis::fail(orbis::errc::invalid_argument, "--resolution", text + ", too many");
+    return orbis::fail(orbis::errc::invalid_argument, "--resolution", text + ", which is too many");
   console.warn(r.warnings.emplace_back(text + "; this takes a long time"));
   return {};
 }
@@ -196,7 +196,7 @@ orbis::result<void> complete_times(const settings& s, orbis::io::trajectory_read
           orbis::errc::no_data, path->string(),
           "the poses have no times (KITTI's layout); put times.txt, one time per line, next to the file");
     if (auto set = orbis::io::set_times(*read, times); !set) return set;
-    warnings.push_back(path->string() + ": the times are those of " + times.lexically_normal().string());
+    warnings.push_back(path->string() + ": the times are those in " + times.lexically_normal().string());
   }
   return {};
 }
@@ -218,8 +218,7 @@ exit_code evaluate(const settings& s, console& console) {
   if (compared && s.json && !compared->no_rpe.empty()) warnings.push_back("no RPE: " + compared->no_rpe);
   const std::string units = orbis::io::describe_units(estimate->poses, truth->poses);
   if (compared && !units.empty())
-    warnings.push_back("only " + std::to_string(compared->poses.size()) +
-                       " poses have a reference pose: of the times, " + units);
+    warnings.push_back("only " + std::to_string(compared->poses.size()) + " poses have a reference pose; " + units);
   for (const std::string& warning : warnings) console.warn(warning);
   if (!compared) {
     orbis::error e{compared.error().code, s.input.string(), compared.error().message};

@@ -50,7 +50,7 @@ void add_tracking(results& r, const tracked_frames& tracked, const frame_source&
   r.world = tracked.world;
 }
 
-/// Ends a run in which no frame was tracked. Writes summary.json, or nothing if the user interrupted the run.
+/// Ends a run in which no frame was tracked. Writes summary.json unless the user interrupted the run.
 exit_code end_untracked(results& r, const tracked_frames& tracked, const frame_source& source, const settings& s,
                         result_files& files, console& console) {
   if (interrupts::stop_requested()) {
@@ -70,7 +70,7 @@ orbis::result<void> build_map(results& r, const tracked_frames& tracked, const f
   if (tracked.live) {
     live = tracked.live->stop();
     const auto known = live_notes(*std::exchange(r.live, tracked.live->so_far()));
-    for (std::string& note : live_notes(*r.live))  // includes the map's last step
+    for (std::string& note : live_notes(*r.live))  // includes results of the map's last step
       if (std::find(known.begin(), known.end(), note) == known.end())
         console.warn(r.warnings.emplace_back(std::move(note)));
   }
@@ -102,13 +102,13 @@ orbis::result<void> complete(results& r, const tracked_frames& tracked, const fr
 
 /// The outcome of `complete_or_give_up`.
 struct completion {
-  bool was_interrupted;                ///< the user interrupted the run, during tracking or later
+  bool was_interrupted;                ///< true if the user interrupted the run, during tracking or later
   std::optional<orbis::error> no_map;  ///< the reason why there is no map: cancelled by the user, or out of memory
   bool is_running = false;             ///< a thread is still working on the map
 };
 
-/// Completes the results and moves their files to the others. If the user abandons the map or it does not fit in
-/// memory, leaves the results as they are. Other errors are those of `complete`; no thread is then running.
+/// Completes the results and moves their files to the other result files. If the user abandons the map or it does not
+/// fit in memory, leaves the results as they are. Other errors are those of `complete`; no thread is then running.
 orbis::result<completion> complete_or_give_up(results& r, const tracked_frames& tracked, const frame_source& source,
                                               const settings& s, result_files& files, viewer& viewer,
                                               console& console) {
@@ -133,7 +133,7 @@ orbis::result<completion> complete_or_give_up(results& r, const tracked_frames& 
     }
   });
   completion end{.was_interrupted = interrupts::end_dispensable(), .no_map = {}};
-  if (!done) {  // nothing here may throw
+  if (!done) {  // this block must not throw
     end.no_map = orbis::error{errc::cancelled, {}, {}};
     end.is_running = true;
     return end;
@@ -150,8 +150,8 @@ orbis::result<completion> complete_or_give_up(results& r, const tracked_frames& 
   return end;
 }
 
-/// Evaluates a run without a map and writes its report. If that fails, writes only the summary, if possible, so that it
-/// describes the other files. Errors: write_failed; out of memory.
+/// Evaluates a run without a map and writes its report. If that fails, writes only the summary, if possible, so that
+/// the other files are described. Errors: write_failed; out of memory.
 orbis::result<void> report_without_map(results& r, const frame_source& source, const file_lists& files,
                                        console& console) {
   const auto guarded = [&](const auto& work) -> orbis::result<void> {

@@ -92,8 +92,8 @@ orbis::octree::bounding_box box_to_search(const octree& map, const settings& s) 
   return {(box.min.array() - margin).matrix(), (box.max.array() + margin).matrix()};
 }
 
-/// The maximum memory of the distance field in bytes: that of all blocks, as large as the field's reach, that contain
-/// an obstacle or are next to one. O(leaves).
+/// The maximum memory of the distance field in bytes: the memory of all blocks with the size of the field's reach that
+/// contain an obstacle or are next to one. O(leaves).
 double most_field_bytes(const octree& map, double reach) {
   const auto block_of = [&](double x) { return static_cast<std::int64_t>(std::floor(x / reach)); };
   std::set<std::array<std::int64_t, 3>> occupied, near;
@@ -127,7 +127,7 @@ bool is_only_unknown(const octree& map, const settings& s, const vec3& p) {
 
 /// Describes what blocks the robot at `p`: the nearest obstacle, or else unknown space.
 std::string describe_blocker(const octree& map, const settings& s, const vec3& p) {
-  if (is_only_unknown(map, s, p)) return " by unknown space alone (--unknown free treats it as free)";
+  if (is_only_unknown(map, s, p)) return " only by unknown space (--unknown free treats it as free)";
   double least = std::numeric_limits<double>::infinity();
   vec3 nearest = p;
   map.for_each_leaf([&](const octree::leaf& leaf) {
@@ -162,8 +162,8 @@ std::string describe_blocker(const nav::floor_map& floor, const settings& s, con
   const auto touches = [&](const blocker& b) { return b.distance <= s.robot_radius + rounding; };
   const char* const remedy = " (--unknown free treats it as free)";
   if (touches(obstacle)) return text(" by an obstacle at %.3f,%.3f", obstacle.at.x(), obstacle.at.y());
-  if (touches(unknown)) return text(" by unknown space alone at %.3f,%.3f%s", unknown.at.x(), unknown.at.y(), remedy);
-  return std::string{" by unknown space alone, outside the floor map"} + remedy;
+  if (touches(unknown)) return text(" only by unknown space at %.3f,%.3f%s", unknown.at.x(), unknown.at.y(), remedy);
+  return std::string{" only by unknown space, outside the floor map"} + remedy;
 }
 
 /// The free position nearest to `p` among the centres of cells within 2 m; empty if there is none.
@@ -263,11 +263,10 @@ exit_code plan(const settings& s, console& console) {
   } else {
     const double reach = field_reach(s.robot_radius, cell), most = most_field_bytes(*map, reach);
     if (const auto memory = examples::free_memory(); memory && most > static_cast<double>(*memory))
-      return give_up(
-          {orbis::errc::invalid_argument, s.input.string(),
-           text("the distances around its obstacles, up to %.2f m in voxels of %g mm, may take %.1f GB, more "
-                "than the available memory",
-                reach, 1000 * cell, 1e-9 * most)});
+      return give_up({orbis::errc::invalid_argument, s.input.string(),
+                      text("the distance field, up to %.2f m from obstacles in voxels of %g mm, may take %.1f GB, more "
+                           "than the available memory",
+                           reach, 1000 * cell, 1e-9 * most)});
     field.emplace(*map, nav::distance_field_options{.reach = reach, .unknown = unknown});
   }
   console.finish(floor ? "floor map" : "distance field");

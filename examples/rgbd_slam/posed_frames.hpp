@@ -61,7 +61,7 @@ class posed_frames {
     add({i, {}, T_world_camera, corrected_by}, frame);
   }
   /// Adds frame `i` of the source, a keyframe whose pose is set later by `place`. `corrected_by`: the motion by which
-  /// its images were corrected; without a motion, they are the source's images.
+  /// its images were corrected; if there is no motion, they are the source's images.
   void add(std::size_t i, orbis::slam::map_keyframe keyframe, const orbis::slam::frame_motion& corrected_by,
            const orbis::camera::rgbd_frame& frame) {
     add({i, keyframe, {}, corrected_by}, frame);
@@ -81,7 +81,7 @@ class posed_frames {
 
   [[nodiscard]] std::size_t size() const { return entries_.size(); }
   [[nodiscard]] orbis::trajectory trajectory() const {
-    orbis::trajectory poses;  // with frame numbers instead of time stamps, which are not used
+    orbis::trajectory poses;  // with frame numbers in place of time stamps
     for (const entry& e : entries_) poses.push_back({static_cast<double>(e.index), e.T_world_camera});
     return poses;
   }

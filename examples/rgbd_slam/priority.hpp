@@ -16,7 +16,7 @@ inline constexpr int viewer_niceness = 10;   ///< may skip frames; holds no lock
 
 /// Reduces this thread's share of a busy processor by one fifth per step of niceness.
 inline void lower_priority([[maybe_unused]] int niceness) {
-#ifdef __linux__  // niceness is a property of the thread there, not of the process
+#ifdef __linux__  // on Linux, niceness is a property of the thread, not of the process
   const auto thread = static_cast<id_t>(::syscall(SYS_gettid));
   static_cast<void>(::setpriority(PRIO_PROCESS, thread, ::getpriority(PRIO_PROCESS, thread) + niceness));
 #endif

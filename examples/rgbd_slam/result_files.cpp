@@ -54,7 +54,7 @@ file_names recorded(const fs::path& folder) {
   if (!text) return {};
   const auto summary = nlohmann::json::parse(*text, nullptr, false);
   if (!summary.is_object() || !summary.contains("tracked") || !summary.contains("octree")) return {};
-  if (!summary.contains("files")) return all_names();  // of a version without the list
+  if (!summary.contains("files")) return all_names();  // written by a version without this list
   file_names names;
   for (const char* list : {"files", "files_of_earlier_runs"})
     if (const auto found = summary.find(list); found != summary.end() && found->is_array())
@@ -263,7 +263,7 @@ result<void> result_files::begin_optional() {
 result<void> result_files::take_optional() {
   std::error_code ec;
   for (const staged_folder& f : folders_) {
-    file_names names;  // first, as the folder changes
+    file_names names;  // evaluated first, because the folder changes
     for (fs::directory_iterator it{f.path() / optional_name, ec}, end; !ec && it != end; it.increment(ec))
       names.push_back(it->path().filename().string());
     for (std::size_t i = 0; !ec && i != names.size(); ++i)

@@ -2,9 +2,9 @@
 /// @file
 /// The files that a run writes to the output folder.
 ///
-/// A run replaces the files that it makes, all together at its end, and deletes nothing. Other files of an earlier run
-/// stay; `summary.json` lists both. Files with a result's name that this program did not write are not replaced, nor
-/// are inputs of the run.
+/// At its end, a run moves all files that it created into place together, and replaces earlier files of the same names;
+/// it deletes no files. Other files of an earlier run remain; `summary.json` lists both. Files with a result's name
+/// that this program did not write are not replaced, nor are inputs of the run.
 #pragma once
 
 #include <cstddef>
@@ -32,23 +32,23 @@ inline constexpr std::size_t most_maps = 9;
 /// The files that the command may write to the output folder.
 [[nodiscard]] file_names result_names(const settings& s);
 
-/// Moves the files of earlier runs into place whose end interrupted that, in all folders that the command reads or writes.
-/// Call before anything there is read.
+/// Completes earlier runs that were interrupted while they moved their files into place, in all folders that the
+/// command reads or writes. Call it before any of these folders is read.
 void finish_earlier_runs(const settings& s);
 
 /// All files that the run reads; `source_files`: those of the recording.
 [[nodiscard]] std::vector<std::filesystem::path> input_files(const settings& s,
                                                              std::vector<std::filesystem::path> source_files);
-/// Returns an error if one of the files `targets` is one of `inputs`, also by a link. Names may be empty.
+/// Returns an error if one of the files `targets` is one of `inputs`, directly or through a link. Names may be empty.
 [[nodiscard]] std::optional<orbis::error> find_overwritten(const std::vector<std::filesystem::path>& targets,
                                                            const std::vector<std::filesystem::path>& inputs);
-/// Returns an error if the run would overwrite one of `inputs`, also by a link, or a file that this program did not
-/// write. Calls stat on each input if a target exists.
+/// Returns an error if the run would overwrite one of `inputs`, directly or through a link, or a file that this program
+/// did not write. Calls stat on each input if a target exists.
 [[nodiscard]] std::optional<orbis::error> find_overwritten(const settings& s,
                                                            const std::vector<std::filesystem::path>& inputs);
 
 /// Returns an error if an output folder can neither be written nor created, as far as this can be checked without
-/// creating it, so that the error is reported before the work. Errors: write_failed.
+/// creating it, so that the error is reported before the run starts. Errors: write_failed.
 [[nodiscard]] std::optional<orbis::error> find_unwritable(const settings& s);
 
 /// Finds the files of the output folder `out`, which are created in `folder`.
@@ -76,18 +76,19 @@ class result_files {
 
   /// The folder in which the files of the output folder are created.
   [[nodiscard]] const std::filesystem::path& folder() const { return folders_.front().path(); }
-  /// The path at which the landmark map is created. @pre the settings ask for one
+  /// The path at which the landmark map is created. @pre the settings request one
   [[nodiscard]] std::filesystem::path landmark_map() const { return folders_[map_folder_].path() / map_name_; }
-  /// The path at which the floor map is created, next to its image; empty if the settings ask for none.
+  /// The path at which the floor map is created, next to its image; empty if the settings request none.
   [[nodiscard]] std::filesystem::path floor_map() const { return floor_map_in({}); }
   [[nodiscard]] file_lists lists() const { return {out_, folder()}; }
 
-  /// Creates the folders of files that are added by `take_optional`, or not at all. Errors: write_failed.
+  /// Creates the folders of optional files: `take_optional` adds all of them to the results, or none is added. Errors:
+  /// write_failed.
   [[nodiscard]] orbis::result<void> begin_optional();
-  /// As `folder` and `floor_map`, for these files.
+  /// The counterparts of `folder` and `floor_map` for the optional files.
   [[nodiscard]] std::filesystem::path optional_folder() const { return folder() / optional_name; }
   [[nodiscard]] std::filesystem::path optional_floor_map() const { return floor_map_in(optional_name); }
-  /// Moves them to the others. Errors: write_failed.
+  /// Moves the optional files to the other files. Errors: write_failed.
   [[nodiscard]] orbis::result<void> take_optional();
   /// Replaces the old files by the new ones: all, or none if this fails. Errors: write_failed.
   [[nodiscard]] orbis::result<void> put_in_place();

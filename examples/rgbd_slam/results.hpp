@@ -49,7 +49,7 @@ struct map_results {
   double resolution = 0.0;
   tree_numbers unfiltered, filtered;
   std::uintmax_t ot_bytes = 0;
-  std::vector<double> insert_ms;  ///< insertion time of each frame
+  std::vector<double> insert_ms;  ///< time taken to insert each frame
   std::vector<voxel> voxels_unfiltered, voxels;
   std::optional<double> error_m;  ///< RMS distance of the filtered cloud to the true surface
 };
@@ -64,7 +64,7 @@ struct compared_pose {
 struct accuracy {
   double ate_rmse_m, ate_mean_m, ate_median_m, ate_max_m;
   std::optional<double> rpe_trans_rmse_m, rpe_rot_rmse_deg;
-  std::string no_rpe;  ///< the reason why there is no RPE, if so
+  std::string no_rpe;  ///< the reason why there is no RPE; empty if there is one
   bool truth_lacks_orientations = false;
   std::vector<compared_pose> poses;
   double scale = 1.0;           ///< metres in the ground truth per unit of length in the estimate
@@ -120,7 +120,7 @@ struct live_results {
   std::size_t frames = 0;                   ///< inserted frames between keyframes
   std::vector<double> frame_delay_ms;       ///< time from the arrival of each of these frames to its insertion
   std::size_t dropped_frames = 0;           ///< frames between keyframes, dropped because the map was busy
-  std::size_t refused_frames = 0;           ///< frames between keyframes whose keyframe was not in the map
+  std::size_t refused_frames = 0;           ///< frames between keyframes whose reference keyframe was not in the map
   std::vector<double> correction_ms;        ///< time taken by each correction to move keyframes
   std::size_t dropped = 0;                  ///< keyframes dropped because the map was busy; the final map contains them
   std::optional<orbis::error> depth_error;  ///< error in storing or reading a depth image
@@ -133,7 +133,7 @@ struct navigation_results {
   std::optional<double> floor_m;    ///< height of the floor; empty if no floor was found
   double free_m2 = 0.0;             ///< area in which the robot can drive
   std::string path_status;          ///< "found", or the reason why there is no path
-  bool drives = false;              ///< the path is on the floor; otherwise it is that of a flying ball
+  bool drives = false;              ///< the path is on the floor; otherwise it is a path of a flying ball
   std::vector<orbis::vec3> path{};  ///< metres
   double path_m = 0.0, straight_m = 0.0, planning_ms = 0.0;
   std::optional<orbis::error> unsaved;  ///< error in writing the requested floor map

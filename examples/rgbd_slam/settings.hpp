@@ -56,7 +56,7 @@ struct settings {
   bool person = false;      ///< adds a walking person to the plain room
   bool walk = false;        ///< the synthetic camera is on a walking robot in a dim room, and has a rolling shutter
   std::optional<orbis::vec3> origin;   ///< origin of the rays to a cloud's points, metres (map)
-  std::optional<orbis::vec3> gravity;  ///< direction of gravity in the frame of the first camera
+  std::optional<orbis::vec3> gravity;  ///< direction of gravity in the camera frame of the first image
 
   std::optional<double> read_out_ms;  ///< read-out time, milliseconds; empty: from the camera's settings, or estimated
   bool refines_camera = true;         ///< calibrate the camera if it contradicts the recording

@@ -49,7 +49,7 @@ class sheet {
   orbis::vec2 legend(const orbis::vec2& p, const cv::Scalar& color, const std::string& meaning) {
     constexpr double radius = 5.0, size = 11.5, to_text = 16.0, apart = 20.0;
     const orbis::vec2 middle = p + orbis::vec2(radius, -4.0);
-    dot(middle, faint, radius + 0.5);  // a rim makes colours visible that are almost white
+    dot(middle, faint, radius + 0.5);  // a rim makes almost white colours visible
     dot(middle, color, radius);
     text(meaning, p + orbis::vec2(to_text, 0.0), ink, size);
     return p + orbis::vec2(to_text + text_width(meaning, size) + apart, 0.0);

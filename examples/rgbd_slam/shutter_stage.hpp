@@ -21,7 +21,7 @@ struct camera_inspection {
 };
 
 /// Takes the shutter from `--read-out-ms`, or else from the camera's settings, or else estimates it: tracks the first
-/// ten seconds, up to the first unreadable frame. `checks_camera` asks for a check of the focal length as well.
+/// ten seconds, up to the first unreadable frame. If `checks_camera` is true, also checks the focal length.
 [[nodiscard]] camera_inspection find_shutter(const frame_source& source, const settings& s, bool checks_camera,
                                              console& console);
 

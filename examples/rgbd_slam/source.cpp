@@ -50,7 +50,7 @@ orbis::error with_option(orbis::error e) {
   return e;
 }
 
-/// The camera given by the option --camera; empty without the option.
+/// The camera given by the option --camera; empty if the option is not used.
 result<std::optional<orbis::camera::camera_settings>> camera_option(const settings& s) {
   if (s.camera.empty()) return std::nullopt;
   auto camera = named_camera(s.camera);
@@ -123,7 +123,7 @@ void subtract_origin(frame_source& source) {
   source.truth_has_positions_only = orbis::eval::has_positions_only(source.ground_truth);
   if (source.truth_has_positions_only) {
     source.notes.push_back(
-        "the ground truth has positions only (all orientations are 0 0 0 1): the world frame is a different one");
+        "the ground truth has positions only (all orientations are 0 0 0 1): the world frame differs from it");
     return;
   }
   const orbis::vec3 origin = examples::nearby_origin(source.ground_truth.front().T_world_camera.translation());
@@ -133,7 +133,7 @@ void subtract_origin(frame_source& source) {
   if (!origin.isZero()) source.notes.push_back(origin_note(origin));
 }
 
-/// Makes the parts of a source that are the same for recordings of all sensors.
+/// Creates a source with the parts that are the same for recordings of all sensors.
 template <class Recording>
 frame_source make_source(const Recording& recording, const char* kind, const settings& s) {
   frame_source source;
@@ -191,7 +191,7 @@ std::string recording_in(const std::filesystem::path& folder) {
   return first;
 }
 
-/// A sentence about the recording of which `folder` is a part; empty if the parent folder is not a recording.
+/// A sentence about the recording that contains `folder`; empty if the parent folder is not a recording.
 std::string recording_above(const std::filesystem::path& folder) {
   const auto above = std::filesystem::absolute(folder / "").lexically_normal().parent_path().parent_path();
   if (orbis::io::detect_format(above) == orbis::io::recording_format::automatic) return {};
@@ -244,7 +244,7 @@ result<frame_source> open_recording(const settings& s) {
   return source;
 }
 
-/// Notes folders whose names indicate depth images, which a recording of one camera does not use.
+/// Adds a note about folders whose names indicate depth images, which a recording of one camera does not use.
 void note_depth_folders(const std::filesystem::path& folder, std::vector<std::string>& notes) {
   std::error_code failure;
   for (std::filesystem::directory_iterator it{folder, failure}, end; !failure && it != end; it.increment(failure)) {
@@ -455,7 +455,7 @@ frame_source make_synthetic(const settings& s) {
                                        .path = path,
                                        .sensor = {.stray_depths = s.plain ? 0.0 : 0.001}};
   if (s.walk) make_walk(options);
-  const auto recording = std::make_shared<const orbis::io::synthetic_recording>(options);  // small: renders nothing
+  const auto recording = std::make_shared<const orbis::io::synthetic_recording>(options);  // renders no images
   const auto frames_of = std::make_shared<renderer>(options);
   frame_source source;
   source.title = s.walk ? "synthetic room, walking robot" : "synthetic room";
@@ -492,7 +492,7 @@ frame_source make_synthetic(const settings& s) {
 }
 
 /// Adds a note if voxels are so small that a frame takes seconds, and fails if one frame alone may exhaust the memory.
-/// The estimate is that of the largest of a few frames; if all frames together exhaust the memory, the run abandons the
+/// The estimate is the largest one among a few frames; if all frames together exhaust the memory, the run abandons the
 /// map.
 result<void> check_resolution(frame_source& source, const settings& s) {
   const orbis::camera::intrinsics& k = source.camera.model.k();
@@ -517,7 +517,7 @@ result<void> check_resolution(frame_source& source, const settings& s) {
     of_largest = voxels.describe(s.resolution, name + " alone");
     most = voxels.voxels(s.resolution);
     if (voxels.is_too_large(s.resolution, examples::free_memory()))
-      return fail(orbis::errc::invalid_argument, "--resolution", of_largest + ", too many");
+      return fail(orbis::errc::invalid_argument, "--resolution", of_largest + ", which is too many");
   }
   if (!of_largest.empty()) source.notes.push_back(of_largest + "; this takes a long time");
   return {};
@@ -534,7 +534,7 @@ result<void> check_images(frame_source& source, const settings& s) {
     if (!frame && sample != 0) return {};  // tracking reports the error
     if (!frame) {
       orbis::error e = frame.error();
-      if (e.message.find("pixels, the camera") != std::string::npos)
+      if (e.message.find("pixels, but the camera has") != std::string::npos)
         e.message += "; use a camera of this size (--camera)";
       return fail(std::move(e));
     }

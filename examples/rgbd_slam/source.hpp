@@ -46,7 +46,7 @@ struct frame_source {
   std::function<std::size_t()> dropped;
   /// Reads or renders a frame, given its index after applying `--stride`. May be called from another thread.
   std::function<orbis::result<source_frame>(std::size_t)> frame;
-  /// Computes the depth image of a stereo frame, which takes long; no effect on other frames.
+  /// Computes the depth image of a stereo frame, which takes a long time. Has no effect on other frames.
   void complete(source_frame& f) const;
   /// Reads or renders only the colour image of a frame; otherwise like `frame`.
   std::function<orbis::result<orbis::image<orbis::rgb8>>(std::size_t)> color;

@@ -155,7 +155,7 @@ std::optional<se3> present_pose(const orbis::slam::atlas& maps, const orbis::sla
   return maps.active().pose(now.keyframe);
 }
 
-/// The function with which the live map reads the poses of its keyframes.
+/// Returns the function with which the live map reads the poses of its keyframes.
 live_mapping::find_poses make_pose_reader(const slam_system& slam) {
   return [&slam, seen = orbis::slam::pose_revision{.map = orbis::slam::no_id}](
              const std::vector<live_mapping::made>& keyframes, live_mapping::poses& poses, bool always) mutable {
@@ -173,8 +173,9 @@ live_mapping::find_poses make_pose_reader(const slam_system& slam) {
   };
 }
 
-/// The function with which the viewer reads the keyframes and their graph: edges of the spanning tree, loop edges, and
-/// edges between keyframes that share many landmarks. If all covisibility edges were drawn, they would hide each other.
+/// Returns the function with which the viewer reads the keyframes and their graph: edges of the spanning tree, loop
+/// edges, and edges between keyframes that share many landmarks. If all covisibility edges were drawn, they would hide
+/// each other.
 auto make_graph_reader(const slam_system& slam) {
   return [&slam, seen = orbis::slam::pose_revision{.map = orbis::slam::no_id}](slam_graph& graph, bool always) mutable {
     constexpr std::uint32_t many_shared = 100;
@@ -400,8 +401,8 @@ std::vector<std::string> tracking_notes(const tracked_frames& tracked, const set
   if (elsewhere != 0) {
     const std::size_t last = std::min(tracked.slam.other_maps.size() + 1, most_maps);
     notes.push_back(std::to_string(elsewhere) + of_all +
-                    "are not in cloud and octree: tracking was lost, and their maps were never merged with the main "
-                    "map; their poses, in separate world frames, are in " +
+                    "are not in the cloud and octree: tracking was lost, and their maps were never merged with the "
+                    "main map; their poses, in separate world frames, are in " +
                     trajectory_name(2) + (last > 2 ? " ... " + trajectory_name(last) : ""));
   }
   if (const std::size_t dropped = tracked.slam.dropped.value_or(0); dropped > (dropped + tracked.slam.frames) / 10)

@@ -43,7 +43,7 @@ struct tracked_frames {
 
 /// The error that stopped tracking, with the number of frames before it. @pre tracked.stopped
 [[nodiscard]] orbis::error explain_stop(const tracked_frames& tracked, const frame_source& source);
-/// The error that relocalisation in the loaded map never succeeded, with the consequences.
+/// The error for a run that was never relocalised in the loaded map; describes the consequences.
 [[nodiscard]] orbis::error explain_miss(const tracked_frames& tracked, const settings& s);
 /// Warnings about the frames of a map and its world frame.
 [[nodiscard]] std::vector<std::string> mapping_notes(const posed_frames& frames,

@@ -22,9 +22,9 @@ class upright_worlds {
   upright_worlds(const frame_source& source, const settings& s);
 
   /// The pose of the camera at `frame` in the world frame that starts with this frame. With ground truth, it is the
-  /// world frame of the ground truth, rotated if its z axis does not point up; without (or with positions only), the
-  /// camera is at the origin and looks along x. The gravity of the settings applies only to the very first frame
-  /// (`is_first`).
+  /// world frame of the ground truth, rotated if its z axis does not point up; without ground truth (or with positions
+  /// only), the camera is at the origin and looks along x. The direction of gravity in the settings applies only to the
+  /// very first frame (`is_first`).
   [[nodiscard]] orbis::se3 start_world(const orbis::camera::rgbd_frame& frame, bool is_first);
   /// The source of the vertical direction of the world frame that starts at this time; empty if there is none.
   [[nodiscard]] std::optional<world_results> world_starting_at(double timestamp) const;

@@ -15,7 +15,7 @@ namespace app {
 
 struct view_frame {
   orbis::se3 T_view_world;
-  orbis::vec3 low = orbis::vec3::Zero(), high = orbis::vec3::Ones();  ///< bounds of the map in view, without outliers
+  orbis::vec3 low = orbis::vec3::Zero(), high = orbis::vec3::Ones();  ///< bounds of the map in view, excluding outliers
   double cut = 1.0;  ///< height above which the map is not drawn, because a ceiling would hide the rest
 };
 

@@ -26,8 +26,8 @@ class voxel_colors {
   void add(const orbis::vec3f& point, orbis::rgb8 color);
   /// Removes a point that was added before. The memory of an empty voxel is reused.
   void remove(const orbis::vec3f& point, orbis::rgb8 color);
-  /// The mean colour of the points in a cube of whole voxels; if there are none, of the points in the neighbouring
-  /// voxels; empty if there are none either.
+  /// The mean colour of the points in a cube of whole voxels or, if it contains none, of the points in the neighbouring
+  /// voxels; empty if these contain none either.
   [[nodiscard]] std::optional<orbis::rgb8> mean_color(const voxel& cube) const;
   /// The number of voxels with points.
   [[nodiscard]] std::size_t size() const { return index_.size(); }

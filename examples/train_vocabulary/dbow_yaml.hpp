@@ -132,7 +132,7 @@ class dbow_yaml_parser {
     return false;
   }
 
-  /// Reads up to "vocabulary:".
+  /// Skips the text up to and including "vocabulary:".
   bool read_head() {
     for (;;) {
       scan_.skip_blanks();
@@ -163,7 +163,7 @@ class dbow_yaml_parser {
         if (key == "weightingType") {
           if (!number(value, weights_are_) || weights_are_ > 3) return reject("the weighting must be between 0 and 3");
         } else if (key == "k" || key == "L" || key == "scoringType") {
-          std::uint32_t ignored = 0;  // follows from the tree; scores are types
+          std::uint32_t ignored = 0;  // the depth follows from the tree, and scores are types
           if (!number(value, ignored)) return reject(orbis::in_quotes(key) + " is not a number");
         }
       }
@@ -304,8 +304,8 @@ class dbow_yaml_parser {
   std::size_t line_ = 1;
 };
 
-/// Parses the vocabulary in `text`; `where` names the source in errors. Words are renumbered. Errors, with the line:
-/// malformed; unsupported (descriptors that do not have `Bits` bits).
+/// Parses the vocabulary in `text`; `where` names the source in errors. Words are renumbered. Errors, with the line
+/// number: malformed; unsupported (descriptors that do not have `Bits` bits).
 template <std::size_t Bits = 256>
 [[nodiscard]] result<basic_vocabulary<Bits>> parse_dbow_yaml(std::string_view text, const std::string& where = "text") {
   return dbow_yaml_parser<Bits>{text, where}.parse();

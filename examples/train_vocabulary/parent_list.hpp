@@ -36,7 +36,8 @@ struct list_problem {
   std::size_t node = 0;
 };
 
-/// Numbers the nodes level by level; children keep the order of the list. `is_word(node)`: as in the file. O(nodes).
+/// Numbers the nodes level by level; children keep the order of the list. `is_word(node)`: true if the file marks the
+/// node as a word. O(nodes).
 /// @pre one parent (at most the number of nodes), one descriptor and one weight per node
 template <std::size_t Bits, class IsWord>
 [[nodiscard]] list_problem order_by_level(const parent_list<Bits>& list, IsWord&& is_word,

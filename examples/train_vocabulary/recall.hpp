@@ -27,15 +27,15 @@ struct task {
   std::vector<view> map{}, queries{};
   double overlap = 0.6;   ///< minimum share of each view's surface that is visible in the other
   double turned = 0.6;    ///< maximum rotation between the two views, radians
-  bool within = false;    ///< the queries are views in the database
-  std::size_t apart = 0;  ///< minimum distance from the query in views, if `within`
+  bool within = false;    ///< true if the queries are views in the database
+  std::size_t apart = 0;  ///< minimum distance from the query, in views; used if `within` is true
 };
 
 struct outcome {
-  std::size_t queries = 0;    ///< queries whose place is in the database
+  std::size_t queries = 0;    ///< number of queries whose place is in the database
   double first = 0.0;         ///< share of queries whose best view is correct
   double among_ten = 0.0;     ///< share of queries with a correct view among the best ten
-  double candidate = 0.0;     ///< share of queries whose first candidate, by the criteria of a query, is correct
+  double candidate = 0.0;     ///< share of queries whose first candidate from the database is correct
   double transform_ms = 0.0;  ///< median time to compute a bag of words
 };
 

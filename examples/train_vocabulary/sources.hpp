@@ -31,7 +31,7 @@ struct view {
   descriptors found{};
 };
 
-/// Makes the view of a frame.
+/// Creates the view of a frame.
 [[nodiscard]] inline view make_view(const orbis::features::orb_extractor& extract,
                                     const orbis::camera::rgbd_frame& frame,
                                     const orbis::camera::camera_settings& camera, std::size_t place) {

@@ -107,7 +107,7 @@ foreach(unit "1403715529.0 " "1403715529000 milli" "1403715529000000 micro" "140
 endforeach()
 file(WRITE ${WORK}/thousands.txt
   "0 1 1 0 ${identity}\n1000 -1 1 0 ${identity}\n2000 -1 -1 0 ${identity}\n3000 1 -1 0 ${identity}\n")
-app_fails(2 "the times are 0 to 3000 s and 0 to 3 s. those of the first seem to be milliseconds"
+app_fails(2 "the times are 0 to 3000 s and 0 to 3 s. the times of the first seem to be in milliseconds"
           eval thousands.txt truth.txt)
 
 # Times with too few digits, and more than two runs.
@@ -157,9 +157,9 @@ check(err MATCHES "poses are compared line by line" AND err MATCHES "own/00.txt 
 app_fails(2 "kitti/poses/00.txt: the poses have no times .*put times.txt" eval estimate.txt kitti/poses/00.txt)
 file(WRITE ${WORK}/kitti/sequences/00/times.txt "0\n1\n2\n3\n")
 app(0 eval estimate.txt kitti/poses/00.txt)
-check(out MATCHES "RMSE 0.0100 m" AND err MATCHES "the times are those of kitti/sequences/00/times.txt")
+check(out MATCHES "RMSE 0.0100 m" AND err MATCHES "the times are those in kitti/sequences/00/times.txt")
 file(WRITE ${WORK}/kitti/poses/times.txt "0\n1\n2\n")
-app_fails(2 "kitti/poses/times.txt: 3 times for 4 poses" eval estimate.txt kitti/poses/00.txt)
+app_fails(2 "kitti/poses/times.txt: 3 time stamps for 4 poses" eval estimate.txt kitti/poses/00.txt)
 
 if(EXISTS ${DATA}/trajectories)
   app(0 eval ${DATA}/trajectories/freiburg1_xyz-rgbdslam.txt ${DATA}/trajectories/freiburg1_xyz-groundtruth.txt --json)

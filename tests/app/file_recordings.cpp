@@ -91,7 +91,8 @@ TEST_CASE("a video of two images side by side is a stereo recording") {
   CHECK(frame.color.width() == 32);
   CHECK(is_near(frame.color(20, 4), 60, 50, 60));
   CHECK(is_near(frame.right(8, 4), 60, 50, 70));
-  CHECK_THAT(message_of(app::open_video(path, {.camera = settings})), Contains("64x24 pixels, the camera 32x24"));
+  CHECK_THAT(message_of(app::open_video(path, {.camera = settings})),
+             Contains("64x24 pixels, but the camera has 32x24"));
   auto lone = settings;
   lone.baseline.reset();
   CHECK_THAT(message_of(app::open_video(path, {.sensor = sensor_kind::stereo, .camera = lone})), Contains("baseline"));
@@ -164,9 +165,9 @@ TEST_CASE("colour and depth of a bag are found and paired by the times in their 
   CHECK(app::open_bag(path, {.sensor = sensor_kind::monocular}).value()->size() == 3);
   CHECK(app::open_bag(path, {.topics = {"/camera/rgb/image_mono"}}).value()->color(0).value()(1, 1) == rgb8{9, 9, 9});
   CHECK_THAT(message_of(app::open_bag(path, {.topics = {"/camera/rgb/image_color", "/camera/depth/image_raw"}})),
-             Contains("16x12 pixels, the camera 32x24: depth is not registered"));
+             Contains("16x12 pixels, but the camera has 32x24: depth is not registered"));
   CHECK_THAT(message_of(app::open_bag(path, {.topics = {"/camera/depth_registered/image", "/camera/rgb/image_color"}})),
-             Contains("give the colour topic first"));
+             Contains("specify the colour topic first"));
   CHECK_THAT(message_of(app::open_bag(path, {.topics = {"/nothing"}})),
              Contains("has no images in /nothing; it contains /camera/depth/image_raw (16UC1)"));
   CHECK_THAT(message_of(app::open_bag(path, {.sensor = sensor_kind::stereo})), Contains("has no suitable images"));
@@ -249,7 +250,7 @@ TEST_CASE("the topics of librealsense's bags are found") {
   };
   write({16, 12, 15.0, 15.0, 7.5, 5.5});
   CHECK_THAT(message_of(app::open_bag(path, {})),
-             Contains("16x12 pixels, the camera 32x24: depth is not registered to colour") &&
+             Contains("16x12 pixels, but the camera has 32x24: depth is not registered to colour") &&
                  Contains("these names do not identify frames"));
   write(k);
   const auto bag = app::open_bag(path, {}).value();
@@ -267,7 +268,7 @@ TEST_CASE("the topics of librealsense's bags are found") {
     CHECK(known->frame(0).value().depth_scale == 4000.0);
     CHECK(known->notes.size() == 1);
     CHECK_THAT(app::open_bag(path, {.camera = settings}).value()->notes.at(0),
-               Contains("the bag stores 4000 depth units per metre, the specified camera 1000"));
+               Contains("the bag stores 4000 depth units per metre; the specified camera has 1000"));
   }
 }
 
@@ -565,7 +566,7 @@ TEST_CASE("damaged bags and images are refused in words") {
   write("rgb8", true, 25);
   CHECK_THAT(message_of(app::open_bag(path, {})), Contains("/cam/image_raw: an image has fewer pixels"));
   write("rgb8", true, 23);
-  CHECK_THAT(message_of(app::open_bag(path, {})), Contains("32x23 pixels, the camera 32x24"));
+  CHECK_THAT(message_of(app::open_bag(path, {})), Contains("32x23 pixels, but the camera has 32x24"));
   write("rgb8", false, 24);
   CHECK_THAT(message_of(app::open_bag(path, {})), Contains("no sensor_msgs/CameraInfo for /cam/image_raw"));
   CHECK(app::open_bag(path, {.camera = settings}));

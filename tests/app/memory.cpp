@@ -49,7 +49,7 @@ TEST_CASE("an octree that does not fit is told from the image's rays") {
   CHECK_FALSE(rays.is_too_large(0.001, 3'300'000'000U));
   CHECK(rays.is_too_large(0.001, 3'100'000'000U));
   CHECK(rays.is_too_large(0.0005, std::nullopt));
-  CHECK(rays.describe(0.001, "it") == "voxels of 1 mm: it has about 0.4 billion of them, 3.2 GB");
+  CHECK(rays.describe(0.001, "it") == "it has about 0.4 billion voxels of 1 mm (3.2 GB)");
 }
 
 TEST_CASE("who gives up says why") {

@@ -245,7 +245,7 @@ class bag_recording final : public file_recording {
       first_ = &topics_.at(options.topics[0]);
       if (options.topics.size() == 2) second_ = &topics_.at(options.topics[1]);
       if (second_ != nullptr && first_->is_depth())
-        return wrong("has depth images in " + first_->name + ": give the colour topic first, then the depth topic");
+        return wrong("has depth images in " + first_->name + ": specify the colour topic first, then the depth topic");
       sensor = second_ == nullptr    ? sensor_kind::monocular
                : second_->is_depth() ? sensor_kind::rgbd
                                      : sensor_kind::stereo;
@@ -426,10 +426,10 @@ class bag_recording final : public file_recording {
         return fail(errc::invalid_argument, path_, "a stereo camera needs a baseline");
       if (sensor == sensor_kind::stereo && !(first_->is_rectified() && second_->is_rectified()))
         notes.push_back("the images of " + images_of +
-                        " are used as if they were rectified, as the camera is specified");
+                        " are used as if they were rectified, because the camera is specified");
       if (sensor == sensor_kind::rgbd && !in_metres)
         if (const auto scale = stored_scale(); scale && std::abs(*scale / camera.depth_scale - 1.0) > 1e-3)
-          notes.push_back("the bag stores " + in_words(*scale) + " depth units per metre, the specified camera " +
+          notes.push_back("the bag stores " + in_words(*scale) + " depth units per metre; the specified camera has " +
                           in_words(camera.depth_scale));
       return {};
     }
@@ -657,7 +657,7 @@ class bag_recording final : public file_recording {
     const bool is_depth = sensor == sensor_kind::rgbd && &of == second_;
     return fail(errc::malformed, where(of),
                 "the image has " + std::to_string(image->width()) + "x" + std::to_string(image->height()) +
-                    " pixels, the camera " + std::to_string(width) + "x" + std::to_string(height) +
+                    " pixels, but the camera has " + std::to_string(width) + "x" + std::to_string(height) +
                     (is_depth ? ": depth is not registered to colour" + unregistered_ : ""));
   }
   /// Applies `decode` to a message of either type.

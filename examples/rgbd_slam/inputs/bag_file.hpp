@@ -77,10 +77,10 @@ class bag {
   /// Opens a bag. Errors: not_found, unreadable, malformed, unsupported, no_data.
   [[nodiscard]] static orbis::result<bag> open(const std::filesystem::path& path);
 
-  /// The first `most` bytes of a message. Errors: as `bag_file::read`.
+  /// The first `most` bytes of a message. Errors: those of `bag_file::read`.
   [[nodiscard]] orbis::result<std::string> read(const bag_message& m, std::size_t most = whole_message);
 
-  std::vector<bag_topic> topics;  ///< topics with messages, which are in chronological order
+  std::vector<bag_topic> topics;  ///< topics with their messages, in chronological order
   std::vector<std::string> notes;
   std::vector<std::filesystem::path> files;
 

@@ -46,7 +46,7 @@ struct device_options {
 /// `name`: the URI or the file. Errors: unsupported (not in this build), not_found.
 [[nodiscard]] orbis::result<std::unique_ptr<camera_device>> open_openni(const device_options& options);
 /// Opens a video camera; if `sensor` is stereo, a camera that delivers two rectified images side by side. `name`: the
-/// device file (/dev/video0) or number. Errors: as `open_openni`, and those of `check_camera`.
+/// device file (/dev/video0) or number. Errors: those of `open_openni` and `check_camera`.
 [[nodiscard]] orbis::result<std::unique_ptr<camera_device>> open_video_camera(const device_options& options);
 /// Plays the recording in a folder (`name`) at the rate of its timestamps, for tests without a camera. Errors: those of
 /// `open_recording`.

@@ -33,7 +33,7 @@ orbis::result<void> check_camera(const orbis::camera::camera_settings& camera, o
   const int columns = two ? 2 * camera.model.width() : camera.model.width();
   if (width == columns && height == camera.model.height()) return {};
   return fail(errc::malformed, where,
-              "the image has " + std::to_string(width) + "x" + std::to_string(height) + " pixels, the camera " +
+              "the image has " + std::to_string(width) + "x" + std::to_string(height) + " pixels, but the camera has " +
                   std::to_string(camera.model.width()) + "x" + std::to_string(camera.model.height()) +
                   (two ? ", twice" : ""));
 }

@@ -26,7 +26,7 @@ class file_recording {
   [[nodiscard]] virtual std::size_t size() const = 0;
   /// Reads frame `i`. Errors: unreadable, malformed. @pre i < size()
   [[nodiscard]] virtual orbis::result<source_frame> frame(std::size_t i) const = 0;
-  /// The image of frame `i`; for a stereo pair, the left image. Errors: as `frame`. @pre i < size()
+  /// The image of frame `i`; for a stereo pair, the left image. Errors: those of `frame`. @pre i < size()
   [[nodiscard]] virtual orbis::result<orbis::image<orbis::rgb8>> color(std::size_t i) const = 0;
 
   orbis::slam::sensor_kind sensor = orbis::slam::sensor_kind::monocular;
@@ -61,7 +61,8 @@ struct file_recording_options {
 /// or of one camera. See ros_images.hpp for the encodings. Depth in a coordinate frame other than that of colour is
 /// registered by means of both cameras and the transform between them. The ground truth comes from poses
 /// (`PoseStamped`, `PoseWithCovarianceStamped`, `Odometry`) or from `/tf`. Reads the whole bag once, for the times of
-/// its messages. Errors: as `open_video`, and invalid_argument (missing topics; the message lists the existing ones).
+/// its messages. Errors: those of `open_video`, and invalid_argument (missing topics; the message lists the existing
+/// ones).
 [[nodiscard]] orbis::result<std::unique_ptr<file_recording>> open_bag(const std::filesystem::path& path,
                                                                       const file_recording_options& options);
 

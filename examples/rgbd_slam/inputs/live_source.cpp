@@ -12,7 +12,7 @@ using orbis::errc;
 using orbis::fail;
 
 namespace {
-constexpr auto poll_interval = 50ms;  // between checks whether the run has ended
+constexpr auto poll_interval = 50ms;  // time between checks of whether the run has ended
 constexpr auto longest_wait = 10s;    // without a frame, until the camera counts as disconnected
 }  // namespace
 

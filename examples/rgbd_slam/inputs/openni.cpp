@@ -47,9 +47,9 @@ double seconds(const openni::VideoFrameRef& f) { return 1e-6 * static_cast<doubl
 
 class openni_camera final : public camera_device {
  public:
-  // Some drivers, such as that of the dummy device, do not wait until a stream's thread has ended, which sleeps for the
-  // duration of a frame; the data of the stream must exist until then. OpenNI2 itself is not shut down, because that
-  // would unload the drivers.
+  // The thread of a stream sleeps for the duration of a frame. Some drivers, such as that of the dummy device, do not
+  // wait until the thread has ended, but the data of the stream must exist until then. OpenNI2 itself is not shut down,
+  // because that would unload the drivers.
   ~openni_camera() override {
     pairs_.clear();
     for (openni::VideoStream* s : {&depth_, &color_})
@@ -123,7 +123,7 @@ class openni_camera final : public camera_device {
     return {};
   }
 
-  /// Sets the camera to that of the options, or to a pinhole camera with the device's field of view.
+  /// Uses the camera in the options, or a pinhole camera with the device's field of view.
   result<void> choose_camera(const device_options& options, const openni::VideoMode& mode) {
     const int width = mode.getResolutionX(), height = mode.getResolutionY();
     if (options.camera) {
@@ -131,8 +131,9 @@ class openni_camera final : public camera_device {
       camera.depth_scale = 1000.0;
       if (camera.model.width() == width && camera.model.height() == height) return {};
       return fail(errc::invalid_argument, name,
-                  "has images of " + std::to_string(width) + "x" + std::to_string(height) + " pixels, the camera has " +
-                      std::to_string(camera.model.width()) + "x" + std::to_string(camera.model.height()));
+                  "has images of " + std::to_string(width) + "x" + std::to_string(height) +
+                      " pixels, but the camera has " + std::to_string(camera.model.width()) + "x" +
+                      std::to_string(camera.model.height()));
     }
     const double angle = color_.getHorizontalFieldOfView();
     const bool is_known = std::isfinite(angle) && angle > 0.2 && angle < 2.5;

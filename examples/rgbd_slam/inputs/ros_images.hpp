@@ -34,7 +34,7 @@ inline constexpr double metres_scale = 5000.0;
 [[nodiscard]] orbis::result<orbis::image<orbis::rgb8>> decode_color(const ros_messages::compressed_image& m,
                                                                     const std::string& where);
 
-/// Decodes a depth image; depth in metres is converted with `metres_scale`, integers are unchanged. Errors: as
+/// Decodes a depth image; depth in metres is converted with `metres_scale`, integers are unchanged. Errors: those of
 /// `decode_color`.
 [[nodiscard]] orbis::result<orbis::image<std::uint16_t>> decode_depth(const ros_messages::image& m,
                                                                       const std::string& where);

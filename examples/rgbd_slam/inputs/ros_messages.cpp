@@ -110,7 +110,7 @@ result<orbis::camera::any_camera> make_camera(const camera_info& info, bool is_r
   const std::string& model = info.distortion_model;
   if (model == "equidistant" && d.size() == 4)
     return orbis::camera::any_camera{orbis::camera::kannala_brandt{k, {d[0], d[1], d[2], d[3]}}};
-  // The models of thin prisms and tilted sensors have 12 and 14 numbers. librealsense uses the second name.
+  // The models of thin prisms and tilted sensors have 12 and 14 numbers. librealsense uses the name "Brown Conrady".
   const bool is_radial = model == "plumb_bob" || model == "Brown Conrady" || model == "rational_polynomial";
   const bool has_more = d.size() > 8 && std::any_of(d.begin() + 8, d.end(), [](double v) { return v != 0.0; });
   if (is_radial && d.size() >= 4 && !has_more)

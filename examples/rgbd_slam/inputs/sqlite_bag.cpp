@@ -35,7 +35,8 @@ std::string_view column(const statement& row, int i) {
                           : std::string_view{static_cast<const char*>(bytes), static_cast<std::size_t>(size)};
 }
 
-/// Makes reading the incomplete last page of a truncated file an error; SQLite would complete the page with zeros.
+/// Makes SQLite report an error if it reads the incomplete last page of a truncated file; by default, it would complete
+/// the page with zeros.
 void reject_short_reads(sqlite3* database) {
   sqlite3_file* file = nullptr;
   sqlite3_file_control(database, "main", SQLITE_FCNTL_FILE_POINTER, &file);

@@ -31,7 +31,7 @@ class call_thread {
     thread_.join();
   }
 
-  /// Calls `f()` on the thread, waits for it, and rethrows its exception. For one caller at a time.
+  /// Calls `f()` on the thread, waits for it, and rethrows its exception. Only one caller at a time may use it.
   void call(const std::function<void()>& f) {
     std::unique_lock lock{mutex_};
     call_ = &f;

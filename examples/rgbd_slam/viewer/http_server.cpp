@@ -234,7 +234,7 @@ class http_server::connection {
   std::string received_;      // data of the next requests
   std::vector<std::shared_ptr<const std::string>> parts_;
   std::size_t part_ = 0, sent_ = 0;  // bytes of that part
-  bool closes_ = false;              // after this response
+  bool closes_ = false;              // closes the connection after this response
   std::size_t ignored_ = 0;          // bytes received after the last response
 };
 
@@ -329,7 +329,7 @@ void http_server::serve() {
     if (watched[0].revents != 0) return;
     const auto later = clock::now();
     for (std::size_t i = 0; i != open.size(); ++i) {
-      if (ends_) return;  // checked here because responses may take long
+      if (ends_) return;  // checked here because responses may take a long time
       const bool goes_on = watched[i + 2].revents == 0 || open[i]->advance();
       if (!goes_on || open[i]->deadline() <= later) open[i].reset();
     }

@@ -69,7 +69,7 @@ class http_server {
   class connection;
 
   void serve();
-  /// Frees a connection if none is left, by closing the one that has been idle between requests for the longest time.
+  /// If all connections are in use, closes the one that has been idle between requests for the longest time.
   bool make_room(std::vector<std::unique_ptr<connection>>& open) const;
   void accept_one(std::vector<std::unique_ptr<connection>>& open);
 

@@ -24,7 +24,7 @@ using frustum_rays = std::array<orbis::vec3f, 4>;
 
 struct shown_feature {
   float x = 0.0F, y = 0.0F;  ///< pixels
-  bool tracked = false;      ///< is an observation of a known landmark
+  bool tracked = false;      ///< true if the feature observes a known landmark
 };
 
 /// The newest frame.

@@ -51,7 +51,7 @@ frustum_rays corner_rays(const orbis::camera::ray_table& rays) {
   const std::array<std::array<int, 2>, 4> at{{{0, 0}, {right, 0}, {right, bottom}, {0, bottom}}};
   for (std::size_t i = 0; i != 4; ++i) {
     corners[i] = rays.at(at[i][0], at[i][1], 1.0F);
-    // The corners of a wide-angle image may have no such rays; a pyramid of 90 degrees is then drawn.
+    // The corners of a wide-angle image may have no ray; a pyramid of 90 degrees is then drawn.
     if (!corners[i].allFinite()) corners[i] = {at[i][0] == 0 ? -1.0F : 1.0F, at[i][1] == 0 ? -1.0F : 1.0F, 1.0F};
   }
   return corners;
@@ -91,7 +91,8 @@ std::vector<scene_builder::sample> scene_builder::take_samples(const viewer_fram
 }
 
 void scene_builder::push(viewer_frame frame) {
-  // Takes back unread mail, adds the frame, and puts it into the box again, so that neither thread blocks the other.
+  // Takes back an unread mailbox, adds the frame, and publishes the mailbox again, so that neither thread blocks the
+  // other.
   std::unique_ptr<mailbox> mail{box_.exchange(nullptr)};
   if (!mail) mail = std::make_unique<mailbox>();
   if (frame.keyframe && takes_colors_ && mail->samples <= max_samples_ / 8) {

@@ -76,8 +76,8 @@ class scene_builder {
   ~scene_builder();
 
   /// Adds a frame. Lock-free; never waits for the other functions. The frame replaces the previous one if that is not
-  /// in the scene yet, except for the path and the colours of keyframes, the number of which is limited until the next
-  /// update. Reads the pixels that are stored for a keyframe. For one thread.
+  /// in the scene yet, except for the path and the colours of keyframes; the number of these colours is limited until
+  /// the next update. Reads the pixels that are stored for a keyframe. Call it from one thread only.
   void push(viewer_frame frame);
 
   /// Updates the scene and returns it. Queries SLAM and the map at most every few hundred milliseconds and spends at

@@ -46,7 +46,7 @@ class viewer_thread {
   /// Returns true if the viewer is open.
   [[nodiscard]] bool is_open() const noexcept { return is_open_; }
 
-  /// Shows the frame that `make()` returns if the viewer is open. Does not block. For one thread.
+  /// Shows the frame that `make()` returns if the viewer is open. Does not block. Call it from one thread only.
   template <std::invocable Make>
   void show(Make&& make) noexcept {
     if (!is_open()) return;
@@ -59,7 +59,7 @@ class viewer_thread {
 
   /// Connects the sources. This and the next two functions wait until the current drawing is complete.
   void connect(scene_sources sources);
-  /// Queries the sources a last time and disconnects them.
+  /// Queries the sources one last time and disconnects them.
   void disconnect();
   /// Shows the final map.
   void show_map(const std::vector<voxel>& voxels);

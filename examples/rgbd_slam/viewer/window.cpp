@@ -252,7 +252,7 @@ void window_backend::upload_voxels(const shown_voxels& voxels) {
     if (block.voxels.empty()) continue;
     low = low.min(Eigen::Array2i{index[0], index[1]});
     high = high.max(Eigen::Array2i{index[0] + 1, index[1] + 1});
-    const auto at = [&, &index = index](std::size_t axis, std::uint8_t inside, float edge) {  // for clang before 16
+    const auto at = [&, &index = index](std::size_t axis, std::uint8_t inside, float edge) {  // needed by clang < 16
       return static_cast<float>(index[axis] * block_voxels + inside) * resolution + 0.5F * edge;
     };
     for (const shown_voxel& v : block.voxels) {
@@ -263,7 +263,7 @@ void window_backend::upload_voxels(const shown_voxels& voxels) {
   }
   cubes_.set(cubes);
 
-  // A grid under the map with lines every metre, or fewer if these would be too many.
+  // A grid under the map with a line every metre, or at a larger spacing if there would be too many lines.
   std::vector<line_instance> lines;
   if (!cubes.empty()) {
     const Eigen::Array2f from = (low.cast<float>() * resolution * static_cast<float>(block_voxels)).floor() - 1.0F;
