@@ -12,7 +12,7 @@
 /// | `parameters.hpp` | camera parameters and derivatives with respect to them, for calibration |
 /// | `presets.hpp, settings.hpp` | cameras of common public recordings; the contents of `camera.toml` |
 /// | `depth.hpp, rgbd_frame.hpp` | depth images; a colour image with its depth image |
-/// | `rays.hpp, world_point.hpp, cloud.hpp` | rays through pixels; world points of pixels; points of a depth image |
+/// | `rays.hpp, world_point.hpp, cloud.hpp` | rays through pixels; conversion of pixels and of depth images to points |
 /// | `shutter.hpp, shutter_correction.hpp` | rolling-shutter timing; conversion to global-shutter images |
 /// | `depth_clock.hpp` | times of depth images relative to colour images, from their time stamps |
 /// | `undistort.hpp` | removal of lens distortion from images |

@@ -12,13 +12,13 @@
 /// | `thread_pool.hpp` | persistent worker threads for parallel loops |
 /// | `trajectory.hpp` | stamped poses, pose interpolation, association of time stamps |
 /// | `point.hpp, point_cloud.hpp` | in-place access to any point type; a point cloud with colours |
-/// | `inline.hpp` | for authors of components: marks the functions of -inl files |
+/// | `inline.hpp` | marks functions that are defined in -inl files; for authors of components |
 /// | `image.hpp` | images and image views |
 /// | `execution.hpp` | execution policies (`seq`, `par`), progress, cancellation |
 /// | `result.hpp, file.hpp` | values or errors; reading and writing whole files |
 /// | `random.hpp` | random numbers that are the same on every machine |
 /// | `rounded.hpp` | products that are never fused with a sum; bitwise reproducible sines and cosines |
-/// | `simd.hpp` | vector kernels, written once for every instruction set |
+/// | `simd.hpp` | SIMD kernels, written once for all instruction sets |
 /// | `hash_index.hpp, cow_pages.hpp` | hash tables from keys to positions; copy-on-write arrays |
 /// | `bits.hpp, bytes.hpp` | bit counts and bit strings; byte orders, checksums, base-85 text |
 /// | `quote.hpp` | short quotations for messages |
