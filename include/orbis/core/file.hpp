@@ -170,7 +170,7 @@ namespace orbis {
     if (size > bytes.max_size()) throw std::bad_alloc{};
     bytes.reserve(static_cast<std::size_t>(size));
   }
-  char buffer[65536];
+  char buffer[8192];  // stacks may be small
   while (in.read(buffer, sizeof buffer) || in.gcount() > 0) {
     const auto count = static_cast<std::size_t>(in.gcount());
     if (count > max_bytes - bytes.size()) return too_large();  // the file grows, or does not report its size
