@@ -12,18 +12,18 @@
 /// | `ids.hpp` | the ids of landmarks, keyframes and maps |
 /// | `extractor.hpp` | requirements on extractors and descriptors |
 /// | `frame.hpp` | frames and keyframes: features, depth and the observed landmarks |
-/// | `landmark.hpp` | a point of the map and its observations |
+/// | `landmark.hpp` | a 3D point of the map and its observations |
 /// | `map.hpp` | keyframes, landmarks, observations, covisibility graph and spanning tree |
 /// | `covisibility_graph.hpp` | the graph of keyframes that observe the same landmarks |
 /// | `spanning_tree.hpp` | the tree of keyframes, and the loops closed between them |
 /// | `atlas.hpp` | several maps, one of them active |
 /// | `map_file.hpp` | saving and loading a map |
 /// | `measure.hpp` | features with depth from a depth image, a stereo pair, or one image |
-/// | `calibration.hpp` | calibration of the camera from a map made with it |
+/// | `calibration.hpp` | calibration of a camera from a map built with it |
 /// | `camera_rig.hpp` | the camera with its image pyramid and depth weight |
 /// | `pyramid_scales.hpp` | the scales of an image pyramid |
-/// | `matchers.hpp` | feature matchers of tracking, replaceable |
-/// | `place_recognition.hpp` | search for similar keyframes, replaceable |
+/// | `matchers.hpp` | the feature matchers for tracking (replaceable) |
+/// | `place_recognition.hpp` | search for similar keyframes (replaceable) |
 #pragma once
 
 #include <orbis/slam/atlas.hpp>

@@ -19,15 +19,14 @@
 
 namespace orbis::slam {
 
-/// Maps with one world frame each. Frames are tracked in one of them, the active map. References to maps stay valid
-/// until the map is merged into another one or removed.
+/// A set of maps, each with its own world frame. Frames are tracked in one of them, the active map. References to maps
+/// stay valid until the map is merged into another one or removed.
 template <feature_descriptor D>
 class basic_atlas {
  public:
   using map_type = basic_map<D>;
 
-  /// Creates an atlas with one empty map. `levels`, `scale_factor`, `min_shared`: as for `basic_map`; all maps have the
-  /// same values.
+  /// Creates an atlas with one empty map. The arguments are those of `basic_map`; all maps have the same values.
   explicit basic_atlas(int levels = 8, double scale_factor = 1.2, std::uint32_t min_shared = 15)
       : levels_{levels}, scale_factor_{scale_factor}, min_shared_{min_shared} {
     create();

@@ -38,7 +38,7 @@ template <feature_descriptor D>
   return first;
 }
 
-/// Returns the participating keyframes, and the landmarks that two of them observe.
+/// Returns the selected keyframes, and the landmarks that at least two of them observe.
 template <feature_descriptor D, class Camera>
 [[nodiscard]] bundle_snapshot make_calibration_problem(const basic_map<D>& m, const camera_rig<Camera>& rig,
                                                        const calibration_options& options) {
@@ -75,9 +75,9 @@ template <camera::parametric_camera Camera>
   return {all & ~(focal_lengths | central), central, focal_lengths};
 }
 
-/// The parameters that are estimated if the motion determines all of them. If the distortion is a fraction, its
-/// numerator and denominator are determined only jointly; this nearly holds for more than two powers of the radius as
-/// well.
+/// The parameters that are estimated if the motion determines all of them. If the distortion is a rational function,
+/// only its numerator and denominator together are determined, not each separately; the same is nearly true of
+/// coefficients for more than two powers of the radius.
 template <camera::parametric_camera Camera>
 [[nodiscard]] std::uint32_t usual_parameters(const Camera&) {
   return (1U << camera::parameters_of<Camera>::count) - 1U;

@@ -34,7 +34,7 @@ struct calibration_options {
   /// of the map.
   double depth_weight = 0.0025;
   bool keeps_aspect = true;  ///< keeps the given ratio of the focal lengths, for example 1 for square pixels
-  /// Maximum number of consecutive keyframes, chosen where there are the most observations; the cost is cubic in their
+  /// Maximum number of consecutive keyframes; those with the most observations are chosen. The cost is cubic in this
   /// number.
   std::size_t max_keyframes = 300;
   /// Maximum number of landmarks, chosen at regular intervals from those that two keyframes observe; the cost is linear
@@ -56,7 +56,7 @@ struct calibrated_parameter {
 struct calibration_summary {
   /// The parameters of the model; for `radial_tangential`, k3 only if it is not 0, and never k4 to k6.
   std::vector<calibrated_parameter> parameters;
-  std::size_t keyframes = 0, landmarks = 0;  ///< number of each used
+  std::size_t keyframes = 0, landmarks = 0;  ///< numbers of keyframes and landmarks used
   std::size_t observations = 0, outliers = 0;
   double initial_rms = 0.0;  ///< RMS of the inlier observations, in standard deviations
   double final_rms = 0.0;    ///< RMS for the refined camera
@@ -76,8 +76,8 @@ struct calibration : calibration_summary {
 ///
 /// `rig`: the rig with which the map was built (`make_rig`). @pre options.depth_weight > 0. Errors: `no_data` for a map
 /// without landmarks that two keyframes observe; `degenerate` if the camera motion determines no parameter, or no
-/// observation has depth; `cancelled` by `callback`. Complexity: see `optimize::self_calibrate`, which is called up to
-/// four times.
+/// observation has depth; `cancelled` if `callback` cancels. Complexity: see `optimize::self_calibrate`, which is
+/// called up to four times.
 template <feature_descriptor D, calibrated_camera Camera>
 [[nodiscard]] result<calibration<Camera>> calibrate(const basic_map<D>& m, const camera_rig<Camera>& rig,
                                                     const calibration_options& options = {},

@@ -42,13 +42,13 @@ template <class Pairs>
 }
 }  // namespace detail
 
-/// A symmetric graph with the number of shared landmarks for every pair of keyframes that shares any. A pair has an
-/// edge if it shares at least `min_shared` landmarks; a keyframe without such a pair has one edge, to the keyframe with
-/// which it shares the most. The graph depends only on these numbers, not on the order of the changes.
+/// A symmetric graph that stores the number of shared landmarks for every pair of keyframes that share at least one. A
+/// pair has an edge if it shares at least `min_shared` landmarks; a keyframe without such a pair has one edge, to the
+/// keyframe with which it shares the most. The graph depends only on these numbers, not on the order of the changes.
 ///
 /// Let d be the number of keyframes that share landmarks with a given one. Lookups and changes take O(log d); adding a
-/// pair, removing a pair and lowering the strongest one take O(d). Memory: O(1) per keyframe that shares landmarks, and
-/// per pair.
+/// pair, removing a pair and lowering the count of the strongest pair take O(d). Memory: O(1) per keyframe that shares
+/// landmarks, and per pair.
 class covisibility_graph {
  public:
   explicit covisibility_graph(std::uint32_t min_shared = 15) : min_shared_{min_shared} {}
@@ -132,7 +132,7 @@ class covisibility_graph {
   }
 
  private:
-  struct node {                    // for a keyframe that shares landmarks
+  struct node {                    // a keyframe that shares landmarks
     std::vector<covisible> pairs;  ///< in ascending order of keyframe
     covisible strongest;
   };

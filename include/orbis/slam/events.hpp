@@ -54,12 +54,12 @@ struct correction_event {
   /// whose world frame is kept; otherwise the identity.
   sim3 T_map_before{};
   double milliseconds = 0.0;         ///< wall time
-  double locked_milliseconds = 0.0;  ///< the longest single wait of tracking and queries
+  double locked_milliseconds = 0.0;  ///< the longest time for which tracking and queries had to wait
 };
 
 /// The state of tracking changed.
 struct state_event {
-  track_state from{};  ///< the state at the last event
+  track_state from{};  ///< the state before the change
   track_state to{};
   std::size_t frame = 0;  ///< index of the frame, from 0
 };

@@ -35,7 +35,7 @@ enum class sensor_kind : std::uint8_t { unknown, rgbd, stereo, monocular };
 /// Change in the depth of a keypoint if the depth image was taken `step` seconds later, or earlier, than assumed;
 /// metres, 0 if unknown.
 struct depth_change {
-  static constexpr double step = 0.008;  ///< seconds; so short that few depth edges are crossed
+  static constexpr double step = 0.008;  ///< seconds; short enough that few depth edges are crossed
   float later = 0.0F, earlier = 0.0F;
   /// Returns this change if the depth varies smoothly, as on a surface; otherwise zero: a depth edge between the
   /// readings would be mistaken for motion.
@@ -83,7 +83,7 @@ struct basic_frame {
   /// The keypoints as read by a rolling shutter; the other members refer to the frame's time. Empty with a global
   /// shutter.
   std::vector<keypoint_as_read> as_read;
-  camera::shutter shutter{};   ///< assumed for the frame; includes this frame's depth image delay
+  camera::shutter shutter{};   ///< the shutter assumed for the frame, including its depth image delay
   vec6 twist = zeros<vec6>();  ///< twist of the camera in its own frame during read-out, per second, translation first
 
   /// The number of features.

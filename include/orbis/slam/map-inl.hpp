@@ -199,7 +199,7 @@ void basic_map<D>::fuse(landmark_id from, landmark_id into) {
   assert(from != into && has_landmark(into));
   landmark_type l = remove(from, into);
   for (const observation& o : l.observations)
-    if (add_observation(into, o.keyframe, o.feature) && l.patch.pixels != nullptr)  // measured with that patch
+    if (add_observation(into, o.keyframe, o.feature) && l.patch.pixels != nullptr)  // measured with the patch of `l`
       set_deviation(o.keyframe, o.feature, std::max(at(o.keyframe).deviation(o.feature), l.patch.corner_deviation));
   landmark_type& by = content_.landmarks[into];
   if (by.patch.pixels == nullptr) by.patch = std::move(l.patch);

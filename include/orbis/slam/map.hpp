@@ -45,8 +45,8 @@ class basic_map {
   using landmark_type = basic_landmark<D>;
 
   basic_map() = default;
-  /// Creates an empty map. `levels`, `scale_factor`: of the extractor's image pyramid; `min_shared`: minimum number of
-  /// shared landmarks for an edge in the covisibility graph.
+  /// Creates an empty map. `levels`, `scale_factor`: parameters of the extractor's image pyramid; `min_shared`: minimum
+  /// number of shared landmarks for an edge in the covisibility graph.
   basic_map(int levels, double scale_factor, std::uint32_t min_shared = 15) : covisibility_{min_shared} {
     content_.levels = levels;
     content_.scale_factor = scale_factor;
@@ -136,8 +136,8 @@ class basic_map {
     of_keyframe.resize(at(id).size(), 1.0F);
     of_keyframe[feature] = static_cast<float>(deviation);
   }
-  /// Moves a keyframe by `T_new_old`, a motion in the world frame; multiplies `scale(id)` by its scale. @pre
-  /// has_keyframe(id)
+  /// Moves a keyframe by `T_new_old`, a motion in the world frame; multiplies `scale(id)` by the scale of the motion.
+  /// @pre has_keyframe(id)
   void move_keyframe(keyframe_id id, const sim3& T_new_old) {
     set_pose(id, moved(T_new_old, at(id).T_world_camera));
     content_.keyframes[id].scale *= T_new_old.scale();

@@ -93,7 +93,7 @@ inline void put_landmark(std::string& to, const landmark& l) {
     }
     const auto is_gone = [&m](landmark_id id) { return m.replacement(id) == no_id; };
     for (landmark_id id = 0; id != m.landmark_end();) {
-      // Erased ids: runs if the map has forgotten them, one by one if it still has an entry.
+      // Erased ids are written as runs if the map has forgotten them, otherwise individually.
       landmark_id next = m.landmarks().next_known_id(id);
       while (next != m.landmark_end() && is_gone(next)) next = m.landmarks().next_known_id(next + 1);
       if (next != id) put(to, run_of_gone, next - id);

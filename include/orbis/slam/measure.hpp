@@ -192,7 +192,7 @@ template <camera::camera_model Camera, feature_descriptor D, class Pixels>
 }  // namespace detail
 
 /// Creates a frame from the left image of a rectified pair (`camera::rectify`). A feature has the right coordinate that
-/// `features::stereo_matcher` finds for it, or none; its depth is `options::bf` divided by the disparity if that is
+/// `features::stereo_matcher` finds for it, if any; its depth is `options::bf` divided by the disparity if that is
 /// within the rig's range. Features without a right coordinate become landmarks once other keyframes observe them with
 /// enough parallax. @pre both images have the size of the camera
 template <camera::camera_model Camera, grey_extractor Extractor>

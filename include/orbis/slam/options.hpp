@@ -43,9 +43,9 @@ struct adjustment_options {
 struct culling_options {
   double found_ratio = 0.25;        ///< minimum ratio of frames that find a landmark to frames that expect it ...
   std::uint32_t min_visible = 8;    ///< ... tested after this number of frames has expected it
-  std::uint32_t age = 2;            ///< number of keyframes after its creation by which a landmark must have ...
+  std::uint32_t age = 2;            ///< number of keyframes after a landmark's creation by which it must have ...
   std::uint32_t min_support = 4;    ///< ... this number of observations, where those with depth count twice
-  std::uint32_t least_support = 0;  ///< minimum support of an older landmark; it is removed below that
+  std::uint32_t least_support = 0;  ///< minimum support of an older landmark; with less, it is removed
   std::size_t neighborhood = 20;    ///< number of keyframes examined around the newest one
   double redundant = 0.9;           ///< a keyframe is redundant if this share of its close landmarks is observed by ...
   std::size_t redundant_observers = 3;  ///< ... this number of other keyframes ...
@@ -60,10 +60,10 @@ struct depth_term_options {
   std::size_t points = 400;      ///< maximum number of points per frame
   double effective_points = 40;  ///< maximum effective number of points: neighbouring depth errors are correlated
   std::size_t surfaces = 16;     ///< maximum number of keyframe surfaces kept; about 130 kB each
-  double weakest = 0.002;  ///< a direction is unconstrained if the mean square of the normals along it is below this
+  double weakest = 0.002;  ///< a direction is unconstrained if the mean square of the normals along it is smaller
   double min_share = 0.7;  ///< minimum share of consistent points among those on known surfaces ...
   std::size_t min_points = 100;  ///< ... and minimum number of points on known surfaces, for localisation by depth
-  std::size_t min_inliers = 5;   ///< minimum number of landmarks per direction of the pose that surfaces leave free
+  std::size_t min_inliers = 5;   ///< minimum number of landmarks per pose direction not constrained by surfaces
 };
 
 /// Measurement of landmark positions in the image by patch matching.
@@ -80,7 +80,7 @@ struct recovery_options {
   std::size_t candidates = 8;         ///< maximum number of keyframes tried for relocalisation
   std::size_t min_inliers = 40;       ///< minimum number of inliers of a relocalised frame
   double new_map_after = 1.0;         ///< seconds without a pose after which a new map is started
-  std::size_t min_map_keyframes = 3;  ///< a map with fewer keyframes is then removed, including its tracked frames
+  std::size_t min_map_keyframes = 3;  ///< a map with fewer keyframes is removed at that time, with its tracked frames
 };
 
 /// Initialisation of a map from one camera without depth.
@@ -105,7 +105,7 @@ struct triangulation_options {
   float ratio = 0.6F;            ///< maximum ratio of the distance to that of the second-best match
   float line_distance = 1.96F;   ///< maximum distance from the epipolar line, pixels of a keypoint's level
   float epipole_radius = 10.0F;  ///< radius around the epipole where nothing is matched, pixels of a keypoint's level
-  double scale_tolerance = 1.5;  ///< maximum factor between the ratios of scales and of distances, plus one level
+  double scale_tolerance = 1.5;  ///< maximum factor between scale and distance ratios, times one level's factor
 };
 
 /// Fusion of duplicate landmarks around a new keyframe.
@@ -190,8 +190,8 @@ struct moving_options {
 
 /// Threads of the system.
 struct thread_options {
-  /// Off: `track` does all the work, and the same frames give the same bytes. On: mapping, loop closing and global
-  /// adjustment have one thread each, and `track` returns as soon as the pose is known.
+  /// Off: `track` does all the work, and the same frames give bit-identical results. On: mapping, loop closing and
+  /// global adjustment have one thread each, and `track` returns as soon as the pose is known.
   bool enabled = false;
   /// Maximum number of keyframes waiting for mapping; at the limit, no more keyframes are created ...
   std::size_t max_waiting = 3;
@@ -200,9 +200,10 @@ struct thread_options {
   bool wait = false;
 };
 
-/// `options::bf` of a depth camera that triangulates: focal length (pixels) and distance between projector and camera
-/// (metres). Its disparity is accurate to about a tenth of a pixel, compared with one pixel for features of a stereo
-/// pair. Source: K. Khoshelham, S. O. Elberink, "Accuracy and resolution of Kinect depth data", Sensors 2012.
+/// Returns `options::bf` of a depth camera that triangulates, from its focal length (pixels) and the distance between
+/// its projector and camera (metres). The disparity of such a camera is accurate to about a tenth of a pixel, compared
+/// with one pixel for features of a stereo pair. Source: K. Khoshelham, S. O. Elberink, "Accuracy and resolution of
+/// Kinect depth data", Sensors 2012.
 [[nodiscard]] constexpr double depth_camera_bf(double focal_length, double baseline) noexcept {
   return 10.0 * focal_length * baseline;
 }

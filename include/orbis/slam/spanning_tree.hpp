@@ -66,8 +66,8 @@ class spanning_tree {
 
   /// Erases a keyframe. Each of its children gets a new parent: the old parent or another child, whichever shares the
   /// most landmarks with it (`shared(a, b)`); the old parent if none does. If the root is erased, its oldest child
-  /// becomes the root. Its loop edges are moved to the returned keyframe: the parent, or the new root, or `no_id` if
-  /// none is left. O(children^2). @pre contains(k)
+  /// becomes the root. The loop edges of `k` are moved to the returned keyframe: the parent, or the new root, or
+  /// `no_id` if none is left. O(children^2). @pre contains(k)
   template <std::invocable<keyframe_id, keyframe_id> Shared>
   keyframe_id erase(keyframe_id k, Shared&& shared) {
     const node gone = std::move(nodes_.extract(k.value()).mapped());
@@ -90,7 +90,8 @@ class spanning_tree {
     return replacement;
   }
 
-  /// Adds another tree after adding `offset` to its ids. Its keyframe `by` becomes its root and a child of `at`.
+  /// Adds another tree after adding `offset` to its ids. Keyframe `by` of the other tree becomes the root of that tree
+  /// and a child of `at`.
   /// @pre all ids of this tree are less than `offset`; `at` and `by` exist, unless either tree is empty
   void append(spanning_tree&& other, std::uint32_t offset, keyframe_id at, keyframe_id by) {
     const bool was_empty = size() == 0;

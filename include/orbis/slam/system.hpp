@@ -8,7 +8,7 @@
 ///   auto trajectory = slam.trajectory();
 /// @endcode
 ///
-/// The scheme is that of R. Mur-Artal, J. D. Tardos, "ORB-SLAM2: an open-source SLAM system for monocular, stereo and
+/// The method is that of R. Mur-Artal, J. D. Tardos, "ORB-SLAM2: an open-source SLAM system for monocular, stereo and
 /// RGB-D cameras", T-RO 33 (2017): predict the pose with a constant-velocity model, search for the landmarks of the
 /// local map, refine the pose, create a keyframe when the view has changed, adjust the map around it, and close loops
 /// when a place is recognised. Starting a new map after tracking is lost, and merging maps, follow R. Elvira, J. D.
@@ -65,11 +65,11 @@ class stopwatch;
 /// Tracks the frames of one camera and builds a map of landmarks. Images are not kept; callers that need keyframe
 /// images must store them when `track` returns a keyframe.
 ///
-/// Without threads (the default), `track` does all the work, and the same frames and options give the same bytes. With
-/// threads (`options::threads`) mapping, loop closing and global adjustment run while frames are tracked. Call `track`
-/// from one thread; all other functions may be called from any thread. An exception on one of the system's threads
-/// (`std::bad_alloc`, or one thrown by a callback) ends that thread; `wait`, and `track` when it creates a keyframe,
-/// then rethrow the exception. A map may be left partly changed: destroy the system.
+/// Without threads (the default), `track` does all the work, and the same frames and options give bit-identical
+/// results. With threads (`options::threads`) mapping, loop closing and global adjustment run while frames are tracked.
+/// Call `track` from one thread; all other functions may be called from any thread. An exception on one of the system's
+/// threads (`std::bad_alloc`, or one thrown by a callback) ends that thread; `wait`, and `track` when it creates a
+/// keyframe, then rethrow the exception. A map may be left partly changed: destroy the system.
 ///
 /// Template parameters: the camera model; the extractor, which determines the descriptor type; the matchers for
 /// tracking; place recognition. orbis::compiled contains the system for `camera::any_camera` and the default
@@ -104,10 +104,10 @@ class system {
     return track(f.timestamp, f.color.view(), f.depth_metres(), f.depth_timestamp);
   }
   /// As above; the images are not copied. `timestamp`: of the colour image, seconds; `depth`: metres, registered to the
-  /// colour image; `depth_timestamp`: of the depth image by the same clock, if it has a separate one. Depth is
-  /// corrected for the difference, which is smoothed over about a second; differences of more than 0.1 s are ignored.
-  /// orbis::compiled contains this function for `camera::depth_view` of 16-bit integers and of float; for others
-  /// include system-inl.hpp.
+  /// colour image; `depth_timestamp`: of the depth image, from the same clock, if it differs. Depth is corrected for
+  /// the difference, which is smoothed over about a second; differences of more than 0.1 s are ignored. orbis::compiled
+  /// contains this function for `camera::depth_view` of 16-bit integers and of float; for others include
+  /// system-inl.hpp.
   template <camera::depth_source Depth>
   track_result track(double timestamp, image_view<const rgb8> color, const Depth& depth,
                      std::optional<double> depth_timestamp = {});

@@ -39,7 +39,7 @@ enum class track_state {
 struct track_timings {
   double features_ms = 0.0;  ///< feature extraction and depth
   double tracking_ms = 0.0;  ///< estimation of the pose
-  double mapping_ms = 0.0;   ///< keyframe, second localisation of early frames and, without threads, all of mapping
+  double mapping_ms = 0.0;   ///< keyframe creation, second localisation of early frames; without threads, all mapping
 };
 
 /// The result of tracking one frame.
@@ -47,7 +47,7 @@ struct track_result {
   track_state state = track_state::not_started;
   std::optional<se3> T_world_camera;    ///< the pose, in the world of `map`; empty if not tracked
   map_id map = 0;                       ///< the active map
-  std::size_t inliers = 0;              ///< landmarks that agree with the pose; few or none if depth determines it
+  std::size_t inliers = 0;              ///< number of landmarks that agree with the pose; small if depth determines it
   std::optional<keyframe_id> keyframe;  ///< the keyframe created from the frame, if any
   /// Twist of the camera in its own frame during the read-out of a rolling shutter, per second, translation first. Zero
   /// if unknown. Argument of `camera::shutter_correction`.
@@ -78,7 +78,7 @@ struct tracked_frame {
 /// Counts over all frames so far. Frames before the start of the first map are neither tracked nor lost.
 struct track_counters {
   std::size_t frames = 0;
-  std::size_t tracked = 0;  ///< including relocalised frames and the first of two that start a map without depth
+  std::size_t tracked = 0;  ///< including relocalised frames and the first of two frames that start a map
   std::size_t lost = 0;
   std::size_t relocalized = 0;
   std::size_t loops_closed = 0;
