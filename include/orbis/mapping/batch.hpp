@@ -75,7 +75,7 @@ struct built_map {
   std::optional<Octree> unfiltered_octree{};
   Octree octree;                    ///< built from the points that the filter kept, each observed from its own keyframe
   std::vector<double> insert_ms{};  ///< time taken to insert each keyframe into `octree`
-  std::vector<double> insert_ms_unfiltered{};  ///< the same for `unfiltered_octree`, if it is built
+  std::vector<double> insert_ms_unfiltered{};  ///< time taken to insert each keyframe into `unfiltered_octree`
   std::size_t skipped = 0;                     ///< number of keyframes without a finite pose
 
   /// Returns a copy of the points that the filter kept.

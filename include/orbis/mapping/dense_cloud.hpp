@@ -211,7 +211,7 @@ class dense_cloud {
   /// are removed, and pixels that belong to a point that is not in `kept`. A pixel between the strides belongs to the
   /// point in its voxel, or otherwise to the point of its block of stride x stride pixels if their depths agree within
   /// 3 cm and 2 % per pixel between them; a pixel that belongs to no point is excluded. O(pixels).
-  /// @pre as for `measurements`
+  /// @pre the preconditions of `measurements`
   template <execution_policy Policy, keyframe_like Keyframe>
   [[nodiscard]] auto masked_depth(const Policy& policy, const Keyframe& k, std::size_t number,
                                   const selection& kept = {}) const {

@@ -98,7 +98,7 @@ class depth_store {
     if (done) detail::set_zeros(entries_.find(frame)->second.zeros, out.view());
     return done;
   }
-  /// As `get`, but includes the removed pixels.
+  /// Like `get`, but includes the removed pixels.
   result<void> get_whole(std::uint64_t frame, image<std::uint16_t>& out) const {
     const auto at = entries_.find(frame);
     if (at == entries_.end()) return not_stored(frame);
@@ -203,7 +203,7 @@ class depth_store {
   bool spills_ = false;
   detail::depth_encoder encoder_;
   std::unordered_map<std::uint64_t, entry> entries_;
-  std::vector<use> oldest_;  // a past list of uses, the oldest at the back; searched before a new list is made
+  std::vector<use> oldest_;  // an earlier list of uses, the oldest last; exhausted before a new list is made
   std::size_t bytes_in_memory_ = 0, bytes_spilled_ = 0, bytes_of_masks_ = 0;
   alignas(8) mutable std::uint64_t uses_ = 0;
 };

@@ -51,7 +51,7 @@ struct filter_options {
 
 /// Report of a filter run: steps, thresholds and reason.
 struct filter_report {
-  cloud::filter_chain mode{};  ///< its steps; `to_string` gives their names, such as "log-statistical+cluster"
+  cloud::filter_chain mode{};  ///< the steps; `to_string` returns their names, such as "log-statistical+cluster"
   std::string reason{};
   std::size_t points = 0;  ///< number of points before filtering
   std::size_t removed = 0;

@@ -54,12 +54,12 @@ namespace detail {
 struct live_map_options {
   double resolution = 0.05;                   ///< edge length of a voxel, metres; > 0
   octree::integration_options integration{};  ///< options for every depth image
-  /// Tolerance in voxels: a keyframe is moved in the map when its pose moves a point of its view by more than this. 0:
-  /// when any bit of the pose changes, so that the map corresponds to the current poses whenever nothing is pending. >=
-  /// 0
+  /// Tolerance in voxels, >= 0: a keyframe is moved in the map when a change of its pose moves a point in its view by
+  /// more than this. 0: when any bit of the pose changes, so that the map corresponds to the current poses whenever
+  /// nothing is pending.
   double tolerance = 0.25;
-  /// Number of keyframes that are moved before the map is updated: a larger number means less work, a smaller one
-  /// earlier updates. > 0
+  /// Number of keyframes that are moved before the map is updated, > 0: a larger number means less work, a smaller one
+  /// earlier updates.
   std::size_t keyframes_per_replay = 16;
   /// Maximum number of frames between keyframes in the map; older ones are dropped. 0: keyframes only.
   std::size_t max_frames = 0;
@@ -145,8 +145,8 @@ class live_map {
     if (!kept) return fail(std::move(kept.error()));
     return summary;
   }
-  /// Removes pixels from the depth image of a keyframe, in place of those removed before, for a later result of a
-  /// filter. Removed pixels are 0 in `depth`. The map follows with `correct`. Errors: not_found; that of
+  /// Replaces the set of pixels that are removed from the depth image of a keyframe, for example when a filter has a
+  /// new result. Removed pixels are 0 in `depth`. The map follows with `correct`. Errors: not_found; that of
   /// `Depths::mask`, or of `Depths::put` if there is no `mask`.
   /// @pre depth has the camera's size; its other pixels are those of the keyframe's image, `whole` in add_keyframe
   template <execution_policy Policy>

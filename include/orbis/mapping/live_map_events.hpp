@@ -35,7 +35,7 @@ enum class depth_use : std::uint8_t {
 struct insertion_event {
   std::uint64_t frame = 0;
   bool is_keyframe = false;
-  double milliseconds = 0.0;        ///< wall time of `prepare`, moved objects, marking and storing the depth image
+  double milliseconds = 0.0;        ///< wall time of `prepare`, moved-object removal, marking and storing the image
   double delay_milliseconds = 0.0;  ///< time from the call that added the image until readers can see it
   std::size_t waiting = 0;          ///< keyframes and frames still waiting
 };
@@ -105,7 +105,7 @@ struct live_map_counters {
   std::size_t keyframes = 0;          ///< number of inserted keyframes
   std::size_t frames = 0;             ///< number of inserted frames between keyframes
   std::size_t dropped_keyframes = 0;  ///< keyframes dropped because too many were waiting
-  std::size_t dropped_frames = 0;     ///< frames between keyframes dropped for the same reason
+  std::size_t dropped_frames = 0;     ///< frames dropped because too many images were waiting
   std::size_t refused_frames = 0;     ///< frames rejected by the map
   std::size_t corrections = 0;        ///< number of finished corrections
   std::size_t most_waiting = 0;       ///< maximum number of waiting depth images
