@@ -260,8 +260,8 @@ class distance_field : public metric_distances<squared_distances> {
     }
     apply();
   }
-  /// Lists the octants that may differ in the map; initialises an empty field with the cubes. Returns false if those
-  /// initial cubes no longer match the map.
+  /// Lists the octants in which the field may differ from the map; initialises an empty field with the cubes. Returns
+  /// false if those initial cubes no longer match the map.
   template <planning_map Map>
   bool find_differences(const Map& map) {
     octants_.clear();
@@ -284,7 +284,7 @@ class distance_field : public metric_distances<squared_distances> {
       const voxel_cube node{low, level};
       const bool is_in_cube = voxels_.is_in_cube(node);
       if (is_in_cube) in_cubes += volume(level);
-      if (mask == (is_in_cube ? ~elsewhere : elsewhere)) return;  // equal to the value where nothing is stored
+      if (mask == (is_in_cube ? ~elsewhere : elsewhere)) return;  // equal to the value of space that is not stored
       if (level >= cube_level && mask == (is_in_cube ? elsewhere : ~elsewhere)) {
         const std::uint64_t more = voxels_.max_added_bricks(node);
         if (!is_in_cube && cubes_.bricks + more > options_.max_bricks) {

@@ -22,7 +22,7 @@ namespace orbis::nav {
 
 namespace detail {
 
-/// Maximum number of octants on top of large leaves that find_floor examines; they take about a second.
+/// Maximum number of octants on top of large leaves that find_floor examines; examining them takes about a second.
 inline constexpr std::uint64_t most_octants_on_leaves = std::uint64_t{1} << 24U;
 
 }  // namespace detail
@@ -83,7 +83,7 @@ void spread_extremes(image<int>& values, int radius, int nothing, const Extreme&
   for (int x = 0; x != values.width(); ++x) along(&values(x, 0), &values(0, 1) - &values(0, 0), values.height());
 }
 
-/// Surfaces in columns, and the ones that a robot can reach.
+/// The surfaces in all columns, and those that a robot can reach.
 class floor_search {
  public:
   static constexpr int none = no_level;
@@ -237,8 +237,9 @@ class floor_search {
     first_.push_back(static_cast<std::uint32_t>(surfaces_.size()));
     reached_.resize(surfaces_.size());
   }
-  /// Returns true if the floor around rises by more than a step, and its least-squares plane is steeper than `steepest`
-  /// (tangent). Only columns that differ by at most a step per cell of distance count, which excludes ledges.
+  /// Returns true if the floor around a cell rises by more than a step, and its least-squares plane is steeper than
+  /// `steepest` (tangent). Only columns that differ by at most a step per cell of distance count, which excludes
+  /// ledges.
   [[nodiscard]] bool is_steep(int x, int y, double steepest) const {
     const int level = levels_(x, y);
     if (high_(x, y) - low_(x, y) <= step_ || step_ == 0) return false;
@@ -250,14 +251,14 @@ class floor_search {
     w.levels = levels_.data() + place(x + w.x, y + w.y);
     w.stride = levels_.width();
     w.level = level;
-    w.step = std::min(step_, columns_.levels());  // no levels differ by more
+    w.step = std::min(step_, columns_.levels());  // no two levels differ by more
     w.enough = columns_.levels() / w.step + 1;
     const plane_sums s = sums_(w);
     if (s.highest - s.lowest <= step_) return false;
     const double xx = s.xx - s.x * s.x / s.n, xy = s.xy - s.x * s.y / s.n, yy = s.yy - s.y * s.y / s.n,
                  xz = s.xz - s.x * s.z / s.n, yz = s.yz - s.y * s.z / s.n;
     const double determinant = xx * yy - xy * xy;
-    if (determinant < 1e-9 * xx * yy || determinant <= 0.0) {  // all columns in one row: the slope along it
+    if (determinant < 1e-9 * xx * yy || determinant <= 0.0) {  // all columns are in one row: use the slope along it
       const double along = xx + yy, rise = std::hypot(xz, yz);
       return along > 0.0 && rise > steepest * along;
     }
@@ -270,7 +271,7 @@ class floor_search {
   octree::occupancy unknown_;
   int radius_ = 1;
   plane_sums (*sums_)(const level_window&) = nullptr;
-  std::vector<surface> surfaces_;     ///< surfaces by column, the lowest first
+  std::vector<surface> surfaces_;     ///< surfaces sorted by column, the lowest first in each
   std::vector<std::uint32_t> first_;  ///< index of each column's first surface
   std::vector<bool> reached_;
   image<int> levels_;

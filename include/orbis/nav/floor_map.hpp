@@ -44,8 +44,8 @@ enum class floor_state : std::uint8_t {
 
 struct floor_map_options {
   std::optional<double> floor{};  ///< height of the floor, metres; empty: the result of find_floor
-  double below = 1.0;             ///< how far below the floor ramps and stairs are followed, metres
-  double above = 1.0;             ///< how far above the floor they are followed, metres
+  double below = 1.0;             ///< ramps and stairs are followed to this depth below the floor, metres
+  double above = 1.0;             ///< ramps and stairs are followed to this height above the floor, metres
   /// State assigned to a cell if too little is known about it: unknown, free or occupied.
   octree::occupancy unknown = octree::occupancy::unknown;
   std::optional<octree::bounding_box> region{};  ///< part of the map to use (x and y), metres; empty: all

@@ -43,8 +43,8 @@ class floor_view {
       : map_{&map}, radius_{radius}, options_{options} {
     look_at_obstacles(unknown, [&](int x, int y) { return map.states(x, y); });
   }
-  /// For the centre of a robot on a cost map (see inflate) that accounts for the robot's radius: cells with a cost of
-  /// at least `inscribed` are obstacles; in other cells a metre costs 1 + clearance_weight cost / 252;
+  /// Creates a view for the centre of a robot on a cost map (see inflate), which accounts for the robot's radius: cells
+  /// with a cost of at least `inscribed` are obstacles; in other cells a metre costs 1 + clearance_weight cost / 252;
   /// preferred_clearance is ignored.
   /// @pre as above; `costs` belongs to `map` and outlives the view
   floor_view(const floor_map& map, const image<std::uint8_t>& costs, const planning_options& options = {},

@@ -145,8 +145,8 @@ class frontiers {
     std::uint64_t mask;
   };
 
-  /// Direct-mapped cache of a map's octants, addressed by the low bits of the Morton code: one entry per position in a
-  /// cube.
+  /// Direct-mapped cache of a map's octants, addressed by the low bits of the Morton code, so that the octants of an
+  /// aligned block do not evict each other.
   template <class Octants>
   class octant_cache {
    public:

@@ -52,9 +52,9 @@ enum class path_status : std::uint8_t {
 
 /// Method of the path search.
 enum class path_method : std::uint8_t {
-  /// Lazy Theta*: straight across many cells where no obstacle is in between. Paths are shorter, but not guaranteed to
-  /// be optimal. If costs other than length apply (see planning_options), costs are integrated along each segment,
-  /// which takes several times as long as `grid` for a marginally better path.
+  /// Lazy Theta*: straight segments across many cells where no obstacle is in the way. Paths are shorter, but not
+  /// guaranteed to be optimal. If costs other than length apply (see planning_options), costs are integrated along each
+  /// segment, which takes several times as long as `grid` for a marginally better path.
   any_angle,
   grid  ///< A*: optimal among paths in steps from cell to neighbouring cell
 };
@@ -74,8 +74,8 @@ struct path_options {
 /// A path, or the reason why no path was found.
 struct found_path {
   path_status status = path_status::unreachable;
-  /// From the start to the goal, metres. If no path leads to the goal but the start is free, the path ends at the
-  /// centre of the reached cell nearest to the goal (empty if the goal is not finite).
+  /// Points of the path from the start to the goal, metres. If no path leads to the goal but the start is free, the
+  /// path ends at the centre of the reached cell nearest to the goal (empty if the goal is not finite).
   std::vector<vec3> points{};
   double length = 0.0;       ///< length of the path, metres
   double cost = 0.0;         ///< see planning_options; equals the length in a uniform space. Excludes floor heights

@@ -131,7 +131,7 @@ class planning_view {
     assert(cover_.inner > 0.0 && map_access<Map>::grid(map) == field.grid() && !field.options().inside);
     assert(options.clearance_weight >= 0.0 && options.preferred_clearance > 0.0 && options.unknown_cost >= 1.0);
   }
-  /// For a ball. `radius`: metres. @pre radius > 0
+  /// Creates a view for a robot that is a ball. `radius`: metres. @pre radius > 0
   planning_view(const Map& map, const distance_field& field, double radius,
                 const planning_options& options = {}) requires std::same_as<Shape, ball>
       : planning_view{map, field, ball{radius}, options} {}

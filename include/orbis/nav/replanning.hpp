@@ -61,7 +61,7 @@ class path_monitor {
     if constexpr (detail::follows_changes<Space>) follower_.mark_read(space.map());
   }
 
-  /// Index of the first segment (from points()[i] to points()[i + 1]) that is no longer free since the path was set or
+  /// Index of the first segment (from points()[i] to points()[i + 1]) that has become blocked since the path was set or
   /// last checked; empty if all are free. A blocked segment is tested again each time. O(changed octants x segments)
   /// with few operations each, plus the cost of `is_free` for the segments that are tested. @pre the same map every
   /// time (for floors: a map of the same world), and a view of its current state
@@ -129,7 +129,7 @@ class path_monitor {
 
   std::vector<vec3> points_;
   detail::map_follower follower_;
-  std::vector<bool> is_suspect_;  ///< segments that changes touched and that are not known to be free
+  std::vector<bool> is_suspect_;  ///< segments that changes have affected, not yet known to be free
   std::vector<octree::bounding_box> sweeps_;
   std::size_t tested_ = 0;
 };

@@ -47,7 +47,7 @@ struct swept_shape {
   return {vec3{b.min.x(), b.min.y(), std::min(s.a.z(), s.b.z()) + s.shape.low},
           vec3{b.max.x(), b.max.y(), std::max(s.a.z(), s.b.z()) + s.shape.high}};
 }
-/// Exact: stretches the box by the segment instead of the robot.
+/// Exact: extends the box by the capsule's vertical segment, and tests a ball instead of the capsule.
 [[nodiscard]] inline bool touches(const swept_shape<vertical_capsule>& s, const octree::bounding_box& box) noexcept {
   const octree::bounding_box stretched{box.min - s.shape.high * vec3(0.0, 0.0, 1.0),
                                        box.max - s.shape.low * vec3(0.0, 0.0, 1.0)};

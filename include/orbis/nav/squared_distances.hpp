@@ -220,7 +220,8 @@ class squared_distances : public squared_distance_view {
   void remove(std::uint32_t brick);
   [[nodiscard]] std::size_t buffer_bytes() const noexcept;
   void release_buffers();
-  /// For a brick that is not stored: true if it is full of obstacles; one of its rows as bits.
+  /// For a brick that is not stored: `is_full` returns true if it is full of obstacles; `row_bits` returns one of its
+  /// rows.
   [[nodiscard]] bool is_full(std::uint32_t found) const noexcept { return value_without_brick(found) == 0; }
   [[nodiscard]] std::uint8_t row_bits(std::uint32_t found) const noexcept { return is_full(found) ? 0xff : 0; }
   [[nodiscard]] std::uint16_t bound() const noexcept { return static_cast<std::uint16_t>(reach_ * reach_); }
@@ -245,7 +246,7 @@ class squared_distances : public squared_distance_view {
   void make_space(std::uint32_t brick, unsigned slices);
 
   detail::slice_code kernels_;
-  detail::block_vector<stages> stages_;  ///< by brick
+  detail::block_vector<stages> stages_;  ///< indexed by brick
   int bricks_in_reach_;
   int squares_pad_;
   std::vector<std::uint16_t> squares_;
