@@ -83,7 +83,7 @@ class inverted_index {
     return taken;
   }
 
-  std::vector<std::uint32_t> list_of_;  // list index, by word
+  std::vector<std::uint32_t> list_of_;  // index of each word's list
   std::vector<std::vector<std::uint32_t>> lists_;
   std::vector<std::uint32_t> unused_;  // free lists
 };

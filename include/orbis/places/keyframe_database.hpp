@@ -45,12 +45,12 @@ struct place_candidate {
   friend bool operator==(const place_candidate&, const place_candidate&) = default;
 };
 
-/// Reusable memory for queries, proportional to the largest numbers of keyframes and candidates so far.
+/// Reusable memory for queries; its size is proportional to the largest numbers of keyframes and candidates so far.
 template <class Id>
 struct query_workspace {
-  std::vector<std::uint32_t> shared;   ///< number of shared words, by slot
+  std::vector<std::uint32_t> shared;   ///< number of shared words, indexed by slot
   std::vector<std::uint32_t> touched;  ///< slots that share a word
-  std::vector<double> scores;          ///< scores by slot, for the keyframes scored in the current query
+  std::vector<double> scores;          ///< scores indexed by slot, for the keyframes scored in the current query
   std::vector<std::uint32_t> scored;
   std::vector<place_candidate<Id>> groups;
 };
@@ -147,8 +147,8 @@ class basic_keyframe_database {
   /// keyframe of each group with a sufficient score sum becomes a candidate (at most once). Neighbours that are not in
   /// the database are ignored.
   ///
-  /// O(keyframes + keyframes that share a word, word by word + candidates x words); in steady state only the callables
-  /// allocate memory.
+  /// O(keyframes + keyframes that share a word, counted once per shared word + candidates x words); in steady state
+  /// only the callables allocate memory.
   template <std::predicate<const Id&> Exclude = none_excluded, class Neighbors = no_neighbors<Id>>
   requires std::ranges::input_range<std::invoke_result_t<Neighbors&, const Id&>> &&
       std::convertible_to<std::ranges::range_reference_t<std::invoke_result_t<Neighbors&, const Id&>>, Id>

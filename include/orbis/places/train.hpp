@@ -24,7 +24,7 @@ struct training_options {
   std::uint32_t depth = 4;       ///< levels below the root, at least 1; branching^depth is the maximum number of words
   places::weighting weighting = places::weighting::tf_idf;
   std::uint64_t seed = 1;
-  int max_iterations = 10;  ///< maximum iterations of each clustering
+  int max_iterations = 10;  ///< maximum number of iterations of each clustering
 };
 
 /// A range of images, each a range of descriptors.

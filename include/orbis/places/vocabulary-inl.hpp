@@ -14,7 +14,7 @@
 namespace orbis::places {
 namespace detail {
 
-// Finds the words of many descriptors in a vocabulary's tree at once.
+// Finds the words of many descriptors in a vocabulary's tree together.
 //
 // In a large tree, each level costs a cache miss. Several descriptors therefore descend together, level by level: while
 // one descriptor is compared with the children of its node, the children of the other nodes are prefetched.

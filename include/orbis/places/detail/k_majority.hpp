@@ -194,7 +194,7 @@ class k_majority_solver {
 };
 
 /// Clusters `descriptors`. The same seed gives the same clusters under every policy. O(descriptors x clusters x
-/// iterations). Empty for empty input.
+/// iterations). The result is empty if the input is.
 /// Source: C. Grana, D. Borghesani, M. Manfredi, R. Cucchiara, "A fast approach for integrating ORB descriptors in
 /// the bag of words model", SPIE 2013.
 /// @pre 0 < clusters < 65536, max_iterations >= 0, fewer than 2^32 descriptors
