@@ -60,8 +60,8 @@ struct depth_term_options {
   std::size_t points = 400;      ///< maximum number of points per frame
   double effective_points = 40;  ///< maximum effective number of points: neighbouring depth errors are correlated
   std::size_t surfaces = 16;     ///< maximum number of keyframe surfaces kept; about 130 kB each
-  double weakest = 0.002;  ///< a direction is unconstrained if the mean square of the normals along it is smaller
-  double min_share = 0.7;  ///< minimum share of consistent points among those on known surfaces ...
+  double weakest = 0.002;        ///< a direction is unconstrained if the mean square of the normals along it is smaller
+  double min_share = 0.7;        ///< minimum share of consistent points among those on known surfaces ...
   std::size_t min_points = 100;  ///< ... and minimum number of points on known surfaces, for localisation by depth
   std::size_t min_inliers = 5;   ///< minimum number of landmarks per pose direction not constrained by surfaces
 };

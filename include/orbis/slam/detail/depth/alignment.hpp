@@ -50,7 +50,7 @@ struct plane_observation_of_row {
   double time = 0.0;              ///< time of the row relative to the frame, seconds
 };
 
-/// Number of associated samples.
+/// Numbers of associated samples.
 struct association {
   std::size_t visible = 0;     ///< number of samples that project onto a known surface
   std::size_t consistent = 0;  ///< number of visible samples within the gate
@@ -117,9 +117,9 @@ struct depth_equations {
   double deviation = 0.0;  ///< root mean square of the residuals, in standard deviations
 };
 
-/// Builds the equations for the given planes. `points`: maximum number of independent points; larger numbers are
-/// down-weighted to it. `weakest`: a direction counts as unconstrained if the mean square of the normals along it is
-/// smaller; rotations are scaled to metres by the mean depth of the points. O(planes).
+/// Builds the equations for the given planes. `points`: maximum number of independent points; if there are more, their
+/// weights are reduced accordingly. `weakest`: a direction counts as unconstrained if the mean square of the normals
+/// along it is smaller; rotations are scaled to metres by the mean depth of the points. O(planes).
 [[nodiscard]] inline depth_equations build_equations(std::span<const plane_observation_of_row> planes,
                                                      const moving_pose& at, double points, double weakest) {
   depth_equations e;

@@ -156,7 +156,7 @@ class depth_tracker {
 
   /// Returns the cost with respect to the surfaces around a pose close to the true one; empty if they do not constrain
   /// the pose.
-  /// @pre find_surfaces
+  /// @pre find_surfaces was called
   [[nodiscard]] std::optional<pose_quadratic> term_at(const moving_pose& at, const camera::shutter& shutter) {
     const association seen = associate<Camera>(samples_, 1, placed_, at, shutter, rig_, close, planes_);
     if (seen.consistent < options_.min_points / 2) return std::nullopt;
@@ -166,7 +166,7 @@ class depth_tracker {
     return e.term;
   }
 
-  /// Counts the points of the frame that are on the surfaces around it, given a pose. @pre find_surfaces
+  /// Counts the points of the frame that are on the surfaces around it, given a pose. @pre find_surfaces was called
   [[nodiscard]] association agreement(const moving_pose& at, const camera::shutter& shutter) {
     return associate<Camera>(samples_, 1, placed_, at, shutter, rig_, close, planes_);
   }
@@ -176,7 +176,8 @@ class depth_tracker {
   }
 
   /// Aligns the frame, starting from the best of several poses; empty if the result is uncertain. The pose keeps its
-  /// start value in directions that the surfaces do not constrain. Takes about a millisecond. @pre find_surfaces
+  /// start value in directions that the surfaces do not constrain. Takes about a millisecond. @pre find_surfaces was
+  /// called
   template <class Starts>
   [[nodiscard]] std::optional<depth_alignment> align(const Starts& starts, const camera::shutter& shutter) {
     found_.clear();

@@ -22,7 +22,7 @@ namespace orbis::slam::detail {
 struct surface_cell {
   float x = 0.0F, y = 0.0F, z = 0.0F;     ///< a point on it, metres; `z` is 0 if there is no plane
   float nx = 0.0F, ny = 0.0F, nz = 0.0F;  ///< unit normal, towards the camera
-  float measured = 0.0F;                  ///< measured depth of the cell without its neighbours, metres
+  float measured = 0.0F;                  ///< measured depth of the cell, excluding its neighbours, metres
   [[nodiscard]] bool is_there() const noexcept { return z > 0.0F; }
   [[nodiscard]] vec3 point() const { return {static_cast<double>(x), static_cast<double>(y), static_cast<double>(z)}; }
   [[nodiscard]] vec3 normal() const {
@@ -79,7 +79,7 @@ class surface_builder {
   /// The mean of the depths in a cell.
   struct sampled {
     float x, y;     ///< ray through their mean pixel, at z = 1
-    float inverse;  ///< 1/m; 0 if there is none
+    float inverse;  ///< inverse depth, 1/m; 0 if the cell has no depth
   };
   struct ray {
     float x, y;        ///< ray through the centre of the cell; NaN if there is none

@@ -26,8 +26,8 @@ struct surface_sample {
 /// Selects points on surfaces. Reuses its memory.
 class surface_sampler {
  public:
-  /// Selects at most `count` cells of a surface: the same number for every direction of normals, or all cells of that
-  /// direction, evenly spread over the image. O(cells).
+  /// Selects at most `count` cells of a surface: the same number for every direction of normals (all cells of a
+  /// direction if it has fewer), evenly spread over the image. O(cells).
   void choose(const surface& from, std::size_t count, std::vector<surface_sample>& to) {
     for (auto& bin : bins_) bin.clear();
     for (std::size_t i = 0; i != from.cells.size(); ++i)
@@ -40,7 +40,7 @@ class surface_sampler {
     });
     to.clear();
     std::size_t left = count;
-    for (std::size_t k = 0; k != bin_count; ++k) {  // the smallest first: their unused share goes to the others
+    for (std::size_t k = 0; k != bin_count; ++k) {  // the smallest bin first: larger bins use the rest of its share
       const auto& bin = bins_[order[k]];
       const std::size_t take = std::min(bin.size(), left / (bin_count - k));
       left -= take;

@@ -32,7 +32,7 @@ struct motion_split {
   std::size_t inliers = 0;             ///< number of matches that agree with the pose
   std::vector<std::uint8_t> outliers;  ///< 1 for each match that disagrees with the pose
   std::vector<std::uint8_t> moving;    ///< 1 for each match on a moving object; these are also outliers
-  bool by_trust = false;               ///< true if the pose is from the trusted matches alone
+  bool by_trust = false;               ///< true if the pose is from the trusted matches only
 };
 
 /// Minimum trust for a match to count as static.
@@ -50,7 +50,7 @@ inline constexpr double least_trust = 0.02;
 /// Searches for a second rigid motion among matches many of which disagree with a single pose, and decides which of the
 /// two motions is that of the camera: the one with the greater sum of trust times spread. Matches with old landmarks
 /// are trusted; an object that biases the pose has appeared recently, or is small compared with the background. The
-/// candidate poses include the one estimated from the trusted matches alone, starting from the prediction. The second
+/// candidate poses include the one estimated only from the trusted matches, starting from the prediction. The second
 /// motion is found by RANSAC among the outliers of the first, as in P. H. S. Torr, "Geometric motion segmentation and
 /// model selection", Phil. Trans. R. Soc. A 356 (1998).
 template <camera::camera_model Camera>

@@ -3,8 +3,8 @@
 /// Bundle adjustment of a whole map.
 ///
 /// `take_...`, `apply_poses` and `erase_outliers` access the map; the solver works on the snapshot. Keyframes,
-/// landmarks and observations may be added between these calls: new keyframes follow their parent in the spanning tree,
-/// and new landmarks the keyframe that created them, as do landmarks with a single observation, which are not adjusted.
+/// landmarks and observations may be added between these calls: new keyframes follow their parent in the spanning tree;
+/// new landmarks, and landmarks with a single observation, are not adjusted and follow the keyframe that created them.
 /// The root of the map is held fixed. If lengths are not measured, all data relative to a keyframe are scaled with the
 /// lengths in its view.
 ///

@@ -102,7 +102,7 @@ class loop_closer {
     clock::time_point start = clock::now();
     double locked = 0.0;  ///< longest single time, milliseconds
   };
-  /// Holds the lock and records its duration.
+  /// Holds the lock and records for how long.
   struct timing_lock {
     std::unique_lock<std::mutex> held;
     correction_timing& timing;
@@ -186,7 +186,7 @@ class loop_closer {
     report(std::move(event), timing);
     return true;
   }
-  /// Merges the map of `k` into the candidate's.
+  /// Merges the map of `k` into the candidate's map.
   bool merge(map_keyframe k, map_keyframe candidate, const loop_match& match, correction_timing timing) {
     const loop_fusion_options& o = shared_.settings.places.correction.fusion;
     correction_event event{.kind = correction_kind::merge, .map = candidate.map, .to = candidate, .merged = k.map};

@@ -175,7 +175,7 @@ template <feature_descriptor D>
   });
   for (essential_edge& e : s.edges) {
     // The more landmarks two keyframes share, the better their relative pose is known. The edge of an earlier loop may
-    // have been moved to keyframes that share few landmarks although many of their neighbours do: it keeps a minimum
+    // have been moved to keyframes that share few landmarks, although their neighbours share many: it keeps a minimum
     // weight.
     const std::uint32_t least = e.kind == edge_kind::loop ? std::max(1U, o.strong / 4) : 1U;
     e.weight *= static_cast<double>(std::clamp(e.shared, least, o.strong)) / o.strong;

@@ -128,7 +128,7 @@ struct snapshot {
   view<D> seen, known;             ///< the keyframe and the candidate
   landmark_snapshot<D> landmarks;  ///< landmarks around the candidate
   std::vector<neighbor<D>> supporters;
-  double path_length = 0.0;  ///< path length along the keyframes between both, metres
+  double path_length = 0.0;  ///< length of the path along the keyframes between the two, metres
 };
 
 /// Returns the standard deviation of a landmark's depth in keyframe `k` if no depth is measured, in the map's unit: the
@@ -365,7 +365,8 @@ class checker {
     return off <= 0.3 * expected || expected <= 0.02 * found.scale * s_.seen.median_depth;
   }
 
-  /// Scale drift has no bound known in advance: if the scale is unknown, only the rotation is limited.
+  /// Returns true if the drift is plausible. If the scale is unknown, only the rotation is limited, because scale drift
+  /// has no known bound.
   [[nodiscard]] bool is_plausible(const se3& T_candidate_keyframe) const {
     const se3& was = s_.seen.image.T_world_camera;
     const se3 is = s_.landmarks.T_world_camera * T_candidate_keyframe;

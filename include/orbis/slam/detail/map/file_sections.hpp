@@ -20,7 +20,7 @@ void put(std::string& to, T... values) {
   (append_little_endian(to, values), ...);
 }
 
-inline constexpr std::size_t section_head = 12, section_tail = 4;  ///< name and length; checksum
+inline constexpr std::size_t section_head = 12, section_tail = 4;  ///< bytes of name and length; bytes of the checksum
 
 /// Appends a section; `write(std::string&)` appends its content.
 template <class Write>

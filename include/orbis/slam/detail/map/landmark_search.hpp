@@ -22,7 +22,7 @@ struct candidate_point {
   landmark_id landmark;           ///< `no_id` for a point known only from the depth of the last frame
 };
 
-/// Points with their descriptors and search windows, by common index.
+/// Points with their descriptors and search windows, which have the same indices.
 template <feature_descriptor D>
 struct search_list {
   std::vector<candidate_point> points;

@@ -38,7 +38,7 @@ struct map_content {
   double scale_factor = 1.2;      ///< scale factor between two levels
   std::uint32_t min_shared = 15;  ///< minimum number of shared landmarks for an edge of the covisibility graph
   sensor_kind sensor = sensor_kind::unknown;  ///< sensor of the first keyframe
-  bool scale_is_known = true;                 ///< as for the first keyframe
+  bool scale_is_known = true;                 ///< taken from the first keyframe
   slot_map<basic_keyframe<D>, keyframe_id> keyframes;
   slot_map<basic_landmark<D>, landmark_id, remembered_landmarks> landmarks;
   spanning_tree tree;

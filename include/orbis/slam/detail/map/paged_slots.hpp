@@ -17,10 +17,10 @@ namespace orbis::slam::detail {
 /// Stores a number for each of the ids 0, 1, 2 ...: the slot of its object (less than `erased`); `erased` combined with
 /// the id of its replacement if it was replaced; or `gone` if it was erased without a replacement.
 ///
-/// Numbers are in pages of 256. A page whose ids are all erased is freed after `remembered` more ids have been
-/// assigned; its ids are then `gone` and take 16 bytes per thousand. A page with at least one id that is not erased
-/// takes 1 kB. A robot that runs indefinitely therefore needs memory for the existing objects, and almost none for
-/// erased ones.
+/// The numbers are stored in pages of 256. A page whose ids are all erased is freed after `remembered` more ids have
+/// been assigned; its ids are then `gone` and take 16 bytes per thousand. A page with at least one id that is not
+/// erased takes 1 kB. A robot that runs indefinitely therefore needs memory for the existing objects, and almost none
+/// for erased ones.
 class paged_slots {
  public:
   static constexpr std::uint32_t erased = 0x80000000U;
@@ -84,7 +84,7 @@ class paged_slots {
     return next(
         i, [](std::uint32_t) { return true; }, [](std::uint32_t slot) { return slot != gone; });
   }
-  /// Returns the last id that is not erased; `size()` if there is none. Cost as for `next_contained`.
+  /// Returns the last id that is not erased; `size()` if there is none. Same cost as `next_contained`.
   [[nodiscard]] std::uint32_t last_contained() const noexcept {
     for (std::uint32_t i = size_; i != 0;) {
       const std::uint32_t at = i - 1;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The observation of a point by a keypoint, and the test whether they agree.
+/// The observation of a point by a keypoint, and a test of whether they agree.
 #pragma once
 
 #include <algorithm>
@@ -31,7 +31,7 @@ template <camera::camera_model Camera, feature_descriptor D>
 
 /// Sets the weights of an observation of the keypoint's own landmark. `deviation`: standard deviation of the keypoint's
 /// position, pixels of its level (`basic_frame::deviation`). The standard deviation of the depth is unchanged, but the
-/// third residual also contains that of the pixel.
+/// third residual also depends on the deviation of the pixel.
 inline void set_deviation(optimize::pose_observation& o, double deviation) {
   o.information /= deviation * deviation;
   o.depth_weight = std::min(1.0, deviation);

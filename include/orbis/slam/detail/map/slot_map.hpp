@@ -84,7 +84,7 @@ class slot_map {
   /// Returns the first id >= `i` that has an object; `end_id()` if there is none. O(erased ids skipped), in steps of
   /// 256 if all 256 are erased.
   [[nodiscard]] Id next_id(Id i) const noexcept { return slots_.next_contained(i.value()); }
-  /// Returns the first id >= `i` that has an object or a replacement; `end_id()` if there is none. Cost as for
+  /// Returns the first id >= `i` that has an object or a replacement; `end_id()` if there is none. Same cost as
   /// `next_id`.
   [[nodiscard]] Id next_known_id(Id i) const noexcept { return slots_.next_known(i.value()); }
 
@@ -156,9 +156,9 @@ class slot_map {
 
   [[nodiscard]] const_iterator begin() const { return {*this, 0}; }
   [[nodiscard]] const_iterator end() const { return {*this, end_id()}; }
-  /// The object with the smallest id. Cost as for `next_id`. @pre !empty()
+  /// The object with the smallest id. Same cost as `next_id`. @pre !empty()
   [[nodiscard]] const T& front() const { return *begin(); }
-  /// The object with the greatest id. Cost as for `next_id`. @pre !empty()
+  /// The object with the greatest id. Same cost as `next_id`. @pre !empty()
   [[nodiscard]] const T& back() const { return (*this)[slots_.last_contained()]; }
 
  private:

@@ -101,10 +101,10 @@ struct view_pair {
 /// Matches keypoints without landmarks between a keyframe and its best neighbours, along epipolar lines, and creates
 /// landmarks from the matches. The position is triangulated, or taken from the depth of either keypoint if that is more
 /// precise. A match becomes a landmark with both observations if
-/// - it is in front of both cameras;
+/// - its point is in front of both cameras;
 /// - the angle between the rays is large enough (not required if depth is used);
-/// - it agrees with both keypoints (chi-square, 95 %), and with their depth if available;
-/// - the ratio of its distances agrees with the keypoints' pyramid levels.
+/// - the point agrees with both keypoints (chi-square, 95 %), and with their depth if available;
+/// - the ratio of its distances from the two cameras agrees with the keypoints' pyramid levels.
 /// Returns the number of new landmarks. Computes O(neighbours x keypoints^2) distances to epipolar lines. @pre
 /// m.has_keyframe(newest)
 template <feature_descriptor D, camera::camera_model Camera>

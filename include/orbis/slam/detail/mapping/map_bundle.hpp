@@ -35,7 +35,7 @@ struct bundle_snapshot {
   std::vector<vec3> points;                                ///< position of each landmark in the world frame, metres
   std::vector<optimize::bundle_observation> observations;  ///< `pose` and `point` are indices into the arrays above
   std::vector<observation> sources;                        ///< keyframe and keypoint of each observation
-  keyframe_id end_keyframe = 0;                            ///< keyframes from this id on were added to the map later
+  keyframe_id end_keyframe = 0;                            ///< later keyframes have this id or a greater one
   landmark_id end_landmark = 0;
 
   /// Returns true if there is nothing to adjust.

@@ -291,11 +291,11 @@ class early_depth_twist {
     gain_ = change * inverse(change + inverse(of_twist));
   }
 
-  mat6 pose_covariance_ = zeros<mat6>(), former_covariance_ = zeros<mat6>();  ///< determined by pixels alone
+  mat6 pose_covariance_ = zeros<mat6>(), former_covariance_ = zeros<mat6>();  ///< determined only by pixels
   mat6 gain_ = identity<mat6>();
 };
 
-/// Refines pose and twist, or the pose alone, by Gauss-Newton steps as long as they reduce the cost. The observations
+/// Refines pose and twist, or only the pose, by Gauss-Newton steps as long as they reduce the cost. The observations
 /// should contain few outliers. O(observations) per step.
 template <camera::camera_model Camera>
 [[nodiscard]] moving_pose refine_moving_pose(std::span<const row_observation> observations,

@@ -130,8 +130,8 @@ class shutter_observer {
     return next;
   }
 
-  /// Returns the new estimate once there are enough equations, because it is better than the previous one, which was
-  /// linearised around a less accurate shutter.
+  /// Returns the new estimate if its deviation is at most twice that of the previous one, which was linearised around a
+  /// less accurate shutter; otherwise the previous one.
   [[nodiscard]] shutter_estimate best(const shutter_estimate& now) const {
     return last_ && !(now.read_out_deviation <= 2.0 * last_->read_out_deviation) ? *last_ : now;
   }

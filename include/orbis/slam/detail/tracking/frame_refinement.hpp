@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Refinement of a frame with a roughly known pose: by the landmarks around it, their patches, and depth.
+/// Refinement of a frame with a roughly known pose, using the landmarks around it, their patches, and depth.
 #pragma once
 
 #include <cstddef>

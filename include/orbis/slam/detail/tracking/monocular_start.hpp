@@ -67,8 +67,8 @@ class monocular_start {
   monocular_start(const camera_rig<Camera>& rig, const start_options& options, std::uint64_t seed = 1)
       : rig_{rig}, options_{options}, seed_{seed} {}
 
-  /// Processes the next frame; its pose is not used. Returns the start of a map and forgets all frames, or returns
-  /// nothing.
+  /// Processes the next frame; its pose is not used. If a map can be started, returns the result and forgets all
+  /// frames; otherwise returns an empty value.
   [[nodiscard]] std::optional<monocular_start_result<D>> process(const basic_frame<D>& f) {
     why_ = {errc::no_data, "map initialisation", "no earlier frame has enough matches"};
     std::erase_if(candidates_, [&](candidate& c) { return !follow(c, f); });

@@ -20,8 +20,8 @@
 
 namespace orbis::slam::detail {
 
-/// Returns the value of an image between pixels, by bilinear interpolation. @pre 0 <= x < width - 1, 0 <= y < height -
-/// 1
+/// Returns the value of an image between pixels, by bilinear interpolation.
+/// @pre 0 <= x < width - 1, 0 <= y < height - 1
 [[nodiscard]] inline float interpolate(image_view<const std::uint8_t> image, float x, float y) noexcept {
   const int left = static_cast<int>(x), top = static_cast<int>(y);
   const float fx = x - static_cast<float>(left), fy = y - static_cast<float>(top);

@@ -88,7 +88,7 @@ class patch_tracker {
       const basic_landmark<D>& l = m.landmark_at(f.landmarks[i]);
       const auto view = predict_view(f, i, l, T_camera_world, motion);
       if (!view) continue;
-      constexpr std::size_t every = 32;  // patches: takes a fraction of the time of the alignment
+      constexpr std::size_t every = 32;  // one in this number of patches is compared: much cheaper than the alignment
       if (estimates && !options_.exposure && shows_exposure(l.patch, *view) && moving++ % every == 0)
         compare_exposures(l.patch, *view);
       const auto found = match(l.patch, *view, seconds);

@@ -149,8 +149,8 @@ struct tracking_context {
     const basic_keyframe<D>& k = maps.active().at(reference.keyframe);
     return {reference, scaled(k.T_world_camera.inverse() * f.T_world_camera, 1.0 / k.scale), k.scale};
   }
-  /// Makes a tracked frame the last one, and updates the motion, which is unknown unless the frame follows the previous
-  /// last one.
+  /// Makes a tracked frame the last one, and updates the motion, which is unknown unless the preceding frame was also
+  /// tracked.
   void set_last(frame_type&& f, const anchored_pose& anchor) {
     if (follows_last(f)) motion.set({last.timestamp, last.T_world_camera}, {f.timestamp, f.T_world_camera});
     anchor_ = anchor;
