@@ -304,7 +304,7 @@ class depth_decoder {
     return {};
   }
 
-  std::vector<std::uint16_t> depths_;        // by rank
+  std::vector<std::uint16_t> depths_;        // indexed by rank
   std::vector<std::uint16_t> above_, here_;  // ranks of two rows
 };
 

@@ -65,7 +65,7 @@ class free_ranges {
   [[nodiscard]] std::uint64_t end() const noexcept { return end_; }
 
  private:
-  std::map<std::uint64_t, std::uint64_t> holes_;  // sizes by start
+  std::map<std::uint64_t, std::uint64_t> holes_;  // size of each hole, keyed by its start
   std::uint64_t end_ = 0;
 };
 

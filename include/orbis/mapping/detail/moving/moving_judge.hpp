@@ -154,7 +154,7 @@ class moving_judge {
     for (std::size_t i = 0; i != verdict_.size(); ++i) differ += verdict_[i] != v.removed[i] ? 1 : 0;
     return differ;
   }
-  /// Accepts the last verdict. @pre it is about this view
+  /// Accepts the last verdict. @pre the last verdict is for this view
   void accept(view& v) const { v.removed = verdict_; }
   /// The view's depth image without the removed cells. Valid until the next call.
   [[nodiscard]] depth_view masked(const view& v) {
