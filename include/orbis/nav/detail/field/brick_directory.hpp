@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Index from positions to brick indices; a brick has 8x8x8 voxels.
+/// Map from brick positions to brick indices; a brick has 8x8x8 voxels.
 #pragma once
 
 #include <algorithm>

@@ -55,7 +55,8 @@ struct equal_slices_kernel {
   }
 };
 
-/// Lowers the values of such slices to the source's offer where it is less and at most `bound`; updates `tops`.
+/// For the same slices as `equal_slices_kernel`: lowers values to the source's offer where it is less and at most
+/// `bound`; updates `tops`.
 struct lower_slices_kernel {
   using signature = void(std::uint16_t* targets, std::uint16_t* tops, const slice_offer* offer, int from, int first,
                          int last, unsigned skip, std::uint16_t bound);

@@ -48,7 +48,8 @@ class voxel_columns {
     const int found = next(occupied_, 0, x, y, z);
     return found < levels() ? found : std::numeric_limits<int>::max();
   }
-  /// A level up to which all voxels from `z` upwards are occupied: the end of the run or of its word.
+  /// A level up to which all voxels from `z` upwards are occupied: the end of the run, or of the 64-bit word that
+  /// contains `z` if that comes first.
   /// @pre the voxel at `z` is occupied; z >= 0
   [[nodiscard]] int end_of_run(int x, int y, int z) const noexcept {
     return z + std::countr_one(occupied_[place(x, y) + static_cast<std::size_t>(z >> 6)] >> (z & 63)) - 1;

@@ -38,7 +38,7 @@ struct plane_sums {
   int lowest = 0, highest = 0;  ///< extremes of z and 0
 };
 
-/// `T`: type of the sums; exact if each sum fits in a T (for double: if it is less than 2^53).
+/// Computes the sums. `T`: type of the sums; exact if each sum fits in a T (for double: if it is less than 2^53).
 template <class T>
 struct plane_sums_kernel {
   using signature = plane_sums(const level_window&);

@@ -60,8 +60,8 @@ class cell_floods {
     return std::any_of(cells.begin(), cells.end(), [&](const key& k) { return may_reach(k, max_cells); });
   }
   /// The cell nearest to the goal that is connected to the start, among the `max_cells` cells that a flood examines;
-  /// empty without doors. O(cells that are nearer to the goal, or enclosed together with such a cell), or O(cells
-  /// connected to the start).
+  /// empty if there are no doors. O(cells that are nearer to the goal, or enclosed together with such a cell), or
+  /// O(cells connected to the start).
   [[nodiscard]] std::optional<key> nearest(std::size_t max_cells) {
     // Visit cells around the goal in order of distance, as long as there are fewer of them than cells in a flood.
     constexpr double most = std::size_t{1} << 20U;
