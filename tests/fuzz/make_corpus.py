@@ -654,6 +654,7 @@ def texts():
     write("read_trajectory", "two_runs", b"".join(b"%d 0 0 %d 0 0 0 1\n" % (i, j) for j in (1, 2) for i in range(40)))
     write("read_trajectory", "repeated", b"1403715529000;1;2;3;0;0;0;1\n" * 2 + b"1403715529000;1;2;4;0;0;0;1\n" * 9)
     write("read_trajectory", "matrix", b"1 0 0 1\n0 0.001 -1 2\n0 1 0 3\n0 0 0 1\n")
+    write("read_trajectory", "many_columns", b"x" + b"," * 600 + b"\n1 0 0 0 0 0 0 1\n")
     write("read_trajectory", "mirror", b"1 0 0 1\n0 1 0 2\n0 0 -1 3\n0 0 0 1\n")
     sensor = (b"# General.\nsensor_type: camera\nT_BS:\n  cols: 4\n  rows: 4\n"
               b"  data: [0.0, -1.0, 0.0, 0.1,\n         1.0, 0.0, 0.0, -0.06,\n         0, 0, 1, 0.01,\n         0, 0, 0, 1]\n"

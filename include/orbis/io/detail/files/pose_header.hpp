@@ -67,9 +67,12 @@ struct column_name {
     return std::ranges::find(known, word) != std::end(known);
   }
 };
+/// The names of the columns in a line; empty for more than 200, which are not those of poses and would take many times
+/// the memory of the line.
 [[nodiscard]] inline std::vector<column_name> column_names(std::string_view line, char separator) {
   std::vector<column_name> names;
   while (!line.empty()) {
+    if (names.size() == 200) return {};
     const std::string_view field = next_value(line, separator);
     const bool nanoseconds = field.find("[ns") != field.npos || field.find("(ns") != field.npos;
     const bool is_unit = separator == ' ' && field.starts_with('[');
