@@ -7,10 +7,10 @@
 /// | `all_knn.hpp`              | k nearest neighbours of every point, and the mean distance to them          |
 /// | `cluster.hpp`              | filter: small groups of points far from the surface                         |
 /// | `extract.hpp`              | points by index; points inside a box; treatment of non-finite points        |
-/// | `filter_chain.hpp`         | a sequence of filters, as data                                              |
+/// | `filter_chain.hpp`         | a sequence of filters with their parameters                                 |
 /// | `filter_choice.hpp`        | options and result of the automatic selection, with its evidence            |
-/// | `flying_pixels.hpp`        | removal of flying pixels at edges of depth images                           |
-/// | `log_statistical.hpp`      | filter: mean neighbour distance relative to its median                      |
+/// | `flying_pixels.hpp`        | removal of flying pixels at edges in depth images                           |
+/// | `log_statistical.hpp`      | filter: large mean neighbour distance relative to the median                |
 /// | `nanoflann.hpp`            | neighbours of single points with a k-d tree; include it separately, needs nanoflann |
 /// | `neighbors.hpp`            | result type of nearest-neighbour searches                                   |
 /// | `radius.hpp`               | filter: points with too few neighbours within a radius                      |

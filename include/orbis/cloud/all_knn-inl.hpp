@@ -32,7 +32,7 @@ neighbor_table find_all_knn(const Policy& policy, const point_view& points, std:
         tree, kernels, out.width, begin, end,
         [&](std::size_t l, std::size_t i) { return row_of(tree.members[l * leaf_width + i]); }, [](std::size_t) {});
   });
-  // The neighbours of a point that was left out are the first of its copies.
+  // The nearest neighbours of a point that is in no leaf are its copies in the leaves; enough of them exist.
   for (const surplus_copy& copy : tree.left_out) {
     const auto row = row_of(copy.index);
     for (std::size_t n = 0; n != row.size(); ++n) row[n] = {tree.members[copy.kept + n], 0.0F};

@@ -59,10 +59,10 @@ template <execution_policy Policy, point_range Points>
 /// Computes for each point the mean distance in metres to its `k` nearest other points, or to all others if there are
 /// fewer than `k`. The result is NaN for non-finite points, and for a finite point that is the only one.
 ///
-/// Coordinates are converted to float. Squared distances are float; roots and sums are double, in ascending order; the
-/// mean is float. The result equals, bit for bit, the mean distances of the usual statistical outlier filter. O(n log
-/// n) for fixed k, even with many identical points; the same result for every policy and processor. Memory: about 40
-/// bytes per point, and 0.45 k + 42 kilobytes per thread.
+/// Coordinates are converted to float. Squared distances are computed in float; their roots are computed in double and
+/// summed in ascending order; the mean is rounded to float. The result equals, bit for bit, the mean distances of the
+/// usual statistical outlier filter. O(n log n) for fixed k, even with many identical points; the same result for every
+/// policy and processor. Memory: about 40 bytes per point, and 0.45 k + 42 kilobytes per thread.
 /// @pre k > 0, fewer than 2^32 points
 template <execution_policy Policy, point_range Points>
 [[nodiscard]] std::vector<float> all_mean_knn_distance(const Policy& policy, const Points& points, std::size_t k) {

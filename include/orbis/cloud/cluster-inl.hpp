@@ -148,17 +148,16 @@ class disjoint_sets {
 
 /// Connected components of the neighbour graph, in the order of their first vertices.
 struct linked_components {
-  std::vector<std::uint32_t> component;  ///< by vertex
-  std::vector<std::uint32_t> sizes;      ///< by component
-  std::vector<char> goes;                ///< by component: 1 if it is removed
+  std::vector<std::uint32_t> component;  ///< component of each vertex
+  std::vector<std::uint32_t> sizes;      ///< number of vertices of each component
+  std::vector<char> goes;                ///< per component: 1 if it is removed
   std::size_t min_size = 0;              ///< the `min_size` that was applied
 
   [[nodiscard]] bool is_small(std::uint32_t i) const noexcept { return sizes[component[i]] < min_size; }
 };
 
-/// Finds the components of a graph and decides which of them to remove. `gone`: by place, nonzero for points to ignore,
-/// or empty. `spacing`: by place, metres. O(links), 4 bytes per vertex and
-/// 5 per component.
+/// Finds the components of a graph and decides which of them to remove. `gone`: per place, nonzero for points to
+/// ignore; empty to ignore none. `spacing`: per place, metres. O(links); 4 bytes per vertex and 5 per component.
 template <execution_policy Policy>
 [[nodiscard]] linked_components separate(const Policy& policy, const neighbor_graph& graph, std::span<const char> gone,
                                          std::span<const float> spacing, const cluster_options& options) {
@@ -228,7 +227,7 @@ template <class Vertex, class Stays>
   cluster_result out;
   out.min_size = found.min_size;
   out.component.assign(count, cluster_result::none);
-  std::vector<std::uint32_t> number(found.sizes.size(), cluster_result::none);  // index by component of the graph
+  std::vector<std::uint32_t> number(found.sizes.size(), cluster_result::none);  // indexed by component of the graph
   for (std::size_t i = 0; i != count; ++i) {
     const std::int64_t v = vertex(i);
     if (v < 0) continue;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Removal of small isolated groups of points: dense enough to pass every density test, but far from the surface.
+/// Removal of small isolated groups of points that are dense enough to pass every density test but far from the
+/// surface.
 ///
 /// Points are linked to neighbours within a few times their spacing; linked points form components. A component is
 /// removed if it is small and separated from the large ones by many local spacings.
@@ -36,7 +37,7 @@ struct cluster_result {
   static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
 
   std::vector<std::uint32_t> inliers;    ///< indices, ascending
-  std::vector<std::uint32_t> component;  ///< component of each point, in order of first point; `none`: no component
+  std::vector<std::uint32_t> component;  ///< component of each point, numbered by their first points; or `none`
   std::vector<std::uint32_t> sizes;      ///< number of points of each component
   std::vector<char> removed;             ///< per component: nonzero if it is removed
   std::size_t min_size = 0;              ///< the `min_size` that was applied

@@ -64,8 +64,8 @@ struct ray_step {
 
 /// Criteria for neighbours that form a surface; density tests keep points on surfaces.
 struct surface_test {
-  double flatness = 0.15;   ///< maximum `off_plane` of a plane
-  double same_scale = 0.7;  ///< neighbours denser by more than this (log) do not support a point
+  double flatness = 0.15;   ///< maximum deviation from a plane, in units of the mean neighbour distance
+  double same_scale = 0.7;  ///< neighbours whose log spacing is lower by more than this give no support
   std::size_t support = 3;  ///< supporting neighbours required among the nearest 8, unless the point is in a plane
 };
 
@@ -77,7 +77,8 @@ struct density_step {
   double offset = 0;     ///< offset of the bulk from its surroundings in the local mode
   double threshold = 0;  ///< outliers: log spacing - usual > threshold
   surface_test surface{};
-  /// Log spacing on surfaces as a function of log range; neighbours with it count as a surface. Empty: `usual`.
+  /// Log spacing on surfaces as a function of log range; neighbours that are not much sparser count as a surface.
+  /// Empty: `usual`.
   std::optional<log_line> surface_spacing{};
 
   [[nodiscard]] const log_line& surface_line() const noexcept { return surface_spacing ? *surface_spacing : usual; }
@@ -96,7 +97,7 @@ struct isolation_step {
 using filter_step =
     std::variant<ray_step, density_step, isolation_step, cluster_options, statistical_options, radius_options>;
 /// Filters in order; each step tests the points that the previous ones kept. The density, isolation and cluster tests
-/// share one pass over the neighbours of the points present before the first of them.
+/// share one neighbour search, among the points that remain before the first of these tests.
 using filter_chain = std::vector<filter_step>;
 
 [[nodiscard]] inline filter_mode step_mode(const filter_step& step) noexcept {

@@ -47,12 +47,12 @@ struct density_evidence {
 struct filter_evidence {
   std::size_t points = 0;                   ///< number of points
   std::size_t finite = 0;                   ///< number of finite points
-  std::size_t judged = 0;                   ///< finite, with a finite range if any point has one, and spacing > 0
+  std::size_t judged = 0;                   ///< number of points with spacing > 0 and, if any range is known, a range
   double median_spacing = 0;                ///< median over the points of the mean neighbour distance
   double left_scale = 0;                    ///< width of the bulk below its median with the chosen reference, log
   double right_scale = 0;                   ///< width of the bulk above its median, log
   double global_scale = 0;                  ///< width with one reference for all points, log
-  std::optional<double> range_scale;        ///< width with the reference over range, if ranges are known
+  std::optional<double> range_scale;        ///< width with a reference that depends on range, if ranges are known
   double local_scale = 0;                   ///< width with the surroundings as the reference
   std::vector<density_evidence> density{};  ///< one entry per test performed
   double isolated = 0;                      ///< share of points removed as isolated groups

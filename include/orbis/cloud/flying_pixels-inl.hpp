@@ -59,8 +59,8 @@ struct flag_between {
       const float w = l.center[i];
       const float a = l.before[i];
       const float b = l.after[i];
-      // Slopes over `reach` pixels; an unmeasured surface takes the slope of the other side. Values outside the image
-      // are NaN, as are differences with them, so all comparisons are false.
+      // Slopes over `reach` pixels. If the slope on one side is unknown, that of the other side is used. Values outside
+      // the image are NaN, as are differences with them, so all comparisons are false.
       const std::uint32_t a_known = exceeds(a, 0.0F) & differ(l.before_that[i], 0.0F);
       const std::uint32_t b_known = exceeds(b, 0.0F) & differ(l.after_that[i], 0.0F);
       const float a_own = masked(a - l.before_that[i], a_known);
@@ -69,7 +69,7 @@ struct flag_between {
       const float b_slope = b_own - masked(a_own, ~b_known);
       const float a_here = a + a_slope;
       const float b_here = b + b_slope;
-      // Each surface may continue flat, extrapolated, or anywhere in between.
+      // At the pixel, a surface may have its sampled value, its extrapolated value, or any value between the two.
       const float a_low = a < a_here ? a : a_here;
       const float a_high = a_here < a ? a : a_here;
       const float b_low = b < b_here ? b : b_here;
@@ -90,7 +90,7 @@ struct flag_between {
   }
 };
 
-/// Number of the eight neighbours of the pixel at `center` with the same depth.
+/// Returns the number of neighbours (of eight) with the same depth as the pixel at `center`.
 [[nodiscard]] inline int flying_support(const float* center, std::ptrdiff_t stride, float tolerance) noexcept {
   int count = -1;  // the pixel itself
   for (std::ptrdiff_t y = -1; y <= 1; ++y) {
@@ -115,7 +115,7 @@ flying_pixel_count read_without_flying_pixels(const Policy& policy, const depth_
   for_each_index(policy, counts.size(), grain, [&](std::size_t row) {
     const int y = static_cast<int>(row);
     float* const z = out.row(y).data();
-    depth.read(depth.depth, y, width, z);  // may be in place
+    depth.read(depth.depth, y, width, z);  // the output may overwrite the input
     float* const w = &inverse(border, y + border);
     std::uint32_t valid = 0;
     for (int x = 0; x != width; ++x) {

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
 /// Detection of flying pixels in depth images: at the edge of a near surface in front of a far one, pixels that see
-/// both measure a depth in between, where there is no surface.
+/// both surfaces measure a depth between them, where there is no surface.
 ///
 /// The test works on inverse depth along the rows and columns of the image. Inverse depth is linear over the image of a
 /// plane of any slant, and for a triangulating camera (sigma_z ~ z^2) its noise and quantisation are the same at every
 /// depth. A pixel is flying if the surfaces on its two sides, each extrapolated to the pixel along its own slope,
-/// differ by a jump, and the pixel lies between the two, clear of both. It is kept if enough of the pixels around it
-/// have the same depth, as on a thin real object. A missing measurement counts as infinitely far, because the shadow
-/// next to a near surface is also an edge.
+/// differ by a jump, and the pixel lies between the two, at a distance from both. It is kept if enough of the pixels
+/// around it have the same depth, as on a thin real object. A missing measurement counts as infinitely far, because the
+/// shadow next to a near surface is also an edge.
 ///
 /// Sources: M. Reynolds, J. Dobos, L. Peel, T. Weyrich, G. J. Brostow, "Capturing time-of-flight data with
 /// confidence", CVPR 2011; A. Sabov, J. Krueger, "Identification and correction of flying pixels in range

@@ -36,8 +36,8 @@ struct log_statistical_result {
   double threshold_distance = std::numeric_limits<double>::infinity();  ///< the threshold as a mean distance, metres
 };
 
-/// Classifies points by known mean distances, see `log_statistical_inliers`. `non_finite` applies to points without one
-/// (NaN). O(n).
+/// Classifies points by known mean distances, see `log_statistical_inliers`. `non_finite` applies to points without a
+/// mean distance (NaN). O(n).
 [[nodiscard]] log_statistical_result log_statistical_decision(std::vector<float> mean_distance,
                                                               const log_statistical_options& options = {});
 

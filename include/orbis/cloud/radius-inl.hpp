@@ -25,7 +25,7 @@ class crowd_search {
   /// `enough`: minimum number of points, including the point itself.
   crowd_search(const leaf_hierarchy& tree, const knn_kernels& kernels, float radius, std::size_t enough)
       : tree_{&tree}, kernels_{kernels}, bound_{radius * radius}, enough_{enough}, near_{most_leaves} {
-    // If `enough` is too large for the gathered list, counting stops as soon as enough points are found.
+    // Without these lists, points are counted one by one, until enough are found.
     if (std::isfinite(bound_) && enough <= most_found) {
       chosen_.resize(near_.leaves.size() + leaf_width);
       found_.resize(enough + 4 * leaf_width);
@@ -37,7 +37,7 @@ class crowd_search {
   void visit_leaf(std::size_t l, F&& f) {
     const std::size_t size = tree_->leaf_size(l);
     const box3 box = tree_->levels[0][l / leaf_width].child(l % leaf_width);
-    // No two points of a box are further apart than its corners, even after rounding.
+    // No two points in a box are further apart than its opposite corners, even after rounding.
     const bool all_near = squared_distance(box.low, box.high) <= bound_;
     bool gathered = false;
     bool usable = !found_.empty();
@@ -99,7 +99,7 @@ std::vector<std::uint32_t> find_radius_inliers(const Policy& policy, const point
           l, [&](std::size_t i, bool has_enough) { kept[tree.members[l * leaf_width + i]] = has_enough ? 1 : 0; });
     }
   });
-  // The leaves hold enough copies of each point that was left out.
+  // Each point that is in no leaf has enough copies in the leaves.
   for (const surplus_copy& copy : tree.left_out) kept[copy.index] = 1;
   return indices_where(count, [&](std::size_t i) { return kept[i] != 0; });
 }

@@ -53,7 +53,7 @@ struct ray_evidence_result {
   std::size_t seen = 0;                ///< number of points with evidence from at least one view
 };
 
-/// Returns true if the counts show that the point does not exist.
+/// Returns true if enough views pass through the point for it to be an outlier.
 [[nodiscard]] constexpr bool is_passed_through(const ray_evidence& e, const ray_evidence_options& options) noexcept {
   const int against = e.through + e.refuted;
   return against >= options.min_through && against > options.ratio * e.supported;

@@ -42,15 +42,15 @@ concept posed_depth_range =
 /// Options for counting rays and for the decision.
 struct ray_evidence_options {
   int window = 1;                ///< radius in pixels of the window of depths around a pixel; >= 0
-  float margin = 0.02F;          ///< allowance for noise and small pose errors, metres:
-  float margin_growth = 0.005F;  ///< margin + margin_growth z^2 at depth z; 1 / metres
+  float margin = 0.02F;          ///< constant part of the allowance for noise and small pose errors, metres
+  float margin_growth = 0.005F;  ///< the allowance at depth z is margin + margin_growth z^2; 1 / metres
   float slant = 1.0F;      ///< fraction of the window's depth range added to the margin for rays that pass through
-  float min_depth = 0.0F;  ///< a view provides no evidence on points at or below this depth, metres
-  float max_depth = std::numeric_limits<float>::max();  ///< nor on points beyond this depth, metres
+  float min_depth = 0.0F;  ///< views provide evidence only about points beyond this depth, metres
+  float max_depth = std::numeric_limits<float>::max();  ///< and up to this depth, metres
   bool resolve_ghosts = true;     ///< read the views a second time to find parts that most other views contradict
   float ghost_reach = 0.3F;       ///< maximum distance of a contradicting surface in front of a measurement, metres
-  std::uint16_t min_through = 2;  ///< an outlier has at least this many views against it,
-  double ratio = 1.0;             ///< and more than this factor times the number of views that support it
+  std::uint16_t min_through = 2;  ///< minimum number of views that pass through an outlier
+  double ratio = 1.0;             ///< this number must also exceed `ratio` times the number of supporting views
 };
 
 /// Counts for one point: views whose rays pass through it, views that measured a surface at it, and views whose support

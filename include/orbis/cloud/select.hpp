@@ -45,7 +45,8 @@ namespace detail {
 /// Type-erased callback that evaluates points against views. Returns false if cancelled.
 struct view_judge {
   const void* context = nullptr;
-  /// Sets `left` to 0 for the points that the views exclude, and adds a step and its reason; null without views.
+  /// Sets `left` to 0 for the points that the views exclude, and adds a step and its reason; null if there are no
+  /// views.
   bool (*run)(const void* context, std::span<char> left, filter_choice& choice,
               std::vector<std::string>& reasons) = nullptr;
 };

@@ -47,8 +47,8 @@ struct statistical_result {
   double threshold = 0;                ///< mu + alpha sigma; points above it are outliers
 };
 
-/// Classifies points by known mean distances, see `statistical_inliers`. `non_finite` applies to points without one
-/// (NaN). O(n).
+/// Classifies points by known mean distances, see `statistical_inliers`. `non_finite` applies to points without a mean
+/// distance (NaN). O(n).
 ///
 /// The variance is a difference of sums, as in other implementations, and can be negative if all distances are nearly
 /// equal. The spread of such a cloud cannot be measured: sigma is then reported as 0 and the threshold as infinite, and

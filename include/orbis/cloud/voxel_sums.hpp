@@ -65,8 +65,8 @@ struct brick_place {
 
 }  // namespace detail
 
-/// A part of a set of measurements, grouped into runs within one brick each, as input for `voxel_sums`. Reuses its
-/// memory.
+/// Part of a set of measurements, the input of `voxel_sums`, grouped into runs of measurements in the same brick.
+/// Reuses its memory.
 class voxel_measurements {
  public:
   /// @pre size > 0, metres
@@ -107,7 +107,7 @@ class voxel_measurements {
   friend class voxel_sums;
   struct run {
     detail::voxel_key brick;
-    std::uint32_t begin;  ///< the run ends where the next one begins
+    std::uint32_t begin;  ///< index of the first item of the run, which ends where the next run begins
   };
   double steps_per_metre_;
   std::vector<detail::voxel_item> items_;
@@ -117,7 +117,7 @@ class voxel_measurements {
 };
 
 /// The mean of the measurements in each voxel. It depends only on the measurements added and not yet removed, not on
-/// their order, the number of threads or earlier measurements. About 50 bytes per voxel.
+/// their order, the number of threads or earlier measurements. Takes about 50 bytes per voxel.
 class voxel_sums {
   [[nodiscard]] auto key_by_number() const {
     return [this](std::uint32_t number) -> const detail::voxel_key& { return bricks_[number].key; };
@@ -158,8 +158,8 @@ class voxel_sums {
     return bytes;
   }
 
-  /// Position of every voxel in the order of `cloud`: sorted by brick, then by voxel, along z, y, x. Valid until the
-  /// next change. O(bricks log bricks).
+  /// Position of every voxel in the order of `cloud`: sorted by brick, then by voxel, each in the order of z, y and x.
+  /// Valid until the next change. O(bricks log bricks).
   class order {
    private:
     friend class voxel_sums;
@@ -304,7 +304,7 @@ class voxel_sums {
   template <bool Add, execution_policy Policy>
   void apply(const Policy& policy, std::span<voxel_measurements> parts) {
     assert(!finished_);
-    // Runs are chained by brick; then one thread handles each brick.
+    // Chain the runs of each brick, so that one thread can handle the whole brick.
     std::size_t total = 0;
     for (const auto& part : parts) total += part.runs_.size();
     chained_.clear();
