@@ -25,8 +25,8 @@ namespace orbis::features {
 /// Limits on the distance between a match and its epipolar line.
 struct epipolar_rule {
   float distance = 1.96F;       ///< maximum at the finest level, pixels; accepts 95 % of matches if sigma is one pixel
-  float scale_factor = 1.2F;    ///< scale factor of the pyramid: the limit grows by it per level of the train keypoint
-  float epipole_radius = 0.0F;  ///< excludes train keypoints this close to the epipole (no parallax); grows likewise
+  float scale_factor = 1.2F;    ///< scale factor of the pyramid; multiplies the limit per level of the train keypoint
+  float epipole_radius = 0.0F;  ///< train keypoints closer to the epipole are excluded (no parallax); scales likewise
 };
 
 /// Finds, for each query, the nearest and second-nearest train descriptors among those close to its epipolar line. Used
@@ -38,7 +38,8 @@ struct epipolar_rule {
 ///   std::vector<match> found = matcher(f1, f2, ray_geometry{rays1, rays2, T_camera2_camera1, focal});
 /// @endcode
 ///
-/// The reverse neighbour of a train descriptor is the nearest query among those whose line it is close to.
+/// The reverse neighbour of a train descriptor is the nearest query among those whose epipolar lines pass close to its
+/// keypoint.
 template <class Distance>
 struct epipolar_source {
   using match_source_tag = void;
@@ -47,7 +48,7 @@ struct epipolar_source {
 
   struct workspace {
     detail::search_among_workspace search;
-    std::vector<float> x, y, limit;  ///< of the train keypoints, padded to whole blocks
+    std::vector<float> x, y, limit;  ///< positions and limits of the train keypoints, padded to whole blocks
   };
 
   /// Reports invalid arguments with a single compiler error.
@@ -60,8 +61,8 @@ struct epipolar_source {
     static_assert(epipolar_geometry<Other>, "orbis: epipolar(...) requires an epipolar_geometry, such as ray_geometry");
   }
 
-  /// Returns one candidate for each query with a train keypoint close to its line. O(queries x trains) distances to
-  /// lines.
+  /// Returns one candidate for each query with a train keypoint close to its line. Computes O(queries x trains)
+  /// distances to lines.
   /// @pre one keypoint for each descriptor on both sides
   template <class Descriptor, epipolar_geometry Geometry>
   requires descriptor_distance<Distance, Descriptor>

@@ -47,7 +47,7 @@ template <class Target>
       words::generate([](std::size_t i) ORBIS_INLINE_LAMBDA { return i % 2 == 0 ? luma_red : luma_green; });
   const words blue_weight =
       words::generate([](std::size_t i) ORBIS_INLINE_LAMBDA { return i % 2 == 0 ? luma_blue : 0; });
-  // Computes the luma of four pixels at p and at each further 48 bytes; reads four bytes beyond the four pixels.
+  // Computes the luma of four pixels at p and at every 48th byte after it; reads four bytes beyond the four pixels.
   const auto fours = [&](const std::uint8_t* p) ORBIS_INLINE_LAMBDA {
     const bytes v = blocks_of_16<Target>(p, 48);
     const numbers sum =
@@ -55,7 +55,7 @@ template <class Target>
         multiply_add_pairs(simd::bits_as<std::int16_t>(look_up_in_blocks(v, blue)), blue_weight);
     return simd::bits_as<std::uint8_t>((sum + numbers(1 << 14)) >> 15);
   };
-  // Shuffles that select, in each 16-byte block, four numbers of `a`, then four of `b`, as words.
+  // Shuffles that select, in each 16-byte block, four values of `a`, then four of `b`, as words.
   const bytes first = bytes::generate([](std::size_t i) ORBIS_INLINE_LAMBDA {
     return i % 16 < 8 ? static_cast<std::uint8_t>(i % 8 / 2 * 4 + i % 2) : zero;
   });

@@ -45,7 +45,7 @@ struct feature_view {
   std::span<const Descriptor> descriptors;
 };
 
-/// Converts any valid argument of a matcher to a view: `basic_features`, a `feature_view`, a contiguous range of
+/// Converts any valid argument of a matcher to a view: `basic_features`, a `feature_view` or a contiguous range of
 /// descriptors.
 template <class Descriptor>
 [[nodiscard]] feature_view<Descriptor> as_view(const basic_features<Descriptor>& f) noexcept {

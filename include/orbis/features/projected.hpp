@@ -32,8 +32,8 @@ struct projection {
 /// Search radius around a projection, and pyramid levels to search.
 struct projection_rule {
   float radius = 4.0F;            ///< radius of the window for points predicted at the finest level, pixels
-  float slanted = 1.6F;           ///< factor on the radius if the viewing direction differs from the earlier one
-  float frontal_cosine = 0.998F;  ///< the viewing direction differs if its cosine is below this
+  float slanted = 1.6F;           ///< factor that multiplies the radius if the viewing direction differs from before
+  float frontal_cosine = 0.998F;  ///< the viewing direction counts as different if the cosine is below this
   float min_cosine = 0.5F;        ///< points with a smaller cosine are not searched for; -1: no limit
   float range_tolerance = 0.2F;   ///< fraction by which the distance may exceed the point's range at either end
   int levels = 8;                 ///< number of levels of the extractor's pyramid
@@ -43,7 +43,7 @@ struct projection_rule {
 
 /// The predicted pyramid level of a point that appears at the finest level at `max_distance`: log(max_distance /
 /// distance) / log(scale_factor), rounded up, which gives better tracking on real recordings than rounding to the
-/// nearest.
+/// nearest level.
 [[nodiscard]] inline int predicted_octave(float distance, float max_distance, int levels, float scale_factor) noexcept {
   assert(levels > 0 && scale_factor > 1.0F);
   const double octave = std::ceil(std::log(static_cast<double>(max_distance) / static_cast<double>(distance)) /

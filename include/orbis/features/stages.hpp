@@ -42,7 +42,7 @@ struct max_distance {
 /// Of the candidates with the same train descriptor, keeps the nearest (the lowest query on ties). Unlike
 /// `cross_check`, only candidates left by earlier stages compete.
 struct unique {
-  using workspace = std::vector<std::uint32_t>;  ///< the smallest distance, by train descriptor
+  using workspace = std::vector<std::uint32_t>;  ///< the smallest distance for each train descriptor
 
   void operator()(std::vector<candidate>& candidates, std::span<const keypoint>, std::span<const keypoint>,
                   workspace& nearest) const {
@@ -52,7 +52,7 @@ struct unique {
     for (const candidate& c : candidates) nearest[c.train] = std::min(nearest[c.train], c.distance);
     std::erase_if(candidates, [&](const candidate& c) {
       if (c.distance != nearest[c.train]) return true;
-      nearest[c.train] = none;  // assigned: rejects later candidates with equal distance
+      nearest[c.train] = none;  // mark as assigned, to reject later candidates with the same distance
       return false;
     });
   }

@@ -64,9 +64,9 @@ struct stereo_options {
   float rows = 2.0F;            ///< maximum row difference between the keypoints, pixels of a level
   int octaves = 1;              ///< maximum level difference between the keypoints
   std::uint32_t distance = 75;  ///< maximum descriptor distance
-  int radius = 5;               ///< half the side of the compared square, pixels of a level; maximum 15
-  int slide = 5;                ///< shift to either side of the right keypoint, pixels of a level; maximum 15
-  float outlier = 3.0F;         ///< drops matches whose pixel difference exceeds this multiple of the median
+  int radius = 5;               ///< half the side of the compared square, pixels of a level; <= 15
+  int slide = 5;                ///< maximum shift from the right keypoint in either direction, pixels of a level; <= 15
+  float outlier = 3.0F;         ///< maximum pixel difference of a match, as a multiple of the median over all matches
 };
 
 /// Finds the right-image coordinates of the left image's features in a rectified pair. The descriptor of a feature is
