@@ -61,7 +61,7 @@ class store_reader {
 
   const brick_store<T>* store_;
   voxel_key at_{~0U, ~0U, ~0U};  ///< the last voxel read; initially far from all others
-  std::uint32_t cells_ = 0;      ///< edge of the node around it that `octant_` represents
+  std::uint32_t cells_ = 0;      ///< edge in voxels of the node around `at_` that `octant_` represents
   const chunk* chunk_ = nullptr;
   const brick<T>* brick_ = nullptr;
   octant_view<T> octant_;

@@ -126,7 +126,7 @@ class change_log {
   struct entry {
     std::uint64_t octant;  ///< Morton code
     std::uint64_t mask;
-    std::uint64_t revision;  ///< revision of the change; the last one of merged entries
+    std::uint64_t revision;  ///< revision of the change; for merged entries, the last of their revisions
   };
 
   /// A first-in-first-out ring buffer that grows to its maximum size.

@@ -66,7 +66,7 @@ class scan_history {
   using model = typename Octree::model;
 
   /// Creates an empty map. `resolution`: edge of a voxel, metres. `tree_depth`: the map is 2^tree_depth voxels wide.
-  /// @pre as for occupancy_octree
+  /// @pre as for the constructor of occupancy_octree
   explicit scan_history(double resolution, int tree_depth = default_tree_depth) : map_{resolution, tree_depth} {
     map_.track_changes();
   }
