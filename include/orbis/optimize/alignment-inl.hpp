@@ -28,7 +28,7 @@ class alignment_estimator {
  public:
   struct model {
     Transform transform;           ///< transform between the centred points
-    std::array<float, 12> rows{};  ///< the transform as 3x4 matrix, row by row
+    std::array<float, 12> rows{};  ///< the transform as a 3x4 matrix, row by row
   };
   static constexpr std::size_t sample_size = 3;
   static constexpr bool with_scale = std::same_as<Transform, sim3>;
@@ -104,7 +104,7 @@ class alignment_estimator {
   }
 
   std::vector<pair> pairs_;
-  std::vector<float> columns_;  ///< coordinates of from and to, and weights
+  std::vector<float> columns_;  ///< coordinates of `from` and `to`, and the weights
   std::size_t stride_ = 0;
 };
 

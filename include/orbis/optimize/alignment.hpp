@@ -98,7 +98,7 @@ template <point_range From, point_range To>
 }
 
 struct alignment_options {
-  /// Maximum distance between the transformed point and its partner for an inlier: in metres, or in units of
+  /// Maximum distance between a transformed point and its partner in an inlier pair: in metres, or in units of
   /// `deviations` if specified.
   double threshold = 0.05;
   double confidence = 0.9999;

@@ -67,11 +67,11 @@ class bundle_adjuster {
   void chi2(std::span<const camera_state> cameras, std::span<const vec3> points,
             std::span<const observation> observations, std::span<double> out);
 
-  /// Minimises the robust cost over `cameras` and `points`. Their final cost is never higher than the initial one, and
-  /// they are unchanged if the status is a failure (`is_failure`). Observations that are not finite, or have no
-  /// projection at the start, are excluded; the summary contains their number.
-  /// `callback(iteration, max_iterations)` is called before each step and returns false to stop. `report(summary)` is
-  /// called before the first step and after each one.
+  /// Minimises the robust cost over `cameras` and `points`. The final cost is never higher than the initial one, and
+  /// the estimates are unchanged if the status is a failure (`is_failure`). Observations that are not finite, or have
+  /// no projection at the start, are excluded; the summary contains their number. `callback(iteration, max_iterations)`
+  /// is called before each step and returns false to stop. `report(summary)` is called before the first step and after
+  /// each one.
   /// @pre the options' spans are empty or of matching length
   template <execution_policy Policy, class Report = detail::no_report>
   bundle_summary solve(const Policy& policy, std::span<camera_state> cameras, std::span<vec3> points,

@@ -56,15 +56,14 @@ concept observation_of_a_point = std::copyable<O> && requires(const O& o) {
 /// The residual of one observation of a point by a camera.
 ///
 /// - `R::camera_state` is the estimated state of each camera (a pose, or a pose with intrinsics); `R::camera_manifold`
-/// defines its steps;
+///   defines its steps;
 /// - `r.prepare(state)` computes an `R::view`, the values shared by all observations by one camera; it is called once
-/// per camera and linearisation;
+///   per camera and linearisation;
 /// - `r.is_usable(o)` is false for an observation that must be excluded, for example a non-finite one;
 /// - `r.residual(view, point, o)` is a vector of `R::dimension` numbers, not yet whitened, or empty if the point has no
-/// projection. `point` is in the world frame;
+///   projection. `point` is in the world frame;
 /// - `r.linearize(view, point, o, by_camera, by_point)` returns the same vector and writes its derivatives with respect
-/// to
-///   a step of the camera and to the point.
+///   to a step of the camera and to the point.
 template <class R>
 concept bundle_residual = std::copyable<R> && camera_manifold<typename R::camera_manifold> &&
     observation_of_a_point<typename R::observation> &&

@@ -44,9 +44,10 @@ class pose_graph_solver {
   explicit pose_graph_solver(Loss loss = {}, Damping damping = {}, Between between = {});
 
   /// Minimises half the sum of the robust loss over the edges by moving `vertices`. The final cost is never higher than
-  /// the initial one, and the vertices are unchanged if the status is a failure. Vertices do not move if they have no
-  /// edges, and only in directions that the edges determine; if there are others, `gauss_newton` stops with `singular`.
-  /// Every execution policy gives the same result. One step takes O(blocks of the factor).
+  /// the initial one, and the vertices are unchanged if the status is a failure. Vertices without edges do not move,
+  /// and the others move only in directions that the edges determine. If the edges leave a direction undetermined,
+  /// `gauss_newton` stops with `singular`. Every execution policy gives the same result. One step takes O(blocks of the
+  /// factor).
   ///
   /// `callback(iteration, max_iterations)` is called before each step and returns false to stop. `report(summary)` is
   /// called before the first step and after each one.

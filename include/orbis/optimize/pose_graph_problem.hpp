@@ -65,9 +65,9 @@ struct logarithm_between {
   }
 };
 
-/// The translation of `D` and the vector part of its quaternion, with a positive real part. This is the residual of
-/// g2o's `EDGE_SE3:QUAT`, compatible with the information matrices and chi-squared values of g2o files. It is cheaper
-/// than the logarithm; for small angles its rotational part is half as large.
+/// The translation of `D` and the vector part of its quaternion, whose sign is chosen so that the real part is
+/// positive. This is the residual of g2o's `EDGE_SE3:QUAT`, compatible with the information matrices and chi-squared
+/// values of g2o files. It is cheaper than the logarithm; for small angles its rotational part is half as large.
 ///
 /// Source: R. Kuemmerle, G. Grisetti, H. Strasdat, K. Konolige, W. Burgard, "g2o: a general framework for
 /// graph optimization", ICRA 2011.

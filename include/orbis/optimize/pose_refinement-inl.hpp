@@ -224,10 +224,10 @@ pose_refinement refine_pose(std::span<const pose_observation> observations, cons
   bool changed = true;
   for (int round = 0; round < options.rounds; ++round) {
     const bool last = round + 1 == options.rounds;
-    if (last)  // an infinite width is least squares, with the same bits
+    if (last)  // an infinite width gives least squares, with the same bits
       out.status = refiner.run_round(huber{std::numeric_limits<double>::infinity()}, 1e-9);
     else if (changed || out.status != refinement_status::converged)
-      out.status = refiner.run_round(loss, 1e-6);  // only needs to identify the outliers
+      out.status = refiner.run_round(loss, 1e-6);  // this round only needs to identify the outliers
     else
       continue;  // the problem is the same as in the previous round
     if (out.status == refinement_status::degenerate) return give_up(out.status);

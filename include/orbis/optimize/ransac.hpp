@@ -34,7 +34,7 @@ namespace orbis::optimize {
 /// - `squared_error(model, i)`: the squared error of data point `i`, in squared units of the threshold;
 ///   infinite or NaN if it has none.
 /// - `refine(model, inliers)`: a better model from many data points, starting at `model`; empty if that fails. Return
-/// the model itself to disable refinement.
+///   the model itself to disable refinement.
 template <class E>
 concept model_estimator = requires(const E& estimator, const typename E::model& model,
                                    std::span<const std::uint32_t> indices, std::size_t i,

@@ -35,7 +35,7 @@ struct self_calibrated {
   parameter_matrix covariance = zeros<parameter_matrix>();
   std::size_t observations = 0;  ///< number of observations used
   std::size_t outliers = 0;      ///< number of these that were excluded at the end
-  double initial_rms = 0.0;      ///< RMS of the inliers, in standard deviations, before ...
+  double initial_rms = 0.0;      ///< RMS residual of the inliers in standard deviations, before the adjustment ...
   double final_rms = 0.0;        ///< ... and after
   int iterations = 0;
 };
