@@ -80,10 +80,10 @@ struct nearby_leaves {
   }
 };
 
-/// Partial result for the `wanted` smallest of some squared distances.
+/// Partial result for the `wanted` smallest values of a list of squared distances.
 struct nearest_sum {
   double roots = 0;           ///< sum of the roots, with relative error up to `roots_slack`; negative if unknown
-  float largest_squared = 0;  ///< the largest of them
+  float largest_squared = 0;  ///< the largest of these squared distances
 };
 
 /// Upper bound on the relative error of `nearest_sum::roots`: the error of roots from Newton's method and of
@@ -98,7 +98,7 @@ template <simd::vector V>
   return (x * x + y * y) + z * z;
 }
 
-/// A point or the corner of a box, each coordinate broadcast to all lanes.
+/// A point or the corner of a box, with each coordinate broadcast to all lanes.
 template <simd::vector V>
 struct spread_point {
   V x, y, z;
@@ -156,8 +156,8 @@ struct leaf_distances {
   }
 };
 
-/// Writes the squared distances from a point to the points of a leaf, if they are within `bound`, contiguously; returns
-/// their number. May write up to sixteen values.
+/// Writes contiguously the squared distances within `bound` from a point to the points of a leaf; returns their number.
+/// May write up to sixteen values.
 struct near_in_leaf {
   template <simd::vector V>
   static ORBIS_ALWAYS_INLINE std::size_t keep(const point_row& leaf, const spread_point<V>& q, const V& bound,
@@ -197,9 +197,9 @@ struct chosen_leaves {
   }
 };
 
-/// Writes the squared distances from a point to the points of the chosen leaves, if they are within `bound`, followed
-/// by sixteen infinities. Returns their number. Ends early if there are more than `capacity`; writes at most `capacity
-/// + 3 * leaf_width` values.
+/// Writes the squared distances within `bound` from a point to the points of the chosen leaves, followed by sixteen
+/// infinities. Returns their number. Ends early if there are more than `capacity`; writes at most `capacity + 3 *
+/// leaf_width` values.
 struct near_in_leaves {
   template <simd::vector V>
   static ORBIS_ALWAYS_INLINE std::size_t collect(const point_row* leaves, const std::uint32_t* chosen,
@@ -312,7 +312,7 @@ struct sum_nearest {
     using lanes = simd::vec<float, leaf_width, Target>;
     using numbers = simd::vec<std::int32_t, leaf_width, Target>;
     const lanes v = lanes::load(values);
-    numbers even = 0, odd = 0;  // for each value, minus the number of smaller ones
+    numbers even = 0, odd = 0;  // for each value, the negated number of smaller values
     for (std::size_t i = 0; i != leaf_width; i += 2) {
       count_smaller(even, values[i], v);
       count_smaller(odd, values[i + 1], v);
@@ -379,7 +379,8 @@ struct sum_nearest {
     }
   };
 
-  /// Adds `times` the root of the largest squared distance to a sum of roots; negative if the sum is unknown.
+  /// Returns a sum of roots with `times` times the root of the largest squared distance added; negative if it is
+  /// unknown.
   static ORBIS_ALWAYS_INLINE double with_largest(double roots, std::size_t times, float largest_squared) noexcept {
     return roots < 0 ? -1.0 : roots + static_cast<double>(times) * std::sqrt(static_cast<double>(largest_squared));
   }
@@ -500,8 +501,8 @@ struct ranked_of_leaf {
   }
 };
 
-/// Adds the boxes selected by the bits of `wanted` to `near`; the first box of the row belongs to leaf, or row,
-/// `first`.
+/// Adds the boxes selected by the bits of `wanted` to `near`; the first box is that of leaf `first`, or of row `first`
+/// of leaves.
 struct gather_leaves {
   template <simd::target Target>
   static ORBIS_ALWAYS_INLINE void run(const box_row& boxes, std::uint32_t wanted, std::uint32_t first,

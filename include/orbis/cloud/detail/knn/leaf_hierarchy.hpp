@@ -92,9 +92,9 @@ struct fill_curve_keys {
 };
 
 /// Order of the points in the leaves: along a Hilbert curve through a grid with 2^10 cells per side; if many points
-/// share a cell, recursively along a finer curve within it. The leaves thus adapt to any uneven density. Each level
-/// divides the extent by about a thousand, and the range of float allows 28 levels: O(n) on usual clouds, at most 28
-/// times as long otherwise.
+/// share a cell, they are ordered recursively along a finer curve within it. The leaves thus adapt to any uneven
+/// density. Each level divides the extent by about a thousand, and the range of float allows 28 levels: O(n) on usual
+/// clouds, at most 28 times as long otherwise.
 class leaf_order {
  public:
   struct entry {
@@ -222,7 +222,7 @@ struct surplus_copy {
   std::uint32_t kept;  ///< position in `members` of the first identical point in a leaf
 };
 
-/// The leaves of a cloud and their bounding boxes. About 18 bytes per point, even during construction.
+/// The leaves of a cloud and their bounding boxes. Takes about 18 bytes per point, even during construction.
 struct leaf_hierarchy {
   std::vector<point_row> leaves;
   std::vector<std::vector<box_row>> levels;  ///< [0]: boxes of the leaves; the last one is a single row

@@ -181,7 +181,7 @@ class nearest_search {
   };
   static constexpr float infinity = std::numeric_limits<float>::infinity();
   static constexpr float most = std::numeric_limits<float>::max();
-  static constexpr float most_spread = 32;  ///< of points that share candidates; squared, relative to `usual_`
+  static constexpr float most_spread = 32;  ///< maximum squared extent of a run of points, relative to `usual_`
   static constexpr float spare = 1.3F;      ///< factor by which the search radius for near rows exceeds that of a leaf
 
   [[nodiscard]] std::array<float, 3> query(std::size_t l, std::size_t i) const noexcept {
@@ -397,8 +397,8 @@ class nearest_search {
   std::array<float, leaf_width> bounds_{};
   std::array<bool, leaf_width> has_places_{};
   std::array<float, leaf_width> largest_{};  ///< squared distance to the `wanted`-th nearest
-  float hoped_;  ///< factor of `usual_` that should suffice; scatter decreases with the number of neighbours
-  float reach_;  ///< factor of `usual_` that should always suffice
+  float hoped_;  ///< multiple of `usual_` that should suffice; the more neighbours, the less it scatters
+  float reach_;  ///< multiple of `usual_` that should always suffice
   float shared_reach_ = -1;  ///< squared distance from the run's box up to which `shared_` is complete
   float usual_ = -1;         ///< squared distance to the `wanted`-th nearest; negative if not yet known
 };

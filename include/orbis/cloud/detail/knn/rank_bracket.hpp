@@ -50,8 +50,8 @@ struct rank_bracket {
 }
 
 /// Narrows the interval of the `wanted`-th smallest of `count` values up to `bound`, until at most sixteen values
-/// remain or all that remain are equal. `count_within(x)`: number of values at most `x`; `count_three(x)`: the same for
-/// three values at once.
+/// remain or all that remain are equal. `count_within(x)`: number of values at most `x`; `count_three(x)`: these
+/// numbers for three values at once.
 template <class Count, class CountThree>
 [[gnu::always_inline]] inline rank_bracket bracket_rank(float bound, std::size_t count, std::size_t wanted,
                                                         const Count& count_within, const CountThree& count_three) {

@@ -25,8 +25,8 @@ namespace orbis::cloud::detail {
 /// Parameters of a view in the form that the kernels use.
 struct ray_view {
   std::array<std::array<float, 3>, 3> rotation{};  ///< camera from world, row by row
-  std::array<float, 3> origin{};                   ///< camera position in the world frame, metres, rounded to float,
-  std::array<float, 3> origin_rest{};              ///< and the rounding error, since coordinates may be large
+  std::array<float, 3> origin{};                   ///< camera position in the world frame, metres, rounded to float
+  std::array<float, 3> origin_rest{};              ///< rounding error of `origin`, whose coordinates may be large
   float fx = 0, fy = 0, cx = 0, cy = 0;            ///< pinhole parameters; cx and cy include an additional half pixel
   int width = 0;
   int height = 0;

@@ -134,8 +134,8 @@ struct no_view_action {
 };
 
 struct view_trust_options {
-  double conflict = 0.1;  ///< a view is distrusted if its conflict exceeds this
-  double excess = 3;      ///< and exceeds this factor times the usual conflict
+  double conflict = 0.1;  ///< the conflict of a distrusted view exceeds this
+  double excess = 3;      ///< it also exceeds this factor times the usual conflict
   int samples = 20;       ///< number of samples along either axis of each view; > 0
   std::size_t least = 4;  ///< minimum number of views; with fewer, no view is distrusted
 };

@@ -79,11 +79,11 @@ class sparse_values {
 };
 
 /// The remaining points of a cloud with their neighbours. Points are identified by the places of a `neighbor_graph`;
-/// all data are stored by place. Log spacings are NaN for single points and for points identical to all their
+/// all data are indexed by place. Log spacings are NaN for single points and for points identical to all their
 /// neighbours. About 45 bytes per point.
 class surroundings {
  public:
-  static constexpr std::size_t width = 12;       ///< number of neighbours in the graph; more if more are averaged
+  static constexpr std::size_t width = 12;       ///< number of neighbours in the graph; increased if more are averaged
   static constexpr std::size_t shape_width = 8;  ///< number of neighbours whose shape is analysed
   static constexpr float bulk_end = 0.3F;        ///< log spacing above usual up to which the shape is not analysed
 
@@ -135,15 +135,15 @@ class surroundings {
     return out;
   }
 
-  /// Computes the shapes around the points that are sparser than the bulk by `residual` or relative to `line`.
+  /// Computes the shapes around the points whose `residual`, or whose log spacing above `line`, is beyond the bulk.
   template <execution_policy Policy>
   void compute_shapes(const Policy& policy, std::span<const float> residual, const log_line& line) {
     flat_.add(
         policy, size(), [&](std::size_t i) { return residual[i] >= bulk_end || !is_bulk(line, i); },
         [&](std::size_t i) { return static_cast<float>(off_plane_at(i)); });
   }
-  /// Returns true if the point lies in a plane with its neighbours, or next to enough points of similar spacing that
-  /// do.
+  /// Returns true if the point lies in a plane with its neighbours, or has enough neighbours of similar spacing that
+  /// belong to the bulk or lie in a plane.
   /// @pre the shapes of the point and of its sparse neighbours were computed with the same line
   [[nodiscard]] bool on_surface(std::size_t i, const surface_test& test, const log_line& line) const {
     const auto is_flat = [&](std::size_t j) { return double{flat_.at(j)} < test.flatness; };
@@ -174,7 +174,8 @@ class surroundings {
       const float around = spacing[i] + static_cast<float>(step.offset);
       const float line = usual(step.usual, i);
       const float widest = line > around ? line : around;
-      spacing[i] = std::isnan(widest) ? std::numeric_limits<float>::infinity() : std::exp(widest);  // linked by others
+      // With an infinite spacing, only the spacing of the other point limits a link.
+      spacing[i] = std::isnan(widest) ? std::numeric_limits<float>::infinity() : std::exp(widest);
     }
     const cluster_options options{.neighbors = width, .reach = step.reach, .min_size = step.min_size, .min_gap = 0};
     remove_components(policy, spacing, options, [&](std::size_t i) {
