@@ -35,7 +35,7 @@ struct binomial_kernel {
     using bytes = simd::native_vec<std::uint8_t, Target>;
     constexpr int step = static_cast<int>(bytes::count);
     const auto block = [&](int x) ORBIS_INLINE_LAMBDA {
-      // The mean of a and c, rounded down, then its mean with b, rounded up: together this is correct rounding.
+      // The mean of a and c, rounded down, then its mean with b, rounded up: together they round correctly.
       const bytes va = bytes::load(a + x), vb = bytes::load(b + x), vc = bytes::load(c + x);
       const bytes ac = average(va, vc) - ((va ^ vc) & bytes(1));
       average(ac, vb).store(to + x);
@@ -111,7 +111,7 @@ ORBIS_INLINE void fast9::find_peaks(image_view<const std::uint8_t> image, const 
       if (x < area.x || x >= area.x + area.width) continue;
       corners.push_back({x, inner, static_cast<float>(row[column] - 1)});
       if (!subpixel) continue;
-      const std::uint8_t* here = row + column;  // at column 0, the preceding bytes are row_margin
+      const std::uint8_t* here = row + column;  // the bytes before column 0 are the margin
       corners.back().dx = parabola_peak(here[-1], here[0], here[1]);
       corners.back().dy = parabola_peak(above[column], here[0], row_of(y)[column]);
     }

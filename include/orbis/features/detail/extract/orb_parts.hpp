@@ -54,8 +54,8 @@ struct fast9 {
 };
 static_assert(corner_detector<fast9>);
 
-/// Selects corners that cover the image first. The image is divided into square cells, their number a fraction of the
-/// number of requested corners, and every cell contributes its strongest corner across all levels. The rest are the
+/// Selects corners that cover the image first. The image is divided into square cells, whose number is a fraction of
+/// the number of requested corners, and every cell contributes its strongest corner across all levels. The rest are the
 /// strongest corners of their levels, at any position, because strong corners are more repeatable. A cell contributes
 /// one corner in total, not one per level, which leaves room for strong corners. O(n), plus sorting of the selected
 /// corners.

@@ -117,7 +117,8 @@ struct resize_along_kernel {
   }
 };
 
-/// Interpolates vertically between two such rows with rounding; the second has the weight `weight` / 256.
+/// Interpolates vertically, with rounding, between two horizontally interpolated rows; the second has the weight
+/// `weight` / 256.
 struct resize_across_kernel {
   using signature = void(const std::uint16_t* first, const std::uint16_t* second, int weight, int count,
                          std::uint8_t* to);

@@ -57,7 +57,7 @@ struct smooth_along_kernel {
   }
 };
 
-/// Weighted sums of seven such rows, rounded, in pixel order.
+/// Weighted sums of seven rows of sums, rounded, in pixel order.
 struct smooth_across_kernel {
   using signature = void(const std::array<const std::int16_t*, 7>& rows, int count, std::uint8_t* to);
   template <class Target>

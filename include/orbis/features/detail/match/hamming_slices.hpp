@@ -170,8 +170,7 @@ ORBIS_ALWAYS_INLINE void compare_bit(V& below, const V& x, const V& y) noexcept 
   }
 }
 
-/// Computes the distances from a query to the train descriptors of a table, and the ones whose distance is below
-/// `limit`.
+/// Computes the distances from a query to the train descriptors of a table, and the set of those below `limit`.
 template <class Target>
 ORBIS_ALWAYS_INLINE void slice_count(const slice_table<slice_words<Target>>& table, const slice_query& query,
                                      std::uint32_t limit, slice_distances<slice_words<Target>>& distances,
