@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Writers of the nodes of OctoMap's files: in preorder, from the bricks, one mask of 64 voxels at a time.
+/// Writers of the nodes of OctoMap's files. Nodes are written in preorder from the bricks, one mask of 64 voxels at a
+/// time.
 ///
 /// A `.bt` node has two bits per child (0 unknown, 1 free, 2 occupied, 3 an inner node); an `.ot` node has a value and
 /// one bit per child. The content of a node depends on the nodes below it: its space is reserved while its children are
@@ -27,7 +28,7 @@
 
 namespace orbis::octree::detail {
 
-/// A growing byte buffer, which grows in place if the system can move pages.
+/// A byte buffer that grows in place if the system can move pages.
 class node_buffer {
  public:
   [[nodiscard]] std::size_t size() const noexcept { return size_; }
@@ -38,7 +39,7 @@ class node_buffer {
     return bytes_.get() + size_;
   }
   [[nodiscard]] char* at(std::size_t place) noexcept { return bytes_.get() + place; }
-  /// Sets the size: forward past the bytes written into room(), or back.
+  /// Sets the size: larger to include bytes written to room(), or smaller to discard bytes.
   void set_size(std::size_t n) noexcept { size_ = n; }
   void set_end(const char* end) noexcept { size_ = static_cast<std::size_t>(end - bytes_.get()); }
 
@@ -190,7 +191,7 @@ class bt_writer {
     nodes_ += count + static_cast<unsigned>(std::popcount(in_groups));
     return inner;
   }
-  /// Returns true if there is a 2x2x2 node whose voxels have different values but the same likelier state.
+  /// Returns true if there is a 2x2x2 node whose voxels have different values but the same maximum-likelihood state.
   [[nodiscard]] bool is_group_pruned(const std::vector<tree_part<float>>& parts) const {
     block<float> voxels;
     return std::any_of(parts.begin(), parts.end(), [&](const tree_part<float>& part) {

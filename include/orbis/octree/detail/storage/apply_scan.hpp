@@ -56,7 +56,7 @@ template <sensor_model Model>
   return v <= Model::clamp_min;
 }
 
-/// Returns true if the brick that contains `k` is part of a larger leaf that is saturated free.
+/// Returns true if the brick that contains `k` is part of a larger leaf whose value a miss cannot lower further.
 template <sensor_model Model>
 [[nodiscard]] bool is_saturated_leaf(const brick_store<typename Model::value_type>& store, const voxel_key& k) {
   if (!store.has_large()) return false;
@@ -64,7 +64,7 @@ template <sensor_model Model>
   return large != nullptr && is_saturated_free<Model>(*large);
 }
 
-/// Adds the saturated free voxels of the named brick to `saturated` (word i: octant i).
+/// Adds the voxels of the named brick whose values a miss cannot lower further to `saturated` (word i: octant i).
 template <sensor_model Model>
 void find_saturated(const brick_store<typename Model::value_type>& store, std::uint64_t name,
                     std::array<std::uint64_t, 8>& saturated) {
@@ -81,8 +81,8 @@ struct octant_change {
   std::uint64_t changed = 0, missed = 0;
 };
 
-/// Applies a hit to the voxels `occupied` of octant `octant` of `b` and a miss to the voxels `free`. @pre the two are
-/// disjoint
+/// Applies a hit to the voxels `occupied` of octant `octant` of `b` and a miss to the voxels `free`. @pre free and
+/// occupied are disjoint
 template <sensor_model Model>
 octant_change apply_octant(brick_store<typename Model::value_type>& store, brick<typename Model::value_type>& b,
                            std::uint32_t octant, std::uint64_t occupied, std::uint64_t free) {

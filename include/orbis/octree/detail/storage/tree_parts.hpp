@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A pruned octree down to its bricks as a sorted list, for algorithms that visit the whole tree.
+/// The upper levels of a pruned octree, down to its bricks, as a sorted list, for algorithms that visit the whole tree.
 #pragma once
 
 #include <algorithm>

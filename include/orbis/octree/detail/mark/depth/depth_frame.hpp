@@ -64,8 +64,8 @@ struct depth_frame : view_frame {
                     static_cast<double>(scene.voxel), static_cast<double>(std::max(scene.fx, scene.fy)));
   }
   /// Returns true if no ray is nearly parallel to the image plane. Otherwise neighbouring rays are far apart although
-  /// their depths are small, and most voxels between them would have to be tested individually. Cameras whose rays are
-  /// not separable limit the angle by `map`.
+  /// their depths are small, and most voxels between them would have to be tested individually. For cameras whose rays
+  /// are not separable, `map` limits the angle.
   [[nodiscard]] bool has_moderate_angles() const {
     constexpr float most = 20.0F;  // tangent of 87 degrees
     const pixel_rays& rays = ends.rays();
@@ -122,7 +122,8 @@ struct depth_rays {
 };
 
 /// Marks the voxels that the rays of a frame cross, see descend_nodes; `bounds`: see view_frame::ray_bounds; `end`: see
-/// depth_rays. Returns view_frame::is_on_face: if true, the neighbours of the camera's voxel remain, see first_voxels.
+/// depth_rays. Returns view_frame::is_on_face: if true, the neighbours of the camera's voxel are not marked yet, see
+/// first_voxels.
 template <execution_policy Policy, class End, class Saturated>
 [[nodiscard]] bool mark_image(const Policy& policy, depth_frame& frame, const depth_sensor& sensor, float max_z,
                               const std::pair<voxel_key, voxel_key>& bounds, const End& end, scan_masks& masks,

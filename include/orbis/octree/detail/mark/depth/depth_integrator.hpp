@@ -47,10 +47,10 @@ inline void load_points(const pixel_points& points, std::size_t begin, std::size
 
 /// Marks the voxels of depth images. Reuses its memory between images.
 ///
-/// The descent through the octree starts at a node around all rays. Nodes that no ray reaches are dropped, and nodes
-/// whose voxels are all certainly crossed are filled; a min/max pyramid of the ray ends decides both. The remaining
-/// voxels are at surfaces and at the border of the view: such a voxel is free if the ray of one of its pixels crosses
-/// it. If rounding could change the result, the exact traversal of that ray decides.
+/// The descent through the octree starts at a node that contains all rays. Nodes that no ray reaches are skipped, and
+/// nodes in which rays certainly cross every voxel are filled; a min/max pyramid of the ray ends decides both. The
+/// remaining voxels are at surfaces and at the border of the view: such a voxel is free if the ray of one of its pixels
+/// crosses it. If rounding could change the result, the exact traversal of that ray decides.
 class depth_integrator {
  public:
   /// Marks in `masks` the voxels that integrating the image's world points (see append_world_points) in mode every_ray
@@ -93,7 +93,7 @@ class depth_integrator {
     return {.used = ends.used, .truncated = ends.truncated, .rejected = ends.rejected};
   }
 
-  /// Returns the world points of the last marked image. Valid as long as `scan`, and until the next image.
+  /// Returns the world points of the last marked image. Valid while `scan` exists, and until the next image.
   [[nodiscard]] pixel_points points(const depth_scan& scan, const se3& T_world_camera) const {
     return {scan, frame_.ends.rays(), camera::float_pose{T_world_camera}};
   }

@@ -86,7 +86,8 @@ struct overlap_kernel {
 };
 
 /// Level k >= 1 has cells of 2^k x 2^k pixels; its entry (i, j) covers the cells i, i + 1 of the rows j, j + 1. A box
-/// that touches at most four cells in a row is covered by the entries of its first cell and its second-to-last cell.
+/// that touches at most four cells along an axis is covered along this axis by the entries of its first and its
+/// second-to-last cell.
 ///
 /// There are three kinds of entries with different definitions of the nearest end. Kind 0: the nearest end of all
 /// pixels, 0 if any pixel has no end. Kind 1: pixels without an end are ignored unless their whole aligned tile of 2x2
@@ -102,7 +103,7 @@ class depth_pyramid {
     lay_out(width, height);
     if (width == 0 || height == 0) return;
     scale_ = max_z > 0.0F ? 65533.0F / max_z : 1.0F;
-    // Tiles that extend beyond the image: the last row counts twice at the bottom; ends are missing on the right.
+    // Tiles may extend beyond the image: at the bottom, the last row counts twice; on the right, ends are missing.
     for (int j = 0; j != height_[1]; ++j)
       first_(row(2 * j), row(std::min(2 * j + 1, height - 1)), scale_, width_[1], strict_.data() + j * row_size_,
              some_.data() + j * row_size_);
@@ -154,7 +155,7 @@ class depth_pyramid {
     levels_ = 0;
     std::int32_t size = 0;
     int w = width, h = height;
-    do {  // the highest level has at most four cells in a row
+    do {  // the highest level has at most four cells along each axis
       ++levels_;
       w = (w + 1) / 2;
       h = (h + 1) / 2;

@@ -158,7 +158,7 @@ class endpoint_image {
     if constexpr (requires { stored_type(depth); }) {
       using stored = decltype(stored_type(depth));
       const auto scale = static_cast<float>(depth.scale());
-      // Rounding a quotient of floats to double before float gives the same result.
+      // Rounding a quotient of two floats first to double and then to float gives the same result as rounding it once.
       if (static_cast<double>(scale) == depth.scale()) {
         simd::kernel<to_metres_kernel<stored>, void(const metres_row<stored>&), simd::avx2>()(
             {depth.pixels().row(v).data(), z, rays_.width(), scale, depth.min_depth(), depth.max_depth()});

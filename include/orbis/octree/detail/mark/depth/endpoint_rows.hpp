@@ -100,7 +100,7 @@ struct end_counts {
   std::size_t used = 0, truncated = 0, rejected = 0;
   bool leaves = false;  ///< true if a ray ends outside the voxel of the camera's centre
   float max_z = 0.0F;
-  double sum_z = 0.0;  ///< sum over the used and truncated rays; up to rounding
+  double sum_z = 0.0;  ///< sum of the end depths of the used and truncated rays, up to rounding
 
   void add(const end_counts& o) noexcept {
     used += o.used;

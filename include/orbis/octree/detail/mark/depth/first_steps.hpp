@@ -93,7 +93,7 @@ class first_voxels {
  public:
   explicit first_voxels(const depth_sensor& sensor) noexcept : sensor_{sensor} {}
 
-  /// Takes the first steps of a ray.
+  /// Adds the voxels that the first steps of a ray reach.
   void add(const ray_endpoint& e) noexcept {
     const voxel_key& from = *sensor_.key;
     if (e.key == from) return;

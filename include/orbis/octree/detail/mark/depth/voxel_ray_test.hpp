@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Classification of the rays of a depth image by whether they cross a voxel: certainly, certainly not, or undecided.
+/// Classification of the rays of a depth image with respect to a voxel: a ray certainly crosses it, certainly does not
+/// cross it, or is undecided.
 #pragma once
 
 #include <algorithm>

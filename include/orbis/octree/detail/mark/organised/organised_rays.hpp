@@ -26,7 +26,7 @@
 
 namespace orbis::octree::detail {
 
-/// Image into whose pixels rays are sorted.
+/// Image to whose pixels rays are assigned.
 struct pixel_placement {
   static constexpr std::int32_t nowhere = -1;
 
@@ -35,7 +35,7 @@ struct pixel_placement {
   float fx = 1, fy = 1, cx = 0, cy = 0;
   float last_u = 0, last_v = 0;    ///< last column and row
   float error_u = 0, error_v = 0;  ///< maximum distance of a ray from the centre of its pixel
-  float far = 0;  ///< rays that end deeper are traversed, because no other rays cross the voxels around them
+  float far = 0;  ///< rays with deeper ends are traversed singly: no other rays cross the voxels around them
   std::int32_t stride = 0;
 };
 

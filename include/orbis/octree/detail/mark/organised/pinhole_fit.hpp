@@ -60,7 +60,7 @@ class pinhole_fit {
   static constexpr std::size_t most_runs = 128, run_length = 8;
   static constexpr double straight = 1e-5;    ///< maximum angle in radians between the points of a row and its plane
   static constexpr double most_error = 1e-5;  ///< maximum error of rays, at z = 1
-  static constexpr int widest = 4096;         ///< pixels
+  static constexpr int widest = 4096;         ///< maximum width and height of the image, pixels
   static constexpr double widest_slope = 4.0;
 
   /// Consecutive points of the cloud in one row of the image.

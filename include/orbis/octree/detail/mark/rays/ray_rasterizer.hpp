@@ -63,7 +63,7 @@ class ray_rasterizer {
     }
   }
 
-  /// Marks the waiting rays.
+  /// Marks the voxels of the queued rays.
   void flush(scan_masks& masks) {
     if (grid_ == nullptr) return;
     for (std::size_t kind = 0; kind != queues_.size(); ++kind) rasterize(kind, masks);

@@ -32,7 +32,7 @@ struct ray_setup {
   std::uint32_t step_u = 0;  ///< the ray crosses a face across u between the last two planes
   std::uint32_t step_v = 0;
   std::uint32_t step_u_first = 0;  ///< the face across u comes first
-  std::uint32_t end_u = 0;         ///< the same between the last plane and the end
+  std::uint32_t end_u = 0;         ///< the ray crosses a face across u between the last plane and its end
   std::uint32_t end_v = 0;
   std::uint32_t end_u_first = 0;
 
