@@ -25,8 +25,8 @@
 
 namespace orbis::optimize::detail {
 
-/// The cost of an observation without a projection after a step: that of an error of a thousand standard deviations, so
-/// that losing observations never reduces the cost.
+/// Cost of an observation that has no projection after a step: as large as for an error of a thousand standard
+/// deviations, so that losing observations never reduces the cost.
 inline constexpr double out_of_sight = 0.5e6;
 
 /// Memory layout of the camera-point blocks of eight observations: row by row in vectors of eight. With camera-frame

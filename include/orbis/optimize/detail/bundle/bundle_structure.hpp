@@ -51,7 +51,7 @@ class bundle_structure {
   std::vector<chunk> chunk_begin;           ///< start of each chunk, followed by the end
   std::vector<segment> segments;            ///< ordered by chunk, then by camera
   std::vector<std::uint32_t> source;        ///< index of the caller's observation at each place
-  std::vector<std::uint32_t> point;         ///< point of each place; for empty places that of the segment's first one
+  std::vector<std::uint32_t> point;         ///< point of each place; for empty places, the segment's first point
   std::vector<std::uint32_t> mixed_number;  ///< for each place: its index among observations by movable cameras
 
   std::vector<std::uint32_t> point_source;  ///< index of point p in the caller's array

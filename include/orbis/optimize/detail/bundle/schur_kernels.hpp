@@ -298,7 +298,7 @@ ORBIS_ALWAYS_INLINE void substitute(const substitution& work) {
         unroll<3>([&](auto k)
                       ORBIS_INLINE_LAMBDA { pulled[k] += L::load(mixed + mixed_block::row(row) + 8 * k) * factor; });
       };
-      if constexpr (ThroughCamera) {  // rows 3 to 5 are hat(q) times the first ones
+      if constexpr (ThroughCamera) {  // rows 3 to 5 are hat(q) times rows 0 to 2
         const L q[3] = {L::load(mixed + mixed_block::q), L::load(mixed + mixed_block::q + 8),
                         L::load(mixed + mixed_block::q + 16)};
         add(0, x[0] + (x[4] * q[2] - x[5] * q[1]));

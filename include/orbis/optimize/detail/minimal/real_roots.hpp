@@ -81,7 +81,8 @@ std::size_t roots_in_unit_interval(const std::array<double, Degree + 1>& c, std:
 }
 
 /// Computes all real roots of a polynomial; returns their number. `c[i]` is the coefficient of x^i. A root of even
-/// multiplicity is reported once, and a nearby root may be reported as well. None if a coefficient is not finite.
+/// multiplicity is reported once, and a nearby root may be reported as well. There are none if a coefficient is not
+/// finite.
 template <std::size_t Degree>
 std::size_t real_roots(const std::array<double, Degree + 1>& c, std::array<double, Degree>& roots) {
   double largest = 0.0;

@@ -88,7 +88,7 @@ class pose_graph_structure {
   std::vector<std::uint32_t> vertices;              ///< the vertex of each unknown
   std::vector<edge_bundle> bundles;                 ///< bundles between two unknowns come first
   std::vector<std::uint32_t> bundled;               ///< indices of the edges, ordered by bundle
-  std::vector<block_place> places;                  ///< of the bundles between two unknowns, in the order of `bundles`
+  std::vector<block_place> places;                  ///< blocks of the bundles between two unknowns, in their order
   std::vector<std::uint32_t> first_touch, touches;  ///< for each unknown: 2 * bundle, plus 1 at the bundle's `to`
 
   /// Determines the unknowns and, if the graph differs from that of the previous call, the blocks (`changed` is then

@@ -274,10 +274,10 @@ class quotient_graph {
   std::uint32_t size_;
   std::vector<std::uint32_t> weight_;  ///< number of blocks that a node represents
   std::vector<range> list_;
-  std::vector<std::uint32_t> degree_;  ///< of variables: upper bound on the number of blocks connected by elimination
+  std::vector<std::uint32_t> degree_;  ///< for variables: upper bound on the number of blocks connected by elimination
   std::vector<kind> state_;
-  std::vector<std::uint64_t> remains_;  ///< of elements: 1 + weight outside the clique; of variables: membership
-  std::vector<std::uint32_t> bucket_, next_, previous_;  ///< variables by degree
+  std::vector<std::uint64_t> remains_;  ///< for elements: 1 + weight outside the clique; for variables: membership
+  std::vector<std::uint32_t> bucket_, next_, previous_;  ///< lists of the variables of each degree
   std::vector<std::uint32_t> merged_, last_merged_;      ///< chains of variables eliminated together
   std::vector<std::uint32_t> pool_, clique_, touched_;
   std::vector<hashed> hashes_;

@@ -28,7 +28,7 @@ struct supernode {
   std::uint32_t rows = 0;      ///< number of block rows
 };
 
-/// The rows `[begin, end)` of supernode `source`'s panel are in the columns of another supernode and update that one.
+/// The rows `[begin, end)` of supernode `source`'s panel are in the columns of another supernode, which they update.
 struct supernode_update {
   std::uint32_t source = 0;
   std::uint32_t begin = 0, end = 0;  ///< positions in the source's rows
