@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <chrono>
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
@@ -11,6 +12,7 @@
 #include <ostream>
 #include <string_view>
 #include <system_error>
+#include <thread>
 #include <utility>
 
 #include <fcntl.h>
@@ -20,6 +22,8 @@
 #include <unistd.h>
 
 #include <orbis/core/file.hpp>
+
+#include "interrupts.hpp"
 
 namespace app {
 
@@ -54,6 +58,9 @@ descriptor open_folder(const fs::path& folder) {
 }
 
 /// Locks folders during its lifetime. No effect on file systems without locks.
+///
+/// Other programs hold these locks for a short time, unless they are stopped or are not ours: waits for 10 s at most,
+/// or 1 s if the user interrupts the run.
 class folder_locks {
  public:
   explicit folder_locks(std::vector<int> folders) : folders_{std::move(folders)} {
@@ -66,8 +73,14 @@ class folder_locks {
     std::sort(folders_.begin(), folders_.end(), [&](int a, int b) { return number(a) < number(b); });
     const auto is_same = [&](int a, int b) { return number(a) == number(b); };
     folders_.erase(std::unique(folders_.begin(), folders_.end(), is_same), folders_.end());
+    using namespace std::chrono_literals;
+    const auto start = std::chrono::steady_clock::now();
     for (const int folder : folders_)
-      while (::flock(folder, LOCK_EX) != 0 && errno == EINTR) {
+      while (::flock(folder, LOCK_EX | LOCK_NB) != 0 && (errno == EINTR || errno == EWOULDBLOCK)) {
+        const auto waited = std::chrono::steady_clock::now() - start;
+        is_complete_ = waited < (interrupts::stop_requested() ? 1s : 10s);
+        if (!is_complete_) return;
+        std::this_thread::sleep_for(2ms);
       }
   }
   ~folder_locks() {
@@ -76,9 +89,14 @@ class folder_locks {
   folder_locks(const folder_locks&) = delete;
   folder_locks& operator=(const folder_locks&) = delete;
 
+  /// False if another program still holds one of the locks.
+  [[nodiscard]] bool is_complete() const noexcept { return is_complete_; }
+
  private:
   std::vector<int> folders_;
+  bool is_complete_ = true;
 };
+constexpr const char* locked_by_another = "another program has locked the folder";
 
 /// A file to move into place. Strings, because a child process must not allocate memory.
 struct move {
@@ -87,7 +105,11 @@ struct move {
   bool has_old = false;   ///< it also exists at `old`
 };
 
-/// Moves all files into place, or none; returns 0 or an errno value. Makes system calls only.
+/// Added to the errno value if the files that were already moved cannot be moved back.
+constexpr int not_restored = 128;
+
+/// Moves all files into place, or none; returns 0 or an errno value (see `not_restored`). Makes system calls only. At
+/// every moment each new file exists, so that any program can finish.
 int rename_all(const std::vector<move>& moves) {
   for (std::size_t i = 0; i != moves.size(); ++i) {
     const move& next = moves[i];
@@ -98,11 +120,14 @@ int rename_all(const std::vector<move>& moves) {
     const int why = errno;
     if (why == ENOENT && !is_there && ::access(next.to.c_str(), F_OK) == 0)
       continue;  // done by a child process that was killed
-    for (std::size_t done = i + 1; done-- != 0;)
-      if (const move& m = moves[done]; m.replaces)
-        ::rename(m.old.c_str(), m.to.c_str());
-      else if (done != i)
-        ::rename(m.to.c_str(), m.from.c_str());
+    for (std::size_t done = i + 1; done-- != 0;) {
+      const move& m = moves[done];
+      const bool is_back = done == i || ::rename(m.to.c_str(), m.from.c_str()) == 0;
+      // The failed file was not moved aside if there is a link to it.
+      const bool is_aside = m.replaces && !(done == i && ::access(m.to.c_str(), F_OK) == 0);
+      if (!is_back || (is_aside && ::rename(m.old.c_str(), m.to.c_str()) != 0))
+        return not_restored + why % not_restored;
+    }
     return why;
   }
   return 0;
@@ -163,7 +188,8 @@ std::optional<std::vector<std::string>> read_list(const fs::path& path) {
 
 /// Those of other users do not count, who may put one into a folder like /tmp, unless the whole folder is theirs.
 bool is_hidden_folder(const fs::path& path) {
-  struct stat status {}, parent {};
+  struct stat status {
+  }, parent{};
   if (!path.filename().string().starts_with(prefix) || ::lstat(path.c_str(), &status) != 0 || !S_ISDIR(status.st_mode))
     return false;
   return status.st_uid == ::geteuid() ||
@@ -227,8 +253,8 @@ bool finish_transaction(const fs::path& first) {
 
 /// Finishes or removes the hidden folders of ended processes in `folder`, which is open as `opened`. Locks it and the
 /// folders of the transactions' other files, all at once: if there are more than are locked, starts again with them.
-/// Returns false if a transaction cannot be finished now: it would overwrite later files.
-bool clear_leftovers(const fs::path& folder, int opened) {
+/// Returns an empty text, or the reason why a transaction cannot be finished now: it would overwrite later files.
+std::string clear_leftovers(const fs::path& folder, int opened) {
   std::vector<fs::path> folders{folder};
   std::vector<descriptor> descriptors;
   std::unique_ptr<folder_locks> locks;
@@ -243,6 +269,7 @@ bool clear_leftovers(const fs::path& folder, int opened) {
       }
     locked = folders.size();
     locks = std::make_unique<folder_locks>(std::move(numbers));
+    if (!locks->is_complete()) return locked_by_another;
     const auto add = [&](const fs::path& hidden) {
       if (std::find(folders.begin(), folders.end(), hidden.parent_path()) == folders.end())
         folders.push_back(hidden.parent_path());
@@ -253,16 +280,16 @@ bool clear_leftovers(const fs::path& folder, int opened) {
         for (const fs::path& other : others_of(*first)) add(other);
       }
   }
-  bool is_clear = true;
+  std::string why;
   for (const fs::path& left : leftovers_in(folder)) {
     const auto first = first_of(left);
     std::error_code ignored;
     if (first && (first->empty() || finish_transaction(*first)))
       fs::remove_all(left, ignored);
     else
-      is_clear = false;
+      why = "the results of an earlier run, in a hidden folder, cannot be moved into place";
   }
-  return is_clear;
+  return why;
 }
 
 }  // namespace
@@ -271,7 +298,8 @@ void staged_folder::finish(const fs::path& folder) {
   std::error_code ignored;
   const fs::path whole = fs::canonical(folder, ignored);
   if (hidden_folders_in(whole).empty()) return;  // without waiting for the lock
-  if (const descriptor opened = open_folder(whole); opened.get() >= 0) clear_leftovers(whole, opened.get());
+  if (const descriptor opened = open_folder(whole); opened.get() >= 0)
+    static_cast<void>(clear_leftovers(whole, opened.get()));
 }
 
 result<staged_folder> staged_folder::open(const fs::path& folder, std::vector<std::string> names,
@@ -288,9 +316,10 @@ result<staged_folder> staged_folder::open(const fs::path& folder, std::vector<st
     if (!may_be_replaced(made.folder_ / name))
       return failure(folder / name, "is not a regular file and is not replaced");
 
-  if (!clear_leftovers(made.folder_, made.folder_lock_.get()))
-    return failure(folder, "the results of an earlier run, in a hidden folder, cannot be moved into place");
+  if (const std::string why = clear_leftovers(made.folder_, made.folder_lock_.get()); !why.empty())
+    return failure(folder, why);
   const folder_locks lock{{made.folder_lock_.get()}};
+  if (!lock.is_complete()) return failure(folder, locked_by_another);
   std::string name = (made.folder_ / (std::string{prefix} + "XXXXXX")).string();
   const std::lock_guard registers{hidden.mutex};
   hidden.paths.emplace_back();
@@ -331,11 +360,13 @@ std::error_code staged_folder::rename_hidden(const fs::path& to, hidden_folders&
   return {};
 }
 
+void staged_folder::leave(hidden_folders& hidden) {
+  std::erase(hidden.paths, staging_);
+  staging_.clear();
+  staging_lock_ = {};
+}
+
 result<void> staged_folder::put_in_place(std::span<staged_folder* const> folders, hidden_folders& hidden) {
-  std::vector<int> numbers;
-  for (const staged_folder* f : folders) numbers.push_back(f->folder_lock_.get());
-  const folder_locks locks{std::move(numbers)};
-  const std::lock_guard stays{hidden.mutex};
   staged_folder& first = *folders.front();
   const fs::path marked = first.staging_.string() + std::string{ready};
   std::vector<std::string> others;
@@ -357,10 +388,21 @@ result<void> staged_folder::put_in_place(std::span<staged_folder* const> folders
     ::fsync(f->staging_lock_.get());
     ::fsync(f->folder_lock_.get());
   }
+  std::vector<int> numbers;
+  for (const staged_folder* f : folders) numbers.push_back(f->folder_lock_.get());
+  const folder_locks locks{std::move(numbers)};
+  const std::lock_guard stays{hidden.mutex};
   // From here on, any program can finish.
   const fs::path unmarked = first.staging_;
   if (const std::error_code why = first.rename_hidden(marked, hidden))
     return failure(first.folder_, "cannot move the new files into place: " + why.message());
+  const auto postponed = [&](const std::string& what) {
+    auto failed =
+        failure(first.folder_, what + "; the next command that uses the folder moves the new files into place");
+    for (staged_folder* f : folders) f->leave(hidden);
+    return failed;
+  };
+  if (!locks.is_complete()) return postponed(locked_by_another);
 
   std::vector<move> moves;
   for (const staged_folder* f : folders)
@@ -369,6 +411,7 @@ result<void> staged_folder::put_in_place(std::span<staged_folder* const> folders
       moves.push_back(std::move(m));
     }
   const int why = rename_all_in_child(moves);
+  if (why >= not_restored) return postponed("cannot move the new files into place: " + reason(why - not_restored));
   if (why != 0) {
     static_cast<void>(first.rename_hidden(unmarked, hidden));  // nobody may finish this, now or after a crash
     return failure(first.folder_, "cannot move the new files into place: " + reason(why));

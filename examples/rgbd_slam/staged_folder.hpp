@@ -68,8 +68,9 @@ class staged_folder {
   /// Removes the hidden folder with its files.
   void discard() noexcept;
 
-  /// Moves the files of all folders into place: all of them, or none if it returns an error. `hidden`: as for `open`.
-  /// Errors: write_failed.
+  /// Moves the files of all folders into place: all of them, or none if it returns an error. If another program holds
+  /// the lock of a folder, or files can be moved neither forwards nor back, the error says that the next program that
+  /// uses the folder finishes. `hidden`: see `open`. Errors: write_failed.
   [[nodiscard]] static orbis::result<void> put_in_place(std::span<staged_folder* const> folders,
                                                         hidden_folders& hidden);
 
@@ -77,6 +78,8 @@ class staged_folder {
   staged_folder() = default;
   /// Renames the hidden folder, which an interrupt must still find. @pre hidden.mutex is locked
   std::error_code rename_hidden(const std::filesystem::path& to, hidden_folders& hidden);
+  /// Keeps the hidden folder after the end of this process. @pre hidden.mutex is locked
+  void leave(hidden_folders& hidden);
 
   std::filesystem::path folder_, staging_;
   std::vector<std::string> names_;

@@ -5,6 +5,7 @@
 include(${CMAKE_CURRENT_LIST_DIR}/support.cmake)
 make_recording(${WORK}/room 4 160)
 set(quick --quiet --resolution 0.2 --filter none)
+list(JOIN quick " " quick_text)
 file(WRITE ${WORK}/cloud.ply "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\nproperty float z\n"
      "end_header\n0 0 1\n0.1 0 1\n")
 function(run_killed moved)  # arguments of the run
@@ -96,6 +97,45 @@ foreach(moved 0 5)
   file(GLOB maps ${WORK}/maps/.rgbd_slam-*)
   check(NOT maps)
 endforeach()
+
+# The same, and files that were moved cannot be moved back: the next command finishes, with or without earlier results.
+foreach(moved 3 8)
+  foreach(earlier ON OFF)
+    file(REMOVE_RECURSE ${WORK}/out)
+    if(earlier)
+      file(COPY ${WORK}/before/ DESTINATION ${WORK}/out)
+    endif()
+    execute_process(COMMAND ${CMAKE_COMMAND} -E env LD_PRELOAD=${KILLED} ASAN_OPTIONS=verify_asan_link_order=0
+                            ORBIS_TEST_RENAMES=${moved} ORBIS_TEST_NO_LINKS=1 ORBIS_TEST_STAYS_BROKEN=1
+                            ${APP} run room --out out ${quick} --deterministic
+                    WORKING_DIRECTORY ${WORK} RESULT_VARIABLE result ERROR_VARIABLE err)
+    check(result EQUAL 2)
+    check(err MATCHES "Input/output error; the next command that uses the folder moves the new files into place\n$")
+    app(0 map cloud.ply --out out ${quick})
+    must_be_of(all)
+  endforeach()
+endforeach()
+
+# Another program holds the lock of the folder: after an interrupt the run ends soon, and the next command finishes.
+file(REMOVE_RECURSE ${WORK}/out)
+file(COPY ${WORK}/before/ DESTINATION ${WORK}/out)
+execute_process(COMMAND bash -c "
+  ${APP} run room --out out ${quick_text} --deterministic 2>locked.log &
+  run=$!
+  for i in $(seq 1000); do ls -d out/.rgbd_slam-* >/dev/null 2>&1 && break; sleep 0.01; done
+  exec 9<out
+  flock -s 9
+  for i in $(seq 6000); do [ -e out/.rgbd_slam-*/.rgbd_slam/names ] && break; kill -0 $run || break; sleep 0.01; done
+  kill -TERM $run
+  wait $run" WORKING_DIRECTORY ${WORK} RESULT_VARIABLE result)
+check(result EQUAL 2)
+file(READ ${WORK}/locked.log err)
+check(err MATCHES "out: another program has locked the folder; the next command that uses the folder moves the new")
+must_equal(out/trajectory.txt before/trajectory.txt)
+app(0 map cloud.ply --out out ${quick})
+must_be_of(all)
+file(REMOVE_RECURSE ${WORK}/out)
+file(COPY ${WORK}/before/ DESTINATION ${WORK}/out)
 
 # What another user has put into the folder is neither moved nor removed, unless the folder is that user's.
 execute_process(COMMAND id -u OUTPUT_VARIABLE user OUTPUT_STRIP_TRAILING_WHITESPACE)

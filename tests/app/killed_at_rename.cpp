@@ -2,7 +2,7 @@
 //
 // Loaded before a program (LD_PRELOAD). After ORBIS_TEST_RENAMES files have been moved out of hidden folders, the
 // program and its child processes are killed, or, with ORBIS_TEST_NO_LINKS, one rename fails, on a file system without
-// hard links. With ORBIS_TEST_KILLED_AFTER_ERROR, they are killed when the failed move has been withdrawn.
+// hard links; with ORBIS_TEST_STAYS_BROKEN, all later ones as well. With ORBIS_TEST_KILLED_AFTER_ERROR, they are killed when the failed move has been withdrawn.
 #include <cerrno>
 #include <csignal>
 #include <cstdlib>
@@ -36,9 +36,12 @@ extern "C" int rename(const char* from, const char* to) {
     original(from, to);
     kill_all();
   }
+  static bool is_broken = false;
+  if (is_broken && std::getenv("ORBIS_TEST_STAYS_BROKEN") != nullptr) return errno = EIO, -1;
   const bool moves = name != nullptr && std::strchr(name + 1, '/') == nullptr && std::strstr(to, "/.rgbd_slam-") == nullptr;
   if (allowed == nullptr || !moves || renamed++ != std::atoi(allowed)) return original(from, to);
   if (!has_no_links()) kill_all();
+  is_broken = true;
   errno = EIO;
   return -1;
 }
