@@ -3,9 +3,11 @@
 // Start and end of a program: exit codes, one-line error messages, and handling of exceptions and signals.
 #pragma once
 
+#include <cerrno>
 #include <cmath>
 #include <csignal>
 #include <cstdio>
+#include <cstdlib>
 #include <exception>
 #include <optional>
 #include <string>
@@ -36,15 +38,28 @@ namespace examples {
   return orbis::shortened(what) + " (--help shows the usage)";
 }
 
+/// Throws if an option of the program or of the chosen commands has a number that CLI11 accepts but changes: NaN, which
+/// passes limits, because these are comparisons, or an integer that is negative or too large for its unsigned type.
+inline void check_numbers(const CLI::App& cli) {
+  for (const CLI::Option* option : cli.get_options())
+    for (const std::string& text : option->results()) {
+      const std::string type = option->get_type_name();
+      if (double value = 0; type.starts_with("FLOAT") && CLI::detail::lexical_cast(text, value) && std::isnan(value))
+        throw CLI::ValidationError{option->get_name(), orbis::in_quotes(text) + " is not a number"};
+      if (!type.starts_with("UINT")) continue;
+      errno = 0;
+      static_cast<void>(std::strtoull(text.c_str(), nullptr, 0));
+      if (text.find('-') != std::string::npos || errno == ERANGE)
+        throw CLI::ValidationError{option->get_name(), orbis::in_quotes(text) + " is out of range"};
+    }
+  for (const CLI::App* command : cli.get_subcommands()) check_numbers(*command);
+}
+
 /// Parses the command line. Returns the exit code if the program must end: 0 after --help, 1 after a usage error.
 [[nodiscard]] inline std::optional<int> parse(CLI::App& cli, int argc, char** argv) {
   try {
     cli.parse(argc, argv);
-    for (const CLI::Option* option : cli.get_options())  // CLI11's limits are comparisons, which NaN passes
-      if (option->get_type_name().starts_with("FLOAT"))
-        for (const std::string& text : option->results())
-          if (double value = 0; CLI::detail::lexical_cast(text, value) && std::isnan(value))
-            throw CLI::ValidationError{option->get_name(), orbis::in_quotes(text) + " is not a number"};
+    check_numbers(cli);
     return std::nullopt;
   } catch (const CLI::ParseError& e) {
     if (e.get_exit_code() == 0) return cli.exit(e);

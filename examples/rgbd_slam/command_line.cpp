@@ -515,6 +515,7 @@ std::variant<settings, exit_code> command_line::read(int argc, char** argv) {
         bad_usage);
   try {
     cli.parse(argc, argv);
+    examples::check_numbers(cli);
   } catch (const CLI::CallForHelp&) {
     std::fputs(cli.help().c_str(), stdout);
     return done;

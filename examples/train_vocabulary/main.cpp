@@ -7,17 +7,20 @@
 #include <algorithm>
 #include <cstdint>
 #include <cstdio>
+#include <filesystem>
 #include <iterator>
 #include <ostream>
 #include <span>
 #include <string>
 #include <string_view>
+#include <system_error>
 #include <utility>
 #include <vector>
 
 #include <CLI/CLI.hpp>
 
 #include <orbis/core/file.hpp>
+#include <orbis/io/recording.hpp>
 #include <orbis/places.hpp>
 
 #include "../common/program.hpp"
@@ -47,7 +50,21 @@ int write(const settings& s, const places::vocabulary& words) {
   return 0;
 }
 
+/// The message if the output file is a file of one of the recordings; empty otherwise.
+std::string overwritten_input(const settings& s) {
+  std::error_code ignored;
+  if (!std::filesystem::exists(s.output, ignored)) return {};
+  for (const std::string& folder : s.recordings) {
+    const auto recording = orbis::io::open_recording(folder);
+    if (!recording) continue;  // reported when it is read
+    for (const std::filesystem::path& file : recording->files())
+      if (examples::is_same_file(s.output, file)) return examples::overwrite_message(s.output, file.string());
+  }
+  return {};
+}
+
 int train(const settings& s) {
+  if (const std::string why = overwritten_input(s); !why.empty()) return report_error(1, why);
   std::vector<sources::descriptors> images = sources::of_textures(s.textures, s.training.seed, s.features);
   for (std::size_t room = 0; room != s.rooms; ++room)
     for (sources::view& v : sources::of_room(1000 * s.training.seed + room, s.views, s.features, room).views)
@@ -70,6 +87,12 @@ int convert(const settings& s) {
 }
 
 int judge(const settings& s) {
+  std::vector<std::pair<std::string, places::vocabulary>> all{{"(default)", places::default_vocabulary()}};
+  for (const std::string& file : s.inputs) {
+    auto words = dbow::load_vocabulary(file);
+    if (!words) return report_error(2, examples::describe(words.error()));
+    all.emplace_back(file.substr(file.find_last_of('/') + 1), *std::move(words));
+  }
   std::vector<recall::task> tasks;
   if (s.rooms != 0) {
     recall::task rooms{.name = "rooms"};
@@ -93,12 +116,6 @@ int judge(const settings& s) {
   }
   std::printf("%-32s %8s %-12s %8s %8s %8s %10s %13s\n", "vocabulary", "words", "views", "queries", "first", "in ten",
               "candidate", "transform, ms");
-  std::vector<std::pair<std::string, places::vocabulary>> all{{"(default)", places::default_vocabulary()}};
-  for (const std::string& file : s.inputs) {
-    auto words = dbow::load_vocabulary(file);
-    if (!words) return report_error(2, examples::describe(words.error()));
-    all.emplace_back(file.substr(file.find_last_of('/') + 1), *std::move(words));
-  }
   for (const auto& [name, words] : all)
     for (const recall::task& t : tasks) {
       const auto o = recall::measure(t, words);

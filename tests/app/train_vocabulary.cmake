@@ -53,3 +53,18 @@ if(result EQUAL 0)
 endif()
 app(0 recall first.voc --rooms 1)
 check(out MATCHES "first.voc +25 rooms")
+
+# A recording is not overwritten, directly or through a link.
+execute_process(COMMAND ${MAKE_RECORDING} ${WORK}/room 3 160 RESULT_VARIABLE result)
+check(result EQUAL 0)
+file(CREATE_LINK room ${WORK}/linked SYMBOLIC)
+foreach(name room/rgb.txt room/rgb/000000.png room/camera.toml linked/depth/000001.png)
+  file(SHA256 ${WORK}/${name} before)
+  fails(1 "${name}: is an input" train ${name} ${small} --recording room)
+  file(SHA256 ${WORK}/${name} after)
+  check(before STREQUAL after)
+endforeach()
+# Numbers that do not fit are not changed into others; damaged files are reported before any work.
+fails(1 "--seed: .* is out of range" train no.voc ${small} --seed -1)
+fails(1 "--seed: .* is out of range" train no.voc ${small} --seed 18446744073709551616)
+fails(2 "text.txt:2: .*descriptor" recall text.txt --rooms 1000000)
