@@ -71,4 +71,8 @@ app_fails(5 "no point is observed by two images" calibrate room --frames 3 --rea
 check(NOT EXISTS ${WORK}/found.toml)
 app_fails(1 "would be overwritten" calibrate room --out room/rgb/000000.png)
 app_fails(1 "is a folder" calibrate room --out room)
+file(WRITE ${WORK}/room.json "{\"width\": 320, \"height\": 240, \"fx\": 262.5, \"fy\": 262.5, \"cx\": 159.5, \"cy\": 119.5, \"depth_scale\": 5000}")
+app_fails(1 "would be overwritten" calibrate room --camera room.json --out room.json)
+app_fails(1 "written as TOML" calibrate room --out other.json)
+check(NOT EXISTS ${WORK}/other.json)
 app_fails(2 "nothing" calibrate nothing)
