@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // Shows the scene in a browser: a read-only server on 127.0.0.1 with one page and its data.
+#include <algorithm>
 #include <atomic>
 #include <charconv>
 #include <chrono>
+#include <cstddef>
 #include <cstdint>
 #include <exception>
 #include <map>
@@ -14,6 +16,8 @@
 #include <string>
 #include <utility>
 #include <vector>
+
+#include <sys/resource.h>
 
 #include "viewer/backend.hpp"
 #include "viewer/http_server.hpp"
@@ -32,6 +36,14 @@ std::optional<std::uint64_t> parse_since(const http_request& request) {
   return value;
 }
 
+/// Leaves most of the file descriptors to the run.
+http_limits limits() {
+  http_limits made;
+  if (rlimit files{}; ::getrlimit(RLIMIT_NOFILE, &files) == 0)
+    made.connections = std::clamp<std::size_t>(files.rlim_cur / 8, 1, made.connections);
+  return made;
+}
+
 class web_backend final : public viewer_backend {
  public:
   web_backend()
@@ -44,7 +56,8 @@ class web_backend final : public viewer_backend {
                 "Cross-Origin-Resource-Policy: same-origin\r\n"
                 "Referrer-Policy: no-referrer\r\n"
                 "Content-Security-Policy: default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
-                "connect-src 'self'; img-src blob:; base-uri 'none'; form-action 'none'\r\n"} {}
+                "connect-src 'self'; img-src blob:; base-uri 'none'; form-action 'none'\r\n",
+                limits()} {}
   web_backend(const web_backend&) = delete;
   web_backend& operator=(const web_backend&) = delete;
 
