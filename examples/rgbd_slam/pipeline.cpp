@@ -103,12 +103,12 @@ orbis::result<void> complete(results& r, const tracked_frames& tracked, const fr
 /// The outcome of `complete_or_give_up`.
 struct completion {
   bool was_interrupted;                ///< true if the user interrupted the run, during tracking or later
-  std::optional<orbis::error> no_map;  ///< the reason why there is no map: cancelled by the user, or out of memory
+  std::optional<orbis::error> no_map;  ///< the reason why there is no map, for example cancelled by the user
   bool is_running = false;             ///< a thread is still working on the map
 };
 
-/// Completes the results and moves their files to the other result files. If the user abandons the map or it does not
-/// fit in memory, leaves the results as they are. Other errors are those of `complete`; no thread is then running.
+/// Completes the results and moves their files to the other result files. If the user abandons the map, or it cannot be
+/// made or written, leaves the results as they are. Errors: write_failed; no thread is then running.
 orbis::result<completion> complete_or_give_up(results& r, const tracked_frames& tracked, const frame_source& source,
                                               const settings& s, result_files& files, viewer& viewer,
                                               console& console) {
@@ -139,8 +139,7 @@ orbis::result<completion> complete_or_give_up(results& r, const tracked_frames& 
     return end;
   }
   if (!*done) {
-    if (done->error().code != errc::cancelled && done->error().code != errc::exception)
-      return orbis::fail(done->error());
+    files.drop_optional();  // makes room on the disk for the report
     end.no_map = done->error();
     return end;
   }
@@ -186,7 +185,7 @@ exit_code finish_run(results& r, const tracked_frames& tracked, completion& end,
                      const settings& s, result_files& files, viewer& viewer, console& console) {
   orbis::result<void> reported;
   if (end.no_map) {
-    end.no_map->where = s.out.string();
+    end.no_map->where = (s.out / std::filesystem::path{end.no_map->where}.filename()).string();
     end.no_map->message =
         (end.no_map->code == orbis::errc::cancelled ? "interrupted by the user" : end.no_map->message) +
         "; the map is missing, the other results were written";

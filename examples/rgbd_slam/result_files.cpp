@@ -273,6 +273,11 @@ result<void> result_files::take_optional() {
   return {};
 }
 
+void result_files::drop_optional() noexcept {
+  std::error_code ignored;
+  for (const staged_folder& f : folders_) fs::remove_all(f.path() / optional_name, ignored);
+}
+
 result<void> result_files::put_in_place() {
   std::vector<staged_folder*> folders;
   for (staged_folder& f : folders_) folders.push_back(&f);

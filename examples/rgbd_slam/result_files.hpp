@@ -90,11 +90,14 @@ class result_files {
   [[nodiscard]] std::filesystem::path optional_floor_map() const { return floor_map_in(optional_name); }
   /// Moves the optional files to the other files. Errors: write_failed.
   [[nodiscard]] orbis::result<void> take_optional();
+  /// Removes the optional files.
+  void drop_optional() noexcept;
   /// Replaces the old files by the new ones: all, or none if this fails. Errors: write_failed.
   [[nodiscard]] orbis::result<void> put_in_place();
 
  private:
-  static inline const std::filesystem::path optional_name = std::filesystem::path{staged_folder::private_name} / "optional";
+  static inline const std::filesystem::path optional_name =
+      std::filesystem::path{staged_folder::private_name} / "optional";
 
   result_files() = default;
   [[nodiscard]] std::filesystem::path floor_map_in(const std::filesystem::path& part) const {
