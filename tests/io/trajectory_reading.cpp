@@ -102,7 +102,7 @@ TEST_CASE("layouts, separators, headers and units of trajectories are recognised
     form of;
     std::vector<std::string> notes{};  // parts, in order
   };
-  const std::string w = "read in EuRoC's layout, the quaternion with w first";
+  const std::string w = "read in EuRoC's layout: the quaternion has w first";
   const std::vector<kind> kinds{
       {"", {tum, " "}},
       {"# timestamp tx ty tz qx qy qz qw\n", {tum, "\t"}},
@@ -120,7 +120,7 @@ TEST_CASE("layouts, separators, headers and units of trajectories are recognised
       {"", {euroc, ",", 19}, {w, "the time stamps are in nanoseconds"}},
       {"# timestamp tx ty tz qw qx qy qz\n", {euroc, " "}, {w}},
       {"#time, tx, ty, tz, q_w, q_x, q_y, q_z\n", {euroc, ", "}, {w}},
-      {"", {kitti, " "}, {"read in KITTI's layout, a pose matrix per line"}},
+      {"", {kitti, " "}, {"read in KITTI's layout: a pose matrix per line"}},
       {"# poses\n", {kitti, "\t"}, {"read in KITTI's layout"}}};
   const trajectory poses = some_path(20, 1);
   for (const kind& k : kinds) {
@@ -146,8 +146,10 @@ TEST_CASE("columns of trajectories are found by their names") {
     std::vector<std::string> notes{};  // parts, in order
     std::string before{}, after_time{};
   };
-  const std::string at_2 = "according to the header, column 2 is the time, column 3 the first of the position, and column 6";
-  const std::string at_1 = "according to the header, column 1 is the time, column 3 the first of the position, and column 6";
+  const std::string at_2 =
+      "according to the header, column 2 is the time, column 3 the first of the position, and column 6";
+  const std::string at_1 =
+      "according to the header, column 1 is the time, column 3 the first of the position, and column 6";
   const std::vector<kind> kinds{
       {"timestamp,x,y,z,orientation_w,orientation_x,orientation_y,orientation_z", comma, true, 10, {w}},
       {"time,x,y,z,orientation.x,orientation.y,orientation.z,orientation.w", comma, false, 19, {ns}},
@@ -180,8 +182,7 @@ TEST_CASE("columns of trajectories are found by their names") {
        comma,
        true,
        19,
-       {w, ns,
-        "line 1 does not list a quaternion (such as qx, qy, qz and qw): read as timestamp tx ty tz qw qx"}}};
+       {w, ns, "line 1 does not list a quaternion (such as qx, qy, qz and qw): read as timestamp tx ty tz qw qx"}}};
   const trajectory poses = some_path(20, 1);
   for (const kind& k : kinds) {
     INFO(k.head);

@@ -172,7 +172,8 @@ class floor_view {
   [[nodiscard]] double distance(int x, int y) const {
     return std::sqrt(static_cast<double>(squared_(x + 1, y + 1))) * resolution();
   }
-  /// See detail::is_segment_free. An obstacle's square is half a cell to half a diagonal nearer than its centre.
+  /// The margin at `p`, see detail::is_segment_free. The nearest point of an obstacle's cell is closer to `p` than the
+  /// centre of the cell, by half a cell to half a diagonal.
   [[nodiscard]] double margin(const vec3& p, double radius) const {
     const auto cell = map_->cell(p);
     if (!cell) return -radius - resolution();

@@ -23,8 +23,8 @@ struct integration_options {
   ray_mode mode = ray_mode::every_ray;
 };
 
-/// Counts of points and voxels of an integrated scan. In mode `discretized`, `used` and `truncated` count voxels that
-/// hold points instead of points; points that share a voxel count once.
+/// Counts of points and voxels of an integrated scan. In mode `discretized`, `used` and `truncated` count
+/// voxels rather than points: all points in a voxel count once.
 struct integration_summary {
   std::size_t used = 0;       ///< number of points within range
   std::size_t truncated = 0;  ///< number of points beyond the range

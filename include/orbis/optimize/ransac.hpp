@@ -219,7 +219,7 @@ class ransac_run {
     }
   }
   [[nodiscard]] const std::optional<model>& best() const noexcept { return best_; }
-  /// Returns the required number of samples if the best model is correct.
+  /// Returns the number of samples required, assuming that the best model is correct.
   [[nodiscard]] double wanted() const {
     return wanted_iterations(options_.confidence,
                              static_cast<double>(workspace_.inliers.size()) / static_cast<double>(estimator_.size()),

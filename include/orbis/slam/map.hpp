@@ -187,7 +187,7 @@ class basic_map {
   /// Erases the observation `noted` if it still exists; returns true if it existed.
   bool erase_observation(landmark_id l, const observation& noted);
 
-  /// Replaces landmark `from` by `into`, which takes over its observations by keyframes that do not observe `into`.
+  /// Merges landmark `from` into `into`, which takes over the observations of keyframes that do not observe it yet.
   /// O(n^2). @pre from != into, and both exist
   void fuse(landmark_id from, landmark_id into);
 

@@ -34,8 +34,8 @@ concept compares_as_map = !requires {
 /// The matchers for tracking with descriptors of type `D`: `motion` matches the features of the last frame near their
 /// predicted positions; `landmarks` matches landmarks near their projections; `appearance` matches two images without a
 /// prediction. Each is a matcher chain (see `features/matcher.hpp`). If `M` declares a type `distance`, it must be the
-/// distance with which a map compares these descriptors: many descriptor types can be compared bit by bit, which is
-/// meaningless for most of them.
+/// distance with which a map compares these descriptors: many descriptor types compile with a bitwise distance,
+/// which is meaningful for few of them.
 template <class M, class D>
 concept tracking_matchers = feature_descriptor<D> && detail::compares_as_map<M, D> &&
     requires(const features::basic_features<D>& image, const features::feature_view<D>& seen,

@@ -72,7 +72,7 @@ TEST_CASE("lost poses of a recording are left out and counted") {
     CHECK(scenes.frames[0].T_world_camera.has_value());
     CHECK_FALSE(scenes.frames[1].T_world_camera.has_value());
     CHECK(scenes.ground_truth.size() == 1);
-    CHECK(has_note(scenes.notes, "1 of 2 frames have no pose: the camera was lost there"));
+    CHECK(has_note(scenes.notes, "1 of 2 frames have no pose: tracking was lost"));
 
     io::detail::recording_index kitti;
     folder.write("poses.txt", "1 0 0 1 0 1 0 2 0 0 1 3\n" + repeated(mark, 12) + "\n1 0 0 4 0 1 0 5 0 0 1 6\n");

@@ -384,7 +384,7 @@ class nearest_search {
   nearby_leaves shared_;                                                ///< candidates of a run of points
   nearby_leaves own_;                                                   ///< candidates of one point
   nearby_leaves near_rows_;                                             ///< rows of leaves near the row near_rows_of_
-  std::size_t near_rows_of_ = std::numeric_limits<std::size_t>::max();  ///< no row at first
+  std::size_t near_rows_of_ = std::numeric_limits<std::size_t>::max();  ///< the row; initially none
   float near_rows_reach_ = -1;      ///< squared distance up to which near rows are complete; negative if unknown
   float too_many_rows_ = infinity;  ///< smallest squared distance at which the row had too many near rows
   line_vector<std::uint32_t> chosen_;
@@ -397,8 +397,8 @@ class nearest_search {
   std::array<float, leaf_width> bounds_{};
   std::array<bool, leaf_width> has_places_{};
   std::array<float, leaf_width> largest_{};  ///< squared distance to the `wanted`-th nearest
-  float hoped_;  ///< multiple of `usual_` that should suffice; the more neighbours, the less it scatters
-  float reach_;  ///< multiple of `usual_` that should always suffice
+  float hoped_;              ///< multiple of `usual_` that should suffice; the more neighbours, the less it scatters
+  float reach_;              ///< multiple of `usual_` that should always suffice
   float shared_reach_ = -1;  ///< squared distance from the run's box up to which `shared_` is complete
   float usual_ = -1;         ///< squared distance to the `wanted`-th nearest; negative if not yet known
 };

@@ -99,7 +99,7 @@ class surroundings {
   }
 
   [[nodiscard]] std::size_t size() const noexcept { return graph_.size(); }
-  /// Index in the cloud of the point at place `i`.
+  /// Cloud index of the point at place `i`.
   [[nodiscard]] std::uint32_t index(std::size_t i) const noexcept { return graph_.index(i); }
   [[nodiscard]] std::span<const float> log_spacing() const noexcept { return log_spacing_; }
   [[nodiscard]] bool has_range(std::size_t i) const noexcept {

@@ -297,8 +297,9 @@ class voxel_parts {
   double size_;
   std::size_t count_;
   std::size_t bits_;
-  std::vector<std::uint32_t> starts_;         ///< start of each part in the entries, and the end
-  std::unique_ptr<std::uint16_t[]> part_of_;  ///< part of each point; finally also a mark
+  std::vector<std::uint32_t> starts_;  ///< start of each part in the entries, and the end
+  std::unique_ptr<std::uint16_t[]>
+      part_of_;  ///< part of each point; at the end also marks the first point of each voxel
   table_memory<entry> memory_;
   entry* entries_ = nullptr;
 };

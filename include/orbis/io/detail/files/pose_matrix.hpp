@@ -81,7 +81,7 @@ namespace orbis::io::detail {
 
 /// A warning about frames without a pose.
 [[nodiscard]] inline std::string lost_frames_note(std::size_t lost, std::size_t frames) {
-  return std::to_string(lost) + " of " + std::to_string(frames) + " frames have no pose: the camera was lost there";
+  return std::to_string(lost) + " of " + std::to_string(frames) + " frames have no pose: tracking was lost";
 }
 
 }  // namespace orbis::io::detail

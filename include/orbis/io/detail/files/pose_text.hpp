@@ -263,7 +263,7 @@ inline repeated_times keep_first(std::vector<pose_lines::entry>& entries) {
   for (const std::string& text : lines.notes) note(text);
   if (lines.lost != 0)
     note(std::to_string(lines.lost) +
-         " poses with NaN, infinity or a zero quaternion are left out: the camera was lost there");
+         " poses with NaN, infinity or a zero quaternion are left out: tracking was lost at these times");
 
   std::vector<pose_lines::entry>& entries = lines.entries;
   const std::size_t all = entries.size();

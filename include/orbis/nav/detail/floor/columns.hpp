@@ -166,7 +166,8 @@ template <planning_map Map>
   const std::array<std::uint32_t, 3> size{around.high.x + 4 - around.low.x, around.high.y + 4 - around.low.y,
                                           around.high.z + 4 - around.low.z};
   if (std::uint64_t{size[0]} * size[1] > most || std::uint64_t{size[0]} * size[1] * ((size[2] + 63) / 64) > most)
-    return fail(errc::invalid_argument, "region", "the map is too wide, or its layer too high, for one floor map");
+    return fail(errc::invalid_argument, "region",
+                "the region is too large for one floor map: reduce its area or its height");
   voxel_columns columns{around.low, size};
   for (const part& p : parts) columns.set(p.octants, p.states);
   return columns;

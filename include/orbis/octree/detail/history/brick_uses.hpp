@@ -67,7 +67,7 @@ class brick_uses {
     if (b.stale == 0) queue_.push_back(number);
     b.stale = static_cast<std::uint8_t>(b.stale | octants);
   }
-  /// Bricks with stale octants, those stale for longest first.
+  /// Bricks with stale octants, longest stale first.
   [[nodiscard]] std::span<const std::uint32_t> stale() const noexcept { return std::span{queue_}.subspan(done_); }
   /// Marks the first `count` stale bricks as up to date.
   void finish(std::size_t count) {

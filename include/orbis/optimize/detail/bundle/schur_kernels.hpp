@@ -113,8 +113,7 @@ ORBIS_ALWAYS_INLINE std::size_t invert_factors(const elimination& work, std::siz
   return p + i;
 }
 
-/// Computes Y for the observations in a chunk by one camera, the sum of Y Y^T, and the contribution to the right-hand
-/// side.
+/// Computes Y for one camera's observations in a chunk, the sum of Y Y^T, and the contribution to the right-hand side.
 template <int C, bool ThroughCamera, simd::target Target>
 ORBIS_ALWAYS_INLINE void make_factors(const elimination& work, const bundle_structure::segment& segment,
                                       std::size_t unknown) {

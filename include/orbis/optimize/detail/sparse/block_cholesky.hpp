@@ -23,8 +23,8 @@
 
 namespace orbis::optimize::detail {
 
-/// Analyses the structure once; factorisation and solution for any values then allocate nothing. Every processor gives
-/// the same bits. Not thread-safe.
+/// Analyses the structure once; factorisation and solution for any values then allocate nothing. Results are
+/// bit-identical on all processors. Not thread-safe.
 template <int B>
 requires(B >= 1) class block_cholesky {
  public:

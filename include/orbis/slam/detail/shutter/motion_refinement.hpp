@@ -78,7 +78,8 @@ template <feature_descriptor D>
   return (before.T_world_camera.inverse() * after.T_world_camera).log() / interval;
 }
 
-/// Finds the observations of landmarks by the keypoints of a frame, as read if available. O(features).
+/// Collects a frame's observations of landmarks, with the keypoints as the rolling shutter read them if available.
+/// O(features).
 template <feature_descriptor D, camera::camera_model Camera>
 void find_row_observations(const basic_frame<D>& f, const basic_map<D>& m, const camera_rig<Camera>& rig,
                            std::vector<row_observation>& to) {

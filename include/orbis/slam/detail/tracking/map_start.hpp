@@ -45,7 +45,7 @@ class map_start {
     begins_map_ = false;
     first_.reset();
   }
-  /// Discards the candidates for the first frame of a map without depth, because a frame was tracked.
+  /// Discards the candidates for the first frame of a map without depth. Call it after a frame was tracked.
   void forget_candidates() { pair_.reset(); }
 
   /// Starts a map from a frame if its measurements are sufficient; without depth, together with an earlier frame. The

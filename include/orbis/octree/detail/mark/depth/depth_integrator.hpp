@@ -53,10 +53,9 @@ inline void load_points(const pixel_points& points, std::size_t begin, std::size
 /// crosses it. If rounding could change the result, the exact traversal of that ray decides.
 class depth_integrator {
  public:
-  /// Marks in `masks` the voxels that integrating the image's world points (see append_world_points) in mode every_ray
-  /// marks. Voxels that a miss would not change according to `saturated` may be missing from the free ones, and an
-  /// occupied voxel may also be marked free. The summary's voxel counts stay zero. The voxels are the same under every
-  /// policy.
+  /// Marks in `masks` the same voxels as integrating the image's world points (see append_world_points) in mode
+  /// every_ray, except that free voxels that a miss would not change (see `saturated`) may be missing, and an occupied
+  /// voxel may also be marked free. The summary's voxel counts stay zero. The voxels are the same under every policy.
   ///
   /// If the rays are too sparse for this method, or too close to the border of the grid, marks only the occupied voxels
   /// and sets `needs_rays`: the caller must mark the rays to the pixels, see `points`.

@@ -155,7 +155,7 @@ class ray_rasterizer {
     for (std::size_t i = 0; i != 3; ++i) at[i] = down[i] != 0 ? -source_.skipped[1][i] : source_.skipped[0][i];
     return at;
   }
-  /// Marks the cell of a ray in its n-th layer, relative to the start of the ray.
+  /// Marks the cell (u, v) of a ray's n-th layer; the indices are relative to the start of the ray.
   void mark_cell(std::int32_t kind, std::int32_t n, std::int32_t u, std::int32_t v, scan_masks& masks) const {
     std::array<std::int32_t, 3> at = start_voxel(kind);
     const std::size_t axis = ray_setup::axis(kind);
