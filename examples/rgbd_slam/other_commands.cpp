@@ -141,7 +141,7 @@ orbis::result<void> check_resolution(const std::vector<orbis::vec3f>& points, co
 orbis::result<mapped> map_cloud_file(const settings& s, const std::filesystem::path& folder, console& console) {
   if (filter_options(s).kind == orbis::mapping::filter_kind::ray_evidence)
     return orbis::fail(orbis::errc::invalid_argument, s.input.string(),
-                       "the filter ray-evidence needs a recording: a cloud has no depth images");
+                       "the ray-evidence filter needs a recording: a cloud has no depth images");
   console.stage("reading");
   auto found = examples::read_near_origin(s.input);
   if (!found) return orbis::fail(found.error());

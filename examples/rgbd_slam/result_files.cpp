@@ -204,7 +204,7 @@ result<result_files> result_files::begin(const settings& s) {
         return fail(file, "another result has this name");
       names.push_back(name);
       if (const auto there = fs::status(folder / name, ec); fs::exists(there) && !fs::is_regular_file(there))
-        return fail(folder / name, "the existing file is not a regular file and is not replaced");
+        return fail(folder / name, "the existing file is not a regular file and will not be replaced");
     }
     return {};
   };

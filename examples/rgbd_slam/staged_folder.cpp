@@ -314,7 +314,7 @@ result<staged_folder> staged_folder::open(const fs::path& folder, std::vector<st
   if (made.folder_lock_.get() < 0) return failure(folder, "cannot be opened: " + reason(errno));
   for (const std::string& name : made.names_)
     if (!may_be_replaced(made.folder_ / name))
-      return failure(folder / name, "is not a regular file and is not replaced");
+      return failure(folder / name, "is not a regular file and will not be replaced");
 
   if (const std::string why = clear_leftovers(made.folder_, made.folder_lock_.get()); !why.empty())
     return failure(folder, why);
@@ -377,7 +377,7 @@ result<void> staged_folder::put_in_place(std::span<staged_folder* const> folders
   for (const staged_folder* f : folders) {
     for (const std::string& name : f->made())
       if (!may_be_replaced(f->folder_ / name))
-        return failure(f->folder_ / name, "is not a regular file and is not replaced");
+        return failure(f->folder_ / name, "is not a regular file and will not be replaced");
     if (fs::create_directories(f->staging_ / backup, ec); ec)
       return failure(f->folder_, "cannot create files in it: " + ec.message());
     auto listed = write_list(f->staging_ / names_list, f->names_);

@@ -302,14 +302,14 @@ orbis::result<tracked_frames> track(const frame_source& source, const shutter_re
       return std::make_unique<live_mapping>(source, s, out.keyframes.depths(), make_pose_reader(slam));
     });
   std::optional<viewer::connection> connection{std::in_place, viewer, make_sources(slam, out.live.get())};
-  interrupts::keep_results(s.quiet
-                               ? ""
-                               : "\nrgbd_slam: stopping; the results so far are mapped and written. Interrupt again to "
-                                 "stop immediately and leave the folder unchanged\n",
-                           [&slam, live = out.live.get()] {
-                             slam.stop();
-                             if (live != nullptr) live->leave();
-                           });
+  interrupts::keep_results(
+      s.quiet ? ""
+              : "\nrgbd_slam: stopping; the results so far will be mapped and written. Interrupt again to "
+                "stop immediately and leave the folder unchanged\n",
+      [&slam, live = out.live.get()] {
+        slam.stop();
+        if (live != nullptr) live->leave();
+      });
   struct forget_stop {
     ~forget_stop() { interrupts::forget_stop(); }
   };

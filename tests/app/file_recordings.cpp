@@ -307,8 +307,9 @@ TEST_CASE("the distortion of a message becomes that of the camera, or an error")
             ->distortion()
             .k3 == 0.5);
   CHECK(open("Inverse Brown Conrady", {0, 0, 0, 0, 0}).value()->camera.model.model_name() == "pinhole");
-  CHECK_THAT(message_of(open("Inverse Brown Conrady", {0.1, 0, 0, 0, 0})),
-             Contains("\"Inverse Brown Conrady\" with 5 numbers is not supported") && Contains("; specify a camera"));
+  CHECK_THAT(
+      message_of(open("Inverse Brown Conrady", {0.1, 0, 0, 0, 0})),
+      Contains("\"Inverse Brown Conrady\" with 5 coefficients is not supported") && Contains("; specify a camera"));
 }
 
 TEST_CASE("colour and depth of one camera are chosen, with a calibrated camera if there is one") {

@@ -116,9 +116,10 @@ result<orbis::camera::any_camera> make_camera(const camera_info& info, bool is_r
   if (is_radial && d.size() >= 4 && !has_more)
     return orbis::camera::any_camera{
         orbis::camera::radial_tangential{k, {at(0), at(1), at(2), at(3), at(4), at(5), at(6), at(7)}}};
-  return fail(errc::unsupported, where,
-              "distortion model \"" + orbis::shortened(model, 60) + "\" with " + std::to_string(d.size()) +
-                  " numbers is not supported, only plumb_bob, rational_polynomial and equidistant; specify a camera");
+  return fail(
+      errc::unsupported, where,
+      "distortion model \"" + orbis::shortened(model, 60) + "\" with " + std::to_string(d.size()) +
+          " coefficients is not supported (plumb_bob, rational_polynomial and equidistant are); specify a camera");
 }
 
 }  // namespace app::ros_messages
