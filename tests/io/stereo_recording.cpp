@@ -214,7 +214,7 @@ TEST_CASE("settings of ASL cameras that are damaged or not known are refused in 
   CHECK_THAT(message("radial-tangential", "equidistant"), !Contains("sensor.yaml"));
   write_asl(folder);
   folder.write("mav0/state_groundtruth_estimate0/data.csv", "1,2,3,4,0,0,0,1e-9\n");
-  CHECK_THAT(message_of(io::open_stereo_recording(folder.path())), Contains("data.csv:1: a pose has"));
+  CHECK_THAT(message_of(io::open_stereo_recording(folder.path())), Contains("data.csv:1: the quaternion (w first) is"));
   write_asl(folder);
   folder.write("mav0/cam1/sensor.yaml", sensor_yaml("0.0"));  // both at one place
   CHECK_THAT(message_of(io::open_stereo_recording(folder.path())), Contains("must be to the right of the left one"));

@@ -160,7 +160,7 @@ TEST_CASE("damaged files of ScanNet are named") {
   CHECK_THAT(message("intrinsic/intrinsic_color.txt", "40 1 23.5 0 40 17.5 0 0 1"), Contains("skew"));
   CHECK_THAT(message("intrinsic/extrinsic_color.txt", "2 0 0 0 0 2 0 0 0 0 2 0 0 0 0 1"),
              Contains("extrinsic_color.txt: the matrix is not a rigid transform"));
-  CHECK_THAT(message("pose/10.txt", "1 0 0"), Contains("10.txt: a pose is a 4x4 matrix"));
+  CHECK_THAT(message("pose/10.txt", "1 0 0"), Contains("10.txt: a pose must be a 4x4 matrix"));
   folder.write("depth/2.png", io::encode_png(image<std::uint16_t>(16, 11, 1)));
   CHECK_THAT(message_of(io::open_recording(folder.path()).value().frame(1)),
              Contains("16x11 pixels, but the camera has 16x12"));
