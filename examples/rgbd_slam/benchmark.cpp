@@ -266,7 +266,7 @@ class runner {
     if (process_ > 0) {
       ::kill(process_, SIGKILL);
       wait_for(process_);
-      staged_folder::finish(out_);
+      static_cast<void>(staged_folder::finish(out_));
       std::error_code ignored;
       fs::remove(out_, ignored);  // if it is empty
     }

@@ -42,7 +42,8 @@ int run(int argc, char** argv) {
   const auto& settings = std::get<app::settings>(parsed);
   app::console console{settings.quiet};
   try {
-    app::finish_earlier_runs(settings);
+    if (const auto finished = app::finish_earlier_runs(settings); !finished)
+      return console.error(finished.error()), app::bad_input;
     switch (settings.what) {
       case app::command::run:
       case app::command::demo:

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <exception>
 #include <mutex>
 #include <string_view>
 #include <system_error>
@@ -133,10 +134,13 @@ std::optional<orbis::error> find_overwritten(const std::vector<fs::path>& target
   return std::nullopt;
 }
 
-void finish_earlier_runs(const settings& s) {
+result<void> finish_earlier_runs(const settings& s) {
   std::error_code ignored;
   for (const fs::path& path : {s.out, s.save_map, s.floor_map, s.input, s.reference, s.load_map})
-    if (!path.empty()) staged_folder::finish(fs::is_directory(path, ignored) ? path : parent_folder(path));
+    if (!path.empty())
+      if (auto done = staged_folder::finish(fs::is_directory(path, ignored) ? path : parent_folder(path)); !done)
+        return done;
+  return {};
 }
 
 std::optional<orbis::error> find_overwritten(const settings& s, const std::vector<fs::path>& inputs) {
@@ -274,8 +278,10 @@ result<void> result_files::take_optional() {
 }
 
 void result_files::drop_optional() noexcept {
-  std::error_code ignored;
-  for (const staged_folder& f : folders_) fs::remove_all(f.path() / optional_name, ignored);
+  try {
+    for (const staged_folder& f : folders_) fs::remove_all(f.path() / optional_name);
+  } catch (const std::exception&) {  // they are removed at the end
+  }
 }
 
 result<void> result_files::put_in_place() {

@@ -33,8 +33,8 @@ inline constexpr std::size_t most_maps = 9;
 [[nodiscard]] file_names result_names(const settings& s);
 
 /// Completes earlier runs that were interrupted while they moved their files into place, in all folders that the
-/// command reads or writes. Call it before any of these folders is read.
-void finish_earlier_runs(const settings& s);
+/// command reads or writes. Call it before any of these folders is read. Errors: write_failed.
+[[nodiscard]] orbis::result<void> finish_earlier_runs(const settings& s);
 
 /// All files that the run reads; `source_files`: those of the recording.
 [[nodiscard]] std::vector<std::filesystem::path> input_files(const settings& s,

@@ -59,8 +59,8 @@ descriptor open_folder(const fs::path& folder) {
 
 /// Locks folders during its lifetime. No effect on file systems without locks.
 ///
-/// Other programs hold these locks for a short time, unless they are stopped or are not ours: waits for 10 s at most,
-/// or 1 s if the user interrupts the run.
+/// Other programs hold these locks for a short time, unless they are stopped or are not ours: waits for 10 s at most.
+/// If the user has interrupted the run, waits for 1 s, or not any longer.
 class folder_locks {
  public:
   explicit folder_locks(std::vector<int> folders) : folders_{std::move(folders)} {
@@ -111,22 +111,23 @@ constexpr int not_restored = 128;
 /// Moves all files into place, or none; returns 0 or an errno value (see `not_restored`). Makes system calls only. At
 /// every moment each new file exists, so that any program can finish.
 int rename_all(const std::vector<move>& moves) {
+  const auto exists = [](const std::string& path) {
+    return ::faccessat(AT_FDCWD, path.c_str(), F_OK, AT_SYMLINK_NOFOLLOW) == 0;
+  };
+  const auto rename = [](const std::string& from, const std::string& to) {
+    return ::rename(from.c_str(), to.c_str()) == 0;
+  };
   for (std::size_t i = 0; i != moves.size(); ++i) {
     const move& next = moves[i];
-    const bool is_there = ::access(next.from.c_str(), F_OK) == 0;
+    if (!exists(next.from) && exists(next.to)) continue;  // done by a child process that was killed
     // Without a hard link to it, the old file is moved aside.
-    if (next.replaces && !next.has_old && is_there) ::rename(next.to.c_str(), next.old.c_str());
-    if (::rename(next.from.c_str(), next.to.c_str()) == 0) continue;
-    const int why = errno;
-    if (why == ENOENT && !is_there && ::access(next.to.c_str(), F_OK) == 0)
-      continue;  // done by a child process that was killed
+    const bool moves_aside = next.replaces && !next.has_old && exists(next.to);
+    if ((!moves_aside || rename(next.to, next.old)) && rename(next.from, next.to)) continue;
+    const int why = errno < not_restored ? errno : EIO;
     for (std::size_t done = i + 1; done-- != 0;) {
       const move& m = moves[done];
-      const bool is_back = done == i || ::rename(m.to.c_str(), m.from.c_str()) == 0;
-      // The failed file was not moved aside if there is a link to it.
-      const bool is_aside = m.replaces && !(done == i && ::access(m.to.c_str(), F_OK) == 0);
-      if (!is_back || (is_aside && ::rename(m.old.c_str(), m.to.c_str()) != 0))
-        return not_restored + why % not_restored;
+      const bool is_back = done == i || rename(m.to, m.from);
+      if (!is_back || (m.replaces && !exists(m.to) && !rename(m.old, m.to))) return not_restored + why;
     }
     return why;
   }
@@ -206,13 +207,20 @@ std::optional<fs::path> first_of(const fs::path& hidden) {
   const fs::path path = first->size() == 1 ? first->front() : std::string{};
   return is_ready(path) && is_hidden_folder(path) ? path : fs::path{};
 }
-/// The other hidden folders of a transaction, those that exist.
-std::vector<fs::path> others_of(const fs::path& first) {
+/// The other hidden folders of a transaction, those that exist; nullopt if they cannot be found out.
+std::optional<std::vector<fs::path>> others_of(const fs::path& first) {
+  const auto listed = read_list(first / others_list);
+  if (!listed) return std::nullopt;
   std::vector<fs::path> others;
-  std::error_code ignored;
-  for (const fs::path path : read_list(first / others_list).value_or(std::vector<std::string>{}))
-    if (is_hidden_folder(path) && fs::equivalent(first_of(path).value_or(fs::path{}), first, ignored))
-      others.push_back(path);
+  for (const fs::path path : *listed) {
+    std::error_code failure;
+    const bool is_there = fs::exists(fs::symlink_status(path, failure));
+    if (failure && failure != std::errc::no_such_file_or_directory) return std::nullopt;
+    if (!is_there || !is_hidden_folder(path)) continue;
+    const auto first_there = first_of(path);
+    if (!first_there) return std::nullopt;
+    if (fs::equivalent(*first_there, first, failure)) others.push_back(path);
+  }
   return others;
 }
 
@@ -223,23 +231,34 @@ std::vector<fs::path> hidden_folders_in(const fs::path& folder) {
     if (is_hidden_folder(it->path())) found.push_back(it->path());
   return found;
 }
-/// The hidden folders of ended processes in `folder`, without those that cannot be opened.
+/// The hidden folders of ended processes in `folder`, without those that cannot be opened. Those of earlier results
+/// come first.
 std::vector<fs::path> leftovers_in(const fs::path& folder) {
   std::vector<fs::path> found = hidden_folders_in(folder);
   std::erase_if(found, [](const fs::path& hidden) {
     const descriptor lock = open_folder(hidden);
     return lock.get() < 0 || ::flock(lock.get(), LOCK_EX | LOCK_NB) != 0;
   });
+  std::vector<std::pair<fs::file_time_type, fs::path>> by_time;
+  for (fs::path& hidden : found) {
+    std::error_code no_list;
+    const fs::file_time_type time = fs::last_write_time(hidden / names_list, no_list);
+    by_time.emplace_back(no_list ? fs::file_time_type::min() : time, std::move(hidden));
+  }
+  std::sort(by_time.begin(), by_time.end());
+  found.clear();
+  for (auto& [time, hidden] : by_time) found.push_back(std::move(hidden));
   return found;
 }
 
 /// Finishes the transaction that begins with the hidden folder `first`. Returns false if that is not possible now.
 /// @pre the folders of all its files are locked
 bool finish_transaction(const fs::path& first) {
-  std::vector<fs::path> folders = others_of(first);
-  folders.push_back(first);  // the last to be removed
+  auto folders = others_of(first);
+  if (!folders) return false;
+  folders->push_back(first);  // the last to be removed
   std::vector<move> moves;
-  for (const fs::path& hidden : folders) {
+  for (const fs::path& hidden : *folders) {
     auto names = read_list(hidden / names_list);
     if (!names) return false;
     std::erase_if(*names, [](const fs::path& name) { return name.empty() || name != name.filename(); });
@@ -247,7 +266,7 @@ bool finish_transaction(const fs::path& first) {
   }
   if (rename_all(moves) != 0) return false;
   std::error_code ignored;
-  for (const fs::path& hidden : folders) fs::remove_all(hidden, ignored);
+  for (const fs::path& hidden : *folders) fs::remove_all(hidden, ignored);
   return true;
 }
 
@@ -277,7 +296,7 @@ std::string clear_leftovers(const fs::path& folder, int opened) {
     for (const fs::path& left : leftovers_in(folder))
       if (const auto first = first_of(left); first && !first->empty()) {
         add(*first);
-        for (const fs::path& other : others_of(*first)) add(other);
+        for (const fs::path& other : others_of(*first).value_or(std::vector<fs::path>{})) add(other);
       }
   }
   std::string why;
@@ -294,12 +313,14 @@ std::string clear_leftovers(const fs::path& folder, int opened) {
 
 }  // namespace
 
-void staged_folder::finish(const fs::path& folder) {
+result<void> staged_folder::finish(const fs::path& folder) {
   std::error_code ignored;
   const fs::path whole = fs::canonical(folder, ignored);
-  if (hidden_folders_in(whole).empty()) return;  // without waiting for the lock
-  if (const descriptor opened = open_folder(whole); opened.get() >= 0)
-    static_cast<void>(clear_leftovers(whole, opened.get()));
+  if (hidden_folders_in(whole).empty()) return {};  // without waiting for the lock
+  const descriptor opened = open_folder(whole);
+  if (opened.get() < 0) return {};  // nothing can be read in it
+  if (const std::string why = clear_leftovers(whole, opened.get()); !why.empty()) return failure(folder, why);
+  return {};
 }
 
 result<staged_folder> staged_folder::open(const fs::path& folder, std::vector<std::string> names,
@@ -388,9 +409,14 @@ result<void> staged_folder::put_in_place(std::span<staged_folder* const> folders
     ::fsync(f->staging_lock_.get());
     ::fsync(f->folder_lock_.get());
   }
+  // Results of runs that ended before come first.
+  std::string obstacle;
+  for (const staged_folder* f : folders)
+    if (obstacle.empty()) obstacle = clear_leftovers(f->folder_, f->folder_lock_.get());
   std::vector<int> numbers;
   for (const staged_folder* f : folders) numbers.push_back(f->folder_lock_.get());
   const folder_locks locks{std::move(numbers)};
+  if (!locks.is_complete()) obstacle = locked_by_another;
   const std::lock_guard stays{hidden.mutex};
   // From here on, any program can finish.
   const fs::path unmarked = first.staging_;
@@ -402,7 +428,7 @@ result<void> staged_folder::put_in_place(std::span<staged_folder* const> folders
     for (staged_folder* f : folders) f->leave(hidden);
     return failed;
   };
-  if (!locks.is_complete()) return postponed(locked_by_another);
+  if (!obstacle.empty()) return postponed(obstacle);
 
   std::vector<move> moves;
   for (const staged_folder* f : folders)
@@ -413,8 +439,9 @@ result<void> staged_folder::put_in_place(std::span<staged_folder* const> folders
   const int why = rename_all_in_child(moves);
   if (why >= not_restored) return postponed("cannot move the new files into place: " + reason(why - not_restored));
   if (why != 0) {
-    static_cast<void>(first.rename_hidden(unmarked, hidden));  // nobody may finish this, now or after a crash
-    return failure(first.folder_, "cannot move the new files into place: " + reason(why));
+    const std::string what = "cannot move the new files into place: " + reason(why);
+    if (first.rename_hidden(unmarked, hidden)) return postponed(what);
+    return failure(first.folder_, what);  // nobody finishes this, now or after a crash
   }
   for (const staged_folder* f : folders) ::fsync(f->folder_lock_.get());
   for (staged_folder* f : folders) f->discard();

@@ -50,8 +50,8 @@ class staged_folder {
   static constexpr const char* private_name = ".rgbd_slam";
 
   /// Finishes what ended processes have begun to move into place in `folder`, and removes their other hidden folders.
-  /// Call before anything in the folder is read. No effect if the folder does not exist.
-  static void finish(const std::filesystem::path& folder);
+  /// Call before anything in the folder is read. No effect if the folder does not exist. Errors: write_failed.
+  [[nodiscard]] static orbis::result<void> finish(const std::filesystem::path& folder);
 
   /// Creates `folder` if it does not exist, and the hidden folder in it, and adds that to `hidden`. Calls `finish`.
   /// `names`: the files that may be moved into place. Errors: write_failed.

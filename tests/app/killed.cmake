@@ -26,6 +26,7 @@ endfunction()
 
 app(0 run room --out all ${quick} --deterministic)
 app(0 run room --frames 3 --out three ${quick} --deterministic)
+app(0 run room --frames 2 --out two ${quick} --deterministic)
 foreach(moved 0 1 4 9)
   # Without earlier results: not refused.
   file(REMOVE_RECURSE ${WORK}/out)
@@ -61,12 +62,19 @@ endforeach()
 file(REMOVE_RECURSE ${WORK}/out)
 app(0 run room --frames 3 --out out ${quick} --deterministic)
 
-# An error in the middle, without hard links: the earlier results are restored.
+# An error at the first, a middle and the last file, with and without hard links: the earlier results are restored.
 file(GLOB names RELATIVE ${WORK}/out ${WORK}/out/*)
 file(COPY ${WORK}/out/ DESTINATION ${WORK}/before)
-foreach(moved 0 5 11)
+file(REMOVE ${WORK}/out/navigation.png)  # one of the new files replaces nothing
+file(REMOVE ${WORK}/before/navigation.png)
+list(REMOVE_ITEM names navigation.png)
+list(LENGTH names last)
+foreach(how "0\\;NO" "5\\;NO" "11\\;NO" "0\\;HAS" "5\\;HAS" "${last}\\;HAS")
+  list(GET how 0 moved)
+  list(GET how 1 links)
   execute_process(COMMAND ${CMAKE_COMMAND} -E env LD_PRELOAD=${KILLED} ASAN_OPTIONS=verify_asan_link_order=0
-                          ORBIS_TEST_RENAMES=${moved} ORBIS_TEST_NO_LINKS=1 ${APP} run room --out out ${quick} --deterministic
+                          ORBIS_TEST_RENAMES=${moved} ORBIS_TEST_FAILS=1 ORBIS_TEST_${links}_LINKS=1
+                          ${APP} run room --out out ${quick} --deterministic
                   WORKING_DIRECTORY ${WORK} RESULT_VARIABLE result ERROR_VARIABLE err)
   check(result EQUAL 2)
   check(err MATCHES "cannot move the new files into place: Input/output error")
@@ -80,7 +88,7 @@ endforeach()
 # The same, and the run is killed before it can remove its files: nobody finishes it.
 foreach(moved 0 5)
   execute_process(COMMAND ${CMAKE_COMMAND} -E env LD_PRELOAD=${KILLED} ASAN_OPTIONS=verify_asan_link_order=0
-                          ORBIS_TEST_RENAMES=${moved} ORBIS_TEST_NO_LINKS=1 ORBIS_TEST_KILLED_AFTER_ERROR=1
+                          ORBIS_TEST_RENAMES=${moved} ORBIS_TEST_FAILS=1 ORBIS_TEST_NO_LINKS=1 ORBIS_TEST_KILLED_AFTER_ERROR=1
                           ${APP} run room --out out ${quick} --deterministic ${elsewhere}
                   WORKING_DIRECTORY ${WORK} RESULT_VARIABLE result OUTPUT_QUIET ERROR_QUIET)
   check(NOT result EQUAL 0 AND NOT result EQUAL 2)
@@ -106,34 +114,59 @@ foreach(moved 3 8)
       file(COPY ${WORK}/before/ DESTINATION ${WORK}/out)
     endif()
     execute_process(COMMAND ${CMAKE_COMMAND} -E env LD_PRELOAD=${KILLED} ASAN_OPTIONS=verify_asan_link_order=0
-                            ORBIS_TEST_RENAMES=${moved} ORBIS_TEST_NO_LINKS=1 ORBIS_TEST_STAYS_BROKEN=1
+                            ORBIS_TEST_RENAMES=${moved} ORBIS_TEST_FAILS=1 ORBIS_TEST_NO_LINKS=1 ORBIS_TEST_STAYS_BROKEN=1
                             ${APP} run room --out out ${quick} --deterministic
                     WORKING_DIRECTORY ${WORK} RESULT_VARIABLE result ERROR_VARIABLE err)
     check(result EQUAL 2)
     check(err MATCHES "Input/output error. the next command that uses the folder moves the new files into place\n$")
+    file(GLOB ready ${WORK}/out/.rgbd_slam-*.ready)
+    check(ready)
     app(0 map cloud.ply --out out ${quick})
     must_be_of(all)
   endforeach()
 endforeach()
 
-# Another program holds the lock of the folder: after an interrupt the run ends soon, and the next command finishes.
-file(REMOVE_RECURSE ${WORK}/out)
-file(COPY ${WORK}/before/ DESTINATION ${WORK}/out)
-execute_process(COMMAND bash -c "
-  ${APP} run room --out out ${quick_text} --deterministic 2>locked.log &
-  run=$!
-  for i in $(seq 1000); do ls -d out/.rgbd_slam-* >/dev/null 2>&1 && break; sleep 0.01; done
-  exec 9<out
-  flock -s 9
-  for i in $(seq 6000); do [ -e out/.rgbd_slam-*/.rgbd_slam/names ] && break; kill -0 $run || break; sleep 0.01; done
-  kill -TERM $run
-  wait $run" WORKING_DIRECTORY ${WORK} RESULT_VARIABLE result)
-check(result EQUAL 2)
-file(READ ${WORK}/locked.log err)
-check(err MATCHES "out: another program has locked the folder. the next command that uses the folder moves the new")
-must_equal(out/trajectory.txt before/trajectory.txt)
-app(0 map cloud.ply --out out ${quick})
-must_be_of(all)
+# Another program holds the lock of the folder: after an interrupt the run ends soon, and its results are moved into
+# place later: by the next command, or by a run that ends later, before its own.
+foreach(later OFF ON)
+  file(REMOVE_RECURSE ${WORK}/out)
+  file(COPY ${WORK}/before/ DESTINATION ${WORK}/out)
+  execute_process(COMMAND bash -c "
+    begin() {  # number of frames, number of hidden folders then
+      '${APP}' run room --frames $1 --out out ${quick_text} --deterministic 2>$1.log &
+      run=$!
+      until [ $(ls -d out/.rgbd_slam-* 2>/dev/null | wc -l) = $2 ] || ! kill -0 $run; do sleep 0.01; done
+    }
+    present=0
+    if [ ${later} = ON ]; then
+      begin 3 1
+      later=$run present=1
+      kill -STOP $later
+    fi
+    begin 2 $((present + 1))
+    exec 9<out
+    flock -s 9
+    until [ -e out/.rgbd_slam-*/.rgbd_slam/names ] || ! kill -0 $run; do sleep 0.01; done
+    start=$(date +%s)
+    kill -TERM $run
+    wait $run
+    [ $? = 2 ] && [ $(($(date +%s) - start)) -lt 6 ] || exit 1
+    exec 9<&-
+    if [ ${later} = ON ]; then
+      kill -CONT $later
+      wait $later
+    fi" WORKING_DIRECTORY ${WORK} RESULT_VARIABLE result)
+  check(result EQUAL 0)
+  file(READ ${WORK}/2.log err)
+  check(err MATCHES "out: another program has locked the folder. the next command that uses the folder moves the new")
+  if(later)
+    must_be_of(three)
+  else()
+    must_equal(out/trajectory.txt before/trajectory.txt)
+    app(0 map cloud.ply --out out ${quick})
+    must_be_of(two)
+  endif()
+endforeach()
 file(REMOVE_RECURSE ${WORK}/out)
 file(COPY ${WORK}/before/ DESTINATION ${WORK}/out)
 
