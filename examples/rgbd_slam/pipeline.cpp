@@ -8,6 +8,7 @@
 #include <new>
 #include <optional>
 #include <string>
+#include <system_error>
 #include <utility>
 
 #include "../common/memory.hpp"
@@ -113,7 +114,8 @@ orbis::result<completion> complete_or_give_up(results& r, const tracked_frames& 
                                               const settings& s, result_files& files, viewer& viewer,
                                               console& console) {
   using orbis::errc;
-  if (auto begun = files.begin_optional(); !begun) return orbis::fail(begun.error());
+  if (auto begun = files.begin_optional(); !begun)
+    return completion{.was_interrupted = interrupts::end_dispensable(), .no_map = begun.error()};
   interrupts::begin_dispensable(
       s.quiet ? ""
               : "\nrgbd_slam: stopping; the map is abandoned, the other results are written. Interrupt again to stop "
@@ -130,6 +132,8 @@ orbis::result<completion> complete_or_give_up(results& r, const tracked_frames& 
       return std::move(whole);
     } catch (const std::bad_alloc&) {
       return orbis::fail(errc::exception, {}, "out of memory");
+    } catch (const std::exception& e) {
+      return orbis::fail(errc::exception, {}, examples::describe_exception(e));
     }
   });
   completion end{.was_interrupted = interrupts::end_dispensable(), .no_map = {}};
@@ -174,10 +178,20 @@ exit_code end_tracked(const results& r, const tracked_frames& tracked, const com
   if (tracked.stopped) return console.error(explain_stop(tracked, source)), bad_input;
   if (tracked.unsaved) return console.error(*tracked.unsaved), bad_input;
   if (r.navigation && r.navigation->unsaved) return console.error(*r.navigation->unsaved), bad_input;
-  if (end.was_interrupted) return interrupted;
+  if (end.was_interrupted && (!end.no_map || end.no_map->code == orbis::errc::cancelled)) return interrupted;
   if (end.no_map) return console.error(*end.no_map), bad_input;
   if (tracked.missed_map) return console.error(explain_miss(tracked, s)), never_tracked;
   return done;
+}
+
+/// The path at which a file in a hidden folder would have appeared; other names unchanged, `out` if there is none.
+std::string shown_path(const std::string& where, const std::filesystem::path& out) {
+  const std::size_t hidden = where.find(std::string{"/"} + staged_folder::private_name + "-");
+  if (hidden == std::string::npos) return where.empty() ? out.string() : where;
+  std::error_code ignored;
+  const std::filesystem::path folder = where.substr(0, hidden);
+  return ((std::filesystem::equivalent(folder, out, ignored) ? out : folder) / std::filesystem::path{where}.filename())
+      .string();
 }
 
 /// Writes the report if the map is missing, moves all files into place, and prints the results. Returns the exit code.
@@ -185,7 +199,7 @@ exit_code finish_run(results& r, const tracked_frames& tracked, completion& end,
                      const settings& s, result_files& files, viewer& viewer, console& console) {
   orbis::result<void> reported;
   if (end.no_map) {
-    end.no_map->where = (s.out / std::filesystem::path{end.no_map->where}.filename()).string();
+    end.no_map->where = shown_path(end.no_map->where, s.out);
     end.no_map->message =
         (end.no_map->code == orbis::errc::cancelled ? "interrupted by the user" : end.no_map->message) +
         "; the map is missing, the other results were written";
@@ -193,7 +207,11 @@ exit_code finish_run(results& r, const tracked_frames& tracked, completion& end,
     reported = report_without_map(r, source, files.lists(), console);
   }
   if (auto done = files.put_in_place(); !done) return console.error(done.error()), bad_input;
-  if (!reported) return console.error(reported.error()), bad_input;
+  if (!reported) {
+    orbis::error why = reported.error();
+    why.where = shown_path(why.where, s.out);
+    return console.error(why), bad_input;
+  }
   print_results(r, console);
   if (!end.is_running) viewer.finish(s, console);
   return end_tracked(r, tracked, end, source, s, console);
