@@ -62,15 +62,15 @@ std::optional<orbis::error> check_output(const settings& s, const frame_source& 
   std::vector<std::filesystem::path> kept = source.files;  // excluding camera files, which may be replaced
   std::erase_if(kept, [](const std::filesystem::path& file) { return file.extension() == ".toml"; });
   if (is_file_name(s.camera) && std::filesystem::path{s.camera}.extension() != ".toml") kept.emplace_back(s.camera);
+  kept.push_back(s.config);
   if (auto lost = find_overwritten({s.out}, kept)) return lost;
-  for (const char* const other : {".json", ".yaml", ".yml"})
-    if (s.out.extension() == other)
-      return orbis::error{orbis::errc::invalid_argument, s.out.string(),
-                          "the camera is written as TOML: choose a name that ends in .toml"};
   if (s.out.has_parent_path() && !std::filesystem::is_directory(s.out.parent_path(), ignored))
     return orbis::error{orbis::errc::invalid_argument, s.out.string(), "its folder does not exist"};
   if (std::filesystem::is_directory(s.out, ignored))
     return orbis::error{orbis::errc::invalid_argument, s.out.string(), "is a folder, not a file"};
+  if (s.out.extension() != ".toml")
+    return orbis::error{orbis::errc::invalid_argument, s.out.string(),
+                        "the camera is written as TOML: choose a name that ends in .toml"};
   return std::nullopt;
 }
 

@@ -369,6 +369,7 @@ std::optional<exit_code> read_config(CLI::App& cmd, const std::string& path) {
     try {
       option->add_result(as_text.str());
       option->run_callback();
+      examples::check_numbers(cmd);
     } catch (const CLI::ParseError& e) {
       return report_error(orbis::shortened_path(path) + ": " + orbis::shortened(e.what()), bad_usage);
     }

@@ -120,7 +120,7 @@ orbis::result<void> write_map_picture(const std::string& name, const std::string
   s.text("height 0", {1172, 794}, faint, 11, 1.0);
   s.text(buffer, {1388, 794}, faint, 11);
   // A scale bar of 1, 2 or 5 times a power of ten, at most about 120 pixels long.
-  const double length = nice_step(100.0 / above.pixels_per_metre, 1), end = 940 + length * above.pixels_per_metre;
+  const double length = nice_step(80.0 / above.pixels_per_metre, 1), end = 940 + length * above.pixels_per_metre;
   s.line({940, 789}, {end, 789}, ink, 1.5);
   for (const double x : {940.0, end}) s.line({x, 785}, {x, 793}, ink, 1.5);
   s.text(tick_text(length, length) + " m", {end + 8, 794}, faint, 11);
