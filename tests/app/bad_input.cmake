@@ -222,7 +222,7 @@ app_fails(2 "cut.ply: " map cut.ply --out out --quiet)
 file(WRITE ${WORK}/empty.ply "ply\nformat ascii 1.0\nelement vertex 0\nproperty float x\nproperty float y\nproperty float z\nend_header\n")
 app_fails(2 "empty.ply: .*no finite points" map empty.ply --out out)
 app_fails(2 "file: " map file --out out)
-app_fails(2 "cut.ply: .*ray-evidence needs a recording" map cut.ply --out out --filter ray-evidence)
+app_fails(2 "cut.ply: the ray-evidence filter needs a recording" map cut.ply --out out --filter ray-evidence)
 
 # Output that cannot be: 2.
 app_fails(2 "file/out" run good --out file/out)

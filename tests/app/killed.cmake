@@ -69,9 +69,10 @@ file(REMOVE ${WORK}/out/navigation.png)  # one of the new files replaces nothing
 file(REMOVE ${WORK}/before/navigation.png)
 list(REMOVE_ITEM names navigation.png)
 list(LENGTH names last)
-foreach(how "0\\;NO" "5\\;NO" "11\\;NO" "0\\;HAS" "5\\;HAS" "${last}\\;HAS")
-  list(GET how 0 moved)
-  list(GET how 1 links)
+foreach(how 0-NO 5-NO ${last}-NO 0-HAS 5-HAS ${last}-HAS)
+  string(REGEX MATCH "^(.*)-(.*)$" how ${how})
+  set(moved ${CMAKE_MATCH_1})
+  set(links ${CMAKE_MATCH_2})
   execute_process(COMMAND ${CMAKE_COMMAND} -E env LD_PRELOAD=${KILLED} ASAN_OPTIONS=verify_asan_link_order=0
                           ORBIS_TEST_RENAMES=${moved} ORBIS_TEST_FAILS=1 ORBIS_TEST_${links}_LINKS=1
                           ${APP} run room --out out ${quick} --deterministic
@@ -176,7 +177,7 @@ if(user EQUAL 0)
   set(foreign ${WORK}/out/.rgbd_slam-others.ready)
   file(WRITE ${foreign}/trajectory.txt "theirs")
   file(WRITE ${WORK}/names "trajectory.txt\n")
-  file(MAKE_DIRECTORY ${foreign}/.rgbd_slam)
+  file(MAKE_DIRECTORY ${foreign}/.rgbd_slam/replaced)
   execute_process(COMMAND tr "\\n" "\\000" INPUT_FILE ${WORK}/names OUTPUT_FILE ${foreign}/.rgbd_slam/names)
   execute_process(COMMAND chown -R 65534 ${foreign})
   app(0 map cloud.ply --out out ${quick})
