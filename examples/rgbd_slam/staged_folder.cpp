@@ -261,6 +261,8 @@ bool finish_transaction(const fs::path& first) {
   for (const fs::path& hidden : *folders) {
     auto names = read_list(hidden / names_list);
     if (!names) return false;
+    std::error_code ignored;
+    fs::create_directories(hidden / backup, ignored);  // usually exists
     std::erase_if(*names, [](const fs::path& name) { return name.empty() || name != name.filename(); });
     for (move& m : moves_to(hidden.parent_path(), hidden, *names)) moves.push_back(std::move(m));
   }
