@@ -129,11 +129,11 @@ endif()
 # Voxels of which one frame would fill the memory are refused before they do.
 make_recording(${WORK}/sharp 2 640)
 foreach(command run map)
-  app_fails(2 "--resolution: the first frame alone has about .* too many"
+  app_fails(2 "--resolution: the first frame alone has about .* voxels of 1 mm .* too many"
             ${command} sharp --out out --resolution 0.001)
 endforeach()
 make_recording(${WORK}/sharp_later 4 640 - 0 1)
-app_fails(2 "--resolution: frame 2 alone has about .* too many" run sharp_later --out out --resolution 0.001)
+app_fails(2 "--resolution: frame 2 alone has about .* voxels of 1 mm .* too many" run sharp_later --out out --resolution 0.001)
 app_fails(2 "--resolution: .* voxels of 1 mm" demo --plain --frames 2 --out out --resolution 0.001)
 check(NOT EXISTS ${WORK}/out/summary.json)
 

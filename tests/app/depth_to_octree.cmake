@@ -85,7 +85,7 @@ if(NOT err MATCHES "^depth_to_octree: the image has about [^\n]* billion voxels 
 endif()
 check(NOT EXISTS ${WORK}/no.bt)
 
-fails(2 "--resolution: the image has about .* too many" ${depth} no.bt --resolution 0.0002 --scale 1000)
+fails(2 "--resolution: the image has about .* voxels of 0.2 mm .* too many" ${depth} no.bt --resolution 0.0002 --scale 1000)
 
 # The same camera, as a file and as numbers.
 app(0 ${depth} map.bt --camera room/camera.toml --pose 1 2 0.5 0 0 0 1)

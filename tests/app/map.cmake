@@ -19,7 +19,7 @@ check(free GREATER 100)
 string(REPEAT "5.05 5.05 1.05\n" 40000 points)
 file(WRITE ${WORK}/many.ply "ply\nformat ascii 1.0\nelement vertex 40000\nproperty float x\nproperty float y\n"
      "property float z\nend_header\n${points}")
-app_fails(2 "--resolution: the space between origin and points has about .* too many"
+app_fails(2 "--resolution: the space between origin and points has about .* voxels of 1 mm .* too many"
           map many.ply --out no --resolution 0.001 --filter none --origin 0,0,0)
 app(0 map many.ply --out fine --resolution 0.001 --filter none)
 

@@ -47,7 +47,7 @@ if(WAY STREQUAL "find_package")
   endif()
   if(BUILD)  # the compiled flavour, as this build has it
     run(${CMAKE_COMMAND} --install ${BUILD} --prefix ${SCRATCH}/with_library)
-    foreach(with_io IN ITEMS OFF ON)
+    foreach(with_io IN ITEMS OFF ON)  # in this order: the second build adds io to the first
       run(${CMAKE_COMMAND} -S ${PROJECT} -B ${SCRATCH}/mixed ${options} -DWAY=find_package -DMIXED=ON
           -DWITH_IO=${with_io} -DCMAKE_PREFIX_PATH=${SCRATCH}/with_library)
       run(${CMAKE_COMMAND} --build ${SCRATCH}/mixed)
