@@ -60,8 +60,8 @@ std::optional<orbis::error> check_output(const settings& s, const frame_source& 
   std::error_code ignored;
   if (s.out.empty()) return std::nullopt;
   std::vector<std::filesystem::path> kept = source.files;  // excluding camera files, which may be replaced
+  if (is_file_name(s.camera)) kept.emplace_back(s.camera);
   std::erase_if(kept, [](const std::filesystem::path& file) { return file.extension() == ".toml"; });
-  if (is_file_name(s.camera) && std::filesystem::path{s.camera}.extension() != ".toml") kept.emplace_back(s.camera);
   kept.push_back(s.config);
   if (auto lost = find_overwritten({s.out}, kept)) return lost;
   if (s.out.has_parent_path() && !std::filesystem::is_directory(s.out.parent_path(), ignored))

@@ -189,8 +189,8 @@ std::optional<std::vector<std::string>> read_list(const fs::path& path) {
 
 /// Those of other users do not count, who may put one into a folder like /tmp, unless the whole folder is theirs.
 bool is_hidden_folder(const fs::path& path) {
-  struct stat status {
-  }, parent{};
+  struct stat status {};
+  struct stat parent {};
   if (!path.filename().string().starts_with(prefix) || ::lstat(path.c_str(), &status) != 0 || !S_ISDIR(status.st_mode))
     return false;
   return status.st_uid == ::geteuid() ||
