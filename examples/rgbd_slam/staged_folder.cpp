@@ -272,45 +272,59 @@ bool finish_transaction(const fs::path& first) {
   return true;
 }
 
-/// Finishes or removes the hidden folders of ended processes in `folder`, which is open as `opened`. Locks it and the
-/// folders of the transactions' other files, all at once: if there are more than are locked, starts again with them.
-/// Returns an empty text, or the reason why a transaction cannot be finished now: it would overwrite later files.
-std::string clear_leftovers(const fs::path& folder, int opened) {
-  std::vector<fs::path> folders{folder};
+struct opened_folder {
+  fs::path path;
+  int number = -1;
+};
+
+/// Folders that are locked, and contain no results of earlier runs that are not in place yet.
+struct cleared_folders {
   std::vector<descriptor> descriptors;
   std::unique_ptr<folder_locks> locks;
-  for (std::size_t locked = 0; locked != folders.size();) {
-    locks.reset();
-    std::vector<int> numbers{opened};
-    descriptors.clear();
-    for (std::size_t i = 1; i != folders.size(); ++i)
-      if (descriptor d = open_folder(folders[i]); d.get() >= 0) {
-        numbers.push_back(d.get());
-        descriptors.push_back(std::move(d));
-      }
-    locked = folders.size();
-    locks = std::make_unique<folder_locks>(std::move(numbers));
-    if (!locks->is_complete()) return locked_by_another;
-    const auto add = [&](const fs::path& hidden) {
-      if (std::find(folders.begin(), folders.end(), hidden.parent_path()) == folders.end())
-        folders.push_back(hidden.parent_path());
-    };
-    for (const fs::path& left : leftovers_in(folder))
-      if (const auto first = first_of(left); first && !first->empty()) {
-        add(*first);
-        for (const fs::path& other : others_of(*first).value_or(std::vector<fs::path>{})) add(other);
-      }
+  std::string obstacle;  ///< if not empty, the reason why such results remain: they would overwrite later files
+};
+
+/// Locks `folders`, and finishes or removes the hidden folders of ended processes in them. Also locks the folders of
+/// the other files of these transactions, all at once: starts again whenever it finds folders that are not locked yet.
+cleared_folders lock_and_clear(const std::vector<opened_folder>& folders) {
+  cleared_folders cleared;
+  std::vector<fs::path> paths;
+  std::vector<int> numbers;
+  for (const opened_folder& folder : folders) {
+    paths.push_back(folder.path);
+    numbers.push_back(folder.number);
   }
-  std::string why;
-  for (const fs::path& left : leftovers_in(folder)) {
-    const auto first = first_of(left);
-    std::error_code ignored;
-    if (first && (first->empty() || finish_transaction(*first)))
-      fs::remove_all(left, ignored);
-    else
-      why = "the results of an earlier run, in a hidden folder, cannot be moved into place";
+  const auto add = [&](const fs::path& path) {
+    if (std::find(paths.begin(), paths.end(), path) != paths.end()) return;
+    paths.push_back(path);
+    cleared.descriptors.push_back(open_folder(path));
+    if (const int number = cleared.descriptors.back().get(); number >= 0) numbers.push_back(number);
+  };
+  for (std::size_t locked = 0; locked != paths.size();) {
+    locked = paths.size();
+    cleared.locks.reset();
+    cleared.locks = std::make_unique<folder_locks>(numbers);
+    if (!cleared.locks->is_complete()) {
+      cleared.obstacle = locked_by_another;
+      return cleared;
+    }
+    for (const opened_folder& folder : folders)
+      for (const fs::path& left : leftovers_in(folder.path))
+        if (const auto first = first_of(left); first && !first->empty()) {
+          add(first->parent_path());
+          for (const fs::path& other : others_of(*first).value_or(std::vector<fs::path>{})) add(other.parent_path());
+        }
   }
-  return why;
+  for (const opened_folder& folder : folders)
+    for (const fs::path& left : leftovers_in(folder.path)) {
+      const auto first = first_of(left);
+      std::error_code ignored;
+      if (first && (first->empty() || finish_transaction(*first)))
+        fs::remove_all(left, ignored);
+      else
+        cleared.obstacle = "the results of an earlier run, in a hidden folder, cannot be moved into place";
+    }
+  return cleared;
 }
 
 }  // namespace
@@ -321,7 +335,8 @@ result<void> staged_folder::finish(const fs::path& folder) {
   if (hidden_folders_in(whole).empty()) return {};  // without waiting for the lock
   const descriptor opened = open_folder(whole);
   if (opened.get() < 0) return {};  // nothing can be read in it
-  if (const std::string why = clear_leftovers(whole, opened.get()); !why.empty()) return failure(folder, why);
+  if (const auto cleared = lock_and_clear({{whole, opened.get()}}); !cleared.obstacle.empty())
+    return failure(folder, cleared.obstacle);
   return {};
 }
 
@@ -339,10 +354,8 @@ result<staged_folder> staged_folder::open(const fs::path& folder, std::vector<st
     if (!may_be_replaced(made.folder_ / name))
       return failure(folder / name, "is not a regular file and will not be replaced");
 
-  if (const std::string why = clear_leftovers(made.folder_, made.folder_lock_.get()); !why.empty())
-    return failure(folder, why);
-  const folder_locks lock{{made.folder_lock_.get()}};
-  if (!lock.is_complete()) return failure(folder, locked_by_another);
+  const auto cleared = lock_and_clear({{made.folder_, made.folder_lock_.get()}});
+  if (!cleared.obstacle.empty()) return failure(folder, cleared.obstacle);
   std::string name = (made.folder_ / (std::string{prefix} + "XXXXXX")).string();
   const std::lock_guard registers{hidden.mutex};
   hidden.paths.emplace_back();
@@ -412,13 +425,9 @@ result<void> staged_folder::put_in_place(std::span<staged_folder* const> folders
     ::fsync(f->folder_lock_.get());
   }
   // Results of runs that ended before come first.
-  std::string obstacle;
-  for (const staged_folder* f : folders)
-    if (obstacle.empty()) obstacle = clear_leftovers(f->folder_, f->folder_lock_.get());
-  std::vector<int> numbers;
-  for (const staged_folder* f : folders) numbers.push_back(f->folder_lock_.get());
-  const folder_locks locks{std::move(numbers)};
-  if (!locks.is_complete()) obstacle = locked_by_another;
+  std::vector<opened_folder> opened;
+  for (const staged_folder* f : folders) opened.push_back({f->folder_, f->folder_lock_.get()});
+  const auto cleared = lock_and_clear(opened);
   const std::lock_guard stays{hidden.mutex};
   // From here on, any program can finish.
   const fs::path unmarked = first.staging_;
@@ -430,7 +439,7 @@ result<void> staged_folder::put_in_place(std::span<staged_folder* const> folders
     for (staged_folder* f : folders) f->leave(hidden);
     return failed;
   };
-  if (!obstacle.empty()) return postponed(obstacle);
+  if (!cleared.obstacle.empty()) return postponed(cleared.obstacle);
 
   std::vector<move> moves;
   for (const staged_folder* f : folders)
