@@ -29,7 +29,7 @@ struct keypoint_depth_options {
   int min_valid = 3;            ///< minimum number of pixels with depth in the window
   float edge_sigmas = 4.0F;     ///< a gap of more than this number of standard deviations ...
   float edge_relative = 0.02F;  ///< ... and more than this fraction of the depth is an edge
-  float min_share = 0.7F;       ///< minimum fraction of the valid pixels on one side of every edge; > 0.5
+  float min_share = 0.7F;       ///< minimum fraction of the valid pixels in the largest group without an edge; > 0.5
   double position_sigma = 0.5;  ///< sigma of the keypoint position, pixels; adds to the depth deviation on slopes
   depth_noise noise{};
 };
@@ -43,7 +43,7 @@ struct keypoint_depth {
 /// Least-squares plane through the depths of a window. Used by `depth_at`.
 class depth_plane {
  public:
-  /// Adds a pixel, relative to the position of the requested depth.
+  /// Adds the depth `z` of a pixel at the offset (u, v) from the requested position.
   void add(double u, double v, double z) noexcept {
     ++n_;
     u_ += u, v_ += v, z_ += z;
@@ -106,7 +106,7 @@ template <camera::depth_source Depth>
   if (count == 0 || static_cast<int>(count) < options.min_valid) return std::nullopt;
   std::sort(z.begin(), z.begin() + static_cast<std::ptrdiff_t>(count));
 
-  // The largest run without a gap; even a steep slope has no gaps.
+  // Finds the largest run of sorted depths without a gap; even a steep slope has no gaps.
   const auto is_edge = [&](float near, float far) {
     const double gap = static_cast<double>(far) - static_cast<double>(near);
     return gap > static_cast<double>(options.edge_sigmas) * options.noise(static_cast<double>(near)) &&

@@ -26,7 +26,7 @@ namespace orbis::features {
 struct epipolar_rule {
   float distance = 1.96F;       ///< maximum at the finest level, pixels; accepts 95 % of matches if sigma is one pixel
   float scale_factor = 1.2F;    ///< scale factor of the pyramid; multiplies the limit per level of the train keypoint
-  float epipole_radius = 0.0F;  ///< train keypoints closer to the epipole are excluded (no parallax); scales likewise
+  float epipole_radius = 0.0F;  ///< exclusion radius around the epipole (no parallax), pixels; scales like `distance`
 };
 
 /// Finds, for each query, the nearest and second-nearest train descriptors among those close to its epipolar line. Used

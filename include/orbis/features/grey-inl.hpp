@@ -15,7 +15,7 @@
 namespace orbis::features {
 namespace detail {
 
-/// Rec. 601 luma, in 1/32768.
+/// Weights of Rec. 601 luma, in units of 1/32768.
 inline constexpr int luma_red = 9798, luma_green = 19235, luma_blue = 3735;
 
 /// Blocks of 16 bytes that are `step` bytes apart.

@@ -11,8 +11,7 @@
 
 namespace orbis::features {
 
-/// Converts a colour image to luma (Rec. 601, rounded to the nearest): the same bits as OpenCV's COLOR_RGB2GRAY.
-/// O(pixels).
+/// Converts a colour image to luma (Rec. 601, rounded to nearest); bit-identical to OpenCV's COLOR_RGB2GRAY. O(pixels).
 /// @pre both images have the same size
 void luma(image_view<const rgb8> from, image_view<std::uint8_t> to);
 

@@ -132,7 +132,7 @@ concept match_filter = std::invocable < const S&,
 template <class S>
 concept match_stage = (match_predicate<S> || match_filter<S>)&&!match_source<S>;
 
-/// The requirements of a stage.
+/// Returns the data that a stage requires.
 template <match_stage S>
 [[nodiscard]] constexpr search_needs stage_needs() noexcept {
   if constexpr (requires {

@@ -32,8 +32,8 @@ struct projection {
 /// Search radius around a projection, and pyramid levels to search.
 struct projection_rule {
   float radius = 4.0F;            ///< radius of the window for points predicted at the finest level, pixels
-  float slanted = 1.6F;           ///< factor that multiplies the radius if the viewing direction differs from before
-  float frontal_cosine = 0.998F;  ///< the viewing direction counts as different if the cosine is below this
+  float slanted = 1.6F;           ///< factor applied to the radius if the viewing direction has changed
+  float frontal_cosine = 0.998F;  ///< the viewing direction counts as changed if the cosine is below this
   float min_cosine = 0.5F;        ///< points with a smaller cosine are not searched for; -1: no limit
   float range_tolerance = 0.2F;   ///< fraction by which the distance may exceed the point's range at either end
   int levels = 8;                 ///< number of levels of the extractor's pyramid

@@ -49,8 +49,8 @@ struct sliding_square {
 };
 
 /// Sets `sums[k]` to four times the sum of absolute differences between the square and the strip starting at column
-/// `k`, each minus its mean (to a quarter of a grey value), for k < `shifts`. Writes a multiple of 16 sums; those at
-/// index `shifts` and above are unspecified. @pre 1 <= side <= max_side, 1 <= shifts <= max_shifts
+/// `k`, each minus its mean (rounded to a quarter of a grey value), for k < `shifts`. Writes a multiple of 16 sums;
+/// those at index `shifts` and above are unspecified. @pre 1 <= side <= max_side, 1 <= shifts <= max_shifts
 void slide_differences(const sliding_square& s, int shifts, std::int32_t* sums);
 
 }  // namespace detail
@@ -75,7 +75,7 @@ struct stereo_options {
 /// differences give the subpixel position. The differences are invariant to a brightness offset. Concurrent calls on a
 /// const object are allowed.
 ///
-/// After R. Mur-Artal, J. D. Tardos, "ORB-SLAM2: an open-source SLAM system for monocular, stereo and RGB-D cameras",
+/// Source: R. Mur-Artal, J. D. Tardos, "ORB-SLAM2: an open-source SLAM system for monocular, stereo and RGB-D cameras",
 /// T-RO 33 (2017), section III.A. The line fit is from M. Shimizu, M. Okutomi, "Precise sub-pixel estimation on
 /// area-based matching", ICCV 2001: sums of absolute differences are not parabolic, and fitting a parabola gives errors
 /// 1.4 times as large.
@@ -148,7 +148,7 @@ class stereo_matcher {
     image_pyramid left, right;                ///< used if the caller provides no pyramids
     std::vector<double> scales;               ///< pixels of the image per pixel of a level
     std::vector<std::uint32_t> first_in_row;  ///< index into `rows`
-    std::vector<right_place> rows;            ///< right keypoints by row
+    std::vector<right_place> rows;            ///< right keypoints, sorted by row
     detail::search_among_workspace search;
     std::vector<candidate> candidates;
     std::vector<match_found> found;

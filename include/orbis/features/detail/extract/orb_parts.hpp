@@ -100,7 +100,7 @@ struct smooth_workspace {
 };
 
 /// ORB's descriptor: the standard pattern, rotated to the keypoint's orientation and rounded to pixels, in the image
-/// smoothed by a Gaussian (7x7, sigma 2). Gives the same bits as OpenCV's ORB for the same orientation.
+/// smoothed by a Gaussian (7x7, sigma 2). Bit-identical to OpenCV's ORB for the same orientation.
 struct steered_brief {
   using descriptor = binary_descriptor<256>;
   static constexpr int reach = 18;     ///< extent of the rotated pattern, pixels

@@ -90,7 +90,7 @@ struct disc_moments_kernel {
   }
 };
 
-/// The angle of (x, y) in [0, 2 pi), accurate to 1e-7; the same bits on every machine with IEEE doubles.
+/// The angle of (x, y) in [0, 2 pi), accurate to 1e-7; bit-identical on every machine with IEEE doubles.
 [[nodiscard]] inline float polar_angle(double x, double y) noexcept {
   using std::numbers::pi;
   const double ax = std::abs(x), ay = std::abs(y);

@@ -135,9 +135,9 @@ struct resize_across_kernel {
   }
 };
 
-/// Scales an image to the size of `to` by bilinear interpolation: weights in 1/256, one rounding at the end. Gives the
-/// same bits as OpenCV's INTER_LINEAR_EXACT. Fast for downscaling factors up to 1.8. Downscaling by more than 2 skips
-/// pixels. O(pixels of both images).
+/// Scales an image to the size of `to` by bilinear interpolation: weights in 1/256, one rounding at the end.
+/// Bit-identical to OpenCV's INTER_LINEAR_EXACT. Fast for downscaling factors up to 1.8. Downscaling by more than 2
+/// skips pixels. O(pixels of both images).
 /// @pre neither image is empty; every row of `to`, including the last, is writable up to a multiple of 32 pixels
 inline void resize(image_view<const std::uint8_t> from, image_view<std::uint8_t> to, resize_workspace& memory) {
   assert(!from.empty() && !to.empty());

@@ -26,8 +26,8 @@ namespace orbis::features::detail {
 inline constexpr std::array<std::uint16_t, 7> gaussian_weights{18, 34, 48, 56, 48, 34, 18};
 inline constexpr int smooth_block = 64;  ///< number of pixels written at a time
 
-/// Weighted sums along a row, minus 2^15 so that they are signed words. In every block of one register of bytes, the
-/// sums of the even pixels precede those of the odd pixels.
+/// Weighted sums along a row, minus 2^15 so that they fit into signed words. In every block of one register of bytes,
+/// the sums of the even pixels precede those of the odd pixels.
 /// @pre `line` is readable from -3 to 4 + `count` rounded up to whole blocks
 struct smooth_along_kernel {
   // The weights are a parameter, because the compiler generates slow shifts and sums of products from constants.
@@ -108,8 +108,8 @@ struct smooth_across_kernel {
 };
 
 /// Convolves rows `[first, last)` of an image with a 7x7 Gaussian (sigma 2, weights in 1/256) and one rounding at the
-/// end. The image is extended by reflection without repeating the edge. Gives the same bits as OpenCV's GaussianBlur
-/// with these parameters. O(pixels).
+/// end. The image is extended by reflection without repeating the edge. Bit-identical to OpenCV's GaussianBlur with
+/// these parameters. O(pixels).
 /// @pre width >= 4, height >= 4; `to` has the size of `from`, and every row, including the last, is writable up to a
 /// multiple of 64 pixels
 inline void smooth(image_view<const std::uint8_t> from, image_view<std::uint8_t> to, int first, int last,

@@ -3,7 +3,7 @@
 /// Bit-sliced Hamming distances from one query to 256 or 512 train descriptors at once.
 ///
 /// Train descriptors are stored by bit: a slice holds one bit of 256 descriptors, or of 512 with 512-bit registers. A
-/// full adder sums three differing bits to their parity and their majority, which counts two. The parities are then
+/// full adder sums three differing bits to their parity and their majority, which counts as two. The parities are then
 /// summed in the same way, so 128 groups of three bits leave 128 majorities and one parity. The three bits of a query,
 /// a pattern from 0 to 7, select the majority of a group from a table, which is built once per block of train
 /// descriptors and used for all queries. Full adders sum the majorities in bit planes, so that one logic instruction

@@ -13,7 +13,7 @@
 
 namespace orbis::features::detail {
 
-/// The nearest of a set (lowest index on ties), and the distance of the second-nearest.
+/// The nearest element of a set (the lowest index on ties), and the distance of the second-nearest.
 struct nearest_two {
   std::uint32_t index = none;
   std::uint32_t distance = none;

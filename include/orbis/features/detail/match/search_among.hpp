@@ -22,8 +22,8 @@ struct search_among_workspace {
     std::uint32_t distance = none;
     std::uint32_t query = none;
   };
-  std::vector<std::uint32_t> indices, distances;  ///< of the train descriptors to compare with the current query
-  std::vector<nearest_query> reverse;             ///< by train descriptor
+  std::vector<std::uint32_t> indices, distances;  ///< for the train descriptors to compare with the current query
+  std::vector<nearest_query> reverse;             ///< indexed by train descriptor
 };
 
 /// Returns one candidate for each query with at least one listed train descriptor. `list(q, add)` calls `add(t)` once
