@@ -104,7 +104,7 @@ TEST_CASE("what a file with the right checksum declares is checked all the same"
   };
   using std::string_view_literals::operator""sv;
   CHECK(message_of(8, "\2"sv) == "version 2; only version 1 is supported");
-  CHECK(message_of(16, "\0\2"sv) == "descriptors of 512 bits, not of 256");
+  CHECK(message_of(16, "\0\2"sv) == "descriptors have 512 bits, expected 256");
   CHECK(message_of(20, "\7"sv).starts_with("weighting 7"));
   CHECK(message_of(24, "\xff\xff\xff\xff"sv).find("but the header requires") != std::string::npos);
   CHECK(message_of(24, "\0\0\0\0"sv).starts_with("more inner nodes"));

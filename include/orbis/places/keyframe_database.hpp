@@ -49,7 +49,7 @@ struct place_candidate {
 template <class Id>
 struct query_workspace {
   std::vector<std::uint32_t> shared;   ///< number of shared words, indexed by slot
-  std::vector<std::uint32_t> touched;  ///< slots that share a word
+  std::vector<std::uint32_t> touched;  ///< slots of keyframes that share a word
   std::vector<double> scores;          ///< scores indexed by slot, for the keyframes scored in the current query
   std::vector<std::uint32_t> scored;
   std::vector<place_candidate<Id>> groups;

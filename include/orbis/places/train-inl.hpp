@@ -91,7 +91,7 @@ class vocabulary_trainer {
     return next;
   }
 
-  /// Does nothing if all descriptors are equal.
+  /// Clusters the descriptors of a node; returns an empty result if all are equal.
   template <execution_policy Policy>
   [[nodiscard]] clustering<Bits> split(const Policy& policy, const segment& node) const {
     const auto part = std::span{descriptors_}.subspan(node.begin, node.size());
@@ -148,8 +148,8 @@ class vocabulary_trainer {
   std::vector<words> descriptors_;
   std::vector<std::uint32_t> images_;  // image index of each descriptor
   std::uint32_t image_count_ = 0;
-  std::vector<std::uint16_t> child_counts_;  // of the nodes
-  std::vector<words> centres_;               // of the nodes except the root
+  std::vector<std::uint16_t> child_counts_;  // number of children of each node
+  std::vector<words> centres_;               // centre of each node except the root
   struct ended {
     std::size_t node;
     segment part;

@@ -50,7 +50,7 @@ template <std::size_t Bits, class Read>
     return fail(errc::unsupported, where, "version " + std::to_string(field(8)) + "; only version 1 is supported");
   if (field(16) != Bits)
     return fail(errc::unsupported, where,
-                "descriptors of " + std::to_string(field(16)) + " bits, not of " + std::to_string(Bits));
+                "descriptors have " + std::to_string(field(16)) + " bits, expected " + std::to_string(Bits));
   const std::uint32_t nodes = field(24), inner_end = field(28), words = field(32);
   if (field(20) > 3) return bad("weighting " + std::to_string(field(20)) + ", must be 0 to 3");
   if (nodes == 0 || inner_end > nodes || words > nodes) return bad("more inner nodes or words than nodes");

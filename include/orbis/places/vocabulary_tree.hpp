@@ -20,7 +20,7 @@ namespace orbis::places {
 
 /// The links of a node, stored separately from its descriptor.
 struct tree_node {
-  std::uint32_t first_child = 0;   ///< the children end at the first child of the next node
+  std::uint32_t first_child = 0;   ///< index of the first child; the last is before the first child of the next node
   std::uint32_t inner_before = 0;  ///< number of nodes with children before this one
 };
 
