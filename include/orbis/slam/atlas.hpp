@@ -44,7 +44,7 @@ class basic_atlas {
   [[nodiscard]] const std::map<map_id, map_type>& maps() const noexcept { return maps_; }
   [[nodiscard]] std::size_t size() const noexcept { return maps_.size(); }
 
-  /// Returns true if a keyframe with this current id exists.
+  /// Returns true if `k` is the current id of an existing keyframe.
   [[nodiscard]] bool has(map_keyframe k) const { return contains(k.map) && at(k.map).has_keyframe(k.keyframe); }
   /// @pre has(k)
   [[nodiscard]] const basic_keyframe<D>& at(map_keyframe k) const { return at(k.map).at(k.keyframe); }
@@ -85,7 +85,7 @@ class basic_atlas {
     return offsets;
   }
   /// Returns the current id of a keyframe, after merges of its map. The keyframe may have been erased since (see
-  /// `basic_map::replacement`). The id of a removed map does not change. O(merges).
+  /// `basic_map::replacement`). Ids in a removed map are returned unchanged. O(merges).
   [[nodiscard]] map_keyframe current(map_keyframe k) const {
     for (auto to = merged_.find(k.map); to != merged_.end(); to = merged_.find(k.map))
       k = {to->second.into, k.keyframe + to->second.offsets.keyframes};

@@ -3,8 +3,8 @@
 /// The covisibility graph: the keyframes that observe the same landmarks, and the number of shared landmarks.
 ///
 /// Source: R. Mur-Artal, J. M. M. Montiel, J. D. Tardos, "ORB-SLAM: a versatile and accurate monocular SLAM system",
-/// T-RO 31 (2015), section III.D; the idea is H. Strasdat's, "Double window optimisation for constant time visual
-/// SLAM", ICCV 2011.
+/// T-RO 31 (2015), section III.D; the idea is from H. Strasdat et al., "Double window optimisation for constant time
+/// visual SLAM", ICCV 2011.
 #pragma once
 
 #include <algorithm>
@@ -28,7 +28,7 @@ struct covisible {
   friend bool operator==(const covisible&, const covisible&) = default;
 };
 
-/// Order of covisible keyframes: more shared landmarks first; if equal, the older keyframe.
+/// Order of covisible keyframes: more shared landmarks first; if equal, the older keyframe first.
 [[nodiscard]] constexpr bool stronger(const covisible& a, const covisible& b) noexcept {
   return a.shared != b.shared ? a.shared > b.shared : a.keyframe < b.keyframe;
 }

@@ -26,7 +26,7 @@ struct distance_of {
 template <class D>
 using distance_of_t = typename distance_of<D>::type;
 
-/// A descriptor of features: a value whose distance to another one is an integer.
+/// A feature descriptor: a value whose distance to another descriptor is an integer.
 template <class D>
 concept feature_descriptor = std::semiregular<D> && features::descriptor_distance<distance_of_t<D>, D>;
 

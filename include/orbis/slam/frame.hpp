@@ -32,8 +32,8 @@ enum class sensor_kind : std::uint8_t { unknown, rgbd, stereo, monocular };
   return "unknown";
 }
 
-/// Change in the depth of a keypoint if the depth image was taken `step` seconds later, or earlier, than assumed;
-/// metres, 0 if unknown.
+/// Change in the depth of a keypoint if the depth image was captured `step` seconds later or earlier than assumed, in
+/// metres; 0 if unknown.
 struct depth_change {
   static constexpr double step = 0.008;  ///< seconds; short enough that few depth edges are crossed
   float later = 0.0F, earlier = 0.0F;
@@ -58,8 +58,8 @@ struct keypoint_as_read {
   depth_change change{};            ///< change of `depth`; zero unless the shutter is estimated
 };
 
-/// An image represented by features with descriptors of type `D`. All vectors have one entry per keypoint; some may be
-/// empty instead.
+/// An image represented by features with descriptors of type `D`. Each vector has one entry per keypoint; some vectors
+/// may be empty.
 template <feature_descriptor D>
 struct basic_frame {
   using descriptor_type = D;

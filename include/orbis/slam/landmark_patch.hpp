@@ -23,7 +23,7 @@ struct landmark_patch {
   std::shared_ptr<const pixel_array> pixels;  ///< row by row; null: the landmark has no patch
   vec3 across = zeros<vec3>();    ///< step from a pixel to the next one in its row, in the world frame, metres
   vec3 down = zeros<vec3>();      ///< step from a row to the next one, in the world frame, metres
-  double corner_deviation = 1.0;  ///< standard deviation of a corner's position in this image along its blur, pixels
+  double corner_deviation = 1.0;  ///< standard deviation of a corner's position along the motion blur, pixels
   vec2 motion = zeros<vec2>();    ///< velocity of the landmark in the image, patch pixels per second
 
   /// Moves the surface by a motion in the world frame.

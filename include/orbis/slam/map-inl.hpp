@@ -90,7 +90,7 @@ keyframe_id basic_map<D>::next_remembered(keyframe_id id) const {
 template <feature_descriptor D>
 void basic_map<D>::forget_erased(std::span<const keyframe_id> keep, std::size_t latest) {
   std::map<keyframe_id, detail::erased_keyframe> kept;
-  const auto take = [&](keyframe_id id) {  // including its chain of replacements
+  const auto take = [&](keyframe_id id) {  // keeps an id with its chain of replacements
     for (auto e = content_.erased.find(id); e != content_.erased.end();) {
       const keyframe_id next = e->second.replacement;
       kept.insert(content_.erased.extract(e));

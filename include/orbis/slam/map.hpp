@@ -32,7 +32,7 @@ namespace orbis::slam {
 /// Invariants: an observation is stored on both sides, so `keyframe.landmarks[f] == l` if and only if
 /// `landmark.observations` contains `{keyframe, f}`; the covisibility graph counts exactly these observations; the
 /// spanning tree contains all keyframes. References to keyframes and landmarks stay valid until they are erased. Const
-/// members may be called from several threads at once.
+/// members may be called concurrently from several threads.
 ///
 /// Let n be the number of observations of a landmark: a change to one of them takes O(n), independent of the map's
 /// size.
@@ -159,7 +159,7 @@ class basic_map {
   /// one if none does. O(observations of its landmarks).
   keyframe_id add_keyframe(frame_type f);
   /// Erases a keyframe with its observations, and the landmarks that no other keyframe observes. Its children in the
-  /// spanning tree get other parents. `pose(id)` still returns its pose. @pre has_keyframe(id)
+  /// spanning tree get new parents. `pose(id)` still returns its pose. @pre has_keyframe(id)
   void erase_keyframe(keyframe_id id);
   /// Forgets the poses of erased keyframes, except those in `keep`, the `latest` most recently erased ones, and their
   /// replacements. Each remembered keyframe takes about 130 bytes. O((n + keep) log n), where n is the number of erased
@@ -221,7 +221,8 @@ class basic_map {
   /// Removes both sides of an observation, without updating the covisibility graph. @pre the observation exists
   void detach(landmark_id id, keyframe_id k);
   landmark_type remove(landmark_id id, landmark_id replacement);
-  /// Adds the landmarks that `k` shares with keyframes of ids less than `below` to the covisibility graph.
+  /// Adds to the covisibility graph the pairs of `k` and each keyframe that has an id less than `below` and shares
+  /// landmarks with it.
   void count_covisible(const keyframe_type& k, keyframe_id below);
 
   detail::map_content<D> content_;

@@ -11,10 +11,10 @@
 ///
 /// Poses are tx ty tz qx qy qz qw (f64); ids are u32, ffffffff for none.
 ///
-///     size  levels of the pyramid (u32), minimum shared landmarks of an edge (u32), scale factor (f64), number
-///           of ids assigned to keyframes (u32) and to landmarks (u32), sensor (u32: 1 RGB-D, 2 stereo, 3 monocular, 0
-///           unknown), unit of length (u32: 1 metres, 0 arbitrary); version 1 has neither of the last two
-///     kfrm  for each keyframe id a byte. 0: it was erased; its replacement (id) and its pose relative to the
+///     size  number of pyramid levels (u32), minimum number of shared landmarks per edge (u32), scale factor (f64),
+///           number of ids assigned to keyframes (u32) and to landmarks (u32), sensor (u32: 1 RGB-D, 2 stereo, 3
+///           monocular, 0 unknown), unit of length (u32: 1 metres, 0 arbitrary); version 1 has neither of the last two
+///     kfrm  for each keyframe id, a byte. 0: it was erased; its replacement (id) and its pose relative to the
 ///           replacement. 1: timestamp (f64), frame index (u64), pose, number of keypoints (u32), and for each keypoint
 ///           x, y, size, angle, response (f32), octave (i32), depth (f32), x and y of the ray (f64; NaN without one),
 ///           descriptor (32 bytes). 2 (version 4): a run of forgotten ids; its length (u32, at least 1, this id
@@ -22,7 +22,7 @@
 ///     tree  for each keyframe: parent (id), number of loop edges (u32), their other ends (ids)
 ///     land  for each landmark id the number of observations (u32). 0: it was erased; the id that replaced it, or none.
 ///           ffffffff (version 3): a run of erased ids without replacement; its length (u32, at least 1, this id
-///           included). Otherwise position, normal (3 f64 each), least and greatest distance (f64), descriptor (32
+///           included). Otherwise position, normal (3 f64 each), minimum and maximum distance (f64), descriptor (32
 ///           bytes), keyframe that created it (id), times visible, times found (u32 each), a byte that is 1 if the
 ///           descriptor is current, and the observations: keyframe (id), keypoint (u32)
 ///

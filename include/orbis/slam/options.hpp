@@ -21,7 +21,7 @@ namespace orbis::slam {
 /// Conditions under which a frame becomes a keyframe.
 struct keyframe_options {
   double interval = 0.3;  ///< seconds since the last keyframe after which motion alone triggers a new one
-  /// Translation since the last keyframe that counts as motion, metres (without depth: median depths of the view) ...
+  /// Translation since the last keyframe that counts as motion, metres (without depth: median depths) ...
   double moved = 0.06;
   double turned = 0.06;              ///< ... or rotation, radians
   double inlier_ratio = 0.75;        ///< a keyframe is created below this share of the reference keyframe's landmarks
@@ -44,23 +44,23 @@ struct culling_options {
   double found_ratio = 0.25;        ///< minimum ratio of frames that find a landmark to frames that expect it ...
   std::uint32_t min_visible = 8;    ///< ... tested after this number of frames has expected it
   std::uint32_t age = 2;            ///< number of keyframes after a landmark's creation by which it must have ...
-  std::uint32_t min_support = 4;    ///< ... this number of observations, where those with depth count twice
+  std::uint32_t min_support = 4;    ///< ... this number of observations; those with depth count twice
   std::uint32_t least_support = 0;  ///< minimum support of an older landmark; with less, it is removed
   std::size_t neighborhood = 20;    ///< number of keyframes examined around the newest one
   double redundant = 0.9;           ///< a keyframe is redundant if this share of its close landmarks is observed by ...
   std::size_t redundant_observers = 3;  ///< ... this number of other keyframes ...
-  int coarser_levels = 1;               ///< ... each at most this number of pyramid levels coarser
+  int coarser_levels = 1;               ///< ... on a pyramid level that is coarser by at most this number
 };
 
 /// Use of depth images in pose estimation: aligns points of a frame with surfaces of keyframes. For sensors with a
 /// depth image.
 struct depth_term_options {
   bool enabled = true;           ///< adds the depth term to the keypoint residuals in every pose refinement
-  bool recovers = true;          ///< localises the camera by depth when keypoints fail
+  bool recovers = true;          ///< localises the camera by depth when localisation by keypoints fails
   std::size_t points = 400;      ///< maximum number of points per frame
   double effective_points = 40;  ///< maximum effective number of points: neighbouring depth errors are correlated
   std::size_t surfaces = 16;     ///< maximum number of keyframe surfaces kept; about 130 kB each
-  double weakest = 0.002;        ///< a direction is unconstrained if the mean square of the normals along it is smaller
+  double weakest = 0.002;        ///< directions with a smaller mean squared normal component are unconstrained
   double min_share = 0.7;        ///< minimum share of consistent points among those on known surfaces ...
   std::size_t min_points = 100;  ///< ... and minimum number of points on known surfaces, for localisation by depth
   std::size_t min_inliers = 5;   ///< minimum number of landmarks per pose direction not constrained by surfaces
@@ -80,32 +80,34 @@ struct recovery_options {
   std::size_t candidates = 8;         ///< maximum number of keyframes tried for relocalisation
   std::size_t min_inliers = 40;       ///< minimum number of inliers of a relocalised frame
   double new_map_after = 1.0;         ///< seconds without a pose after which a new map is started
-  std::size_t min_map_keyframes = 3;  ///< a map with fewer keyframes is removed at that time, with its tracked frames
+  std::size_t min_map_keyframes = 3;  ///< maps with fewer keyframes are removed with their frames when a new map starts
 };
 
 /// Initialisation of a map from one camera without depth.
 struct start_options {
   double radius = 100.0;           ///< search radius around a keypoint's last position, pixels
   std::uint32_t distance = 50;     ///< maximum descriptor distance
-  float ratio = 0.9F;              ///< maximum ratio of the distance to that of the second-best match
+  float ratio = 0.9F;              ///< maximum ratio of the best to the second-best distance
   std::size_t min_features = 100;  ///< minimum number of features of the first frame
-  std::size_t min_matches = 100;   ///< minimum number of matches with the first frame; with fewer it is discarded
+  std::size_t min_matches = 100;   ///< minimum number of matches to keep a candidate for the first frame
   std::size_t max_candidates = 3;  ///< maximum number of simultaneous candidates for the first frame, 1 or more
   double deviation = 0.6;          ///< standard deviation of a keypoint's position, pixels of its level
   std::size_t min_points = 50;     ///< minimum number of points of a new map
-  double min_parallax = 0.02;      ///< minimum median parallax of these points, radians
+  double min_parallax = 0.02;      ///< minimum median parallax of the points of a new map, radians
 };
 
 /// Triangulation of keypoints without a landmark.
 struct triangulation_options {
   std::size_t neighbors = 10;    ///< number of keyframes searched around the new one
-  double min_baseline = 0.03;    ///< minimum keyframe distance: metres; without depth, in units of the median depth
+  double min_baseline = 0.03;    ///< minimum keyframe distance, metres; without depth, in units of the median depth
   double min_parallax = 0.05;    ///< minimum angle between two rays, radians
   std::uint32_t distance = 50;   ///< maximum descriptor distance
-  float ratio = 0.6F;            ///< maximum ratio of the distance to that of the second-best match
+  float ratio = 0.6F;            ///< maximum ratio of the best to the second-best distance
   float line_distance = 1.96F;   ///< maximum distance from the epipolar line, pixels of a keypoint's level
   float epipole_radius = 10.0F;  ///< radius around the epipole where nothing is matched, pixels of a keypoint's level
-  double scale_tolerance = 1.5;  ///< maximum factor between scale and distance ratios, times one level's factor
+  /// Maximum mismatch between the ratio of the distances from both cameras and the ratio of the pyramid scales, as a
+  /// multiple of the scale factor of one level.
+  double scale_tolerance = 1.5;
 };
 
 /// Fusion of duplicate landmarks around a new keyframe.
@@ -119,7 +121,7 @@ struct fusion_options {
 /// Conditions for accepting a loop.
 struct loop_options {
   std::uint32_t distance = 64;   ///< maximum descriptor distance between the two keyframes ...
-  float ratio = 0.85F;           ///< ... and maximum ratio to that of the second-best match
+  float ratio = 0.85F;           ///< ... and maximum ratio of the best to the second-best distance
   std::size_t min_matches = 20;  ///< minimum number of descriptor matches between the two keyframes
   /// Inlier threshold for these matches, in standard deviations of the depth or, if no lengths are measured, of the
   /// pixels in both images.
@@ -138,7 +140,7 @@ struct loop_options {
   double max_rotation = 5.0 * std::numbers::pi / 180.0;        ///< allowed rotational drift, radians ...
   double rotation_per_metre = 1.0 * std::numbers::pi / 180.0;  ///< ... plus this per metre of the path
   /// Maximum standard deviation of the logarithm of the scale between both ends if no lengths are measured. Scale drift
-  /// is then unbounded, and only `max_rotation` of the four limits above applies.
+  /// is then unbounded, and of the four limits above, only `max_rotation` applies.
   double max_scale_deviation = 0.02;
   std::uint64_t seed = 1;  ///< seed of RANSAC
 };
@@ -154,7 +156,7 @@ struct loop_fusion_options {
 /// Correction of a map after a loop closure.
 struct loop_correction_options {
   std::uint32_t strong = 100;  ///< minimum number of shared landmarks for an edge of the essential graph
-  double loop_weight = 100.0;  ///< weight of the loop edge relative to a pair that shares `strong` landmarks
+  double loop_weight = 100.0;  ///< weight of the loop edge relative to an edge with `strong` shared landmarks
   int iterations = 20;         ///< maximum number of iterations of pose graph optimisation
   loop_fusion_options fusion{};
 };
@@ -163,7 +165,7 @@ struct loop_correction_options {
 struct global_adjustment_options {
   int robust_iterations = 10;         ///< maximum number of iterations with all observations
   int iterations = 20;                ///< maximum number of iterations after exclusion of the outliers
-  double relative_tolerance = 1e-6;   ///< either stage ends when a step reduces the cost by less than this fraction
+  double relative_tolerance = 1e-6;   ///< each stage ends when a step reduces the cost by less than this fraction
   std::size_t min_observations = 10;  ///< a keyframe with fewer observations follows its parent in the spanning tree
 };
 
@@ -171,7 +173,7 @@ struct global_adjustment_options {
 struct place_options {
   bool enabled = true;           ///< off: no loops are closed and no maps merged; relocalisation still works
   std::size_t candidates = 5;    ///< maximum number of keyframes that a new keyframe is compared with
-  std::uint32_t apart = 10;      ///< minimum number of keyframes between both ends of a loop, and between two loops
+  std::uint32_t apart = 10;      ///< minimum number of keyframes between the two ends of a loop, and between two loops
   bool adjusts_globally = true;  ///< runs global adjustment after each loop closure and merge
   loop_options loop{};
   loop_correction_options correction{};
@@ -195,15 +197,15 @@ struct thread_options {
   bool enabled = false;
   /// Maximum number of keyframes waiting for mapping; at the limit, no more keyframes are created ...
   std::size_t max_waiting = 3;
-  /// ... or, if true, `track` waits: for recordings, which must not outrun mapping. If false, an adjustment also ends
-  /// early when a keyframe is waiting.
+  /// ... or, if true, `track` waits: for recordings, so that tracking does not outrun mapping. If false, an adjustment
+  /// also ends early when a keyframe is waiting.
   bool wait = false;
 };
 
-/// Returns `options::bf` of a depth camera that triangulates, from its focal length (pixels) and the distance between
-/// its projector and camera (metres). The disparity of such a camera is accurate to about a tenth of a pixel, compared
-/// with one pixel for features of a stereo pair. Source: K. Khoshelham, S. O. Elberink, "Accuracy and resolution of
-/// Kinect depth data", Sensors 2012.
+/// Returns `options::bf` for a triangulating depth camera, given its focal length (pixels) and the distance between its
+/// projector and camera (metres). The disparity of such a camera is accurate to about a tenth of a pixel, compared with
+/// one pixel for features of a stereo pair. Source: K. Khoshelham, S. O. Elberink, "Accuracy and resolution of Kinect
+/// depth data", Sensors 2012.
 [[nodiscard]] constexpr double depth_camera_bf(double focal_length, double baseline) noexcept {
   return 10.0 * focal_length * baseline;
 }

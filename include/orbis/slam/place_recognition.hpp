@@ -23,8 +23,8 @@ namespace orbis::slam {
 /// - `describe(features)`: returns the signature of an image. Callable at any time, from any thread.
 /// - `add`, `erase`, `rename`: change the keyframes in the database; return false if that is impossible.
 /// - `similar(signature, count, exclude, neighbors)`: returns at most `count` keyframes, the most similar first,
-/// excluding those for which `exclude(id)` is true. `neighbors(id)` returns keyframes that observe the same place; the
-/// result needs only one of them. The same sequence of changes gives the same results.
+/// excluding those for which `exclude(id)` is true. `neighbors(id)` returns keyframes that observe the same place, of
+/// which the result need contain only one. The same sequence of changes gives the same results.
 template <class P, class D>
 concept place_recognizer = std::movable<P> &&
     requires(P& places, const P& known, const features::basic_features<D>& seen,

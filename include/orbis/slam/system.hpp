@@ -8,7 +8,7 @@
 ///   auto trajectory = slam.trajectory();
 /// @endcode
 ///
-/// The method is that of R. Mur-Artal, J. D. Tardos, "ORB-SLAM2: an open-source SLAM system for monocular, stereo and
+/// The method follows R. Mur-Artal, J. D. Tardos, "ORB-SLAM2: an open-source SLAM system for monocular, stereo and
 /// RGB-D cameras", T-RO 33 (2017): predict the pose with a constant-velocity model, search for the landmarks of the
 /// local map, refine the pose, create a keyframe when the view has changed, adjust the map around it, and close loops
 /// when a place is recognised. Starting a new map after tracking is lost, and merging maps, follow R. Elvira, J. D.
@@ -103,11 +103,11 @@ class system {
   track_result track(const camera::rgbd_frame& f) {
     return track(f.timestamp, f.color.view(), f.depth_metres(), f.depth_timestamp);
   }
-  /// As above; the images are not copied. `timestamp`: of the colour image, seconds; `depth`: metres, registered to the
-  /// colour image; `depth_timestamp`: of the depth image, from the same clock, if it differs. Depth is corrected for
-  /// the difference, which is smoothed over about a second; differences of more than 0.1 s are ignored. orbis::compiled
-  /// contains this function for `camera::depth_view` of 16-bit integers and of float; for others include
-  /// system-inl.hpp.
+  /// As above; the images are not copied. `timestamp`: time of the colour image, seconds; `depth`: metres, registered
+  /// to the colour image; `depth_timestamp`: time of the depth image on the same clock, if different. Depth is
+  /// corrected for the difference, which is smoothed over about a second; differences of more than 0.1 s are ignored.
+  /// orbis::compiled contains this function for `camera::depth_view` of 16-bit integers and of float; for others
+  /// include system-inl.hpp.
   template <camera::depth_source Depth>
   track_result track(double timestamp, image_view<const rgb8> color, const Depth& depth,
                      std::optional<double> depth_timestamp = {});
@@ -136,8 +136,8 @@ class system {
   [[nodiscard]] std::optional<tracked_frame> last_frame() const;
 
   /// Sets `T_world_camera` of the first frame of every map started by the next frame or later
-  /// (`options::initial_pose`). For the tracking thread only. Example: if the gravity direction is known per frame, new
-  /// maps can start upright.
+  /// (`options::initial_pose`). For the tracking thread only. Example: if the gravity direction is known for each
+  /// frame, new maps can start upright.
   void set_initial_pose(const se3& T_world_camera) {
     options_.initial_pose = T_world_camera;
     options_.find_initial_pose = nullptr;

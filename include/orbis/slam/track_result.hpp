@@ -45,7 +45,7 @@ struct track_timings {
 /// The result of tracking one frame.
 struct track_result {
   track_state state = track_state::not_started;
-  std::optional<se3> T_world_camera;    ///< the pose, in the world of `map`; empty if not tracked
+  std::optional<se3> T_world_camera;    ///< the pose, in the world frame of `map`; empty if not tracked
   map_id map = 0;                       ///< the active map
   std::size_t inliers = 0;              ///< number of landmarks that agree with the pose; small if depth determines it
   std::optional<keyframe_id> keyframe;  ///< the keyframe created from the frame, if any

@@ -108,8 +108,8 @@ association associate(std::span<const surface_sample> samples, std::size_t strid
   return count;
 }
 
-/// The cost of the plane residuals to second order in a motion of the camera frame (`exp(step) * T_camera_world`),
-/// excluding the directions that the planes do not constrain.
+/// The cost of the plane residuals as a quadratic function of a motion of the camera frame
+/// (`exp(step) * T_camera_world`), excluding the directions that the planes do not constrain.
 struct depth_equations {
   pose_quadratic term;     ///< cost with the information of at most the given number of independent points
   int determined = 0;      ///< number of determined directions of the pose, of six

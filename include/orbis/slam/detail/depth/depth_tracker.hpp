@@ -227,7 +227,7 @@ class depth_tracker {
  private:
   static constexpr alignment_gate close{.distance = 0.03, .deviations = 2.0, .cosine = 0.85};
 
-  /// Iterates with a gate that shrinks, starting from `distance` (metres).
+  /// Iterates with a shrinking gate that starts at `distance` (metres).
   depth_alignment descend(const moving_pose& start, const camera::shutter& shutter, std::size_t stride, double distance,
                           int iterations) {
     depth_alignment a;

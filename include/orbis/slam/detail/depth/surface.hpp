@@ -78,7 +78,7 @@ class surface_builder {
  private:
   /// The mean of the depths in a cell.
   struct sampled {
-    float x, y;     ///< ray through their mean pixel, at z = 1
+    float x, y;     ///< ray through the mean pixel, at z = 1
     float inverse;  ///< inverse depth, 1/m; 0 if the cell has no depth
   };
   struct ray {

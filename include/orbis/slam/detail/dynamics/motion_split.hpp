@@ -49,10 +49,10 @@ inline constexpr double least_trust = 0.02;
 
 /// Searches for a second rigid motion among matches many of which disagree with a single pose, and decides which of the
 /// two motions is that of the camera: the one with the greater sum of trust times spread. Matches with old landmarks
-/// are trusted; an object that biases the pose has appeared recently, or is small compared with the background. The
-/// candidate poses include the one estimated only from the trusted matches, starting from the prediction. The second
-/// motion is found by RANSAC among the outliers of the first, as in P. H. S. Torr, "Geometric motion segmentation and
-/// model selection", Phil. Trans. R. Soc. A 356 (1998).
+/// are trusted: an object that biases the pose is assumed to have appeared recently, or to be small compared with the
+/// background. The candidate poses include the one estimated only from the trusted matches, starting from the
+/// prediction. The second motion is found by RANSAC among the outliers of the first, as in P. H. S. Torr, "Geometric
+/// motion segmentation and model selection", Phil. Trans. R. Soc. A 356 (1998).
 template <camera::camera_model Camera>
 class motion_splitter {
  public:

@@ -59,7 +59,7 @@ struct snapshot : bundle_snapshot {
 /// The loss of the solver: Huber, with the 95 % chi-square limit for two coordinates.
 inline constexpr optimize::huber loss{2.447};
 
-/// Copies the keyframes of a map with enough shared landmarks. O(keypoints).
+/// Copies the keyframes of a map that observe enough shared landmarks, and the root. O(keypoints).
 template <feature_descriptor D>
 [[nodiscard]] snapshot take_keyframes(const basic_map<D>& m, const global_adjustment_options& o = {}) {
   snapshot s;
@@ -77,8 +77,8 @@ template <feature_descriptor D>
     s.index.emplace(k.id.value(), static_cast<std::uint32_t>(s.keyframes.size()));
     s.add_keyframe(k.id, k.T_world_camera, is_root);
   }
-  // Without reservation, growing arrays would be copied, which would prolong the time with the lock held for one part
-  // of the landmarks.
+  // Without `reserve`, growing arrays would be copied, and the lock would be held longer while one part of the
+  // landmarks is copied.
   s.landmarks.reserve(m.landmark_count());
   s.points.reserve(m.landmark_count());
   s.observations.reserve(keypoints);

@@ -26,7 +26,7 @@
 
 namespace orbis::slam::detail {
 
-/// Closes a loop if a place in the same map is recognised; merges two maps if it is in another map.
+/// Closes a loop if a place in the same map is recognised; merges two maps if the place is in another map.
 /// Source: R. Mur-Artal, J. D. Tardos, "ORB-SLAM2", T-RO 33 (2017), sections III.D and E; R. Elvira et al.,
 /// "ORBSLAM-Atlas", IROS 2019, for map merging.
 template <camera::camera_model Camera, feature_descriptor D, place_recognizer<D> Places>
@@ -92,12 +92,12 @@ class loop_closer {
 
  private:
   using clock = std::chrono::steady_clock;
-  // Amount of work per lock, chosen so that tracking waits for about a millisecond:
+  // Amount of work per acquisition of the lock, chosen so that tracking waits for about a millisecond:
   static constexpr std::uint32_t at_once = 4096;              ///< landmarks
   static constexpr std::size_t pairs_at_once = 512;           ///< pairs of landmarks to fuse
   static constexpr std::size_t observations_at_once = 65536;  ///< observations to check for outliers
 
-  /// Start of a correction, and the longest time with the lock held.
+  /// Start of a correction, and the longest time for which the lock was held.
   struct correction_timing {
     clock::time_point start = clock::now();
     double locked = 0.0;  ///< longest single time, milliseconds
@@ -223,7 +223,7 @@ class loop_closer {
     return true;
   }
 
-  // These functions work in parts so that tracking waits only for one part. @pre edit() is held, and the map exists
+  // These functions work in parts, so that tracking waits for at most one part. @pre edit() is held, and the map exists
 
   /// Updates all landmarks of a map.
   void update(map_id id, correction_timing& timing) {

@@ -58,8 +58,8 @@ struct essential_edge {
 
 /// Returns the edges of the spanning tree, the loop edges, and the pairs that share at least `threshold` landmarks;
 /// each pair of keyframes once, in ascending order of `from`. Tree edges lead from child to parent, other edges from
-/// the newer keyframe to the older one. The measurements are the current relative poses. O(keyframes and pairs that
-/// share landmarks).
+/// the newer keyframe to the older one. The measurements are the current relative poses. O(keyframes + pairs that share
+/// landmarks).
 template <feature_descriptor D>
 [[nodiscard]] std::vector<essential_edge> essential_graph(const basic_map<D>& m, std::uint32_t threshold = 100) {
   std::vector<essential_edge> edges;
@@ -154,8 +154,8 @@ struct solution {
   int iterations = 0;
 };
 
-/// Copies the data needed for the correction. Empty if a keyframe of the match no longer exists. O(keyframes, pairs
-/// that share landmarks, features of the neighbourhood).
+/// Copies the data needed for the correction. Empty if a keyframe of the match no longer exists. O(keyframes + pairs
+/// that share landmarks + features of the neighbourhood).
 /// @pre both keyframes of the match are in the map
 template <feature_descriptor D>
 [[nodiscard]] std::optional<snapshot<D>> take(const basic_map<D>& m, const loop_match& match,

@@ -81,9 +81,10 @@ template <camera::camera_model Camera, feature_descriptor D>
   return pairs;
 }
 
-/// Fuses the landmarks that the pairs identify; those of the candidate are kept. `offsets`: offsets added to the ids of
-/// the keyframe's map, if that was a separate map. Pairs whose keyframe or landmark no longer exists are skipped.
-/// Changed landmarks are updated. Callers that share the map can pass the pairs in parts: the result is the same.
+/// For each pair, fuses the landmark that the keypoint observes, if any, into the pair's landmark; otherwise adds an
+/// observation. `offsets`: offsets added to the ids of the keyframe's map, if that was a separate map. Pairs whose
+/// keyframe or landmark no longer exists are skipped. Changed landmarks are updated. Callers that share the map can
+/// pass the pairs in parts: the result is the same.
 template <feature_descriptor D>
 fusion_counts fuse(basic_map<D>& m, std::span<const pair> pairs, const id_offsets& offsets = {}) {
   fusion_counts counts;

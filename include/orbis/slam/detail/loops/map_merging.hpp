@@ -45,7 +45,7 @@ template <feature_descriptor D>
 }
 
 /// Copies the data needed to merge map `from`, which contains the keyframe of the match, into map `into`, which
-/// contains the candidate. Empty if a map or keyframe no longer exists, or ids run out. O(features of the
+/// contains the candidate. Empty if a map or keyframe no longer exists, or too few ids are left. O(features of the
 /// neighbourhood).
 template <feature_descriptor D>
 [[nodiscard]] std::optional<snapshot<D>> take(const basic_atlas<D>& maps, map_id from, map_id into,

@@ -24,7 +24,7 @@ namespace orbis::slam::detail {
 
 /// Upper bound for all coordinates, metres: sums and products remain finite.
 inline constexpr double farthest = 1e12;
-/// Upper bound for rays at z = 1: their product with a depth, and its square, are finite.
+/// Upper bound for the coordinates of rays at z = 1: their products with a depth, and their squares, are finite.
 inline constexpr double farthest_aside = 1e30;
 inline constexpr std::size_t bytes_of_keypoint = 76, bytes_of_observation = 8;
 
@@ -126,10 +126,10 @@ class map_reader {
       if (a < b) to_.tree.add_loop_edge(a, b);
     for (const auto& [a, b] : loops)
       if (const auto& ends = to_.tree.loop_edges(a); !std::binary_search(ends.begin(), ends.end(), b))
-        return wrong("keyframe " + to_string(a) + ": a loop edge without its reverse edge");
+        return wrong("keyframe " + to_string(a) + ": a loop edge has no reverse edge");
     std::size_t both_ways = 0;
     for (const keyframe& k : to_.keyframes) both_ways += to_.tree.loop_edges(k.id).size();
-    if (both_ways != loops.size()) return wrong("a loop edge without its reverse edge");
+    if (both_ways != loops.size()) return wrong("a loop edge has no reverse edge");
     return ends(in, "tree");
   }
 
@@ -266,7 +266,7 @@ class map_reader {
     if (!(largest_magnitude(l.position) < farthest) || !all_finite(l.normal) || !(l.min_distance >= 0.0) ||
         !(l.max_distance >= 0.0) || !std::isfinite(l.max_distance))
       return wrong("invalid position, normal or distance range");
-    if (l.created >= keyframe_ids_) return wrong("its first keyframe has an invalid id");
+    if (l.created >= keyframe_ids_) return wrong("the keyframe that created it has an invalid id");
     l.observations.reserve(count);
     for (std::uint32_t i = 0; i != count; ++i) {
       observation o;

@@ -81,8 +81,8 @@ class slot_map {
   [[nodiscard]] bool empty() const noexcept { return size() == 0; }
   /// The id of the next object.
   [[nodiscard]] Id end_id() const noexcept { return slots_.size(); }
-  /// Returns the first id >= `i` that has an object; `end_id()` if there is none. O(erased ids skipped), in steps of
-  /// 256 if all 256 are erased.
+  /// Returns the first id >= `i` that has an object; `end_id()` if there is none. O(erased ids skipped); 256
+  /// consecutive erased ids may take one step.
   [[nodiscard]] Id next_id(Id i) const noexcept { return slots_.next_contained(i.value()); }
   /// Returns the first id >= `i` that has an object or a replacement; `end_id()` if there is none. Same cost as
   /// `next_id`.
@@ -102,7 +102,7 @@ class slot_map {
   }
 
   /// Appends all objects and erased ids of `other`; the latter count as erased now. Returns the offset added to its
-  /// ids. Ids inside the objects are not changed. O(ids of `other`), in steps of 256 for ids forgotten long ago.
+  /// ids. Ids inside the objects are not changed. O(ids of `other`); 256 consecutive forgotten ids may take one step.
   /// @pre at most `most_ids` ids in all
   std::uint32_t append(slot_map&& other) {
     assert(other.slots_.size() <= most_ids - slots_.size());

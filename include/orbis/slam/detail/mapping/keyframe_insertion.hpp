@@ -30,8 +30,8 @@ template <feature_descriptor D>
   return with_depth;
 }
 
-/// Adds a frame as a keyframe that observes `f.landmarks`, and adds landmarks at `new_landmark_keypoints`. Returns its
-/// id.
+/// Adds a frame as a keyframe that observes `f.landmarks`, and adds landmarks at `new_landmark_keypoints`. Returns the
+/// keyframe's id.
 template <feature_descriptor D>
 keyframe_id insert_keyframe(basic_map<D>& m, basic_frame<D> f, const options& o) {
   f.as_read = {};  // the map does not use row times

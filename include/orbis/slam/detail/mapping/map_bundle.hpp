@@ -28,10 +28,10 @@ namespace orbis::slam::detail {
 
 /// Keyframes, landmarks and observations of a map, as arrays.
 struct bundle_snapshot {
-  std::vector<keyframe_id> keyframes;                      ///< ascending
+  std::vector<keyframe_id> keyframes;                      ///< in ascending order
   std::vector<std::uint8_t> is_fixed;                      ///< for each keyframe: 1 if its pose is held fixed
   std::vector<se3> poses;                                  ///< `T_world_camera` of each keyframe
-  std::vector<landmark_id> landmarks;                      ///< ascending
+  std::vector<landmark_id> landmarks;                      ///< in ascending order
   std::vector<vec3> points;                                ///< position of each landmark in the world frame, metres
   std::vector<optimize::bundle_observation> observations;  ///< `pose` and `point` are indices into the arrays above
   std::vector<observation> sources;                        ///< keyframe and keypoint of each observation
@@ -118,7 +118,8 @@ class bundle_solver {
       : model_{model}, adjuster_{model, loss} {}
 
   /// Calls `go_on(iteration, iterations)` before each step; if it returns false, the adjustment stops. No observation
-  /// is marked as an outlier before the first half is complete. `memory`: a previous solution, whose memory is reused.
+  /// is marked as an outlier before the robust iterations are complete. `memory`: a previous solution, whose memory is
+  /// reused.
   [[nodiscard]] bundle_solution solve(const bundle_snapshot& s, const bundle_schedule& schedule,
                                       const progress& go_on = {}, bundle_solution memory = {}) {
     bundle_solution result = std::move(memory);
@@ -171,8 +172,8 @@ class bundle_solver {
       to.outliers[i] = squared_[i] > error_limit(!std::isnan(s.observations[i].right)) ? 1 : 0;
   }
 
-  /// Unmarks the observations that agree with the current poses and points if the standard deviation of their pixel is
-  /// one pixel of its level: a slightly misplaced patch remains an observation.
+  /// Unmarks the outliers that agree with the current poses and points if a standard deviation of one pixel of the
+  /// level is assumed: a slightly misplaced patch remains an observation.
   void keep_rough(const bundle_snapshot& s, bundle_solution& to) const {
     for (std::size_t i = 0; i != s.observations.size(); ++i) {
       const optimize::bundle_observation& o = s.observations[i];

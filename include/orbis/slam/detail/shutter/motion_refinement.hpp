@@ -78,7 +78,7 @@ template <feature_descriptor D>
   return (before.T_world_camera.inverse() * after.T_world_camera).log() / interval;
 }
 
-/// Collects a frame's observations of landmarks, with the keypoints as the rolling shutter read them if available.
+/// Collects a frame's observations of landmarks, using the keypoints as read by the rolling shutter, if available.
 /// O(features).
 template <feature_descriptor D, camera::camera_model Camera>
 void find_row_observations(const basic_frame<D>& f, const basic_map<D>& m, const camera_rig<Camera>& rig,
@@ -125,8 +125,8 @@ template <camera::camera_model Camera>
   return r;
 }
 
-/// A cost of pose and twist to second order around `at`, from measurements other than keypoints. A step consists of a
-/// motion of the camera frame (`exp(step) * T_camera_world`) and a change of the twist.
+/// A cost of measurements other than keypoints, as a quadratic function of pose and twist around `at`. A step consists
+/// of a motion of the camera frame (`exp(step) * T_camera_world`) and a change of the twist.
 struct pose_quadratic {
   moving_pose at;
   matrix<12, 12> h = zeros<matrix<12, 12>>();
@@ -165,8 +165,8 @@ void set_parts(Equations& to, const std::array<mat6, 3>& h, const std::array<vec
   to.g = stacked(g[0], g[1]);
 }
 
-/// Adds the other constraints on pose and twist to the equations of the keypoints, which are given in powers of the row
-/// times.
+/// Adds the other constraints on pose and twist to the equations of the keypoints, given as sums for each power of the
+/// row times (`h`, `g`).
 inline void add_terms(moving_pose_equations& e, const std::array<mat6, 3>& h, const std::array<vec6, 2>& g,
                       const se3& T_camera_world, const vec6& twist, const twist_prior& prior,
                       const refinement_terms& terms) {
@@ -277,7 +277,7 @@ class early_depth_twist {
   void advance() { former_covariance_ = pose_covariance_; }
 
  private:
-  /// Computes the gain from the information of the pixels, given in powers of the row times.
+  /// Computes the gain from the information of the pixels, given as sums for each power of the row times.
   void determine(const std::array<mat6, 3>& h, const twist_prior& prior) {
     pose_covariance_ = inverse(h[0]);
     if (!prior.T_world_before) return;
@@ -286,13 +286,13 @@ class early_depth_twist {
     const mat6 tie = inverse(prior_covariance(prior, 1.0) + by_pose * by_pose * former_covariance_);
     const mat6 mixed = h[1] + by_pose * tie;
     const mat6 of_twist = h[2] + tie - transposed(mixed) * inverse(h[0] + by_pose * by_pose * tie) * mixed;
-    // From one frame to the next, the twist changes by twice the standard deviation of the prior, which is relative to
-    // the mean.
+    // The standard deviation of the prior is relative to the mean twist between two frames; from one frame to the next,
+    // the twist changes by twice that.
     const mat6 change = prior_covariance(prior, 2.0);
     gain_ = change * inverse(change + inverse(of_twist));
   }
 
-  mat6 pose_covariance_ = zeros<mat6>(), former_covariance_ = zeros<mat6>();  ///< determined only by pixels
+  mat6 pose_covariance_ = zeros<mat6>(), former_covariance_ = zeros<mat6>();  ///< covariances determined only by pixels
   mat6 gain_ = identity<mat6>();
 };
 

@@ -3,9 +3,9 @@
 /// Estimation of a camera's read-out time, and of the delay of its depth image, from the frames.
 ///
 /// A point observed by a keyframe and a frame is projected from one into the other; its error depends on read-out and
-/// delay in a known way, because the motion of the camera is known from the poses before and after each. For each pair,
-/// the relative pose, which would explain part of the error, is eliminated; two linear equations remain, which are
-/// summed over all pairs. The standard deviation of the solution is estimated from the variation of the sums per
+/// delay in a known way, because the motion of the camera is known from the poses before and after each frame. For each
+/// pair, the relative pose, which would explain part of the error, is eliminated; two linear equations remain, which
+/// are summed over all pairs. The standard deviation of the solution is estimated from the variation of the sums per
 /// keyframe, because the errors of pairs with a common keyframe are not independent.
 ///
 /// Sources: read-out from motion: P.-E. Forssen, E. Ringaby, "Rectifying rolling shutter video from hand-held devices",
@@ -197,7 +197,7 @@ class shutter_estimator {
       const double sigmas = before == 0.0 ? 5.0 : 2.5;
       return std::abs(value) > sigmas * deviation && std::abs(value) >= least && std::abs(value) <= most;
     };
-    // A shorter read-out has no relevant effect, and no camera has a longer one.
+    // Shorter read-out times have no relevant effect, and no camera has longer ones.
     if (result.read_out > 0.0 && holds(result.read_out, result.read_out_deviation, assumed.color_read_out, 0.003, 0.07))
       result.shutter.color_read_out = result.shutter.depth_read_out = result.read_out;
     if (holds(result.delay, result.delay_deviation, assumed.depth_delay, 0.003, 0.05))

@@ -24,8 +24,8 @@
 
 namespace orbis::slam::detail {
 
-/// Compares each tracked frame with the last keyframes as soon as the next frame is known, which helps to determine its
-/// motion, and periodically proposes the resulting shutter.
+/// Compares each tracked frame with the last keyframes after the next frame has been tracked, because both neighbouring
+/// frames determine the motion; periodically proposes the resulting shutter.
 class shutter_observer {
  public:
   [[nodiscard]] shutter_estimate estimate() const { return estimate_; }
@@ -58,7 +58,8 @@ class shutter_observer {
                                                    const camera_rig<Camera>& rig, const camera::shutter& assumed) {
     const vec6 motion = motion_between(last, f);
     if (before_ && before_that_) {
-      // The velocity between two intervals from the mean velocities of three: exact for motions that are cubic in time.
+      // The velocity at the boundary of two intervals, from the mean velocities of three intervals: exact for motions
+      // that are cubic in time.
       pending_.T_world_camera = last.T_world_camera;
       pending_.twist = (-*before_that_ + 5.0 * *before_ + 2.0 * motion) / 6.0;
       compare(m, rig, assumed);

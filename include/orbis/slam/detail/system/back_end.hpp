@@ -97,7 +97,7 @@ class worker {
     for (;;) {
       changed_.wait(lock, [&] { return ends_ || !jobs_.empty(); });
       if (ends_) {
-        jobs_.clear();  // callers must not wait for these
+        jobs_.clear();  // so that no caller waits for them
         changed_.notify_all();
         return;
       }

@@ -59,7 +59,7 @@ class frame_refinement {
   }
 
   /// Refines the pose of a frame from its observed landmarks and, if enabled, from depth; with a rolling shutter, also
-  /// the twist, with which the keypoints are then corrected. `is_next`: the frame follows the last one.
+  /// refines the twist and corrects the keypoints with it. `is_next`: true if the frame follows the last one.
   void refine_motion(const task& t, bool is_next) {
     frame_type& f = t.frame;
     const auto& m = t.map();

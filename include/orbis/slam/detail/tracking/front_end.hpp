@@ -174,7 +174,7 @@ class front_end {
     if (!lost_since_) lost_since_ = t.frame.timestamp;
     context_.state = track_state::lost;
     const options& o = context_.settings;
-    // Finding two frames for a new map takes time: if not much is lost, the search begins immediately.
+    // Finding two frames for a new map takes time: if the current map is small, the search begins immediately.
     const bool is_here = context_.last.size() != 0 && context_.last_map(t.maps) == t.maps.active_id();
     const bool at_once =
         is_here && !context_.rig.scale_is_known && t.map().keyframes().size() < o.recovery.min_map_keyframes;
@@ -260,7 +260,8 @@ class front_end {
       context_.depth.keep(anchor.reference, anchor.T_reference_camera, f.twist, f.shutter);
     if (start_.begins_map()) young_.begin_map(maps.active_id());
     if (made) young_.count_keyframe(made->map);
-    // While the shutter is being estimated, a frame may have been tracked with a different shutter than the map.
+    // While the shutter is being estimated, a frame may have been tracked with a different shutter than that of the
+    // map.
     const bool may_wait = !made && !context_.observer && state == track_state::tracking && !f.held_by_depth;
     if (may_wait && context_.moving.size() == 0) young_.add(f, context_.depth_quadratic, log_);
     context_.set_last(std::move(f), anchor);
@@ -282,7 +283,7 @@ class front_end {
   frame_log log_;
   track_counters counters_;
   double held_since_ = 0.0;           ///< time of the last tracked frame not localised by depth alone, seconds
-  std::optional<double> lost_since_;  ///< timestamp; empty: the timestamp of the next frame
+  std::optional<double> lost_since_;  ///< timestamp; if empty, set to that of the next lost frame
   landmark_id first_new_;             ///< the first landmark created from the last frame; `no_id`: none
   std::size_t most_erased_ = 2 * latest_erased;  ///< maximum number of erased keyframes before some are forgotten
 };

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The decision of whether a frame becomes a keyframe.
+/// Decides whether a frame becomes a keyframe.
 #pragma once
 
 #include <algorithm>

@@ -34,10 +34,10 @@ class map_start {
     map_keyframe keyframe;
     double timestamp;  ///< seconds
   };
-  /// The first keyframe of the map that the last frame has started; empty if the frame has started no map, or is the
+  /// The first keyframe of the map started by the last frame; empty if that frame started no map, or is itself the
   /// first keyframe.
   [[nodiscard]] const std::optional<first_frame>& first() const noexcept { return first_; }
-  /// Returns true if the last frame has started a map.
+  /// Returns true if the last frame started a map.
   [[nodiscard]] bool begins_map() const noexcept { return begins_map_; }
 
   /// Prepares for the next frame.
@@ -45,7 +45,7 @@ class map_start {
     begins_map_ = false;
     first_.reset();
   }
-  /// Discards the candidates for the first frame of a map without depth. Call it after a frame was tracked.
+  /// Discards the candidates for the first frame of a map without depth. Call after a frame was tracked.
   void forget_candidates() { pair_.reset(); }
 
   /// Starts a map from a frame if its measurements are sufficient; without depth, together with an earlier frame. The

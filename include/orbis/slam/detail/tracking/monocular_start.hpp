@@ -52,7 +52,7 @@ struct monocular_start_result {
 /// newer candidates remain, so that the search does not restart. Each candidate takes about a millisecond per frame.
 ///
 /// Source: R. Mur-Artal, J. M. M. Montiel, J. D. Tardos, "ORB-SLAM: a versatile and accurate monocular SLAM system",
-/// T-RO 31 (2015), section IV, which keeps one frame.
+/// T-RO 31 (2015), section IV, where only one candidate is kept.
 template <camera::camera_model Camera, feature_descriptor D>
 class monocular_start {
  public:
@@ -111,7 +111,7 @@ class monocular_start {
   }
   /// Makes `f` a candidate if it has enough features and differs from the newest candidate.
   void add(const basic_frame<D>& f) {
-    constexpr double faded = 0.6;  // maximum share of its matches that the newest candidate still has
+    constexpr double faded = 0.6;  // maximum share of its peak match count that the newest candidate retains
     if (f.size() < options_.min_features || candidates_.size() == options_.max_candidates) return;
     if (!candidates_.empty() &&
         static_cast<double>(candidates_.back().matches.size()) > faded * static_cast<double>(candidates_.back().most))
@@ -120,7 +120,7 @@ class monocular_start {
     for (const auto& k : f.features.keypoints)
       candidates_.back().windows.push_back({k.x, k.y, static_cast<float>(options_.radius), k.octave - 1, k.octave + 1});
   }
-  /// Reconstructs a start from a candidate and the next frame; on success, moves out the candidate's frame.
+  /// Reconstructs a start from a candidate and the next frame; on success, moves the candidate's frame into the result.
   [[nodiscard]] result<monocular_start_result<D>> reconstruct(candidate& c, const basic_frame<D>& f) const {
     std::vector<vec2> first, second;
     std::vector<double> deviations;

@@ -63,7 +63,7 @@ class line_kernel {
         }
   }
 
-  /// The horizontal and vertical distances of the farthest pixels with a weight.
+  /// The horizontal and vertical distances of the farthest pixels with a nonzero weight.
   [[nodiscard]] int reach_x() const noexcept { return reach_x_; }
   [[nodiscard]] int reach_y() const noexcept { return reach_y_; }
 
@@ -196,8 +196,8 @@ struct match_patch_kernel {
   static ORBIS_ALWAYS_INLINE double lane_sum(const L& v) {
     return static_cast<double>(simd::sum(v));
   }
-  /// Sets `to`, with rows `stride` apart, to the image at those pixels of the patch, starting at -(8 + margin), that
-  /// `by_patch` needs. Returns false if one of these is outside the image.
+  /// Samples the image at the patch pixels that `by_patch` needs. `to`: the samples, starting at patch coordinate
+  /// -(8 + margin), in rows `stride` apart. Returns false if one of these pixels is outside the image.
   template <simd::target Target>
   static ORBIS_ALWAYS_INLINE bool sample(image_view<const std::uint8_t> image, const patch_placement& expected,
                                          const line_kernel& by_patch, float* to, int stride) {
@@ -247,8 +247,8 @@ struct match_patch_kernel {
   }
 };
 
-/// Measures the position of a patch in `image`, at most three pixels of the patch from the expected position. Both
-/// contain motion blur: the patch by `patch_smear`, the image by `image_smear` (motions, pixels of the patch). Each is
+/// Measures the position of a patch in `image`, at most three pixels of the patch from the expected position. Both are
+/// blurred by motion: the patch by `patch_smear`, the image by `image_smear` (in pixels of the patch). Each is
 /// additionally blurred by the motion of the other, which makes both equal: blur along two lines does not depend on
 /// their order. The mean and the contrast of the patch may differ. Empty if the patch lacks texture in a direction,
 /// leaves the image, or is not found.

@@ -88,7 +88,7 @@ class patch_tracker {
       const basic_landmark<D>& l = m.landmark_at(f.landmarks[i]);
       const auto view = predict_view(f, i, l, T_camera_world, motion);
       if (!view) continue;
-      constexpr std::size_t every = 32;  // one in this number of patches is compared: much cheaper than the alignment
+      constexpr std::size_t every = 32;  // only one patch in this number is compared, which costs little
       if (estimates && !options_.exposure && shows_exposure(l.patch, *view) && moving++ % every == 0)
         compare_exposures(l.patch, *view);
       const auto found = match(l.patch, *view, seconds);
@@ -132,8 +132,9 @@ class patch_tracker {
     deviation_ += rate * (std::clamp(*middle / median_of_rayleigh, least, most) - deviation_);
   }
 
-  /// Adds a patch from the image of a new keyframe to each of its landmarks that has none. These keypoints define the
-  /// positions of the landmarks in images. `f`: the frame from which the keyframe was created. @pre is_ready()
+  /// Adds a patch from the image of a new keyframe to each of its landmarks that has none. The keypoints at which
+  /// patches are taken define the image positions of the landmarks. `f`: the frame from which the keyframe was created.
+  /// @pre is_ready()
   void add_patches(basic_map<D>& m, keyframe_id id, const basic_frame<D>& f, const vec6& twist) const {
     const se3 T_camera_world = f.T_world_camera.inverse();
     for (std::uint32_t i = 0; i != f.size(); ++i) {
@@ -146,7 +147,7 @@ class patch_tracker {
     }
   }
 
-  /// Sets the motion of the patches of a map's first keyframe, which is known only after the next frame.
+  /// Sets the motion of the patches of a map's first keyframe; this motion is known only after the next frame.
   /// @pre m.has_keyframe(id), is_ready()
   void set_first_motion(basic_map<D>& m, keyframe_id id, const vec6& twist) const {
     const auto& k = m.at(id);
@@ -161,8 +162,8 @@ class patch_tracker {
     }
   }
 
-  /// Moves the keypoints of the last aligned frame that no longer observe a landmark, or all keypoints, back to their
-  /// detected positions.
+  /// Moves keypoints of the last aligned frame back to their detected positions: all, or those that no longer observe a
+  /// landmark.
   void move_back(basic_frame<D>& f, bool all) const {
     for (const moved_keypoint& k : moved_) {
       if (!all && f.landmarks[k.index] != no_id) continue;
@@ -183,8 +184,8 @@ class patch_tracker {
   };
   /// A landmark's expected placement in the image.
   struct patch_view {
-    vec2 pixel, across, down;  ///< centre of the patch, and the steps to its next pixels, pixels of the image
-    vec2 delay;                ///< motion from the frame's time to that of its row, pixels of the image
+    vec2 pixel, across, down;  ///< centre of the patch, and the steps between its pixels, in pixels of the image
+    vec2 delay;                ///< motion from the frame's time to the time of the row, pixels of the image
     vec2 motion;               ///< pixels of the patch per second
     image_view<const std::uint8_t> level;
   };
@@ -274,7 +275,7 @@ class patch_tracker {
   }
 
   /// Moves keypoint `i` to a pixel of the image, and reads its depth there. `delay`: the motion from the frame's time
-  /// to that of its row. Returns false, without a change, if a pixel has no ray.
+  /// to the time of the row. Returns false, without a change, if a pixel has no ray.
   bool move_keypoint(basic_frame<D>& f, std::size_t i, const vec2& to, const vec2& delay) {
     const auto read_ray = rig_.camera().unproject(to), ray = rig_.camera().unproject(to - delay);
     if (!read_ray || !ray) return false;
@@ -292,7 +293,7 @@ class patch_tracker {
     read.x = static_cast<float>(to.x()), read.y = static_cast<float>(to.y());
     read.ray_x = read_ray->x() / read_ray->z(), read.ray_y = read_ray->y() / read_ray->z();
     if (!image_.depth_at) return true;
-    // The correction for the time of the depth image at the old pixel is applied to the new one.
+    // Applies the old pixel's correction for the time of the depth image to the new pixel.
     const auto corrected = [&](float depth) {
       if (!(read.stored_depth > 0.0F && stored > 0.0F)) return stored;
       return depth > 0.0F ? stored + (depth - read.stored_depth) : 0.0F;
@@ -340,7 +341,7 @@ class patch_tracker {
   /// smoothly around the pixel, the slope of the surface is measured; otherwise the surface is assumed parallel to the
   /// image. `z`: depth at the pixel, metres. Empty if a pixel has no ray.
   [[nodiscard]] std::optional<vec3> step_on_surface(const vec2& pixel, const vec2& step, double z) const {
-    constexpr double arm = 4.0, unevenness = 0.01, steepest = 0.1;  // steps; shares of the depth
+    constexpr double arm = 4.0, unevenness = 0.01, steepest = 0.1;  // steps; fractions of the depth
     const vec2 before = pixel - arm * step, after = pixel + arm * step;
     const auto ray_before = rig_.camera().unproject(before), ray_after = rig_.camera().unproject(after);
     if (!ray_before || !ray_after) return std::nullopt;

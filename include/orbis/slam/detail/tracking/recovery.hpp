@@ -31,7 +31,7 @@ class recovery {
  public:
   recovery(Context& context, frame_refinement<Context>& refinement) : c_{context}, refinement_{refinement} {}
 
-  /// Aligns the depth of a frame, whose pose is near that of the last one, with the surfaces of keyframes.
+  /// Aligns the depth of a frame, whose pose is near that of the last frame, with the surfaces of keyframes.
   [[nodiscard]] std::optional<depth_alignment> align_depth(const task& t) {
     constexpr double longest = 2.0;  // seconds
     const double interval = t.frame.timestamp - c_.last.timestamp;
@@ -130,7 +130,7 @@ class recovery {
   }
 
  private:
-  /// Refines a pose found by a search on the local map around the reference in the active map.
+  /// Refines the pose that a search has found, using the local map around the reference in the active map.
   std::size_t track_found(const task& t) {
     const std::size_t inliers = refinement_.match_local_map(t, 3.0 * c_.settings.search_radius);
     if (inliers < c_.settings.recovery.min_inliers) return 0;

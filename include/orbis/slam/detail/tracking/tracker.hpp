@@ -94,7 +94,7 @@ class tracker {
   tracker(const camera_rig<Camera>& rig, const options& settings) : rig_{rig}, options_{settings} {}
 
   /// Searches for the points observed by the last frame: its landmarks, and its other points with depth. The pose in
-  /// `last` is up to date; its landmark ids are those from when it was tracked. `predicted`: the expected
+  /// `last` is up to date; its landmark ids are those at the time it was tracked. `predicted`: the expected
   /// `T_world_camera`.
   std::size_t by_motion(basic_frame<D>& f, const basic_map<D>& m, const basic_frame<D>& last, const se3& predicted,
                         moving_features<Camera, D, Matchers>& moving) const {
@@ -112,8 +112,8 @@ class tracker {
     return 0;
   }
 
-  /// Like `by_motion`, for a camera that may have turned in any direction by up to half of its view since the last
-  /// frame: tries the turned poses with the most matches, at the position of the last frame. Takes about 80 searches.
+  /// Like `by_motion`, for a camera that may have turned in any direction by up to half of its field of view since the
+  /// last frame: tries the rotations with the most matches, at the position of the last frame. Takes about 80 searches.
   std::size_t by_turning(basic_frame<D>& f, const basic_map<D>& m, const basic_frame<D>& last) const {
     const auto& camera = rig_.camera();
     const auto corner = camera.unproject({0.0, 0.0});

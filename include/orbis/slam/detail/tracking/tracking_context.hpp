@@ -50,7 +50,7 @@ struct tracking_task {
   [[nodiscard]] basic_map<D>& map() const { return maps.active(); }
 };
 
-/// A pose relative to a keyframe, with which it moves.
+/// A pose relative to a keyframe; it moves with the keyframe.
 struct anchored_pose {
   map_keyframe reference;
   se3 T_reference_camera;  ///< translation divided by the scale of the reference

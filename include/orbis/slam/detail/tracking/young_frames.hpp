@@ -76,7 +76,7 @@ class young_frames {
 
  private:
   static constexpr std::size_t most = 100;                ///< maximum number of frames per map
-  static constexpr std::size_t most_pixels = 20'000'000;  ///< maximum pixels of all waiting frames: 65 of 640x480
+  static constexpr std::size_t most_pixels = 20'000'000;  ///< maximum total pixels of waiting frames: 65 of 640x480
   static constexpr std::size_t enough = 5;                ///< required number of later keyframes
 
   struct young_frame {
