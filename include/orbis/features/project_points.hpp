@@ -24,7 +24,7 @@ concept world_point = std::convertible_to<const P&, const vec3&> || requires(con
 /// Projects world points into the image of a camera at a given pose. The result is empty if the point is behind the
 /// camera or outside the image. Optional members of a point in addition to `position`:
 /// - `normal`: the unit vector from the point towards its earlier viewpoints, for gating the viewing angle;
-/// - `min_distance`, `max_distance`: the distances between which the point is detectable, for predicting the level.
+/// - `min_distance`, `max_distance`: the range of distances at which the point is detectable, for predicting the level.
 template <camera::camera_model Camera>
 class camera_projection {
  public:

@@ -16,7 +16,7 @@ struct resize_plan {
   std::vector<std::uint16_t> weight;  ///< weight of the next pixel, in 1/256
   // For each group of eight result pixels; empty if their source pixels do not fit into sixteen.
   std::vector<std::int32_t> base;    ///< start of the sixteen pixels
-  std::vector<std::uint8_t> places;  ///< index of each `first` in these, in low bytes of words; high bytes select zero
+  std::vector<std::uint8_t> places;  ///< offsets of `first` from `base`, in low bytes of words; high bytes select zero
 };
 
 /// Reusable memory for `resize`.

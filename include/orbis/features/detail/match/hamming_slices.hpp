@@ -127,7 +127,7 @@ template <class Target>
 
 #if ORBIS_X86
 /// Lane-wise function of three bits whose truth table is the bits of `Table`. The compiler recognises only a few of the
-/// functions below as such; without this function, brute-force matching takes 1.35 times as long with AVX-512.
+/// functions below as ternary logic; without this function, brute-force matching takes 1.35 times as long with AVX-512.
 template <int Table, class R>
 ORBIS_TARGET_AVX512 inline void ternary_logic(R& out, const R& a, const R& b, const R& c) noexcept {
   out = reinterpret_cast<R>(_mm512_ternarylogic_epi64(reinterpret_cast<__m512i>(a), reinterpret_cast<__m512i>(b),
