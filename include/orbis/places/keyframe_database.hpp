@@ -30,9 +30,9 @@ concept keyframe_id = std::totally_ordered<Id> && std::copyable<Id> && std::defa
 
 /// Acceptance criteria of a query.
 struct query_options {
-  double shared_words = 0.8;  ///< minimum number of shared words, relative to the keyframe with the most; exclusive
+  double shared_words = 0.8;  ///< the number of shared words must exceed this fraction of the largest number
   double min_score = 0.0;     ///< minimum score
-  double group_score = 0.75;  ///< minimum score sum of a group, relative to the best group; exclusive
+  double group_score = 0.75;  ///< the score sum of a group must exceed this fraction of the best group's
 };
 
 /// A keyframe that may show the same place as the image.
