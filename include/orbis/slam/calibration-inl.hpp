@@ -86,7 +86,8 @@ template <camera::parametric_camera Camera>
   return c.distortion().k3 != 0.0 ? 0x1ffU : 0xffU;
 }
 
-/// Returns the largest displacement of a pixel by one standard deviation of the given parameters, in pixels.
+/// Returns the largest displacement of an image point, in pixels, when the given parameters change by one standard
+/// deviation.
 template <camera::parametric_camera Camera, class Covariance>
 [[nodiscard]] double max_pixel_deviation(const Camera& camera, const Covariance& covariance, std::uint32_t parameters) {
   constexpr int count = camera::parameters_of<Camera>::count, steps = 8;

@@ -25,7 +25,7 @@ concept calibrated_camera = std::same_as<C, camera::any_camera> || std::same_as<
     std::same_as<C, camera::radial_tangential> || std::same_as<C, camera::kannala_brandt>;
 
 struct calibration_options {
-  /// Maximum displacement, in pixels, of any pixel of the image by one standard deviation of a group of parameters
+  /// Maximum displacement of any image point, in pixels, when a group of parameters changes by one standard deviation
   /// (focal lengths; principal point and tangential distortion; radial distortion). Groups above this limit are held
   /// fixed.
   double max_effect = 2.0;

@@ -12,7 +12,7 @@
 
 namespace orbis::slam {
 
-/// The value of an id that refers to nothing.
+/// The value of a null id, which refers to no object.
 inline constexpr std::uint32_t no_id = std::numeric_limits<std::uint32_t>::max();
 
 /// A strongly typed 32-bit id. An integer converts to an id; an id converts neither to an integer nor to an id of

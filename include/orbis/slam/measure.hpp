@@ -87,7 +87,7 @@ template <camera::camera_model Camera, camera::depth_source Depth>
 }  // namespace detail
 
 /// Returns the number of points with which a frame can start a map: the number of its features with depth if lengths
-/// are measured (`options::scale_is_measured`), otherwise of all its features; 0 if there are fewer than
+/// are measured (`options::scale_is_measured`), otherwise the number of all its features; 0 if there are fewer than
 /// `settings.min_start_points`.
 template <feature_descriptor D>
 [[nodiscard]] std::size_t start_points(const basic_frame<D>& f, const options& settings) {

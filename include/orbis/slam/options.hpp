@@ -34,18 +34,18 @@ struct keyframe_options {
 /// Local bundle adjustment after each keyframe.
 struct adjustment_options {
   std::size_t keyframes = 12;   ///< number of adjusted keyframes: the newest and those most covisible with it; 0: none
-  std::size_t min_shared = 15;  ///< minimum number of landmarks that these share with the newest keyframe
+  std::size_t min_shared = 15;  ///< minimum number of landmarks that an adjusted keyframe shares with the newest
   int robust_iterations = 5;    ///< maximum number of iterations with all observations
   int iterations = 5;           ///< maximum number of iterations after exclusion of the outliers
 };
 
 /// Removal of unreliable landmarks and redundant keyframes.
 struct culling_options {
-  double found_ratio = 0.25;        ///< minimum ratio of frames that find a landmark to frames that expect it ...
-  std::uint32_t min_visible = 8;    ///< ... tested after this number of frames has expected it
+  double found_ratio = 0.25;        ///< minimum share of a landmark's expected observations that are found ...
+  std::uint32_t min_visible = 8;    ///< ... tested after this number of expected observations
   std::uint32_t age = 2;            ///< number of keyframes after a landmark's creation by which it must have ...
   std::uint32_t min_support = 4;    ///< ... this number of observations; those with depth count twice
-  std::uint32_t least_support = 0;  ///< minimum support of an older landmark; with less, it is removed
+  std::uint32_t least_support = 0;  ///< the same number for older landmarks; 0: no minimum
   std::size_t neighborhood = 20;    ///< number of keyframes examined around the newest one
   double redundant = 0.9;           ///< a keyframe is redundant if this share of its close landmarks is observed by ...
   std::size_t redundant_observers = 3;  ///< ... this number of other keyframes ...
@@ -61,7 +61,7 @@ struct depth_term_options {
   double effective_points = 40;  ///< maximum effective number of points: neighbouring depth errors are correlated
   std::size_t surfaces = 16;     ///< maximum number of keyframe surfaces kept; about 130 kB each
   double weakest = 0.002;        ///< directions with a smaller mean squared normal component are unconstrained
-  double min_share = 0.7;        ///< minimum share of consistent points among those on known surfaces ...
+  double min_share = 0.7;        ///< minimum share of the points on known surfaces that agree with them ...
   std::size_t min_points = 100;  ///< ... and minimum number of points on known surfaces, for localisation by depth
   std::size_t min_inliers = 5;   ///< minimum number of landmarks per pose direction not constrained by surfaces
 };
@@ -104,7 +104,7 @@ struct triangulation_options {
   std::uint32_t distance = 50;   ///< maximum descriptor distance
   float ratio = 0.6F;            ///< maximum ratio of the best to the second-best distance
   float line_distance = 1.96F;   ///< maximum distance from the epipolar line, pixels of a keypoint's level
-  float epipole_radius = 10.0F;  ///< radius around the epipole where nothing is matched, pixels of a keypoint's level
+  float epipole_radius = 10.0F;  ///< exclusion radius around the epipole, pixels of a keypoint's level
   /// Maximum mismatch between the ratio of the distances from both cameras and the ratio of the pyramid scales, as a
   /// multiple of the scale factor of one level.
   double scale_tolerance = 1.5;
@@ -183,8 +183,8 @@ struct place_options {
 /// Detection of moving objects.
 struct moving_options {
   bool enabled = true;            ///< off: every feature counts as static
-  std::size_t min_features = 20;  ///< minimum number of features with a common motion ...
-  double share = 0.15;            ///< ... if more than this share of the matches disagrees with a single pose
+  std::size_t min_features = 20;  ///< minimum number of features of a moving object ...
+  double share = 0.15;            ///< ... and minimum share of the matches that disagree with a single pose
   double seasoned = 1.0;          ///< age at which a landmark is fully trusted to be static, seconds
   double reach = 0.2;  ///< radius around moving features within which features of unknown motion are excluded, metres
   double hold = 3.0;   ///< seconds for which moved features stay excluded after coming to rest

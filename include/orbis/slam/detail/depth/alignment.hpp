@@ -50,7 +50,7 @@ struct plane_observation_of_row {
   double time = 0.0;              ///< time of the row relative to the frame, seconds
 };
 
-/// Numbers of associated samples.
+/// Counts of associated samples.
 struct association {
   std::size_t visible = 0;     ///< number of samples that project onto a known surface
   std::size_t consistent = 0;  ///< number of visible samples within the gate
@@ -113,12 +113,12 @@ association associate(std::span<const surface_sample> samples, std::size_t strid
 struct depth_equations {
   pose_quadratic term;     ///< cost with the information of at most the given number of independent points
   int determined = 0;      ///< number of determined directions of the pose, of six
-  double least = 0.0;      ///< mean square of the normals in the least determined direction
+  double least = 0.0;      ///< mean squared normal component in the least determined direction
   double deviation = 0.0;  ///< root mean square of the residuals, in standard deviations
 };
 
 /// Builds the equations for the given planes. `points`: maximum number of independent points; if there are more, their
-/// weights are reduced accordingly. `weakest`: a direction counts as unconstrained if the mean square of the normals
+/// weights are reduced accordingly. `weakest`: a direction counts as unconstrained if the mean squared normal component
 /// along it is smaller; rotations are scaled to metres by the mean depth of the points. O(planes).
 [[nodiscard]] inline depth_equations build_equations(std::span<const plane_observation_of_row> planes,
                                                      const moving_pose& at, double points, double weakest) {

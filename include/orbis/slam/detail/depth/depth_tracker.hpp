@@ -118,8 +118,8 @@ struct depth_alignment {
   return starts;
 }
 
-/// Keeps surfaces of keyframes and compares frames with them. `set_depth` begins a frame; `keep` may end it. Allocates
-/// nothing once its buffers are large enough.
+/// Keeps surfaces of keyframes and compares frames with them. For each frame, call `set_depth` first; calling `keep` at
+/// the end is optional. Allocates nothing once its buffers are large enough.
 template <camera::camera_model Camera>
 class depth_tracker {
  public:

@@ -225,7 +225,7 @@ class motion_splitter {
     return false;
   }
 
-  /// Returns true if enough of the new matches that disagree with a pose are surrounded by outliers.
+  /// Returns true if enough of the untrusted matches that disagree with a pose are surrounded by outliers.
   [[nodiscard]] bool outliers_form_body(const se3& T_world_camera) const {
     std::vector<std::uint8_t> out(observations_.size());
     judge(T_world_camera, out);

@@ -39,7 +39,7 @@
 
 namespace orbis::slam::detail {
 
-// The essential graph: the few edges between keyframes over which the correction of a loop is distributed.
+// The essential graph: the subset of edges between keyframes over which the correction of a loop is distributed.
 //
 // Source: R. Mur-Artal, J. M. M. Montiel, J. D. Tardos, "ORB-SLAM: a versatile and accurate monocular SLAM system",
 // T-RO 31 (2015), section III.D.

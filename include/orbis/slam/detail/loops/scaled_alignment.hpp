@@ -29,7 +29,7 @@ namespace orbis::slam::detail {
 
 /// A point with its observation by a camera.
 struct known_point {
-  vec3 position = zeros<vec3>();  ///< in the camera frame and its unit
+  vec3 position = zeros<vec3>();  ///< in the camera frame, in that camera's unit of length
   vec2 pixel = zeros<vec2>();     ///< observed position
   double information = 1.0;       ///< 1 / sigma^2 of the pixel, in 1 / pixel^2
 };

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A table from ids to slots of objects, for ids most of which are eventually erased.
+/// A table that maps ids to slots of objects, for use where most ids are eventually erased.
 #pragma once
 
 #include <cassert>
@@ -29,7 +29,7 @@ class paged_slots {
 
   explicit paged_slots(std::uint32_t remembered) : remembered_{remembered} {}
   paged_slots(const paged_slots&) = default;
-  /// Takes the ids of `other`, which has none afterwards.
+  /// Moves the ids out of `other`, which has none afterwards.
   paged_slots(paged_slots&& other) : paged_slots{other.remembered_} { swap(other); }
   paged_slots& operator=(paged_slots other) noexcept {
     swap(other);

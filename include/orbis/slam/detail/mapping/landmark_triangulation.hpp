@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Triangulation of new landmarks, for points without depth, from matching keypoints of two keyframes.
+/// Triangulation of new landmarks from matching keypoints of two keyframes, for points without depth.
 ///
 /// Sources: R. Mur-Artal, J. M. M. Montiel, J. D. Tardos, "ORB-SLAM: a versatile and accurate monocular SLAM system",
 /// T-RO 31 (2015), section VI.C; R. Mur-Artal, J. D. Tardos, "ORB-SLAM2", T-RO 33 (2017), section III.A, for the

@@ -28,7 +28,7 @@ struct logged_frame {
 
 class frame_log {
  public:
-  /// Creates a log that keeps at most the `most` latest frames.
+  /// Creates a log that keeps only the latest `most` frames.
   explicit frame_log(std::size_t most = std::numeric_limits<std::size_t>::max()) : most_{most} {}
 
   void add(const logged_frame& f) {

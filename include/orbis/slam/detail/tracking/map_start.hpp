@@ -111,7 +111,7 @@ class map_start {
   monocular_start<typename Context::camera_type, descriptor> pair_;
   bool begins_map_ = false;
   std::optional<first_frame> first_;
-  std::vector<start_point> points_;  ///< points of both frames, in the world frame, until the second is a keyframe
+  std::vector<start_point> points_;  ///< points of both frames in the world frame, until the second frame is a keyframe
 };
 
 }  // namespace orbis::slam::detail
