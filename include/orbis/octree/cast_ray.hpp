@@ -196,8 +196,8 @@ class ray_caster {
   std::size_t here_ = 0;  ///< index of the chunk read last
 };
 
-/// Casts many rays: sets `out[i]` to the end of the ray from `origins[i]` along `directions[i]`. The result is the same
-/// under every policy. `origins` may be a single point. Allocates nothing.
+/// Casts many rays: sets `out[i]` to the result for the ray from `origins[i]` along `directions[i]`. The result is the
+/// same under every policy. `origins` may be a single point. Allocates nothing.
 /// @pre origins (unless a point), directions and out have the same size
 template <execution_policy Policy, octree_map Map, class Origins, point_range Directions>
 requires point_range<Origins> || point_like<Origins>

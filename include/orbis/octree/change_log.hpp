@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Log of voxels changed since a revision, for sending changes of a map to other processes or updating data derived
-/// from it.
+/// Log of voxels changed since a revision, for sending map changes to other processes or updating data derived from the
+/// map.
 #pragma once
 
 #include <algorithm>
@@ -29,8 +29,8 @@ namespace orbis::octree {
 ///
 /// Takes 24 bytes per recorded octant and revision, up to a capacity. Beyond the capacity the oldest entries are merged
 /// into one entry per octant, a few with each new entry. Memory is thus bounded by the capacity and the number of
-/// octants that have ever changed, and record() has no long pauses. Const members can be called from several threads at
-/// once.
+/// octants that have ever changed, and record() has no long pauses. Const members can be called from several threads
+/// concurrently.
 class change_log {
  public:
   /// Returns the current revision; 0 before the first begin_revision().
@@ -88,7 +88,7 @@ class change_log {
       merged_index_.set(merged_[i].octant, static_cast<std::uint32_t>(i));
   }
   /// Oldest revision for which queries are complete, see forget_before(), clear() and stop(). A reader that has
-  /// processed only an older one needs the whole map.
+  /// processed only an older revision needs the whole map.
   [[nodiscard]] std::uint64_t complete_since() const noexcept { return complete_since_; }
   /// Oldest revision for which queries are exact; for older revisions the masks may contain additional voxels.
   [[nodiscard]] std::uint64_t exact_since() const noexcept { return exact_since_; }

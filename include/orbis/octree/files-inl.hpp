@@ -73,7 +73,7 @@ struct octomap_file {
     const char* const end = value.data() + value.size();
     if (word == "data") break;
     if (word == "id") {
-      if (value != "OcTree") return fail(errc::unsupported, where, "holds a tree of type " + in_quotes(value));
+      if (value != "OcTree") return fail(errc::unsupported, where, "contains a tree of type " + in_quotes(value));
       has_id = true;
     } else if (word == "size") {
       const auto parsed = std::from_chars(value.data(), end, file.nodes);
@@ -104,7 +104,7 @@ template <class Model, class Reader>
   if (file->nodes != 0 && !reader.read({}, default_tree_depth)) return fail(errc::malformed, where, reader.problem);
   if (reader.nodes != file->nodes)
     return fail(errc::malformed, where,
-                "holds " + std::to_string(reader.nodes) + " nodes, but declares " + std::to_string(file->nodes));
+                "contains " + std::to_string(reader.nodes) + " nodes, but declares " + std::to_string(file->nodes));
   if (!reader.left.empty())
     return fail(errc::malformed, where, std::to_string(reader.left.size()) + " bytes after the last node");
   return occupancy_octree<Model>{file->resolution, default_tree_depth, std::move(store)};

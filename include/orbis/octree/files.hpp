@@ -18,7 +18,8 @@
 
 namespace orbis::octree {
 
-/// Returns the bytes of a `.bt` file: every voxel is free or occupied, whichever is likelier, and the tree is pruned.
+/// Returns the bytes of a `.bt` file: every known voxel is free or occupied, whichever is more likely, and the tree is
+/// pruned.
 /// @pre map.tree_depth() == default_tree_depth
 template <octomap_model Model>
 [[nodiscard]] std::string bt_bytes(const occupancy_octree<Model>& map);
@@ -37,8 +38,8 @@ template <octomap_model Model>
 template <octomap_model Model>
 [[nodiscard]] result<void> write_ot(const occupancy_octree<Model>& map, const std::filesystem::path& path);
 
-/// Reads the bytes of a `.bt` file; `where` is the name of the bytes in error messages. Leaves get the log-odds at the
-/// model's bounds. Errors: malformed (damaged, truncated, not a `.bt` file), unsupported (another type of tree).
+/// Reads the bytes of a `.bt` file; `where` names the source in error messages. Leaves get the log-odds at the model's
+/// bounds. Errors: malformed (damaged, truncated, not a `.bt` file), unsupported (another type of tree).
 template <octomap_model Model = log_odds<>>
 [[nodiscard]] result<occupancy_octree<Model>> read_bt(std::span<const std::byte> bytes,
                                                       const std::string& where = "bytes");

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Voxel keys: the voxel of a coordinate, computed bit-identically to OctoMap; boxes of voxels; and the order of voxels
-/// along the Morton curve.
+/// Voxel keys: conversion of coordinates to voxels, bit-identical to OctoMap's; boxes of voxels; and the order of
+/// voxels along the Morton curve.
 #pragma once
 
 #include <array>

@@ -70,9 +70,9 @@ struct octree_leaf {
 ///   if (map.state(p) == orbis::octree::occupancy::occupied) ...
 /// @endcode
 ///
-/// Const members can be called from several threads at once. A copy shares all memory with the original (copy on write)
-/// and takes O(pages of 4 KB): readers on other threads take a copy between two insertions and use it while the writer
-/// continues.
+/// Const members can be called from several threads concurrently. A copy shares all memory with the original (copy on
+/// write) and takes O(pages of 4 KB): readers on other threads take a copy between two insertions and use it while the
+/// writer continues.
 template <sensor_model Model = log_odds<>>
 class occupancy_octree {
  public:
@@ -203,8 +203,8 @@ class occupancy_octree {
   /// Rolling window: removes every brick (8x8x8 voxels) and larger leaf that is completely outside `box` (metres),
   /// after calling `evict(const leaf&)` for its leaves. `set_unknown_node(leaf.key, leaf.depth, leaf.log_odds)`
   /// restores a leaf. Returns the number of bricks and larger leaves removed. The change log records the evicted
-  /// voxels, which are now unknown. Payload layers keep their values; erase the evicted voxels there. O(bricks + voxels
-  /// evicted).
+  /// voxels, which are now unknown. Payload layers keep their values; erase the evicted voxels from them. O(bricks +
+  /// voxels evicted).
   template <std::invocable<const leaf&> Evict>
   std::size_t evict_outside(const bounding_box& box, Evict&& evict) {
     const auto is_outside = [&](std::uint64_t name) {
@@ -316,9 +316,9 @@ class occupancy_octree {
   integration_summary integrate_depth(const parallel_policy& policy, const detail::depth_scan& scan,
                                       const se3& T_world_camera, const integration_options& options);
 
-  /// The change log. Copies of a map start without one, and a map that is moved takes its log along. If a map is
-  /// assigned to or moved from, its whole content changes and its own log becomes incomplete: readers hold revisions of
-  /// this log, and the revisions of another log would be meaningless to them.
+  /// The change log. Copies of a map start without one; moving a map moves its log. If a map is assigned to or moved
+  /// from, its whole content changes and its own log becomes incomplete: readers hold revisions of this log, and the
+  /// revisions of another log would be meaningless to them.
   struct tracking {
     change_log log;
     bool on = false;

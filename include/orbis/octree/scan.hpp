@@ -36,7 +36,7 @@ class scan {
   /// One brick. In the 8-bit masks, bit i is octant i.
   struct part {
     std::uint64_t name = 0;     ///< see detail::node_name
-    std::uint32_t first = 0;    ///< index of its first mask in words(): the free masks, then the occupied ones
+    std::uint32_t first = 0;    ///< index in words() of its first mask; free masks precede occupied ones
     std::uint8_t free = 0;      ///< octants that have a mask of free voxels
     std::uint8_t occupied = 0;  ///< octants that have a mask of occupied voxels
     std::uint8_t full = 0;      ///< octants that are completely free, without masks
@@ -52,7 +52,7 @@ class scan {
   [[nodiscard]] std::span<const part> parts() const noexcept { return parts_; }
   [[nodiscard]] std::span<const std::uint64_t> words() const noexcept { return words_; }
   [[nodiscard]] bool empty() const noexcept { return parts_.empty(); }
-  /// Calls `visit(octant, free, occupied)` for every octant of a brick with observations of the scan, in order.
+  /// Calls `visit(octant, free, occupied)` for every octant of a brick that the scan observed, in order.
   template <class Visit>
   void for_each_octant(const part& p, Visit&& visit) const {
     const std::uint64_t* free = words_.data() + p.first;

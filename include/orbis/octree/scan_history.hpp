@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A map that follows its scans: when a scan changes, is removed or arrives late, the map becomes bit-identical to one
-/// built from all scans in order.
+/// A map that is updated when its scans change: when a scan changes, is removed or arrives late, the map becomes
+/// bit-identical to one built from all scans in order.
 ///
 /// Log-odds are clamped, so the order of scans matters, and a scan cannot be subtracted, because clamping loses
 /// information. Instead, the history keeps the voxels that each scan observed free and occupied, and replays the
@@ -170,7 +170,7 @@ class scan_history {
   void replay_first(const parallel_policy& policy, detail::brick_store<value_type>& store, change_log* log,
                     std::size_t count);
   Octree map_;
-  std::vector<entry> scans_;         ///< by scan index
+  std::vector<entry> scans_;         ///< indexed by scan
   std::vector<std::uint32_t> free_;  ///< unused scan indices
   std::vector<place> order_;         ///< sorted by frame
   detail::brick_uses uses_;

@@ -67,8 +67,7 @@ class rgb_mean {
 ///   if (const auto key = map.grid().key(p)) colors.make(*key).update({200, 120, 40});
 /// @endcode
 ///
-/// Const members can be called from several threads at once.
-/// All functions: @pre coordinates of keys < 2^21.
+/// Const members can be called from several threads concurrently. All functions: @pre coordinates of keys < 2^21.
 template <voxel_payload T>
 class voxel_layer {
  public:

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Leaves larger than a brick. There are only a few; a look-up tries the names of the nodes above a brick that contain
-/// the voxel.
+/// Leaves larger than a brick. There are only a few; a look-up tries the names of the nodes above brick level that
+/// contain the voxel.
 #pragma once
 
 #include <array>
@@ -16,7 +16,7 @@
 
 namespace orbis::octree::detail {
 
-/// A set of disjoint nodes above bricks, each with one value.
+/// A set of disjoint nodes larger than a brick, each with one value.
 template <class T>
 class large_leaves {
  public:

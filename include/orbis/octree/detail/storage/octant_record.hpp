@@ -18,7 +18,7 @@
 
 namespace orbis::octree::detail {
 
-/// A stored octant: its known voxels, and the index of each voxel's value, bit by bit.
+/// A stored octant: its known voxels, and the indices of their values as bit planes.
 template <class T>
 struct octant_view {
   std::uint64_t known = 0;

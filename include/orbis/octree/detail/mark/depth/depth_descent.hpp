@@ -173,7 +173,7 @@ struct depth_descent {
   }
   [[nodiscard]] bool test_box(const voxel_test& test, const pixel_box& box, float near_z) const {
     if ((box.u1 - box.u0) * (box.v1 - box.v0) < 1024) return rays.test(test, box, near_z, own.unsure);
-    // Most rays of the box of a voxel near the camera miss the voxel, so the box is tested tile by tile.
+    // Near the camera, most rays in a voxel's pixel box miss the voxel, so the box is tested tile by tile.
     constexpr std::int32_t size = 128;
     for (std::int32_t v = box.v0 & -size; v <= box.v1; v += size)
       for (std::int32_t u = box.u0 & -size; u <= box.u1; u += size)

@@ -48,7 +48,7 @@ inline void load_points(const pixel_points& points, std::size_t begin, std::size
 /// Marks the voxels of depth images. Reuses its memory between images.
 ///
 /// The descent through the octree starts at a node that contains all rays. Nodes that no ray reaches are skipped, and
-/// nodes in which rays certainly cross every voxel are filled; a min/max pyramid of the ray ends decides both. The
+/// nodes in which rays certainly cross every voxel are filled; both tests use a min/max pyramid of the ray ends. The
 /// remaining voxels are at surfaces and at the border of the view: such a voxel is free if the ray of one of its pixels
 /// crosses it. If rounding could change the result, the exact traversal of that ray decides.
 class depth_integrator {

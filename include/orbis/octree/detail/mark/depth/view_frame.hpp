@@ -114,7 +114,7 @@ struct view_frame {
   [[nodiscard]] float half_diagonal() const noexcept {
     return 0.5F * std::sqrt(1.0F / (scene.fx * scene.fx) + 1.0F / (scene.fy * scene.fy));
   }
-  /// Sets the maximum distance from a direction in the view to the nearest ray, apart from pixels without an end.
+  /// Sets the maximum distance from a direction in the view to the nearest ray, ignoring pixels without an end.
   void set_spacing(float spacing) noexcept {
     for (std::size_t kind = 0; kind != 3; ++kind) scene.dense_z[kind] = scene.dense(kind, spacing);
   }

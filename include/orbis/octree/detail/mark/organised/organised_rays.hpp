@@ -35,7 +35,7 @@ struct pixel_placement {
   float fx = 1, fy = 1, cx = 0, cy = 0;
   float last_u = 0, last_v = 0;    ///< last column and row
   float error_u = 0, error_v = 0;  ///< maximum distance of a ray from the centre of its pixel
-  float far = 0;  ///< rays with deeper ends are traversed singly: no other rays cross the voxels around them
+  float far = 0;  ///< rays with deeper ends are traversed one by one: no other rays cross the voxels around them
   std::int32_t stride = 0;
 };
 
@@ -137,7 +137,7 @@ class organised_rays {
     place_ = simd::kernel<place_in_pixels_kernel, place_in_pixels>();
   }
   /// Adds the rays of a batch of `count` points, the first of which is point `first` of the scan. The rays that must be
-  /// traversed one by one remain in `rays`. Can be called by several workers at once.
+  /// traversed one by one remain in `rays`. Several workers can call it concurrently.
   /// @pre `count` is a multiple of a vector's size, except for the last batch of the scan
   void add(std::size_t worker, ray_batch& rays, std::size_t first, std::size_t count) {
     ray_batch::bits left_out;

@@ -96,7 +96,7 @@ struct set_up_rays_kernel {
       const doubles way = simd::convert<double>(integers::load(rays.way[axis].data() + i));
       expected[axis] = select(down[axis], -way, way) -
                        select(down[axis], doubles(source.skipped[1][axis]), doubles(source.skipped[0][axis]));
-      // True if the traversal reaches the end's voxel before the ray's length stops it.
+      // True if the traversal reaches the end's voxel before it stops at the length of the ray.
       good = good & within(metres * speed[axis] - first[axis] + 1.0 - expected[axis]);
     }
     const mask y_main = speed[0] < speed[1];

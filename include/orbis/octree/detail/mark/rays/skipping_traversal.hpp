@@ -11,9 +11,9 @@
 
 namespace orbis::octree::detail {
 
-/// Takes the same steps as `ray_traversal`, but whole nodes at once. The parameters of the next steps along each axis
-/// are precomputed in the same order of summation, so that the number of steps up to a node's face is looked up instead
-/// of traversed.
+/// Takes the same steps as `ray_traversal`, but can cross a whole node at once. The parameters of the next steps along
+/// each axis are precomputed in the same order of summation, so that the number of steps up to a node's face is found
+/// by a look-up instead of by stepping.
 class skipping_traversal {
  public:
   explicit skipping_traversal(const ray_traversal& c) noexcept

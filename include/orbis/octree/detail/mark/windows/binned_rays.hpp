@@ -26,7 +26,7 @@ struct binned_ray {
 static_assert(sizeof(binned_ray) == 16);
 
 /// Rays of one window. Per cell: the deepest end (0 if the cell is empty), the index of its ray, and the start of the
-/// cell's rays among the sorted rays. `rays` are all rays by index.
+/// cell's rays among the sorted rays. `rays`: all rays, in the order of their indices.
 struct window_rays {
   const float* z = nullptr;
   const std::int32_t* deepest = nullptr;
@@ -152,7 +152,7 @@ class binned_rays {
     place_ = simd::kernel<place_rays_kernel, place_kernel>();
   }
   /// Adds the rays of a batch of `count` points, the first of which is point `first` of the scan. The rays that must be
-  /// traversed one by one remain in `rays`. Can be called by several workers at once. @pre no other worker adds points
+  /// traversed one by one remain in `rays`. Several workers can call it concurrently. @pre no other worker adds points
   /// between `first` and the next multiple of 256
   void add(std::size_t worker, ray_batch& rays, std::size_t first, std::size_t count) {
     ray_places places;
