@@ -6,7 +6,7 @@
 /// | -------------------------- | --------------------------------------------------------------------------- |
 /// | `all_knn.hpp`              | k nearest neighbours of every point, and the mean distance to them          |
 /// | `cluster.hpp`              | filter: small groups of points far from the surface                         |
-/// | `extract.hpp`              | points by index; points inside a box; treatment of non-finite points        |
+/// | `extract.hpp`              | points with given indices or inside a box; treatment of non-finite points   |
 /// | `filter_chain.hpp`         | a sequence of filters with their parameters                                 |
 /// | `filter_choice.hpp`        | options and result of the automatic selection, with its evidence            |
 /// | `flying_pixels.hpp`        | removal of flying pixels at edges in depth images                           |
@@ -21,7 +21,7 @@
 /// | `statistical.hpp`          | filter: mean neighbour distance above mu + alpha sigma; also relative to range |
 /// | `view_samples.hpp`         | samples of each depth image, used to compare images with each other         |
 /// | `voxel_grid.hpp`           | voxel-grid downsampling: one point per occupied voxel                       |
-/// | `voxel_sums.hpp`           | voxel centroids, from which measurements can be removed again               |
+/// | `voxel_sums.hpp`           | voxel centroids; measurements can be removed from them again                |
 #pragma once
 
 #include <orbis/cloud/all_knn.hpp>

@@ -57,7 +57,7 @@ template <execution_policy Policy, point_range Points>
 }
 
 /// Computes for each point the mean distance in metres to its `k` nearest other points, or to all others if there are
-/// fewer than `k`. The result is NaN for non-finite points, and for a finite point that is the only one.
+/// fewer than `k`. The result is NaN for non-finite points, and for a finite point if there is no other.
 ///
 /// Coordinates are converted to float. Squared distances are computed in float; their roots are computed in double and
 /// summed in ascending order; the mean is rounded to float. The result equals, bit for bit, the mean distances of the

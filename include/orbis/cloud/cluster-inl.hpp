@@ -214,7 +214,7 @@ template <execution_policy Policy>
   });
   for (const std::uint32_t i : small_ones) out.goes[out.component[i]] = 1;
   for (std::size_t s = 0; s != small_ones.size(); ++s) {
-    if (apart[s] == 0) out.goes[out.component[small_ones[s]]] = 0;  // one point near the surface keeps all points
+    if (apart[s] == 0) out.goes[out.component[small_ones[s]]] = 0;  // one point near the surface keeps the component
   }
   return out;
 }

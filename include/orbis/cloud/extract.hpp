@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Parts of a cloud: points by index, points inside a box, and the treatment of non-finite points.
+/// Parts of a cloud: points with given indices, points inside a box, and the treatment of non-finite points.
 #pragma once
 
 #include <cassert>
@@ -16,7 +16,7 @@
 
 namespace orbis::cloud {
 
-/// Treatment of non-finite points by a filter. Its statistics never include them.
+/// Treatment of non-finite points by a filter. The filter's statistics never include them.
 enum class non_finite {
   drop,  ///< they count as outliers
   keep   ///< they count as inliers, so that an organised cloud keeps its structure

@@ -49,7 +49,7 @@ class nanoflann_search {
 
   /// Finds the `min(k, size())` points nearest to `q`, nearest first, then by index. A point of the cloud equal to `q`
   /// is found as well. If several points are at exactly the k-th distance, the choice between them is deterministic.
-  /// Can be called from several threads at once. @pre q is finite
+  /// Can be called from several threads concurrently. @pre q is finite
   void knn(const query& q, std::size_t k, std::vector<neighbor<scalar>>& out) const {
     out.clear();
     if (k != 0) find(q, nearest_sink{k, out}, out);

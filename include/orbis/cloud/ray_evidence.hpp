@@ -4,9 +4,9 @@
 ///
 /// Points left by a moving object, a wrong pose or a stray measurement can be as dense and as smooth as any surface; a
 /// filter that uses only the points cannot detect them. Depth images can: a measurement indicates a surface at the end
-/// of its ray and free space before it. The same idea carves space in occupancy grids (A. Elfes, 1989) and checks
-/// multi-view stereo for violations of free space (P. Merrell et al., "Real-time visibility-based fusion of depth
-/// maps", ICCV 2007).
+/// of its ray and free space before it. The same idea is used to carve free space in occupancy grids (A. Elfes, 1989)
+/// and to check multi-view stereo for free-space violations (P. Merrell et al., "Real-time visibility-based fusion of
+/// depth maps", ICCV 2007).
 ///
 /// Users of orbis::compiled that call `ray_evidence_scores` or `ray_evidence_inliers` must include
 /// ray_evidence-inl.hpp.

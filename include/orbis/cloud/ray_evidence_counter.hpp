@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Incremental counting, view by view, of rays that pass through the points of a cloud and rays that end there; the
+/// Incremental counting, view by view, of rays that pass through the points of a cloud and rays that end at them; the
 /// input of the decision in `ray_evidence.hpp`. Users of orbis::compiled must include ray_evidence_counter-inl.hpp.
 #pragma once
 
@@ -47,10 +47,10 @@ struct ray_evidence_options {
   float slant = 1.0F;      ///< fraction of the window's depth range added to the margin for rays that pass through
   float min_depth = 0.0F;  ///< views provide evidence only about points beyond this depth, metres
   float max_depth = std::numeric_limits<float>::max();  ///< and up to this depth, metres
-  bool resolve_ghosts = true;     ///< read the views a second time to find parts that most other views contradict
+  bool resolve_ghosts = true;     ///< true to read the views again and find parts that most other views contradict
   float ghost_reach = 0.3F;       ///< maximum distance of a contradicting surface in front of a measurement, metres
   std::uint16_t min_through = 2;  ///< minimum number of views that pass through an outlier
-  double ratio = 1.0;             ///< this number must also exceed `ratio` times the number of supporting views
+  double ratio = 1.0;             ///< that number must also exceed `ratio` times the number of supporting views
 };
 
 /// Counts for one point: views whose rays pass through it, views that measured a surface at it, and views whose support
@@ -91,10 +91,10 @@ class ray_evidence_counter {
   void remove(const Policy& policy, const View& view);
 
   /// Finds the parts of a view that the others contradict, and discards their counts. Call it once for each view after
-  /// all were added. Parts are tiles of `tile_size` pixels a side. A tile is contradicted if its rays pass through
-  /// points, at most `ghost_reach` before their ends, that together have at least 1.5 times the support of the points
-  /// that the tile itself supports (excluding its own support). Its evidence no longer counts, and the points it
-  /// supports are refuted. O(pixels + points in front of the camera).
+  /// all views were added. Parts are tiles of `tile_size` pixels a side. A tile is contradicted if its rays pass
+  /// through points at most `ghost_reach` in front of the ends of the rays, and these points together have at least 1.5
+  /// times the support of the points that the tile itself supports (excluding its own support). Its evidence no longer
+  /// counts, and the points it supports are refuted. O(pixels + points in front of the camera).
   template <execution_policy Policy, posed_depth View>
   void review(const Policy& policy, const View& view);
   /// Edge of a tile in pixels: 32 for a width of 640.

@@ -13,7 +13,7 @@
 ///
 /// A step is part of the chosen chain only if it removes points.
 ///
-/// The library orbis::compiled contains the selection from points alone; to pass views, include select-inl.hpp.
+/// The library orbis::compiled contains the selection without views; to pass views, include select-inl.hpp.
 #pragma once
 
 #include <cassert>
@@ -87,8 +87,8 @@ template <execution_policy Policy, point_range Points, posed_depth_range Views, 
                                                     const Camera& camera, const select_options& options = {},
                                                     progress on_progress = {});
 
-/// Selects filters from the points alone. A cloud that is empty or too small to analyse gets an empty chain. O(n log
-/// n).
+/// Selects filters from the points, without views. A cloud that is empty or too small to analyse gets an empty chain.
+/// O(n log n).
 /// @pre neighbors > 0; ranges is empty or as long as points
 template <execution_policy Policy, point_range Points>
 [[nodiscard]] automatic_result filter_automatically(const Policy& policy, const Points& points,

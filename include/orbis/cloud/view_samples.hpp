@@ -43,7 +43,7 @@ template <camera::depth_source Depth>
   int agree = 0;
   for (const float other : around) agree += other > 0 && std::abs(other - z) <= margin ? 1 : 0;
   if (agree >= 2) return true;
-  constexpr float widest = 0.15F;  // fraction of z; opposite pixels further apart lie on two surfaces
+  constexpr float widest = 0.15F;  // fraction of z; opposite pixels further apart are on different surfaces
   for (std::size_t i = 0; i != 4; ++i) {
     const float a = around[i];
     const float b = around[7 - i];

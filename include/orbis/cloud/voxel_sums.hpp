@@ -210,14 +210,14 @@ class voxel_sums {
      private:
       const choice* of_;
       bool asked_ = false;
-      detail::voxel_key brick_{};  ///< of the last point
+      detail::voxel_key brick_{};  ///< brick of the last point
       std::uint32_t number_ = 0;   ///< index of that brick
     };
 
    private:
     friend class voxel_sums;
     const voxel_sums* sums_ = nullptr;
-    std::vector<std::array<std::uint64_t, 8>> chosen_;  ///< by brick index, one bit per cell
+    std::vector<std::array<std::uint64_t, 8>> chosen_;  ///< indexed by brick; one bit per cell
   };
   /// Creates a subset. `chosen`: per voxel, in the order of `cloud`, nonzero if it is chosen. O(voxels + bricks log
   /// bricks).

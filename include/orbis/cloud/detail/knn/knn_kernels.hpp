@@ -139,7 +139,8 @@ struct near_boxes {
   }
 };
 
-/// Computes the squared distances from a point to those of a leaf; returns a bit mask of the distances within `bound`.
+/// Computes the squared distances from a point to the points of a leaf; returns a bit mask of the distances within
+/// `bound`.
 struct leaf_distances {
   template <simd::target Target>
   static ORBIS_ALWAYS_INLINE std::uint32_t run(const point_row& leaf, const std::array<float, 3>& query, float bound,

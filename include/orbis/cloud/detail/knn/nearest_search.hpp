@@ -91,8 +91,8 @@ void for_each_within(const leaf_hierarchy& tree, const knn_kernels& kernels, con
 /// the point within the distance that suffices for its neighbours on the curve. If that distance is too large to be
 /// useful, leaves are visited in ascending order of distance. A bad guess thus costs only time.
 ///
-/// Source of the search by ascending box distance: G. R. Hjaltason, H. Samet, "Distance browsing in spatial databases",
-/// ACM TODS 24, 1999.
+/// Source of the search in ascending order of box distance: G. R. Hjaltason, H. Samet, "Distance browsing in spatial
+/// databases", ACM TODS 24, 1999.
 class nearest_search {
  public:
   /// Prepares a search. `with_places`: also record the places of the found points. `most_near_rows`: maximum number of
@@ -204,8 +204,8 @@ class nearest_search {
     return {found_.data() + i * stride_, counts_[i]};
   }
 
-  /// Searches for the points of a leaf, run by run of points that share candidates. `f(first, last, box)` searches for
-  /// a run with bounding box `box` and sets `largest_`.
+  /// Searches for the points of a leaf, one run of points that share candidates at a time. `f(first, last, box)`
+  /// searches for a run with bounding box `box` and sets `largest_`.
   template <class F>
   void search_leaf(std::size_t l, F&& f) {
     const std::size_t size = tree_->leaf_size(l);
@@ -397,8 +397,8 @@ class nearest_search {
   std::array<float, leaf_width> bounds_{};
   std::array<bool, leaf_width> has_places_{};
   std::array<float, leaf_width> largest_{};  ///< squared distance to the `wanted`-th nearest
-  float hoped_;              ///< multiple of `usual_` that should suffice; the more neighbours, the less it scatters
-  float reach_;              ///< multiple of `usual_` that should always suffice
+  float hoped_;              ///< multiple of `usual_` that usually suffices; smaller for more neighbours
+  float reach_;              ///< multiple of `usual_` that nearly always suffices
   float shared_reach_ = -1;  ///< squared distance from the run's box up to which `shared_` is complete
   float usual_ = -1;         ///< squared distance to the `wanted`-th nearest; negative if not yet known
 };

@@ -27,7 +27,7 @@ namespace orbis::cloud::detail {
 
 /// The rows of `all_knn`, with the points to which they belong. Points are identified by *places*, their positions
 /// along the curve of `leaf_order`, from 0 to size() - 1; identical points that are in no leaf come last. Store
-/// per-point data by place, so that the data of neighbours are close in memory.
+/// per-point data indexed by place, so that the data of neighbours are close in memory.
 ///
 /// The points of a leaf have their neighbours in few leaves. These are listed once, and a neighbour is encoded in one
 /// byte: index in the list, and point in the leaf. With more than 16 listed leaves a neighbour takes two bytes; with

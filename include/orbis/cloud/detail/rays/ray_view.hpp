@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// One posed depth image as `ray_evidence.hpp` uses it, and a test for blocks of points on which the image has no
-/// evidence.
+/// A posed depth image in the form that `ray_evidence.hpp` uses, and a test for blocks of points for which the image
+/// provides no evidence.
 #pragma once
 
 #include <algorithm>
@@ -24,7 +24,7 @@ namespace orbis::cloud::detail {
 
 /// Parameters of a view in the form that the kernels use.
 struct ray_view {
-  std::array<std::array<float, 3>, 3> rotation{};  ///< camera from world, row by row
+  std::array<std::array<float, 3>, 3> rotation{};  ///< R_camera_world, row by row
   std::array<float, 3> origin{};                   ///< camera position in the world frame, metres, rounded to float
   std::array<float, 3> origin_rest{};              ///< rounding error of `origin`, whose coordinates may be large
   float fx = 0, fy = 0, cx = 0, cy = 0;            ///< pinhole parameters; cx and cy include an additional half pixel
@@ -68,7 +68,7 @@ template <camera::camera_model Camera>
   return 1.02 * angle + 0.02;
 }
 
-/// Finds blocks of points for which a view has no evidence, by their bounding boxes. Conservative: may accept blocks
+/// Uses bounding boxes to find blocks of points for which a view has no evidence. Conservative: may accept blocks
 /// without evidence.
 template <camera::camera_model Camera>
 class block_test {
@@ -137,7 +137,7 @@ class block_test {
 
   const Camera* camera_;
   std::optional<double> angle_;
-  mat3 rotation_;  ///< camera from world
+  mat3 rotation_;  ///< R_camera_world
   mat3 absolute_;
   vec3 origin_;
   const ray_view* view_ = nullptr;

@@ -61,9 +61,9 @@ struct count_agreeing_depths {
 };
 
 /// Writes the depth image in metres with stray pixels replaced. A pixel is stray if fewer than two of the pixels around
-/// it agree with it within `margin + margin_growth z^2`. It gets the median of their depths, or no depth if fewer than
-/// five of them have one. Otherwise a stray pixel would support itself and suppress the evidence of the rays around it.
-/// O(pixels). `out` is resized if its size differs.
+/// it agree with it within `margin + margin_growth z^2`. It is replaced with the median of their depths, or with 0 if
+/// fewer than five of them have a depth. Unless replaced, a stray pixel would support itself and suppress the evidence
+/// of the rays around it. O(pixels). `out` is resized if its size differs.
 template <execution_policy Policy, camera::depth_source Depth>
 void remove_stray_pixels(const Policy& policy, const Depth& depth, float margin, float margin_growth,
                          image<float>& out) {
@@ -162,9 +162,9 @@ struct view_verdict {
   return static_cast<std::uint32_t>(mix64((std::uint64_t{of} << 32U | by) ^ mix64(tile)) >> 32U);
 }
 
-/// Verdicts that involve one view. With up to 128 views, all are kept; with more views, only the same number of
-/// verdicts with the lowest ranks, which are an unbiased sample. Memory thus grows linearly with the number of views,
-/// and a view that overlaps with few others loses no verdicts.
+/// Verdicts that involve one view. With up to 128 views, all are kept; with more views, only that number is kept: those
+/// with the lowest ranks, which are an unbiased sample. Memory thus grows linearly with the number of views, and a view
+/// that overlaps with few others loses no verdicts.
 class view_verdicts {
  public:
   static constexpr std::size_t most = std::size_t{128} * 2 * 16;  ///< 16 tiles of this view and of the other view
@@ -201,11 +201,11 @@ class view_verdicts {
 
 /// Finds views with wrong poses by comparing the views with each other. A sample of the pixels of each view is tested
 /// by all others (`ray_evidence`), tile by tile. A view with a wrong pose is contradicted all over its image, a view
-/// with a moving object only in a part, so the median over the tiles decides. The worst view is left out repeatedly
-/// until no view stands out; if this would leave out half of the views, all are trusted. Deterministic. Calls
-/// `also(view, cleaned view, its windows)` for each view, so that callers with further computations need no second
-/// pass: views may be costly to read. `samples`: samples drawn from the views earlier, if any; otherwise each view is
-/// read a second time. O(views (pixels + samples of all views)), and O(views) memory.
+/// with a moving object only in a part of it, so the median over the tiles decides. The worst view is left out
+/// repeatedly until no view stands out; if this would leave out half of the views, all are trusted. Deterministic.
+/// Calls `also(view, cleaned view, its windows)` for each view, so that callers with further computations need no
+/// second pass: views may be costly to read. `samples`: samples drawn from the views earlier, if any; otherwise each
+/// view is read a second time. O(views (pixels + samples of all views)), and O(views) memory.
 /// @pre views' images have the camera's size; the samples are from these views
 template <execution_policy Policy, posed_depth_range Views, camera::camera_model Camera, class Also = no_view_action>
 [[nodiscard]] view_trust find_distrusted_views(const Policy& policy, const Views& views, const Camera& camera,

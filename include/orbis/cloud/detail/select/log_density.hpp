@@ -46,10 +46,10 @@ template <std::ranges::contiguous_range Values>
 }
 
 /// Fits a Theil-Sen line through the 40 % quantiles of log spacing in 24 bins of log range. Bins are weighted by their
-/// numbers of points, so that ranges with few points apart from outliers do not distort the line. Empty if fewer than
-/// four bins are populated. The slope is clipped to 0 ... 2.5, because spacing can only grow with range, and no faster
-/// than the noise. Points with a non-finite spacing or range are ignored. O(n), 4 bytes per point.
-/// Source: P. K. Sen, "Estimates of the regression coefficient based on Kendall's tau", JASA 63, 1968.
+/// numbers of points, so that ranges that contain few points other than outliers do not distort the line. Empty if
+/// fewer than four bins are populated. The slope is clipped to 0 ... 2.5, because spacing can only grow with range, and
+/// no faster than the noise. Points with a non-finite spacing or range are ignored. O(n), 4 bytes per point. Source: P.
+/// K. Sen, "Estimates of the regression coefficient based on Kendall's tau", JASA 63, 1968.
 /// @pre one range for each spacing
 [[nodiscard]] inline std::optional<log_line> fit_log_line(std::span<const float> log_spacing,
                                                           std::span<const float> log_range) {
