@@ -38,14 +38,14 @@ namespace orbis::mapping {
 
 struct map_options {
   dense_options dense{};
-  /// Removes moved objects from the depth images before they become points: cells that rays of the keyframes just
-  /// before and after pass through, see moving_filter. (A filter by ray evidence uses the rays of the original images.)
-  /// For depth images that are not a depth_view<std::uint16_t>, depths beyond 16 m are ignored. Empty: only the filter
-  /// removes moved objects.
+  /// Removal of moved objects from the depth images before they are converted to points, see moving_filter: removes
+  /// cells that rays of the keyframes just before and after pass through. (The ray-evidence filter uses the rays of the
+  /// original images.) For depth images that are not a depth_view<std::uint16_t>, depths beyond 16 m are ignored.
+  /// Empty: only the filter removes moved objects.
   std::optional<moving_filter_options> moving{};
   filter_options filter{};
   double resolution = 0.05;                   ///< voxel size of the octrees, metres; > 0
-  octree::integration_options integration{};  ///< options for every keyframe's depth image
+  octree::integration_options integration{};  ///< options for integrating each keyframe's depth image
   bool unfiltered_octree = true;              ///< also build the octree of the unfiltered cloud
 };
 
@@ -73,7 +73,7 @@ struct built_map {
   std::vector<std::uint32_t> inliers{};       ///< indices into `cloud` of the points that the filter kept, ascending
   filter_report filter{};
   std::optional<Octree> unfiltered_octree{};
-  Octree octree;                    ///< built from the points that the filter kept, each observed from its own keyframe
+  Octree octree;                    ///< built from the points that the filter kept, each seen from its keyframe's pose
   std::vector<double> insert_ms{};  ///< time taken to insert each keyframe into `octree`
   std::vector<double> insert_ms_unfiltered{};  ///< time taken to insert each keyframe into `unfiltered_octree`
   std::size_t skipped = 0;                     ///< number of keyframes without a finite pose
@@ -361,7 +361,7 @@ struct live_octree {
     if (auto done = live.finish(policy); !done) return fail(std::move(done.error()));
     return live.snapshot();
   }
-  /// If the images cannot be written to their file, they stay in memory, so that nothing is lost.
+  /// Ignores a failure to write images to the spill file: they stay in memory, so nothing is lost.
   template <class Done>
   static result<void> ignore_write_failure(Done done) {
     if (done || done.error().code == errc::write_failed) return {};
@@ -395,16 +395,16 @@ requires depth_map<Octree, Camera>
   return detail::build_map_into<Octree>(policy, keyframes, camera, options, on_progress, into);
 }
 
-/// As above, with a live map that grew while these keyframes were recorded: moves its keyframes to their current poses,
-/// adds missing ones, hides others, and then applies the result of the filter. The octrees are bit-identical to those
-/// of the function above. Each keyframe has a member `frame`, its index in the live map; the range is in ascending
-/// order of `frame`. The times in the result are those for passing images to the map, excluding replay; those after the
-/// filter are a mean. `options.resolution` and `options.integration` are those of the live map, and the unfiltered
-/// octree is always built. Additional errors: `invalid_argument` if the frame numbers are not ascending; those of the
-/// live map, except if images stay in memory because they cannot be written to their file. After an error the live map
-/// may contain some of the new images and poses already; calling the function again corrects it. @pre the images in the
-/// live map are those that `keyframe_points::masked` returns with `point_options(options.dense)`, except for keyframes
-/// that are `live_map::is_filtered`, which are added again
+/// As above, but updates a live map that was built while these keyframes were recorded: moves its keyframes to their
+/// current poses, adds missing ones, hides others, and then applies the result of the filter. The octrees are
+/// bit-identical to those of the function above. Each keyframe has a member `frame`, its index in the live map; the
+/// range is in ascending order of `frame`. The times in the result are those for passing images to the map, excluding
+/// replay; after filtering, they are the mean over all keyframes. `options.resolution` and `options.integration` are
+/// those of the live map, and the unfiltered octree is always built. Additional errors: `invalid_argument` if the frame
+/// numbers are not ascending; those of the live map, except if images stay in memory because they cannot be written to
+/// their file. After an error the live map may contain some of the new images and poses already; calling the function
+/// again corrects it. @pre the images in the live map are those that `keyframe_points::masked` returns with
+/// `point_options(options.dense)`, except for keyframes that are `live_map::is_filtered`, which are added again
 template <execution_policy Policy, keyframe_range Keyframes, octree::replayable_octree Octree,
           camera::camera_model Camera, depth_history Depths>
 requires requires(const std::ranges::range_value_t<Keyframes>& k) {

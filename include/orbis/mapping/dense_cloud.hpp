@@ -60,7 +60,7 @@ class dense_cloud {
 
   /// Adds a keyframe's points; returns the number of measurements. The index of the keyframe (`number` below) is the
   /// number of keyframes added before it. Colours are kept if every keyframe has them. O(pixels). @pre the images have
-  /// the size of the ray table; the pose is finite; with a voxel size, fewer than 2^22 measurements in a voxel; not
+  /// the size of the ray table; the pose is finite; with a voxel size, fewer than 2^22 measurements per voxel; not
   /// after `finish`
   template <execution_policy Policy, keyframe_like Keyframe>
   std::size_t add_keyframe(const Policy& policy, const Keyframe& k) {
@@ -149,8 +149,8 @@ class dense_cloud {
     for (const frame& f : frames_) out.insert(out.end(), f.ranges.begin(), f.ranges.end());
     return out;
   }
-  /// Finalises the cloud and frees the memory that changes, `cloud` and `ranges` need. Call it after their last use; no
-  /// keyframe may be added, removed or moved afterwards. With a voxel size a few bytes for each voxel remain, for
+  /// Finalises the cloud and frees the memory needed for changes, `cloud` and `ranges`. Call it after their last use;
+  /// no keyframe may be added, removed or moved afterwards. With a voxel size a few bytes for each voxel remain, for
   /// `select`, `masked_depth` and `measurements`; without one nothing is freed. O(bricks).
   void finish() {
     finished_ = true;
@@ -208,7 +208,7 @@ class dense_cloud {
   }
   /// The whole depth image of keyframe `number` (every pixel, regardless of the stride; the stored values, see
   /// `view_like`) with 0 in the pixels that the cloud excludes: those with a depth out of range, flying pixels if they
-  /// are removed, and pixels that belong to a point that is not in `kept`. A pixel between the strides belongs to the
+  /// are removed, and pixels that belong to a point that is not in `kept`. A pixel that the stride skips belongs to the
   /// point in its voxel, or otherwise to the point of its block of stride x stride pixels if their depths agree within
   /// 3 cm and 2 % per pixel between them; a pixel that belongs to no point is excluded. O(pixels).
   /// @pre the preconditions of `measurements`
@@ -227,7 +227,7 @@ class dense_cloud {
   }
   /// The second half of `masked_depth`: sets pixels of `out`, a copy of the stored values of `depth`, to 0 if they
   /// belong to no point of the cloud or to a point that is not kept. O(pixels). @pre contains(number), and `depth` is
-  /// its image after `keyframe_points::masked`
+  /// its image as returned by `keyframe_points::masked`
   template <execution_policy Policy, camera::depth_source Depth>
   void remove_points(const Policy& policy, const Depth& depth, std::size_t number, const selection& kept,
                      image_view<depth_pixel<Depth>> out) const {
@@ -267,7 +267,7 @@ class dense_cloud {
         });
   }
   /// Returns the measurements of keyframe `number`, in the world frame at its latest pose, whose cloud point is in
-  /// `kept`. Reads only the images of `k`. O(pixels). @pre contains(number), and its images are those of `k`
+  /// `kept`. Reads only the images of `k`. O(pixels). @pre contains(number), and it was added with the images of `k`
   template <execution_policy Policy, keyframe_like Keyframe>
   [[nodiscard]] std::vector<vec3f> measurements(const Policy& policy, const Keyframe& k, std::size_t number,
                                                 const selection& kept = {}) const {

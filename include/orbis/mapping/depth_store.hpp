@@ -71,7 +71,7 @@ class depth_store {
   }
 
   /// Removes the pixels that are 0 in `depth` from the image of `frame`, in place of those removed by an earlier call.
-  /// Only the runs of pixels without depth are stored; they stay in memory, in addition to the budget. Errors:
+  /// Only the runs of pixels without depth are stored; they stay in memory and do not count towards the budget. Errors:
   /// not_found; invalid_argument if the size of `depth` differs from that of the image. Linear in the number of pixels,
   /// about 0.2 ms for 640 x 480.
   /// @pre the other pixels of `depth` are those of the image

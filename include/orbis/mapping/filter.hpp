@@ -30,7 +30,7 @@
 namespace orbis::mapping {
 
 enum class filter_kind {
-  automatic,  ///< selected from the cloud: `cloud::filter_automatically`
+  automatic,  ///< selected for the cloud by `cloud::filter_automatically`
   none,
   statistical,
   radius,
@@ -78,8 +78,8 @@ namespace detail {
   return all;
 }
 
-/// `automatically(select_options)` runs the automatic filter, `by_rays(ray_evidence_options)` returns the inliers by
-/// ray evidence.
+/// Runs the filter of the given kind. `automatically(select_options)` runs the automatic filter;
+/// `by_rays(ray_evidence_options)` returns the inliers of the ray-evidence filter.
 template <execution_policy Policy, point_range Points, class Automatic, class ByRays>
 [[nodiscard]] filtered_indices filter_by_kind(const Policy& policy, const Points& points, std::span<const float> ranges,
                                               const filter_options& options, Automatic&& automatically,
@@ -141,7 +141,7 @@ template <execution_policy Policy, point_range Points, class Automatic, class By
     case filter_kind::ray_evidence:
       out.inliers = by_rays(options.ray_evidence);
       report.mode = {cloud::ray_step{.evidence = options.ray_evidence}};
-      report.reason = "requested; points that rays of other keyframes pass through";
+      report.reason = "requested; removes points that rays of other keyframes pass through";
       break;
   }
   report.removed = report.points - out.inliers.size();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The keyframe that mapping reads.
+/// The keyframe type that mapping uses.
 #pragma once
 
 #include <cstdint>

@@ -58,8 +58,8 @@ struct live_map_options {
   /// more than this. 0: when any bit of the pose changes, so that the map corresponds to the current poses whenever
   /// nothing is pending.
   double tolerance = 0.25;
-  /// Number of keyframes that are moved before the map is updated, > 0: a larger number means less work, a smaller one
-  /// earlier updates.
+  /// Number of keyframes that are moved before the map is updated, > 0: a larger number reduces the work; a smaller one
+  /// updates the map earlier.
   std::size_t keyframes_per_replay = 16;
   /// Maximum number of frames between keyframes in the map; older ones are dropped. 0: keyframes only.
   std::size_t max_frames = 0;
@@ -76,16 +76,16 @@ concept keyframe_position_like = requires(const P& p) {
   { p.T_world_camera } -> std::convertible_to<se3>;
 };
 
-/// Treatment of keyframes without a given pose: they keep their poses, or are removed from the map until they get a
-/// pose again, such as the keyframes of another map of the atlas.
+/// Treatment of keyframes that are not listed: they keep their poses, or are removed from the map until they are listed
+/// again (for example keyframes of another map of the atlas).
 enum class unlisted { keep, hide };
 
-/// State of a keyframe's depth image: as the camera measured it, or without pixels removed by a filter.
+/// State of a keyframe's depth image: as the camera measured it, or without the pixels that a filter removed.
 enum class completeness { complete, filtered };
 
 /// Limits of one call to live_map::correct.
 struct correction_limits {
-  /// Time limit; the keyframe or the few dozen bricks in progress are finished first.
+  /// Time limit; the current keyframe, or the current few dozen bricks, are finished first.
   std::chrono::nanoseconds time = std::chrono::nanoseconds::max();
   std::optional<vec3> robot{};  ///< position in the world frame; keyframes near it are moved first
 };
@@ -128,8 +128,8 @@ class live_map {
   /// Adds a keyframe, or replaces the depth image and pose of an existing one. `frame`: the index of its frame, which
   /// orders keyframes; `depth`: as integrated into the map, without the pixels that a filter removed; `T_world_camera`:
   /// if it is not finite, the keyframe waits outside the map for a pose. The newest keyframe is in the map immediately.
-  /// `what` is only stored, see is_filtered. `whole`: the stored values of `depth` with the pixels that a filter
-  /// removed, which may return with set_depth; empty: none was removed. Error: that of `Depths::put`; the keyframe is
+  /// `what` is only stored, see is_filtered. `whole`: the stored values of `depth` including the pixels that a filter
+  /// removed, which set_depth may restore; empty: none was removed. Error: that of `Depths::put`; the keyframe is
   /// nevertheless in the map. O(marking, see octree::scan_marker) and Depths::put. @pre the images have the camera's
   /// size
   template <execution_policy Policy>
@@ -203,7 +203,7 @@ class live_map {
     return kept;
   }
   /// Adds a frame between keyframes whose pose was measured relative to `keyframe`: it is marked relative to the
-  /// keyframe's pose in the map. It makes the map denser in time but is not kept for corrections: it is removed from
+  /// keyframe's pose in the map. It adds observations to the map but is not kept for corrections: it is removed from
   /// the map when there are more than `max_frames`, when its keyframe moves, is hidden or removed, and with `finish`.
   /// Accepts any depth source. Returns false if `max_frames` is 0, the keyframe is not in the map, the pose is not
   /// finite, or the frame is a keyframe. O(marking). @pre depth has the camera's size
@@ -253,7 +253,7 @@ class live_map {
   }
   /// Moves keyframes whose poses are out of tolerance to their current poses, and updates the map, until the time
   /// limit. Keyframes whose views moved far and that are close to the robot come first. Every call makes progress if
-  /// anything is pending. Error: that of `Depths::get`. The keyframe whose image is lost is removed; the next call
+  /// anything is pending. Error: that of `Depths::get`. A keyframe whose image is lost is removed; the next call
   /// continues with the others. O(keyframes) and, for each keyframe that is moved, marking and replaying; O(1) if
   /// nothing is pending.
   template <execution_policy Policy>
@@ -337,8 +337,8 @@ class live_map {
     const entry* const k = find(frame);
     return k == nullptr ? std::nullopt : k->wanted;
   }
-  /// Returns true if a keyframe's depth image lacks the pixels that a filter removed: it was set by `set_depth`, or
-  /// declared so in `add_keyframe`. O(log keyframes).
+  /// Returns true if a keyframe's depth image lacks the pixels that a filter removed: the image was set by `set_depth`,
+  /// or passed to `add_keyframe` as filtered. O(log keyframes).
   [[nodiscard]] bool is_filtered(std::uint64_t frame) const noexcept {
     const entry* const k = find(frame);
     return k != nullptr && k->filtered;

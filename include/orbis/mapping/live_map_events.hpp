@@ -37,7 +37,7 @@ struct insertion_event {
   bool is_keyframe = false;
   double milliseconds = 0.0;        ///< wall time of `prepare`, moved-object removal, marking and storing the image
   double delay_milliseconds = 0.0;  ///< time from the call that added the image until readers can see it
-  std::size_t waiting = 0;          ///< keyframes and frames still waiting
+  std::size_t waiting = 0;          ///< number of keyframes and frames still waiting
 };
 /// A depth image was dropped because too many were waiting.
 struct overflow_event {
@@ -58,7 +58,7 @@ struct live_correction_event {
 
 /// Poses of the keyframes from the SLAM system.
 struct keyframe_poses {
-  std::vector<keyframe_position> poses{};  ///< the current ones; other keyframes are hidden
+  std::vector<keyframe_position> poses{};  ///< current poses; keyframes that are not listed are hidden
   std::vector<std::uint64_t> removed{};    ///< frame indices of keyframes that will never get a pose again
 };
 
@@ -79,9 +79,10 @@ struct live_map_listeners {
   std::function<void(const overflow_event&)> overflowed{};  ///< on the thread that adds the image
   std::function<void(const refusal_event&)> refused{};
   std::function<void(const live_correction_event&)> corrected{};
-  /// A new snapshot, and the log of changes up to it; the log may be read during the call.
+  /// Called with each new snapshot and the log of changes up to it; the log may be read during the call.
   std::function<void(const live_map_snapshot<Octree>&, const octree::change_log&)> published{};
-  /// A depth image could not be stored or read, see live_map; or the thread ended, see live_map_thread::failure.
+  /// Called if a depth image could not be stored or read, see live_map, or the thread ended, see
+  /// live_map_thread::failure.
   std::function<void(const error&)> failed{};
 };
 

@@ -59,7 +59,7 @@ struct live_map_thread_options {
   std::chrono::microseconds correction_slice{5000};
   std::chrono::milliseconds poll_interval{30};  ///< interval between calls to live_map_listeners::poll_poses
   /// Removal of moved objects, see moving_filter; empty: no removal. If set, poses are also polled before each
-  /// keyframe, and the keyframe is inserted at its pose of that moment.
+  /// keyframe, and the keyframe is inserted at its pose at that moment.
   std::optional<moving_filter_options> moving{};
 };
 
@@ -322,7 +322,7 @@ class live_map_thread {
       case job::keyframe: {
         bool judged = moving_.has_value();
         if (moving_ && listeners_.poll_poses) {
-          // Keyframes are compared at poses of the same moment: the current ones, including that of the new keyframe.
+          // Keyframes are compared at poses from the same moment: the current ones, including that of the new keyframe.
           const keyframe_poses& now = poll(true);
           const auto at = std::ranges::find(now.poses, j.frame, &keyframe_position::frame);
           judged = at != now.poses.end();
@@ -436,7 +436,7 @@ class live_map_thread {
       return;
     auto next = std::make_shared<const snapshot_type>(
         snapshot_type{map_.snapshot(), revision, map_.size(), map_.frames(), pending});
-    std::shared_ptr<const snapshot_type> before_latest, before_settled;  // released without the lock
+    std::shared_ptr<const snapshot_type> before_latest, before_settled;  // freed after the lock is released
     {
       const std::lock_guard lock{published_mutex_};
       before_latest = std::exchange(latest_, next);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Removes moving objects from a live map while the camera moves: the pixels of the last keyframes that rays of other
-/// keyframes pass through are removed from their depth images.
+/// Removes moving objects from a live map while the camera moves: pixels of the most recent keyframes' depth images are
+/// removed if rays of other keyframes pass through them.
 ///
 /// The log-odds of a voxel become those of free space only if more rays pass through it than end in it. A person
 /// walking through a room leaves voxels in which one or two scans end and which few later scans see. The depth images
@@ -32,15 +32,15 @@
 
 namespace orbis::mapping {
 
-/// Compares the last keyframes of a live map with each other, and applies the result to the map: a later keyframe whose
-/// rays pass through a surface of an earlier one removes it, and one that shows it again restores it. A keyframe is
-/// inserted first; the others are compared with it afterwards, one at a time, so that no insertion waits for the
-/// comparison. The result is a depth image with fewer pixels (`live_map::set_depth`); the map still corresponds to the
-/// depth images and poses of its keyframes. Keyframes are compared at the latest poses given to the map
+/// Compares the most recent keyframes of a live map with each other, and applies the result to the map: a surface is
+/// removed from a keyframe when rays of a later one pass through it, and restored when a later one shows it again. A
+/// keyframe is inserted first; the others are compared with it afterwards, one at a time, so that no insertion waits
+/// for the comparison. The result is a depth image with fewer pixels (`live_map::set_depth`); the map still corresponds
+/// to the depth images and poses of its keyframes. Keyframes are compared at the latest poses given to the map
 /// (`live_map::wanted_pose`), because these belong to the same moment; in the map, a keyframe waiting for a correction
 /// is still at an earlier pose.
 ///
-/// Stores the last keyframes' depth images: 3.5 bytes per pixel for each. Memory is reused from keyframe to keyframe.
+/// Stores the most recent keyframes' depth images, 3.5 bytes per pixel. Memory is reused from keyframe to keyframe.
 template <camera::camera_model Camera>
 class moving_filter {
  public:
@@ -50,9 +50,9 @@ class moving_filter {
   explicit moving_filter(Camera camera, const moving_filter_options& options = {})
       : judge_{std::move(camera), options} {}
 
-  /// Calls live_map::add_keyframe without the pixels that rays of the last keyframes pass through. Afterwards the last
-  /// keyframes are due for re-evaluation, see revise. A keyframe with a pose that is not finite is added to the map
-  /// unchanged. The result is the same for every policy. Errors: those of live_map::add_keyframe and set_depth.
+  /// Calls live_map::add_keyframe without the pixels that rays of the most recent keyframes pass through. Afterwards
+  /// these keyframes are due for re-evaluation, see revise. A keyframe with a pose that is not finite is added to the
+  /// map unchanged. The result is the same for every policy. Errors: those of live_map::add_keyframe and set_depth.
   /// O(pixels + cells x keyframes), and marking. @pre as for live_map::add_keyframe; all calls pass the same `map`
   template <execution_policy Policy, octree::replayable_octree Octree, depth_history Depths>
   result<octree::integration_summary> add_keyframe(const Policy& policy, live_map<Octree, Camera, Depths>& map,
@@ -81,9 +81,9 @@ class moving_filter {
   [[nodiscard]] std::size_t due() const noexcept {
     return static_cast<std::size_t>(std::ranges::count_if(judge_.views(), [](const auto& v) { return is_due(v); }));
   }
-  /// Re-evaluates one of the last keyframes that are due, and updates its image in the map (live_map::set_depth) if the
-  /// verdict has changed; the map follows with `correct`. Call it until nothing is due, or the next keyframe is more
-  /// urgent: the remaining ones are evaluated together with that one. Errors: those of live_map::set_depth; the
+  /// Re-evaluates one of the recent keyframes that are due, and updates its image in the map (live_map::set_depth) if
+  /// the verdict has changed; the map follows with `correct`. Call it until nothing is due, or the next keyframe is
+  /// more urgent: the remaining ones are evaluated together with that one. Errors: those of live_map::set_depth; the
   /// keyframe is nevertheless evaluated. O(cells), and marking if the image changes.
   template <execution_policy Policy, octree::replayable_octree Octree, depth_history Depths>
   result<void> revise(const Policy& policy, live_map<Octree, Camera, Depths>& map) {
@@ -96,7 +96,7 @@ class moving_filter {
   }
   /// Drops a keyframe from the comparison: it was removed, or its image was replaced.
   void forget(std::uint64_t frame) { judge_.forget(frame); }
-  /// Share of a keyframe's cells that is removed; empty if it is not among the last keyframes. O(cells).
+  /// Share of a keyframe's cells that is removed; empty if the keyframe is not among the most recent ones. O(cells).
   [[nodiscard]] std::optional<double> removed_share(std::uint64_t frame) const {
     for (const auto& v : judge_.views())
       if (v.frame == frame)
@@ -115,7 +115,8 @@ class moving_filter {
     return [&map](const view& v) { return map.wanted_pose(v.frame); };
   }
   [[nodiscard]] bool leaves_next(const view& v) const { return judge_.is_full() && &v == &judge_.views().front(); }
-  /// Evaluates a keyframe of the map, and updates its image there if enough of its cells differ.
+  /// Evaluates a keyframe of the map, and updates its image in the map if the verdict has changed for enough of its
+  /// cells.
   template <class Policy, class Map>
   result<void> change(const Policy& policy, Map& map, view& v) {
     const std::size_t differ = judge_.judge(v);

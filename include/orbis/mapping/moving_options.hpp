@@ -31,7 +31,7 @@ struct moving_filter_options {
 
 namespace detail {
 
-/// Maximum difference of two equal depths near z, metres.
+/// Difference below which two depths near z count as equal, metres.
 [[nodiscard]] inline float depth_margin(const moving_filter_options& options, float z) noexcept {
   return options.margin + rounded_product(options.margin_growth, rounded_product(z, z));
 }

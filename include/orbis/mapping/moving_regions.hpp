@@ -45,8 +45,8 @@ struct moving_region_options {
   std::size_t least_marks = 5;
 };
 
-/// Grows marked pixels along the surfaces of a depth image, moving and static ones at the same time: a cell moves if
-/// its nearest mark moves. Surfaces end at depth discontinuities. The remaining pixels of a keyframe can be integrated
+/// Grows marked pixels along the surfaces of a depth image, moving and static ones at the same time: a cell is moving
+/// if its nearest mark is. Surfaces end at depth discontinuities. The remaining pixels of a keyframe can be integrated
 /// into a map. Tracking detects moving objects in front of the camera immediately (`slam::tracked_feature::moving`),
 /// including a person walking along with the camera, whom no later ray passes through; `moving_filter` detects moved
 /// objects that tracking has missed.
@@ -75,7 +75,7 @@ class moving_regions {
   }
 
   /// Writes the stored values of `depth` to `out`, with 0 in moving regions. Returns the number of removed pixels.
-  /// O(pixels). @pre the image that `find` was called with; `out` has its size
+  /// O(pixels). @pre `depth` is the image that `find` was called with; `out` has the same size
   template <camera::depth_source Depth>
   std::size_t remove(const Depth& depth, image_view<depth_pixel<Depth>> out) const {
     for (int y = 0; y != depth.height(); ++y)
@@ -87,7 +87,7 @@ class moving_regions {
   enum class label : std::uint8_t { unknown, stands, moves };
   /// A cell reached from a mark along a surface.
   struct step {
-    float way;  ///< metres
+    float way;  ///< distance along the surface, metres
     std::uint32_t cell;
     label what;
     [[nodiscard]] friend bool operator<(const step& a, const step& b) noexcept {  // the nearest is first in a heap
@@ -151,7 +151,7 @@ class moving_regions {
         push({0.0F, static_cast<std::uint32_t>(cell), m.moves ? label::moves : label::stands});
     }
   }
-  /// Dijkstra's algorithm from all marks at once.
+  /// Dijkstra's algorithm, started from all marks simultaneously.
   void grow() {
     while (!open_.empty()) {
       std::pop_heap(open_.begin(), open_.end());

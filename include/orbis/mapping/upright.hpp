@@ -46,7 +46,7 @@ struct found_up {
 /// Weights of the normals along and across the direction `up`.
 struct up_ballot {
   double along = 0.0, across = 0.0;  ///< weights
-  mat3 spread = zeros<mat3>();       ///< scatter of the normals across, minus that of the normals along `up`
+  mat3 spread = zeros<mat3>();       ///< scatter of the normals across `up`, minus that of the normals along it
 
   up_ballot(std::span<const vec3> normals, const vec3& up, double reach) {
     for (const vec3& n : normals) {
@@ -62,8 +62,8 @@ struct up_ballot {
   }
 };
 
-/// The direction within `max_tilt` radians of -y that most normals are along or perpendicular to; empty if there is no
-/// such normal, or if a rotated direction fits equally well. O(normals) for each of a few thousand directions.
+/// The direction within `max_tilt` radians of -y to which most normals are parallel or perpendicular; empty if there is
+/// no such normal, or if a rotated direction fits equally well. O(normals) for each of a few thousand directions.
 [[nodiscard]] inline std::optional<found_up> vote_for_up(std::span<const vec3> normals, double max_tilt) {
   constexpr double degree = std::numbers::pi / 180.0;
   const double wide = std::sin(10.0 * degree);
@@ -118,7 +118,7 @@ struct planar_blocks {
   std::size_t with_depth = 0;  ///< number of blocks with depth in most pixels, flat or not
 };
 
-/// Fits a plane to each block of a grid of about 27 by 20 blocks. On a plane `n . p = 1` the inverse depth is linear in
+/// Fits a plane to each block of a grid of about 27 x 20 blocks. On a plane `n . p = 1` the inverse depth is linear in
 /// the ray: `1 / z = n . (x, y, 1)`. Blocks whose inverse depths deviate by more than a few thousandths, or by 2 % at
 /// long range, are not flat; the threshold grows with depth because the depth noise does.
 template <camera::depth_source Depth>

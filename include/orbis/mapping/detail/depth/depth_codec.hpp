@@ -12,7 +12,7 @@
 ///   Seroussi, G. Sapiro, "The LOCO-I lossless image compression algorithm", IEEE Transactions on Image Processing
 ///   9(8), 2000, section III.A.
 /// - a run consists of pixels, with depth or without (0), that equal their prediction.
-/// - a group has one bit for a run and two bits for a difference, because both numbers are small.
+/// - a group has one data bit in a run length and two in a difference, because most of these numbers are small.
 #pragma once
 
 #include <algorithm>

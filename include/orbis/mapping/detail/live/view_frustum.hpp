@@ -61,14 +61,14 @@ class view_frustum {
   /// Extends the pyramid to a ray: x and y at z = 1.
   void include(vec2 ray) {
     if (!all_finite(ray)) return;
-    // Depth along the axis hardly limits the length of rays almost perpendicular to it: rays beyond 80 degrees count as
-    // if they were at 80 degrees.
+    // Depth along the axis hardly limits the length of rays almost perpendicular to it: rays beyond 80 degrees are
+    // treated as if they were at 80 degrees.
     constexpr double widest = 5.67;
     const double off_axis = norm(ray);
     if (off_axis > widest) ray *= widest / off_axis;
     for (std::size_t i = 0; i != sides; ++i) reach_[i] = std::max(reach_[i], dot(direction(i), ray));
   }
-  /// Computes the corners: intersections of two neighbouring sides.
+  /// Computes the corners: the intersections of neighbouring sides.
   void close() {
     for (std::size_t i = 0; i != sides; ++i) {
       const vec2 a = direction(i), b = direction(i + 1);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A depth image in cells of 4x4 pixels, with tests of the rays of one image against the points of another.
+/// A depth image divided into cells of 4x4 pixels, with tests of the rays of one image against the points of another.
 #pragma once
 
 #include <algorithm>
@@ -113,7 +113,7 @@ class depth_cells {
   }
 
   /// Calls `visit(cell, visibility)` for each cell that `view` shows or that its rays pass through. `margin(z)`:
-  /// tolerance for noise at that depth, metres; `slant`: for rays that pass through, a window's range of depths times
+  /// tolerance for noise at depth `z`, metres; `slant`: for rays that pass through, a window's range of depths times
   /// this factor is added to the margin. O(cells).
   template <execution_policy Policy, camera::camera_model Camera, class Margin, class Visit>
   void ask(const Policy& policy, const depth_cells& view, const cell_grid& grid, const Camera& camera,

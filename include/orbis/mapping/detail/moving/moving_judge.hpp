@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Detects cells in the last keyframes' depth images that show moved objects, using the rays of the other keyframes.
+/// Detects cells in the most recent keyframes' depth images that show moved objects, using the rays of the other
+/// keyframes.
 #pragma once
 
 #include <algorithm>
@@ -31,7 +32,7 @@ struct removed_cell {
   float depth = 0.0F;  ///< depth of its nearest pixel, metres
 };
 
-/// Sets the pixels of these cells to 0 in `pixels`, a copy of the stored values of `depth`, and those pixels of
+/// Sets the pixels of these cells to 0 in `pixels`, a copy of the stored values of `depth`, and also the pixels of
 /// adjacent cells that belong to the same surface. Returns the number of removed pixels. O(cells)
 template <camera::depth_source Depth>
 std::size_t remove_cells(const Depth& depth, const std::vector<removed_cell>& cells,
@@ -56,7 +57,7 @@ std::size_t remove_cells(const Depth& depth, const std::vector<removed_cell>& ce
   return removed;
 }
 
-/// The last keyframes, and the evidence that their rays provide about each other. See moving_filter.
+/// The most recent keyframes, and the evidence that their rays provide about each other. See moving_filter.
 template <camera::camera_model Camera>
 class moving_judge {
  public:
@@ -69,10 +70,10 @@ class moving_judge {
     float min_depth = 0.0F, max_depth = 0.0F;
     depth_cells cells;
     std::vector<std::uint8_t> through;  ///< number of other views whose rays pass through each cell
-    std::vector<std::uint8_t> shown;    ///< number of other views that show the cell as well
+    std::vector<std::uint8_t> shown;    ///< number of other views that also show each cell
     std::vector<std::uint8_t> removed;  ///< 1: removed by the verdict of the last call to `accept`
-    bool due = false;                   ///< true if it has not been compared with the newest view
-    bool unjudged = false;              ///< true if evidence has arrived since the last evaluation
+    bool due = false;                   ///< true if the view has not been compared with the newest one
+    bool unjudged = false;              ///< true if the view has new evidence since its last evaluation
 
     [[nodiscard]] depth_view depth() const { return depth_view{pixels.view(), scale, min_depth, max_depth}; }
     [[nodiscard]] std::vector<removed_cell> removed_cells() const {
@@ -170,7 +171,8 @@ class moving_judge {
     spare_.push_back(std::move(*at));
     views_.erase(at);
   }
-  /// The last keyframes, the oldest first. If the window is full, the oldest is replaced when the next one is added.
+  /// The most recent keyframes, the oldest first. If the window is full, the oldest is replaced when the next one is
+  /// added.
   [[nodiscard]] std::deque<view>& views() noexcept { return views_; }
   [[nodiscard]] const std::deque<view>& views() const noexcept { return views_; }
   [[nodiscard]] bool is_full() const noexcept { return views_.size() == options_.keyframes; }
