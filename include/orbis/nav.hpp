@@ -4,12 +4,12 @@
 ///
 /// | header | contents |
 /// | --- | --- |
-/// | distance_field.hpp | distance and direction to the nearest obstacle of a map; follows the map |
+/// | distance_field.hpp | distance and direction to the nearest obstacle; updated when the map changes |
 /// | floor_map.hpp | free, occupied and unknown cells of the floor for a ground robot |
 /// | floor_cost.hpp | costs near obstacles, as in Nav2's costmaps |
 /// | floor_file.hpp | floor map files for the map servers of ROS and Nav2 |
 /// | floor_view.hpp | planning space of a round robot on a floor, in two dimensions |
-/// | frontiers.hpp | boundary between known free and unknown space; follows the map |
+/// | frontiers.hpp | boundary between known free and unknown space; updated when the map changes |
 /// | view_gain.hpp | amount of unknown space that a camera would see |
 /// | next_view.hpp | next best view of an exploring robot |
 /// | robot_shape.hpp | robot shapes: ball, vertical capsule, vertical cylinder |
@@ -18,7 +18,7 @@
 /// | path_search.hpp | cheapest paths of a robot through a map or over a floor |
 /// | replanning.hpp | checks a path after map changes, and replans only if it is blocked |
 /// | robot_trajectory.hpp | conversion of paths to timed trajectories within bounds on speed and acceleration |
-/// | squared_distances.hpp | the distance field without a map: exact squared distances in voxels |
+/// | squared_distances.hpp | the distance field of a set of voxels, without a map: exact squared distances |
 /// | map_access.hpp | read access to a map for planning, including maps of other libraries |
 #pragma once
 

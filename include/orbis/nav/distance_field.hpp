@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A truncated Euclidean distance field of an occupancy map (distance to the nearest obstacle) that follows map
+/// A truncated Euclidean distance field of an occupancy map (distance to the nearest obstacle), updated when the map
 /// changes.
 ///
 /// @code
@@ -181,11 +181,12 @@ class distance_field : public metric_distances<squared_distances> {
   }
 
   /// Updates the field from the map's change log (`map.changes()`) if the log covers all changes since the last update.
-  /// Otherwise compares everything: after changes that the log does not record (see occupancy_octree::track_changes),
-  /// and every time if changes are not tracked. Costs as much as squared_distances::update, plus O(bricks of the field
-  /// + octants of the map) if everything is compared. Of a leaf with an edge of 256 voxels or more, only the part
-  /// within reach of its faces costs time and memory; if such a leaf has appeared or disappeared since everything was
-  /// last compared, the field is rebuilt. @pre the same map every time, with the same grid
+  /// Otherwise compares the field with the whole map: after changes that the log does not record (see
+  /// occupancy_octree::track_changes), and every time if changes are not tracked. Costs as much as
+  /// squared_distances::update, plus O(bricks of the field + octants of the map) for the comparison. Of a leaf with an
+  /// edge of 256 voxels or more, only the part within reach of its faces costs time and memory; if such a leaf has
+  /// appeared or disappeared since the last comparison, the field is rebuilt. @pre the same map every time, with the
+  /// same grid
   template <planning_map Map>
   void update(const Map& map) {
     assert(map_access<Map>::grid(map) == grid_);
@@ -206,7 +207,7 @@ class distance_field : public metric_distances<squared_distances> {
     assert(map_access<Map>::grid(copy) == grid_);
     follower_.follow(log, revision, changed_in(copy), [&] { compare_all(copy); });
   }
-  /// Updates the field by comparing everything, without the log.
+  /// Updates the field by comparing it with the whole map, without the log.
   template <planning_map Map>
   void update_all(const Map& map) {
     assert(map_access<Map>::grid(map) == grid_);
@@ -227,12 +228,12 @@ class distance_field : public metric_distances<squared_distances> {
   /// destroyed on any thread. O(bricks): one pointer and one atomic increment per 4 bricks; afterwards, the field
   /// clones the parts that it writes to, 4 kB at a time. On the updating thread, query the field itself.
   [[nodiscard]] distance_view view() const { return {grid_, voxels_.view(), reach_}; }
-  /// False if leaves of the map were omitted because of `max_bricks`: they count as unknown, at least where the field
-  /// stores nothing. In that case, if unknown space counts as an obstacle, distances may be too short; if it counts as
-  /// free, obstacles are missing. With the option `inside`, the reverse holds.
+  /// Returns false if leaves of the map were omitted because of `max_bricks`: they count as unknown, at least where the
+  /// field stores nothing. In that case, if unknown space counts as an obstacle, distances may be too short; if it
+  /// counts as free, obstacles are missing. With the option `inside`, the reverse holds.
   [[nodiscard]] bool is_complete() const noexcept { return is_complete_; }
   [[nodiscard]] const distance_field_options& options() const noexcept { return options_; }
-  /// Bytes on the heap.
+  /// Heap memory in bytes.
   [[nodiscard]] std::size_t memory_bytes() const noexcept {
     return voxels_.memory_bytes() + octants_.capacity() * sizeof(octant_obstacles);
   }

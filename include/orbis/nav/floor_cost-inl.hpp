@@ -69,7 +69,7 @@ ORBIS_INLINE image<float> squared_floor_distances(const image<floor_state>& stat
 ORBIS_INLINE image<std::uint8_t> inflate(const floor_map& map, const inflation_options& options) {
   assert(options.radius >= 0.0 && options.cost_scaling >= 0.0);
   const image<float> squared = squared_floor_distances(map.states);
-  const double rounding = 1e-9 * map.resolution;  // three cells of 0.05 m are at most 0.15 m apart
+  const double rounding = 1e-9 * map.resolution;  // three cells of 0.05 m must count as 0.15 m
   image<std::uint8_t> costs(map.states.width(), map.states.height(), floor_cost::free_space);
   for (std::size_t i = 0; i != squared.pixels().size(); ++i) {
     const double d = std::sqrt(static_cast<double>(squared.pixels()[i])) * map.resolution;

@@ -30,12 +30,12 @@ inline constexpr std::uint64_t most_octants_on_leaves = std::uint64_t{1} << 24U;
 template <planning_map Map>
 std::optional<double> find_floor(const Map& map) {
   const octree::voxel_grid& grid = map_access<Map>::grid(map);
-  std::vector<std::size_t> surface(grid.cells());  // surface area by layer
+  std::vector<std::size_t> surface(grid.cells());  // surface area of each layer
   auto read = map_access<Map>::octants(map);
   std::uint64_t of_leaves = 0;
   map_access<Map>::for_each_octant(map, [&](const octree::voxel_key& k, int level, const octree::octant_states& s) {
     if (s.occupied == 0) return;
-    // Of a large cube, only the highest layer may have free space above.
+    // Only the highest layer of a large cube can have free space above it.
     const std::uint32_t size = octree::node_cells(level);
     if (level > 3 && (of_leaves += std::uint64_t{size / 4} * (size / 4)) > detail::most_octants_on_leaves) return;
     const auto& layers = detail::octant_layers;

@@ -31,7 +31,7 @@ namespace orbis::nav {
 struct ground_robot {
   double radius = 0.2;      ///< metres
   double height = 0.5;      ///< clearance that it needs above the floor, metres
-  double step = 0.05;       ///< the highest step that it can drive up or down, metres; less than a voxel: none
+  double step = 0.05;       ///< the highest step that it can drive up or down, metres; none if less than a voxel
   double max_slope = 0.35;  ///< the steepest floor that it can drive on, radians
 };
 

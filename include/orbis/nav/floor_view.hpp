@@ -152,7 +152,7 @@ class floor_view {
     const auto blocks = [&](floor_state s) {
       return s == floor_state::occupied || (s == floor_state::unknown && unknown_blocks);
     };
-    // A border of unknown cells represents everything outside.
+    // A border of unknown cells represents the space outside the map.
     image<floor_state> states(width + 2, height + 2, unknown_blocks ? floor_state::occupied : floor_state::free);
     for (int y = 0; y != height; ++y)
       for (int x = 0; x != width; ++x)

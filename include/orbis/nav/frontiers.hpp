@@ -98,7 +98,7 @@ class frontiers {
     assert(map_access<Map>::grid(copy) == grid_);
     follower_.follow(log, revision, changed_in(copy), [&] { rebuild(copy); });
   }
-  /// Examines the whole map, without the log.
+  /// Updates the frontier from the whole map, without the log.
   template <planning_map Map>
   void update_all(const Map& map) {
     assert(map_access<Map>::grid(map) == grid_);
@@ -109,8 +109,8 @@ class frontiers {
   /// Number of frontier voxels. O(1)
   [[nodiscard]] std::size_t size() const noexcept { return size_; }
   [[nodiscard]] bool empty() const noexcept { return size_ == 0; }
-  /// False if leaves of the map were omitted because of `max_octants`: frontier voxels on their faces are missing,
-  /// except next to later changes.
+  /// Returns false if leaves of the map were omitted because of `max_octants`: frontier voxels on their faces are
+  /// missing, except next to later changes.
   [[nodiscard]] bool is_complete() const noexcept { return is_complete_; }
   /// Returns true if the voxel belongs to the frontier; false outside the grid. O(1)
   [[nodiscard]] bool contains(const octree::voxel_key& k) const noexcept {
@@ -134,7 +134,7 @@ class frontiers {
   [[nodiscard]] std::vector<frontier_cluster> clusters(const cluster_options& options = {}) const;
 
   [[nodiscard]] const octree::voxel_grid& grid() const noexcept { return grid_; }
-  /// Bytes on the heap.
+  /// Heap memory in bytes.
   [[nodiscard]] std::size_t memory_bytes() const noexcept {
     return index_.memory_bytes() + found_.capacity() * sizeof(entry) + stale_.capacity() * sizeof(std::uint64_t);
   }

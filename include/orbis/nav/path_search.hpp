@@ -64,7 +64,7 @@ struct path_options {
   /// Weight of the heuristic for `any_angle`; finite and >= 1. With 1, the search expands ten times as many cells for
   /// paths that are typically less than 0.1 % shorter.
   double heuristic_weight = 1.1;
-  bool shorten = true;  ///< straighten the path; otherwise it runs from cell centre to cell centre
+  bool shorten = true;  ///< true to straighten the path; otherwise it runs from cell centre to cell centre
   /// Maximum number of expanded cells. The limit applies separately to the test of whether the goal is reachable, to
   /// the search for the nearest reachable cell, and to the search for a path to it.
   std::size_t max_expanded = 2'000'000;

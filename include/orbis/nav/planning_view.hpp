@@ -113,7 +113,7 @@ template <planning_map Map, octree::overlap_shape Shape>
 /// the robot's shape or the volume that it sweeps (for a ball, a capsule), with unknown space treated as in the field.
 /// Nothing is sampled or approximated by voxel centres; the two results differ only by rounding, where the robot just
 /// touches a voxel. The field alone is sufficient if obstacles are far away, or so near that the robot certainly
-/// touches one; the map is read only in the narrow band in between.
+/// touches one; the map is read only in the narrow band between these cases.
 ///
 /// A `planning_space`. The view refers to the map and the field; neither may change while the view is used. Safe for
 /// concurrent queries.

@@ -183,7 +183,7 @@ class squared_distances : public squared_distance_view {
   /// block of 8x8x8 bricks (the directory); afterwards, the field clones the parts that it writes to, 4 kB at a time.
   /// On the updating thread, no copy is needed.
   [[nodiscard]] const squared_distance_view& view() const noexcept { return *this; }
-  /// Bytes on the heap, including memory shared with copies of the view.
+  /// Heap memory in bytes, including memory shared with copies of the view.
   [[nodiscard]] std::size_t memory_bytes() const noexcept;
 
  private:

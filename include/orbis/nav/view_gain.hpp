@@ -55,7 +55,7 @@ class view_gain {
     if (options.bounds) counted_ = octree::keys_between(grid_, options.bounds->min, options.bounds->max);
     counts_any_ = !options.bounds || counted_;
   }
-  // A temporary would not outlive the gain.
+  // A temporary would not outlive the object.
   view_gain(const Map&&, const Camera&, const view_gain_options& = {}) = delete;
 
   /// The number of unknown voxels seen from a pose; 0 if the pose is outside the grid. O(voxels along the rays)

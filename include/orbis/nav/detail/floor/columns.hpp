@@ -26,7 +26,7 @@ inline constexpr std::array<std::uint64_t, 4> octant_layers{0x000000000f0f0f0f, 
 /// The voxels in a box of a map, column by column: bits for known voxels, and for occupied ones among them.
 class voxel_columns {
  public:
-  /// Columns of unknown voxels. @pre low and size are multiples of 4
+  /// Creates columns of unknown voxels. @pre low and size are multiples of 4
   voxel_columns(const octree::voxel_key& low, std::array<std::uint32_t, 3> size)
       : low_{low},
         size_{size},

@@ -148,7 +148,7 @@ class cell_floods {
     if (const double away = squared_norm(space_.center(k) - goal_); away < nearest_away_)
       nearest_away_ = away, nearest_ = k;
   }
-  /// Adds the neighbours of one more cell. Returns true if the floods meet there. @pre not empty
+  /// Adds the neighbours of one more cell. Returns true if the floods meet at one of them. @pre not empty
   bool grow(std::vector<entry>& flood, mark which) {
     std::pop_heap(flood.begin(), flood.end());
     const key k = flood.back().cell;

@@ -47,10 +47,10 @@ enum class search_end : std::uint8_t {
 /// in C. Dellin, S. Srinivasa, "A unifying formalism for shortest path problems with expensive edge evaluations via
 /// lazy best-first search over paths with edge selectors", ICAPS 2016.)
 ///
-/// The heuristic is the remaining length without obstacles, in steps or straight. It is admissible, because no path
-/// costs less than its length, and consistent, because it is a metric. At any angle, where the optimum is not
-/// guaranteed anyway, it may have a weight greater than 1 (I. Pohl, "First results on the effect of error in heuristic
-/// search", Machine Intelligence 5, 1970).
+/// The heuristic is the length of the remaining path without obstacles, in steps or along a straight line. It is
+/// admissible, because no path costs less than its length, and consistent, because it is a metric. At any angle, where
+/// the optimum is not guaranteed anyway, it may have a weight greater than 1 (I. Pohl, "First results on the effect of
+/// error in heuristic search", Machine Intelligence 5, 1970).
 template <class Space>
 class voxel_search {
  public:
@@ -275,8 +275,8 @@ class voxel_search {
     node& n = at(number);
     if (n.known == trust::sure) return true;
     const std::uint32_t parent = n.parent;
-    // Testing a line over several cells is not worth much time; if the line is barely free, the search finds steps
-    // there, and shortening finds the line afterwards.
+    // Spending much time on testing a line over several cells is not worthwhile: if the line is barely free, the search
+    // finds steps along it, and shortening finds the line afterwards.
     const unsigned direction = direction_between(parent, number);
     double cost = infinity;
     const auto is_line_free = [&] {
