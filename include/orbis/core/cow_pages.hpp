@@ -70,7 +70,7 @@ class cow_pages {
     }
   }
   void clear() noexcept { *this = cow_pages{}; }
-  /// Bytes on the heap, including pages shared with copies.
+  /// Heap memory in bytes, including pages shared with copies.
   [[nodiscard]] std::size_t memory_bytes() const noexcept {
     return pages_.capacity() * sizeof(page*) + pages_.size() * sizeof(page);
   }

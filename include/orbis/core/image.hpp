@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Images as pointer, size and stride. Pixel centres are at integers; (0, 0) is the top left pixel.
+/// Images as pointer, size and stride. Pixel centres have integer coordinates; (0, 0) is the top left pixel.
 #pragma once
 
 #include <algorithm>

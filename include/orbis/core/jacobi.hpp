@@ -57,8 +57,8 @@ void swap_columns(matrix<N, N>& m, int i, int k) {
 
 }  // namespace detail
 
-/// Eigen-decomposition of the symmetric matrix whose lower triangle is in `a`. O(n^3) per sweep, a few sweeps. N may be
-/// `Eigen::Dynamic`.
+/// Eigen-decomposition of the symmetric matrix whose lower triangle is in `a`. O(n^3) per sweep; takes a few sweeps. N
+/// may be `Eigen::Dynamic`.
 /// @pre `a` is square and finite
 template <int N>
 [[nodiscard]] symmetric_eigen<N> eigen_of_symmetric(matrix<N, N> a) {
@@ -104,7 +104,8 @@ template <int N>
   return out;
 }
 
-/// Singular value decomposition of any finite square matrix, including singular ones. O(N^3) per sweep, a few sweeps.
+/// Singular value decomposition of any finite square matrix, including singular ones. O(N^3) per sweep; takes a few
+/// sweeps.
 template <int N>
 [[nodiscard]] singular_decomposition<N> svd(const matrix<N, N>& m) {
   constexpr double epsilon = std::numeric_limits<double>::epsilon();

@@ -160,7 +160,7 @@ class basic_so3 {
   /// Below this squared angle, the series is exact to rounding.
   static constexpr S small = std::same_as<S, float> ? S(1e-4) : S(1e-8);
 
-  // Written out because expression templates would slow down the compilation of every includer.
+  // Written out because expression templates would slow down the compilation of every file that includes this header.
   [[nodiscard]] static S sum_of_squares(S x, S y, S z) { return x * x + y * y + z * z; }
   [[nodiscard]] static quaternion unit(S x, S y, S z, S w) {
     const S square = (x * x + z * z) + (y * y + w * w);

@@ -99,7 +99,7 @@ class thread_pool {
 
   std::atomic<std::uint64_t> state_{0};
   std::atomic<bool> is_busy_{false};
-  void (*work_)(const void*) = nullptr;  // of the current job; read by the threads that work on it
+  void (*work_)(const void*) = nullptr;  // function of the current job; read by its threads
   const void* context_ = nullptr;
   std::size_t helpers_ = 0;
   std::vector<std::jthread> workers_;  // the last member: the threads end before the other members are destroyed

@@ -2,8 +2,8 @@
 /// @file
 /// Detection of the processor's instruction sets, and a limit on them for tests.
 ///
-/// Public interfaces do not name a level: every kernel runs at `simd::best_level()`, and all levels give the same bits.
-/// A test of a component verifies this by making the same public call under a `simd::level_limit`:
+/// Public interfaces have no level parameter: every kernel runs at `simd::best_level()`, and all levels give the same
+/// bits. A test of a component verifies this by making the same public call under a `simd::level_limit`:
 ///
 /// @code
 ///   for (const simd::level l : simd::available_levels()) {

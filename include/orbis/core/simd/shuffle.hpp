@@ -16,7 +16,7 @@ namespace orbis::simd {
 
 namespace detail {
 
-/// Lane i is lane Place(i) of a followed by b. For vectors of one register.
+/// Lane i is lane Place(i) of the concatenation of a and b. For vectors of one register.
 template <auto Place, class V>
 [[nodiscard]] ORBIS_ALWAYS_INLINE V shuffle_by(const V& a, const V& b) noexcept {
   V out;
@@ -94,7 +94,8 @@ ORBIS_TARGET_AVX512 inline void look_up_bytes_64(V& out, const V& table, const V
 
 }  // namespace detail
 
-/// Lane i is lane I[i] of a followed by b. For vectors of one register; the result may have any number of lanes.
+/// Lane i is lane I[i] of the concatenation of a and b. For vectors of one register; the result may have any number of
+/// lanes.
 template <std::size_t... I, class T, std::size_t N, target Target>
 [[nodiscard]] ORBIS_ALWAYS_INLINE vec<T, sizeof...(I), Target> shuffle(const vec<T, N, Target>& a,
                                                                        const vec<T, N, Target>& b) noexcept {
@@ -173,7 +174,7 @@ template <class T, std::size_t N, target Target>
     return gather(value.data(), at);
   }
 }
-/// Lane i is entry at[i] of a table that is `low` followed by `high`, for four-byte numbers. @pre 0 <= at[i] < 2 N
+/// Lane i is entry at[i] of the table that consists of `low` and `high`, for four-byte numbers. @pre 0 <= at[i] < 2 N
 template <class T, std::size_t N, target Target>
 [[nodiscard]] ORBIS_ALWAYS_INLINE vec<T, N, Target> look_up(const vec<T, N, Target>& low, const vec<T, N, Target>& high,
                                                             const vec<std::int32_t, N, Target>& at) noexcept {
