@@ -44,8 +44,8 @@ struct ray_options {
   bool ignore_unknown = false;                                 ///< true if rays pass through unknown space
 };
 
-/// Casts rays one after the other; faster if each passes near the previous one. Use one per thread; store and grid must
-/// outlive the caster and must not change.
+/// Casts single rays; faster if each passes near the previous one. Use one per thread; store and grid must outlive the
+/// caster and must not change.
 template <sensor_model Model>
 class ray_caster {
  public:

@@ -18,8 +18,8 @@
 
 namespace orbis::octree {
 
-/// A log of changed voxels by revision, as masks of octants of 4x4x4 voxels. A reader that has processed revision r
-/// requests the changes after it:
+/// A log of the voxels that changed in each revision, as masks of octants of 4x4x4 voxels. A reader that has processed
+/// revision r requests the changes after it:
 ///
 /// @code
 ///   const std::uint64_t seen = log.revision();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A map that is updated when its scans change: when a scan changes, is removed or arrives late, the map becomes
+/// A map that stays consistent with its scans: when a scan changes, is removed or arrives late, the map becomes
 /// bit-identical to one built from all scans in order.
 ///
 /// Log-odds are clamped, so the order of scans matters, and a scan cannot be subtracted, because clamping loses
@@ -66,7 +66,7 @@ class scan_history {
   using model = typename Octree::model;
 
   /// Creates an empty map. `resolution`: edge of a voxel, metres. `tree_depth`: the map is 2^tree_depth voxels wide.
-  /// @pre as for the constructor of occupancy_octree
+  /// @pre same as for the constructor of occupancy_octree
   explicit scan_history(double resolution, int tree_depth = default_tree_depth) : map_{resolution, tree_depth} {
     map_.track_changes();
   }

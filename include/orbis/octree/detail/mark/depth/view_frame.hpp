@@ -44,7 +44,7 @@ struct view_frame {
   chosen_kernel<classify_children_kernel, classify_kernel, simd::avx2> classify;
   depth_pyramid pyramid;
   depth_scene scene;
-  std::vector<child_offsets> offsets;  ///< per level, offsets of a node's children at that level
+  std::vector<child_offsets> offsets;  ///< for each level, offsets of a node's children
   std::vector<node> nodes;             ///< nodes at list_level that rays may touch
 
   /// Computes the test parameters that depend on the view; the caller sets those that depend on the rays. `ray_error`:

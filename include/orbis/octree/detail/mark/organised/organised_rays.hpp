@@ -257,7 +257,7 @@ class organised_rays {
   std::vector<float> z_;                            ///< depth of the end of each ray
   std::vector<placed_part> parts_;                  ///< part of the image for each worker's rays
   std::vector<std::uint32_t> numbers_;              ///< index of each pixel's ray, if it has one
-  std::vector<std::vector<std::uint32_t>> second_;  ///< per band of rows: additional rays of occupied pixels
+  std::vector<std::vector<std::uint32_t>> second_;  ///< additional rays of occupied pixels, for each band of rows
 };
 
 }  // namespace orbis::octree::detail
