@@ -150,14 +150,14 @@ class disjoint_sets {
 struct linked_components {
   std::vector<std::uint32_t> component;  ///< component of each vertex
   std::vector<std::uint32_t> sizes;      ///< number of vertices of each component
-  std::vector<char> goes;                ///< per component: 1 if it is removed
+  std::vector<char> goes;                ///< for each component, 1 if it is removed
   std::size_t min_size = 0;              ///< the `min_size` that was applied
 
   [[nodiscard]] bool is_small(std::uint32_t i) const noexcept { return sizes[component[i]] < min_size; }
 };
 
-/// Finds the components of a graph and decides which of them to remove. `gone`: per place, nonzero for points to
-/// ignore; empty to ignore none. `spacing`: per place, metres. O(links); 4 bytes per vertex and 5 per component.
+/// Finds the components of a graph and decides which of them to remove. `gone`: for each place, nonzero to ignore the
+/// point; empty to ignore none. `spacing`: for each place, metres. O(links); 4 bytes per vertex and 5 per component.
 template <execution_policy Policy>
 [[nodiscard]] linked_components separate(const Policy& policy, const neighbor_graph& graph, std::span<const char> gone,
                                          std::span<const float> spacing, const cluster_options& options) {

@@ -127,13 +127,13 @@ class voxel_sums {
   /// @pre size > 0, metres
   explicit voxel_sums(double size) : size_{size} { assert(size > 0); }
 
-  /// Adds measurements. O(n). @pre fewer than 2^22 measurements in a voxel; not after `finish`
+  /// Adds measurements. O(n). @pre fewer than 2^22 measurements in a voxel; `finish` has not been called
   template <execution_policy Policy>
   void add(const Policy& policy, std::span<voxel_measurements> parts) {
     apply<true>(policy, parts);
   }
   /// Removes measurements that were added. Frees voxels without measurements and bricks without voxels. O(n). @pre they
-  /// were added and have not been removed since; not after `finish`
+  /// were added and have not been removed since; `finish` has not been called
   template <execution_policy Policy>
   void remove(const Policy& policy, std::span<voxel_measurements> parts) {
     apply<false>(policy, parts);
@@ -164,7 +164,7 @@ class voxel_sums {
    private:
     friend class voxel_sums;
     std::vector<std::uint32_t> bricks_;  ///< brick indices, in order
-    std::vector<std::size_t> first_;     ///< per brick index, the position of its first voxel
+    std::vector<std::size_t> first_;     ///< position of each brick's first voxel, indexed by brick
   };
   [[nodiscard]] order in_order() const {
     order out;
@@ -189,7 +189,7 @@ class voxel_sums {
   class choice {
    public:
     choice() = default;
-    /// Looks up points one after the other; fast if most points are in the same brick as the previous one.
+    /// Looks up one point at a time; fast if most points are in the same brick as the previous one.
     class reader {
      public:
       explicit reader(const choice& of) noexcept : of_{&of} {}
@@ -219,7 +219,7 @@ class voxel_sums {
     const voxel_sums* sums_ = nullptr;
     std::vector<std::array<std::uint64_t, 8>> chosen_;  ///< indexed by brick; one bit per cell
   };
-  /// Creates a subset. `chosen`: per voxel, in the order of `cloud`, nonzero if it is chosen. O(voxels + bricks log
+  /// Creates a subset. `chosen`: for each voxel, in the order of `cloud`, nonzero to choose it. O(voxels + bricks log
   /// bricks).
   [[nodiscard]] choice choose(std::span<const char> chosen) const {
     assert(chosen.size() == occupied_);
@@ -235,7 +235,8 @@ class voxel_sums {
     return out;
   }
 
-  /// Returns the mean of each voxel's measurements, with their mean colours. O(voxels). @pre not after `finish`
+  /// Returns the mean of each voxel's measurements, with their mean colours. O(voxels). @pre `finish` has not been
+  /// called
   template <execution_policy Policy>
   [[nodiscard]] point_cloud cloud(const Policy& policy, const order& places, bool with_colors = true) const {
     point_cloud out;
@@ -255,7 +256,7 @@ class voxel_sums {
         });
     return out;
   }
-  /// Returns the mean distance from which each voxel was measured, metres. O(voxels). @pre not after `finish`
+  /// Returns the mean distance from which each voxel was measured, metres. O(voxels). @pre `finish` has not been called
   template <execution_policy Policy>
   [[nodiscard]] std::vector<float> ranges(const Policy& policy, const order& places) const {
     std::vector<float> out(occupied_);

@@ -158,7 +158,7 @@ struct leaf_distances {
 };
 
 /// Writes contiguously the squared distances within `bound` from a point to the points of a leaf; returns their number.
-/// May write up to sixteen values.
+/// The output must have room for sixteen values.
 struct near_in_leaf {
   template <simd::vector V>
   static ORBIS_ALWAYS_INLINE std::size_t keep(const point_row& leaf, const spread_point<V>& q, const V& bound,
@@ -181,8 +181,8 @@ struct near_in_leaf {
   }
 };
 
-/// Writes the indices of the leaves of `near` whose boxes are within `bound` of a point; returns their number. May
-/// write sixteen more values.
+/// Writes the indices of the leaves of `near` whose boxes are within `bound` of a point; returns their number. The
+/// output must have room for sixteen more values.
 struct chosen_leaves {
   template <simd::vector V, simd::vector Numbers>
   static ORBIS_ALWAYS_INLINE std::size_t find(const nearby_leaves& near, const spread_point<V>& q, const V& bound,
@@ -565,7 +565,7 @@ struct knn_kernels {
     near_points_of_each(leaves, near, row, 0, 1, bound, scratch, found, places, 0, capacity, &count);
     return count;
   }
-  /// Applies `sums_of_each` to one point. @pre as for `detail::sum_nearest`
+  /// Applies `sums_of_each` to one point. @pre same as for `detail::sum_nearest`
   [[nodiscard]] nearest_sum sum_nearest(const float* found, std::size_t count, std::size_t wanted, float bound) const {
     const auto counted = static_cast<std::uint32_t>(count);
     nearest_sum out;

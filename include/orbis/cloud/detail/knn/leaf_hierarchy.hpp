@@ -107,7 +107,7 @@ class leaf_order {
   };
 
   /// Orders the finite points. Of identical points in a crowded cell, only `most_copies` are kept, because a search
-  /// needs no more. `there`: per point, nonzero if it is included; empty to include all.
+  /// needs no more. `there`: for each point, nonzero to include it; empty to include all.
   template <execution_policy Policy>
   leaf_order(const Policy& policy, const point_view& points, std::size_t most_copies, std::span<const char> there = {})
       : points_{points}, most_copies_{most_copies} {
@@ -247,7 +247,7 @@ struct leaf_hierarchy {
   return row;
 }
 
-/// Builds the hierarchy. `there`: per point, nonzero if it is included; empty to include all.
+/// Builds the hierarchy. `there`: for each point, nonzero to include it; empty to include all.
 /// @pre most_copies > 0, fewer than 2^32 points; there is empty or as long as points
 template <execution_policy Policy>
 [[nodiscard]] leaf_hierarchy make_leaves(const Policy& policy, const point_view& points, std::size_t most_copies,

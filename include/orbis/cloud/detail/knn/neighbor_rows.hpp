@@ -58,7 +58,7 @@ class rank_sorter {
     std::memcpy(&keys_[count_], &distance_squared, sizeof distance_squared);
     indices_[count_++] = index;
   }
-  /// Replaces the added points by those at the given places of `members`. @pre as for `add`
+  /// Replaces the added points by those at the given places of `members`. @pre same as for `add`
   void assign(std::span<const float> squared, const std::uint32_t* places, const std::uint32_t* members) {
     while (squared.size() + 2 * room > keys_.size()) grow();
     count_ = squared.size();

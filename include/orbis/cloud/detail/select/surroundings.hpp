@@ -87,9 +87,9 @@ class surroundings {
   static constexpr std::size_t shape_width = 8;  ///< number of neighbours whose shape is analysed
   static constexpr float bulk_end = 0.3F;        ///< log spacing above usual up to which the shape is not analysed
 
-  /// Builds the neighbour graph. `left`: per point, nonzero if it is present; non-finite points never are. `ranges`:
-  /// metres, per point of the cloud, non-finite or negative if unknown; empty if all are unknown. The ranges must
-  /// outlive this object.
+  /// Builds the neighbour graph. `left`: for each point, nonzero to include it; non-finite points are never included.
+  /// `ranges`: for each point of the cloud, metres, non-finite or negative if unknown; empty if all are unknown. The
+  /// ranges must outlive this object.
   template <execution_policy Policy>
   surroundings(const Policy& policy, const point_view& points, std::span<const char> left,
                std::span<const float> ranges, std::size_t neighbors)
@@ -109,7 +109,7 @@ class surroundings {
   [[nodiscard]] float log_range(std::size_t i) const noexcept {
     return has_range(i) ? std::log(std::max(ranges_[index(i)], 1e-3F)) : nan;
   }
-  /// Per place, nonzero if a test removed the point.
+  /// For each place, nonzero if a test removed the point.
   [[nodiscard]] std::span<const char> gone() const noexcept { return gone_; }
   /// Restores an earlier state of the removals. @pre one entry per point
   void restore(std::vector<char> gone) { gone_ = std::move(gone); }
@@ -235,7 +235,7 @@ class surroundings {
     }
   }
 
-  std::span<const float> ranges_;  ///< per point of the cloud
+  std::span<const float> ranges_;  ///< one per point of the cloud
   neighbor_graph graph_;
   std::vector<float> log_spacing_;
   std::vector<float> local_;  ///< empty before the first use
