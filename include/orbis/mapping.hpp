@@ -5,11 +5,11 @@
 /// | header | contents |
 /// | --- | --- |
 /// | `batch.hpp` | `build_map`: a map from posed keyframes in one batch |
-/// | `live_map.hpp` | `live_map`: an octree that grows with each keyframe and follows pose corrections |
+/// | `live_map.hpp` | `live_map`: an octree that grows with each keyframe and is updated when keyframe poses change |
 /// | `live_map_thread.hpp` | a live map with its own thread, a queue, and snapshots for readers |
 /// | `live_map_events.hpp` | events and callbacks of a live map |
 /// | `depth_history.hpp` | the concept for a store of the keyframes' depth images |
-/// | `dense_cloud.hpp` | the points of all keyframes as one cloud that follows corrections of their poses |
+/// | `dense_cloud.hpp` | the points of all keyframes as one cloud, updated when keyframe poses change |
 /// | `depth_store.hpp` | depth images of many keyframes, compressed without loss, within a memory budget |
 /// | `filter.hpp` | `filter_points`: the outlier filter, selected at run time |
 /// | `keyframe.hpp` | the keyframe type that mapping uses |

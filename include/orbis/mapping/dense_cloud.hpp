@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The points of all keyframes' depth images as one cloud in the world frame that follows corrections of their poses.
+/// The points of all keyframes' depth images as one cloud in the world frame, updated when keyframe poses change.
 #pragma once
 
 #include <algorithm>
@@ -43,7 +43,7 @@ struct dense_options {
   return {options.stride, options.min_depth, options.max_depth, options.flying_pixels};
 }
 
-/// A cloud that grows with each keyframe and follows changes of the keyframes' poses.
+/// A cloud that grows with each keyframe and is updated when keyframe poses change.
 ///
 /// With a voxel size, memory is proportional to the observed surface (about 50 bytes for each voxel, and 20 for each
 /// measurement of the largest keyframe); without one, it is proportional to the number of measurements. In both cases
@@ -60,16 +60,16 @@ class dense_cloud {
 
   /// Adds a keyframe's points; returns the number of measurements. The index of the keyframe (`number` below) is the
   /// number of keyframes added before it. Colours are kept if every keyframe has them. O(pixels). @pre the images have
-  /// the size of the ray table; the pose is finite; with a voxel size, fewer than 2^22 measurements per voxel; not
-  /// after `finish`
+  /// the size of the ray table; the pose is finite; with a voxel size, fewer than 2^22 measurements per voxel; `finish`
+  /// has not been called
   template <execution_policy Policy, keyframe_like Keyframe>
   std::size_t add_keyframe(const Policy& policy, const Keyframe& k) {
     assert(!finished_);
     frames_.push_back({});
     return put(policy, k, frames_.size() - 1);
   }
-  /// Removes keyframe `number`. Reads only the images of `k`.
-  /// O(pixels). @pre it was added with the same images and has not been removed; not after `finish`
+  /// Removes keyframe `number`. Reads only the images of `k`. O(pixels). @pre it was added with the same images and has
+  /// not been removed; `finish` has not been called
   template <execution_policy Policy, keyframe_like Keyframe>
   void remove(const Policy& policy, const Keyframe& k, std::size_t number) {
     assert(contains(number) && !finished_);
@@ -85,18 +85,18 @@ class dense_cloud {
     f = {};
   }
   /// Moves keyframe `number` to the current pose of `k`. O(pixels).
-  /// @pre it was added with the same images and has not been removed; the pose is finite; not after `finish`
+  /// @pre it was added with the same images and has not been removed; the pose is finite; `finish` has not been called
   template <execution_policy Policy, keyframe_like Keyframe>
   void move(const Policy& policy, const Keyframe& k, std::size_t number) {
     remove(policy, k, number);
     put(policy, k, number);
   }
-  /// Moves all keyframes whose pose has changed since they were last placed: in any bit or, with a `tolerance` (metres,
-  /// >= 0), far enough that a point in their view, up to `max_depth`, moves by more than the tolerance (in any bit if
-  /// `max_depth` is not finite). Returns the number of moved keyframes. `keyframes`: all keyframes added so far, in the
-  /// order in which they were added; removed ones are skipped. O(keyframes + pixels of those that moved), plus O(pixels
-  /// of one image) with a tolerance. @pre `keyframes` has one entry per added keyframe; the poses are finite; not after
-  /// `finish`
+  /// Moves all keyframes whose pose has changed since they were last placed. With `tolerance` 0, or if `max_depth` is
+  /// not finite, a change of any bit counts; with a `tolerance` (metres), only a change that moves a point in the
+  /// keyframe's view, up to `max_depth`, by more than the tolerance. Returns the number of moved keyframes.
+  /// `keyframes`: all keyframes added so far, in the order in which they were added; removed ones are skipped.
+  /// O(keyframes + pixels of those that moved), plus O(pixels of one image) with a tolerance. @pre `keyframes` has one
+  /// entry per added keyframe; the poses are finite; tolerance >= 0; `finish` has not been called
   template <execution_policy Policy, keyframe_range Keyframes>
   std::size_t reassemble(const Policy& policy, const Keyframes& keyframes, double tolerance = 0.0) {
     assert(std::ranges::size(keyframes) == frames_.size() && tolerance >= 0 && !finished_);
@@ -125,7 +125,7 @@ class dense_cloud {
   /// Number of points.
   [[nodiscard]] std::size_t size() const noexcept { return merging() ? voxels_.size() : size_; }
   /// Returns the current cloud in the world frame: voxel by voxel in the order of `cloud::voxel_sums`, or keyframe by
-  /// keyframe. O(size()), and O(bricks log bricks) with a voxel size. @pre not after `finish`
+  /// keyframe. O(size()), and O(bricks log bricks) with a voxel size. @pre `finish` has not been called
   template <execution_policy Policy = sequential_policy>
   [[nodiscard]] point_cloud cloud(const Policy& policy = {}) const {
     assert(!finished_);
@@ -140,7 +140,7 @@ class dense_cloud {
   }
   /// Returns the distance (metres) from which each point of the cloud was observed; with a voxel size, the mean over
   /// the measurements in the voxel, to the nearest millimetre. (A mean can be updated when a keyframe is removed; a
-  /// minimum could not.) O(size()). @pre not after `finish`
+  /// minimum could not.) O(size()). @pre `finish` has not been called
   template <execution_policy Policy = sequential_policy>
   [[nodiscard]] std::vector<float> ranges(const Policy& policy = {}) const {
     assert(!finished_);

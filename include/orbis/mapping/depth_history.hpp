@@ -11,7 +11,7 @@
 
 namespace orbis::mapping {
 
-/// Stores depth images by frame index, and returns them without loss.
+/// Stores depth images, indexed by frame, and returns them without loss.
 ///
 /// `put(frame, pixels)` stores a copy, and replaces an existing image of the same frame. After an error, either the
 /// image is nevertheless stored, or `get` fails for this frame.

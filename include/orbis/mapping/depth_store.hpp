@@ -38,7 +38,7 @@ struct depth_store_options {
   std::filesystem::path spill_file{};
 };
 
-/// Depth images by frame index, stored losslessly.
+/// Stores depth images, indexed by frame, without loss.
 ///
 /// An image from a real or simulated sensor takes 0.05 to 0.2 of its original 16 bits per pixel, because a depth camera
 /// that measures disparity produces few distinct depths (`detail/depth/depth_codec.hpp`). An image of pure noise is not
@@ -127,7 +127,7 @@ class depth_store {
   }
 
   [[nodiscard]] bool contains(std::uint64_t frame) const { return entries_.contains(frame); }
-  /// Frees the buffers of `put`; its next call allocates them again.
+  /// Frees the buffers of `put`; the next call to `put` allocates them again.
   void free_buffers() { encoder_ = {}; }
   /// Number of images.
   [[nodiscard]] std::size_t size() const noexcept { return entries_.size(); }

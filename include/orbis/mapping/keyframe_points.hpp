@@ -58,7 +58,7 @@ class keyframe_points {
   }
   /// Returns a copy of the depth image (see `view_like`) with 0 in every pixel that would not become a point,
   /// regardless of the stride: the result of `dense_cloud::masked_depth` before the cloud is filtered. O(pixels). @pre
-  /// as for `read`
+  /// same as for `read`
   template <execution_policy Policy, camera::depth_source Depth>
   [[nodiscard]] image<depth_pixel<Depth>> masked(const Policy& policy, const Depth& depth,
                                                  const camera::ray_table& rays, const keyframe_point_options& options) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// An occupancy map that grows with each keyframe, and follows every correction of the keyframes' poses.
+/// An occupancy map that grows with each keyframe, and is updated when keyframe poses change.
 ///
 /// @code
 ///   using live = orbis::mapping::live_map<orbis::octree::occupancy_octree<>, orbis::camera::pinhole>;
@@ -128,8 +128,8 @@ class live_map {
   /// Adds a keyframe, or replaces the depth image and pose of an existing one. `frame`: the index of its frame, which
   /// orders keyframes; `depth`: as integrated into the map, without the pixels that a filter removed; `T_world_camera`:
   /// if it is not finite, the keyframe waits outside the map for a pose. The newest keyframe is in the map immediately.
-  /// `what` is only stored, see is_filtered. `whole`: the stored values of `depth` including the pixels that a filter
-  /// removed, which set_depth may restore; empty: none was removed. Error: that of `Depths::put`; the keyframe is
+  /// `what` is only recorded, see is_filtered. `whole`: the stored values of `depth` including the pixels that a filter
+  /// removed, which set_depth may restore; empty: none was removed. Errors: those of `Depths::put`; the keyframe is
   /// nevertheless in the map. O(marking, see octree::scan_marker) and Depths::put. @pre the images have the camera's
   /// size
   template <execution_policy Policy>
@@ -146,7 +146,7 @@ class live_map {
     return summary;
   }
   /// Replaces the set of pixels that are removed from the depth image of a keyframe, for example when a filter has a
-  /// new result. Removed pixels are 0 in `depth`. The map follows with `correct`. Errors: not_found; that of
+  /// new result. Removed pixels are 0 in `depth`. `correct` updates the map. Errors: not_found; those of
   /// `Depths::mask`, or of `Depths::put` if there is no `mask`.
   /// @pre depth has the camera's size; its other pixels are those of the keyframe's image, `whole` in add_keyframe
   template <execution_policy Policy>
@@ -160,10 +160,10 @@ class live_map {
   /// Removes pixels from the depth images of several keyframes: `remove_pixels(i, depth, pixels)` sets the pixels to
   /// remove from the image of `frames[i]` to 0 in `pixels`, a copy of the stored values of `depth`; it is called on
   /// several threads. Keyframes are changed in groups of one per thread; if `remove_pixels` throws, the whole group is
-  /// unchanged. The map follows with `correct`. Stops when `on_progress`, which counts the keyframes, returns false.
-  /// Errors: not_found, before anything is changed; that of `Depths::get`, in which case the keyframe is removed and
-  /// the rest of its group is unchanged; that of set_depth, after all keyframes are processed; cancelled. For each
-  /// keyframe O(pixels), Depths::get and mask, and marking. @pre no frame is listed twice
+  /// unchanged. `correct` updates the map. Stops when `on_progress`, which counts the keyframes, returns false. Errors:
+  /// not_found, before anything is changed; those of `Depths::get`, in which case the keyframe is removed and the rest
+  /// of its group is unchanged; those of set_depth, after all keyframes are processed; cancelled. For each keyframe
+  /// O(pixels), Depths::get and mask, and marking. @pre no frame is listed twice
   template <execution_policy Policy, class RemovePixels>
   result<void> edit_depths(const Policy& policy, std::span<const std::uint64_t> frames,
                            const RemovePixels& remove_pixels, progress on_progress = {}) {
@@ -221,7 +221,7 @@ class live_map {
     frames_.push_back({frame, keyframe});
     return true;
   }
-  /// Removes a culled keyframe; the map follows with `correct`. Returns false if it does not exist. O(its bricks).
+  /// Removes a culled keyframe; `correct` updates the map. Returns false if it does not exist. O(its bricks).
   bool remove(std::uint64_t frame) {
     entry* const k = find(frame);
     if (k == nullptr) return false;
@@ -233,9 +233,9 @@ class live_map {
 
   // -- corrections
 
-  /// Sets the current poses of keyframes, in any order; the map follows with `correct`. Frames that are not keyframes
-  /// of the map are skipped; a pose that is not finite hides its keyframe. Returns the number of keyframes waiting to
-  /// be moved. O(poses x log keyframes), about 0.1 us each.
+  /// Sets the current poses of keyframes, in any order; `correct` updates the map. Frames that are not keyframes of the
+  /// map are skipped; a pose that is not finite hides its keyframe. Returns the number of keyframes waiting to be
+  /// moved. O(poses x log keyframes), about 0.1 us each.
   template <std::ranges::input_range Poses>
   requires keyframe_position_like<std::ranges::range_value_t<Poses>> std::size_t set_poses(
       const Poses& poses, unlisted others = unlisted::keep) {
@@ -253,7 +253,7 @@ class live_map {
   }
   /// Moves keyframes whose poses are out of tolerance to their current poses, and updates the map, until the time
   /// limit. Keyframes whose views moved far and that are close to the robot come first. Every call makes progress if
-  /// anything is pending. Error: that of `Depths::get`. A keyframe whose image is lost is removed; the next call
+  /// anything is pending. Errors: those of `Depths::get`. A keyframe whose image is lost is removed; the next call
   /// continues with the others. O(keyframes) and, for each keyframe that is moved, marking and replaying; O(1) if
   /// nothing is pending.
   template <execution_policy Policy>

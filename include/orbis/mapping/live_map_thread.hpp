@@ -76,7 +76,7 @@ class live_map_thread {
   using snapshot_type = live_map_snapshot<Octree>;
   using depth_view = typename map_type::depth_view;
 
-  /// @pre as for live_map; options.threads > 0, options.max_waiting > 0
+  /// @pre same as for live_map; options.threads > 0, options.max_waiting > 0
   explicit live_map_thread(Camera camera, const live_map_thread_options& options = {},
                            live_map_listeners<Octree> listeners = {}, Depths depths = Depths{})
       : options_{options},

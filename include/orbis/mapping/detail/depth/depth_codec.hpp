@@ -2,9 +2,9 @@
 /// @file
 /// Lossless compression of 16-bit depth images.
 ///
-/// A. D. Wilson, "Fast lossless depth image compression", ISS 2017 (RVL): run lengths and, between the runs, folded
-/// differences, written in groups of bits, each with a bit that indicates whether another group follows. In RVL, runs
-/// consist of pixels without depth, and a pixel is predicted by the previous one. In this codec,
+/// A. D. Wilson, "Fast lossless depth image compression", ISS 2017 (RVL): run lengths and, between the runs,
+/// zigzag-encoded differences, written in groups of bits, each with a bit that indicates whether another group follows.
+/// In RVL, runs consist of pixels without depth, and a pixel is predicted by the previous one. In this codec,
 ///
 /// - a pixel is coded by its *rank* among the distinct depths of the image. A depth camera that measures disparity has
 ///   only a few hundred of them, centimetres apart at long range; in ranks, all steps of the sensor are equal.
@@ -46,7 +46,7 @@ enum class depth_coding : std::uint8_t {
   return above < high ? above : high;
 }
 
-/// Maps signed numbers to unsigned ones: 0, -1, 1, -2, ...
+/// Zigzag encoding: maps the signed numbers 0, -1, 1, -2 ... to 0, 1, 2, 3 ...
 [[nodiscard]] inline std::uint32_t folded(std::int32_t value) noexcept {
   return static_cast<std::uint32_t>(value) << 1U ^ (value < 0 ? ~0U : 0U);
 }
