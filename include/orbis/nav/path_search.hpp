@@ -216,12 +216,12 @@ template <planning_space Space>
 
 }  // namespace detail
 
-/// Finds a path for the robot `from` a start `to` a goal (metres): the straight segment if it is free and its cost
-/// equals its length; otherwise a cheap path over cell centres (see path_method), which is then shortened in continuous
-/// space, or the straight segment if there is no other path. Without `shorten`, the path always runs over cell centres.
-/// Every segment is free according to `space.is_free`: the robot touches no obstacle anywhere on it. If the goal cannot
-/// be reached, `status` gives the reason and the path leads to the nearest reachable point. A passage in which the
-/// robot fits only between cell centres is not found.
+/// Finds a path for the robot from the start `from` to the goal `to` (metres): the straight segment if it is free and
+/// its cost equals its length; otherwise a cheap path over cell centres (see path_method), which is then shortened in
+/// continuous space, or the straight segment if there is no other path. Without `shorten`, the path always runs over
+/// cell centres. Every segment is free according to `space.is_free`: the robot touches no obstacle anywhere on it. If
+/// the goal cannot be reached, `status` gives the reason and the path leads to the nearest reachable point. A passage
+/// in which the robot fits only between cell centres is not found.
 ///
 /// O(n log n) for n expanded cells, 16 kB per visited block of 8x8x8 voxels (2 kB per 8x8 cells of a floor), and
 /// `max_checks` segment checks for shortening. An unreachable goal costs little if it, or the start, is in a small

@@ -143,7 +143,7 @@ class replanner {
   explicit replanner(const vec3& goal, const path_options& options = {}) : goal_{goal}, options_{options} {}
 
   /// The path from `position` (metres) to the goal, as found by find_path: the previous path without the part already
-  /// passed, or a new one; on a floor, at the floor's current height. Valid until the next call. @pre as for
+  /// passed, or a new one; on a floor, at the floor's current height. Valid until the next call. @pre same as for
   /// path_monitor::first_blocked
   template <planning_space Space>
   const found_path& update(const Space& space, const vec3& position) {
