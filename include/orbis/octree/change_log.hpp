@@ -232,7 +232,7 @@ class change_log {
   std::uint64_t complete_since_ = 0;
   std::uint64_t exact_since_ = 0;
   std::size_t capacity_ = std::size_t{1} << 18U;
-  std::size_t limit_ = 2 * capacity_;  ///< number of entries at which those of the current revision are merged
+  std::size_t limit_ = 2 * capacity_;  ///< number of entries at which the current revision's are merged
 };
 
 }  // namespace orbis::octree

@@ -25,8 +25,8 @@ template <sensor_model M>
   return M::occupancy_threshold > 0 ? T{0} : largest_free_value<M>();
 }
 
-/// Exponential decay: log-odds halve every `half_life`. Two applications equal one with the sum of the times, up to
-/// rounding. Free voxels never become occupied, or vice versa.
+/// Exponential decay: log-odds halve every `half_life`. Two applications are equivalent to one with the sum of the
+/// elapsed times, up to rounding. Free voxels never become occupied, or vice versa.
 /// @pre half_life > 0, elapsed >= 0
 template <sensor_model M = log_odds<>>
 struct exponential_decay {

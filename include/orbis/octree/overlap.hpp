@@ -51,7 +51,7 @@ struct capsule {
   return squared_norm(s.center - nearest) <= s.radius * s.radius;
 }
 namespace detail {
-/// Exact test for the cases that `touches` below cannot decide otherwise.
+/// Exact test for the cases that the quick tests of `touches` below do not decide.
 [[nodiscard]] inline bool touches_exactly(const capsule& c, const bounding_box& b) noexcept {
   const vec3 along = c.b - c.a;
   // The squared distance of a + t (b - a) from the box is convex in t, and its slope is linear between the parameters
@@ -92,9 +92,9 @@ namespace detail {
   if (apart > outside * outside) return false;
   const double inside = (c.radius + min_entry(half)) * (1.0 - 1e-9);
   if (apart < inside * inside) return true;
-  // That point of the segment may be near enough to the box; otherwise the plane through the nearest point of the box,
-  // perpendicular to the line between the two, may separate both ends from the box. If `c` is a ball, one of the two
-  // holds, up to rounding.
+  // The nearest point of the segment may be near enough to the box; otherwise the plane through the nearest point of
+  // the box, perpendicular to the line between these points, may separate both ends from the box. If `c` is a ball, one
+  // of the two holds, up to rounding.
   const vec3 point = c.a + share * along, nearest = clamped(point, b), way = point - nearest;
   const double squared = squared_norm(way), reach = c.radius * c.radius;
   if (squared < reach * (1.0 - 1e-9)) return true;

@@ -35,7 +35,7 @@ namespace orbis::octree {
 
 /// Limits of one call to replay. When a limit is reached, the remaining octants stay stale for the next call.
 struct replay_limits {
-  std::chrono::nanoseconds time = std::chrono::nanoseconds::max();  ///< checked after each few dozen bricks
+  std::chrono::nanoseconds time = std::chrono::nanoseconds::max();  ///< checked after every few dozen bricks
   std::size_t bricks = std::numeric_limits<std::size_t>::max();
 };
 
@@ -160,7 +160,7 @@ class scan_history {
   /// Position (existing or for insertion) of the scan of `frame` among the scans that use a brick.
   [[nodiscard]] std::vector<detail::brick_use>::iterator find_place(std::vector<detail::brick_use>& uses,
                                                                     std::uint64_t frame) const noexcept;
-  /// Updates the bricks' lists of scans from the old voxels of scan `number` to `after`. If the scan is the newest of a
+  /// Updates the bricks' lists of scans from the old voxels of scan `number` to `after`. If the scan is the newest in a
   /// brick, apply_fresh handles the brick; otherwise octants become stale.
   void change_uses(std::uint32_t number, const scan& after);
   /// Applies the parts of a scan that are the newest in their bricks.

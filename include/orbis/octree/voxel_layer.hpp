@@ -26,8 +26,8 @@ namespace orbis::octree {
 template <class T>
 concept voxel_payload = std::copyable<T> && std::default_initializable<T> && std::is_trivially_copyable_v<T>;
 
-/// Running mean of observed colours; 8 bytes. Exact for the first 257 observations; afterwards the past has a weight of
-/// at least 128 observations, so that the mean covers roughly the last two hundred.
+/// Running mean of observed colours; 8 bytes. Exact for the first 257 observations; afterwards, earlier observations
+/// have a total weight of at least 128, so that the mean covers roughly the last two hundred.
 class rgb_mean {
  public:
   void update(const rgb8& color) noexcept {
@@ -67,7 +67,7 @@ class rgb_mean {
 ///   if (const auto key = map.grid().key(p)) colors.make(*key).update({200, 120, 40});
 /// @endcode
 ///
-/// Const members can be called from several threads concurrently. All functions: @pre coordinates of keys < 2^21.
+/// Const members can be called from several threads concurrently. All functions require key coordinates < 2^21.
 template <voxel_payload T>
 class voxel_layer {
  public:

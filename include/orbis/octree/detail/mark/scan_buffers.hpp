@@ -22,7 +22,7 @@ namespace orbis::octree::detail {
 
 struct scan_buffers {
   point_integrator points;
-  std::unique_ptr<depth_integrator> depth;  ///< created by the first image; not compiled in programs without images
+  std::unique_ptr<depth_integrator> depth;  ///< created by the first image; not compiled if no images are used
   scan_masks masks;
 
   [[nodiscard]] std::size_t memory_bytes() const noexcept {

@@ -87,7 +87,7 @@ template <sensor_model Model>
 octant_change apply_octant(brick_store<typename Model::value_type>& store, brick<typename Model::value_type>& b,
                            std::uint32_t octant, std::uint64_t occupied, std::uint64_t free) {
   using T = typename Model::value_type;
-  // Most voxels of a room are already saturated, so octants that cannot change are not unpacked.
+  // Most voxels of a mapped room are already saturated, so octants that cannot change are not unpacked.
   if (free != 0) free &= ~store.voxels_where(b, octant, is_saturated_free<Model>);
   if (occupied != 0) occupied &= ~store.voxels_where(b, octant, [](T v) { return v >= Model::clamp_max; });
   if ((free | occupied) == 0) return {};

@@ -128,8 +128,8 @@ std::size_t visit_parts(const brick_store<T>& store, const std::vector<tree_part
   });
 }
 
-/// Calls `visit(key, level, value)` for every leaf of the pruned octree whose root is at `root_level`,
-/// in the order of `pruned_tree::visit`. Returns the number of inner nodes. O(known voxels).
+/// Calls `visit(key, level, value)` for every leaf of the pruned octree whose root is at `root_level`, in Morton order.
+/// Returns the number of inner nodes. O(known voxels).
 template <class T, std::invocable<const voxel_key&, int, T> Visit>
 std::size_t visit_leaves(const brick_store<T>& store, int root_level, Visit&& visit) {
   return visit_parts(store, tree_parts(store, root_level), root_level, visit);

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// 64 voxels as indices into their few distinct values. Log-odds result from a few additions and two bounds, so
-/// neighbouring voxels mostly share values: an octant takes a quarter of the memory of its floats, without loss.
+/// Storage of 64 voxels as indices into their few distinct values. Log-odds result from a few additions and two bounds,
+/// so neighbouring voxels mostly have equal values: an octant takes a quarter of the memory of its floats, without
+/// loss.
 #pragma once
 
 #include <array>

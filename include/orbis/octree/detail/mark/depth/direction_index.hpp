@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
 /// Index from regions of directions to the pixels that see them, for any camera model. It is computed only from the
-/// rays of the pixels, without the projection.
+/// rays of the pixels, without the camera's projection function.
 #pragma once
 
 #include <algorithm>

@@ -205,7 +205,7 @@ struct classify_children_kernel {
     const integers width = of_level(pyramid.width().data()), family(static_cast<std::int32_t>(pyramid.family()));
     integers begin = of_level(pyramid.begin().data());
     begin += select(far < dense_z[1], family, zero);
-    begin += select(far < dense_z[2], family, zero);  // implies the condition above
+    begin += select(far < dense_z[2], family, zero);  // this condition implies the one above
     const integers i0 = a >> level, i1 = max(i0, (b >> level) - integers(1));
     const integers j0 = d >> level, j1 = max(j0, (e >> level) - integers(1));
     const integers row0 = begin + j0 * width, row1 = begin + j1 * width;

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
 /// Finds the voxels that the rays of an organised point cloud cross. The points of such a cloud are the pixels of a
-/// depth image, in pixel order; this is detected from the points. The voxels are found as for a depth image.
+/// depth image, in pixel order, which is detected from the points. The voxels are found in the same way as for a depth
+/// image.
 #pragma once
 
 #include <algorithm>
@@ -147,7 +148,7 @@ class organised_rays {
   /// Marks the voxels of the added rays. Voxels that a miss would not change according to `saturated` may be missing,
   /// see depth_integrator::mark, as may those that are occupied in `masks`. Returns false, and marks nothing, if rays
   /// come too close to the border of the grid, or if many rays share a pixel. `end_of(i)`: the ray_endpoint of the i-th
-  /// point. (The signature is that of dense_rays::mark, which uses the range.)
+  /// point. (The unused range keeps the signature the same as that of dense_rays::mark.)
   template <execution_policy Policy, class Range, class EndOf, class Saturated>
   [[nodiscard]] bool mark(const Policy& policy, const depth_sensor& scan, Range&&, const EndOf& end_of,
                           scan_masks& masks, const Saturated& saturated) {

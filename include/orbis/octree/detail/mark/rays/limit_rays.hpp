@@ -175,7 +175,7 @@ using fresh_kernel = void(const ray_batch&, std::size_t, ray_batch::bits&);
 using limit_kernel = void(const ray_frame&, const point_batch&, double, std::size_t, ray_batch&);
 
 /// Computes the rays to `count` points, limited to a length in metres. There is no ray to an end outside the grid.
-/// @pre points can be read up to a multiple of 16; the limit is not negative
+/// @pre points are readable up to the next multiple of 16; the limit is not negative
 [[nodiscard]] inline limit_kernel* limit_rays() noexcept { return simd::kernel<limit_rays_kernel, limit_kernel>(); }
 
 }  // namespace orbis::octree::detail

@@ -25,7 +25,7 @@ struct queued_rays {
   std::vector<std::int32_t> planes;
   std::vector<std::uint32_t> id;
 
-  /// Makes room for `count` rays, and for reading a full vector at any of them.
+  /// Makes room for `count` rays, and for reading a full vector that starts at any of them.
   void fit(std::size_t count) {
     if (planes.size() >= count + lanes) return;
     u.resize(count + lanes);
@@ -104,7 +104,7 @@ struct mark_crossings_kernel {
     const integers first_plane(w.first), origin_cell(static_cast<std::int32_t>(w.cell(0, 0)));
 
     for (std::size_t r = begin; r < end; r += n) {
-      integers left = integers::load(rays.planes.data() + r) - first_plane;  // planes; negative: the ray has ended
+      integers left = integers::load(rays.planes.data() + r) - first_plane;  // planes left; negative: the ray has ended
       mask alive = mask::first(end - r) & (left >= integers(0));
       if (none(alive)) continue;
 
@@ -150,7 +150,7 @@ struct mark_crossings_kernel {
         const integers part_u = part_of(u), part_v = part_of(v);
         const integers cell = cell_at(u, v), changed = cell ^ last;
         const mask both = ((changed & bits_u) != integers(0)) & ((changed & bits_v) != integers(0));
-        // The ray crosses first the face that is further back, measured in units of the ray's speed.
+        // The ray first crosses the face that is further back, measured in units of the ray's speed.
         const floats behind_u = simd::convert<float>(part_u ^ flip_u) * fv;
         const floats behind_v = simd::convert<float>(part_v ^ flip_v) * fu;
         const floats order = behind_u - behind_v;

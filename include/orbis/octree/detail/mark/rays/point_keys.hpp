@@ -62,7 +62,7 @@ inline void load_points(const point_view& points, std::size_t begin, std::size_t
 /// compiled once.
 class point_source {
  public:
-  /// Refers to `points`: point_view, or a type with the same members and overload of load_points.
+  /// Refers to `points`, a point_view or another type with the same members and an overload of load_points.
   template <class Points>
   requires(!std::same_as<Points, point_source>) point_source(const Points& points)
       : count{points.count},
@@ -154,7 +154,7 @@ struct find_keys_kernel {
   }
 };
 
-/// Finds the voxels of the first `count` points. @pre the arrays of `points` can be read up to a multiple of 16
+/// Finds the voxels of the first `count` points. @pre the arrays of `points` are readable up to the next multiple of 16
 inline void find_keys(const voxel_grid& grid, const point_batch& points, std::size_t count, batch_keys& keys) noexcept {
   using signature = void(const voxel_grid&, const point_batch&, std::size_t, batch_keys&);
   simd::kernel<find_keys_kernel, signature>()(grid, points, count, keys);

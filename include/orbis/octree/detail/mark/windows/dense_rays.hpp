@@ -146,7 +146,7 @@ class dense_rays {
   static constexpr std::size_t fewest_rays = 4096;
   static constexpr std::size_t most_sampled = 1024;
   static constexpr double cell_edge = 0.25;  ///< edge of a cell at the ends of the rays, in voxels
-  static constexpr double fewest_in_cell = 2.0, most_in_cell = 16.0;  ///< average number of rays per cell
+  static constexpr double fewest_in_cell = 2.0, most_in_cell = 16.0;  ///< bounds on the average number of rays per cell
 
   template <class EndOf>
   void walk_first_steps(const depth_sensor& sensor, const EndOf& end_of, scan_masks& masks) const {
