@@ -76,8 +76,8 @@ struct nearest_place {
   [[nodiscard]] bool found() const noexcept { return place != std::numeric_limits<std::uint32_t>::max(); }
 };
 
-/// Finds the point nearest to `q` among those for which `counts(place)` is true. Ties are resolved by the lowest index,
-/// except at `q` itself. `found()` is false if there is no such point. @pre q is finite
+/// Finds the point nearest to `q` among those for which `counts(place)` is true. Ties are resolved in favour of the
+/// lowest index, except at `q` itself. `found()` is false if there is no such point. @pre q is finite
 template <class Counts>
 [[nodiscard]] nearest_place find_nearest(const leaf_hierarchy& tree, const knn_kernels& kernels,
                                          const std::array<float, 3>& q, const Counts& counts) {

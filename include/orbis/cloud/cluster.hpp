@@ -37,7 +37,7 @@ struct cluster_result {
   static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
 
   std::vector<std::uint32_t> inliers;    ///< indices, ascending
-  std::vector<std::uint32_t> component;  ///< component of each point, in the order of their first points; or `none`
+  std::vector<std::uint32_t> component;  ///< component of each point, or `none`; numbered in the order of first points
   std::vector<std::uint32_t> sizes;      ///< number of points of each component
   std::vector<char> removed;             ///< for each component, nonzero if it is removed
   std::size_t min_size = 0;              ///< the `min_size` that was applied

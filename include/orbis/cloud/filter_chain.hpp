@@ -71,7 +71,7 @@ struct surface_test {
 
 /// Removes points whose log spacing exceeds the usual one by more than the threshold, unless they lie on a surface.
 struct density_step {
-  filter_mode mode = filter_mode::log_statistical;  ///< or range_log_statistical, local_log_statistical
+  filter_mode mode = filter_mode::log_statistical;  ///< one of the three log-statistical modes
   std::size_t neighbors = 8;                        ///< number of neighbours over which the spacing is averaged; > 0
   log_line usual{};      ///< log spacing of the bulk as a function of log range; slope 0: constant
   double offset = 0;     ///< offset of the bulk from its surroundings in the local mode

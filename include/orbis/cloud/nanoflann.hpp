@@ -26,8 +26,8 @@
 namespace orbis::cloud {
 
 /// A k-d tree over `points`, which must outlive it and must not change. Skips non-finite points. Construction takes O(n
-/// log n), a query O(log n + k) on usual clouds; identical points are supported. Memory: about 20 bytes per point, plus
-/// the indices of the finite points if some are not finite.
+/// log n), a query O(log n + k) on typical clouds; identical points are supported. Memory: about 20 bytes per point,
+/// plus the indices of the finite points if some are not finite.
 ///
 /// The tree reads the points in place, in random order. For a large cloud without spatial order in memory (shuffled, or
 /// from a hash table), queries are limited by memory latency.
@@ -40,7 +40,7 @@ class nanoflann_search {
 
   explicit nanoflann_search(const Points& points, std::size_t leaf_size = 12)
       : data_{points}, tree_{3, data_, nanoflann::KDTreeSingleIndexAdaptorParams(leaf_size)} {}
-  nanoflann_search(Points&&, std::size_t = 0) = delete;  // would not outlive the constructor
+  nanoflann_search(Points&&, std::size_t = 0) = delete;  // a temporary would not outlive the constructor
   nanoflann_search(const nanoflann_search&) = delete;
   nanoflann_search& operator=(const nanoflann_search&) = delete;
 

@@ -23,7 +23,7 @@
 
 namespace orbis::cloud {
 
-/// Counts for each point the views that pass through it and those that support it.
+/// Counts for each point the views whose rays pass through it and the views that support it.
 ///
 /// Let a point be at depth z in a view, m = margin + margin_growth z^2, and consider the depths in the window around
 /// its pixel. The view passes *through* the point if every pixel of the window has a depth and the nearest exceeds z by
@@ -63,8 +63,8 @@ struct ray_evidence_result {
 [[nodiscard]] ray_evidence_result ray_evidence_decision(std::vector<ray_evidence> scores,
                                                         const ray_evidence_options& options = {});
 
-/// Returns the indices, ascending, of the finite points that rays do not pass through. See `ray_evidence_scores`, also
-/// for `on_progress`.
+/// Returns the indices, ascending, of the finite points that rays do not pass through. See `ray_evidence_scores`, which
+/// also describes `on_progress`.
 template <execution_policy Policy, point_range Points, posed_depth_range Views, camera::camera_model Camera>
 [[nodiscard]] std::vector<std::uint32_t> ray_evidence_inliers(const Policy& policy, const Points& points,
                                                               const Views& views, const Camera& camera,

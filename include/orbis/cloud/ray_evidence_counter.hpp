@@ -45,8 +45,8 @@ struct ray_evidence_options {
   float margin = 0.02F;          ///< constant part of the allowance for noise and small pose errors, metres
   float margin_growth = 0.005F;  ///< the allowance at depth z is margin + margin_growth z^2; 1 / metres
   float slant = 1.0F;      ///< fraction of the window's depth range added to the margin for rays that pass through
-  float min_depth = 0.0F;  ///< views provide evidence only about points beyond this depth, metres
-  float max_depth = std::numeric_limits<float>::max();  ///< and up to this depth, metres
+  float min_depth = 0.0F;  ///< points up to this depth get no evidence, metres
+  float max_depth = std::numeric_limits<float>::max();  ///< points beyond this depth get no evidence, metres
   bool resolve_ghosts = true;     ///< true to read the views again and find parts that most other views contradict
   float ghost_reach = 0.3F;       ///< maximum distance of a contradicting surface in front of a measurement, metres
   std::uint16_t min_through = 2;  ///< minimum number of views that pass through an outlier
@@ -86,7 +86,8 @@ class ray_evidence_counter {
   template <execution_policy Policy>
   void add(const Policy& policy, const detail::depth_windows& windows, const se3& T_world_camera);
   /// Subtracts the counts of a view. O(pixels + points in front of the camera).
-  /// @pre the view was added and has not been removed since; fewer than 65536 views were added; there was no review
+  /// @pre the view was added and has not been removed since; fewer than 65536 views were added; `review` has not been
+  /// called
   template <execution_policy Policy, posed_depth View>
   void remove(const Policy& policy, const View& view);
 
@@ -125,7 +126,7 @@ class ray_evidence_counter {
   detail::point_blocks blocks_;
   std::vector<std::uint16_t> through_;  ///< in the order of the blocks
   std::vector<std::uint16_t> supported_;
-  std::vector<std::uint16_t> through_dropped_;  ///< from contradicted parts of views; empty before the first review
+  std::vector<std::uint16_t> through_dropped_;  ///< counts from contradicted parts; empty before the first review
   std::vector<std::uint16_t> refuted_;
   detail::depth_windows windows_;
   detail::block_test<Camera> test_;

@@ -61,7 +61,7 @@ ORBIS_INLINE range_statistical_result range_statistical_decision(std::span<const
   if (out.judged > 0) {
     const auto count = static_cast<double>(out.judged);
     out.mean = sum / count;
-    double squares = 0;  // from deviations from the mean, to avoid cancellation
+    double squares = 0;  // sum of squared deviations from the mean, to avoid cancellation
     for (const float u : out.normalised) {
       if (std::isfinite(u)) squares += (u - out.mean) * (u - out.mean);
     }

@@ -77,8 +77,8 @@ class voxel_measurements {
     runs_.clear();
     without_voxel_ = 0;
   }
-  /// Adds a measurement (world frame, metres) with the distance in metres from which it was made. Non-finite
-  /// measurements, and those more than 2^31 voxels from the origin, have no voxel; they are counted but not stored.
+  /// Adds a measurement (world frame, metres) and its distance from the sensor in metres. Non-finite measurements, and
+  /// those more than 2^31 voxels from the origin, have no voxel; they are counted but not stored.
   void push(const vec3& point, const rgb8& color, float range) {
     detail::brick_place at;
     if (!detail::locate(point, steps_per_metre_, at)) {

@@ -280,7 +280,7 @@ class lane_counter {
   using lanes = simd::native_vec<float, Target>;
   ORBIS_ALWAYS_INLINE void add(const typename lanes::mask_type& m) noexcept {
     if constexpr (Target::needs == simd::level::portable)
-      count_ -= select(m, numbers(-1), numbers(0));  // no population count instruction
+      count_ -= select(m, numbers(-1), numbers(0));  // needs no population count
     else
       count_ += simd::popcount(m);
   }
@@ -494,7 +494,7 @@ struct sum_nearest_each {
   }
 };
 
-/// Returns the `rank`-th smallest, from 1, of sixteen non-negative values.
+/// Returns the `rank`-th smallest (from 1) of sixteen non-negative values.
 struct ranked_of_leaf {
   template <simd::target Target>
   static ORBIS_ALWAYS_INLINE float run(const float* values, std::size_t rank) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A cloud in leaves of sixteen points under a sixteen-wide hierarchy of boxes: the index structure of the all-points
-/// neighbour search.
+/// A cloud divided into leaves of sixteen points, with a hierarchy of boxes in which each node has sixteen children:
+/// the index structure of the all-points neighbour search.
 #pragma once
 
 #include <algorithm>
@@ -93,7 +93,7 @@ struct fill_curve_keys {
 
 /// Order of the points in the leaves: along a Hilbert curve through a grid with 2^10 cells per side; if many points
 /// share a cell, they are ordered recursively along a finer curve within it. The leaves thus adapt to any uneven
-/// density. Each level divides the extent by about a thousand, and the range of float allows 28 levels: O(n) on usual
+/// density. Each level divides the extent by about a thousand, and the range of float allows 28 levels: O(n) on typical
 /// clouds, at most 28 times as long otherwise.
 class leaf_order {
  public:

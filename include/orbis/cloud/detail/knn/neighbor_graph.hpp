@@ -31,8 +31,8 @@ namespace orbis::cloud::detail {
 ///
 /// The points of a leaf have their neighbours in few leaves. These are listed once, and a neighbour is encoded in one
 /// byte: index in the list, and point in the leaf. With more than 16 listed leaves a neighbour takes two bytes; with
-/// more than 256 it is a place. Distances are recomputed. Takes about k + 3 bytes per point on a surface, and 18 for
-/// the point's position and index; a `neighbor_table` takes 8 k.
+/// more than 256 it is encoded as a place. Distances are recomputed. Takes about k + 3 bytes per point on a surface,
+/// and 18 for the point's position and index; a `neighbor_table` takes 8 k.
 class neighbor_graph {
  public:
   neighbor_graph() = default;

@@ -72,8 +72,8 @@ class rank_sorter {
     if (count_ <= most_ranked) {
       find_ranks_(keys_.data(), count_, ranks_.data());
       for (std::size_t i = 0; i != count_; ++i) sorted_[static_cast<std::size_t>(ranks_[i])] = pack(i);
-      // Sorts equal distances by index. There are few, and scalar reads can follow the preceding scalar writes without
-      // delay.
+      // Sorts equal distances by index. There are only a few, and scalar reads can follow the preceding scalar writes
+      // without delay.
       std::uint64_t before = sorted_[0];
       for (std::size_t i = 1; i < count_; ++i) {
         const std::uint64_t here = sorted_[i];

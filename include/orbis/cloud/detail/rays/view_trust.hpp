@@ -135,7 +135,7 @@ struct no_view_action {
 
 struct view_trust_options {
   double conflict = 0.1;  ///< the conflict of a distrusted view exceeds this
-  double excess = 3;      ///< it also exceeds this factor times the usual conflict
+  double excess = 3;      ///< and exceeds this factor times the usual conflict
   int samples = 20;       ///< number of samples along either axis of each view; > 0
   std::size_t least = 4;  ///< minimum number of views; with fewer, no view is distrusted
 };
@@ -286,7 +286,7 @@ template <execution_policy Policy, posed_depth_range Views, camera::camera_model
     if (conflicts[worst] <= options.conflict || conflicts[worst] <= options.excess * out.usual_conflict) break;
     left_out[worst] = 1;
     out.distrusted.push_back(worst);
-    if (2 * out.distrusted.size() >= count) {  // the views do not show which half is correct
+    if (2 * out.distrusted.size() >= count) {  // it is unknown which half is correct
       out.distrusted.clear();
       break;
     }
