@@ -153,7 +153,7 @@ template <class Octree, execution_policy Policy, keyframe_range Keyframes, camer
   const std::size_t total = (2U + looks) * std::ranges::size(keyframes);
   std::size_t done = 0;
 
-  // One pass for everything that is computed from single keyframes, because depth images are expensive to obtain.
+  // Everything that depends on one keyframe is computed in a single pass, because depth images are expensive to obtain.
   using keyframe_type = std::ranges::range_value_t<Keyframes>;
   using depth_type = std::remove_cvref_t<decltype(std::declval<const keyframe_type&>().depth)>;
   using pixel = mapping::depth_pixel<depth_type>;
@@ -236,7 +236,7 @@ template <class Octree, execution_policy Policy, keyframe_range Keyframes, camer
   map.cloud = dense.cloud(policy);
   std::vector<float> ranges = dense.ranges(policy);
   dense.finish();
-  // Reported only after the memory of the pass was freed, so that callers can return it to the system.
+  // Reported only after the memory of the pass has been freed, so that callers can return it to the system.
   if (!on_progress(done, total)) return fail(errc::cancelled, {}, "cancelled");
   bool cancelled = false;
   const auto while_filtering = [&](std::size_t views_done, std::size_t) {

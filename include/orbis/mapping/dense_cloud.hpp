@@ -177,7 +177,7 @@ class dense_cloud {
     return bytes;
   }
 
-  /// The points of the cloud to keep, in a form for fast queries. Valid until the cloud changes.
+  /// A subset of the cloud's points to keep, stored for fast look-ups. Valid until the cloud changes.
   class selection {
    public:
     /// Keeps every point.
@@ -211,7 +211,7 @@ class dense_cloud {
   /// are removed, and pixels that belong to a point that is not in `kept`. A pixel that the stride skips belongs to the
   /// point in its voxel, or otherwise to the point of its block of stride x stride pixels if their depths agree within
   /// 3 cm and 2 % per pixel between them; a pixel that belongs to no point is excluded. O(pixels).
-  /// @pre the preconditions of `measurements`
+  /// @pre same as for `measurements`
   template <execution_policy Policy, keyframe_like Keyframe>
   [[nodiscard]] auto masked_depth(const Policy& policy, const Keyframe& k, std::size_t number,
                                   const selection& kept = {}) const {

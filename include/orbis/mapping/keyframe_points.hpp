@@ -89,7 +89,8 @@ class keyframe_points {
     keep(depth);
     return {};
   }
-  /// Returns the point of one pixel in the world frame, bit-identical to that of `read`; empty if it has none.
+  /// Returns the point of one pixel in the world frame, bit-identical to the one from `read`; empty if the pixel has no
+  /// point.
   /// @pre the pixel is inside the image; depth and rays have the same size
   template <camera::depth_source Depth>
   [[nodiscard]] static std::optional<vec3f> point_at(const Depth& depth, int x, int y, const camera::ray_table& rays,

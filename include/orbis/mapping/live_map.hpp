@@ -85,7 +85,7 @@ enum class completeness { complete, filtered };
 
 /// Limits of one call to live_map::correct.
 struct correction_limits {
-  /// Time limit; the current keyframe, or the current few dozen bricks, are finished first.
+  /// Time limit; work on the current keyframe, or on the current few dozen bricks, is finished first.
   std::chrono::nanoseconds time = std::chrono::nanoseconds::max();
   std::optional<vec3> robot{};  ///< position in the world frame; keyframes near it are moved first
 };

@@ -76,7 +76,7 @@ struct live_map_listeners {
   /// thread, so that no other thread waits for it.
   std::function<void(std::uint64_t frame, depth_use use, image_view<std::uint16_t> pixels)> prepare{};
   std::function<void(const insertion_event&)> inserted{};
-  std::function<void(const overflow_event&)> overflowed{};  ///< on the thread that adds the image
+  std::function<void(const overflow_event&)> overflowed{};  ///< called on the thread that adds the image
   std::function<void(const refusal_event&)> refused{};
   std::function<void(const live_correction_event&)> corrected{};
   /// Called with each new snapshot and the log of changes up to it; the log may be read during the call.

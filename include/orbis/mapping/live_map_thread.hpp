@@ -100,8 +100,9 @@ class live_map_thread {
   bool add_keyframe(std::uint64_t frame, const depth_view& depth, const se3& T_world_camera) {
     return add_scan({.kind = job::keyframe, .frame = frame, .T = T_world_camera}, depth);
   }
-  /// Adds a frame between keyframes, see live_map::add_frame; otherwise as above. Never waits. Returns false if it was
-  /// dropped; `refused` reports frames that the map rejects. O(pixels). @pre depth has the camera's size
+  /// Adds a frame between keyframes, see live_map::add_frame; the image is copied and prepared as in add_keyframe.
+  /// Never waits. Returns false if it was dropped; `refused` reports frames that the map rejects. O(pixels). @pre depth
+  /// has the camera's size
   bool add_frame(std::uint64_t frame, const depth_view& depth, std::uint64_t keyframe, const se3& T_keyframe_camera) {
     return add_scan({.kind = job::between, .frame = frame, .keyframe_of = keyframe, .T = T_keyframe_camera}, depth);
   }

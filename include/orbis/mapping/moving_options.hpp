@@ -19,8 +19,8 @@ struct moving_filter_options {
   /// A ray passes through a point only if the end of the ray is farther away by the margin plus this factor times the
   /// range of depths around that end: rays that graze a surface are not evidence.
   float slant = 1.0F;
-  int min_through = 1;  ///< a cell is removed if the rays of at least this number of keyframes pass through it, > 0,
-  double ratio = 1.0;   ///< and of more than this factor times the number of keyframes that show it
+  int min_through = 1;  ///< minimum number of keyframes whose rays pass through a removed cell, > 0
+  double ratio = 1.0;   ///< that number must exceed this factor times the number of keyframes that show the cell
   /// Distance in cells up to which neighbours of a removed cell are removed too, if they belong to the same surface and
   /// the keyframes that show them do not outnumber those whose rays pass through them. >= 0
   int grow = 4;

@@ -114,7 +114,7 @@ struct up_ballot {
 namespace detail {
 
 struct planar_blocks {
-  std::vector<vec3> normals;   ///< normals of the flat blocks, in the camera frame, towards the camera
+  std::vector<vec3> normals;   ///< normals of the flat blocks, in the camera frame, pointing towards the camera
   std::size_t with_depth = 0;  ///< number of blocks with depth in most pixels, flat or not
 };
 

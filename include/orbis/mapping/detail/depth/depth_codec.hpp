@@ -32,7 +32,7 @@ namespace orbis::mapping::detail {
 
 /// Coding of the pixels, stored in the first byte of a compressed image.
 enum class depth_coding : std::uint8_t {
-  plain,  ///< two bytes each, little-endian: images that do not compress
+  plain,  ///< two bytes per pixel, little-endian: for images that do not compress
   runs    ///< the number of distinct depths, the steps between them, then alternating runs and differences
 };
 
@@ -97,7 +97,7 @@ class group_writer {
 class group_reader {
  public:
   explicit group_reader(std::span<const std::byte> from) noexcept : from_{from} {}
-  /// Returns the next number; zeros after the end of the data.
+  /// Returns the next number; bits after the end of the data are 0.
   template <unsigned Bits>
   [[nodiscard]] std::uint32_t get() noexcept {
     std::uint32_t value = 0, group = 0;

@@ -28,7 +28,7 @@ struct cell_grid {
   static constexpr int edge = 4;  ///< edge of a cell, pixels
 
   int across = 0, down = 0;
-  std::vector<vec2f> rays;  ///< at z = 1; NaN if the camera has no ray there
+  std::vector<vec2f> rays;  ///< at z = 1; NaN where the camera has no ray
 
   template <camera::camera_model Camera>
   explicit cell_grid(const Camera& camera)
