@@ -183,10 +183,10 @@ class distance_field : public metric_distances<squared_distances> {
   /// Updates the field from the map's change log (`map.changes()`) if the log covers all changes since the last update.
   /// Otherwise compares the field with the whole map: after changes that the log does not record (see
   /// occupancy_octree::track_changes), and every time if changes are not tracked. Costs as much as
-  /// squared_distances::update, plus O(bricks of the field + octants of the map) for the comparison. Of a leaf with an
+  /// squared_distances::update, plus O(bricks of the field + octants of the map) for the comparison. For a leaf with an
   /// edge of 256 voxels or more, only the part within reach of its faces costs time and memory; if such a leaf has
-  /// appeared or disappeared since the last comparison, the field is rebuilt. @pre the same map every time, with the
-  /// same grid
+  /// appeared or disappeared since the last comparison, the field is rebuilt. @pre every call passes the same map, with
+  /// the same grid
   template <planning_map Map>
   void update(const Map& map) {
     assert(map_access<Map>::grid(map) == grid_);
@@ -201,7 +201,7 @@ class distance_field : public metric_distances<squared_distances> {
   ///     field.update(snapshot.map, log, snapshot.revision);
   ///   };
   /// @endcode
-  /// @pre revision <= log.revision(); copies of the same map every time, with the same grid
+  /// @pre revision <= log.revision(); every call passes a copy of the same map, with the same grid
   template <planning_map Map>
   void update(const Map& copy, const octree::change_log& log, std::uint64_t revision) {
     assert(map_access<Map>::grid(copy) == grid_);

@@ -46,7 +46,7 @@ ORBIS_INLINE image<float> squared_floor_distances(const image<floor_state>& stat
       double from = -std::numeric_limits<double>::infinity();
       for (; count != 0; --count) {
         const int other = lowest[count - 1];
-        const double here = y, there = other;  // squares of integers may overflow
+        const double here = y, there = other;  // doubles: squares of integers may overflow
         from = (value + here * here - column[static_cast<std::size_t>(other)] - there * there) / (2.0 * (here - there));
         if (from > begin[count - 1]) break;
         from = -std::numeric_limits<double>::infinity();

@@ -165,8 +165,8 @@ class floor_search {
     spread_extremes(high_, radius_, none, [](int a, int b) { return std::max(a, b); });
   }
 
-  /// For each column, the level of the nearest column with a level, counting steps to the four neighbours; the lowest
-  /// on ties. `otherwise` if no column has a level.
+  /// For each column, the level of the nearest column that has one, where distance is the number of steps between
+  /// four-connected neighbours; on ties, the lowest level. `otherwise` if no column has a level.
   [[nodiscard]] image<int> spread_levels(int otherwise) const {
     image<int> spread = levels_;
     std::vector<std::array<int, 2>> border, next;

@@ -84,7 +84,7 @@ struct floor_map {
 template <planning_map Map>
 [[nodiscard]] std::optional<double> find_floor(const Map& map);
 
-/// The floor map of `map` for a robot.
+/// Makes the floor map of `map` for a robot.
 ///
 /// A voxel is a *surface* if it is occupied and no voxel within the robot's height above it is. The robot reaches
 /// surfaces within a step of the floor and, from each reached surface, surfaces in the four neighbouring columns that

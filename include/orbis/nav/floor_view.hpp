@@ -37,7 +37,7 @@ class floor_view {
   static constexpr int dimensions = 2;
 
   /// `radius`: radius of the robot, metres. `unknown`: state assumed for unknown cells. O(cells).
-  /// @pre radius > 0; fewer than 2^21 cells along x and y; the preconditions of `options`
+  /// @pre radius > 0; fewer than 2^21 cells along x and y; `options` satisfies its own preconditions
   floor_view(const floor_map& map, double radius, const planning_options& options = {},
              octree::occupancy unknown = octree::occupancy::occupied)
       : map_{&map}, radius_{radius}, options_{options} {
@@ -186,7 +186,7 @@ class floor_view {
   [[nodiscard]] bool overlaps(const vec3& a, const vec3& b, double radius) const {
     const octree::capsule way{a, b, radius};
     const octree::bounding_box box = bounds_of(way);
-    const auto index = [&](double p, double origin, int cells) {  // in squared_, which has a border
+    const auto index = [&](double p, double origin, int cells) {  // index into squared_, which has a border
       return std::clamp(static_cast<int>(std::floor((p - origin) / resolution())) + 1, 0, cells - 1);
     };
     const double edge = resolution();  // includes cells whose faces only touch the disc

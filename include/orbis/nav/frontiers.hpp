@@ -85,14 +85,14 @@ class frontiers {
 
   /// Updates the frontier from the map's change log, as distance_field::update does. O(octants that changed) on
   /// average; if the log does not reach back far enough, O(octants of the map + octants on the faces of its larger
-  /// leaves). @pre the same map every time, with the same grid
+  /// leaves). @pre every call passes the same map, with the same grid
   template <planning_map Map>
   void update(const Map& map) {
     assert(map_access<Map>::grid(map) == grid_);
     follower_.follow(map, changed_in(map), [&] { rebuild(map); });
   }
   /// Updates the frontier from a copy of the map, as distance_field::update does.
-  /// @pre revision <= log.revision(); copies of the same map every time, with the same grid
+  /// @pre revision <= log.revision(); every call passes a copy of the same map, with the same grid
   template <planning_map Map>
   void update(const Map& copy, const octree::change_log& log, std::uint64_t revision) {
     assert(map_access<Map>::grid(copy) == grid_);
@@ -317,7 +317,7 @@ inline std::vector<frontier_cluster> frontiers::clusters(const cluster_options& 
   };
   for (std::uint32_t i = 0; i != all.size(); ++i)
     for (int direction = 14; direction != 27;
-         ++direction) {  // 13 of the 26 directions; the others are tested from the other side
+         ++direction) {  // 13 of the 26 directions; the opposite ones are tested from the neighbour
       const std::array<int, 3> offset{direction % 3 - 1, direction / 3 % 3 - 1, direction / 9 - 1};
       if (detail::dilated(all[i].mask, offset) == 0) continue;
       const auto along = [](std::uint32_t c, int by) { return c + static_cast<std::uint32_t>(4 * by); };

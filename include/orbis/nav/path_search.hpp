@@ -78,7 +78,7 @@ struct found_path {
   /// path ends at the centre of the reached cell nearest to the goal (empty if the goal is not finite).
   std::vector<vec3> points{};
   double length = 0.0;       ///< length of the path, metres
-  double cost = 0.0;         ///< see planning_options; equals the length in a uniform space. Excludes floor heights
+  double cost = 0.0;         ///< see planning_options; equals the length in a uniform space. Ignores floor heights
   std::size_t expanded = 0;  ///< number of expanded cells; 0 if the straight segment was used without a search
 };
 
@@ -209,7 +209,7 @@ template <planning_space Space>
     if (end == search_end::found) return ended(to_nearest, search_end::exhausted);
     out.expanded += to_nearest.expanded();
   }
-  auto all = make_search();  // cells connected by free cells, with blocked steps between them
+  auto all = make_search();  // free cells connect start and goal, but steps between them are blocked
   static_cast<void>(all.run(start, goal, {}, most));
   return ended(all, search_end::exhausted);
 }

@@ -124,8 +124,8 @@ class planning_view {
 
   /// The field's reach should exceed the robot's radius by at least two voxels, and the field should be complete
   /// (`is_complete`). Otherwise, queries only take longer: an incomplete field is used only for distances in costs.
-  /// @pre the preconditions of the shape and the options; the field belongs to the map, is up to date, and contains
-  /// distances to obstacles (not `inside`)
+  /// @pre the shape and the options satisfy their own preconditions; the field belongs to the map, is up to date, and
+  /// contains distances to obstacles (not `inside`)
   planning_view(const Map& map, const distance_field& field, const Shape& shape, const planning_options& options = {})
       : map_{&map}, field_{&field}, shape_{shape}, cover_{covering_balls(shape)}, options_{options} {
     assert(cover_.inner > 0.0 && map_access<Map>::grid(map) == field.grid() && !field.options().inside);

@@ -63,8 +63,8 @@ class path_monitor {
 
   /// Index of the first segment (from points()[i] to points()[i + 1]) that has become blocked since the path was set or
   /// last checked; empty if all are free. A blocked segment is tested again each time. O(changed octants x segments)
-  /// with few operations each, plus the cost of `is_free` for the segments that are tested. @pre the same map every
-  /// time (for floors: a map of the same world), and a view of its current state
+  /// with few operations each, plus the cost of `is_free` for the segments that are tested. @pre every call passes a
+  /// view of the current state of the same map (for floors: of a map of the same world)
   template <planning_space Space>
   [[nodiscard]] std::optional<std::size_t> first_blocked(const Space& space) {
     const std::size_t segments = points_.empty() ? 0 : points_.size() - 1;
@@ -89,8 +89,8 @@ class path_monitor {
   [[nodiscard]] const std::vector<vec3>& points() const noexcept { return points_; }
 
   /// Sets the robot's position (metres): drops the part of the path that the robot has passed; the path then begins at
-  /// `position`. The segment from there to the next point is tested again, unless `position` is already the first point
-  /// of the path.
+  /// `position`. The segment from `position` to the next point is tested again, unless `position` is already the first
+  /// point of the path.
   void advance(const vec3& position) {
     if (points_.size() < 2 || position == points_.front()) return;
     is_suspect_.resize(points_.size() - 1);

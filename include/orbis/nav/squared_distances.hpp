@@ -139,7 +139,7 @@ class squared_distance_view {
 /// Distances that are updated with the obstacles: after any sequence of updates, the values are bitwise identical to
 /// those of a field rebuilt from the same obstacles. No bounds need to be specified. Memory is proportional to the
 /// space near obstacles or, if unset space counts as an obstacle (`elsewhere_is_obstacle`), to the free space: about
-/// 2.9 kB for each block of 8x8x8 voxels with a voxel within reach, released when none is left.
+/// 2.9 kB for each block of 8x8x8 voxels with a voxel within reach, which is released when it no longer has one.
 ///
 /// Not thread-safe. Readers on other threads use copies of `view()`.
 class squared_distances : public squared_distance_view {
@@ -151,7 +151,7 @@ class squared_distances : public squared_distance_view {
 
   /// Initialises these cubes to the opposite state of the rest of space (`elsewhere_is_obstacle`). Bricks are stored
   /// only within reach of the cubes' faces, on the free side: outside full cubes, inside free ones (see
-  /// max_added_bricks). @pre before the first update; disjoint cubes of level 6 or more, in the grid
+  /// max_added_bricks). @pre `update` has not been called; the cubes are disjoint, in the grid, and of level 6 or more
   void begin(std::span<const voxel_cube> cubes);
   /// Maximum number of bricks that a single cube adds to the field. O(1).
   [[nodiscard]] std::uint64_t max_added_bricks(const voxel_cube& cube) const noexcept;
@@ -195,7 +195,7 @@ class squared_distances : public squared_distance_view {
     alignas(64) std::array<std::uint16_t, 512> plane;
     std::array<std::uint8_t, 512> along;
     std::array<std::uint8_t, 64> obstacles;  ///< row z * 8 + y, bit x
-    std::array<std::uint64_t, 8> octants;    ///< the obstacles by octant, as passed to update
+    std::array<std::uint64_t, 8> octants;    ///< the obstacles of each octant, as passed to update
     std::array<std::uint16_t, 8> plane_top;  ///< the largest value of each slice
     std::array<std::uint16_t, 8> space_top;
     std::uint32_t kept = none;     ///< index of the copy of `plane` from before the update

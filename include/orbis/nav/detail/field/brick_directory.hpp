@@ -43,7 +43,7 @@ class brick_directory {
   }
   /// Sets the result of `find` to `inner` for positions without an index in the cube of 2^level bricks that contains
   /// `p`.
-  /// @pre no brick has an index; level >= 3; in the grid
+  /// @pre no brick has an index; level >= 3; the cube is in the grid
   void add_cube(const brick_place& p, int level) {
     cubes_.set(cube_name(p, level), 0);
     levels_ |= 1U << static_cast<unsigned>(level);

@@ -60,8 +60,8 @@ class voxel_search {
   explicit voxel_search(const Space& space, bool any_angle = false, double weight = 1.0)
       : space_{space}, any_angle_{any_angle}, is_uniform_{space.is_uniform()}, weight_{any_angle ? weight : 1.0} {}
 
-  /// The cells with a free straight segment from `p` to their centre: the cell of `p`, otherwise its neighbours. @pre
-  /// `p` lies in the space
+  /// The cells with a free straight segment from `p` to their centre: the cell of `p` or, if it is not one of them, its
+  /// neighbours. @pre `p` lies in the space
   [[nodiscard]] std::vector<key> doors(const vec3& p) const {
     const key own = *space_.key(p);
     const auto is_door = [&](const key& k) { return space_.contains(k) && space_.is_free(p, space_.center(k)); };
@@ -143,7 +143,7 @@ class voxel_search {
     double density = 0.0;  ///< 0: not computed
     std::uint32_t parent = from;
     std::uint32_t tried = to;  ///< the last parent whose line was blocked or cost more than expected
-    std::uint32_t barred = 0;  ///< bit mask of neighbours (for the goal: exits) from which no step leads here
+    std::uint32_t barred = 0;  ///< bit mask of neighbours (for the goal: exits) whose step to this cell is blocked
     std::uint8_t free = 0;     ///< 0: not tested, 1: no, 2: yes
     trust known = trust::bound;
     bool is_closed = false;
