@@ -2,8 +2,8 @@
 /// @file
 /// `result<T>`: a value, or an `error` with a reason and a location.
 ///
-/// Broken preconditions assert; invalid *data* is reported through this type. The library never prints, exits or
-/// aborts.
+/// Violated preconditions trigger assertions; invalid *data* is reported through this type. The library never prints,
+/// exits or aborts.
 #pragma once
 
 #include <string>

@@ -3,11 +3,11 @@
 /// Arithmetic on fixed-size Eigen matrices that compiles fast: every operation returns a plain matrix, without Eigen's
 /// expression templates, which take about ten times as long to compile.
 ///
-/// Code in namespace orbis (and after `using namespace orbis`) finds these operators by ordinary lookup. They match
-/// better than Eigen's members, so formulas look the same as with Eigen. A sum or product is then a temporary matrix:
-/// do not store an Eigen expression that refers to it in an `auto` variable, as in `auto t = (a - b).transpose()`.
-/// Other code keeps Eigen's operators. If an operand is an Eigen expression or of dynamic size, Eigen's operator is
-/// used.
+/// Code in namespace orbis (and after `using namespace orbis`) finds these operators by ordinary lookup. They are
+/// better matches in overload resolution than Eigen's members, so formulas look the same as with Eigen. A sum or
+/// product is then a temporary matrix: do not store an Eigen expression that refers to it in an `auto` variable, as in
+/// `auto t = (a - b).transpose()`. Other code keeps Eigen's operators. If an operand is an Eigen expression or of
+/// dynamic size, Eigen's operator is used.
 ///
 /// Sums of products run from the first entry to the last, as in Eigen for three-element vectors; in other cases the
 /// last bits may differ from Eigen's results.
