@@ -133,7 +133,8 @@ TEST_CASE("a mask of another size is refused, and the image remains") {
     CHECK(masked.error().code == errc::invalid_argument);
     CHECK(masked.error().where == "frame 1");
   }
-  CHECK(store.mask(1, depth_image(32, 24)).error().message == "the mask has 32 x 24 pixels, the depth image 64 x 48");
+  CHECK(store.mask(1, depth_image(32, 24)).error().message ==
+        "the mask has 32 x 24 pixels, but the depth image has 64 x 48");
   CHECK(get(store, 1) == noise(1));
 }
 

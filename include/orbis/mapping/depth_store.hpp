@@ -81,7 +81,7 @@ class depth_store {
     const entry& e = at->second;
     if (depth.width() != e.width || depth.height() != e.height)
       return fail(errc::invalid_argument, name(frame),
-                  "the mask has " + size_text(depth.width(), depth.height()) + " pixels, the depth image " +
+                  "the mask has " + size_text(depth.width(), depth.height()) + " pixels, but the depth image has " +
                       size_text(e.width, e.height));
     assert(is_part_of_image(e, depth));
     bytes_of_masks_ -= at->second.zeros.size();

@@ -108,13 +108,13 @@ template <execution_policy Policy, point_range Points, class Automatic, class By
       out.inliers = std::move(result.inliers);
       report.mode = {options.statistical};
       report.reason = "requested; mean distance to " + std::to_string(options.statistical.neighbors) +
-                      " neighbors at most " + in_millimetres(result.threshold);
+                      " neighbours at most " + in_millimetres(result.threshold);
       break;
     }
     case filter_kind::radius:
       out.inliers = cloud::radius_inliers(policy, points, options.radius);
       report.mode = {options.radius};
-      report.reason = "requested; at least " + std::to_string(options.radius.min_neighbors) + " neighbors within " +
+      report.reason = "requested; at least " + std::to_string(options.radius.min_neighbors) + " neighbours within " +
                       in_millimetres(options.radius.radius);
       break;
     case filter_kind::log_statistical: {
@@ -125,7 +125,7 @@ template <execution_policy Policy, point_range Points, class Automatic, class By
                                          .usual = {result.median, 0},
                                          .threshold = result.threshold}};
       report.reason = "requested; mean distance to " + std::to_string(options.log_statistical.neighbors) +
-                      " neighbors at most " + in_millimetres(result.threshold_distance);
+                      " neighbours at most " + in_millimetres(result.threshold_distance);
       break;
     }
     case filter_kind::cluster: {
