@@ -26,7 +26,7 @@ app_fails(1 "DATASET" run --out out)
 app_fails(1 "--nonsense" run good --out out --nonsense)
 file(WRITE ${WORK}/circle/depth.txt "0.0 0.png\n")
 file(CREATE_LINK rgb.txt ${WORK}/circle/rgb.txt SYMBOLIC)
-app_fails(2 "rgb.txt: cannot access: Too many levels of symbolic links" run circle --out out)
+app_fails(2 "rgb.txt: cannot be accessed: Too many levels of symbolic links" run circle --out out)
 app_fails(1 "--gravity" run good --out out --gravity "")
 app_fails(1 "unknown option .--nonsense." run good --nonsense)  # before --out, which is missing, too
 app_fails(1 "--frames" run good --out out --frames 0)

@@ -154,7 +154,7 @@ namespace orbis {
   std::error_code ec;
   const auto status = std::filesystem::status(path, ec);
   if (status.type() == std::filesystem::file_type::none)  // no permission, or not a valid file name
-    return fail(errc::unreadable, path.string(), "cannot access: " + ec.message());
+    return fail(errc::unreadable, path.string(), "cannot be accessed: " + ec.message());
   if (!std::filesystem::exists(status)) return fail(errc::not_found, path.string(), "no such file");
   if (std::filesystem::is_directory(status)) return fail(errc::unreadable, path.string(), "is a directory");
   if (!std::filesystem::is_regular_file(status)) return fail(errc::unreadable, path.string(), "is not a regular file");
