@@ -305,7 +305,7 @@ result<floor_map> make_floor_map(const Map& map, const ground_robot& robot, cons
   if (options.region) {
     const auto flat = [&](const vec3& corner) { return vec3{corner.x(), corner.y(), *floor - cell / 2}; };
     const vec3 min = flat(options.region->min), max = flat(options.region->max);
-    if (!(min.x() <= max.x() && min.y() <= max.y())) return fail(errc::invalid_argument, "region", "is not a box");
+    if (!(min.x() <= max.x() && min.y() <= max.y())) return fail(errc::invalid_argument, "region", "min exceeds max");
     const auto named = octree::keys_between(grid, min, max);
     if (!named) return fail(errc::no_data, "", "the region lies outside the map's grid");
     box = *named;
