@@ -106,7 +106,7 @@ template <class Model, class Reader>
     return fail(errc::malformed, where,
                 "contains " + std::to_string(reader.nodes) + " nodes, but declares " + std::to_string(file->nodes));
   if (!reader.left.empty())
-    return fail(errc::malformed, where, std::to_string(reader.left.size()) + " bytes after the last node");
+    return fail(errc::malformed, where, "has " + std::to_string(reader.left.size()) + " bytes after the last node");
   return occupancy_octree<Model>{file->resolution, default_tree_depth, std::move(store)};
 }
 
