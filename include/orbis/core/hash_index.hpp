@@ -76,7 +76,7 @@ class probe_table {
   }
   [[nodiscard]] std::size_t size() const noexcept { return used_; }
   [[nodiscard]] bool empty() const noexcept { return used_ == 0; }
-  /// Bytes on the heap.
+  /// Heap memory in bytes.
   [[nodiscard]] std::size_t memory_bytes() const noexcept { return slots_.capacity() * sizeof(Slot); }
 
  private:
@@ -122,7 +122,7 @@ class hash_index {
   void clear() noexcept { table_.clear(); }
   [[nodiscard]] std::size_t size() const noexcept { return table_.size(); }
   [[nodiscard]] bool empty() const noexcept { return table_.empty(); }
-  /// Bytes on the heap.
+  /// Heap memory in bytes.
   [[nodiscard]] std::size_t memory_bytes() const noexcept { return table_.memory_bytes(); }
 
  private:
@@ -170,7 +170,7 @@ class number_index {
     table_.shrink(hash_of(key_of));
   }
   [[nodiscard]] std::size_t size() const noexcept { return table_.size(); }
-  /// Bytes on the heap.
+  /// Heap memory in bytes.
   [[nodiscard]] std::size_t memory_bytes() const noexcept { return table_.memory_bytes(); }
 
  private:
