@@ -209,7 +209,7 @@ template <planning_space Space>
     if (end == search_end::found) return ended(to_nearest, search_end::exhausted);
     out.expanded += to_nearest.expanded();
   }
-  auto all = make_search();  // free cells connect start and goal, but steps between them are blocked
+  auto all = make_search();  // free cells connect the start to the nearest cell, but steps between them are blocked
   static_cast<void>(all.run(start, goal, {}, most));
   return ended(all, search_end::exhausted);
 }
