@@ -39,7 +39,7 @@ class any_camera {
   [[nodiscard]] const M* get_if() const noexcept {
     return std::get_if<M>(&model_);
   }
-  /// "pinhole", "radtan" or "kannala_brandt", as in camera files.
+  /// Name of the model in camera files: "pinhole", "radtan" or "kannala_brandt".
   [[nodiscard]] std::string_view model_name() const noexcept {
     constexpr std::string_view names[] = {"pinhole", "radtan", "kannala_brandt"};
     static_assert(std::size(names) == std::variant_size_v<decltype(model_)>, "a name for each model");

@@ -24,11 +24,11 @@ namespace orbis::camera {
 /// Selection of the pixels of a depth image that become points.
 struct unproject_options {
   int stride = 1;                                       ///< every stride-th pixel of every stride-th row
-  float min_depth = 0.0F;                               ///< metres along the optical axis
-  float max_depth = std::numeric_limits<float>::max();  ///< metres along the optical axis
+  float min_depth = 0.0F;                               ///< minimum depth, metres along the optical axis
+  float max_depth = std::numeric_limits<float>::max();  ///< maximum depth, metres along the optical axis
 };
 
-/// Points, and the pixels that observed them.
+/// Points, and the pixels from which they were computed.
 struct unprojected_points {
   std::vector<vec3f> points;          ///< metres
   std::vector<std::uint32_t> pixels;  ///< `y * width + x`, ascending; one per point

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The fisheye lens, as defined by OpenCV's `cv::fisheye`.
+/// The fisheye camera model of OpenCV's `cv::fisheye`.
 ///
 /// Model: J. Kannala, S. S. Brandt, "A generic camera model and calibration method for conventional, wide-angle, and
 /// fish-eye lenses", PAMI 28(8), 2006; only the radially symmetric part.
@@ -65,7 +65,7 @@ class kannala_brandt {
     if (!pixel) return pixel;
     const double r = std::hypot(p.x(), p.y());
     const double z = p.z();
-    if (!(r > 1e-9 * z)) {  // on the axis the model is a pinhole
+    if (!(r > 1e-9 * z)) {  // on the axis, the model equals the pinhole model
       jacobian(0, 0) = k_.fx / z, jacobian(0, 1) = 0.0, jacobian(0, 2) = -k_.fx * p.x() / (z * z);
       jacobian(1, 0) = 0.0, jacobian(1, 1) = k_.fy / z, jacobian(1, 2) = -k_.fy * p.y() / (z * z);
       return pixel;
@@ -84,7 +84,8 @@ class kannala_brandt {
     jacobian(1, 2) = k_.fy * by_z * s;
     return pixel;
   }
-  /// The ray through a pixel, scaled to z = 1, by Newton's method on the angle. Empty outside the domain, and for NaN.
+  /// The ray through a pixel, scaled to z = 1, computed by Newton's method on the angle. Empty outside the domain, and
+  /// for NaN.
   [[nodiscard]] std::optional<vec3> unproject(const vec2& pixel) const {
     const vec2 target{(pixel.x() - k_.cx) / k_.fx, (pixel.y() - k_.cy) / k_.fy};
     const double distorted = std::sqrt(target.x() * target.x() + target.y() * target.y());

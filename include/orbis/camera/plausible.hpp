@@ -18,9 +18,9 @@ namespace orbis::camera {
 /// image: with a focal length near zero, each pixel would cover a whole room. If the image size is known, every pixel
 /// must be at most 10 focal lengths from the principal point along each image axis (for a pinhole camera, up to 84
 /// degrees from the optical axis; other models map this distance to other angles), and the focal lengths must be at
-/// most 1000 times the larger side. If it is unknown (0), only the values are checked: both focal lengths must be
-/// positive, below 1e9 and differ by at most a factor of 5; the coordinates of the principal point must be below 1e9.
-/// Errors: malformed at `where`, naming the parameter and the reason.
+/// most 1000 times the larger side of the image. If the size is unknown (0), only the values are checked: both focal
+/// lengths must be positive, below 1e9 and differ by at most a factor of 5; the coordinates of the principal point must
+/// be below 1e9. Errors: malformed at `where`, naming the parameter and the reason.
 [[nodiscard]] inline result<intrinsics> plausible(const intrinsics& k, std::string where) {
   constexpr double largest = 1e9, most_slope = 10.0, most_focal = 1000.0, most_ratio = 5.0;
   const auto reject = [&](const char* name, double value, const std::string& why) {

@@ -57,7 +57,8 @@ struct projected_lanes {
   std::array<lane_array, 6> j;
 };
 
-/// Kept out of the kernels, which are compiled for instruction sets that might round differently.
+/// Projects eight points individually. Not inlined into the kernels, because these are compiled for instruction sets
+/// that might round differently.
 template <camera_model Camera>
 [[gnu::noinline]] void project_each(const Camera& camera, const lane_array& x, const lane_array& y, const lane_array& z,
                                     bool with_jacobian, projected_lanes& out) {

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The common lens model: radial and tangential distortion, with OpenCV's 4, 5 or 8 coefficients.
+/// The common camera model with radial and tangential lens distortion (OpenCV's 4, 5 or 8 coefficients).
 ///
-/// Model: D. C. Brown, "Decentering distortion of lenses", Photogrammetric Engineering 32(3), 1966; the denominator: D.
-/// Claus, A. Fitzgibbon, "A rational function lens distortion model for general cameras", CVPR 2005.
+/// Model: D. C. Brown, "Decentering distortion of lenses", Photogrammetric Engineering 32(3), 1966; for the
+/// denominator: D. Claus, A. Fitzgibbon, "A rational function lens distortion model for general cameras", CVPR 2005.
 #pragma once
 
 #include <algorithm>
@@ -72,8 +72,9 @@ class radial_tangential {
     }
     return pixel;
   }
-  /// The ray through a pixel, scaled to z = 1, by Newton's method: starting from the distorted position or, if that
-  /// fails, from the solution of the radial part only. Empty if there is no ray within the domain, and for NaN.
+  /// The ray through a pixel, scaled to z = 1, computed by Newton's method, which starts from the distorted position
+  /// or, if that fails, from the solution of the radial part only. Empty if there is no ray within the domain, and for
+  /// NaN.
   [[nodiscard]] std::optional<vec3> unproject(const vec2& pixel) const {
     const vec2 target{(pixel.x() - k_.cx) / k_.fx, (pixel.y() - k_.cy) / k_.fy};
     if (!std::isfinite(target.x()) || !std::isfinite(target.y())) return std::nullopt;
@@ -85,7 +86,7 @@ class radial_tangential {
 
  private:
   static constexpr int max_iterations = 30;
-  /// Threshold on the squared relative step; the error after such a step is about its square.
+  /// Threshold on the squared relative step; after such a step, the remaining error is about the square of the step.
   static constexpr double converged = 1e-20;
 
   /// The ray that distorts to `target`, from the initial guess `m`; every step must stay in the domain.

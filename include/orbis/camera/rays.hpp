@@ -17,7 +17,7 @@ namespace orbis::camera {
 class ray_table {
  public:
   ray_table() = default;
-  /// O(width * height) unprojections; pixels without a ray get NaN.
+  /// Computes the table with O(width * height) unprojections; pixels without a ray get NaN.
   template <camera_model Camera>
   explicit ray_table(const Camera& camera)
       : rays_{camera.width(), camera.height(), filled<vec2f>(std::numeric_limits<float>::quiet_NaN())} {

@@ -15,7 +15,7 @@ namespace orbis::camera {
 struct shutter {
   double color_read_out = 0.0;  ///< time from the start of the first row to the end of the last, seconds
   double depth_read_out = 0.0;  ///< read-out time of the depth image, measured in the same way, seconds
-  double depth_delay = 0.0;  ///< from the middle of the colour image to the middle of the depth image, seconds; added
+  double depth_delay = 0.0;  ///< time from the colour read-out's middle to the depth read-out's middle, seconds; added
                              ///< to the difference between their time stamps, if both have one
 
   /// Returns true if all rows of both images are read at the same time.
@@ -43,7 +43,7 @@ struct shutter {
   [[nodiscard]] static constexpr double share(double v, int height) noexcept { return (v + 0.5) / height - 0.5; }
 };
 
-/// Maps a point from the camera frame at time `t` to the camera frame at time 0, if the camera moves by a constant
+/// Maps a point from the camera frame at time `t` to the camera frame at time 0, if the camera moves with a constant
 /// twist: `exp(t * twist) p` to second order; the remainder is below a thousandth of a pixel for the rotation during
 /// one read-out (a few hundredths of a radian). `twist`: twist of the camera in its own frame, per second, translation
 /// first. `p` represents the point `p / inverse_scale`, and the result has the same scale: to handle points at any

@@ -11,10 +11,10 @@
 /// @endcode
 ///
 /// The camera is assumed to move with a constant twist during the read-out. Each depth is moved to the pixel that
-/// observes it at the frame's time, where the nearest depth wins; this determines the surface that a pixel shows. Its
-/// depth is then read at the position where the depth image observed that point of the surface: interpolated linearly
-/// in inverse depth, which is exact on planes, using only pixels on that surface. Planes therefore stay planar, and
-/// edges stay between two pixels.
+/// observes it at the frame's time, where the nearest depth wins; this determines the surface that a pixel shows. The
+/// pixel's depth is then read at the position where the depth image observed that point on the surface: interpolated
+/// linearly in inverse depth, which is exact on planes, using only pixels on that surface. Planes therefore stay
+/// planar, and depth edges stay sharp.
 ///
 /// For the constant-velocity model, see J. Hedborg, P.-E. Forssen, M. Felsberg, E. Ringaby, "Rolling shutter bundle
 /// adjustment", CVPR 2012; for rolling-shutter depth images, see E. Ringaby, P.-E. Forssen, "Scan rectification for
@@ -46,7 +46,7 @@ namespace orbis::camera {
 
 namespace detail {
 
-/// The stored type of a `depth_view`; otherwise float metres.
+/// The type in which depth is stored: the pixel type of a `depth_view`; otherwise `float` (metres).
 template <class Depth>
 struct stored_depth : std::type_identity<float> {};
 template <class T>

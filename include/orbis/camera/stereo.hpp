@@ -54,7 +54,7 @@ struct rectify_options {
 /// each pair: `left().bilinear(image)`. 16 bytes per pixel.
 class rectification {
  public:
-  /// For images that are already rectified.
+  /// Creates the identity mapping, for images that are already rectified.
   rectification(const pinhole& camera, double baseline) : camera_{camera}, baseline_{baseline} {}
   /// @pre both maps have the size of `camera`; `R_left_rectified` rotates rays from the rectified cameras' frame to the
   /// left camera's frame
@@ -99,7 +99,7 @@ namespace detail {
   return axes;
 }
 
-/// The geometric mean of the two focal lengths at the image centre, pixels; empty if there is no ray.
+/// The geometric mean of the focal lengths along x and y at the image centre, pixels; empty if there is no ray.
 template <camera_model Camera>
 [[nodiscard]] std::optional<double> middle_focal(const Camera& camera) {
   const auto ray = camera.unproject({0.5 * (camera.width() - 1), 0.5 * (camera.height() - 1)});
@@ -135,8 +135,8 @@ template <camera_model Left, camera_model Right>
     return false;
   const int w = rig.left.width(), h = rig.left.height();
   if (rig.right.width() != w || rig.right.height() != h || w == 0 || h == 0) return false;
-  // For pinhole cameras, the ray step is the same everywhere, so testing a few pixels suffices, regardless of the
-  // static type.
+  // The rays of a pinhole camera depend linearly on the pixel, so testing a few pixels suffices, regardless of the
+  // camera's static type.
   const auto like = [&](const auto& camera, const pinhole& k) {
     for (const double v : {0.0, 0.3, 1.0})
       for (const double u : {0.0, 0.6, 1.0}) {
@@ -157,9 +157,9 @@ template <camera_model Left, camera_model Right>
 
 /// Computes the rectification of a rig with any two camera models. Both cameras are rotated as little as possible: x
 /// along the baseline, z close to the mean of both axes. The new camera has one focal length: the smaller of the two
-/// cameras' focal lengths at their image centres, increased by up to `max_magnification` if needed to give every pixel
-/// a source. The image centres are preserved. For rigs that are already rectified, the result is the identity.
-/// O(pixels) projections.
+/// cameras' focal lengths at their image centres, increased by a factor of up to `max_magnification` if rectified
+/// pixels would otherwise have no source. The image centres are preserved. For rigs that are already rectified, the
+/// result is the identity. O(pixels) projections.
 ///
 /// After A. Fusiello, E. Trucco, A. Verri, "A compact algorithm for rectification of stereo pairs", Machine Vision and
 /// Applications 12 (2000), which keeps one axis of the left camera instead of the mean of both. Errors:
