@@ -126,7 +126,7 @@ struct alignment {
   return alignment{1.0, se3(*rotation, translation), pairs.size()};
 }
 
-/// Aligns two trajectories: pairs poses by time, then aligns the pairs. Errors as for `align` above.
+/// Aligns two trajectories: pairs poses by time, then aligns the pairs. Errors: those of `align` above.
 /// @pre both are sorted by time
 [[nodiscard]] inline result<alignment> align(const trajectory& estimate, const trajectory& reference,
                                              const alignment_options& options = {}) {

@@ -15,14 +15,14 @@
 
 namespace orbis::eval {
 
-/// Minimum number of poses for concluding from equal orientations that there are none.
+/// Minimum number of poses needed to conclude from equal orientations that a trajectory has no orientations.
 inline constexpr std::size_t min_poses_without_orientation = 5;
 /// Maximum angle between orientations that count as equal, radians.
 inline constexpr double equal_orientations = 1e-9;
 
-/// Returns true if the references of all pairs have the same orientation (at least `min_poses_without_orientation`),
-/// while the estimates rotate by more than a degree: the reference then has positions only. (The estimates do not
-/// rotate if the camera is on rails.) O(n).
+/// Returns true if there are at least `min_poses_without_orientation` pairs and all their reference poses have the same
+/// orientation, while the estimates rotate by more than a degree: the reference then has positions only. (If the camera
+/// is on rails, the estimates do not rotate either.) O(n).
 [[nodiscard]] inline bool lacks_orientations(const std::vector<pose_pair>& pairs) {
   constexpr double degree = std::numbers::pi / 180.0;
   if (pairs.size() < min_poses_without_orientation) return false;

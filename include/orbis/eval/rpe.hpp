@@ -23,8 +23,8 @@
 namespace orbis::eval {
 
 struct rpe_options {
-  std::size_t delta_frames = 1;           ///< motion from one paired pose to the n-th pose after it ...
-  std::optional<double> delta_seconds{};  ///< ... or, if set, to the pose nearest to this time later, seconds
+  std::size_t delta_frames = 1;           ///< interval in paired poses; used if `delta_seconds` is empty
+  std::optional<double> delta_seconds{};  ///< interval in seconds; a motion ends at the pose nearest in time to its end
   double max_time_difference = 0.02;      ///< maximum time difference between paired poses, seconds
 };
 

@@ -11,7 +11,7 @@
 
 namespace orbis::eval {
 
-/// Error statistics in the unit of the errors. `median` and `p95` interpolate between neighbours.
+/// Error statistics in the unit of the errors. `median` and `p95` are interpolated between adjacent values.
 struct error_statistics {
   std::size_t count = 0;
   double rmse = 0.0;
@@ -21,7 +21,7 @@ struct error_statistics {
   double max = 0.0;
 };
 
-/// The `q`-quantile (0 to 1) of `sorted`, interpolated linearly between neighbours.
+/// The `q`-quantile (0 to 1) of `sorted`, interpolated linearly between adjacent values.
 /// @pre !sorted.empty(), sorted
 [[nodiscard]] inline double quantile(std::span<const double> sorted, double q) {
   const double at = q * static_cast<double>(sorted.size() - 1);
