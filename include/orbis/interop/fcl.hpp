@@ -39,8 +39,8 @@
 namespace orbis::interop {
 
 /// A geometry at a pose, as an `octree::overlap_shape`. A mesh consists of its triangles only: voxels entirely inside a
-/// closed mesh do not overlap it. For each box, the result is that of FCL, within its tolerance (1e-6 for most pairs).
-/// The geometry is shared, not copied.
+/// closed mesh do not overlap it. For each box, the result is that of FCL, within FCL's tolerance (1e-6 for most
+/// pairs). The geometry is shared, not copied.
 class fcl_shape {
  public:
   /// @pre geometry != nullptr; the pose is finite

@@ -35,7 +35,7 @@ namespace orbis::interop {
 
 /// Position of a state in metres: the values of a two- or three-dimensional `RealVectorStateSpace`, or of the first
 /// part of a compound space (`SE2StateSpace`, `SE3StateSpace`) if that part is a `RealVectorStateSpace`. The rest of
-/// the state is ignored, because rotation about the vertical does not change the robot's shape.
+/// the state is ignored, because rotation about the vertical axis does not change the robot's shape.
 class ompl_position {
  public:
   /// @pre the space has one of these types
