@@ -5,8 +5,8 @@
 /// | header | contents |
 /// | --- | --- |
 /// | `recording.hpp` | RGB-D recordings in the layouts of TUM RGB-D, 7-Scenes, ICL-NUIM and ScanNet |
-/// | `stereo_recording.hpp` | stereo recordings in the layouts of KITTI odometry and ASL (EuRoC), or two folders |
-/// | `mono_recording.hpp` | recordings of one camera: in the layouts above, or plain folders of images |
+/// | `stereo_recording.hpp` | stereo recordings in the layouts of KITTI odometry and ASL (EuRoC), or in two folders |
+/// | `mono_recording.hpp` | recordings of one camera, in the layouts above or in plain folders of images |
 /// | `synthetic.hpp` | a recording rendered on the fly, with exactly known poses and surfaces |
 /// | `synthetic_options.hpp` | the room, camera path and sensor errors of that recording |
 /// | `camera_file.hpp` | `camera.toml`: model, size, intrinsics, distortion, depth scale |

@@ -379,7 +379,7 @@ TEST_CASE("what a cloud leaves out is noted") {
   t.columns.push_back(column_of("intensity", scalar_type::float32, {8, 9}));
   const auto ply = parse(t, formats[0]);
   CHECK(ply.notes ==
-        std::vector<std::string>{"left out: element sensor (2), list neighbors, element face (1), another x"});
+        std::vector<std::string>{"left out: element sensor (2), list neighbors, element face (1), repeated x"});
   CHECK(io::field_names(ply.fields) == "intensity");
 
   const std::string words =

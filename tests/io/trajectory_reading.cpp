@@ -120,7 +120,7 @@ TEST_CASE("layouts, separators, headers and units of trajectories are recognised
       {"", {euroc, ",", 19}, {w, "the time stamps are in nanoseconds"}},
       {"# timestamp tx ty tz qw qx qy qz\n", {euroc, " "}, {w}},
       {"#time, tx, ty, tz, q_w, q_x, q_y, q_z\n", {euroc, ", "}, {w}},
-      {"", {kitti, " "}, {"read in KITTI's layout: a pose matrix per line"}},
+      {"", {kitti, " "}, {"read in KITTI's layout: one pose matrix per line"}},
       {"# poses\n", {kitti, "\t"}, {"read in KITTI's layout"}}};
   const trajectory poses = some_path(20, 1);
   for (const kind& k : kinds) {
@@ -147,9 +147,9 @@ TEST_CASE("columns of trajectories are found by their names") {
     std::string before{}, after_time{};
   };
   const std::string at_2 =
-      "according to the header, column 2 is the time, column 3 the first of the position, and column 6";
+      "according to the header, column 2 is the time, column 3 the start of the position, and column 6";
   const std::string at_1 =
-      "according to the header, column 1 is the time, column 3 the first of the position, and column 6";
+      "according to the header, column 1 is the time, column 3 the start of the position, and column 6";
   const std::vector<kind> kinds{
       {"timestamp,x,y,z,orientation_w,orientation_x,orientation_y,orientation_z", comma, true, 10, {w}},
       {"time,x,y,z,orientation.x,orientation.y,orientation.z,orientation.w", comma, false, 19, {ns}},

@@ -30,7 +30,7 @@ struct cloud_with_fields {
   std::vector<cloud_field> fields;  ///< in the order of the file, each with the values of all points
   /// VIEWPOINT of a PCD file: translation in metres, then a quaternion, w first.
   std::array<double, 7> viewpoint{0, 0, 0, 1, 0, 0, 0};
-  std::vector<std::string> notes;  ///< warnings for the user: interpretations, and parts of the file that are left out
+  std::vector<std::string> notes;  ///< warnings for the user: assumptions, and omitted parts of the file
 };
 
 namespace detail {

@@ -57,14 +57,14 @@ struct ply_vertex {
   rgb8 color{};
 };
 
-/// Points of any type as vertices: `read(of, begin, out)` writes the vertices from index `begin` on to `out`.
+/// Points of any type as vertices: `read(of, begin, out)` writes the vertices starting at index `begin` to `out`.
 struct ply_vertices {
   const void* of = nullptr;
   void (*read)(const void* of, std::size_t begin, std::span<ply_vertex> out) = nullptr;
   std::size_t count = 0;
   bool colored = false;
   std::span<const cloud_field> fields{};
-  std::span<const std::uint32_t> rows{};  ///< index into the fields, one per vertex
+  std::span<const std::uint32_t> rows{};  ///< for each vertex: its index in the fields
 };
 
 /// Writes vertices in blocks.

@@ -53,7 +53,7 @@ enum class recording_format { automatic, tum, seven_scenes, icl_nuim, scannet, f
 struct recording_options {
   recording_format format = recording_format::automatic;
   std::optional<camera::camera_settings> camera{};  ///< replaces the camera of the recording
-  double max_time_difference = 0.020;               ///< between a colour image and its depth image, seconds
+  double max_time_difference = 0.020;               ///< maximum time between a colour and its depth image, seconds
 };
 
 /// A list of frames that are read on request. `frame` is thread-safe; iterators are not.
@@ -81,9 +81,8 @@ class recording {
   /// Reads only the colour image of frame `i`. Errors: those of `frame`. @pre i < size()
   [[nodiscard]] result<image<rgb8>> color(std::size_t i) const;
 
-  /// Single-pass iterator that reads each frame when it reaches it. Iteration ends at the first frame that cannot be
-  /// read; the recording's `status` then contains the reason. A reference to a frame is valid until the iterator
-  /// advances.
+  /// Single-pass iterator that reads each frame as it advances. Iteration ends at the first frame that cannot be read;
+  /// the recording's `status` then contains the reason. A reference to a frame is valid until the iterator advances.
   class iterator {
    public:
     using iterator_category = std::input_iterator_tag;
@@ -124,7 +123,7 @@ class recording {
 
  private:
   [[nodiscard]] result<image<std::uint16_t>> read_sized_depth(const std::filesystem::path& path) const;
-  /// The colour image as seen from the depth camera.
+  /// Reads a colour image; resamples it to the depth camera if `registration_` is set.
   [[nodiscard]] result<image<rgb8>> read_registered(const std::filesystem::path& path,
                                                     image_view<const std::uint16_t> depth) const;
 

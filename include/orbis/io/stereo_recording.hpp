@@ -48,7 +48,7 @@ enum class stereo_format { automatic, kitti, asl, pairs };
 struct stereo_recording_options {
   stereo_format format = stereo_format::automatic;
   std::optional<camera::camera_settings> camera{};  ///< replaces camera.toml; only for `pairs`
-  double max_time_difference = 0.005;               ///< between a left image and its right image, seconds
+  double max_time_difference = 0.005;               ///< maximum time between a left image and its right image, seconds
   camera::rectify_options rectify{};
 };
 

@@ -48,9 +48,9 @@ template <execution_policy Policy>
 
 }  // namespace detail::synthetic
 
-/// A recording of a hand-held or walking camera moving once around a furnished room, with exact ground truth. Frames
-/// are independent: they may be requested in any order and from several threads, and are identical byte for byte on
-/// every machine (except the pose, whose last bit may differ).
+/// A recording of a hand-held or robot-mounted camera that moves once around a furnished room, with exact ground truth.
+/// Frames are independent: they may be requested in any order and from several threads, and are identical byte for byte
+/// on every machine (except the pose, whose last bit may differ).
 ///
 /// The floor of the room is at z = 0 with the origin at its centre. A surface's texture is generated when the surface
 /// is first visible, which takes a few tenths of a second for the first frames at 640x480. All textures together take
@@ -70,7 +70,7 @@ class synthetic_recording {
   [[nodiscard]] const synthetic_options& options() const noexcept { return options_; }
   /// The unsigned distance (metres) from a point in the world frame to the nearest surface visible to a camera: the
   /// error of a map point. Exact in front of the surfaces; behind them, where solids overlap, it is the distance to the
-  /// surface of the solid that contains the point most deeply. Ignores moving solids. O(number of solids)
+  /// surface of the solid in which the point is deepest. Ignores moving solids. O(number of solids)
   [[nodiscard]] double surface_distance(const vec3& p_world) const noexcept;
   /// The room's solids, for tests of this component (io/detail/synthetic/scene.hpp).
   [[nodiscard]] const detail::synthetic::scene& scene() const noexcept;
@@ -125,7 +125,7 @@ class synthetic_recording {
     for_each_index(policy, static_cast<std::size_t>(camera.height()), 1, [&](std::size_t row) {
       const int y = static_cast<int>(row);
       for (int x = 0; x != camera.width(); ++x)
-        if (const auto ray = camera.unproject(vec2{double(x), double(y)}))  // z is 1, so lengths along it are depths
+        if (const auto ray = camera.unproject(vec2{double(x), double(y)}))  // z = 1, so depth_along returns a depth
           depth(x, y) = static_cast<float>(depth_along(T_world_camera.translation(), T_world_camera.rotation() * *ray));
     });
     return depth;

@@ -19,7 +19,7 @@ struct synthetic_scene_options {
   int poor_walls = 1;            ///< number of walls (0..4) that have almost no texture
   double texture_density = 1.0;  ///< scales the number of patches painted on every surface; 0: none
   bool person = false;           ///< adds a person who walks around the room, opposite to the camera, at 1 m/s
-  double wall_period = 0.0;      ///< metres; if above 0, all walls show one picture that repeats with this period
+  double wall_period = 0.0;      ///< if above 0, all walls show the same picture, repeated with this period, metres
   double light = 1.0;            ///< illumination: 1 requires the sensor's `exposure`, 0.5 twice that time
 };
 
@@ -34,7 +34,7 @@ struct synthetic_gait_options {
   double impact = 0.0015;          ///< amplitude of the vertical vibration after an impact, metres
   double impact_angle = 0.006;     ///< amplitude of the pitch and roll vibration after an impact, radians
   double impact_frequency = 17.0;  ///< frequency of the vibration after an impact, Hz
-  double impact_duration = 0.2;    ///< seconds until the vibration has decayed to 0
+  double impact_duration = 0.2;    ///< time until the vibration has decayed to 0, seconds
 };
 
 /// The motion of the camera. The camera starts at rest, makes one round (360 degrees of yaw) on an ellipse about the
@@ -46,7 +46,7 @@ struct synthetic_path_options {
   double height = 1.35;       ///< height of the camera above the floor, metres
   double pitch = -0.20;       ///< mean pitch, radians; negative looks down
   double overlap = 0.05;      ///< fraction of the time spent at the initial pose after the rounds
-  bool sees_floor = false;    ///< adds a lap with the camera pointing inward and down at the floor
+  bool sees_floor = false;    ///< adds a round with the camera pointing inward and down at the floor
   double wobble = 1.0;        ///< scales the slow sway in height, distance, yaw, pitch and roll
   double jitter = 1.0;        ///< scales the hand tremor (millimetres, tenths of degrees)
   synthetic_gait_options gait{};
@@ -73,7 +73,7 @@ struct synthetic_sensor_options {
   double baseline = 0.075;        ///< distance from projector to camera, metres
   double grazing_angle = 1.45;    ///< maximum angle of incidence, radians; pixels start to drop out
                                   ///< 0.15 radians below it
-  bool shadow = true;             ///< no depth on surfaces that the projector (on the right) does not light
+  bool shadow = true;             ///< no depth on surfaces that the projector (on the right) does not illuminate
   double dropouts = 0.002;        ///< fraction of pixels without depth at random positions
   double stray_depths = 0.0;      ///< fraction of pixels with a random depth in front of the surface: dust, rain, spray
 
@@ -81,7 +81,7 @@ struct synthetic_sensor_options {
 
   double colour_noise = 2.0;  ///< standard deviation in grey values
   int motion_blur = 1;        ///< number of images averaged over the exposure time; 1: no blur
-  double exposure = 0.015;    ///< seconds, at a `light` of 1; for motion blur
+  double exposure = 0.015;    ///< exposure time at a `light` of 1, for motion blur, seconds
   /// Maximum exposure time in a darker room, seconds. If the required time is f times longer, the colour noise is
   /// increased by sqrt(f) instead.
   double max_exposure = 0.033;
@@ -115,7 +115,7 @@ struct synthetic_options {
   std::uint64_t seed = 1;     ///< seed of the room, its textures, the path and the noise
   int width = 640;            ///< pixels
   int height = 480;           ///< pixels
-  double depth_scale = 5000;  ///< stored depth / depth_scale = metres; 5000 reaches 13 m
+  double depth_scale = 5000;  ///< stored depth / depth_scale = metres; the maximum depth with 5000 is 13 m
   int frames_around = 0;      ///< number of frames per round of the path; 0: the path takes all frames
   synthetic_scene_options scene{};
   synthetic_path_options path{};

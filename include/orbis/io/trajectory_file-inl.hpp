@@ -62,7 +62,7 @@ ORBIS_INLINE result<trajectory_reading> parse_trajectory_file(std::string_view t
   if (read->layout != trajectory_layout::kitti && !(unit == detail::time_units[0]))
     note("the time stamps are in " + std::string{unit.name});
   if (read->layout == trajectory_layout::euroc) note("read in EuRoC's layout: the quaternion has w first");
-  if (read->layout == trajectory_layout::kitti) note("read in KITTI's layout: a pose matrix per line");
+  if (read->layout == trajectory_layout::kitti) note("read in KITTI's layout: one pose matrix per line");
   return read;
 }
 

@@ -26,14 +26,14 @@ namespace orbis::io {
 /// lists no quaternion while fields are separated by commas and times have 19 digits), KITTI (12 numbers) or TUM.
 /// Fields are separated by blanks, commas or semicolons. Accepts `#` comments and a line of column names before the
 /// poses; if it contains time, position and quaternion, other columns may precede them. The first time stamp determines
-/// the unit of time: nanoseconds if the header specifies them and it is a whole number, otherwise by its number of
-/// digits (13: milliseconds, 16: microseconds, 19: nanoseconds, otherwise seconds). Poses with NaN, infinity, or a zero
-/// quaternion or rotation count as lost. Of poses with equal times, the first one is kept; if a later run in the file
-/// has other poses during the time of the first run, only the first run is kept. Notes report all of this. Errors:
-/// malformed, with the line number (too few numbers, a quaternion that is too large or almost zero); unsupported (a
-/// header that lists the quaternion before the position, or in another order); degenerate (a quarter of the poses have
-/// the time of another pose and differ from it; with several runs, a quarter of the poses of the first run or more than
-/// half of all poses). O(n log n).
+/// the unit of time: nanoseconds if the header specifies them and the time stamp is a whole number, otherwise by its
+/// number of digits (13: milliseconds, 16: microseconds, 19: nanoseconds, otherwise seconds). Poses with NaN, infinity,
+/// or a zero quaternion or rotation count as lost. Of poses with equal times, the first one is kept; if a later run in
+/// the file has other poses during the time of the first run, only the first run is kept. Notes report all of this.
+/// Errors: malformed, with the line number (too few numbers, a quaternion that is too large or almost zero);
+/// unsupported (a header that lists the quaternion before the position, or in another order); degenerate (a quarter of
+/// the poses have the time of another pose and differ from it; with several runs, a quarter of the poses of the first
+/// run or more than half of all poses). O(n log n).
 [[nodiscard]] result<trajectory_reading> parse_trajectory_file(std::string_view text,
                                                                const std::filesystem::path& where = {});
 

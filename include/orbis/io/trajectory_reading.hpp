@@ -13,7 +13,7 @@ namespace orbis::io {
 
 enum class trajectory_layout {
   tum,    ///< `timestamp tx ty tz qx qy qz qw`
-  euroc,  ///< `timestamp, tx, ty, tz, qw, qx, qy, qz`, and more columns; mostly nanoseconds
+  euroc,  ///< `timestamp, tx, ty, tz, qw, qx, qy, qz`, and more columns; times usually in nanoseconds
   kitti   ///< the first three rows of the pose matrix, 12 numbers, without a time
 };
 
@@ -21,8 +21,8 @@ enum class trajectory_layout {
 struct trajectory_reading {
   trajectory poses;  ///< with distinct times; in KITTI's layout the time is the index of the line, see `set_times`
   trajectory_layout layout = trajectory_layout::tum;
-  std::size_t lost = 0;            ///< lines with NaN, infinity or a zero quaternion, which are left out
-  std::vector<std::string> notes;  ///< warnings for the user: the file, interpretations, and lines that are left out
+  std::size_t lost = 0;            ///< number of omitted lines with NaN, infinity or a zero quaternion
+  std::vector<std::string> notes;  ///< warnings for the user, with the file name: assumptions, and omitted lines
 };
 
 }  // namespace orbis::io

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The named columns of a cloud file, and their interpretation as points and colours, which all formats share.
+/// The named columns of a cloud file, and their interpretation as points and colours, shared by all formats.
 #pragma once
 
 #include <algorithm>
@@ -31,12 +31,12 @@
 
 namespace orbis::io::detail {
 
-/// The points of a file, before their interpretation.
+/// The columns of a cloud file, not yet interpreted.
 struct cloud_columns {
   std::vector<cloud_field> columns;  ///< in the order of the file; names may repeat
   std::size_t size = 0;              ///< number of points
   std::array<double, 7> viewpoint{0, 0, 0, 1, 0, 0, 0};
-  std::vector<std::string> left_out;  ///< parts of the file that are left out
+  std::vector<std::string> left_out;  ///< omitted parts of the file
   std::vector<std::string> notes;
   bool is_text = false;
 };
@@ -242,7 +242,7 @@ inline result<cloud_with_fields> to_cloud(cloud_columns&& read, const std::strin
     if (taken.insert(field.name).second)
       out.fields.push_back(std::move(field));
     else
-      read.left_out.push_back("another " + field.name);
+      read.left_out.push_back("repeated " + field.name);
   }
   if (!read.left_out.empty()) out.notes.push_back("left out: " + joined(read.left_out));
   return out;

@@ -87,7 +87,7 @@ class jpeg_decoder {
       return give_up("specifies more pixels than the file can hold");
     if (jpeg_has_multiple_scans(&info_) != FALSE) {
       // Each scan processes all pixels again, and may consist of only a few bytes; all coefficients are kept in memory.
-      if (pixels > (std::uint64_t{1} << 26)) return give_up("has several scans and too many pixels for them");
+      if (pixels > (std::uint64_t{1} << 26)) return give_up("has too many pixels for an image with several scans");
       progress_.most_scans =
           static_cast<int>(std::clamp<std::uint64_t>((std::uint64_t{1} << 30) / (pixels + 1), 16, 500));
       progress_.base.progress_monitor = [](j_common_ptr common) {

@@ -67,8 +67,8 @@ struct column_name {
     return std::ranges::find(known, word) != std::end(known);
   }
 };
-/// The names of the columns in a line; empty for more than 200, which are not those of poses and would take many times
-/// the memory of the line.
+/// The names of the columns in a line; empty if there are more than 200, because such a line is not a pose header and
+/// the names would take many times the memory of the line.
 [[nodiscard]] inline std::vector<column_name> column_names(std::string_view line, char separator) {
   std::vector<column_name> names;
   while (!line.empty()) {
@@ -112,7 +112,7 @@ struct column_name {
   std::vector<column_name> names;
   for (const char separator : {find_separator(line), ' '}) {  // a comment in prose may contain a comma
     names = column_names(line, separator);
-    for (std::size_t i = 0; i != names.size(); ++i)  // of columns x, y, z, w, x, y, z, the last four
+    for (std::size_t i = 0; i != names.size(); ++i)  // the quaternion in x, y, z, w, x, y, z is at the end
       if (are_components(names, i, "wxyz") && (!header.quaternion || names[*header.quaternion].prefix().empty()))
         header.quaternion = i;
     if (header.quaternion) break;

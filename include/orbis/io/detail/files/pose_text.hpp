@@ -112,8 +112,8 @@ inline result<pose_lines> parse_pose_lines(std::string_view text, const std::fil
     if (header.columns != usual_columns)
       read.notes.push_back("according to the header, column " + std::to_string(header.columns[0] + 1) +
                            " is the time, column " + std::to_string(header.columns[1] + 1) +
-                           " the first of the position, and column " + std::to_string(header.columns[4] + 1) +
-                           " the first of the quaternion");
+                           " the start of the position, and column " + std::to_string(header.columns[4] + 1) +
+                           " the start of the quaternion");
     if (!unknown_names.empty() && !header.quaternion && read.layout != trajectory_layout::kitti)
       read.notes.push_back(unknown_names + (header.w_first ? "qw qx qy qz" : "qx qy qz qw"));
   };
@@ -207,8 +207,8 @@ inline result<pose_lines> parse_pose_lines(std::string_view text, const std::fil
 
 /// Keeps the first of consecutive entries with equal times.
 struct repeated_times {
-  std::size_t same = 0;       ///< removed entries with the pose of the kept one
-  std::size_t different = 0;  ///< removed entries with another pose
+  std::size_t same = 0;       ///< number of removed entries with the same pose as the kept one
+  std::size_t different = 0;  ///< number of removed entries with a different pose
 };
 inline repeated_times keep_first(std::vector<pose_lines::entry>& entries) {
   repeated_times removed;
@@ -239,7 +239,7 @@ inline repeated_times keep_first(std::vector<pose_lines::entry>& entries) {
   });
 }
 
-/// Explains equal times of different poses. `entries`: in ascending order of distinct times. Times have too few digits
+/// Explains why different poses have equal times. `entries` have distinct, ascending times. Times have too few digits
 /// if they are multiples of a power of ten seconds that is not shorter than their median interval.
 [[nodiscard]] inline std::string explain_equal_times(const std::vector<pose_lines::entry>& entries) {
   std::vector<double> times;

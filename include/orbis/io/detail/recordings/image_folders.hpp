@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Recordings as written by exporters: a folder of colour images and a folder of depth images registered to them,
+/// Recordings written by export tools: a folder of colour images and a folder of depth images registered to them,
 /// paired by the numbers or times in their names; optionally `times.txt` and `groundtruth.txt`.
 #pragma once
 

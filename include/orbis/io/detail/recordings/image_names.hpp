@@ -56,7 +56,8 @@ struct keyed_images {
   }
 };
 
-/// The last number in a file name, with a fraction or as seconds and nanoseconds if present, and the text around it.
+/// The last number in a file name, which may have a fraction or consist of seconds and nanoseconds, and the text around
+/// it.
 struct name_number {
   std::string_view before, number, after;
   std::string_view fraction;  ///< the part after the underscore in `seconds_nanoseconds`; `number` is the part before

@@ -2,7 +2,7 @@
 /// @file
 /// Arithmetic for synthetic pixels: bit-identical on every machine.
 ///
-/// Only operations are used that IEEE 754 defines exactly (+ - * / sqrt, conversions) and integers; sine and cosine are
+/// Uses only integers and the operations that IEEE 754 defines exactly (+ - * / sqrt, conversions); sine and cosine are
 /// those of core/rounded.hpp. A compiler may still fuse a product and a sum into one rounding if the target supports it
 /// (`-march=native`), so every header whose arithmetic affects a pixel disables this for its own functions, between
 /// ORBIS_BEGIN_UNFUSED and ORBIS_END_UNFUSED. Functions between these macros are not templates, because templates would
@@ -52,7 +52,7 @@ struct triple {
   return static_cast<double>(word & 0xffffffffU) * 0x1.0p-32;
 }
 
-/// Uniform in [lo, hi).
+/// A uniformly distributed random number in [lo, hi).
 [[nodiscard]] inline double between(random_bits& bits, double lo, double hi) noexcept {
   return lo + (hi - lo) * bits.uniform();
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Path of a hand-held or walking camera once around a room.
+/// Path of a hand-held or robot-mounted camera, once around a room.
 #pragma once
 
 #include <algorithm>
@@ -43,8 +43,8 @@ inline void set_rotation(camera_pose& pose, quaternion r) noexcept {
   pose.q = r.v;
 }
 
-/// Rotates a camera: `yaw` from the world's x axis towards y, `pitch` upward, `roll` about the optical axis; all in
-/// turns.
+/// Rotates a camera: `yaw` from the world's x axis towards y, `pitch` upward, `roll` about the optical axis; all angles
+/// are in turns.
 inline void orient(camera_pose& pose, double yaw, double pitch, double roll) noexcept {
   const quaternion about_up{cos_turns(0.5 * yaw), {0.0, 0.0, sin_turns(0.5 * yaw)}};
   const quaternion about_side{cos_turns(0.5 * pitch), {0.0, -sin_turns(0.5 * pitch), 0.0}};

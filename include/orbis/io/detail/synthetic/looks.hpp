@@ -20,13 +20,13 @@ namespace orbis::io::detail::synthetic {
 /// Appearance of one face of a solid.
 struct face_look {
   material surface = material::plain;  ///< the base
-  double patches = 0.0;                ///< number painted per square metre
+  double patches = 0.0;                ///< number of patches per square metre
   double contrast = 0.8;               ///< contrast of the patches
   std::uint64_t seed = 0;              ///< the same seed and size give the same picture
   double period = 0.0;                 ///< metres; if above 0, the picture repeats with this period along both axes
   double coarseness = 1.0;             ///< size of the face's texels relative to those of other faces
 };
-/// Looks of the six faces of a solid: index 2 * axis, plus one for the positive side.
+/// Looks of the six faces of a solid, indexed by 2 * axis, plus one for the positive side.
 using face_looks = std::array<face_look, 6>;
 
 /// Number of patches per square metre for a material: books and clutter have many corners, a plain surface has few.

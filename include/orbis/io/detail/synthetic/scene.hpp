@@ -21,7 +21,7 @@ ORBIS_BEGIN_UNFUSED
 
 namespace orbis::io::detail::synthetic {
 
-/// Two legs, two arms, two halves of the trunk, and a head.
+/// The parts of a person: two legs, two arms, two halves of the trunk, and a head.
 using body_parts = std::array<solid, 7>;
 
 /// An adult, 1.75 m tall and 0.55 m wide, standing at `foot` (metres, world) and facing along `(cos_yaw, sin_yaw)`.
@@ -101,7 +101,7 @@ class scene {
 
   /// The unsigned distance (metres) from a point to the nearest surface visible to a camera: the error of a map point.
   /// Exact in front of the surfaces; behind them, where several solids overlap, it is the distance to the surface of
-  /// the solid that contains the point most deeply. Ignores moving solids.
+  /// the solid in which the point is deepest. Ignores moving solids.
   [[nodiscard]] double distance(const vec3& p_world) const noexcept {
     const triple p = to_triple(p_world);
     double nearest = solids_.front().signed_distance(p);
@@ -134,7 +134,8 @@ class scene {
     return walking_person({a * x, b * y, 0.0}, a * y / speed, -b * x / speed, time / 1.3, person_seed_);
   }
 
-  /// A position next to a wall: `along` the wall from its centre, `out` from it into the room.
+  /// A wall. Positions next to it are given by `along`, measured from the wall's centre, and `out`, measured from the
+  /// wall into the room.
   struct wall {
     int face;       // as in is_poor_wall
     double length;  // metres
