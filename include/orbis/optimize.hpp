@@ -19,7 +19,7 @@
 /// | self_calibration.hpp | bundle adjustment of images of one camera with unknown intrinsics |
 /// | solver_policies.hpp | damping (Gauss-Newton, Levenberg-Marquardt, dogleg), solvers for the reduced system |
 /// | triangulation.hpp | triangulation of points from two or more rays |
-/// | two_view.hpp | essential matrix, homography and relative pose of two images; initial scene and motion |
+/// | two_view.hpp | essential matrix, homography and relative pose of two images; initial structure and motion |
 #pragma once
 
 #include <orbis/optimize/alignment.hpp>

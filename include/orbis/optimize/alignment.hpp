@@ -115,7 +115,7 @@ template <class Transform>
 struct alignment_estimate {
   Transform T_to_from;
   std::vector<std::uint32_t> inliers;  ///< indices of all pairs within the threshold, ascending
-  double rmse = 0.0;                   ///< root mean square error of the inliers, in units of the threshold
+  double rmse = 0.0;                   ///< root mean square error of the inliers, in the unit of the threshold
   std::size_t iterations = 0;
 };
 

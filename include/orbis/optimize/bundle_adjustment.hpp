@@ -46,8 +46,8 @@ class bundle_solver;
 /// factorised as a sparse matrix). Every policy, number of threads and instruction set gives the same bits. Not
 /// thread-safe.
 ///
-/// The library orbis::compiled contains it for `reprojection` with `camera::pinhole` and `camera::any_camera`, the
-/// default loss and policies, and no report; for other arguments include bundle_adjustment-inl.hpp.
+/// The library orbis::compiled contains it for `reprojection` with `camera::pinhole` and `camera::any_camera`, with the
+/// default loss and policies and without a report; for other arguments include bundle_adjustment-inl.hpp.
 template <bundle_residual Residual, robust_loss Loss = huber, damping_policy Damping = levenberg_marquardt>
 class bundle_adjuster {
  public:

@@ -21,9 +21,9 @@ struct bundle_observation {
   std::uint32_t pose = 0;
   std::uint32_t point = 0;
   vec2 pixel = zeros<vec2>();
-  double right = std::numeric_limits<double>::quiet_NaN();  ///< as in `pose_observation`; NaN if there is no depth
+  double right = std::numeric_limits<double>::quiet_NaN();  ///< see `pose_observation`; NaN if there is no depth
   double information = 1.0;                                 ///< 1 / sigma^2 of the pixel, in 1 / pixel^2
-  double depth_weight = 1.0;                                ///< as in `pose_observation`
+  double depth_weight = 1.0;                                ///< see `pose_observation`
 };
 
 /// Manifold of a camera state: the type of the state and the effect of a step. `m.retract(p, d)` is the state after the
@@ -35,7 +35,8 @@ concept camera_manifold = std::copyable<M> &&
   requires std::same_as<typename M::tangent, matrix<M::dimension>>;
 };
 
-/// A Lie group with steps on the right: `T * exp(d)`. For a pose `T_world_camera`, the step is in the camera frame.
+/// A Lie group whose steps are applied on the right: `T * exp(d)`. For a pose `T_world_camera`, the step is in the
+/// camera frame.
 template <class T>
 struct lie_group {
   using point = T;

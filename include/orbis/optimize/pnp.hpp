@@ -36,7 +36,7 @@ struct pose_estimate {
   std::size_t iterations = 0;
 };
 
-/// Reusable memory, not for concurrent calls: once it is large enough, only the inliers of the result are allocated.
+/// Reusable memory; not for concurrent calls. Once it is large enough, a call allocates only the inliers of the result.
 struct pnp_workspace {
   detail::pnp_matches matches;
   ransac_workspace ransac;

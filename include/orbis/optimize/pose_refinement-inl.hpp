@@ -162,7 +162,7 @@ class pose_refiner {
   [[nodiscard]] int steps() const noexcept { return steps_; }
 
  private:
-  /// Relative decrease of the cost below the practical resolution of a sum of squares.
+  /// Relative decrease of the cost that is too small to distinguish from rounding errors.
   static constexpr double negligible = 1e-13;
 
   [[nodiscard]] pose_at at_pose(const se3& pose) const {
@@ -224,7 +224,7 @@ pose_refinement refine_pose(std::span<const pose_observation> observations, cons
   bool changed = true;
   for (int round = 0; round < options.rounds; ++round) {
     const bool last = round + 1 == options.rounds;
-    if (last)  // an infinite width gives least squares, with the same bits
+    if (last)  // with an infinite width, this loss equals least squares, bit for bit
       out.status = refiner.run_round(huber{std::numeric_limits<double>::infinity()}, 1e-9);
     else if (changed || out.status != refinement_status::converged)
       out.status = refiner.run_round(loss, 1e-6);  // this round only needs to identify the outliers

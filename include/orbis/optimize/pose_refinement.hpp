@@ -6,7 +6,7 @@
 /// by its chi-squared error at the current pose; the last round omits the robust loss. Eight observations are processed
 /// at a time. Needs about 80 kB of stack and never allocates memory.
 ///
-/// Source of the rounds: R. Mur-Artal, J. D. Tardos, "ORB-SLAM2", T-RO 33 (2017).
+/// Source for the rounds: R. Mur-Artal, J. D. Tardos, "ORB-SLAM2", T-RO 33 (2017).
 #pragma once
 
 #include <cassert>
@@ -43,7 +43,7 @@ enum class refinement_status {
 
 struct pose_refinement_options {
   int rounds = 4;
-  int iterations = 10;  ///< per round
+  int iterations = 10;  ///< maximum number of iterations per round
   /// Maximum chi-squared error of an inlier without depth, and with depth.
   double gate_mono = chi_squared_gate(2), gate_depth = chi_squared_gate(3);
 };

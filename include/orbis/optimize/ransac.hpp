@@ -80,7 +80,7 @@ struct ransac_options {
   std::uint64_t seed = 1;
 };
 
-/// Reusable memory, not for concurrent calls: with it, only the inliers of the result are allocated.
+/// Reusable memory; not for concurrent calls. A call that uses it allocates only the inliers of the result.
 struct ransac_workspace {
   std::vector<std::uint32_t> inliers;
 };
@@ -126,7 +126,7 @@ template <std::size_t N>
 }
 
 /// Sequential probability ratio test: scoring stops as soon as the scored data are much more likely under a bad model
-/// than under one as good as the best so far.
+/// than under a model as good as the best one so far.
 class sequential_test {
  public:
   /// `model_cost` as in `ransac_options`; 0: no model is rejected.
@@ -313,7 +313,7 @@ class ransac_run {
   double best_score_ = std::numeric_limits<double>::infinity();
 };
 
-/// Returns the RANSAC options among an estimator's options, which have the same names.
+/// Copies the RANSAC options from an estimator's options, whose members have the same names.
 template <class Options>
 [[nodiscard]] ransac_options ransac_part(const Options& options, double model_cost = 200.0) {
   return {.threshold = options.threshold,

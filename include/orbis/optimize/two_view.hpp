@@ -47,7 +47,7 @@ struct relative_pose_estimate {
 
 namespace detail {
 
-/// Implements `estimate_essential` for the usable ones of `n` matches.
+/// Implements `estimate_essential` for the usable matches among `n` matches.
 template <class Match>
 [[nodiscard]] result<relative_pose_estimate> essential_of_matches(const std::vector<Match>& matches, std::size_t n,
                                                                   const essential_options& options);
@@ -148,7 +148,7 @@ struct two_view_reconstruction {
 
 namespace detail {
 
-/// Implements `reconstruct_two_views` for the usable ones of `n` matches.
+/// Implements `reconstruct_two_views` for the usable matches among `n` matches.
 template <class Match>
 [[nodiscard]] result<two_view_reconstruction> reconstruction_of_matches(const std::vector<Match>& matches,
                                                                         std::size_t n, const two_view_options& options);

@@ -124,9 +124,9 @@ template <bool Derive, class R, int Columns>
   }
 }
 
-/// Computes the residuals `r` of eight observations, and with `Derive` their derivatives with respect to `q` (the point
-/// in the camera frame, or, for general residuals, in the world frame) and to the other parameters. Returns the mask of
-/// observations with a projection.
+/// Computes the residuals `r` of eight observations and, if `Derive` is true, their derivatives with respect to `q`
+/// (the point in the camera frame, or, for general residuals, in the world frame) and to the other parameters. Returns
+/// the mask of observations with a projection.
 template <bool Derive, class R, int Columns, class L>
 ORBIS_ALWAYS_INLINE typename L::mask_type residuals_of_tile(const camera_work<R>& work, std::size_t first, const L* q,
                                                             L* r, L (*by_q)[3],
@@ -441,7 +441,7 @@ struct cost_kernel {
     return camera_cost<Target>(work, loss);
   }
 };
-/// Runs once per problem, so one instruction set is enough.
+/// The loop that finds observations without a projection. It runs once per problem, so one instruction set is enough.
 template <class R>
 struct visibility_kernel {
   template <simd::target Target>

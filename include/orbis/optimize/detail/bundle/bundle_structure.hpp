@@ -93,7 +93,7 @@ class bundle_structure {
     std::uint32_t observation, other;  ///< `other`: index of its point or its camera, depending on the order
   };
   struct span_of_cameras {
-    /// The first and last movable cameras that observe a point, and their number.
+    /// The first and last movable cameras that observe a point, and the number of movable cameras that do.
     std::uint32_t first = none, last = none, seen = 0;
   };
 
@@ -209,7 +209,7 @@ class bundle_structure {
       std::sort(touched_.begin(), touched_.end());
       for (const std::uint32_t c : touched_) {
         segments.push_back({c, in_chunk_[c], tiles, mixed_tiles_});
-        in_chunk_[c] = static_cast<std::uint32_t>(tile * tiles);  // the next places
+        in_chunk_[c] = static_cast<std::uint32_t>(tile * tiles);  // the next free places
         mixed_in_chunk_[c] = static_cast<std::uint32_t>(tile * mixed_tiles_);
         const std::size_t own = (segments.back().count + tile - 1) / tile;
         tiles += own;
@@ -320,7 +320,7 @@ class bundle_structure {
   std::size_t mixed_tiles_ = 0, largest_chunk_ = 0, pairs_ = 0;
   std::vector<entry> by_camera_, by_point_;
   std::vector<std::uint32_t> of_point_, cursor_, moved_, in_chunk_, mixed_in_chunk_, touched_;
-  std::vector<std::uint8_t> is_like_last_;  // for each point: true if its movable cameras are those of the previous one
+  std::vector<std::uint8_t> is_like_last_;  // for each point: true if the same movable cameras observe the previous one
   std::vector<span_of_cameras> spans_;
   std::vector<std::uint64_t> present_;
   std::vector<std::uint32_t> rank_;

@@ -38,7 +38,7 @@ struct row_layout {
 /// Number of rows in a register.
 template <int C, simd::target Target>
 inline constexpr int row_width = row_layout<C>::body % static_cast<int>(Target::bytes / 8) == 0 ? Target::bytes / 8 : 4;
-/// True if the registers have room for two rows of blocks: the sums, and in addition two rows and a factor.
+/// True if the registers have room for two blocks at a time: 2 C sums, two rows and one common factor.
 template <int C, simd::target Target>
 inline constexpr bool has_room_for_two = 2 * C + 3 <= (Target::bytes == 64 ? 32 : 16);
 

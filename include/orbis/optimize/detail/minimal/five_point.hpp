@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The essential matrices of five pairs of rays.
+/// The essential matrices that agree with five pairs of rays.
 ///
 /// The five epipolar constraints are satisfied by the matrices `x X + y Y + z Z + W`. An essential matrix is singular
 /// and has two equal singular values, which gives ten cubic equations in x, y and z. Elimination yields a polynomial of
