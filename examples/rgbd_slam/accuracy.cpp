@@ -76,7 +76,7 @@ void compare_with_truth(results& r, const frame_source& source, console& console
   if (!compared->no_rpe.empty()) console.warn(r.warnings.emplace_back("no RPE: " + compared->no_rpe));
   if (compared->truth_lacks_orientations && !source.truth_has_positions_only)
     console.warn(r.warnings.emplace_back(
-        "all orientations in the ground truth are equal, but the camera turns: the world frame differs from it"));
+        "all orientations in the ground truth are equal, but the camera turns: the world frames differ"));
   r.against_truth = *std::move(compared);
   console.finish("ATE and RPE" + std::string{r.map && r.map->error_m ? ", map error" : ""});
 }

@@ -44,7 +44,7 @@ std::string parameter_line(const calibrated_parameter& p) {
   const int digits = std::max(std::abs(p.before), std::abs(p.after)) < 10.0 ? 5 : 2;
   char text[160];
   if (p.is_held && p.deviation > 0.0 && std::isfinite(p.deviation))
-    std::snprintf(text, sizeof text, "%-12s %12.*f %12s %12.*f  kept: not determined more accurately", p.name.data(),
+    std::snprintf(text, sizeof text, "%-12s %12.*f %12s %12.*f  kept: not determined accurately enough", p.name.data(),
                   digits, p.before, "-", digits, p.deviation);
   else if (p.is_held)
     std::snprintf(text, sizeof text, "%-12s %12.*f %12s %12s  kept: not determined by the motion", p.name.data(),

@@ -238,7 +238,7 @@ void add_slam_options(CLI::App& cmd, settings& s) {
       "--live-map,!--batch-map", s.live_map,
       "build the octree while frames are tracked (default), or from all keyframes at the end; both give the same map");
   cmd.add_flag("--map-every-frame", s.map_every_frame,
-               "insert every tracked frame into the live map, not only keyframes; the files contain keyframes only");
+               "insert every tracked frame into the live map, not only keyframes; output files contain keyframes only");
   if (cmd.get_name() != "live")
     cmd.add_flag("--realtime", s.realtime, "play frames at the rate of their timestamps, as a camera would");
   cmd.add_option("--save-map", s.save_map, "write the landmark map at the end")->check(not_empty)->type_name("FILE");
@@ -252,7 +252,7 @@ void add_slam_options(CLI::App& cmd, settings& s) {
 void add_viewer_options(CLI::App& cmd, settings& s) {
   cmd.add_option_function<std::string>(
          "--viewer", [&s](const std::string& name) { s.viewer = name.empty() ? "window" : name; },
-         "show the run in a window or (--viewer web) on a page for browsers on this machine")
+         "show the run in a window or (--viewer web) in a browser on this machine")
       ->check(CLI::Validator(
           [](const std::string& name) {
             const bool is_known = name.empty() || name == "window" || name == "web";
@@ -400,7 +400,7 @@ struct command_line {
   command_line(const command_line&) = delete;  // options refer to members
   command_line& operator=(const command_line&) = delete;
   ~command_line() = default;
-  /// Same as read_command_line; may be called any number of times.
+  /// Like `read_command_line`; may be called any number of times.
   [[nodiscard]] std::variant<settings, exit_code> read(int argc, char** argv);
 
   settings s;
@@ -438,7 +438,7 @@ command_line::command_line() {
   demo->add_option("--seed", s.seed, "seed of the room, the camera's path and the sensor noise")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
-  demo->add_flag("--plain", s.plain, "render a single round, without a person and stray depths");
+  demo->add_flag("--plain", s.plain, "render a single round, without a person or stray depths");
   demo->add_flag("--person", s.person, "with --plain: a person walks through the room");
   demo->add_flag(
       "--walk", s.walk,

@@ -27,12 +27,12 @@ void forget_stop();
 /// Returns true if a signal arrived after `keep_results`.
 [[nodiscard]] bool stop_requested();
 
-/// Marks the start of work that may be abandoned; a signal from now on prints `notice` on stderr.
+/// Marks the start of work that may be abandoned; from then on, a signal prints `notice` on stderr.
 void begin_dispensable(std::string notice);
 /// Returns true if the work since `begin_dispensable` must be abandoned.
 [[nodiscard]] bool is_given_up();
-/// Marks the end of this work. Returns `stop_requested`; a first signal from now on has no effect, because the rest of
-/// the run takes almost no time.
+/// Marks the end of this work. Returns `stop_requested`; from then on, a first signal has no effect, because the rest
+/// of the run takes almost no time.
 bool end_dispensable();
 /// Removes the temporary files and ends the program, even while threads are running.
 [[noreturn]] void end_program(int code);

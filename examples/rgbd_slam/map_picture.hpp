@@ -19,12 +19,12 @@ enum class coloring { camera, height };
 [[nodiscard]] orbis::image<orbis::rgb8> draw_aslant(const std::vector<voxel>& voxels, const std::vector<voxel>& in_view,
                                                     const view_frame& frame, coloring how, int width, int height);
 
-/// A view from above, and the pixels that one metre of the floor takes.
+/// A view from above, and its scale in pixels per metre.
 struct view_from_above {
   orbis::image<orbis::rgb8> picture;
   double pixels_per_metre;
 };
-/// Draws a view from above; the frame's y axis points up. Otherwise as `draw_aslant`.
+/// Draws a view from above; the frame's y axis points up. Otherwise like `draw_aslant`.
 [[nodiscard]] view_from_above draw_from_above(const std::vector<voxel>& voxels, const std::vector<voxel>& in_view,
                                               const view_frame& frame, coloring how, int width, int height);
 

@@ -32,7 +32,7 @@ std::string describe(const built_map& map) {
          std::string{to_string(map.filter.mode)} + ", octree of " + count_text(map.octree.num_leaves()) + " leaves";
 }
 
-/// The first part of the explanation why points were removed.
+/// The first part of the explanation of why points were removed.
 std::string describe(const orbis::mapping::moving_count& moving) {
   if (moving.pixels == 0) return {};
   return std::to_string(moving.pixels) + " pixels of " + std::to_string(moving.keyframes) +

@@ -44,8 +44,7 @@ std::vector<vec3> free_places(const View& view, const orbis::trajectory& cameras
   return places;
 }
 
-/// A path from the first of these places to the farthest of a few reachable ones; a path that is not straight is
-/// preferred.
+/// A path from the first place to the farthest of a few reachable places; prefers a path that is not straight.
 template <nav::planning_space View>
 std::optional<way> plan_through(const View& view, const std::vector<vec3>& places) {
   if (places.size() < 2) return std::nullopt;

@@ -37,7 +37,7 @@
 namespace app {
 namespace {
 
-/// The camera's motion per second at a time, from the ground truth around it; zero if that is not available.
+/// The camera's twist at a given time, computed from the ground truth; zero if no poses around that time are known.
 orbis::vec6 twist_at(const orbis::trajectory& truth, double time) {
   constexpr double around = 0.02, longest_gap = 0.2;  // seconds
   const auto before = orbis::interpolate(truth, time - around, longest_gap, 0.0);

@@ -88,7 +88,7 @@ orbis::result<void> build_map(results& r, const tracked_frames& tracked, const f
   return {};
 }
 
-/// Completes the results: the map, if there are keyframes, the evaluation and the report. Creates files in `r.folder`
+/// Completes the results: the map (if there are keyframes), the evaluation and the report. Creates files in `r.folder`
 /// and at `floor_map`.
 orbis::result<void> complete(results& r, const tracked_frames& tracked, const frame_source& source, const settings& s,
                              const file_lists& files, const std::filesystem::path& floor_map, viewer& viewer,
@@ -108,7 +108,7 @@ struct completion {
   bool is_running = false;             ///< a thread is still working on the map
 };
 
-/// Completes the results and moves their files to the other result files. If the user abandons the map, or it cannot be
+/// Completes the results and adds their files to the other result files. If the user abandons the map, or it cannot be
 /// made or written, leaves the results as they are. Errors: write_failed; no thread is then running.
 orbis::result<completion> complete_or_give_up(results& r, const tracked_frames& tracked, const frame_source& source,
                                               const settings& s, result_files& files, viewer& viewer,
@@ -184,7 +184,8 @@ exit_code end_tracked(const results& r, const tracked_frames& tracked, const com
   return done;
 }
 
-/// The path at which a file in a hidden folder would have appeared; other names unchanged, `out` if there is none.
+/// The path at which a file in a hidden folder would have appeared. Returns any other path unchanged, and `out` for an
+/// empty path.
 std::string shown_path(const std::string& where, const std::filesystem::path& out) {
   const std::size_t hidden = where.find(std::string{"/"} + staged_folder::private_name + "-");
   if (hidden == std::string::npos) return where.empty() ? out.string() : where;

@@ -43,7 +43,7 @@ using octree = orbis::octree::occupancy_octree<>;
 using orbis::vec3;
 using orbis::octree::occupancy;
 
-/// Reads a .bt or .ot map, which the first bytes distinguish.
+/// Reads a .bt or .ot map; the first bytes determine the format.
 orbis::result<octree> read_map(const std::filesystem::path& path) {
   const auto bytes = orbis::read_file(path);
   if (!bytes) return orbis::fail(bytes.error());
@@ -195,7 +195,7 @@ std::optional<vec3> nearest_free(const Space& space, const vec3& p) {
   return nearest;
 }
 
-/// The reason why there is no path, and the distance from the goal that the robot can reach.
+/// The reason why there is no path, and the distance from the goal to the nearest reachable position.
 template <nav::planning_space Space, class Map>
 std::string explain(const nav::found_path& path, const Space& space, const Map& map, const settings& s) {
   using enum nav::path_status;

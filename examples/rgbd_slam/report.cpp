@@ -61,7 +61,7 @@ std::string base64(std::string_view bytes) {
   return out;
 }
 
-/// The stride that takes at most `most` of `size` elements.
+/// The stride that selects at most `most` of `size` elements.
 std::size_t thinning(std::size_t size, std::size_t most) { return std::max<std::size_t>(1, (size + most - 1) / most); }
 
 double rounded(double v, double step) { return std::round(v / step) * step; }
@@ -110,7 +110,7 @@ class packer {
 };
 
 json packed_points(const map_results& m, const view_frame& frame) {
-  // Removed points are few, and their display is useful: thinned less.
+  // There are few removed points, and seeing them is useful: thin them less.
   const std::size_t every_kept = thinning(m.kept.size(), 80'000);
   const std::size_t every_removed = thinning(m.cloud.size() - m.kept.size(), 20'000);
   packer out;
@@ -385,7 +385,7 @@ void choose(std::string& page, const std::string& name, bool keep) {
   }
 }
 
-/// Replaces all {{name}} in one pass, so that values are not searched for them.
+/// Replaces all {{name}} in one pass, so that inserted values are not searched for placeholders.
 std::string filled(std::string_view page, const std::map<std::string, std::string>& values) {
   std::string out;
   for (std::size_t at = 0;;) {

@@ -88,8 +88,8 @@ hidden_folders& hidden() {
 void remove_hidden_folders() {
   const std::lock_guard lock{hidden().mutex};
   std::error_code ignored;
-  // Removal fails if another thread creates a file at this moment, and is tried again. Once the folder is gone, no file
-  // can be created in it.
+  // Removal fails if another thread creates a file at this moment, and is then tried again. Once the folder is gone, no
+  // file can be created in it.
   for (const fs::path& path : hidden().paths)
     for (int i = 0; i != 1000 && fs::exists(path, ignored); ++i) fs::remove_all(path, ignored);
 }

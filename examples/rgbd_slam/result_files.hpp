@@ -57,7 +57,7 @@ class file_lists {
   file_lists(std::filesystem::path out, std::filesystem::path folder)
       : out_{std::move(out)}, folder_{std::move(folder)} {}
 
-  /// The files of this run: those created so far, and those of `coming`.
+  /// The files of this run: those created so far, and those in `coming`.
   [[nodiscard]] file_names made(const file_names& coming) const;
   /// The files of earlier runs that will stay in the output folder.
   [[nodiscard]] file_names of_earlier_runs(const file_names& made) const;
@@ -82,13 +82,13 @@ class result_files {
   [[nodiscard]] std::filesystem::path floor_map() const { return floor_map_in({}); }
   [[nodiscard]] file_lists lists() const { return {out_, folder()}; }
 
-  /// Creates the folders of optional files: `take_optional` adds all of them to the results, or none is added. Errors:
+  /// Creates the folders for optional files, which `take_optional` adds to the results, either all or none. Errors:
   /// write_failed.
   [[nodiscard]] orbis::result<void> begin_optional();
   /// The counterparts of `folder` and `floor_map` for the optional files.
   [[nodiscard]] std::filesystem::path optional_folder() const { return folder() / optional_name; }
   [[nodiscard]] std::filesystem::path optional_floor_map() const { return floor_map_in(optional_name); }
-  /// Moves the optional files to the other files. Errors: write_failed.
+  /// Adds the optional files to the other files. Errors: write_failed.
   [[nodiscard]] orbis::result<void> take_optional();
   /// Removes the optional files.
   void drop_optional() noexcept;

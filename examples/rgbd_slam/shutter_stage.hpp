@@ -17,7 +17,7 @@ namespace app {
 struct camera_inspection {
   shutter_results shutter;
   std::optional<focal_doubt>
-      doubt;  ///< from the map of the first seconds, if they were tracked and a check was requested
+      doubt;  ///< doubt about the focal length, if a check was requested and the first seconds were tracked
 };
 
 /// Takes the shutter from `--read-out-ms`, or else from the camera's settings, or else estimates it: tracks the first

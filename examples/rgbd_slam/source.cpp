@@ -123,7 +123,7 @@ void subtract_origin(frame_source& source) {
   source.truth_has_positions_only = orbis::eval::has_positions_only(source.ground_truth);
   if (source.truth_has_positions_only) {
     source.notes.push_back(
-        "the ground truth has positions only (all orientations are 0 0 0 1): the world frame differs from it");
+        "the ground truth has positions only (all orientations are 0 0 0 1): the world frames differ");
     return;
   }
   const orbis::vec3 origin = examples::nearby_origin(source.ground_truth.front().T_world_camera.translation());
@@ -133,7 +133,7 @@ void subtract_origin(frame_source& source) {
   if (!origin.isZero()) source.notes.push_back(origin_note(origin));
 }
 
-/// Creates a source with the parts that are the same for recordings of all sensors.
+/// Creates a source and sets the members that do not depend on the sensor.
 template <class Recording>
 frame_source make_source(const Recording& recording, const char* kind, const settings& s) {
   frame_source source;

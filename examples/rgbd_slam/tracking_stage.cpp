@@ -231,7 +231,7 @@ std::invoke_result_t<const Make&> with_threads(viewer& viewer, console& console,
   } catch (const std::system_error&) {
     if (!viewer.give_way(console)) throw;
   }
-  for (int attempt = 0; attempt != 50; ++attempt) try {  // the system still counts threads shortly after their end
+  for (int attempt = 0; attempt != 50; ++attempt) try {  // threads still count for a short time after they end
       return make();
     } catch (const std::system_error&) {
       std::this_thread::sleep_for(std::chrono::milliseconds{2});

@@ -603,7 +603,7 @@ class bag_recording final : public file_recording {
                       " does not specify a body");
     else if (!T_body_camera)
       notes.push_back("poses of " + from.name + " are those of " + pose.child_frame_id +
-                      ", not of the camera: no static transform connects it to " + camera_frame);
+                      ", not of the camera: no static transform connects that frame to " + camera_frame);
     return {};
   }
 

@@ -21,8 +21,8 @@ namespace app {
 
 enum class message_encoding : std::uint8_t { ros1, cdr };
 
-/// Reads from bytes that must outlive the reader. After the first field that exceeds the bytes, all fields are zero or
-/// empty and `ok()` is false.
+/// Reads from bytes that must outlive the reader. After the first field that extends past the end, all fields are zero
+/// or empty and `ok()` is false.
 class message_reader {
  public:
   message_reader(std::string_view bytes, message_encoding encoding) : bytes_{bytes}, encoding_{encoding} {
@@ -54,7 +54,7 @@ class message_reader {
     for (T& v : values) v = number<T>();
     return values;
   }
-  /// The number of elements in a sequence; `ok()` is false if elements of `least` bytes exceed the message.
+  /// The number of elements in a sequence; `ok()` is false if that many elements of `least` bytes extend past the end.
   [[nodiscard]] std::size_t count(std::size_t least) {
     const std::size_t n = number<std::uint32_t>();
     if (n > rest() / least) ok_ = false;

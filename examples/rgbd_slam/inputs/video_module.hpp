@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Videos and video cameras are read by a separate module, `rgbd_slam_video.so` next to the program, which is loaded
-/// when the first of them is opened, because OpenCV's videoio needs about two hundred libraries, which would cost every
+/// Videos and video cameras are read by a separate module, `rgbd_slam_video.so` next to the program. It is loaded when
+/// the first of them is opened, because OpenCV's videoio depends on about two hundred libraries, which would cost every
 /// run half a second and 60 MB.
 #pragma once
 

@@ -36,7 +36,7 @@ std::optional<std::uint64_t> parse_since(const http_request& request) {
   return value;
 }
 
-/// Leaves most of the file descriptors to the run.
+/// Limits that leave most of the file descriptors to the run.
 http_limits limits() {
   http_limits made;
   if (rlimit files{}; ::getrlimit(RLIMIT_NOFILE, &files) == 0)
