@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// 05_rgbd_slam [RECORDING]: RGB-D SLAM with a live map on its own thread; writes trajectory.txt and map.bt, and plans a
-// path. RECORDING: a folder in the TUM RGB-D, 7-Scenes, ICL-NUIM or ScanNet layout; default: a synthetic room.
+// 05_rgbd_slam [RECORDING]: RGB-D SLAM with a live map on a separate thread; writes trajectory.txt and map.bt, and
+// plans a path. RECORDING: a folder in the TUM RGB-D, 7-Scenes, ICL-NUIM or ScanNet layout; default: a synthetic room.
 #include <cstdio>
 
 #include <orbis/camera/any.hpp>
@@ -18,7 +18,7 @@ int run(Recording&& recording) {
   const auto camera = recording.camera().model;
 
   orbis::slam::options options;
-  options.threads.enabled = true;  // local mapping and loop closing on their own threads
+  options.threads.enabled = true;  // local mapping and loop closing on separate threads
   orbis::slam::rgbd_system slam{camera, options};
 
   // The map's thread follows the keyframe poses, which SLAM corrects, and publishes snapshots.
@@ -35,7 +35,7 @@ int run(Recording&& recording) {
   slam.wait();
   map.finish();
 
-  const auto snapshot = map.latest();  // immutable; may be called from any thread at any time
+  const auto snapshot = map.latest();  // snapshots are immutable and available to any thread
   const auto trajectory = slam.trajectory();
   std::printf("%zu frames, %zu tracked, %zu keyframes, %zu leaves in the map\n", i, trajectory.size(),
               snapshot->keyframes, snapshot->map.num_leaves());

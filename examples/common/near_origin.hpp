@@ -27,7 +27,7 @@ namespace examples {
   return place.array().round();
 }
 
-/// The median of the finite points along each axis, which outliers do not move. Zero if there are none.
+/// The median of the finite points along each axis, which is robust to outliers. Zero if there are no finite points.
 [[nodiscard]] inline orbis::vec3 median_point(const std::vector<orbis::vec3f>& points) {
   orbis::vec3 middle = orbis::vec3::Zero();
   std::vector<float> along;

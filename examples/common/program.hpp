@@ -38,8 +38,8 @@ namespace examples {
   return orbis::shortened(what) + " (--help shows the usage)";
 }
 
-/// Throws if an option of the program or of the chosen commands has a number that CLI11 accepts but changes: NaN, which
-/// passes limits, because these are comparisons, or an integer that is negative or too large for its unsigned type.
+/// Throws if an option of the program or of the chosen commands has an invalid number that CLI11 accepts: NaN, which
+/// passes range checks, or an integer that is negative or too large for its unsigned type.
 inline void check_numbers(const CLI::App& cli) {
   for (const CLI::Option* option : cli.get_options())
     for (const std::string& text : option->results()) {

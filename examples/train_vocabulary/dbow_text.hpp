@@ -2,10 +2,10 @@
 /// @file
 /// Vocabularies in the text format of DBoW2, the format of ORB-SLAM's vocabulary.
 ///
-/// The first line contains branching, depth, the score (0 to 5; ignored, because the score is a type in orbis) and the
-/// weighting (0 tf-idf, 1 tf, 2 idf, 3 binary). Each subsequent line is a node; nodes are numbered from 1. A line
-/// contains the index of the parent (0: the root), 1 for a word or 0 for an inner node, the bytes of the descriptor,
-/// and the weight.
+/// The first line contains branching, depth, the score (0 to 5; ignored, because a vocabulary of orbis does not store a
+/// score) and the weighting (0 tf-idf, 1 tf, 2 idf, 3 binary). Each subsequent line is a node; nodes are numbered from
+/// 1. A line contains the index of the parent (0: the root), 1 for a word or 0 for an inner node, the bytes of the
+/// descriptor, and the weight.
 #pragma once
 
 #include <charconv>

@@ -163,7 +163,7 @@ class dbow_yaml_parser {
         if (key == "weightingType") {
           if (!number(value, weights_are_) || weights_are_ > 3) return reject("the weighting must be between 0 and 3");
         } else if (key == "k" || key == "L" || key == "scoringType") {
-          std::uint32_t ignored = 0;  // the depth follows from the tree, and scores are types
+          std::uint32_t ignored = 0;  // the depth follows from the tree; orbis stores no score
           if (!number(value, ignored)) return reject(orbis::in_quotes(key) + " is not a number");
         }
       }
@@ -207,7 +207,7 @@ class dbow_yaml_parser {
     });
     if (!read) return false;
     if (n.id == 0 || !parent || weight < 0.0 || !descriptor)
-      return reject("a node without id (from 1), parent, weight or descriptor", n.line);
+      return reject("a node has no id (from 1), parent, weight or descriptor", n.line);
     nodes_.push_back(n);
     list_.descriptors.push_back(*descriptor);
     list_.weights.push_back(static_cast<float>(weight));

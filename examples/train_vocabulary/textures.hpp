@@ -24,7 +24,7 @@ using orbis::cos_turns;
 using orbis::random_bits;
 using orbis::sin_turns;
 
-/// Uniform in [lo, hi).
+/// A uniformly distributed random number in [lo, hi).
 [[nodiscard]] inline double between(random_bits& bits, double lo, double hi) noexcept { return bits.uniform(lo, hi); }
 
 /// A texture that is being painted; brightness ranges from about 0 to 1.
@@ -90,7 +90,7 @@ class picture {
   void fall() {
     const double smallest = between(bits_, 2.5, 7.0), largest = between(bits_, 60.0, 240.0);
     const double contrast = between(bits_, 0.25, 1.0), middle = between(bits_, 0.35, 0.65);
-    const double cover = between(bits_, 0.3, 2.5);  // coverage of the image by the smallest leaves alone
+    const double cover = between(bits_, 0.3, 2.5);  // coverage of the image by the smallest leaves only
     const int count = static_cast<int>(cover * width_ * height_ / (30.0 * smallest * smallest)) + 10;
     const bool upright = bits_.below(3) == 0;  // like most man-made objects
     for (int i = 0; i < count; ++i) {
@@ -188,8 +188,8 @@ class picture {
         if (stroke(sign, u - cu, v - cv, thick)) at(px, py) = static_cast<float>(ink);
       }
   }
-  /// Returns true if a point in the unit square is on a stroke of a sign, which has up to eight strokes: bars, uprights
-  /// and slants.
+  /// Returns true if a point in the unit square is on a stroke of a sign, which has up to eight strokes: horizontal,
+  /// vertical and diagonal ones.
   [[nodiscard]] static bool stroke(std::uint64_t sign, double u, double v, double thick) noexcept {
     if (u < 0.1 || u > 0.85 || v < 0.15 || v > 0.85) return false;
     const double s = (u - 0.1) / 0.75, t = (v - 0.15) / 0.7;
