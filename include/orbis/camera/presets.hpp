@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Cameras of common public recordings, by name.
+/// Cameras of common public recordings, identified by names.
 #pragma once
 
 #include <array>

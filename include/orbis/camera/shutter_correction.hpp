@@ -125,7 +125,7 @@ class shutter_correction {
   /// Computes the colour image that belongs to a corrected depth image: each pixel gets the colour read at the position
   /// where its point was observed; a pixel without depth is treated as a point at a large distance; positions outside
   /// the image are black. If the camera does not move, or all rows are read at the frame's time, the image is copied.
-  /// Errors and preconditions: as in `depth`. O(pixels).
+  /// Errors and preconditions: those of `depth`. O(pixels).
   template <depth_source Depth>
   [[nodiscard]] result<void> color(const shutter& s, const vec6& twist, const Depth& corrected,
                                    image_view<const rgb8> color, image_view<rgb8> out) {

@@ -45,7 +45,7 @@ struct rectify_options {
   int width = 0;                   ///< width of the rectified images, pixels; 0: width of the left camera
   int height = 0;                  ///< height of the rectified images, pixels; 0: height of the left camera
   std::optional<double> focal{};   ///< focal length of the rectified camera, pixels; default: see `rectify`
-  double max_magnification = 1.5;  ///< maximum ratio of the default focal length to the one at the image centres
+  double max_magnification = 1.5;  ///< maximum ratio of the default focal length to that at the image centres
 };
 
 /// Maps the images of a stereo rig to images of two identical pinhole cameras at the same positions, with parallel

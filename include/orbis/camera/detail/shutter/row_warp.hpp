@@ -215,7 +215,7 @@ class row_warp {
     return p;
   }
 
-  /// Computes the pixels of a cell whose inverse depth is larger than `above`, without parabolas.
+  /// Computes individually, without parabolas, the pixels of a cell whose inverse depth is larger than `above`.
   void evaluate_each(const Camera& camera, std::size_t of, int y, std::span<const float> inverse_depth, float above,
                      warped_row& out) const {
     constexpr float none = std::numeric_limits<float>::quiet_NaN();
