@@ -61,7 +61,7 @@ class ompl_position {
 template <nav::planning_space Space>
 class ompl_validity_checker : public ompl::base::StateValidityChecker {
  public:
-  /// Objects that the space refers to must outlive the checker and not change. @pre see ompl_position
+  /// Objects that the space refers to must outlive the checker and not change. @pre same as for ompl_position
   ompl_validity_checker(const ompl::base::SpaceInformationPtr& information, const Space& space)
       : StateValidityChecker{information}, position_{*information->getStateSpace()}, space_{space} {
     if constexpr (is_ball) specs_.clearanceComputationType = ompl::base::StateValidityCheckerSpecs::BOUNDED_APPROXIMATE;
@@ -95,8 +95,8 @@ class ompl_validity_checker : public ompl::base::StateValidityChecker {
 template <nav::planning_space Space>
 class ompl_motion_validator : public ompl::base::MotionValidator {
  public:
-  /// Objects that the space refers to must outlive the validator and not change. @pre see ompl_position; the state
-  /// space interpolates positions linearly
+  /// Objects that the space refers to must outlive the validator and not change. @pre same as for ompl_position; the
+  /// state space interpolates positions linearly
   ompl_motion_validator(const ompl::base::SpaceInformationPtr& information, const Space& space)
       : MotionValidator{information}, position_{*information->getStateSpace()}, space_{space} {}
 
@@ -126,7 +126,7 @@ class ompl_motion_validator : public ompl::base::MotionValidator {
 };
 
 /// Sets `space` as the state and motion checker of `information`. Call it before `setup()`.
-/// @pre see ompl_motion_validator
+/// @pre same as for ompl_motion_validator
 template <nav::planning_space Space>
 void use_planning_space(const ompl::base::SpaceInformationPtr& information, const Space& space) {
   information->setStateValidityChecker(std::make_shared<ompl_validity_checker<Space>>(information, space));
