@@ -21,7 +21,7 @@
 
 namespace orbis::io {
 
-/// Observation of `point` by `camera`, both as indices.
+/// Observation of the point `point` by the camera `camera`; both are indices.
 struct bal_observation {
   std::uint32_t camera = 0;
   std::uint32_t point = 0;

@@ -12,7 +12,7 @@
 
 namespace orbis::io {
 
-/// Returns true if `bytes` begin like a JPEG file.
+/// Returns true if `bytes` begin with the signature of a JPEG file.
 [[nodiscard]] inline bool is_jpeg(std::string_view bytes) noexcept { return bytes.starts_with("\xFF\xD8\xFF"); }
 
 /// Decodes a JPEG to 8-bit colour; grey is copied to all channels. `where` names the source in errors. Errors:

@@ -20,9 +20,9 @@
 
 namespace orbis::io {
 
-/// Parses a PCD file in memory: `x y z` of any type and, if present, colours like those of `parse_ply`. Ignores all
-/// other fields. `origin` is subtracted from the coordinates before they are converted to float. Errors: malformed
-/// (damaged, truncated), unsupported (no x, y and z).
+/// Parses a PCD file in memory: `x y z` of any type and, if present, colours in the same forms as for `parse_ply`.
+/// Ignores all other fields. `origin` is subtracted from the coordinates before they are converted to float. Errors:
+/// malformed (damaged, truncated), unsupported (no x, y and z).
 [[nodiscard]] result<point_cloud> parse_pcd(std::string_view bytes, const std::string& where = {},
                                             const vec3& origin = zeros<vec3>());
 

@@ -13,7 +13,7 @@
 
 namespace orbis::io {
 
-/// Returns true if `bytes` begin like a PNG file.
+/// Returns true if `bytes` begin with the signature of a PNG file.
 [[nodiscard]] inline bool is_png(std::string_view bytes) noexcept { return bytes.starts_with("\x89PNG\r\n\x1a\n"); }
 
 /// Decodes any PNG to 8-bit colour: grey is copied to all channels, 16 bits are scaled to 8, a palette is resolved, an

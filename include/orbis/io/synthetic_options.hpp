@@ -79,7 +79,7 @@ struct synthetic_sensor_options {
 
   double stereo_baseline = 0.12;  ///< distance between the cameras of a stereo pair, metres
 
-  double colour_noise = 2.0;  ///< standard deviation in grey values
+  double colour_noise = 2.0;  ///< standard deviation of the colour noise, grey values
   int motion_blur = 1;        ///< number of images averaged over the exposure time; 1: no blur
   double exposure = 0.015;    ///< exposure time at a `light` of 1, for motion blur, seconds
   /// Maximum exposure time in a darker room, seconds. If the required time is f times longer, the colour noise is

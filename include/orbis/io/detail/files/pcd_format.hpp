@@ -98,23 +98,23 @@ inline result<pcd_header> take_pcd_header(std::string_view& bytes, const std::st
         header.fields.push_back({.name = std::string{name}});
     } else if (key == "SIZE") {
       for (pcd_field& f : header.fields)
-        if (!parse_number(next_field(line), f.size) || f.size == 0 || f.size > 8) return bad("a bad SIZE");
+        if (!parse_number(next_field(line), f.size) || f.size == 0 || f.size > 8) return bad("invalid SIZE");
     } else if (key == "TYPE") {
       for (pcd_field& f : header.fields) {
         const std::string_view type = next_field(line);
-        if (type != "F" && type != "I" && type != "U") return bad("a bad TYPE");
+        if (type != "F" && type != "I" && type != "U") return bad("invalid TYPE");
         f.type = type.front();
       }
     } else if (key == "COUNT") {
       for (pcd_field& f : header.fields)
-        if (!parse_number(next_field(line), f.count) || f.count > max_point_size) return bad("a bad COUNT");
+        if (!parse_number(next_field(line), f.count) || f.count > max_point_size) return bad("invalid COUNT");
     } else if (key == "WIDTH") {
-      if (!number(line, header.width)) return bad("a bad WIDTH");
+      if (!number(line, header.width)) return bad("invalid WIDTH");
       has_width = true;
     } else if (key == "HEIGHT") {
-      if (!number(line, header.height)) return bad("a bad HEIGHT");
+      if (!number(line, header.height)) return bad("invalid HEIGHT");
     } else if (key == "POINTS") {
-      if (!number(line, header.points)) return bad("a bad number of POINTS");
+      if (!number(line, header.points)) return bad("invalid number of POINTS");
       has_points = true;
     } else if (key == "DATA") {
       const std::string_view encoding = next_field(line);
@@ -125,13 +125,13 @@ inline result<pcd_header> take_pcd_header(std::string_view& bytes, const std::st
       else if (encoding == "binary_compressed")
         header.data = pcd_data::binary_compressed;
       else
-        return bad("an unknown kind of DATA");
+        return bad("unknown type of DATA");
       has_data = true;
     } else if (key == "VIEWPOINT") {
       parse_viewpoint(line, header);
     } else if (key != "VERSION") {
       return header.fields.empty() ? result<pcd_header>(fail(errc::malformed, where, "is not a PCD file"))
-                                   : result<pcd_header>(bad("an unknown line"));
+                                   : result<pcd_header>(bad("unknown line"));
     }
   }
   if (!has_data || header.fields.empty()) return fail(errc::malformed, where, "is not a PCD file, or ends early");
@@ -143,7 +143,7 @@ inline result<pcd_header> take_pcd_header(std::string_view& bytes, const std::st
   if (!has_points) header.points = header.width * header.height;
   if (header.points != header.width * header.height) return bad("POINTS is not WIDTH times HEIGHT");
   for (pcd_field& f : header.fields) {
-    if (!f.scalar()) return bad("a field with a bad SIZE or TYPE");
+    if (!f.scalar()) return bad("a field has an invalid SIZE or TYPE");
     f.offset = header.point_size;
     f.first_token = header.tokens;
     header.point_size += f.size * f.count;

@@ -84,7 +84,7 @@ inline result<ply_header> take_ply_header(std::string_view& bytes, const std::st
       has_format = true;
     } else if (word == "element") {
       ply_element element{std::string{next_field(line)}, 0, {}};
-      if (element.name.empty() || !parse_number(next_field(line), element.count)) return bad("a bad element line");
+      if (element.name.empty() || !parse_number(next_field(line), element.count)) return bad("invalid element line");
       header.elements.push_back(std::move(element));
     } else if (word == "property") {
       if (header.elements.empty()) return bad("a property before any element");
@@ -102,7 +102,7 @@ inline result<ply_header> take_ply_header(std::string_view& bytes, const std::st
       property.name = next_field(line);
       header.elements.back().properties.push_back(std::move(property));
     } else {
-      return bad("an unknown line");
+      return bad("unknown line");
     }
   }
   return bad("ends early");

@@ -47,7 +47,7 @@ struct packed_depth {
     if (type == "IHDR" && out.width == 0) {
       out.width = number(data);
       out.height = number(data.substr(4));
-      // 16 bits, grey, deflate, filters by row, not interlaced
+      // 16 bits, grey, deflate, adaptive filtering, not interlaced
       if (data.substr(8) != "\x10\0\0\0\0"sv || out.width == 0 || out.height == 0) return std::nullopt;
     } else if (type == "IDAT" && (was_pixels || out.pixels.empty())) {
       out.pixels.insert(out.pixels.end(), data.begin(), data.end());

@@ -60,7 +60,7 @@ namespace orbis::io::detail {
   return parse_pose_matrix(*text, path);
 }
 
-/// Returns true if a number in the text is NaN or infinite, or if the text is a matrix (at least 3x4, by rows) whose
+/// Returns true if a number in the text is NaN or infinite, or if the text is a matrix (at least 3x4, row by row) whose
 /// rotation is zero: data sets mark the poses of lost frames in these ways.
 [[nodiscard]] inline bool is_lost_pose(std::string_view text) {
   bool lost = false, is_zero = true;

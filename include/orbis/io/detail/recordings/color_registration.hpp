@@ -53,7 +53,7 @@ class color_registration {
 
   /// The colour image as seen from the depth camera; black where there is no colour. `depth_scale`: stored depth per
   /// metre. `depth` may be empty unless `needs_depth`. O(pixels of both). @pre `color` has the size of the colour
-  /// camera, `depth` that of the depth camera
+  /// camera, and `depth` the size of the depth camera
   [[nodiscard]] image<rgb8> register_color(image_view<const rgb8> color, image_view<const std::uint16_t> depth,
                                            double depth_scale) const {
     assert(color.width() == color_.model.width() && color.height() == color_.model.height());

@@ -41,8 +41,8 @@ inline constexpr double mono_pose_distance = 0.020;
   return first_present(folder, {"rgb.txt", "left.txt"});
 }
 
-/// The index of the images listed in `rgb.txt` or `left.txt`. `fps`: frame rate if there are numbers instead of times.
-/// Errors: not_found, unreadable, no_data, malformed (ground truth, with its line).
+/// The index of the images listed in `rgb.txt` or `left.txt`. `fps`: frame rate, used if the list has frame numbers
+/// instead of times. Errors: not_found, unreadable, no_data, malformed (ground truth, with its line).
 [[nodiscard]] inline result<recording_index> index_image_list(const std::filesystem::path& folder, double fps) {
   recording_index index;
   auto list = find_image_list(folder);

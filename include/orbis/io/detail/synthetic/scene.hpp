@@ -137,7 +137,7 @@ class scene {
   /// A wall. Positions next to it are given by `along`, measured from the wall's centre, and `out`, measured from the
   /// wall into the room.
   struct wall {
-    int face;       // as in is_poor_wall
+    int face;       // see is_poor_wall
     double length;  // metres
   };
 

@@ -99,7 +99,7 @@ class simulator {
   }
 
   /// The images of a stereo camera at `time`; its second camera is `baseline` metres to the right of the first. `at`
-  /// and `key`: as in `frame`.
+  /// and `key`: see `frame`.
   template <execution_policy Policy, class At>
   [[nodiscard]] camera::stereo_frame stereo(const Policy& policy, const At& at, double time, std::uint64_t key,
                                             double baseline) const {
