@@ -89,8 +89,8 @@ template <point_range From, point_range To>
 }
 
 /// Absolute orientation with unknown scale: minimises the sum of `|s R from[i] + t - to[i]|^2`, weighted by
-/// `weights[i]` unless `weights` is empty. O(n). Errors: as above; also `invalid_argument` unless there is one finite,
-/// non-negative weight per pair.
+/// `weights[i]` unless `weights` is empty. O(n). Errors: those of `absolute_orientation`, and `invalid_argument` unless
+/// there is one finite, non-negative weight per pair.
 template <point_range From, point_range To>
 [[nodiscard]] result<sim3> absolute_orientation_with_scale(const From& from, const To& to,
                                                            std::span<const double> weights = {}) {

@@ -129,7 +129,7 @@ template <std::size_t N>
 /// than under a model as good as the best one so far.
 class sequential_test {
  public:
-  /// `model_cost` as in `ransac_options`; 0: no model is rejected.
+  /// `model_cost`: see `ransac_options`; 0: no model is rejected.
   explicit sequential_test(double model_cost) noexcept : model_cost_{model_cost} {}
 
   /// Call before scoring a model.
@@ -398,7 +398,7 @@ template <model_estimator E>
       *run.best(), {run.inliers().begin(), run.inliers().end()}, run.exact_score(), iteration};
 }
 
-/// As above, with temporary working memory.
+/// Same as above, with temporary working memory.
 template <model_estimator E>
 [[nodiscard]] result<ransac_estimate<typename E::model>> ransac(const E& estimator, const ransac_options& options) {
   ransac_workspace workspace;

@@ -63,7 +63,7 @@ triangulation triangulate_all(std::span<const basic_se3<S>> T_world_camera, std:
     b += across * from_origin;
     baseline = std::max(baseline, norm(from_origin));
   }
-  // Two distant rays: the one farthest from the first, and the one farthest from that one.
+  // Measure the parallax between two distant rays: the ray farthest from the first one, and the ray farthest from it.
   const auto farthest_from = [&](std::size_t k) {
     std::size_t farthest = k;
     double angle = 0.0;

@@ -31,8 +31,8 @@
 
 namespace orbis::optimize::detail {
 
-/// The unknowns are the steps of the movable cameras, with C entries each, followed by the steps of the points in the
-/// order of `structure()`, with three entries each. Reuses its memory.
+/// The normal equations and the current estimates. The unknowns are the steps of the movable cameras, with C entries
+/// each, followed by the steps of the points in the order of `structure()`, with three entries each. Reuses its memory.
 template <bundle_residual R, robust_loss Loss>
 class bundle_equations {
  public:
@@ -505,7 +505,7 @@ class bundle_equations {
   schur_kernels<camera_size, camera_frame_residual<R>> schur_;
   bundle_structure structure_;
 
-  // Values for each place in the order by camera.
+  // Values for each place of the order by camera.
   std::vector<double> measurements_, base_information_, information_, flags_;
   std::vector<observation> observations_;
   // Current estimates, and estimates after an attempted step.

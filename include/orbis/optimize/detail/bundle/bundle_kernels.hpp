@@ -454,7 +454,7 @@ void find_visible(const camera_work<R>& work, double* flags) {
   simd::kernel<visibility_kernel<R>, void(const camera_work<R>&, double*), simd::portable>()(work, flags);
 }
 
-/// The kernels for this processor.
+/// Pointers to the kernels for this processor's instruction set.
 template <class R, class Loss>
 struct bundle_kernels {
   using reduce = double(const camera_work<R>&, const Loss&);

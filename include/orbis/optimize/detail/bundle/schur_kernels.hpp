@@ -22,7 +22,8 @@
 
 namespace orbis::optimize::detail {
 
-/// Memory layout of C rows: whole registers; a last row that would be alone in a register is stored separately.
+/// Memory layout of C rows, which fill whole registers; a last row that would need its own register is stored
+/// separately.
 template <int C>
 struct row_layout {
   static constexpr bool has_last = C > 8 && C % 8 == 1;
@@ -342,7 +343,7 @@ struct substitute_kernel {
   }
 };
 
-/// The kernels for this processor.
+/// Pointers to the kernels for this processor's instruction set.
 template <int C, bool ThroughCamera>
 struct schur_kernels {
   using eliminator = std::size_t(const elimination&);

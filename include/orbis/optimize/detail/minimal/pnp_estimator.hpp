@@ -106,7 +106,7 @@ struct match_equations_kernel {
   }
 };
 
-/// The loops for this processor.
+/// Pointers to the loops for this processor's instruction set.
 struct match_kernels {
   match_errors* errors = simd::kernel<match_errors_kernel, match_errors>();
   match_equations* equations = simd::kernel<match_equations_kernel, match_equations>();

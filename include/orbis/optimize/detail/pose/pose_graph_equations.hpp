@@ -18,8 +18,8 @@
 
 namespace orbis::optimize::detail {
 
-/// The unknowns are the steps of the movable vertices, in the order of `structure()`. Reuses its memory. Every
-/// execution policy gives the same bits.
+/// The normal equations and the current estimate. The unknowns are the steps of the movable vertices, in the order of
+/// `structure()`. Reuses its memory. Every execution policy gives the same bits.
 template <class T, class Loss, class Between>
 class pose_graph_equations {
  public:

@@ -224,7 +224,7 @@ struct judge_pose_kernel {
   }
 };
 
-/// The loops for this processor.
+/// Returns a pointer to the loop for this processor's instruction set.
 template <class Camera>
 [[nodiscard]] auto* sum_pose_function() noexcept {
   return simd::kernel<sum_pose_kernel<Camera>,

@@ -39,7 +39,7 @@ requires(B >= 1) class block_cholesky {
   /// Factorises the matrix with `diagonal[i]` at (i, i), `damping` added to its diagonal, and `off_diagonal[k]` at
   /// `places[k]`. Returns false if the matrix is not positive definite: a pivot is not above `tolerance` times the
   /// diagonal entry of the matrix, or not finite; see `failed_block`.
-  /// @pre sizes as analysed; `damping` empty or one per row
+  /// @pre the spans have the analysed sizes; `damping` is empty or has one entry per row
   [[nodiscard]] bool factor(std::span<const block> diagonal, std::span<const block> off_diagonal,
                             std::span<const double> damping = {}, double tolerance = 1e-14);
 

@@ -30,8 +30,7 @@ class dense_cholesky {
   }
   [[nodiscard]] std::size_t size() const { return size_; }
 
-  /// Returns entry (row, column) of the matrix, of which only the lower triangle is read; after `factor`, of the
-  /// factor.
+  /// Returns entry (row, column) of the matrix or, after `factor`, of its factor. Only the lower triangle is used.
   [[nodiscard]] double& operator()(std::size_t row, std::size_t column) { return values_[column * stride_ + row]; }
   [[nodiscard]] double* column(std::size_t c) { return values_.data() + c * stride_; }
 

@@ -74,7 +74,7 @@ struct panel_solve_kernel {
   }
 };
 
-/// The kernels for this processor.
+/// Pointers to the kernels for this processor's instruction set.
 template <int N>
 struct panel_kernels {
   panel_product* product;
