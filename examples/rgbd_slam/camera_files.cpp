@@ -94,8 +94,8 @@ class named_values {
 /// Focal lengths and principal point in pixels.
 using focal_and_center = std::array<double, 4>;
 
-/// The focal lengths and principal point in a 3x3 camera matrix, stored by rows, or by columns as in Open3D and MATLAB;
-/// empty if it is not a camera matrix.
+/// The focal lengths and principal point in a 3x3 camera matrix, stored row by row, or column by column as in Open3D
+/// and MATLAB; empty if it is not a camera matrix.
 std::optional<focal_and_center> of_matrix(const std::array<double, 9>& m) {
   const auto vanishes = [&](std::size_t i) { return std::abs(m[i]) <= 1e-3 * std::abs(m[0]); };
   if (m[8] != 1.0 || !vanishes(1) || !vanishes(3)) return std::nullopt;

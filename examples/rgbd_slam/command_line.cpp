@@ -301,7 +301,7 @@ void add_benchmark_options(CLI::App& cmd, settings& s) {
       ->check(not_empty)
       ->type_name("DIR");
   add_frame_options(cmd, s);
-  cmd.add_option("--run-config", s.run_config, "file with options for the runs, as in run --config")
+  cmd.add_option("--run-config", s.run_config, "file with options for the runs, like that of run --config")
       ->check(CLI::Validator{CLI::ExistingFile}.description(""))
       ->type_name("FILE");
   cmd.footer(

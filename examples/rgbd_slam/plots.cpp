@@ -136,7 +136,7 @@ orbis::result<void> write_filter_picture(const results& r, const view_frame& fra
   s.text("filter: " + m.filter_mode + ", removed " + removed_text(m), {60, 70}, faint, 13);
   if (m.moving_pixels != 0)
     s.text("people and other moving objects, " + count_text(m.moving_pixels) + " pixels of " +
-               count_text(m.moving_keyframes) + " keyframes, were removed before",
+               count_text(m.moving_keyframes) + " keyframes, were removed beforehand",
            {60, 88}, faint, 13);
   const auto panel = [&](int x, const std::string& name, const std::vector<voxel>& voxels, const tree_numbers& numbers,
                          std::size_t points, std::uintmax_t bytes) {

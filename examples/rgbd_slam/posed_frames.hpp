@@ -55,7 +55,7 @@ class posed_frames {
         colors_{spill_file.string() + ".colors", point_stride,
                 source.made ? std::numeric_limits<std::uint64_t>::max() : most_color_bytes} {}
 
-  /// Adds frame `i` of the source with its pose. `corrected_by`: as in the overload for keyframes.
+  /// Adds frame `i` of the source with its pose. `corrected_by`: see the overload for keyframes.
   void add(std::size_t i, const orbis::se3& T_world_camera, const orbis::slam::frame_motion& corrected_by,
            const orbis::camera::rgbd_frame& frame) {
     add({i, {}, T_world_camera, corrected_by}, frame);

@@ -34,9 +34,9 @@ namespace app {
 [[nodiscard]] std::string path_text(const navigation_results& n);
 [[nodiscard]] std::string accuracy_lines(const accuracy& a);
 
-/// "12.3 MB"
+/// Formats a size: "12.3 MB".
 [[nodiscard]] std::string bytes_text(std::uintmax_t bytes);
-/// "1,234,567"
+/// Formats a number with separators: "1,234,567".
 [[nodiscard]] std::string count_text(std::uintmax_t n);
 
 }  // namespace app

@@ -33,7 +33,7 @@ class upright_worlds {
   orbis::camera::ray_table rays_;
   std::optional<orbis::vec3> gravity_;
   bool follows_truth_;
-  std::map<double, world_results> begun_;  // by start time
+  std::map<double, world_results> begun_;  // indexed by start time
 };
 
 }  // namespace app

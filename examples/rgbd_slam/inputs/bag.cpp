@@ -36,7 +36,7 @@ double seconds(std::int64_t nanoseconds) {
   return static_cast<double>(nanoseconds / second) + 1e-9 * static_cast<double>(nanoseconds % second);
 }
 
-/// Sorts by a time and removes elements with repeated times. Returns the number of removed elements.
+/// Sorts elements by their member `time` and removes those with repeated times. Returns the number of removed elements.
 template <class T, class Time>
 std::size_t sort_by_time(std::vector<T>& all, Time T::*time) {
   std::ranges::stable_sort(all, {}, time);
@@ -51,7 +51,7 @@ std::string in_words(double number) {
   return text.str();
 }
 
-/// "1 image of /camera is", "2 images of /camera are".
+/// The beginning of a sentence: "1 image of /camera is", "2 images of /camera are".
 std::string count_text(std::size_t n, const std::string& what, const std::string& from) {
   return std::to_string(n) + " " + what + (n == 1 ? " of " : "s of ") + from + (n == 1 ? " is" : " are");
 }

@@ -50,7 +50,7 @@ inline constexpr std::size_t whole_message = std::size_t{1} << 30U;  ///< bytes;
 
 /// The name of a type in ROS 1: "sensor_msgs/Image" for "sensor_msgs/msg/Image".
 [[nodiscard]] std::string ros1_type(std::string_view type);
-/// Returns true if the messages of a topic are listed. `type`: as in ROS 1.
+/// Returns true if the messages of a topic are listed. `type` is spelt as in ROS 1.
 [[nodiscard]] bool is_listed(std::string_view name, std::string_view type);
 /// Returns true for the topic with the depth unit in metres in a librealsense bag.
 [[nodiscard]] bool is_depth_unit(std::string_view name, std::string_view type);

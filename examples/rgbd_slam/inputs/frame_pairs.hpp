@@ -26,8 +26,8 @@ class frame_pairs {
     Frame color, depth;
   };
 
-  /// `interval`: time between frames of a stream, seconds. Paired frames are less than half of it apart, and at most
-  /// 20 ms, as in recordings.
+  /// `interval`: time between frames of a stream, seconds. Paired frames are less than half an interval apart, and at
+  /// most 20 ms, as for recordings.
   explicit frame_pairs(double interval = 1.0 / 30.0) : most_apart_{std::min(0.020, 0.49 * interval)} {}
 
   /// Adds the next frame of a stream with its time in seconds; returns the pair that it completes, if any.
