@@ -29,7 +29,7 @@ struct numbers {
   [[nodiscard]] const orbis::matrix<N>& to_matrix() const { return values; }
 };
 
-/// The residual `R_b - R_a * R_a_b` for unconstrained matrices, each stored by columns as nine numbers.
+/// The residual `R_b - R_a * R_a_b` for unconstrained matrices, each stored column by column as nine numbers.
 struct rotation_difference {
   static constexpr int dimension = 9;
   using vertex = numbers<9>;

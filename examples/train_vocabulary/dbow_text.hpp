@@ -103,7 +103,7 @@ template <std::size_t Bits = 256>
     if (!take_number(line, parent)) return bad(line_number, "does not begin with the index of the parent");
     if (parent > list.size()) return bad(line_number, "the parent must precede its child");
     if (!take_number(line, leaf) || leaf < 0 || leaf > 1)
-      return bad(line_number, "the second field must be 1 (word) or 0");
+      return bad(line_number, "the second field must be 1 (word) or 0 (inner node)");
     bit_words<Bits> descriptor{};
     for (std::size_t i = 0; i != Bits / 8; ++i) {
       std::uint8_t byte = 0;

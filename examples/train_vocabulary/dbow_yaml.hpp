@@ -262,7 +262,7 @@ class dbow_yaml_parser {
   /// Converts the nodes from the order in the file to the order of their ids, and then to the order of orbis.
   bool order() {
     const std::size_t n = nodes_.size();
-    std::vector<std::uint32_t> entry(n + 1, 0);  // index by id, from 1
+    std::vector<std::uint32_t> entry(n + 1, 0);  // for each id: the index of its node, counted from 1; 0: none
     for (std::size_t i = 0; i != n; ++i) {
       const node& at = nodes_[i];
       if (at.id > n || at.parent > n) return reject("an id exceeds the number of nodes, " + std::to_string(n), at.line);
