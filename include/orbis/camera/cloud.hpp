@@ -49,7 +49,7 @@ void for_each_point_of_row(const Depth& depth, const ray_table& rays, int y, con
 
 }  // namespace detail
 
-/// Converts a depth image to points in the world frame, in pixel order under every policy. O(width * height /
+/// Converts a depth image to points in the world frame, which are in pixel order for every policy. O(width * height /
 /// stride^2).
 /// @pre depth and rays have the same size; options.stride > 0
 template <execution_policy Policy, depth_source Depth>

@@ -50,7 +50,7 @@ struct rectify_options {
 
 /// Maps the images of a stereo rig to images of two identical pinhole cameras at the same positions, with parallel
 /// optical axes and x along the baseline. A point is on the same row in both images; its column in the right image is
-/// its column in the left image minus `camera().k().fx * baseline() / depth`. Build it once (`rectify`), apply it to
+/// its column in the left image minus `camera().k().fx * baseline() / depth`. Build it once (`rectify`) and apply it to
 /// each pair: `left().bilinear(image)`. 16 bytes per pixel.
 class rectification {
  public:

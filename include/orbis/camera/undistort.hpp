@@ -25,11 +25,12 @@ concept has_intrinsics = camera_model<C> && requires(const C& camera) {
   { camera.k() } -> std::convertible_to<intrinsics>;
 };
 
-/// Remaps images of a camera to images of an ideal pinhole camera at the same position. Build it once, apply it to
+/// Remaps images of a camera to images of an ideal pinhole camera at the same position. Build it once and apply it to
 /// every frame. 8 bytes per pixel.
 class undistortion {
  public:
-  /// For an ideal camera at the position of `camera`, rotated by `R_camera_ideal`. O(pixels of `ideal`) projections.
+  /// Creates the map to an ideal camera at the position of `camera`, rotated by `R_camera_ideal`. O(pixels of `ideal`)
+  /// projections.
   template <camera_model Camera>
   undistortion(const Camera& camera, const pinhole& ideal, const mat3& R_camera_ideal = identity<mat3>())
       : source_width_{camera.width()},
@@ -42,7 +43,7 @@ class undistortion {
           source_(x, y) = pixel->template cast<float>();
       }
   }
-  /// For the pinhole camera with the size and camera matrix of `camera`.
+  /// Creates the map to the pinhole camera with the size and camera matrix of `camera`.
   template <has_intrinsics Camera>
   explicit undistortion(const Camera& camera) : undistortion(camera, pinhole{camera.k()}) {}
 

@@ -15,7 +15,7 @@ namespace orbis::camera::detail {
 /// Computes the memory offset of the pixel nearest to each position, or -1 outside the image.
 struct nearest_pixels_kernel {
   struct arguments {
-    std::size_t count;  ///< whole cells
+    std::size_t count;  ///< number of pixels; whole cells
     int width, height;
     std::int32_t stride;  ///< row stride of the image in memory
     const float *x, *y;
@@ -44,7 +44,7 @@ inline constexpr float same_surface = 0.03F;
 /// Interpolates inverse depth linearly between pixels, using only pixels that lie on the target surface.
 struct read_surface_kernel {
   struct arguments {
-    std::size_t count;  ///< whole cells
+    std::size_t count;  ///< number of pixels; whole cells
     int width, height;
     const float* surface;  ///< inverse depth of the target surface
     const float *x, *y;    ///< position at which the target surface was observed
