@@ -18,8 +18,8 @@
 
 namespace orbis::eval {
 
-/// A callable that returns the distance (metres, the sign is ignored) from a point to the surface. Called concurrently
-/// from several threads.
+/// A callable that returns the distance (metres, the sign is ignored) from a point to the surface. It is called
+/// concurrently from several threads.
 template <class F>
 concept distance_function = requires(const F& distance, const vec3& point) {
   { distance(point) } -> std::convertible_to<double>;
