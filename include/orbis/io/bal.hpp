@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
 /// Bundle adjustment problems in the text format of "Bundle Adjustment in the Large". A file contains the numbers of
-/// cameras, points and observations; the indices of the camera and the point, and the pixel, of each observation; nine
-/// numbers per camera; and three numbers per point. Numbers are separated by any white space.
+/// cameras, points and observations; the camera index, point index and pixel of each observation; nine numbers per
+/// camera; and three numbers per point. Numbers are separated by any white space.
 ///
 /// Source: S. Agarwal, N. Snavely, S. M. Seitz, R. Szeliski, "Bundle adjustment in the large", ECCV 2010,
 /// and https://grail.cs.washington.edu/projects/bal.

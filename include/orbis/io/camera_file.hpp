@@ -16,7 +16,8 @@
 ///   baseline = 0.075      # metres, optional
 ///   read_out_ms = 30.0    # rolling-shutter readout time, top row first, optional; 0: global shutter
 ///   depth_read_out_ms = 30.0  # readout time of the depth image, if different
-///   depth_delay_ms = 0.0  # delay of depth after colour, in addition to the difference of their time stamps, if known
+/// depth_delay_ms = 0.0  # delay of depth after colour, in addition to the difference between their time stamps, if
+/// known
 /// @endcode
 #pragma once
 

@@ -22,7 +22,7 @@ enum class cloud_format { ply, pcd };
 
 /// Reads a PLY or PCD file; its first bytes, or otherwise its extension, determine the format. `origin` is subtracted
 /// from the coordinates before they are converted to float, to preserve the accuracy of clouds far from their
-/// coordinate origin. Errors: not_found, unreadable, malformed, unsupported (neither of the two).
+/// coordinate origin. Errors: not_found, unreadable, malformed, unsupported (neither PLY nor PCD).
 [[nodiscard]] result<point_cloud> read_cloud(const std::filesystem::path& path, const vec3& origin = zeros<vec3>());
 
 /// Reads a cloud like `read_cloud`, with all other values that the file stores for each point. Errors: those of

@@ -127,7 +127,7 @@ ORBIS_INLINE result<recording> open_recording(const std::filesystem::path& folde
       return std::to_string(k.width) + " x " + std::to_string(k.height);
     };
     index->notes.push_back("colour images of " + size(index->color->model.k()) +
-                           " pixels are resampled to those of the depth camera, " + size((*camera)->model.k()));
+                           " pixels are resampled to the view of the depth camera, " + size((*camera)->model.k()));
   }
   return recording(*std::move(index), **std::move(camera), format);
 }

@@ -62,8 +62,8 @@ struct synthetic_path_options {
 /// 3DIMPVT 2012; disparity in steps of 1/8 pixel (K. Khoshelham, S. O. Elberink, "Accuracy and resolution of Kinect
 /// depth data", Sensors 2012).
 struct synthetic_sensor_options {
-  double min_depth = 0.4;  ///< metres; smaller depths are not measured
-  double max_depth = 4.5;  ///< metres; larger depths are not measured; 0: no limit
+  double min_depth = 0.4;  ///< minimum depth, metres; smaller depths are not measured
+  double max_depth = 4.5;  ///< maximum depth, metres; larger depths are not measured; 0: no limit
 
   double axial_noise = 1.0;       ///< factor applied to the published standard deviation
   double lateral_noise = 0.5;     ///< standard deviation in pixels of the position of a ray near a depth edge
