@@ -2,7 +2,7 @@
 /// @file
 /// Perspective-n-point: the camera pose from known points and their pixels, many of which may be mismatched.
 ///
-/// Sources: M. Fischler, R. Bolles, CACM 24 (1981) for P3P in RANSAC; see `ransac.hpp` for its parts.
+/// Sources: M. Fischler, R. Bolles, CACM 24 (1981) for P3P in RANSAC; see `ransac.hpp` for the parts of RANSAC.
 #pragma once
 
 #include <array>
@@ -43,7 +43,7 @@ struct pnp_workspace {
   std::vector<std::uint32_t> part;
 };
 
-/// Estimates the pose at which most of `points_world[i]` (metres) project to `pixels[i]`: P3P in RANSAC with a
+/// Estimates the pose at which most points `points_world[i]` (metres) project to `pixels[i]`: P3P in RANSAC with a
 /// sequential test of the models; each new best pose is refined on its inliers. Non-finite matches, and pixels that the
 /// camera cannot unproject, are outliers. Deterministic for a given `options.seed`. O(matches) per completely scored
 /// sample. Errors: `invalid_argument` for spans of different lengths or options out of range; `no_data` for fewer than

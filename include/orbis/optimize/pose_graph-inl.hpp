@@ -43,7 +43,7 @@ class pose_graph_descent {
  private:
   using equations_type = pose_graph_equations<T, Loss, Between>;
 
-  /// The interface of the graph to damping policies.
+  /// The interface through which damping policies access the graph.
   template <class Policy, class Edges>
   struct problem {
     equations_type& equations;

@@ -116,8 +116,8 @@ struct quaternion_between {
 static_assert(between_factor<quaternion_between, se3> && between_factor<logarithm_between<se3>, se3> &&
               between_factor<logarithm_between<sim3>, sim3> && between_factor<logarithm_between<so3>, so3>);
 
-/// Selection of the vertices held fixed so that the others are determined: relative poses do not determine the position
-/// of the graph in the world frame.
+/// Selection of the vertices that are held fixed so that the others are determined: relative poses do not determine the
+/// position of the graph in the world frame.
 enum class pose_graph_gauge {
   automatic,            ///< the fixed vertices; if there are none and the graph is connected, its first vertex
   first_of_each_piece,  ///< the fixed vertices; in each component without one, its first vertex
@@ -134,7 +134,7 @@ enum class pose_graph_status {
   missing_vertex,   ///< edge `where` refers to a nonexistent vertex
   self_edge,        ///< edge `where` connects a vertex to itself
   bad_measurement,  ///< the measurement of edge `where` is not finite
-  bad_information,  ///< the information of edge `where` is not finite, symmetric and positive definite
+  bad_information,  ///< the information of edge `where` is not a finite, symmetric, positive definite matrix
   no_gauge,         ///< vertex `where` is in a connected component without a fixed vertex
   singular          ///< the edges do not determine vertex `where`
 };

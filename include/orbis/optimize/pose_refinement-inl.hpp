@@ -87,7 +87,7 @@ struct pose_normal_equations {
   double cost;  ///< half the robust cost
 };
 
-/// One refinement, for one camera model.
+/// A refinement with a given camera model.
 template <class Camera>
 class pose_refiner {
  public:
@@ -133,7 +133,8 @@ class pose_refiner {
     return refinement_status::iteration_limit;
   }
 
-  /// Classifies every observation at the current pose as inlier or outlier. Returns true if any classification changed.
+  /// Classifies every observation at the current pose as an inlier or an outlier. Returns true if any classification
+  /// changed.
   bool apply_gates() {
     bool changed = false;
     inliers_ = 0;

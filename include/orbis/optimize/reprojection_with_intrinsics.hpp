@@ -80,7 +80,7 @@ struct posed_camera_manifold {
   }
 };
 
-/// The reprojection error as in `reprojection`, with the intrinsic parameters of every camera among the unknowns: the
+/// The reprojection error of `reprojection`, with the intrinsic parameters of every camera among the unknowns: the
 /// estimated state of a camera is a `posed_camera<Camera>`. Satisfies `camera_frame_residual`.
 ///
 /// @code
@@ -200,8 +200,8 @@ struct bal_view : camera_view {
   double focal = 1.0, k1 = 0.0, k2 = 0.0;
 };
 
-/// The reprojection error of a `bal_camera`, projected minus observed, pixels. Ignores `right` of the observations.
-/// Points behind the camera are also projected by the formula. Satisfies `camera_frame_residual`.
+/// The reprojection error of a `bal_camera`, projected minus observed, pixels. Ignores the observations' `right`. The
+/// formula is also applied to points behind the camera. Satisfies `camera_frame_residual`.
 struct bal_reprojection {
   using camera_state = bal_camera;
   using camera_manifold = bal_manifold;

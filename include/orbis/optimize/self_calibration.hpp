@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Bundle adjustment of images from a single camera, with its intrinsic parameters among the unknowns, and their
+/// Bundle adjustment of images from a single camera whose intrinsic parameters are also estimated, with their
 /// covariance.
 #pragma once
 
@@ -49,9 +49,9 @@ struct self_calibrated {
 /// than ten, and images not connected to the largest group by common points are excluded and keep their values.
 ///
 /// Errors, all of which leave `poses` and `points` unchanged: `invalid_argument` for observations of nonexistent images
-/// or points; `no_data` without a usable observation; `degenerate` if the motion of the camera does not determine the
-/// parameters, or no observation has depth; `cancelled` if `callback(iteration, iterations)`, which is called before
-/// each step, returns false.
+/// or points; `no_data` if there is no usable observation; `degenerate` if the motion of the camera does not determine
+/// the parameters, or no observation has depth; `cancelled` if `callback(iteration, iterations)`, which is called
+/// before each step, returns false.
 ///
 /// The covariance assumes neither that the errors of a point's observations are independent nor that their size is
 /// known: it is computed from the points' contributions to the gradient (a "sandwich" estimator).

@@ -239,8 +239,8 @@ struct dogleg {
 /// Choice of the solver for the reduced system of bundle adjustment: a dense factorisation for up to `dense_limit`
 /// cameras, which takes (C n)^3 / 3 multiplications for n cameras with C unknowns each and is the fastest method for up
 /// to about a hundred cameras with many common points; a block-sparse factorisation in a fill-reducing order if the
-/// factor has at most `fill_limit` blocks, as for thousands of cameras along a path; otherwise conjugate gradients with
-/// a block-diagonal preconditioner and inexact steps.
+/// factor has at most `fill_limit` blocks, which is typical of thousands of cameras along a path; otherwise conjugate
+/// gradients with a block-diagonal preconditioner and inexact steps.
 struct reduced_solver_options {
   std::size_t dense_limit = 100;
   std::size_t fill_limit = 2'000'000;

@@ -124,9 +124,9 @@ template <std::same_as<homography_options> Options = homography_options>
 struct two_view_options {
   double deviation = 1.0;            ///< standard deviation of a matched pixel, along each axis, pixels
   std::size_t min_points = 50;       ///< minimum number of points of a reconstruction
-  double min_parallax = 0.02;        ///< minimum median parallax of its points, radians
-  double max_rotation = 0.01;        ///< maximum standard deviation of its rotation, radians ...
-  double max_direction = 0.035;      ///< ... and of the direction of its translation, radians
+  double min_parallax = 0.02;        ///< minimum median parallax of the points, radians
+  double max_rotation = 0.01;        ///< maximum standard deviation of the rotation, radians ...
+  double max_direction = 0.035;      ///< ... and of the direction of the translation, radians
   double max_depth = 0.3;            ///< maximum standard deviation of a point's depth, relative to the depth
   double confidence = 0.999;         ///< confidence of RANSAC
   std::size_t max_iterations = 500;  ///< maximum number of RANSAC iterations for either model

@@ -74,7 +74,7 @@ class bundle_solver {
  private:
   using equations_type = bundle_equations<Residual, Loss>;
 
-  /// The interface of the equations to damping policies.
+  /// The interface through which damping policies access the equations.
   template <class Policy>
   struct problem {
     equations_type& equations;
