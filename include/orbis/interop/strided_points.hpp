@@ -17,10 +17,10 @@ namespace orbis::interop {
 
 /// Layout of the points; strides are in units of `S`.
 struct point_layout {
-  std::ptrdiff_t point_stride = 3;       ///< from one point to the next
-  std::ptrdiff_t coordinate_stride = 1;  ///< from x to y, and from y to z
-  std::size_t row_length = 0;            ///< points in a row; 0: all points are in one row
-  std::ptrdiff_t row_stride = 0;         ///< from the first point of a row to the first point of the next
+  std::ptrdiff_t point_stride = 3;       ///< distance from one point to the next
+  std::ptrdiff_t coordinate_stride = 1;  ///< distance from x to y, and from y to z
+  std::size_t row_length = 0;            ///< number of points per row; 0: all points are in one row
+  std::ptrdiff_t row_stride = 0;         ///< distance from the first point of a row to the first point of the next row
 };
 
 /// A view of `size` points with coordinates of type `S`; each point is read as a `std::array<S, 3>`. A non-owning
