@@ -28,7 +28,7 @@ namespace orbis::io::detail {
 
 struct pcd_field {
   std::string name;
-  std::size_t size = 0;         ///< bytes of one element
+  std::size_t size = 0;         ///< size of one element, bytes
   char type = 0;                ///< F, I or U
   std::size_t count = 1;        ///< elements per point
   std::size_t offset = 0;       ///< offset within a point, bytes
@@ -48,7 +48,7 @@ enum class pcd_data { ascii, binary, binary_compressed };
 struct pcd_header {
   std::vector<pcd_field> fields;
   std::uint64_t width = 0, height = 1, points = 0;
-  std::size_t point_size = 0;  ///< bytes
+  std::size_t point_size = 0;  ///< size of a point, bytes
   std::size_t tokens = 0;      ///< numbers per point
   std::size_t lines = 0;       ///< number of lines of the header
   pcd_data data = pcd_data::ascii;

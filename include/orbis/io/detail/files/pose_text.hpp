@@ -36,7 +36,7 @@ struct pose_lines {
   std::vector<entry> entries;  ///< in the order of the file
   trajectory_layout layout = trajectory_layout::tum;
   time_unit unit = time_units[0];  ///< unit of the first time stamp in the file; `entries` are in seconds
-  std::size_t lost = 0;            ///< lines with NaN, infinity or a zero quaternion
+  std::size_t lost = 0;            ///< number of lines with NaN, infinity or a zero quaternion
   std::size_t first_lost_line = 0;
   std::vector<std::string> notes{};
 };

@@ -89,7 +89,7 @@ namespace orbis::io::detail {
                 "no PNG or JPEG images in rgb, color, colour, image or images; the folder " + describe_content(folder));
   if (depth_folder.empty())
     return fail(errc::not_found, folder.string(),
-                "no folder depth, aligned_depth or depth_registered; the folder " + describe_content(folder));
+                "no folder named depth, aligned_depth or depth_registered; the folder " + describe_content(folder));
   auto depth_images = images_in(depth_folder);
   std::erase_if(depth_images, [](const auto& path) { return !is_png_name(path); });
   if (depth_images.empty())

@@ -57,7 +57,7 @@ class canvas {
       }
   }
 
-  /// Paints `per_square_metre` patches, large ones first.
+  /// Paints `per_square_metre` patches per square metre, large ones first.
   void scatter(double per_square_metre, double contrast, std::uint64_t seed) {
     random_bits bits{seed};
     const double w = width_ * texel_, h = height_ * texel_;

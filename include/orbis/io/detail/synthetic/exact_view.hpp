@@ -7,8 +7,8 @@
 
 namespace orbis::io::detail::synthetic {
 
-/// The exact image at one moment: for each pixel the depth (metres) and the cosine of the angle between ray and surface
-/// normal.
+/// The exact image at one moment: for each pixel the colour, the depth (metres) and the cosine of the angle between ray
+/// and surface normal.
 struct exact_view {
   image<rgb8> color;
   image<float> depth;
