@@ -24,7 +24,7 @@ namespace orbis::optimize::detail {
 struct supernode {
   std::uint32_t first = 0;     ///< first block column, in the order of elimination
   std::uint32_t columns = 0;   ///< number of block columns
-  std::size_t rows_begin = 0;  ///< index in `block_symbolic::rows` of the first block row below its own, ascending
+  std::size_t rows_begin = 0;  ///< start in `block_symbolic::rows` of the rows below its diagonal block, ascending
   std::uint32_t rows = 0;      ///< number of block rows
 };
 
