@@ -161,7 +161,7 @@ struct outcome {
   }
 };
 
-/// Runs this program in a child process, one at a time. An interrupt kills the process and removes the temporary
+/// Runs this program in child processes, one at a time. An interrupt kills the process and removes the temporary
 /// folder.
 class runner {
  public:

@@ -33,7 +33,7 @@ exit_code report_error(const std::string& message, exit_code code) {
   return code;
 }
 
-/// Accepts numbers within [low, high]; unlike CLI11's ranges it rejects "nan".
+/// Accepts numbers within [low, high]; unlike CLI11's ranges, it rejects "nan".
 template <class T>
 CLI::Validator within(T low, T high, std::string unit = {}) {
   std::ostringstream text_of_range;
@@ -385,7 +385,7 @@ void set_profile_defaults(const CLI::App& cmd, settings& s) {
   if (is_open("--depth-memory")) s.depth_memory = small_settings::depth_memory;
 }
 
-/// Parses "x,y,z"; empty if the text is something else.
+/// Parses "x,y,z"; empty if the text has another form.
 std::optional<orbis::vec3> parse_vector(const std::string& text) {
   orbis::vec3 p;
   char rest = 0;

@@ -22,11 +22,11 @@ using live_octree = orbis::mapping::live_map<orbis::octree::occupancy_octree<>, 
 
 /// The selection of pixels that become points, and the density of the cloud.
 [[nodiscard]] orbis::mapping::dense_options dense_options(const frame_source& source, const settings& s);
-/// Keyframes -> dense cloud -> filter -> octree. Uses the live map if `live` is not null.
+/// Builds the map of a run: keyframes -> dense cloud -> filter -> octree. Uses the live map if `live` is not null.
 [[nodiscard]] orbis::result<built_map> map_frames(const posed_frames& frames, const frame_source& source,
                                                   live_octree* live, const settings& s, console& console);
-/// Cloud -> filter -> octree. With an origin, rays from the origin to the points are inserted; without one, the voxels
-/// of the points are occupied and all others are unknown.
+/// Builds the map of a cloud: cloud -> filter -> octree. With an origin, rays from the origin to the points are
+/// inserted; without one, the voxels of the points are occupied and all others are unknown.
 [[nodiscard]] built_map map_cloud(orbis::point_cloud cloud, const settings& s, console& console);
 
 /// Writes the clouds and octrees into `folder` and returns their statistics.

@@ -141,7 +141,7 @@ class posed_frames {
    private:
     const posed_frames* of_ = nullptr;
     std::size_t at_ = 0;
-    mutable std::shared_ptr<unpacked> images_;  // owned by the value as well
+    mutable std::shared_ptr<unpacked> images_;  // also owned by the value
   };
   [[nodiscard]] iterator begin() const {
     depths_->finish();

@@ -417,7 +417,7 @@ orbis::result<void> write_report(const results& r, const view_frame& frame) {
                     {"profile_height", r.against_truth ? "185" : "420"},
                     {"tables", tables(r, frame)},
                     {"tracking_table", r.slam ? time_table(r.slam->tracking_ms) : ""},
-                    {"insert_title", r.live ? "time to insert a keyframe into the live map, in its own thread"
+                    {"insert_title", r.live ? "time to insert a keyframe into the live map, on a separate thread"
                                             : "time to insert a depth image into the octree"},
                     {"insert_table", r.map ? time_table(r.map->insert_ms) : ""},
                     {"footer", footer(r)},

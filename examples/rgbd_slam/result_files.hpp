@@ -36,7 +36,7 @@ inline constexpr std::size_t most_maps = 9;
 /// command reads or writes. Call it before any of these folders is read. Errors: write_failed.
 [[nodiscard]] orbis::result<void> finish_earlier_runs(const settings& s);
 
-/// All files that the run reads; `source_files`: those of the recording.
+/// All files that the run reads. `source_files`: the files of the recording.
 [[nodiscard]] std::vector<std::filesystem::path> input_files(const settings& s,
                                                              std::vector<std::filesystem::path> source_files);
 /// Returns an error if one of the files `targets` is one of `inputs`, directly or through a link. Names may be empty.

@@ -315,7 +315,7 @@ result<frame_source> open_file(const settings& s) {
   if (!is_bag(s.input) && is_text(s.input))
     return fail(
         orbis::errc::unsupported, s.input.string(),
-        "is not a folder, a bag, or a video that OpenCV can read, but text; a recording with lists is opened by its "
+        "is a text file, not a folder, a bag, or a video that OpenCV can read; for a recording with lists, specify its "
         "folder, " +
             std::filesystem::absolute(s.input).parent_path().string());
   const auto camera = camera_option(s);
@@ -378,7 +378,7 @@ result<std::unique_ptr<camera_device>> open_device(const settings& s) {
   return open_openni(options);
 }
 
-/// A camera that starts with the first request for a frame.
+/// A camera that starts at the first request for a frame.
 struct lazy_live_source {
   std::unique_ptr<camera_device> device;
   std::optional<live_source> live;

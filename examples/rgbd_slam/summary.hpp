@@ -14,7 +14,7 @@ namespace app {
 
 /// The summary as JSON text; missing values are null.
 [[nodiscard]] std::string summary_json(const results& r);
-/// Only the comparison with ground truth, and warnings, for `eval --json`.
+/// The comparison with ground truth and the warnings as JSON text, for `eval --json`.
 [[nodiscard]] std::string accuracy_json(const accuracy& a, const std::vector<std::string>& warnings);
 [[nodiscard]] orbis::result<void> write_summary(const results& r);
 

@@ -73,7 +73,7 @@ class camera_pace {
  private:
   console::clock::time_point begin_ = console::clock::now();
   bool has_begun_ = false;
-  double first_ = 0.0;  // time stamp
+  double first_ = 0.0;  // time stamp of the first frame
 };
 
 /// Forwards a tracked frame to the live map.

@@ -19,8 +19,8 @@ struct view_frame {
   double cut = 1.0;  ///< height above which the map is not drawn, because a ceiling would hide the rest
 };
 
-/// Rotates the world about its z axis so that walls are parallel to x and y, and shifts the floor to height 0, or the
-/// lowest points if no floor is known. `floor`: height in the world, metres. For pictures only; no result is in this
+/// Rotates the world about its z axis so that walls are parallel to x and y, and shifts the floor (or, if no floor is
+/// known, the lowest points) to height 0. `floor`: height in the world, metres. For pictures only; no result is in this
 /// frame.
 [[nodiscard]] view_frame find_view_frame(const std::vector<orbis::vec3f>& points, const orbis::trajectory& cameras,
                                          std::optional<double> floor);

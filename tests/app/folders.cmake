@@ -59,7 +59,7 @@ file(WRITE ${WORK}/one.toml "${one}")  # five times too far
 execute_process(COMMAND ${APP} run r --camera one.toml --out out ${quick} WORKING_DIRECTORY ${WORK} ERROR_VARIABLE err)
 check(err MATCHES "the median depth of frame 0 is [0-9]+ m .[0-9]+ / depth_scale 1000.. with depth_scale 5000[^\n]*above 4 m are not used for the map")
 app_fails(2 "pixels, but the camera has 640x480; use a camera of this size" run r --camera kinect --quiet --out out ${quick})
-app_fails(2 "rgb.txt: is not a folder.*but text.*opened by its folder, .*/room" run room/rgb.txt --quiet --out out ${quick})
+app_fails(2 "rgb.txt: is a text file, not.*specify its folder, .*/room" run room/rgb.txt --quiet --out out ${quick})
 file(COPY ${WORK}/room/rgb.txt DESTINATION ${WORK}/r)
 app_fails(2 "depth.txt: no such file.*--format folders.*--sensor mono" run r --quiet --out out ${quick})
 app(0 run r --format folders --out out ${quick})

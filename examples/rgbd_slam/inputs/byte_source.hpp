@@ -32,7 +32,7 @@ class byte_source {
   }
 
   [[nodiscard]] std::uint64_t size() const noexcept { return size_; }
-  /// Reads `count` bytes from position `at` on; fewer at the end.
+  /// Reads `count` bytes starting at position `at`; fewer at the end of the source.
   [[nodiscard]] std::string read(std::uint64_t at, std::uint64_t count) {
     if (at >= size_) return {};
     count = std::min(count, size_ - at);

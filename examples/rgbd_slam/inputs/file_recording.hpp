@@ -31,7 +31,7 @@ class file_recording {
 
   orbis::slam::sensor_kind sensor = orbis::slam::sensor_kind::monocular;
   std::string kind;       ///< "video", "ROS bag"
-  std::string images_of;  ///< the topics of a bag that are used; empty for videos
+  std::string images_of;  ///< the used topics of a bag; empty for videos
   orbis::camera::camera_settings camera;
   orbis::trajectory ground_truth;            ///< empty if unknown
   std::string truth_of;                      ///< the topic and the frames of the ground truth

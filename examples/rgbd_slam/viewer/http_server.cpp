@@ -177,8 +177,8 @@ class http_server::connection {
     // A range that is requested many times could be thousands of times the size of the whole page.
     if (h.has_range) return http_answer{.status = 416};
     if (!h.target.starts_with('/') || !h.version.starts_with("HTTP/1.")) return text_answer(400, "not a request\n");
-    if (h.hosts != 1 || !is_local(h.host)) return text_answer(403, "only for this machine\n");
-    if (h.method != "GET") return text_answer(405, h.method == "HEAD" ? "" : "only GET\n");
+    if (h.hosts != 1 || !is_local(h.host)) return text_answer(403, "the host is not this machine\n");
+    if (h.method != "GET") return text_answer(405, h.method == "HEAD" ? "" : "only GET is supported\n");
     closes_ = h.closes || h.has_body;
     std::string_view rest = h.target;
     const std::string path{take(rest, '?')};

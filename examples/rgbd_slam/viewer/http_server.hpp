@@ -28,7 +28,7 @@ struct http_request {
 struct http_answer {
   int status = 200;
   std::string type = "text/plain";                         ///< content type
-  std::vector<std::shared_ptr<const std::string>> body{};  ///< parts that are sent one after the other
+  std::vector<std::shared_ptr<const std::string>> body{};  ///< parts, which are sent in order
 };
 
 [[nodiscard]] http_answer text_answer(int status, std::string text);

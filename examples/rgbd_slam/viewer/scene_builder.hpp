@@ -128,7 +128,7 @@ class scene_builder {
     std::optional<viewer_frame> newest;
     std::vector<passed_point> passed;
     std::vector<std::pair<orbis::slam::map_keyframe, std::vector<sample>>> keyframes;
-    std::size_t samples = 0;  // total number in the keyframes
+    std::size_t samples = 0;  // total number of samples of the keyframes
     std::vector<double> tracking_ms;
   };
   /// The time of the next query, chosen such that queries take at most a tenth of the time.
@@ -174,7 +174,7 @@ class scene_builder {
   std::unordered_map<std::uint64_t, std::size_t> asked_;  // keyframe -> index in graph_.asked
   std::vector<trail_item> trail_;
   std::vector<colored_keyframe> colored_;
-  std::size_t sample_count_ = 0;  // total in colored_
+  std::size_t sample_count_ = 0;  // total number of samples in colored_
   voxel_colors colors_;
   std::vector<voxel> cubes_;
   std::vector<double> tracking_ms_;  // ring buffer of the last frames
