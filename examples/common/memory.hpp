@@ -37,7 +37,7 @@ namespace examples {
 
 /// The memory files of a control group; empty if there is none.
 struct memory_group {
-  std::string limit;  ///< bytes, or a word that means that there is no limit
+  std::string limit;  ///< bytes, or a word if there is no limit
   std::string use;    ///< bytes, including cached files
   std::string stat;   ///< named values, including those of cached files
 };
