@@ -42,8 +42,8 @@ descriptor::~descriptor() {
 namespace {
 
 constexpr std::string_view prefix = ".rgbd_slam-", ready = ".ready";
-// In hidden folders: the replaced files, and lists of the files to move; in the first folder, of the other hidden
-// folders; in those, of the first one.
+// Each hidden folder contains the replaced files and a list of the files to move. The first hidden folder of a
+// transaction also lists the others, which list the first one.
 const fs::path own = staged_folder::private_name;
 const fs::path backup = own / "replaced", names_list = own / "names", others_list = own / "others",
                first_list = own / "first";
@@ -59,12 +59,12 @@ descriptor open_folder(const fs::path& folder) {
 
 /// Locks folders during its lifetime. No effect on file systems without locks.
 ///
-/// Other programs hold these locks for a short time, unless they are stopped or are not ours: waits for 10 s at most.
-/// If the user has interrupted the run, waits for 1 s, or not any longer.
+/// Runs of this program hold these locks for a short time, but a suspended run or another program may hold them longer:
+/// waits for at most 10 s, or for at most 1 s in total if the user interrupts the run.
 class folder_locks {
  public:
   explicit folder_locks(std::vector<int> folders) : folders_{std::move(folders)} {
-    // In the order of their inode numbers, so that two programs never deadlock, and each once.
+    // Lock each folder once, in the order of the inode numbers, so that two programs never deadlock.
     const auto number = [](int folder) {
       struct stat status {};
       ::fstat(folder, &status);
@@ -89,7 +89,7 @@ class folder_locks {
   folder_locks(const folder_locks&) = delete;
   folder_locks& operator=(const folder_locks&) = delete;
 
-  /// False if another program still holds one of the locks.
+  /// Returns false if another program still holds one of the locks.
   [[nodiscard]] bool is_complete() const noexcept { return is_complete_; }
 
  private:
@@ -98,7 +98,7 @@ class folder_locks {
 };
 constexpr const char* locked_by_another = "another program has locked the folder";
 
-/// A file to move into place. Strings, because a child process must not allocate memory.
+/// A file to move into place. Paths are strings, because a child process must not allocate memory.
 struct move {
   std::string from, to, old;
   bool replaces = false;  ///< a file exists at `to`
@@ -108,8 +108,8 @@ struct move {
 /// Added to the errno value if the files that were already moved cannot be moved back.
 constexpr int not_restored = 128;
 
-/// Moves all files into place, or none; returns 0 or an errno value (see `not_restored`). Makes system calls only. At
-/// every moment each new file exists, so that any program can finish.
+/// Moves all files into place, or none; returns 0 or an errno value (see `not_restored`). Makes system calls only. Each
+/// new file exists at every moment, so that any program can complete the moves.
 int rename_all(const std::vector<move>& moves) {
   const auto exists = [](const std::string& path) {
     return ::faccessat(AT_FDCWD, path.c_str(), F_OK, AT_SYMLINK_NOFOLLOW) == 0;
@@ -120,7 +120,7 @@ int rename_all(const std::vector<move>& moves) {
   for (std::size_t i = 0; i != moves.size(); ++i) {
     const move& next = moves[i];
     if (!exists(next.from) && exists(next.to)) continue;  // done by a child process that was killed
-    // Without a hard link to it, the old file is moved aside.
+    // If there is no hard link to the old file, it is moved aside.
     const bool moves_aside = next.replaces && !next.has_old && exists(next.to);
     if ((!moves_aside || rename(next.to, next.old)) && rename(next.from, next.to)) continue;
     const int why = errno < not_restored ? errno : EIO;
@@ -133,7 +133,7 @@ int rename_all(const std::vector<move>& moves) {
   }
   return 0;
 }
-/// Runs `rename_all` in a child process, which signals to this process or its end do not affect.
+/// Runs `rename_all` in a child process, which is not affected by signals to this process or by its end.
 int rename_all_in_child(const std::vector<move>& moves) {
   sigset_t all, before;
   sigfillset(&all);
@@ -158,7 +158,7 @@ bool may_be_replaced(const fs::path& path) {
   return !fs::exists(there) || fs::is_regular_file(there) || fs::is_symlink(there);
 }
 
-/// The moves of those files in `from` that have one of the names.
+/// The moves for the files in `from` that have one of the names.
 std::vector<move> moves_to(const fs::path& folder, const fs::path& from, const std::vector<std::string>& names) {
   std::vector<move> moves;
   for (const std::string& name : names) {
@@ -176,7 +176,7 @@ result<void> write_list(const fs::path& path, const std::vector<std::string>& te
     for (const std::string& text : texts) out << text << '\0';
   });
 }
-/// Empty if the file does not exist; nullopt if it cannot be read.
+/// Reads a list that `write_list` wrote. Empty if the file does not exist; nullopt if it cannot be read.
 std::optional<std::vector<std::string>> read_list(const fs::path& path) {
   auto read = orbis::read_file(path);
   if (!read && read.error().code != orbis::errc::not_found) return std::nullopt;
@@ -187,7 +187,8 @@ std::optional<std::vector<std::string>> read_list(const fs::path& path) {
   return texts;
 }
 
-/// Those of other users do not count, who may put one into a folder like /tmp, unless the whole folder is theirs.
+/// Returns true for a hidden folder of this program. Folders of other users, who may create one in a folder like /tmp,
+/// do not count unless the parent folder belongs to the same user.
 bool is_hidden_folder(const fs::path& path) {
   struct stat status {};
   struct stat parent {};
@@ -198,8 +199,8 @@ bool is_hidden_folder(const fs::path& path) {
 }
 bool is_ready(const fs::path& hidden) { return hidden.filename().string().ends_with(ready); }
 
-/// The first folder of the transaction that a hidden folder takes part in; empty if there is none, nullopt if that
-/// cannot be read.
+/// The first hidden folder of the transaction to which a hidden folder belongs; empty if there is none, nullopt if it
+/// cannot be determined.
 std::optional<fs::path> first_of(const fs::path& hidden) {
   if (is_ready(hidden)) return hidden;
   const auto first = read_list(hidden / first_list);
@@ -207,7 +208,7 @@ std::optional<fs::path> first_of(const fs::path& hidden) {
   const fs::path path = first->size() == 1 ? first->front() : std::string{};
   return is_ready(path) && is_hidden_folder(path) ? path : fs::path{};
 }
-/// The other hidden folders of a transaction, those that exist; nullopt if they cannot be found out.
+/// The other existing hidden folders of a transaction; nullopt if they cannot be determined.
 std::optional<std::vector<fs::path>> others_of(const fs::path& first) {
   const auto listed = read_list(first / others_list);
   if (!listed) return std::nullopt;
@@ -231,8 +232,8 @@ std::vector<fs::path> hidden_folders_in(const fs::path& folder) {
     if (is_hidden_folder(it->path())) found.push_back(it->path());
   return found;
 }
-/// The hidden folders of ended processes in `folder`, without those that cannot be opened. Those of earlier results
-/// come first.
+/// The hidden folders of ended processes in `folder`, from the earliest results to the latest, excluding folders that
+/// cannot be opened.
 std::vector<fs::path> leftovers_in(const fs::path& folder) {
   std::vector<fs::path> found = hidden_folders_in(folder);
   std::erase_if(found, [](const fs::path& hidden) {
@@ -251,12 +252,12 @@ std::vector<fs::path> leftovers_in(const fs::path& folder) {
   return found;
 }
 
-/// Finishes the transaction that begins with the hidden folder `first`. Returns false if that is not possible now.
+/// Completes the transaction whose first hidden folder is `first`. Returns false if that is not possible now.
 /// @pre the folders of all its files are locked
 bool finish_transaction(const fs::path& first) {
   auto folders = others_of(first);
   if (!folders) return false;
-  folders->push_back(first);  // the last to be removed
+  folders->push_back(first);  // is removed last
   std::vector<move> moves;
   for (const fs::path& hidden : *folders) {
     auto names = read_list(hidden / names_list);
@@ -277,15 +278,16 @@ struct opened_folder {
   int number = -1;
 };
 
-/// Folders that are locked, and contain no results of earlier runs that are not in place yet.
+/// Locked folders in which all results of earlier runs have been moved into place.
 struct cleared_folders {
   std::vector<descriptor> descriptors;
   std::unique_ptr<folder_locks> locks;
-  std::string obstacle;  ///< if not empty, the reason why such results remain: they would overwrite later files
+  std::string obstacle;  ///< the reason why the folders could not be locked or cleared; empty if they were
 };
 
-/// Locks `folders`, and finishes or removes the hidden folders of ended processes in them. Also locks the folders of
-/// the other files of these transactions, all at once: starts again whenever it finds folders that are not locked yet.
+/// Locks `folders`, and completes the transactions of ended processes in them or removes their hidden folders. Also
+/// locks the folders of the other files of these transactions. All folders are locked together: locking starts again
+/// whenever a folder is found that is not locked yet.
 cleared_folders lock_and_clear(const std::vector<opened_folder>& folders) {
   cleared_folders cleared;
   std::vector<fs::path> paths;
@@ -424,12 +426,12 @@ result<void> staged_folder::put_in_place(std::span<staged_folder* const> folders
     ::fsync(f->staging_lock_.get());
     ::fsync(f->folder_lock_.get());
   }
-  // Results of runs that ended before come first.
+  // The results of earlier runs are moved into place first.
   std::vector<opened_folder> opened;
   for (const staged_folder* f : folders) opened.push_back({f->folder_, f->folder_lock_.get()});
   const auto cleared = lock_and_clear(opened);
   const std::lock_guard stays{hidden.mutex};
-  // From here on, any program can finish.
+  // From here on, any program can complete the transaction.
   const fs::path unmarked = first.staging_;
   if (const std::error_code why = first.rename_hidden(marked, hidden))
     return failure(first.folder_, "cannot move the new files into place: " + why.message());
@@ -452,7 +454,7 @@ result<void> staged_folder::put_in_place(std::span<staged_folder* const> folders
   if (why != 0) {
     const std::string what = "cannot move the new files into place: " + reason(why);
     if (first.rename_hidden(unmarked, hidden)) return postponed(what);
-    return failure(first.folder_, what);  // nobody finishes this, now or after a crash
+    return failure(first.folder_, what);  // no program completes this transaction
   }
   for (const staged_folder* f : folders) ::fsync(f->folder_lock_.get());
   for (staged_folder* f : folders) f->discard();

@@ -9,8 +9,8 @@
 ///   3. if the machine stops in between, the next program that reads or writes one of the folders finishes first
 ///      (`finish`).
 /// Only files with the given names are moved; the hidden folders list them and each other in a folder `private_name`,
-/// so that any program can finish. No other file in the folders is changed, and only hidden folders of ended processes
-/// are deleted. Processes that write into the same folder wait for each other by `flock`.
+/// so that any program can complete the transaction. No other file in the folders is changed, and only hidden folders
+/// of ended processes are deleted. Processes that write into the same folder wait for each other by `flock`.
 #pragma once
 
 #include <filesystem>
@@ -40,21 +40,23 @@ class descriptor {
 
 /// The hidden folders of this process, which another thread removes if the process is interrupted.
 struct hidden_folders {
-  std::mutex mutex;  ///< guards paths; locked while a folder is created and while files are moved into place
+  std::mutex mutex;  ///< guards `paths`; locked while a folder is created and while files are moved into place
   std::vector<std::filesystem::path> paths;
 };
 
 class staged_folder {
  public:
-  /// Reserved prefix of names, which no result may have: of hidden folders, and of the folder in each for other files.
+  /// Prefix of the names of hidden folders, and the name of the folder in each of them for other files. No result may
+  /// have a name with this prefix.
   static constexpr const char* private_name = ".rgbd_slam";
 
-  /// Finishes what ended processes have begun to move into place in `folder`, and removes their other hidden folders.
-  /// Call before anything in the folder is read. No effect if the folder does not exist. Errors: write_failed.
+  /// Completes the moves into `folder` that ended processes have begun, and removes the other hidden folders of ended
+  /// processes. Call it before anything in the folder is read. No effect if the folder does not exist. Errors:
+  /// write_failed.
   [[nodiscard]] static orbis::result<void> finish(const std::filesystem::path& folder);
 
-  /// Creates `folder` if it does not exist, and the hidden folder in it, and adds that to `hidden`. Calls `finish`.
-  /// `names`: the files that may be moved into place. Errors: write_failed.
+  /// Creates `folder` if it does not exist, creates the hidden folder in it, and adds the hidden folder to `hidden`.
+  /// Calls `finish`. `names`: the files that may be moved into place. Errors: write_failed.
   [[nodiscard]] static orbis::result<staged_folder> open(const std::filesystem::path& folder,
                                                          std::vector<std::string> names, hidden_folders& hidden);
   staged_folder(staged_folder&&) = default;
@@ -63,14 +65,14 @@ class staged_folder {
 
   /// The hidden folder.
   [[nodiscard]] const std::filesystem::path& path() const { return staging_; }
-  /// Names of the files in it.
+  /// Names of the files in the hidden folder.
   [[nodiscard]] std::vector<std::string> made() const;
   /// Removes the hidden folder with its files.
   void discard() noexcept;
 
   /// Moves the files of all folders into place: all of them, or none if it returns an error. If another program holds
-  /// the lock of a folder, or files can be moved neither forwards nor back, the error says that the next program that
-  /// uses the folder finishes. `hidden`: see `open`. Errors: write_failed.
+  /// the lock of a folder, or files can be moved neither into place nor back, the error indicates that the next program
+  /// that uses the folder completes the moves. `hidden`: see `open`. Errors: write_failed.
   [[nodiscard]] static orbis::result<void> put_in_place(std::span<staged_folder* const> folders,
                                                         hidden_folders& hidden);
 
