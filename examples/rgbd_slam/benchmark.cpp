@@ -374,26 +374,26 @@ table published_table(const std::vector<row>& rows) {
   return t;
 }
 
-/// The table as text with aligned columns, or as Markdown. The first `left` columns, and the last column with the
-/// failures, contain words.
+/// The table as text with aligned columns, or as Markdown. The first `left` columns and the column of failures are
+/// aligned left, all others right.
 std::string formatted(const table& t, bool markdown, std::size_t left) {
   std::vector<std::size_t> widths(t.front().size());
   for (const auto& line : t)
     for (std::size_t i = 0; i != line.size(); ++i) widths[i] = std::max(widths[i], line[i].size());
-  const auto is_word = [&](std::size_t i) { return i < left || t.front()[i] == "failure"; };
+  const auto is_left = [&](std::size_t i) { return i < left || t.front()[i] == "failure"; };
   std::string all;
   for (const auto& line : t) {
     std::string written = markdown ? "|" : "";
     for (std::size_t i = 0; i != line.size(); ++i) {
       const std::string gap(widths[i] - line[i].size(), ' ');
-      const std::string padded = is_word(i) ? line[i] + gap : gap + line[i];
+      const std::string padded = is_left(i) ? line[i] + gap : gap + line[i];
       written += markdown ? " " + padded + " |" : (i == 0 ? "" : "  ") + padded;
     }
     written.erase(written.find_last_not_of(' ') + 1);
     all += written + "\n";
     if (!markdown || &line != &t.front()) continue;
     all += "|";
-    for (std::size_t i = 0; i != line.size(); ++i) all += is_word(i) ? " --- |" : " ---: |";
+    for (std::size_t i = 0; i != line.size(); ++i) all += is_left(i) ? " --- |" : " ---: |";
     all += "\n";
   }
   return all;

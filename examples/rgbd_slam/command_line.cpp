@@ -293,7 +293,7 @@ void add_benchmark_options(CLI::App& cmd, settings& s) {
       ->type_name("");
   cmd.add_flag(
       "--quick", s.quick,
-      "only the deterministic run of each recording; by default, three runs with threads follow, in parallel with "
+      "run each recording only once, deterministically; by default, three runs with threads follow, in parallel with "
       "0, 1 and 2 busy loops");
   CLI::Option* json = cmd.add_flag("--json", s.json, "print JSON");
   cmd.add_flag("--markdown", s.markdown, "print tables as Markdown")->excludes(json);

@@ -22,10 +22,10 @@ namespace app {
   return std::min(std::max(1.0, robot_radius + 2 * resolution), 181 * resolution);
 }
 
-/// Computes the floor map; writes it to `floor_file` if `s.floor_map` (its final path, used in messages) is set; plans
-/// a path between two places that the camera saw, on the floor or, if there is no floor, through the air for a flying
-/// ball; and draws navigation.png into `folder`, unless there are neither a floor nor camera poses. Errors:
-/// write_failed (the picture); for the floor map see `navigation_results::unsaved`.
+/// Computes the floor map and plans a path between two places that the camera saw: on the floor or, without a floor,
+/// through the air for a ball-shaped flying robot. If `s.floor_map` is set, writes the floor map to `floor_file`;
+/// messages use `s.floor_map`, its final path. Draws navigation.png into `folder` if there is a floor or at least one
+/// camera pose. Errors: write_failed (the picture); for the floor map see `navigation_results::unsaved`.
 [[nodiscard]] orbis::result<navigation_results> navigate(const orbis::octree::occupancy_octree<>& map,
                                                          const orbis::trajectory& cameras, const settings& s,
                                                          const std::filesystem::path& folder,

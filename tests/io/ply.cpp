@@ -192,7 +192,7 @@ TEST_CASE("hostile PLY headers are refused without a large allocation") {
   CHECK(bad("format ascii 1.0\nelement vertex -1\nend_header\n").find("invalid element") != std::string::npos);
   CHECK(bad("format ascii 1.0\nproperty float x\n").find("before any element") != std::string::npos);
   CHECK(bad("format ascii 1.0\nelement vertex 1\nproperty half x\n").find("unknown type") != std::string::npos);
-  CHECK(bad("format ascii 1.0\nelement vertex 1\nproperty float x\nend_header\n1\n").find("no x, y and z") !=
+  CHECK(bad("format ascii 1.0\nelement vertex 1\nproperty float x\nend_header\n1\n").find("lack x, y or z") !=
         std::string::npos);
   CHECK(bad("format ascii 1.0\nelement face 0\nproperty list uchar int i\nend_header\n") == "there are no vertices");
   CHECK(bad("format binary_little_endian 1.0\nelement face 1\nproperty list uint double i\nelement vertex 1\n" + xyz +

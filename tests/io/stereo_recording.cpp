@@ -157,7 +157,7 @@ TEST_CASE("damaged files of KITTI are named with their line") {
     return m;
   };
   CHECK_THAT(message("calib.txt", "P0: 7 0 3.5 0 0 7 2.5 0 0 0 1\n"),
-             Catch::Matchers::Contains("calib.txt:1: a projection matrix has 12 numbers"));
+             Catch::Matchers::Contains("calib.txt:1: a projection matrix must have 12 numbers"));
   CHECK_THAT(message("calib.txt", "P0: 7 0 3.5 0 0 7 2.5 0 0 0 1 0\n"), Catch::Matchers::Contains("P1 is missing"));
   CHECK_THAT(message("calib.txt", "P0: 7 0 3.5 0 0 7 2.5 0 0 0 1 0\nP1: 7 0 3.5 3.5 0 7 2.5 0 0 0 1 0\n"),
              Catch::Matchers::Contains("not a rectified pair"));

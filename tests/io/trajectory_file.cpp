@@ -59,8 +59,8 @@ TEST_CASE("a bad pose is named with its line") {
   CHECK(message("1.5 nan 0 0 0 0 0 1") == "gt.txt:3: a pose with NaN or infinity");
   CHECK(message("1.5 0 0 inf 0 0 0 1") == "gt.txt:3: a pose with NaN or infinity");
   CHECK(message("1.5 0 0 0 0 0 0 0") == "gt.txt:3: the quaternion is zero or too large");
-  CHECK(message("1.5 0 0 0 0 0 1").find("gt.txt:3: a pose has 8 numbers") == 0);
-  CHECK(message("1.5 0 0 0 0 0 0 1 9").find("gt.txt:3: a pose has 8 numbers") == 0);
+  CHECK(message("1.5 0 0 0 0 0 1").find("gt.txt:3: a pose must have 8 numbers") == 0);
+  CHECK(message("1.5 0 0 0 0 0 0 1 9").find("gt.txt:3: a pose must have 8 numbers") == 0);
   CHECK(message("1.5 0 0 zero 0 0 0 1") == "gt.txt:3: \"zero\" is not a number");
   CHECK(message("1.5 0 0 0 0 0 0 1").empty());
 }

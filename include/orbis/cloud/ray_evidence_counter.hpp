@@ -110,7 +110,7 @@ class ray_evidence_counter {
   void change(const Policy& policy, const detail::depth_windows& windows, const se3& pose, const Kernel& kernel);
   [[nodiscard]] detail::ray_view view_at(const se3& pose, const detail::depth_windows& windows) const;
 
-  /// Difference of two counts, at least 0, because saturated counts cannot be subtracted exactly.
+  /// Difference of two counts, clamped to 0, because saturated counts cannot be subtracted exactly.
   [[nodiscard]] static std::uint16_t less(std::uint16_t a, std::uint16_t b) noexcept {
     return static_cast<std::uint16_t>(a > b ? a - b : 0);
   }
@@ -124,7 +124,7 @@ class ray_evidence_counter {
   ray_evidence_options options_;
   std::size_t size_;
   detail::point_blocks blocks_;
-  std::vector<std::uint16_t> through_;  ///< in the order of the blocks
+  std::vector<std::uint16_t> through_;  ///< number of rays through each point, in the order of the points in `blocks_`
   std::vector<std::uint16_t> supported_;
   std::vector<std::uint16_t> through_dropped_;  ///< counts from contradicted parts; empty before the first review
   std::vector<std::uint16_t> refuted_;

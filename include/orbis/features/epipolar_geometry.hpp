@@ -28,7 +28,7 @@ struct epipolar_line {
 /// - `point(i, k)`: position of train keypoint `k` (index `i`), pixels; NaN if it has none;
 /// - `epipole()`: intersection of all lines in the train image, or empty.
 ///
-/// Lines and points are in one plane, which need not be the image plane.
+/// Lines and points share a plane, which need not be the image plane.
 template <class G>
 concept epipolar_geometry = requires(const G& geometry, std::size_t i, const keypoint& k) {
   { geometry.line(i, k) } -> std::same_as<std::optional<epipolar_line>>;

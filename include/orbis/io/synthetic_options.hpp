@@ -20,7 +20,7 @@ struct synthetic_scene_options {
   double texture_density = 1.0;  ///< scales the number of patches painted on every surface; 0: none
   bool person = false;           ///< adds a person who walks around the room, opposite to the camera, at 1 m/s
   double wall_period = 0.0;      ///< if above 0, all walls show the same picture, repeated with this period, metres
-  double light = 1.0;            ///< illumination: 1 requires the sensor's `exposure`, 0.5 twice that time
+  double light = 1.0;            ///< relative illumination: the exposure time is the sensor's `exposure` divided by it
 };
 
 /// The gait of a legged robot with the camera on its body: its motion is added to the path, in proportion to the speed

@@ -92,7 +92,7 @@ class dense_cloud {
     put(policy, k, number);
   }
   /// Moves all keyframes whose pose has changed since they were last placed. With `tolerance` 0, or if `max_depth` is
-  /// not finite, a change of any bit counts; with a `tolerance` (metres), only a change that moves a point in the
+  /// not finite, any bitwise change counts; with a `tolerance` (metres), only a change that moves a point in the
   /// keyframe's view, up to `max_depth`, by more than the tolerance. Returns the number of moved keyframes.
   /// `keyframes`: all keyframes added so far, in the order in which they were added; removed ones are skipped.
   /// O(keyframes + pixels of those that moved), plus O(pixels of one image) with a tolerance. @pre `keyframes` has one
@@ -266,8 +266,9 @@ class dense_cloud {
           if (!is_kept.value_or(false)) out(x, y) = 0;
         });
   }
-  /// Returns the measurements of keyframe `number`, in the world frame at its latest pose, whose cloud point is in
-  /// `kept`. Reads only the images of `k`. O(pixels). @pre contains(number), and it was added with the images of `k`
+  /// Returns those measurements of keyframe `number` whose cloud point is in `kept`, in the world frame, at the latest
+  /// pose of the keyframe. Reads only the images of `k`. O(pixels). @pre contains(number); the keyframe was added with
+  /// the images of `k`
   template <execution_policy Policy, keyframe_like Keyframe>
   [[nodiscard]] std::vector<vec3f> measurements(const Policy& policy, const Keyframe& k, std::size_t number,
                                                 const selection& kept = {}) const {

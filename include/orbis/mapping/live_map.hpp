@@ -148,7 +148,7 @@ class live_map {
   /// Replaces the set of pixels that are removed from the depth image of a keyframe, for example when a filter has a
   /// new result. Removed pixels are 0 in `depth`. `correct` updates the map. Errors: not_found; those of
   /// `Depths::mask`, or of `Depths::put` if there is no `mask`.
-  /// @pre depth has the camera's size; its other pixels are those of the keyframe's image, `whole` in add_keyframe
+  /// @pre depth has the camera's size; its nonzero pixels equal those of the keyframe's image (`whole` in add_keyframe)
   template <execution_policy Policy>
   result<void> set_depth(const Policy& policy, std::uint64_t frame, const depth_view& depth) {
     const entry* const k = find(frame);

@@ -64,7 +64,7 @@ enum class occupancy { unknown, free, occupied };
 
 // -- requirements of a sensor model, as separate concepts for specific compiler messages
 
-/// All five constants exist and have the value type, a floating-point type.
+/// The model defines all five constants, of type `value_type`, which is a floating-point type.
 template <class M>
 concept has_constants_of_its_value_type = std::floating_point<typename M::value_type> && requires {
   { M::hit } -> std::same_as<const typename M::value_type&>;

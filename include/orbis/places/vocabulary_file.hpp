@@ -35,8 +35,8 @@ inline constexpr std::string_view vocabulary_magic = "orbisvoc";
 template <std::size_t Bits>
 [[nodiscard]] std::string vocabulary_bytes(const basic_vocabulary<Bits>& vocabulary);
 
-/// Parses the vocabulary in `bytes`; `where` is the location in errors. Uses at most three times the memory of `bytes`.
-/// Errors: malformed (with the reason), unsupported (another version or descriptor size).
+/// Parses the vocabulary in `bytes`; `where` names the source in errors. Uses at most three times the memory of
+/// `bytes`. Errors: malformed (with the reason), unsupported (another version or descriptor size).
 template <std::size_t Bits = 256>
 [[nodiscard]] result<basic_vocabulary<Bits>> parse_vocabulary(std::span<const std::byte> bytes,
                                                               const std::string& where = "bytes");

@@ -216,7 +216,8 @@ class basic_map {
   }
   /// Adds both sides of an observation, without updating the covisibility graph.
   bool attach(landmark_id id, keyframe_id k, std::uint32_t feature);
-  /// Clears the landmark of a keypoint, and resets a deviation below 1, which was due to the landmark's patch.
+  /// Clears the landmark of a keypoint, and raises the keypoint's deviation to at least 1: a smaller one came from the
+  /// alignment of the landmark's patch.
   void release(const observation& o);
   /// Removes both sides of an observation, without updating the covisibility graph. @pre the observation exists
   void detach(landmark_id id, keyframe_id k);

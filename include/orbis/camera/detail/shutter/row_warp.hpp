@@ -128,8 +128,8 @@ struct warp_row_kernel {
 
 /// Evaluates one of the two functions above for all pixels of an image. Both are smooth over a few pixels and over
 /// inverse depth: they are computed at nodes for three inverse depths, and interpolated linearly between nodes and by a
-/// parabola in inverse depth. The error is a few thousandths of a pixel for the motion during a read-out, and no pixel
-/// needs a projection. Very near points, and points next to a node without a pixel, are computed individually.
+/// parabola in inverse depth. The error is a few thousandths of a pixel for the motion during a read-out. Only very
+/// near points, and points next to a node that does not project to a pixel, are projected individually.
 template <camera_model Camera>
 class row_warp {
  public:

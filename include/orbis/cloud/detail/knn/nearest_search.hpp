@@ -399,7 +399,7 @@ class nearest_search {
   std::array<float, leaf_width> largest_{};  ///< squared distance to the `wanted`-th nearest
   float hoped_;              ///< multiple of `usual_` that usually suffices; smaller for more neighbours
   float reach_;              ///< multiple of `usual_` that nearly always suffices
-  float shared_reach_ = -1;  ///< squared distance from the run's box up to which `shared_` is complete
+  float shared_reach_ = -1;  ///< `shared_` has all points within this squared distance of the run's box
   float usual_ = -1;         ///< squared distance to the `wanted`-th nearest; negative if not yet known
 };
 

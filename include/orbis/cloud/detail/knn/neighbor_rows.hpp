@@ -52,7 +52,7 @@ class rank_sorter {
  public:
   void clear() noexcept { count_ = 0; }
   [[nodiscard]] std::size_t size() const noexcept { return count_; }
-  /// Adds a point. @pre distance_squared >= 0: the bit patterns then have the order of the values
+  /// Adds a point. @pre distance_squared >= 0, so that bit patterns have the order of the values
   void add(std::uint32_t index, float distance_squared) {
     if (count_ + 2 * room > keys_.size()) grow();
     std::memcpy(&keys_[count_], &distance_squared, sizeof distance_squared);

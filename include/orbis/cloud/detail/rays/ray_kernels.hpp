@@ -100,7 +100,7 @@ struct locate_in_pinhole {
   }
 };
 
-/// Evaluates the evidence of the windows around the points' pixels.
+/// Decides from the window around each point's pixel whether the point is supported or a ray passes through it.
 struct judge_by_windows {
   template <simd::target Target>
   static ORBIS_ALWAYS_INLINE void run(const ray_view& view, const seen_block& seen, block_verdict& verdict) {

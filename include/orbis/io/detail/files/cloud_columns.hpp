@@ -194,7 +194,7 @@ inline result<cloud_with_fields> to_cloud(cloud_columns&& read, const std::strin
 
   const cloud_field* xyz[3] = {find("x"), find("y"), find("z")};
   for (const cloud_field* c : xyz) {
-    if (c == nullptr) return fail(errc::unsupported, where, "the points have no x, y and z");
+    if (c == nullptr) return fail(errc::unsupported, where, "the points lack x, y or z");
     use(c);
   }
   out.cloud.points.resize(n);

@@ -76,7 +76,9 @@ class g2o_parser {
     if (!read_id(line, named.from) || !read_id(line, named.to) || !read_pose(line, edge.measurement)) return false;
     for (int row = 0; row != 6; ++row)
       for (int column = row; column != 6; ++column) {
-        if (!read_number(line, edge.information(row, column), "an edge's information has 21 numbers")) return false;
+        if (!read_number(line, edge.information(row, column),
+                         "an edge must have 21 numbers for its information matrix"))
+          return false;
         edge.information(column, row) = edge.information(row, column);
       }
     if (!ends(line)) return false;
@@ -108,7 +110,7 @@ class g2o_parser {
   bool read_pose(std::string_view& line, se3& pose) {
     double v[7];
     for (double& value : v)
-      if (!read_number(line, value, "a pose has 7 numbers, x y z qx qy qz qw")) return false;
+      if (!read_number(line, value, "a pose must have 7 numbers: x y z qx qy qz qw")) return false;
     const so3::quaternion q(v[6], v[3], v[4], v[5]);
     if (!(q.norm() > 1e-6) || !std::isfinite(q.norm())) return reject("the quaternion is zero or too large");
     pose = se3(so3(q), vec3(v[0], v[1], v[2]));

@@ -148,7 +148,7 @@ inline result<pcd_header> take_pcd_header(std::string_view& bytes, const std::st
     f.first_token = header.tokens;
     header.point_size += f.size * f.count;
     header.tokens += f.count;
-    if (header.point_size > max_point_size) return bad("points of more than 65536 bytes");
+    if (header.point_size > max_point_size) return bad("a point takes more than 65536 bytes");
   }
   return header;
 }
@@ -227,7 +227,7 @@ cloud_columns read_pcd_binary(const pcd_header& header, bool all, At&& at) {
 inline result<cloud_columns> read_pcd_columns(std::string_view bytes, const std::string& where, bool all) {
   const auto header = take_pcd_header(bytes, where);
   if (!header) return fail(header.error());
-  if (header->point_size == 0) return fail(errc::unsupported, where, "the points have no x, y and z");
+  if (header->point_size == 0) return fail(errc::unsupported, where, "the points lack x, y or z");
   const auto ends_early = [&] { return fail(errc::malformed, where, "the data ends early or is damaged"); };
   if (header->data == pcd_data::ascii) return read_pcd_text(bytes, *header, all, where);
   if (header->data == pcd_data::binary) {

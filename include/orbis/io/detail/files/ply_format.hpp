@@ -93,7 +93,7 @@ inline result<ply_header> take_ply_header(std::string_view& bytes, const std::st
       if (type == "list") {
         property.count = ply_type(next_field(line));
         if (!property.count || byte_size(*property.count) == 8 || *property.count == scalar_type::float32)
-          return bad("a list whose length has an invalid type");
+          return bad("the length of a list has an invalid type");
         type = next_field(line);
       }
       const auto known = ply_type(type);

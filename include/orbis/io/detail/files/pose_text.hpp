@@ -46,8 +46,8 @@ struct pose_lines {
 [[nodiscard]] inline std::string parse_pose_numbers(std::string_view line, char separator, bool more_columns,
                                                     std::array<double, 8>& v, bool& lost,
                                                     const pose_columns& columns = usual_columns) {
-  const char* const eight = more_columns ? "a pose has a time, a position and a quaternion"
-                                         : "a pose has 8 numbers: timestamp tx ty tz qx qy qz qw";
+  const char* const eight = more_columns ? "a pose must have a time, a position and a quaternion"
+                                         : "a pose must have 8 numbers: timestamp tx ty tz qx qy qz qw";
   lost = false;
   std::size_t found = 0;
   for (std::size_t column = 0; found != v.size(); ++column) {

@@ -162,7 +162,7 @@ inline void note_order(const std::filesystem::path& folder, const keyed_images& 
                     images.others.front().filename().string() + ") are skipped");
 }
 
-/// Adds a note about folders with images in `folder` that are not among the `used` ones.
+/// Adds a note that lists the subfolders of `folder` that contain images and are not in `used`.
 inline void note_unused_folders(const std::filesystem::path& folder, const std::vector<std::filesystem::path>& used,
                                 std::vector<std::string>& notes) {
   std::string unused;

@@ -66,7 +66,7 @@ struct kitti_calibration {
     if (!found) bad_line = number;
     return found.has_value();
   });
-  if (bad_line != 0) return fail(errc::malformed, at_line(where, bad_line), "a projection matrix has 12 numbers");
+  if (bad_line != 0) return fail(errc::malformed, at_line(where, bad_line), "a projection matrix must have 12 numbers");
   if (!found) return fail(errc::malformed, where.string(), wanted + " is missing");
   const auto& p = *found;
   if (const auto k = camera::plausible({0, 0, p[0], p[5], p[2], p[6]}, where.string()); !k) return fail(k.error());

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Index that the readers of stereo recordings pass to `stereo_recording`: a list of pairs, not yet read, and the
-/// cameras.
+/// Index that the readers of stereo recordings pass to `stereo_recording`: the cameras and the list of image pairs,
+/// which are read later.
 #pragma once
 
 #include <optional>

@@ -313,7 +313,8 @@ inline void guess_tum_camera(const std::filesystem::path& folder, recording_inde
     if (index.frames.empty())
       return fail(errc::no_data, folder.string(),
                   "no colour image has a depth image within " + describe(max_time_difference) +
-                      " s: rgb.txt has times " + describe_span(times) + ", depth.txt " + describe_span(depth_times));
+                      " s: the times in rgb.txt are " + describe_span(times) + ", in depth.txt " +
+                      describe_span(depth_times));
     for (const auto& [list, kind] : {std::pair{&*color, "colour"}, std::pair{&*depth, "depth"}})
       if (const std::size_t lonely = list->size() - index.frames.size(); lonely != 0)
         index.notes.push_back(std::to_string(lonely) + " of " + std::to_string(list->size()) + " " + kind +

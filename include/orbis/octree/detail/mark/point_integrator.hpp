@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Finds the voxels that a point cloud observes free and occupied.
+/// Finds the voxels that a point cloud observes as free and as occupied.
 #pragma once
 
 #include <algorithm>

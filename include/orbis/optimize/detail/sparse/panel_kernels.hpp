@@ -28,7 +28,8 @@ using panel_solve = void(const double* l, const double* inverse_diagonal, std::s
 
 template <int N>
 struct panel_product_kernel {
-  /// The number of columns of a product that are computed at a time, as sums in registers, followed by the remainder.
+  /// Number of columns of the product that are computed in one pass, with the sums in registers; further passes compute
+  /// the remaining columns.
   static constexpr int columns = N <= 9 ? N : 8;
 
   template <simd::target Target>

@@ -233,7 +233,7 @@ class moving_features {
     std::size_t feature = 0;  ///< index in the current frame
     features::keypoint at;
     D descriptor{};
-    float flow_x = 0.0F, flow_y = 0.0F;  ///< pixels since the previous frame
+    float flow_x = 0.0F, flow_y = 0.0F;  ///< displacement since the previous frame, pixels
     vec3 anchor = zeros<vec3>();         ///< an earlier position in the world frame
     double anchored = 0.0;               ///< time of the anchor, seconds
     double moved = 0.0;                  ///< time of the last motion, or of the first observation, seconds

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Files of sections, each with a name, a length and a checksum, so that damage can be attributed to a section.
+/// Files that consist of sections, each with a name, a length and a checksum, so that damage can be attributed to a
+/// section.
 #pragma once
 
 #include <cstddef>

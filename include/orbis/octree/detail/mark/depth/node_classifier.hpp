@@ -39,8 +39,8 @@ struct depth_scene {
   float margin_0 = 0, margin_1 = 0;                  ///< constant part in metres; part per metre of |c|_1
   float pixel_margin = 0.01F;                        ///< allowance for the rounding of pixels
   float near_z = 0;                                  ///< nodes that come closer than this are not projected
-  /// Maximum depth at which a ball inside a voxel certainly contains the ray of a pixel, or a ray of an aligned tile of
-  /// 2x2 or 4x4 pixels; for pinholes, see dense().
+  /// Maximum depth up to which the ray of at least one pixel certainly passes through a ball inside a voxel; elements 1
+  /// and 2: the same for the rays of aligned tiles of 2x2 and 4x4 pixels. For pinholes; see dense().
   std::array<float, 3> dense_z{};
   float ball = 0, ball_slope = 0;        ///< the ball's radius exceeds `ball - ball_slope * z`
   float voxel = 0;                       ///< metres

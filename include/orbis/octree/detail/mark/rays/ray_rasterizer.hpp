@@ -285,7 +285,7 @@ class ray_rasterizer {
   std::uint32_t passed_ = 0;  ///< see first_steps
   std::array<std::vector<waiting_ray>, ray_setup::kinds> queues_;
   queued_rays rays_;
-  std::vector<std::uint8_t> bytes_;  ///< all zero between slabs
+  std::vector<std::uint8_t> bytes_;  ///< set to zero after each slab
   std::vector<std::uint32_t> counts_, buckets_;
   std::vector<bounds> bounds_;
   std::vector<std::uint32_t> doubtful_;

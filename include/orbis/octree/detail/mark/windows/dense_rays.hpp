@@ -166,9 +166,9 @@ class dense_rays {
     }
     around.mark(masks);
   }
-  /// Compares measured costs in nanoseconds per ray. A traversal has a constant cost per plane of voxels that the ray
-  /// crosses. This method has a constant cost per ray; the fewer rays per voxel, the more voxels must be tested
-  /// individually.
+  /// Returns true if this method is faster than a traversal, according to measured costs in nanoseconds per ray: a
+  /// traversal has a constant cost per plane of voxels that the ray crosses; this method has a constant cost per ray
+  /// and one for the voxels that it must test individually, which are more if there are fewer rays per voxel.
   [[nodiscard]] bool is_worthwhile(double voxel) const {
     // `apart`: spacing of the rays at their ends, in voxels.
     const double planes = sample_.length / voxel, apart = windows_.spacing * planes;
