@@ -81,6 +81,7 @@ int run(int argc, char** argv) {
   const auto why = filter == "auto" ? to_string(best.choice.chain) + ": " + best.choice.reason : filter;
   if (auto ok = orbis::io::write_cloud(output, read, kept, origin); !ok)
     return report_error(2, examples::describe(ok.error()));
+  if (kept.empty()) report_error(0, "warning: " + input + ": the filter removed all points");
   std::printf("%zu points, %zu to filter, %zu kept; %s\n", in_file, finite.size(), kept.size(), why.c_str());
   return 0;
 }
