@@ -3,6 +3,7 @@
 // Part of the video module; see video_module.hpp.
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <mutex>
 #include <utility>
 
@@ -78,16 +79,28 @@ class video_recording final : public file_recording {
 
 /// The time of each frame, seconds.
 std::vector<double> times_in(cv::VideoCapture& reader, std::vector<std::string>& notes) {
+  const double fps = reader.get(cv::CAP_PROP_FPS), declared = reader.get(cv::CAP_PROP_FRAME_COUNT);
+  const double rate = std::isfinite(fps) && fps > 0.0 ? fps : 30.0;
   std::vector<double> times;
   while (reader.grab()) times.push_back(0.001 * reader.get(cv::CAP_PROP_POS_MSEC));
   const bool ascends =
       std::adjacent_find(times.begin(), times.end(), [](double a, double b) { return !(a < b); }) == times.end();
-  if (ascends) return times;
-  const double fps = reader.get(cv::CAP_PROP_FPS);
-  const double rate = std::isfinite(fps) && fps > 0.0 ? fps : 30.0;
-  for (std::size_t i = 0; i != times.size(); ++i) times[i] = static_cast<double>(i) / rate;
-  notes.push_back("the container's timestamps do not ascend: a rate of " + std::to_string(rate) +
-                  " images per second is assumed");
+  if (!ascends) {
+    for (std::size_t i = 0; i != times.size(); ++i) times[i] = static_cast<double>(i) / rate;
+    notes.push_back("the container's timestamps do not ascend: a rate of " + std::to_string(rate) +
+                    " images per second is assumed");
+  }
+  // Compares durations, because containers without a number of frames have an estimate from the duration.
+  const double duration = declared / rate, present = times.empty() ? 0.0 : times.back() + 1.0 / rate;
+  if (std::isfinite(duration) && present < 0.99 * duration - 1.5 / rate) {
+    char text[160];
+    std::snprintf(
+        text, sizeof text,
+        "the video is truncated or damaged: it has %.2f s of images, but declares %.2f s; times after damaged "
+        "images may be wrong",
+        present, duration);
+    notes.emplace_back(text);
+  }
   return times;
 }
 
