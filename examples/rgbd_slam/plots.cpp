@@ -140,12 +140,12 @@ orbis::result<void> write_filter_picture(const results& r, const view_frame& fra
            {60, 88}, faint, 13);
   const auto panel = [&](int x, const std::string& name, const std::vector<voxel>& voxels, const tree_numbers& numbers,
                          std::size_t points, std::uintmax_t bytes) {
-    s.paste(draw_aslant(voxels, m.voxels, frame, how, 720, 600), x, 112);
-    s.text(name, {x + 360.0, 106}, ink, 14, 0.5, true);
-    s.text("cloud: " + count_text(points) + " points, " + bytes_text(bytes), {x + 360.0, 738}, ink, 13, 0.5);
+    s.paste(draw_aslant(voxels, m.voxels, frame, how, 720, 600), x, 122);
+    s.text(name, {x + 360.0, 116}, ink, 14, 0.5, true);
+    s.text("cloud: " + count_text(points) + " points, " + bytes_text(bytes), {x + 360.0, 746}, ink, 13, 0.5);
     s.text("octree: " + count_text(numbers.leaves) + " leaves, " + count_text(numbers.occupied) + " occupied, " +
                bytes_text(numbers.bt_bytes) + " as .bt",
-           {x + 360.0, 762}, ink, 13, 0.5);
+           {x + 360.0, 770}, ink, 13, 0.5);
   };
   panel(20, "before", m.voxels_unfiltered, m.unfiltered, m.cloud.size(), m.cloud_bytes);
   panel(760, "after", m.voxels, m.filtered, m.kept.size(), m.filtered_bytes);
