@@ -12,6 +12,7 @@
 #include <nlohmann/json.hpp>
 
 #include <orbis/core/file.hpp>
+#include <orbis/core/quote.hpp>
 
 #include "formatted_text.hpp"
 #include "shutter_stage.hpp"
@@ -25,11 +26,18 @@ using orbis::vec3;
 
 // -- text ------------------------------------------------------------------------------------------
 
-/// Text for the page. Bytes that are not UTF-8, as in names of files, are replaced.
+/// Text for the page. Replaces control characters and bytes that are not UTF-8; file names may contain both.
 std::string escaped(std::string_view text) {
   const std::string quoted = json(text).dump(-1, ' ', false, json::error_handler_t::replace);
+  const std::string valid = json::parse(quoted).get<std::string>();
   std::string out;
-  for (const char c : json::parse(quoted).get<std::string>()) switch (c) {
+  for (std::size_t i = 0; i != valid.size();) {
+    if (const std::size_t control = orbis::control_bytes(std::string_view{valid}.substr(i)); control != 0) {
+      out += valid[i] == '\n' ? '\n' : '?';
+      i += control;
+      continue;
+    }
+    switch (const char c = valid[i++]) {
       case '&': out += "&amp;"; break;
       case '<': out += "&lt;"; break;
       case '>': out += "&gt;"; break;
@@ -37,6 +45,7 @@ std::string escaped(std::string_view text) {
       case '\'': out += "&#39;"; break;
       default: out += c;
     }
+  }
   return out;
 }
 
