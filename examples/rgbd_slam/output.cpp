@@ -106,6 +106,8 @@ result<void> write_camera_used(const frame_source& source, const shutter_results
 result<void> write_report_files(results& r, const orbis::trajectory& cameras, const file_lists& files,
                                 console& console) {
   console.stage("report");
+  if (r.map && r.map->kept.empty() && !r.map->cloud.empty())
+    console.warn(r.warnings.emplace_back("the filter removed all points; the map is empty"));
   std::vector<orbis::vec3f> points;
   if (r.map) {
     for (const voxel& v : r.map->voxels) points.push_back(v.center);
@@ -130,7 +132,7 @@ result<void> write_summary_only(results& r, const file_lists& files, console& co
 }
 
 orbis::error explain_no_start(const results& r, const settings& s) {
-  const std::string frames = std::to_string(r.slam->frames) + " frames ";
+  const std::string frames = "the " + std::to_string(r.slam->frames) + " frames ";
   return {orbis::errc::no_data, s.what == command::run ? s.input.string() : r.title,
           r.slam->sensor == orbis::slam::sensor_kind::monocular
               ? "tracking never started: no two of " + frames + "have enough matching features and parallax"

@@ -105,6 +105,16 @@ foreach(filter none statistical radius log-statistical cluster ray-evidence)
   check(mode STREQUAL filter)
 endforeach()
 
+# Nothing is left of a cloud, whose name has a control character.
+string(ASCII 27 escape)
+file(WRITE ${WORK}/two${escape}.ply "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\n"
+     "property float z\nend_header\n0 0 1\n1 0 1\n")
+app(0 map two${escape}.ply --filter radius --resolution 0.1 --out nothing)
+check(err MATCHES "the filter removed all points")
+file(READ ${WORK}/nothing/report.html report)
+check(report MATCHES "<h1>two[?].ply</h1>")
+check(NOT report MATCHES "${escape}")
+
 # Coordinates as maps of the earth have them: the same map, relative to a place near by, and it says so.
 function(plate_at file x y)
   set(points "")

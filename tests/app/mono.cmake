@@ -50,7 +50,7 @@ app(0 eval eval/small.txt eval/large.txt)
 check(out MATCHES "ATE  RMSE [1-9]")
 
 # A camera that sees nothing that could be followed: no start.
-app_fails(3 "tracking never started: no two of 3 frames have enough matching features and parallax" demo --plain --sensor mono --frames 3 --out still)
+app_fails(3 "tracking never started: no two of the 3 frames have enough matching features and parallax" demo --plain --sensor mono --frames 3 --out still)
 
 # A folder of images is one camera's where nothing else is in it.
 file(MAKE_DIRECTORY ${WORK}/nothing)
