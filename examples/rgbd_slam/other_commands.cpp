@@ -246,20 +246,21 @@ exit_code map_without_slam(const settings& s, console& console) {
   const auto inputs = input_files(s, recording ? recording->files : std::vector<std::filesystem::path>{});
   if (const auto conflict = find_overwritten(s, inputs)) return console.error(*conflict), bad_usage;
   auto files = result_files::begin(s);
-  if (!files) return give_up(files.error());
+  if (!files) return console.error(files.error()), code_of(files.error());
 
+  const auto give_up_with = [&](const orbis::error& e) { return give_up(files->with_final_path(e)); };
   auto found =
       recording ? map_recording(*recording, s, files->folder(), console) : map_cloud_file(s, files->folder(), console);
   if (!found) return give_up(found.error());
   auto navigation = navigate(found->map.octree, found->cameras, s, files->folder(), files->floor_map(), console);
-  if (!navigation) return give_up(navigation.error());
+  if (!navigation) return give_up_with(navigation.error());
   const auto& unsaved = found->r.navigation.emplace(*std::move(navigation)).unsaved;
   if (unsaved) found->r.warnings.push_back(unsaved->to_string());
   auto written = write_map(std::move(found->map), s, files->folder(), console);
-  if (!written) return give_up(written.error());
+  if (!written) return give_up_with(written.error());
   found->r.map = *std::move(written);
   if (auto done = write_report_files(found->r, found->cameras, files->lists(), console); !done)
-    return give_up(done.error());
+    return give_up_with(done.error());
   if (auto done = files->put_in_place(); !done) return give_up(done.error());
   print_results(found->r, console);
   return unsaved ? give_up(*unsaved) : done;

@@ -109,13 +109,12 @@ struct completion {
 };
 
 /// Completes the results and adds their files to the other result files. If the user abandons the map, or it cannot be
-/// made or written, leaves the results as they are. Errors: write_failed; no thread is then running.
-orbis::result<completion> complete_or_give_up(results& r, const tracked_frames& tracked, const frame_source& source,
-                                              const settings& s, result_files& files, viewer& viewer,
-                                              console& console) {
+/// made or written, leaves the results as they are.
+completion complete_or_give_up(results& r, const tracked_frames& tracked, const frame_source& source, const settings& s,
+                               result_files& files, viewer& viewer, console& console) {
   using orbis::errc;
   if (auto begun = files.begin_optional(); !begun)
-    return completion{.was_interrupted = interrupts::end_dispensable(), .no_map = begun.error()};
+    return {.was_interrupted = interrupts::end_dispensable(), .no_map = begun.error()};
   interrupts::begin_dispensable(
       s.quiet ? ""
               : "\nrgbd_slam: stopping; the map is abandoned, the other results are written. Interrupt again to stop "
@@ -147,9 +146,13 @@ orbis::result<completion> complete_or_give_up(results& r, const tracked_frames& 
     end.no_map = done->error();
     return end;
   }
+  if (auto moved = files.take_optional(); !moved) {
+    files.drop_optional();
+    end.no_map = moved.error();
+    return end;
+  }
   r = **std::move(done);
   r.folder = files.folder();
-  if (auto moved = files.take_optional(); !moved) return orbis::fail(moved.error());
   return end;
 }
 
@@ -184,35 +187,21 @@ exit_code end_tracked(const results& r, const tracked_frames& tracked, const com
   return done;
 }
 
-/// The path at which a file in a hidden folder would have appeared. Returns any other path unchanged, and `out` for an
-/// empty path.
-std::string shown_path(const std::string& where, const std::filesystem::path& out) {
-  const std::size_t hidden = where.find(std::string{"/"} + staged_folder::private_name + "-");
-  if (hidden == std::string::npos) return where.empty() ? out.string() : where;
-  std::error_code ignored;
-  const std::filesystem::path folder = where.substr(0, hidden);
-  return ((std::filesystem::equivalent(folder, out, ignored) ? out : folder) / std::filesystem::path{where}.filename())
-      .string();
-}
-
 /// Writes the report if the map is missing, moves all files into place, and prints the results. Returns the exit code.
 exit_code finish_run(results& r, const tracked_frames& tracked, completion& end, const frame_source& source,
                      const settings& s, result_files& files, viewer& viewer, console& console) {
   orbis::result<void> reported;
   if (end.no_map) {
-    end.no_map->where = shown_path(end.no_map->where, s.out);
+    end.no_map = files.with_final_path(*end.no_map);
     end.no_map->message =
         (end.no_map->code == orbis::errc::cancelled ? "interrupted by the user" : end.no_map->message) +
         "; the map is missing, the other results were written";
     console.warn(r.warnings.emplace_back(end.no_map->message));
     reported = report_without_map(r, source, files.lists(), console);
+    if (!reported) reported = orbis::fail(files.with_final_path(reported.error()));
   }
   if (auto done = files.put_in_place(); !done) return console.error(done.error()), bad_input;
-  if (!reported) {
-    orbis::error why = reported.error();
-    why.where = shown_path(why.where, s.out);
-    return console.error(why), bad_input;
-  }
+  if (!reported) return console.error(reported.error()), bad_input;
   print_results(r, console);
   if (!end.is_running) viewer.finish(s, console);
   return end_tracked(r, tracked, end, source, s, console);
@@ -234,30 +223,30 @@ exit_code run_slam(const settings& s, console& console) {
   auto shown = viewer::open(s, *source, console);
   if (!shown) return console.error(shown.error()), bad_usage;
   auto files = result_files::begin(s);
-  if (!files) return give_up(files.error());
+  if (!files) return console.error(files.error()), code_of(files.error());
   results r = begin_results(s, source->title, &*source, files->folder());
 
   // Track all frames.
-  auto tracked = track(*source, shutter, s, files->landmark_map(), files->folder() / spill_name, *shown, console);
+  auto tracked = track(*source, shutter, s, *files, *shown, console);
   if (!tracked) return give_up(tracked.error());
   if (source->rest) source->rest();
   if (tracked->stopped && tracked->slam.frames == 0) return give_up(*tracked->stopped);
   add_tracking(r, *tracked, *source, s, console);
   if (r.slam->tracked == 0) return end_untracked(r, *tracked, *source, s, *files, console);
-  if (auto done = write_trajectories(*r.slam, files->folder()); !done) return give_up(done.error());
-  if (auto done = write_camera_used(*source, shutter, files->folder()); !done) return give_up(done.error());
+  auto written = write_trajectories(*r.slam, files->folder());
+  if (written) written = write_camera_used(*source, shutter, files->folder());
+  if (!written) return give_up(files->with_final_path(written.error()));
 
   // Build the map from the keyframes, evaluate, and write the report.
-  auto end = complete_or_give_up(r, *tracked, *source, s, *files, *shown, console);
-  if (!end) return give_up(end.error());
-  if (!end->is_running) {
-    if (end->no_map) tracked->live.reset();  // frees memory
-    return finish_run(r, *tracked, *end, *source, s, *files, *shown, console);
+  completion end = complete_or_give_up(r, *tracked, *source, s, *files, *shown, console);
+  if (!end.is_running) {
+    if (end.no_map) tracked->live.reset();  // frees memory
+    return finish_run(r, *tracked, end, *source, s, *files, *shown, console);
   }
   // The thread uses objects of this function, which therefore must not return.
   exit_code code = bad_input;
   try {
-    code = finish_run(r, *tracked, *end, *source, s, *files, *shown, console);
+    code = finish_run(r, *tracked, end, *source, s, *files, *shown, console);
   } catch (const std::exception& e) {
     std::fprintf(stderr, "rgbd_slam: %s\n", e.what());  // allocates no memory
   } catch (...) {

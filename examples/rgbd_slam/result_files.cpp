@@ -10,6 +10,7 @@
 #include <system_error>
 #include <utility>
 
+#include <fcntl.h>
 #include <nlohmann/json.hpp>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -156,6 +157,14 @@ std::optional<orbis::error> find_overwritten(const settings& s, const std::vecto
   if (auto found = find_overwritten(targets, inputs)) return found;
 
   const file_names ours = recorded(s.out);
+  const fs::path floor_picture = fs::path{s.floor_map}.replace_extension(".pgm");
+  if (!s.floor_map.empty() && is_there(floor_picture)) {  // the user has not named it
+    const auto map = orbis::read_file(s.floor_map);
+    if (!map || map->find(floor_picture.filename().string()) == std::string::npos)
+      return orbis::error{orbis::errc::invalid_argument, floor_picture.string(),
+                          "exists and is not the image of " + s.floor_map.string() +
+                              ", so it is not replaced: move it, or choose another --floor-map"};
+  }
   for (const std::string& name : result_names(s))
     if (is_there(s.out / name) && !is_among(name, ours))
       return orbis::error{orbis::errc::invalid_argument, (s.out / name).string(),
@@ -180,7 +189,18 @@ std::optional<orbis::error> find_unwritable(const settings& s) {
   return std::nullopt;
 }
 
+/// Checks that enough files can be open at the end of a run, so that a run does not lose its results then.
+result<void> check_descriptors(const fs::path& out) {
+  std::vector<descriptor> spare;
+  for (int i = 0; i != 8; ++i)
+    if (spare.emplace_back(::open("/dev/null", O_RDONLY | O_CLOEXEC)).get() < 0)
+      return orbis::fail(orbis::errc::write_failed, out.string(),
+                         "cannot create files in it: " + std::generic_category().message(errno));
+  return {};
+}
+
 result<result_files> result_files::begin(const settings& s) {
+  if (auto enough = check_descriptors(s.out); !enough) return orbis::fail(enough.error());
   result_files files;
   files.out_ = s.out;
   struct place {
@@ -189,7 +209,7 @@ result<result_files> result_files::begin(const settings& s) {
   };
   std::vector<place> places{{s.out, result_names(s)}};
   const auto fail = [](const fs::path& path, const std::string& why) {
-    return orbis::fail(orbis::errc::write_failed, path.string(), "the map cannot be saved: " + why);
+    return orbis::fail(orbis::errc::invalid_argument, path.string(), "the map cannot be saved: " + why);
   };
   std::error_code ec;
   // Adds a file that may be outside the output folder. `others`: all files that are created with it.
@@ -256,6 +276,14 @@ file_names file_lists::of_earlier_runs(const file_names& made) const {
   return names;
 }
 
+orbis::error result_files::with_final_path(orbis::error e) const {
+  if (e.where.empty()) e.where = out_.string();
+  for (const staged_folder& f : folders_)
+    if (e.where.starts_with((f.path() / "").string()))
+      e.where = ((&f == &folders_.front() ? out_ : f.target()) / fs::path{e.where}.filename()).string();
+  return e;
+}
+
 result<void> result_files::begin_optional() {
   std::error_code ec;
   for (const staged_folder& f : folders_)
@@ -266,15 +294,21 @@ result<void> result_files::begin_optional() {
 
 result<void> result_files::take_optional() {
   std::error_code ec;
+  std::vector<std::pair<fs::path, fs::path>> moves;
   for (const staged_folder& f : folders_) {
-    file_names names;  // evaluated first, because the folder changes
-    for (fs::directory_iterator it{f.path() / optional_name, ec}, end; !ec && it != end; it.increment(ec))
-      names.push_back(it->path().filename().string());
-    for (std::size_t i = 0; !ec && i != names.size(); ++i)
-      fs::rename(f.path() / optional_name / names[i], f.path() / names[i], ec);
-    if (ec) return orbis::fail(orbis::errc::write_failed, out_.string(), "cannot move the new files: " + ec.message());
+    const fs::path folder = f.path();
+    for (fs::directory_iterator it{folder / optional_name, ec}, end; !ec && it != end; it.increment(ec))
+      moves.emplace_back(it->path(), folder / it->path().filename());
   }
-  return {};
+  std::size_t moved = 0;
+  while (!ec && moved != moves.size()) {
+    fs::rename(moves[moved].first, moves[moved].second, ec);
+    if (!ec) ++moved;
+  }
+  if (!ec) return {};
+  std::error_code ignored;
+  while (moved-- != 0) fs::rename(moves[moved].second, moves[moved].first, ignored);
+  return orbis::fail(orbis::errc::write_failed, out_.string(), "cannot move the new files: " + ec.message());
 }
 
 void result_files::drop_optional() noexcept {

@@ -68,19 +68,23 @@ class file_lists {
 
 class result_files {
  public:
-  /// Creates the folders and checks that files can be created in them. Errors: write_failed.
+  /// Creates the folders and checks that files can be created in them. Errors: write_failed; invalid_argument (a file
+  /// name that is reserved or that two results have).
   [[nodiscard]] static orbis::result<result_files> begin(const settings& s);
   result_files(result_files&&) noexcept = default;
   result_files& operator=(result_files&&) = delete;
   ~result_files();
 
   /// The folder in which the files of the output folder are created.
-  [[nodiscard]] const std::filesystem::path& folder() const { return folders_.front().path(); }
+  [[nodiscard]] std::filesystem::path folder() const { return folders_.front().path(); }
   /// The path at which the landmark map is created. @pre the settings request one
   [[nodiscard]] std::filesystem::path landmark_map() const { return folders_[map_folder_].path() / map_name_; }
   /// The path at which the floor map is created, next to its image; empty if the settings request none.
   [[nodiscard]] std::filesystem::path floor_map() const { return floor_map_in({}); }
   [[nodiscard]] file_lists lists() const { return {out_, folder()}; }
+  /// The error with the path at which the file will appear instead of the path at which it is created; with the output
+  /// folder if the error names no file. @pre the files are not in place yet
+  [[nodiscard]] orbis::error with_final_path(orbis::error e) const;
 
   /// Creates the folders for optional files, which `take_optional` adds to the results, either all or none. Errors:
   /// write_failed.
@@ -88,7 +92,7 @@ class result_files {
   /// The counterparts of `folder` and `floor_map` for the optional files.
   [[nodiscard]] std::filesystem::path optional_folder() const { return folder() / optional_name; }
   [[nodiscard]] std::filesystem::path optional_floor_map() const { return floor_map_in(optional_name); }
-  /// Adds the optional files to the other files. Errors: write_failed.
+  /// Adds the optional files to the other files: all, or none if it returns an error. Errors: write_failed.
   [[nodiscard]] orbis::result<void> take_optional();
   /// Removes the optional files.
   void drop_optional() noexcept;

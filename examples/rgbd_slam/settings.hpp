@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include <orbis/core/result.hpp>
 #include <orbis/core/types.hpp>
 
 namespace app {
@@ -25,6 +26,10 @@ enum exit_code : int {
   undetermined = 5,
   interrupted = 130
 };
+/// The exit code of a command that an error prevents.
+[[nodiscard]] inline exit_code code_of(const orbis::error& e) {
+  return e.code == orbis::errc::invalid_argument ? bad_usage : bad_input;
+}
 
 /// The default maximum depth of the measurements in a map, metres.
 inline constexpr double usual_max_depth = 4.0;

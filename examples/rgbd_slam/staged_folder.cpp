@@ -57,6 +57,9 @@ descriptor open_folder(const fs::path& folder) {
   return descriptor{::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)};
 }
 
+/// A link to an open folder, which the user may rename. Broken on systems without it.
+fs::path link_to(const descriptor& folder) { return "/proc/self/fd/" + std::to_string(folder.get()); }
+
 /// Locks folders during its lifetime. No effect on file systems without locks.
 ///
 /// Runs of this program hold these locks for a short time, but a suspended run or another program may hold them longer:
@@ -373,12 +376,27 @@ result<staged_folder> staged_folder::open(const fs::path& folder, std::vector<st
   return made;
 }
 
+fs::path staged_folder::path() const {
+  std::error_code ignored;
+  const fs::path link = link_to(staging_lock_);
+  return fs::is_directory(link, ignored) ? link : staging_;
+}
+
 std::vector<std::string> staged_folder::made() const {
   std::vector<std::string> found;
   std::error_code ignored;
   for (const std::string& name : names_)
     if (fs::is_regular_file(fs::symlink_status(staging_ / name, ignored))) found.push_back(name);
   return found;
+}
+
+void staged_folder::follow(hidden_folders& hidden) {
+  std::error_code ec;
+  const fs::path present = fs::read_symlink(link_to(staging_lock_), ec);
+  if (ec || !fs::is_directory(present, ec)) return;
+  std::replace(hidden.paths.begin(), hidden.paths.end(), staging_, present);
+  staging_ = present;
+  folder_ = present.parent_path();
 }
 
 void staged_folder::discard() noexcept {
@@ -405,6 +423,10 @@ void staged_folder::leave(hidden_folders& hidden) {
 }
 
 result<void> staged_folder::put_in_place(std::span<staged_folder* const> folders, hidden_folders& hidden) {
+  {
+    const std::lock_guard registers{hidden.mutex};
+    for (staged_folder* f : folders) f->follow(hidden);
+  }
   staged_folder& first = *folders.front();
   const fs::path marked = first.staging_.string() + std::string{ready};
   std::vector<std::string> others;

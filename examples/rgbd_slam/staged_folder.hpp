@@ -63,8 +63,10 @@ class staged_folder {
   staged_folder& operator=(staged_folder&&) = delete;
   ~staged_folder() { discard(); }
 
-  /// The hidden folder.
-  [[nodiscard]] const std::filesystem::path& path() const { return staging_; }
+  /// A path of the hidden folder that stays valid if the user renames one of the folders that contain it.
+  [[nodiscard]] std::filesystem::path path() const;
+  /// The folder into which the files will be moved.
+  [[nodiscard]] const std::filesystem::path& target() const { return folder_; }
   /// Names of the files in the hidden folder.
   [[nodiscard]] std::vector<std::string> made() const;
   /// Removes the hidden folder with its files.
@@ -78,6 +80,8 @@ class staged_folder {
 
  private:
   staged_folder() = default;
+  /// Finds the present paths of the folders. @pre hidden.mutex is locked
+  void follow(hidden_folders& hidden);
   /// Renames the hidden folder, which an interrupt must still find. @pre hidden.mutex is locked
   std::error_code rename_hidden(const std::filesystem::path& to, hidden_folders& hidden);
   /// Keeps the hidden folder after the end of this process. @pre hidden.mutex is locked

@@ -279,8 +279,7 @@ std::string describe(const slam_results& slam) {
 }  // namespace
 
 orbis::result<tracked_frames> track(const frame_source& source, const shutter_results& shutter, const settings& s,
-                                    const std::filesystem::path& landmark_map, const std::filesystem::path& spill_file,
-                                    viewer& viewer, console& console) {
+                                    const result_files& files, viewer& viewer, console& console) {
   console.stage("tracking");
   orbis::slam::options options = options_for(source, s);
   options.shutter = shutter.shutter;
@@ -291,7 +290,7 @@ orbis::result<tracked_frames> track(const frame_source& source, const shutter_re
 
   tracked_frames out{.slam = {},
                      .world = {},
-                     .keyframes = posed_frames{source, s, spill_file},
+                     .keyframes = posed_frames{source, s, files.folder() / spill_name},
                      .live = {},
                      .stopped = {},
                      .unsaved = {},
@@ -358,10 +357,10 @@ orbis::result<tracked_frames> track(const frame_source& source, const shutter_re
   const bool spares_loaded = out.missed_map && examples::is_same_file(s.load_map, s.save_map);
   if (!s.save_map.empty() && !out.slam.trajectory.empty() && !spares_loaded) {
     console.stage("saving");
-    if (auto saved = slam.save_map(landmark_map))
+    if (auto saved = slam.save_map(files.landmark_map()))
       console.finish(s.save_map.string());
     else
-      out.unsaved = saved.error();
+      out.unsaved = files.with_final_path(saved.error());
   }
   return out;
 }
@@ -389,7 +388,8 @@ std::vector<std::string> mapping_notes(const posed_frames& frames, const std::op
     notes.emplace_back(
         "the vertical direction is unknown: the first frame shows neither a floor nor two walls, and the camera is "
         "assumed to be level in it (specify the direction with --gravity)");
-  if (const auto e = frames.unspilled()) notes.push_back(e->to_string() + "; depth images are kept in memory instead");
+  if (const auto e = frames.unspilled())
+    notes.push_back("the temporary file for depth images " + e->message + "; depth images are kept in memory instead");
   return notes;
 }
 

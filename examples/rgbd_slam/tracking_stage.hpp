@@ -3,7 +3,6 @@
 /// Tracking: from frames to trajectory and keyframes.
 #pragma once
 
-#include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
@@ -15,6 +14,7 @@
 #include "console.hpp"
 #include "live_stage.hpp"
 #include "posed_frames.hpp"
+#include "result_files.hpp"
 #include "results.hpp"
 #include "settings.hpp"
 #include "source.hpp"
@@ -34,11 +34,10 @@ struct tracked_frames {
 };
 
 /// Tracks the frames of the source until a frame is unreadable, Ctrl-C is pressed, or memory is exhausted. Errors: a
-/// map that cannot be loaded. `viewer` shows the progress. `landmark_map`: file for the landmark map, if the settings
-/// request one. `spill_file`: see `posed_frames`.
+/// map that cannot be loaded. `files`: receive the landmark map, if the settings request one, and depth images that do
+/// not fit into memory (see `posed_frames`). `viewer` shows the progress.
 [[nodiscard]] orbis::result<tracked_frames> track(const frame_source& source, const shutter_results& shutter,
-                                                  const settings& s, const std::filesystem::path& landmark_map,
-                                                  const std::filesystem::path& spill_file, viewer& viewer,
+                                                  const settings& s, const result_files& files, viewer& viewer,
                                                   console& console);
 
 /// The error that stopped tracking, with the number of frames before it. @pre tracked.stopped

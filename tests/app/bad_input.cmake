@@ -74,6 +74,11 @@ foreach(name cloud.ply map.bt trajectory.txt)
   check(differ EQUAL 0)
 endforeach()
 file(REMOVE_RECURSE ${WORK}/open ${WORK}/shut)
+# Too few descriptors for the results: refused before any frame is tracked.
+execute_process(COMMAND bash -c "ulimit -n 8; exec \"$@\"" limited ${APP} ${same} --out few WORKING_DIRECTORY ${WORK}
+                RESULT_VARIABLE result ERROR_VARIABLE err)
+check(result EQUAL 2)
+check(err MATCHES "Too many open files[^\n]*\n$" AND NOT err MATCHES "tracking")
 # Files that may not grow, pictures of the map among them: one line, the trajectories, and nothing half-written.
 execute_process(COMMAND bash -c "ulimit -f 100; exec \"$@\"" limited ${APP} run good --out out --quiet
                 WORKING_DIRECTORY ${WORK} RESULT_VARIABLE result ERROR_VARIABLE err)

@@ -171,6 +171,38 @@ endforeach()
 file(REMOVE_RECURSE ${WORK}/out)
 file(COPY ${WORK}/before/ DESTINATION ${WORK}/out)
 
+# The map cannot be added to the other results: they are written without it.
+foreach(added 0 3)
+  file(REMOVE_RECURSE ${WORK}/no_map)
+  execute_process(COMMAND ${CMAKE_COMMAND} -E env LD_PRELOAD=${KILLED} ASAN_OPTIONS=verify_asan_link_order=0
+                          ORBIS_TEST_OPTIONAL=${added} ${APP} run room --frames 2 --out no_map ${quick} --deterministic
+                  WORKING_DIRECTORY ${WORK} RESULT_VARIABLE result ERROR_VARIABLE err)
+  check(result EQUAL 2)
+  check(err MATCHES "no_map: cannot move the new files: Input/output error. the map is missing")
+  must_equal(no_map/trajectory.txt two/trajectory.txt)
+  must_exist(${WORK}/no_map keyframes.txt camera_used.toml summary.json report.html)
+  must_not_be_half_written(${WORK}/no_map)
+  file(GLOB map ${WORK}/no_map/*.bt ${WORK}/no_map/*.ply ${WORK}/no_map/map.png)
+  check(NOT map)
+endforeach()
+
+# The user renames the folder during a run: the results are in the renamed folder.
+execute_process(COMMAND bash -c "
+  '${APP}' run room --frames 2 --out moved/out ${quick_text} --deterministic --save-map moved/maps/room.map &
+  run=$!
+  until ls -d moved/maps/.rgbd_slam-* >/dev/null 2>&1 || ! kill -0 $run; do sleep 0.01; done
+  kill -STOP $run
+  mv moved elsewhere
+  kill -CONT $run
+  wait $run" WORKING_DIRECTORY ${WORK} RESULT_VARIABLE result)
+check(result EQUAL 0)
+check(NOT EXISTS ${WORK}/moved)
+must_equal(elsewhere/out/trajectory.txt two/trajectory.txt)
+must_exist(${WORK}/elsewhere/out map.bt report.html summary.json)
+must_exist(${WORK}/elsewhere/maps room.map)
+must_not_be_half_written(${WORK}/elsewhere/out)
+must_not_be_half_written(${WORK}/elsewhere/maps)
+
 # What another user has put into the folder is neither moved nor removed, unless the folder is that user's.
 execute_process(COMMAND id -u OUTPUT_VARIABLE user OUTPUT_STRIP_TRAILING_WHITESPACE)
 if(user EQUAL 0)

@@ -3,7 +3,8 @@
 // Loaded before a program (LD_PRELOAD). After ORBIS_TEST_RENAMES files have been moved out of hidden folders, the
 // program and its child processes are killed, or, with ORBIS_TEST_FAILS, one rename fails; with
 // ORBIS_TEST_STAYS_BROKEN, all later ones as well. With ORBIS_TEST_NO_LINKS, there are no hard links. With
-// ORBIS_TEST_KILLED_AFTER_ERROR, the program is killed when the failed move has been withdrawn.
+// ORBIS_TEST_KILLED_AFTER_ERROR, the program is killed when the failed move has been withdrawn. With
+// ORBIS_TEST_OPTIONAL, after that many files of the map have been added to the other results, one fails.
 #include <cerrno>
 #include <csignal>
 #include <cstdlib>
@@ -37,6 +38,11 @@ extern "C" int rename(const char* from, const char* to) {
     original(from, to);
     kill_all();
   }
+  static int added = 0;
+  const char* const optional = std::getenv("ORBIS_TEST_OPTIONAL");
+  if (optional != nullptr && std::strstr(from, "/.rgbd_slam/optional/") != nullptr &&
+      std::strstr(to, "/optional/") == nullptr && added++ == std::atoi(optional))
+    return errno = EIO, -1;
   static bool is_broken = false;
   if (is_broken && is_set("ORBIS_TEST_STAYS_BROKEN")) return errno = EIO, -1;
   const bool moves =
