@@ -11,6 +11,8 @@
 #include <utility>
 #include <vector>
 
+#include <sys/stat.h>
+
 #ifdef RGBD_SLAM_SQLITE
 #include <sqlite3.h>
 #endif
@@ -210,6 +212,48 @@ TEST_CASE("a database and its write-ahead log are not changed, and no files are 
   CHECK(count == 2);
   std::filesystem::remove(folder.path() / "wal.db3-wal");
   CHECK(app::open_bag(folder.path(), {}).value()->size() == 2);
+}
+
+TEST_CASE("the empty write-ahead log of a recorder that is still running stays") {
+  const temporary_folder folder;
+  const auto path = folder.path() / "a.db3";
+  std::filesystem::copy(bags / "split/split_0.db3", path);
+  sqlite3* recorder = nullptr;
+  REQUIRE(sqlite3_open(path.c_str(), &recorder) == SQLITE_OK);
+  REQUIRE(sqlite3_exec(recorder,
+                       "PRAGMA journal_mode = WAL; CREATE TABLE more (data BLOB); PRAGMA wal_checkpoint(TRUNCATE);",
+                       nullptr, nullptr, nullptr) == SQLITE_OK);
+  const auto log = folder.path() / "a.db3-wal";
+  REQUIRE(std::filesystem::file_size(log) == 0);
+  check_frames(*app::open_bag(path, {}).value(), 2, 1.7e9);
+  CHECK(std::filesystem::exists(log));
+  sqlite3_close(recorder);
+}
+
+TEST_CASE("a database with views, or with a pipe as its journal, is refused") {
+  const temporary_folder folder;
+  const auto path = folder.path() / "a.db3";
+  std::filesystem::copy(bags / "split/split_0.db3", path);
+  SECTION("views, which need not end") {
+    const std::string table = GENERATE("topics", "messages");
+    sqlite3* writer = nullptr;
+    REQUIRE(sqlite3_open(path.c_str(), &writer) == SQLITE_OK);
+    const std::string columns = table == "topics" ? "1 AS id, 'a' AS name, 'b' AS type, 'cdr' AS serialization_format"
+                                                  : "1 AS id, 1 AS topic_id, 1 AS timestamp, x'00' AS data";
+    const std::string sql = "ALTER TABLE " + table + " RENAME TO old; CREATE VIEW " + table +
+                            " AS WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n) SELECT " + columns +
+                            " FROM n;";
+    REQUIRE(sqlite3_exec(writer, sql.c_str(), nullptr, nullptr, nullptr) == SQLITE_OK);
+    sqlite3_close(writer);
+    CHECK_THAT(app::open_bag(path, {}).error().message, Contains("is not a readable bag (rosbag2): "));
+  }
+  SECTION("a pipe") {
+    const std::string pipe = path.string() + GENERATE("-journal", "-wal");
+    REQUIRE(mkfifo(pipe.c_str(), 0600) == 0);
+    const auto refused = app::open_bag(path, {});
+    CHECK(refused.error().where == pipe);
+    CHECK(refused.error().message == "is not a regular file");
+  }
 }
 
 TEST_CASE("a database whose recording was interrupted in a transaction is read as it is, and unchanged") {

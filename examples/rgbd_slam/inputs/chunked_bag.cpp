@@ -96,6 +96,9 @@ result<chunked_bag::opened_chunk> chunked_bag::open_chunk(std::uint32_t chunk) {
     const std::string place = where_ + ": the chunk at byte " + std::to_string(chunks_[chunk]);
     if (r->size > whole_message || r->plain_size > whole_message)
       return fail(errc::unsupported, place, "is larger than 1 GiB");
+    if (r->plain_size / 1000 > r->size + (std::size_t{1} << 14U))  // a few kilobytes must not take minutes
+      return fail(errc::unsupported, place,
+                  "declares " + std::to_string(r->plain_size) + " bytes, over 1000 times more than it contains");
     cache_[1] = {};  // frees memory before more is allocated
     auto plain = decompress(r->compression, file_.read(r->data, r->size), r->plain_size, place);
     if (!plain) return fail(plain.error());

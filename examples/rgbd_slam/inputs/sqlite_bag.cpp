@@ -67,8 +67,12 @@ class sqlite_bag final : public bag_file {
       notes.push_back(path_ + ": the recording was interrupted; its last messages may be damaged");
     }
 
+    const auto unreadable = [&] {
+      return fail(errc::malformed, path_, "is not a readable bag (rosbag2): " + reason());
+    };
     std::map<std::int64_t, std::size_t> topic_of_id;
     const statement rows = prepare("SELECT id, name, type, serialization_format FROM topics");
+    if (!rows) return unreadable();
     int state = sqlite3_step(rows.get());
     for (; state == SQLITE_ROW; state = sqlite3_step(rows.get())) {
       const std::string type = ros1_type(column(rows, 2));
@@ -77,7 +81,7 @@ class sqlite_bag final : public bag_file {
       topics.push_back({std::string{column(rows, 1)}, type, message_encoding::cdr, {}});
     }
     const statement found = prepare("SELECT id, topic_id, timestamp FROM messages ORDER BY id");
-    if (!rows || !found) return fail(errc::malformed, path_, "is not a readable bag (rosbag2): " + reason());
+    if (!found) return unreadable();
     const bool has_topics = state == SQLITE_DONE;
     for (state = sqlite3_step(found.get()); state == SQLITE_ROW; state = sqlite3_step(found.get()))
       if (const auto topic = topic_of_id.find(sqlite3_column_int64(found.get(), 1)); topic != topic_of_id.end())
@@ -114,6 +118,13 @@ class sqlite_bag final : public bag_file {
     sqlite3_open_v2(name.c_str(), &opened, SQLITE_OPEN_READONLY | flags, "unix-none");
     database_.reset(opened);
     reject_short_reads(opened);
+    // Otherwise, SQLite deletes an empty write-ahead log, which the recorder may still be using.
+    int persists = 1;
+    sqlite3_file_control(opened, "main", SQLITE_FCNTL_PERSIST_WAL, &persists);
+    // Views and computed values need not end, or can be larger than the file.
+    sqlite3_db_config(opened, SQLITE_DBCONFIG_ENABLE_VIEW, 0, nullptr);
+    const std::uintmax_t longest = std::clamp<std::uintmax_t>(file_size_, 1U << 20U, whole_message);
+    sqlite3_limit(opened, SQLITE_LIMIT_LENGTH, static_cast<int>(longest));
     sqlite3_exec(opened, "PRAGMA locking_mode = EXCLUSIVE; PRAGMA writable_schema = ON", nullptr, nullptr, nullptr);
   }
   /// The address with which SQLite opens a database as immutable.
@@ -137,7 +148,7 @@ class sqlite_bag final : public bag_file {
   [[nodiscard]] std::string reason() const { return sqlite3_errmsg(database_.get()); }
 
   std::string path_;
-  std::uintmax_t file_size_;  // including the write-ahead log
+  std::uintmax_t file_size_;  // including the write-ahead log and the journal
   std::unique_ptr<sqlite3, closer> database_;
 };
 
@@ -145,10 +156,13 @@ class sqlite_bag final : public bag_file {
 
 result<std::unique_ptr<bag_file>> open_sqlite_bag(const std::filesystem::path& path) {
   std::uintmax_t size = 0;
-  for (const char* ending : {"", "-wal"}) {
+  for (const char* ending : {"", "-wal", "-journal"}) {
     std::error_code error;
-    const std::uintmax_t more = std::filesystem::file_size(path.string() + ending, error);
-    if (!error) size += more;
+    const std::string file = path.string() + ending;
+    const auto status = std::filesystem::status(file, error);
+    if (!std::filesystem::exists(status)) continue;
+    if (!std::filesystem::is_regular_file(status)) return fail(errc::unreadable, file, "is not a regular file");
+    if (const std::uintmax_t more = std::filesystem::file_size(file, error); !error) size += more;
   }
   auto bag = std::make_unique<sqlite_bag>(path.string(), size);
   if (auto opened = bag->open(); !opened) return fail(opened.error());
