@@ -34,6 +34,8 @@ int run(int argc, char** argv) {
   cli.add_flag("--json", s.json, "print the summary as JSON");
   if (const auto code = examples::parse(cli, argc, argv)) return *code;
   if (examples::is_same_file(s.output, s.input)) return report_error(1, examples::overwrite_message(s.output, s.input));
+  if (!s.output.empty())
+    if (const std::string why = examples::unwritable_message(s.output); !why.empty()) return report_error(2, why);
   auto problem = orbis::io::read_bal(std::filesystem::path{s.input});
   if (!problem) return report_error(2, examples::describe(problem.error()));
   return s.loss == "cauchy" || s.loss == "tukey" ? adjust_redescending(s, *problem) : adjust_convex(s, *problem);

@@ -38,11 +38,13 @@ namespace examples {
   return orbis::shortened(what) + " (--help shows the usage)";
 }
 
-/// Throws if an option of the program or of the chosen commands has an invalid number that CLI11 accepts: NaN, which
-/// passes range checks, or an integer that is negative or too large for its unsigned type.
-inline void check_numbers(const CLI::App& cli) {
+/// Throws if an option of the program or of the chosen commands has an invalid value that CLI11 accepts: an empty text
+/// (usually a variable that is not set), NaN, which passes range checks, or an integer that is negative or too large
+/// for its unsigned type.
+inline void check_values(const CLI::App& cli) {
   for (const CLI::Option* option : cli.get_options())
     for (const std::string& text : option->results()) {
+      if (text.empty()) throw CLI::ValidationError{option->get_name(), "must not be empty"};
       const std::string type = option->get_type_name();
       if (double value = 0; type.starts_with("FLOAT") && CLI::detail::lexical_cast(text, value) && std::isnan(value))
         throw CLI::ValidationError{option->get_name(), orbis::in_quotes(text) + " is not a number"};
@@ -52,14 +54,14 @@ inline void check_numbers(const CLI::App& cli) {
       if (text.find('-') != std::string::npos || errno == ERANGE)
         throw CLI::ValidationError{option->get_name(), orbis::in_quotes(text) + " is out of range"};
     }
-  for (const CLI::App* command : cli.get_subcommands()) check_numbers(*command);
+  for (const CLI::App* command : cli.get_subcommands()) check_values(*command);
 }
 
 /// Parses the command line. Returns the exit code if the program must end: 0 after --help, 1 after a usage error.
 [[nodiscard]] inline std::optional<int> parse(CLI::App& cli, int argc, char** argv) {
   try {
     cli.parse(argc, argv);
-    check_numbers(cli);
+    check_values(cli);
     return std::nullopt;
   } catch (const CLI::ParseError& e) {
     if (e.get_exit_code() == 0) return cli.exit(e);

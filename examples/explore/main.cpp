@@ -20,6 +20,7 @@
 #include <orbis/octree.hpp>
 
 #include "../common/program.hpp"
+#include "../common/same_file.hpp"
 
 using orbis::se3;
 using orbis::vec3;
@@ -229,6 +230,7 @@ int run(int argc, char** argv) {
   cli.add_option("--views", budget, "maximum number of views")->check(CLI::Range(16, 100000))->capture_default_str();
   cli.add_option("--seed", seed, "seed of the building")->capture_default_str();
   if (const auto code = examples::parse(cli, argc, argv)) return *code;
+  if (const std::string why = examples::unwritable_message(output); !why.empty()) return report_error(2, why);
 
   const building world{seed};
   const vec3 start{-4.0, 0.0, 1.3};

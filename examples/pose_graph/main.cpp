@@ -101,6 +101,8 @@ int run_command(int argc, char** argv) {
   cli.add_flag("--json", s.json, "print the summary as JSON");
   if (const auto code = examples::parse(cli, argc, argv)) return *code;
   if (examples::is_same_file(s.output, s.input)) return report_error(1, examples::overwrite_message(s.output, s.input));
+  if (!s.output.empty())
+    if (const std::string why = examples::unwritable_message(s.output); !why.empty()) return report_error(2, why);
   auto graph = orbis::io::read_g2o(s.input);
   if (!graph) return report_error(2, examples::describe(graph.error()));
   if (s.chordal) {

@@ -31,6 +31,7 @@
 
 #include <orbis/core/file.hpp>
 #include <orbis/io/recording.hpp>
+#include <orbis/io/toml.hpp>
 
 #include "commands.hpp"
 #include "formatted_text.hpp"
@@ -429,6 +430,15 @@ std::string as_json(const std::vector<row>& rows) {
 }  // namespace
 
 exit_code benchmark(const settings& s, console& console) {
+  if (!s.run_config.empty()) {
+    const auto table = orbis::io::read_toml(s.run_config);
+    if (!table) return console.error(table.error()), bad_input;
+    for (const char* name : {"save-map", "floor-map"})
+      if (table->contains(name))
+        return console.error({orbis::errc::invalid_argument, s.run_config.string(),
+                              std::string{name} + ": every run would replace the file; remove the option"}),
+               bad_usage;
+  }
   const auto recordings = chosen_recordings(s);
   if (!recordings) return console.error(recordings.error()), bad_input;
   auto temporary = make_temporary_folder();

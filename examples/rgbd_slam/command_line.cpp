@@ -369,7 +369,7 @@ std::optional<exit_code> read_config(CLI::App& cmd, const std::string& path) {
     try {
       option->add_result(as_text.str());
       option->run_callback();
-      examples::check_numbers(cmd);
+      examples::check_values(cmd);
     } catch (const CLI::ParseError& e) {
       return report_error(orbis::shortened_path(path) + ": " + orbis::shortened(e.what()), bad_usage);
     }
@@ -516,7 +516,7 @@ std::variant<settings, exit_code> command_line::read(int argc, char** argv) {
         bad_usage);
   try {
     cli.parse(argc, argv);
-    examples::check_numbers(cli);
+    examples::check_values(cli);
   } catch (const CLI::CallForHelp&) {
     std::fputs(cli.help().c_str(), stdout);
     return done;

@@ -65,6 +65,7 @@ std::string overwritten_input(const settings& s) {
 
 int train(const settings& s) {
   if (const std::string why = overwritten_input(s); !why.empty()) return report_error(1, why);
+  if (const std::string why = examples::unwritable_message(s.output); !why.empty()) return report_error(2, why);
   std::vector<sources::descriptors> images = sources::of_textures(s.textures, s.training.seed, s.features);
   for (std::size_t room = 0; room != s.rooms; ++room)
     for (sources::view& v : sources::of_room(1000 * s.training.seed + room, s.views, s.features, room).views)

@@ -39,6 +39,10 @@ must_be(2 room recording)
 must_be(2 "" summary ate_rmse_m)
 must_be(2 "" published_ate_rmse_m)
 
+# Every run would replace a file with a fixed name.
+file(WRITE ${WORK}/saves.toml "save-map = \"all.map\"\n")
+app_fails(1 "saves.toml: save-map: every run would replace the file" benchmark data --quick --run-config saves.toml)
+
 # A table: deterministic, and with threads under load. Results are kept on request, and are those of `run`.
 app(0 benchmark data/room data/rgbd_dataset_freiburg1_desk --frames 4 --run-config coarse.toml --out kept --markdown)
 foreach(name room rgbd_dataset_freiburg1_desk)

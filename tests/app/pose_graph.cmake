@@ -32,6 +32,7 @@ app(0 --help)
 check(out MATCHES "--chordal" AND out MATCHES "--loss")
 
 # Input, graphs that cannot be solved, and output that cannot be: 2.
+fails(1 "--output: must not be empty" square.g2o --output "")
 fails(2 "nowhere.g2o: no such file" nowhere.g2o)
 file(WRITE ${WORK}/text.g2o ${square} "hello\n")
 fails(2 "text.g2o:6: .*hello" text.g2o --output no.g2o)

@@ -225,7 +225,7 @@ TEST_CASE("headers that name another order, and lines that are no poses, are err
   const std::string unnamed = "f.txt:1: the header does not name the columns of the time and the position";
   CHECK(message("seq,sec,nsec,x,y,z,qx,qy,qz,qw\n1,2,3,1,2,3,0,0,0,1\n") == unnamed);
   CHECK(message("time,vx,vy,vz,ax,ay,az,qx,qy,qz,qw\n1,1,2,3,1,2,3,0,0,0,1\n") == unnamed);
-  CHECK(message("time,frame,x,y,z,qx,qy,qz,qw\n1,7,1,2,3,0,0,0\n").find("f.txt:2: a pose has ") == 0);
+  CHECK(message("time,frame,x,y,z,qx,qy,qz,qw\n1,7,1,2,3,0,0,0\n").find("f.txt:2: a pose must have ") == 0);
   CHECK(message("1 2 3 4 0 0 0 1 9\n").find("f.txt:1: a pose must have 8 numbers") == 0);
   CHECK(message("1 2 3 4 0 0 0 1\n1.5,,3,4,0,0,0,1\n").find("f.txt:2: a pose must have 8 numbers") == 0);
   CHECK(message("1 2 3 4 0 0 0 1\n2 2 3 4 0 0 0 1e-9\n").find("f.txt:2: the quaternion is zero or too") == 0);
