@@ -54,7 +54,7 @@ struct calibrated_parameter {
 
 /// Result of a calibration, independent of the camera model.
 struct calibration_summary {
-  /// The parameters of the model; for `radial_tangential`, k3 only if it is not 0, and never k4 to k6.
+  /// The parameters of the model; for `radial_tangential`, they include k3 only if it is not 0, and never k4 to k6.
   std::vector<calibrated_parameter> parameters;
   std::size_t keyframes = 0, landmarks = 0;  ///< numbers of keyframes and landmarks used
   std::size_t observations = 0, outliers = 0;

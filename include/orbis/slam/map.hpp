@@ -210,7 +210,7 @@ class basic_map {
   }
 
  private:
-  /// Returns a pose after a motion in the world frame.
+  /// Returns a camera pose moved by a motion in the world frame.
   [[nodiscard]] static se3 moved(const sim3& T_new_old, const se3& T_old_camera) {
     return {T_new_old.rotation() * T_old_camera.rotation(), vec3(T_new_old * T_old_camera.translation())};
   }

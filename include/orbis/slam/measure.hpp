@@ -50,7 +50,7 @@ concept grey_extractor = feature_extractor<E> && std::invocable<const E&, image_
 
 namespace detail {
 
-/// Creates a frame from features and their rays, before depth is measured. The ray is NaN if the pixel has none.
+/// Creates a frame from features and their rays, before depth is measured. Pixels without a ray get NaN.
 template <camera::camera_model Camera, feature_descriptor D>
 [[nodiscard]] basic_frame<D> make_frame(const camera_rig<Camera>& rig, features::basic_features<D> features,
                                         sensor_kind sensor) {

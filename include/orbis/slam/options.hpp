@@ -21,14 +21,16 @@ namespace orbis::slam {
 /// Conditions under which a frame becomes a keyframe.
 struct keyframe_options {
   double interval = 0.3;  ///< seconds since the last keyframe after which motion alone triggers a new one
-  /// Translation since the last keyframe that counts as motion, metres (without depth: median depths) ...
+  /// Translation since the last keyframe that counts as motion, metres; without depth, in median depths.
   double moved = 0.06;
-  double turned = 0.06;              ///< ... or rotation, radians
-  double inlier_ratio = 0.75;        ///< a keyframe is created below this share of the reference keyframe's landmarks
-  double inlier_ratio_start = 0.4;   ///< `inlier_ratio` while the map has only one keyframe
-  std::size_t min_inliers = 15;      ///< no keyframe is created with this number of inliers or fewer
-  std::size_t close_tracked = 100;   ///< a keyframe is created with fewer tracked close points than this ...
-  std::size_t close_untracked = 70;  ///< ... and more untracked close points than this
+  double turned = 0.06;             ///< rotation since the last keyframe that counts as motion, radians
+  double inlier_ratio = 0.75;       ///< a frame with a smaller share of the reference's landmarks becomes a keyframe
+  double inlier_ratio_start = 0.4;  ///< `inlier_ratio` while the map has only one keyframe
+  std::size_t min_inliers = 15;     ///< no keyframe is created with this number of inliers or fewer
+  /// A frame also becomes a keyframe if it has fewer tracked close points than this, and more untracked close points
+  /// than `close_untracked`.
+  std::size_t close_tracked = 100;
+  std::size_t close_untracked = 70;  ///< see `close_tracked`
 };
 
 /// Local bundle adjustment after each keyframe.
@@ -41,15 +43,15 @@ struct adjustment_options {
 
 /// Removal of unreliable landmarks and redundant keyframes.
 struct culling_options {
-  double found_ratio = 0.25;        ///< minimum share of a landmark's expected observations that are found ...
-  std::uint32_t min_visible = 8;    ///< ... tested after this number of expected observations
-  std::uint32_t age = 2;            ///< number of keyframes after a landmark's creation by which it must have ...
-  std::uint32_t min_support = 4;    ///< ... this number of observations; those with depth count twice
-  std::uint32_t least_support = 0;  ///< the same number for older landmarks; 0: no minimum
+  double found_ratio = 0.25;        ///< minimum share of a landmark's expected observations that are found
+  std::uint32_t min_visible = 8;    ///< number of expected observations from which `found_ratio` applies
+  std::uint32_t age = 2;            ///< number of keyframes after a landmark's creation at which `min_support` applies
+  std::uint32_t min_support = 4;    ///< minimum number of observations at `age`; those with depth count twice
+  std::uint32_t least_support = 0;  ///< minimum number of observations of older landmarks; 0: no minimum
   std::size_t neighborhood = 20;    ///< number of keyframes examined around the newest one
-  double redundant = 0.9;           ///< a keyframe is redundant if this share of its close landmarks is observed by ...
-  std::size_t redundant_observers = 3;  ///< ... this number of other keyframes ...
-  int coarser_levels = 1;               ///< ... on a pyramid level that is coarser by at most this number
+  double redundant = 0.9;           ///< a keyframe is redundant if others observe this share of its close landmarks
+  std::size_t redundant_observers = 3;  ///< for `redundant`: number of other keyframes that must observe a landmark
+  int coarser_levels = 1;               ///< for `redundant`: number of levels by which the observations may be coarser
 };
 
 /// Use of depth images in pose estimation: aligns points of a frame with surfaces of keyframes. For sensors with a
@@ -61,8 +63,8 @@ struct depth_term_options {
   double effective_points = 40;  ///< maximum effective number of points: neighbouring depth errors are correlated
   std::size_t surfaces = 16;     ///< maximum number of keyframe surfaces kept; about 130 kB each
   double weakest = 0.002;        ///< directions with a smaller mean squared normal component are unconstrained
-  double min_share = 0.7;        ///< minimum share of the points on known surfaces that agree with them ...
-  std::size_t min_points = 100;  ///< ... and minimum number of points on known surfaces, for localisation by depth
+  double min_share = 0.7;        ///< for localisation by depth: minimum share of the points on surfaces that fit them
+  std::size_t min_points = 100;  ///< for localisation by depth: minimum number of points on known surfaces
   std::size_t min_inliers = 5;   ///< minimum number of landmarks per pose direction not constrained by surfaces
 };
 
@@ -114,31 +116,31 @@ struct triangulation_options {
 struct fusion_options {
   double radius = 4.0;           ///< search radius around a projection, pixels of a keypoint's level
   std::uint32_t distance = 50;   ///< maximum descriptor distance
-  std::size_t neighbors = 10;    ///< number of keyframes searched around the new one ...
-  std::size_t second_order = 5;  ///< ... and number of neighbours of each of these
+  std::size_t neighbors = 10;    ///< number of keyframes searched around the new one
+  std::size_t second_order = 5;  ///< number of keyframes searched around each of the `neighbors`
 };
 
 /// Conditions for accepting a loop.
 struct loop_options {
-  std::uint32_t distance = 64;   ///< maximum descriptor distance between the two keyframes ...
-  float ratio = 0.85F;           ///< ... and maximum ratio of the best to the second-best distance
+  std::uint32_t distance = 64;   ///< maximum descriptor distance between the two keyframes
+  float ratio = 0.85F;           ///< maximum ratio of the best to the second-best distance
   std::size_t min_matches = 20;  ///< minimum number of descriptor matches between the two keyframes
-  /// Inlier threshold for these matches, in standard deviations of the depth or, if no lengths are measured, of the
-  /// pixels in both images.
+  /// Inlier threshold for the descriptor matches, in standard deviations of the depth or, if no lengths are measured,
+  /// of the pixels in both images.
   double alignment_threshold = 3.0;
-  std::size_t min_aligned = 12;  ///< minimum number of inliers among these matches
+  std::size_t min_aligned = 12;  ///< minimum number of inliers among the descriptor matches
   std::size_t neighbors = 10;    ///< number of neighbours of the candidate whose landmarks are also searched for
   double wide_radius = 12.0;     ///< search radius for landmarks around the first estimate of the pose, pixels
   double radius = 4.0;           ///< search radius around the refined pose, pixels
   std::uint32_t landmark_distance = 50;  ///< maximum descriptor distance for landmarks
   std::size_t min_inliers = 40;         ///< minimum number of landmarks around the candidate that the keyframe observes
-  std::size_t supporters = 5;           ///< number of examined neighbours of the keyframe ...
-  std::size_t min_supporters = 2;       ///< ... of which this number (or all, if there are fewer) must agree ...
-  std::size_t supporter_inliers = 20;   ///< ... by observing this number of the landmarks
-  double max_translation = 0.1;         ///< allowed translational drift, metres ...
-  double translation_per_metre = 0.05;  ///< ... plus this per metre of the path between the two keyframes
-  double max_rotation = 5.0 * std::numbers::pi / 180.0;        ///< allowed rotational drift, radians ...
-  double rotation_per_metre = 1.0 * std::numbers::pi / 180.0;  ///< ... plus this per metre of the path
+  std::size_t supporters = 5;           ///< number of neighbours of the keyframe that are examined as supporters
+  std::size_t min_supporters = 2;       ///< minimum number of neighbours that agree; all, if the keyframe has fewer
+  std::size_t supporter_inliers = 20;   ///< minimum number of landmarks that an agreeing neighbour observes
+  double max_translation = 0.1;         ///< constant part of the allowed translational drift, metres
+  double translation_per_metre = 0.05;  ///< additional drift allowed per metre of the path between the keyframes
+  double max_rotation = 5.0 * std::numbers::pi / 180.0;        ///< constant part of allowed rotational drift, radians
+  double rotation_per_metre = 1.0 * std::numbers::pi / 180.0;  ///< additional drift allowed per metre of the path
   /// Maximum standard deviation of the logarithm of the scale between both ends if no lengths are measured. Scale drift
   /// is then unbounded, and of the four limits above, only `max_rotation` applies.
   double max_scale_deviation = 0.02;
@@ -183,8 +185,8 @@ struct place_options {
 /// Detection of moving objects.
 struct moving_options {
   bool enabled = true;            ///< off: every feature counts as static
-  std::size_t min_features = 20;  ///< minimum number of features of a moving object ...
-  double share = 0.15;            ///< ... and minimum share of the matches that disagree with a single pose
+  std::size_t min_features = 20;  ///< minimum number of features of a moving object
+  double share = 0.15;            ///< minimum share of the matches that disagree with a single pose
   double seasoned = 1.0;          ///< age at which a landmark is fully trusted to be static, seconds
   double reach = 0.2;  ///< radius around moving features within which features of unknown motion are excluded, metres
   double hold = 3.0;   ///< seconds for which moved features stay excluded after coming to rest
@@ -195,10 +197,10 @@ struct thread_options {
   /// Off: `track` does all the work, and the same frames give bit-identical results. On: mapping, loop closing and
   /// global adjustment have one thread each, and `track` returns as soon as the pose is known.
   bool enabled = false;
-  /// Maximum number of keyframes waiting for mapping; at the limit, no more keyframes are created ...
+  /// Maximum number of keyframes waiting for mapping; `wait` specifies what happens at the limit.
   std::size_t max_waiting = 3;
-  /// ... or, if true, `track` waits: for recordings, so that tracking does not outrun mapping. If false, an adjustment
-  /// also ends early when a keyframe is waiting.
+  /// True: at the limit, `track` waits; for recordings, so that tracking does not outrun mapping. False: at the limit,
+  /// no more keyframes are created; in addition, an adjustment ends early when a keyframe is waiting.
   bool wait = false;
 };
 
@@ -255,8 +257,9 @@ struct options {
   std::size_t trajectory_frames = std::numeric_limits<std::size_t>::max();
   bool localization_only = false;     ///< creates no keyframes and keeps the map unchanged: for a loaded map
   std::optional<se3> initial_pose{};  ///< `T_world_camera` of the first frame of a map; default: the identity
-  /// Function that returns the initial pose, used instead of `initial_pose`: the tracking thread calls it when a frame
-  /// starts a map (without depth: the second of two frames, whose pose it returns). It must not call the system.
+  /// Function that returns the initial pose, used instead of `initial_pose`. The tracking thread calls it when a frame
+  /// starts a map, and uses the result as the pose of that frame (without depth, the second of two frames). It must not
+  /// call the system.
   std::function<se3()> find_initial_pose{};
   std::uint64_t seed = 1;  ///< seed of RANSAC
 };

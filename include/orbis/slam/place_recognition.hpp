@@ -59,7 +59,7 @@ class bag_of_words_places {
   bool add(map_keyframe k, const signature& bow_vector) { return database_.add(packed(k), bow_vector); }
   /// Erases a keyframe. Returns false if the keyframe is not in the database.
   bool erase(map_keyframe k) { return database_.erase(packed(k)); }
-  /// Changes the id of a keyframe. Returns false if `from` is not in the database, or `to` is.
+  /// Changes the id of a keyframe. Returns false if `from` is not in the database, or if `to` already is.
   bool rename(map_keyframe from, map_keyframe to) { return database_.rename(packed(from), packed(to)); }
 
   /// Returns at most `count` keyframes with similar bags of words, the most similar first (see `place_recognizer`).

@@ -39,8 +39,8 @@ struct placed_surface {
 
 /// Maximum deviation of a point from its associated plane.
 struct alignment_gate {
-  double distance = 0.05;   ///< metres ...
-  double deviations = 4.0;  ///< ... or this number of standard deviations, whichever is greater
+  double distance = 0.05;   ///< metres; the greater of this and `deviations` applies
+  double deviations = 4.0;  ///< standard deviations; the greater of this and `distance` applies
   double cosine = 0.8;      ///< minimum cosine of the angle between the normals of both surfaces
 };
 
@@ -112,14 +112,14 @@ association associate(std::span<const surface_sample> samples, std::size_t strid
 /// (`exp(step) * T_camera_world`), excluding the directions that the planes do not constrain.
 struct depth_equations {
   pose_quadratic term;     ///< cost with the information of at most the given number of independent points
-  int determined = 0;      ///< number of determined directions of the pose, of six
+  int determined = 0;      ///< number of determined pose directions, out of six
   double least = 0.0;      ///< mean squared normal component in the least determined direction
   double deviation = 0.0;  ///< root mean square of the residuals, in standard deviations
 };
 
 /// Builds the equations for the given planes. `points`: maximum number of independent points; if there are more, their
 /// weights are reduced accordingly. `weakest`: a direction counts as unconstrained if the mean squared normal component
-/// along it is smaller; rotations are scaled to metres by the mean depth of the points. O(planes).
+/// along it is below this value; rotations are scaled to metres by the mean depth of the points. O(planes).
 [[nodiscard]] inline depth_equations build_equations(std::span<const plane_observation_of_row> planes,
                                                      const moving_pose& at, double points, double weakest) {
   depth_equations e;

@@ -96,7 +96,7 @@ class surface_memory {
 /// The result of aligning the depth of a frame.
 struct depth_alignment {
   moving_pose at;
-  int determined = 0;   ///< number of directions of the pose that the surfaces determine, of six
+  int determined = 0;   ///< number of pose directions that the surfaces determine, out of six
   double least = 0.0;   ///< strength of the weakest determined direction: `depth_equations::least`
   association seen;     ///< counts at the aligned pose
   bool is_only = true;  ///< true if no other pose fits nearly as well

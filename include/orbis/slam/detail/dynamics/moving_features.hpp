@@ -139,7 +139,7 @@ class moving_features {
   /// Sets the pose of the last frame.
   void set_last(const se3& T_world_camera) { T_world_last_ = T_world_camera; }
 
-  /// Returns true if a landmark must be excluded from the search in the current frame, because new landmarks may be
+  /// Returns true if a landmark must be excluded from the search in the current frame because it is new and may be
   /// moving.
   [[nodiscard]] bool is_excluded(const basic_map<D>& m, landmark_id id, double now) const {
     return trusts_old_only_ && landmark_trust(m, id, now) < enough_trust;
@@ -227,7 +227,7 @@ class moving_features {
   }
 
  private:
-  static constexpr double anchor_time = 0.25;  ///< seconds
+  static constexpr double anchor_time = 0.25;  ///< age above which an anchor is replaced, seconds
 
   struct track {
     std::size_t feature = 0;  ///< index in the current frame
@@ -308,7 +308,7 @@ class moving_features {
   std::vector<track> tracks_, next_;       ///< tracks of the last and of the current frame
   std::vector<std::uint8_t> is_left_out_;  ///< for each feature of the current frame; empty: none is excluded
   std::vector<std::uint8_t> agrees_;       ///< for each feature: 1 if it agrees with the pose of the static scene
-  bool trusts_old_only_ = false;           ///< applies to the current frame
+  bool trusts_old_only_ = false;           ///< true if only old landmarks are trusted in the current frame
   double moved_ = 0.0;                     ///< time of the last motion, seconds
   se3 T_world_last_;
 };

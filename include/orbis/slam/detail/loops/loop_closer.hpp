@@ -93,9 +93,9 @@ class loop_closer {
  private:
   using clock = std::chrono::steady_clock;
   // Amount of work per acquisition of the lock, chosen so that tracking waits for about a millisecond:
-  static constexpr std::uint32_t at_once = 4096;              ///< landmarks
-  static constexpr std::size_t pairs_at_once = 512;           ///< pairs of landmarks to fuse
-  static constexpr std::size_t observations_at_once = 65536;  ///< observations to check for outliers
+  static constexpr std::uint32_t at_once = 4096;              ///< number of landmarks to copy or update
+  static constexpr std::size_t pairs_at_once = 512;           ///< number of pairs to fuse
+  static constexpr std::size_t observations_at_once = 65536;  ///< number of observations to check for outliers
 
   /// Start of a correction, and the longest time for which the lock was held.
   struct correction_timing {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The similarity transform between two cameras that observe common points, each with its own unit of length.
+/// The similarity transform between two cameras, each with its own unit of length, that observe common points.
 ///
 /// Without a depth sensor, the accuracy of a point's depth depends on its parallax: the error of a pair is therefore
 /// its reprojection error, not the distance between its points.

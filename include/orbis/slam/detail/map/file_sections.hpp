@@ -52,9 +52,9 @@ class section_reader {
     return value;
   }
   [[nodiscard]] std::size_t left() const noexcept { return content_.size(); }
-  /// Returns true if more data were read than available.
+  /// Returns true if a read went past the end of the content.
   [[nodiscard]] bool ended() const noexcept { return ended_; }
-  /// Discards the rest and sets `ended`. Returns false.
+  /// Discards the rest of the content and sets `ended`. Returns false.
   bool end() {
     content_ = {};
     ended_ = true;

@@ -117,8 +117,8 @@ class paged_slots {
   static constexpr std::uint32_t chunk_size = 256 * page_size;
 
   struct retired_page {
-    std::uint32_t first;  ///< id
-    std::uint32_t since;  ///< size() when its last id was erased
+    std::uint32_t first;  ///< first id of the page
+    std::uint32_t since;  ///< size() when the last id of the page was erased
   };
 
   template <class MayHold, class Wanted>
@@ -190,7 +190,7 @@ class paged_slots {
   std::size_t adopted_from_ = 0;          ///< index in `retired_` of the first page of the import
   std::vector<std::uint32_t> chunks_;     ///< for each id / 2^16: index of a group of 256 `pages_`, or `none`
   std::vector<std::uint32_t> pages_;      ///< for each group of 256 ids: index of the page of `slots_`, or `none`
-  std::vector<std::uint32_t> slots_;      ///< page after page
+  std::vector<std::uint32_t> slots_;      ///< the stored numbers, page after page
   std::vector<std::uint16_t> contained_;  ///< for each page of `slots_`: number of its ids that are not erased
   std::vector<std::uint32_t> free_;       ///< unused pages of `slots_`
   std::deque<retired_page> retired_;      ///< pages whose ids are all erased, the oldest first

@@ -101,8 +101,9 @@ class slot_map {
     return no_id;
   }
 
-  /// Appends all objects and erased ids of `other`; the latter count as erased now. Returns the offset added to its
-  /// ids. Ids inside the objects are not changed. O(ids of `other`); 256 consecutive forgotten ids may take one step.
+  /// Appends all objects and erased ids of `other`; the erased ids count as erased at this moment. Returns the offset
+  /// added to the ids of `other`. Ids inside the objects are not changed. O(ids of `other`); 256 consecutive forgotten
+  /// ids may take one step.
   /// @pre at most `most_ids` ids in all
   std::uint32_t append(slot_map&& other) {
     assert(other.slots_.size() <= most_ids - slots_.size());

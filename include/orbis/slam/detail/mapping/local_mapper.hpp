@@ -34,8 +34,8 @@ template <feature_descriptor D>
 }
 
 /// Returns true if a landmark is unreliable at the time of keyframe `newest`: rarely found where it is expected, or
-/// observed by too few of the keyframes after the one that created it. Always false for landmarks of the newest
-/// keyframe. Source: R. Mur-Artal, J. M. M. Montiel, J. D. Tardos, "ORB-SLAM", T-RO 31 (2015), section VI.B.
+/// with too few observations (`support`) for its age. Always false for landmarks of the newest keyframe. Source:
+/// R. Mur-Artal, J. M. M. Montiel, J. D. Tardos, "ORB-SLAM", T-RO 31 (2015), section VI.B.
 template <feature_descriptor D>
 [[nodiscard]] bool is_unreliable(const basic_map<D>& m, const basic_landmark<D>& l, keyframe_id newest,
                                  const culling_options& o) {
@@ -89,8 +89,8 @@ template <feature_descriptor D>
 
 /// Erases the redundant neighbours of keyframe `newest`, the strongest first; each is tested after the previous ones
 /// have been erased. Keeps the root and the keyframes for which `keep(id)` is true. Keyframes with loop edges are
-/// erased like others, and their edges are moved to the replacement (ORB-SLAM keeps such keyframes: a map with loop
-/// closures over days would grow by two keyframes per loop). Returns the erased keyframes.
+/// erased like others, and their edges are moved to the replacement. (ORB-SLAM keeps these keyframes, but a map that
+/// closes loops for days would then grow by two keyframes per loop.) Returns the erased keyframes.
 template <feature_descriptor D, std::predicate<keyframe_id> Keep>
 std::vector<keyframe_id> cull_keyframes(basic_map<D>& m, keyframe_id newest, double close_depth,
                                         const culling_options& o, Keep&& keep) {

@@ -35,10 +35,10 @@ struct moving_pose {
 /// by part of its change, with a standard deviation for the acceleration of a hand-held camera. Without a previous
 /// pose, the prior only limits the twist to that of a hand-held camera.
 struct twist_prior {
-  std::optional<se3> T_world_before{};  ///< the previous pose ...
-  double interval = 0.0;                ///< ... and the time since then, seconds
+  std::optional<se3> T_world_before{};  ///< the previous pose, if any
+  double interval = 0.0;                ///< time since the previous pose, seconds
   double trend = 0.0;                   ///< share of the change since `twist_before` that is added to the mean motion
-  vec6 twist_before = zeros<vec6>();    ///< twist at the previous pose; without one, the expected twist
+  vec6 twist_before = zeros<vec6>();    ///< twist at the previous pose; without a previous pose, the expected twist
   double translation_deviation = 0.5;   ///< metres per second
   double rotation_deviation = 1.0;      ///< radians per second
 
@@ -70,7 +70,7 @@ struct row_observation {
   double time = 0.0;  ///< time of its row relative to the frame, seconds
 };
 
-/// Returns the mean twist of the camera from one frame to a later one; zero if the other frame is not later.
+/// Returns the mean twist of the camera from one frame to a later one; zero if the second frame is not later.
 template <feature_descriptor D>
 [[nodiscard]] vec6 motion_between(const basic_frame<D>& before, const basic_frame<D>& after) {
   const double interval = after.timestamp - before.timestamp;
@@ -240,10 +240,10 @@ template <camera::camera_model Camera>
 ///
 /// A twist depends on the poses before and after it, and the pose of the frame depends on depth that was corrected by
 /// the twist. If the depth image is captured after the frame, an error of the pose feeds back with the opposite sign
-/// and decays; if before, the pose would oscillate from frame to frame with growing amplitude in directions that pixels
-/// hardly determine. Such a depth image is therefore corrected by the refined twist only as far as pixels alone
-/// determine it, and otherwise by the previous twist, with the gain of R. E. Kalman, "A new approach to linear
-/// filtering and prediction problems", J. Basic Engineering 82 (1960).
+/// and decays; if the depth image is captured before the frame, the pose would oscillate from frame to frame with
+/// growing amplitude in directions that pixels hardly determine. Such a depth image is therefore corrected by the
+/// refined twist only as far as pixels alone determine it, and otherwise by the previous twist, with the gain of R. E.
+/// Kalman, "A new approach to linear filtering and prediction problems", J. Basic Engineering 82 (1960).
 class early_depth_twist {
  public:
   /// Computes the gain from the pixels of a frame's observations. Must be called before `between`. O(observations).

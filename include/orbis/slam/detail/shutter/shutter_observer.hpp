@@ -24,8 +24,8 @@
 
 namespace orbis::slam::detail {
 
-/// Compares each tracked frame with the last keyframes after the next frame has been tracked, because both neighbouring
-/// frames determine the motion; periodically proposes the resulting shutter.
+/// Compares each tracked frame with the last keyframes, after the next frame has been tracked: the motion is determined
+/// from both neighbouring frames. Periodically proposes the resulting shutter.
 class shutter_observer {
  public:
   [[nodiscard]] shutter_estimate estimate() const { return estimate_; }
@@ -143,7 +143,7 @@ class shutter_observer {
   std::vector<std::pair<map_keyframe, row_view>> views_;
   row_view pending_;
   std::optional<map_keyframe> pending_keyframe_;
-  std::optional<vec6> before_, before_that_;             ///< the motion to the pending frame, and to the previous one
+  std::optional<vec6> before_, before_that_;             ///< motion to the pending frame, and to the frame before it
   double watched_ = 0.0, decided_ = 0.0, looked_ = 0.0;  ///< seconds
 };
 

@@ -17,8 +17,8 @@ class exposure_estimation {
   /// Returns the `i`-th exposure time to compare, seconds.
   [[nodiscard]] static constexpr double candidate(std::size_t i) noexcept { return 0.004 * static_cast<double>(i); }
 
-  /// Adds the correlations of a patch in a frame, one per candidate. Patches whose blur changes more have a greater
-  /// effect.
+  /// Adds the correlations of a patch in a frame, one per candidate. The more the blur of a patch changes, the greater
+  /// its effect.
   void add(const std::array<double, count>& correlations) noexcept {
     constexpr double memory = 0.999;
     weight_ = memory * weight_ + 1.0;

@@ -72,8 +72,8 @@ class front_end {
   [[nodiscard]] std::optional<shutter_estimate> estimated_shutter() const {
     return context_.observer ? std::optional{context_.observer->estimate()} : std::nullopt;
   }
-  /// Sets the shutter of a frame, whose `shutter.depth_delay` is the difference of its timestamps, and keeps its
-  /// keypoints as read if they need correction.
+  /// Sets the shutter of a frame, and keeps the frame's keypoints as read if they need correction.
+  /// @pre `f.shutter.depth_delay` is the difference of the frame's timestamps
   void set_shutter(frame_type& f) const {
     const double by_clock = f.shutter.depth_delay;
     f.shutter = shutter_;

@@ -15,8 +15,8 @@ namespace orbis::slam::detail {
 /// Quantities on which the decision depends.
 struct keyframe_evidence {
   double since = 0.0;   ///< seconds since the last keyframe
-  double moved = 0.0;   ///< translation since then, metres; if the scale is unknown, relative to the depth of the scene
-  double turned = 0.0;  ///< rotation since then, radians
+  double moved = 0.0;   ///< translation since the last keyframe, metres (relative to scene depth if scale is unknown)
+  double turned = 0.0;  ///< rotation since the last keyframe, radians
   std::size_t inliers = 0;          ///< number of landmarks tracked in the frame
   std::size_t reference = 0;        ///< number of landmarks of the reference keyframe that other keyframes also observe
   std::size_t close_tracked = 0;    ///< number of close keypoints that observe a landmark

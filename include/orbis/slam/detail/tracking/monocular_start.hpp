@@ -42,8 +42,8 @@ struct monocular_start_result {
   se3 T_first_second;                ///< pose of the last frame
   std::vector<start_point> points;   ///< in ascending order of the first frame's keypoints
   double parallax = 0.0;             ///< median angle between the two rays to a point, radians
-  double rotation_deviation = 0.0;   ///< standard deviation of the rotation, radians ...
-  double direction_deviation = 0.0;  ///< ... and of the direction of the translation, radians
+  double rotation_deviation = 0.0;   ///< standard deviation of the rotation, radians
+  double direction_deviation = 0.0;  ///< standard deviation of the direction of the translation, radians
 };
 
 /// Selects two frames from which a map can be started. Keeps several frames of different ages as candidates for the
@@ -61,7 +61,7 @@ class monocular_start {
     basic_frame<D> frame;
     std::vector<features::match> matches;   ///< from its keypoints (query) to those of the last frame (train)
     std::vector<features::window> windows;  ///< one per keypoint, around its last position
-    std::size_t most = 0;                   ///< maximum number of matches with any frame
+    std::size_t most = 0;                   ///< largest number of matches with a frame so far
   };
 
   monocular_start(const camera_rig<Camera>& rig, const start_options& options, std::uint64_t seed = 1)
@@ -120,7 +120,7 @@ class monocular_start {
     for (const auto& k : f.features.keypoints)
       candidates_.back().windows.push_back({k.x, k.y, static_cast<float>(options_.radius), k.octave - 1, k.octave + 1});
   }
-  /// Reconstructs a start from a candidate and the next frame; on success, moves the candidate's frame into the result.
+  /// Reconstructs the scene from a candidate and the next frame; on success, moves the candidate's frame to the result.
   [[nodiscard]] result<monocular_start_result<D>> reconstruct(candidate& c, const basic_frame<D>& f) const {
     std::vector<vec2> first, second;
     std::vector<double> deviations;

@@ -29,7 +29,7 @@
 
 namespace orbis::slam::detail {
 
-/// A frame to localise, which is modified and finally moved from, and its environment. Of the functions, only
+/// A frame to localise, with its environment. The frame is modified and finally moved from. Of the functions, only
 /// `localized` may be empty.
 template <feature_descriptor D>
 struct tracking_task {

@@ -76,7 +76,7 @@ class young_frames {
 
  private:
   static constexpr std::size_t most = 100;                ///< maximum number of frames per map
-  static constexpr std::size_t most_pixels = 20'000'000;  ///< maximum total pixels of waiting frames: 65 of 640x480
+  static constexpr std::size_t most_pixels = 20'000'000;  ///< maximum total number of pixels: 65 frames of 640x480
   static constexpr std::size_t enough = 5;                ///< required number of later keyframes
 
   struct young_frame {
@@ -88,7 +88,7 @@ class young_frames {
     std::size_t landmarks;  ///< number of landmarks observed initially
   };
 
-  /// Returns the new pose; empty if the frame is not localised.
+  /// Localises a frame again. Returns its new pose; empty on failure.
   std::optional<se3> localize(young_frame& young, const frame_log& log, const basic_atlas<D>& maps) {
     const auto pose = log.pose(young.number, maps);
     if (!pose) return std::nullopt;
