@@ -27,8 +27,8 @@ struct depth_noise {
 struct keypoint_depth_options {
   int radius = 1;               ///< radius of the window: 1 is 3x3, 2 is 5x5; maximum 3
   int min_valid = 3;            ///< minimum number of pixels with depth in the window
-  float edge_sigmas = 4.0F;     ///< a gap of more than this number of standard deviations ...
-  float edge_relative = 0.02F;  ///< ... and more than this fraction of the depth is an edge
+  float edge_sigmas = 4.0F;     ///< minimum size of a depth edge, in standard deviations of the depth
+  float edge_relative = 0.02F;  ///< minimum size of a depth edge, as a fraction of the depth
   float min_share = 0.7F;       ///< minimum fraction of the valid pixels in the largest group without an edge; > 0.5
   double position_sigma = 0.5;  ///< sigma of the keypoint position, pixels; adds to the depth deviation on slopes
   depth_noise noise{};

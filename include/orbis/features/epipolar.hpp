@@ -25,7 +25,7 @@ namespace orbis::features {
 /// Limits on the distance between a match and its epipolar line.
 struct epipolar_rule {
   float distance = 1.96F;       ///< maximum at the finest level, pixels; accepts 95 % of matches if sigma is one pixel
-  float scale_factor = 1.2F;    ///< scale factor of the pyramid; multiplies the limit per level of the train keypoint
+  float scale_factor = 1.2F;    ///< scale factor of the pyramid, applied to the limit per level of the train keypoint
   float epipole_radius = 0.0F;  ///< exclusion radius around the epipole (no parallax), pixels; scales like `distance`
 };
 

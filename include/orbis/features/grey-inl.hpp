@@ -28,7 +28,7 @@ template <class Target, std::size_t N = Target::bytes>
     return {blocks_of_16<Target, N / 2>(p, step), blocks_of_16<Target, N / 2>(p + N / 32 * step, step)};
 }
 
-/// Processes one register of pixels at a time; returns the number processed, all except the last few.
+/// Processes one register of pixels at a time; returns the number of processed pixels: all except the last few.
 template <class Target>
 [[nodiscard]] ORBIS_ALWAYS_INLINE int luma_blocks(const rgb8* from, int count, std::uint8_t* to) {
   constexpr int pixels = Target::bytes;

@@ -36,7 +36,7 @@ struct orb_options {
   int levels = 8;             ///< number of pyramid levels; levels too small for a patch are omitted
   float scale_factor = 1.2F;  ///< ratio of the image sizes of successive levels, > 1
   int threshold = 14;         ///< minimum brightness difference of a corner (in the slightly smoothed image)
-  int min_threshold = 3;      ///< threshold in cells without a corner at `threshold`; if equal to it, no weaker corners
+  int min_threshold = 3;      ///< threshold in cells without a corner at `threshold`; if equal, no corner is weaker
 };
 
 /// Finds keypoints on the levels of an image pyramid and describes them. Detection, selection, orientation and
@@ -84,7 +84,7 @@ class basic_orb_extractor {
   /// Deleted: convert 16-bit images with `narrow` first, which needs their value range.
   features_type operator()(image_view<const std::uint16_t> image) const = delete;
 
-  /// Replaces the contents of `found` with the features of an image. Allocates nothing after a previous image of the
+  /// Replaces the contents of `found` with the features of an image. Allocates nothing if a previous image had the
   /// same size and number of corners.
   void into(features_type& found, image_view<const std::uint8_t> image) const;
   void into(features_type& found, image_view<const rgb8> image) const;

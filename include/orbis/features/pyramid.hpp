@@ -26,8 +26,8 @@ class image_pyramid {
   ~image_pyramid() = default;
 
   /// Builds the pyramid. Level 0 is `image` itself, not a copy, so the image must outlive the use of the levels. Levels
-  /// with a side of less than `min_side` pixels, and all coarser levels, are omitted. O(pixels). Allocates nothing
-  /// after a previous image of the same size.
+  /// with a side of less than `min_side` pixels, and all coarser levels, are omitted. O(pixels). Allocates nothing if
+  /// a previous image had the same size.
   /// @pre levels >= 0, scale_factor > 1, min_side >= 1
   void build(image_view<const std::uint8_t> image, int levels, double scale_factor, int min_side);
 

@@ -44,8 +44,8 @@ struct sliding_square {
   static constexpr int max_side = 31, max_shifts = 32;
 
   int side = 0;
-  pixel_rows square;  ///< with `side` readable pixels or more
-  pixel_rows strip;   ///< with `side` + `shifts` - 1 readable pixels or more
+  pixel_rows square;  ///< rows with at least `side` readable pixels
+  pixel_rows strip;   ///< rows with at least `side` + `shifts` - 1 readable pixels
 };
 
 /// Sets `sums[k]` to four times the sum of absolute differences between the square and the strip starting at column
@@ -99,7 +99,7 @@ class stereo_matcher {
     return columns;
   }
 
-  /// As above; writes to `columns`. Allocates nothing after previous images of the same size and number of features.
+  /// As above; writes to `columns`. Allocates nothing if previous images had the same size and number of features.
   template <feature_descriptor D>
   requires descriptor_distance<Distance, D>
   void into(std::vector<float>& columns, const basic_features<D>& left, image_view<const std::uint8_t> left_image,

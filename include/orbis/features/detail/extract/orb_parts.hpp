@@ -88,7 +88,7 @@ inline constexpr int disc_radius = 15;
 struct intensity_centroid {
   static constexpr int radius = disc_radius;
 
-  /// @pre the pixel is at least `radius` pixels from the image edge, and one more on the right
+  /// @pre the pixel is at least `radius` pixels from the image edge, and `radius` + 1 pixels from the right edge
   [[nodiscard]] orientation operator()(image_view<const std::uint8_t> image, int x, int y) const;
 };
 static_assert(orientation_estimator<intensity_centroid>);
@@ -116,7 +116,7 @@ struct steered_brief {
   /// pixels
   void prepare(image_view<const std::uint8_t> image, int first, int last, workspace& memory) const;
 
-  /// @pre the pixel is at least `reach` pixels from the edge of the prepared image, in a prepared row
+  /// @pre the pixel is at least `reach` pixels from the edge of the prepared image, and its row is prepared
   [[nodiscard]] descriptor operator()(const workspace& prepared, int x, int y, const orientation& o) const;
 };
 static_assert(patch_descriptor<steered_brief>);

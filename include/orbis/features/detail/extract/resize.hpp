@@ -21,7 +21,7 @@
 
 namespace orbis::features::detail {
 
-/// The two source pixels of a result pixel; `weight`: weight of the second, in 1/256.
+/// The two source pixels of a result pixel; `weight`: weight of the second, in units of 1/256.
 struct resize_tap {
   int first = 0;
   int second = 0;

@@ -22,7 +22,7 @@
 
 namespace orbis::features::detail {
 
-/// A Gaussian with sigma 2 at -3 ... 3, in 1/256; the weights sum to exactly one.
+/// A Gaussian with sigma 2 at -3 ... 3, in units of 1/256; the weights sum to exactly one.
 inline constexpr std::array<std::uint16_t, 7> gaussian_weights{18, 34, 48, 56, 48, 34, 18};
 inline constexpr int smooth_block = 64;  ///< number of pixels written at a time
 

@@ -90,7 +90,7 @@ ORBIS_ALWAYS_INLINE void make_slice_table(std::span<const D> trains, slice_table
   for (std::size_t w = 0; w != Words; ++w) table.parity[1].words[w] = ~total.words[w];
 }
 
-/// Computes the query's patterns for the same groups.
+/// Computes the patterns of a query for the groups of `make_slice_table`.
 template <class Target>
 ORBIS_ALWAYS_INLINE void make_slice_query(const bit_words<256>& query, slice_query& to) noexcept {
   using bytes = simd::vec<std::uint8_t, 64, Target>;
@@ -126,8 +126,8 @@ template <class Target>
 }
 
 #if ORBIS_X86
-/// Lane-wise function of three bits whose truth table is the bits of `Table`. The compiler recognises only a few of the
-/// functions below as ternary logic; without this function, brute-force matching takes 1.35 times as long with AVX-512.
+/// Lane-wise function of three bits with the truth table `Table`. The compiler recognises only a few of the functions
+/// below as ternary logic; without this function, brute-force matching takes 1.35 times as long with AVX-512.
 template <int Table, class R>
 ORBIS_TARGET_AVX512 inline void ternary_logic(R& out, const R& a, const R& b, const R& c) noexcept {
   out = reinterpret_cast<R>(_mm512_ternarylogic_epi64(reinterpret_cast<__m512i>(a), reinterpret_cast<__m512i>(b),
@@ -216,7 +216,7 @@ ORBIS_ALWAYS_INLINE void slice_count(const slice_table<slice_words<Target>>& tab
   }
 }
 
-/// The train descriptors whose distance is below `limit`.
+/// Sets `below` to the train descriptors whose distance is below `limit`.
 template <class Target>
 ORBIS_ALWAYS_INLINE void slice_below(const slice_distances<slice_words<Target>>& distances, std::uint32_t limit,
                                      slice<slice_words<Target>>& below) noexcept {
@@ -229,7 +229,7 @@ ORBIS_ALWAYS_INLINE void slice_below(const slice_distances<slice_words<Target>>&
   }
 }
 
-/// The train descriptors whose distance is below `least`; lowers `least` to these distances.
+/// Sets `below` to the train descriptors whose distance is below `least`, and lowers `least` to these distances.
 template <class Target>
 ORBIS_ALWAYS_INLINE void slice_lower(const slice_distances<slice_words<Target>>& distances,
                                      slice_distances<slice_words<Target>>& least,
