@@ -170,8 +170,8 @@ class basic_keyframe_database {
     return found;
   }
 
-  /// The `count` keyframes with the highest scores, ties ordered by id; fewer if fewer share a word with the image.
-  /// O(keyframes that share a word x words).
+  /// Finds the `count` keyframes with the highest scores, ties ordered by id; fewer if fewer share a word with the
+  /// image. O(keyframes that share a word x words).
   template <std::predicate<const Id&> Exclude = none_excluded>
   void best(const bag_of_words& image, std::size_t count, std::vector<candidate>& found, workspace& memory,
             Exclude&& exclude = {}) const {

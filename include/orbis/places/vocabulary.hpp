@@ -74,9 +74,9 @@ class basic_vocabulary {
     return find_word(descriptor);
   }
 
-  /// Computes the normalised bag of words for the descriptors of an image. Allocates nothing after an image with the
-  /// same number of descriptors. O(descriptors x depth x branching); safe to call from several threads, each with its
-  /// own memory.
+  /// Computes the normalised bag of words for the descriptors of an image. Allocates nothing if a previous image had
+  /// the same number of descriptors. O(descriptors x depth x branching); safe to call from several threads, each with
+  /// its own memory.
   template <bit_string_range_of<Bits> Descriptors>
   void transform(const Descriptors& descriptors, bag_of_words& bag, transform_workspace& memory) const {
     transform_bytes(reinterpret_cast<const std::byte*>(std::ranges::data(descriptors)), std::ranges::size(descriptors),

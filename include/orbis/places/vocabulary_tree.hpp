@@ -32,7 +32,7 @@ struct tree_node {
 template <std::size_t Bits>
 struct vocabulary_tree {
   table_memory<bit_words<Bits>> descriptors;  ///< the descriptor of node i is at i - 1; the root has none
-  std::vector<tree_node> nodes;  ///< up to the last node with children, and an end marker; later ones are leaves
+  std::vector<tree_node> nodes;  ///< nodes up to the last one with children, and an end marker; later ones are leaves
   std::vector<float> weights;    ///< weights of the words
   std::uint32_t node_count = 1;
   std::uint32_t branching = 0;  ///< maximum number of children of a node
