@@ -68,7 +68,7 @@ struct id_offsets {
   std::uint32_t landmarks = 0;
 };
 
-/// A pair of keyframes, one from each map, that observe the same place, where one map is attached to the other.
+/// A pair of keyframes, one from each of two maps, that observe the same place. One map is attached to the other there.
 struct map_link {
   keyframe_id into;  ///< keyframe of the map that is kept
   keyframe_id from;  ///< keyframe of the merged map, with its id in that map

@@ -197,8 +197,8 @@ class system {
       const requires std::same_as<descriptor_of_t<Extractor>, features::binary_descriptor<256>>;
   /// Reads a map from a file and activates it; the camera is relocalised in it. The previous map is kept, and merged
   /// with the loaded one when a common place is recognised; if the previous map has no keyframes, it is removed. For
-  /// ORB descriptors only. Errors: those of `read_map`; `unsupported` for a map with another image pyramid, or without
-  /// metric scale if the sensor measures lengths, and vice versa; `no_data` for a map without keyframes.
+  /// ORB descriptors only. Errors: those of `read_map`; `unsupported` for a map with another image pyramid, or if
+  /// only one of the map and the sensor has metric scale; `no_data` for a map without keyframes.
   [[nodiscard]] result<void> load_map(const std::filesystem::path& path) requires
       std::same_as<descriptor_of_t<Extractor>, features::binary_descriptor<256>>;
 

@@ -205,9 +205,8 @@ class motion_splitter {
     return found->T_world_camera;
   }
 
-  /// Marks the outliers that agree with a common other motion, clearly disagree with that of the camera, and are
-  /// surrounded by outliers: a moving object is one rigid body, whereas the outliers in a blurred image are scattered
-  /// everywhere.
+  /// Marks the outliers that agree with a second motion, clearly disagree with that of the camera, and are surrounded
+  /// by outliers: a moving object is one rigid body, whereas the outliers in a blurred image are scattered everywhere.
   [[nodiscard]] bool mark_moving(motion_split& s) {
     const std::optional<se3> other = second_motion(s.outliers);
     if (!other) return false;

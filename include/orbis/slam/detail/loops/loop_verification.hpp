@@ -76,7 +76,7 @@ enum class loop_verdict {
   few_matches,    ///< too few features match
   not_aligned,    ///< no rigid motion explains enough of the matches
   few_inliers,    ///< the keyframe observes too few of the landmarks around the candidate
-  not_supported,  ///< too few neighbours of the keyframe observe these landmarks
+  not_supported,  ///< too few neighbours of the keyframe observe the landmarks around the candidate
   unsure_scale,   ///< the scale is not determined
   too_far         ///< the drift would be implausible: probably a different place with the same appearance
 };
@@ -124,11 +124,11 @@ template <feature_descriptor D>
 struct snapshot {
   keyframe_id keyframe;
   bool same_map = false;
-  bool connected = false;          ///< true if both observe the same landmarks; the other members are then empty
+  bool connected = false;          ///< true if the keyframes have a covisibility edge; the other members are then empty
   view<D> seen, known;             ///< the keyframe and the candidate
   landmark_snapshot<D> landmarks;  ///< landmarks around the candidate
   std::vector<neighbor<D>> supporters;
-  double path_length = 0.0;  ///< length of the path along the keyframes between the two, metres
+  double path_length = 0.0;  ///< length of the path along the keyframes from `seen` to `known`, metres
 };
 
 /// Returns the standard deviation of a landmark's depth in keyframe `k` if no depth is measured, in the map's unit: the

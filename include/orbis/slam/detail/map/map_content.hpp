@@ -22,8 +22,8 @@ namespace orbis::slam::detail {
 /// The pose of an erased keyframe relative to its replacement.
 struct erased_keyframe {
   keyframe_id replacement;   ///< may itself be erased; `no_id` if no keyframe was left
-  se3 T_replacement_camera;  ///< translation divided by the replacement's `scale`; `T_world_camera` if there is none
-  double scale = 1.0;        ///< relative to that of the replacement
+  se3 T_replacement_camera;  ///< translation divided by the replacement's `scale`; `T_world_camera` if none is left
+  double scale = 1.0;        ///< scale of the keyframe relative to that of the replacement
   std::uint64_t number = 0;  ///< sequence number of the erasure
 };
 

@@ -67,7 +67,7 @@ struct twist_prior {
 /// A keypoint as read, and the known point that it observes.
 struct row_observation {
   optimize::pose_observation seen;
-  double time = 0.0;  ///< time of its row relative to the frame, seconds
+  double time = 0.0;  ///< time of the keypoint's row relative to the frame, seconds
 };
 
 /// Returns the mean twist of the camera from one frame to a later one; zero if the second frame is not later.

@@ -283,7 +283,7 @@ class front_end {
   frame_log log_;
   track_counters counters_;
   double held_since_ = 0.0;           ///< time of the last tracked frame not localised by depth alone, seconds
-  std::optional<double> lost_since_;  ///< timestamp; if empty, set to that of the next lost frame
+  std::optional<double> lost_since_;  ///< time from which the camera counts as lost; empty: that of the next lost frame
   landmark_id first_new_;             ///< the first landmark created from the last frame; `no_id`: none
   std::size_t most_erased_ = 2 * latest_erased;  ///< maximum number of erased keyframes before some are forgotten
 };
