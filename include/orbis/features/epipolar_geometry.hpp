@@ -17,7 +17,7 @@
 
 namespace orbis::features {
 
-/// A line `a x + b y + c = 0` with `a^2 + b^2 = 1`: the left side is the signed distance of a point from the line.
+/// A line `a x + b y + c = 0` with `a^2 + b^2 = 1`: the left-hand side is the signed distance of a point.
 struct epipolar_line {
   float a = 0.0F, b = 0.0F, c = 0.0F;
 };
