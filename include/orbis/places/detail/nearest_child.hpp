@@ -16,7 +16,7 @@
 
 namespace orbis::places::detail {
 
-/// The Hamming distance: word by word, or in a register that holds a descriptor.
+/// The Hamming distance, computed word by word, or in one register that holds a whole descriptor.
 template <class Target, std::size_t Bits>
 [[nodiscard]] ORBIS_ALWAYS_INLINE std::uint32_t count_differing_bits(const bit_words<Bits>& a,
                                                                      const bit_words<Bits>& b) noexcept {
