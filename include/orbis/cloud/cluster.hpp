@@ -27,7 +27,7 @@ struct cluster_options {
   /// Components with fewer points count as small. 0: 1/250 of the number of points, at least 30 and at most 200.
   std::size_t min_size = 0;
   /// Minimum distance of a removed small component from every large one, in multiples of the local spacing: the spacing
-  /// of the large component at its nearest point, or that of the small component if it is larger.
+  /// of the large component at its nearest point, or that of the small component if that is larger.
   double min_gap = 6.0;
   cloud::non_finite non_finite = cloud::non_finite::drop;
 };
@@ -52,7 +52,7 @@ template <execution_policy Policy>
 
 }  // namespace detail
 
-/// Finds the points that `cluster_inliers` returns, and the components they are in.
+/// Finds the points that `cluster_inliers` returns, and the components of the neighbour graph.
 template <execution_policy Policy, point_range Points>
 [[nodiscard]] cluster_result cluster_filter(const Policy& policy, const Points& points,
                                             const cluster_options& options = {}) {

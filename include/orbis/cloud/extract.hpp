@@ -18,8 +18,8 @@ namespace orbis::cloud {
 
 /// Treatment of non-finite points by a filter. The filter's statistics never include them.
 enum class non_finite {
-  drop,  ///< they count as outliers
-  keep   ///< they count as inliers, so that an organised cloud keeps its structure
+  drop,  ///< non-finite points count as outliers
+  keep   ///< non-finite points count as inliers, so that an organised cloud keeps its structure
 };
 
 /// Copies the points with the given indices, in the order of the indices, and their colours if there are any.

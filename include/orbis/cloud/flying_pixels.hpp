@@ -36,7 +36,7 @@ struct flying_pixel_options {
   double noise = 1.425e-3;    ///< standard deviation of inverse depth, sigma_z / z^2, 1 / metre; default: a Kinect's
   double resolution = 0.001;  ///< smallest significant depth difference, metres
   double sigmas = 4.0;        ///< minimum distance from a surface, in multiples of the noise or the resolution
-  double jump = 3.0;          ///< minimum size of an edge, in multiples of the minimum distance above
+  double jump = 3.0;          ///< minimum size of an edge, in multiples of the minimum distance given by `sigmas`
   double margin = 0.05;       ///< minimum distance from a surface, as a fraction of the jump
   int support = 4;            ///< a pixel is kept if at least this number of its eight neighbours have the same depth
 };
@@ -44,7 +44,7 @@ struct flying_pixel_options {
 /// Counts of the examined and the removed pixels.
 struct flying_pixel_count {
   std::size_t valid = 0;    ///< number of pixels with a depth
-  std::size_t removed = 0;  ///< number of flying pixels among them
+  std::size_t removed = 0;  ///< number of valid pixels that were removed as flying
   friend bool operator==(const flying_pixel_count&, const flying_pixel_count&) = default;
 };
 
@@ -113,7 +113,7 @@ flying_pixel_count remove_flying_pixels(const Policy& policy, const Depth& depth
                                             workspace);
 }
 
-/// Removes flying pixels as above, with temporary buffers.
+/// Like the overload with a workspace, but uses temporary buffers.
 template <execution_policy Policy, camera::depth_source Depth>
 flying_pixel_count remove_flying_pixels(const Policy& policy, const Depth& depth, image_view<float> out,
                                         const flying_pixel_options& options = {}) {

@@ -31,7 +31,7 @@ struct log_statistical_result {
   std::vector<std::uint32_t> inliers;  ///< indices, ascending
   std::vector<float> mean_distance;    ///< per point, metres; NaN for non-finite points and a single point
   std::size_t judged = 0;              ///< number of points with a positive, finite mean distance
-  double median = 0;                   ///< median of the logarithms of these distances
+  double median = 0;                   ///< median of the logarithms of the positive, finite mean distances
   double threshold = 0;                ///< points with log(mean distance) - median above this are outliers
   double threshold_distance = std::numeric_limits<double>::infinity();  ///< the threshold as a mean distance, metres
 };

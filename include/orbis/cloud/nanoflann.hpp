@@ -70,7 +70,7 @@ class nanoflann_search {
     [[nodiscard]] scalar bound_squared() const noexcept {
       return out.size() < k ? std::numeric_limits<scalar>::infinity() : out.front().distance;
     }
-    /// Returns false to end the search.
+    /// Adds a point if it is among the `k` nearest so far. Returns false to end the search.
     bool add(std::uint32_t index, scalar distance_squared) {
       const neighbor<scalar> found{index, distance_squared};
       if (out.size() == k) {

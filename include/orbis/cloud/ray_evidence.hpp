@@ -49,7 +49,7 @@ template <execution_policy Policy, point_range Points, posed_depth_range Views, 
 /// Decision of the filter, and the counts on which it is based.
 struct ray_evidence_result {
   std::vector<std::uint32_t> inliers;  ///< indices, ascending
-  std::vector<ray_evidence> scores;    ///< per point
+  std::vector<ray_evidence> scores;    ///< counts for each point
   std::size_t seen = 0;                ///< number of points with evidence from at least one view
 };
 

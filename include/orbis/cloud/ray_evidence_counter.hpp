@@ -50,7 +50,7 @@ struct ray_evidence_options {
   bool resolve_ghosts = true;     ///< true to read the views again and find parts that most other views contradict
   float ghost_reach = 0.3F;       ///< maximum distance of a contradicting surface in front of a measurement, metres
   std::uint16_t min_through = 2;  ///< minimum number of views that pass through an outlier
-  double ratio = 1.0;             ///< that number must also exceed `ratio` times the number of supporting views
+  double ratio = 1.0;             ///< an outlier has more than `ratio` views that pass through it per supporting view
 };
 
 /// Counts for one point: views whose rays pass through it, views that measured a surface at it, and views whose support
@@ -91,11 +91,12 @@ class ray_evidence_counter {
   template <execution_policy Policy, posed_depth View>
   void remove(const Policy& policy, const View& view);
 
-  /// Finds the parts of a view that the others contradict, and discards their counts. Call it once for each view after
-  /// all views were added. Parts are tiles of `tile_size` pixels a side. A tile is contradicted if its rays pass
+  /// Finds the parts of a view that the other views contradict, and discards their counts. Call it once for each view
+  /// after all views were added. Parts are tiles of `tile_size` pixels a side. A tile is contradicted if its rays pass
   /// through points at most `ghost_reach` in front of the ends of the rays, and these points together have at least 1.5
-  /// times the support of the points that the tile itself supports (excluding its own support). Its evidence no longer
-  /// counts, and the points it supports are refuted. O(pixels + points in front of the camera).
+  /// times the support of the points that the tile itself supports (excluding its own support). The evidence of a
+  /// contradicted tile no longer counts, and the points that it supports are refuted. O(pixels + points in front of the
+  /// camera).
   template <execution_policy Policy, posed_depth View>
   void review(const Policy& policy, const View& view);
   /// Edge of a tile in pixels: 32 for a width of 640.

@@ -69,7 +69,7 @@ struct brick_place {
 /// Reuses its memory.
 class voxel_measurements {
  public:
-  /// @pre size > 0, metres
+  /// `size`: edge of a voxel, metres. @pre size > 0
   explicit voxel_measurements(double size) : steps_per_metre_{1024.0 / size} { assert(size > 0); }
 
   void clear() {
@@ -124,7 +124,7 @@ class voxel_sums {
   }
 
  public:
-  /// @pre size > 0, metres
+  /// `size`: edge of a voxel, metres. @pre size > 0
   explicit voxel_sums(double size) : size_{size} { assert(size > 0); }
 
   /// Adds measurements. O(n). @pre fewer than 2^22 measurements in a voxel; `finish` has not been called
@@ -132,8 +132,8 @@ class voxel_sums {
   void add(const Policy& policy, std::span<voxel_measurements> parts) {
     apply<true>(policy, parts);
   }
-  /// Removes measurements that were added. Frees voxels without measurements and bricks without voxels. O(n). @pre they
-  /// were added and have not been removed since; `finish` has not been called
+  /// Removes measurements that were added. Frees voxels without measurements and bricks without voxels. O(n). @pre the
+  /// measurements were added and have not been removed since; `finish` has not been called
   template <execution_policy Policy>
   void remove(const Policy& policy, std::span<voxel_measurements> parts) {
     apply<false>(policy, parts);
@@ -211,7 +211,7 @@ class voxel_sums {
       const choice* of_;
       bool asked_ = false;
       detail::voxel_key brick_{};  ///< brick of the last point
-      std::uint32_t number_ = 0;   ///< index of that brick
+      std::uint32_t number_ = 0;   ///< index of `brick_`
     };
 
    private:

@@ -61,7 +61,7 @@ struct nearby_leaves {
   explicit nearby_leaves(std::size_t most)
       : stride{(most / leaf_width + 2) * leaf_width}, boxes(6 * stride), leaves(stride) {}
   std::size_t stride;
-  line_vector<float> boxes;  ///< layout of `box_axes`
+  line_vector<float> boxes;  ///< in the layout of `box_axes`
   line_vector<std::uint32_t> leaves;
   std::size_t count = 0;
   /// Returns true if another row of children fits.
@@ -83,7 +83,7 @@ struct nearby_leaves {
 /// Partial result for the `wanted` smallest values of a list of squared distances.
 struct nearest_sum {
   double roots = 0;           ///< sum of the roots, with relative error up to `roots_slack`; negative if unknown
-  float largest_squared = 0;  ///< the largest of these squared distances
+  float largest_squared = 0;  ///< the `wanted`-th smallest squared distance
 };
 
 /// Upper bound on the relative error of `nearest_sum::roots`: the error of roots from Newton's method and of

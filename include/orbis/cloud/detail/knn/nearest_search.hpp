@@ -384,7 +384,7 @@ class nearest_search {
   nearby_leaves shared_;                                                ///< candidates of a run of points
   nearby_leaves own_;                                                   ///< candidates of one point
   nearby_leaves near_rows_;                                             ///< rows of leaves near the row near_rows_of_
-  std::size_t near_rows_of_ = std::numeric_limits<std::size_t>::max();  ///< the row; initially none
+  std::size_t near_rows_of_ = std::numeric_limits<std::size_t>::max();  ///< row of near_rows_; initially none
   float near_rows_reach_ = -1;      ///< squared distance up to which near rows are complete; negative if unknown
   float too_many_rows_ = infinity;  ///< smallest squared distance at which the row had too many near rows
   line_vector<std::uint32_t> chosen_;

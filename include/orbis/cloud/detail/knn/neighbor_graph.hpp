@@ -72,8 +72,8 @@ class neighbor_graph {
   [[nodiscard]] std::uint32_t index(std::size_t place) const noexcept {
     return is_in_leaf(place) ? tree_.members[place] : copy(place).index;
   }
-  /// Returns the places of all points of a cloud of `count`; `no_place` for non-finite points.
   static constexpr std::uint32_t no_place = std::numeric_limits<std::uint32_t>::max();
+  /// Returns the places of all points of a cloud of `count` points; `no_place` for non-finite points.
   [[nodiscard]] std::vector<std::uint32_t> places(std::size_t count) const {
     std::vector<std::uint32_t> out(count, no_place);
     for (std::size_t p = 0; p != size(); ++p) out[index(p)] = static_cast<std::uint32_t>(p);

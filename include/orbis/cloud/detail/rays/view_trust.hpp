@@ -134,8 +134,8 @@ struct no_view_action {
 };
 
 struct view_trust_options {
-  double conflict = 0.1;  ///< the conflict of a distrusted view exceeds this
-  double excess = 3;      ///< and exceeds this factor times the usual conflict
+  double conflict = 0.1;  ///< lower limit of the conflict of a distrusted view
+  double excess = 3;      ///< lower limit of the conflict of a distrusted view, as a multiple of the usual conflict
   int samples = 20;       ///< number of samples along either axis of each view; > 0
   std::size_t least = 4;  ///< minimum number of views; with fewer, no view is distrusted
 };
@@ -147,13 +147,13 @@ struct view_trust {
   double usual_conflict = 0;  ///< median conflict of the trusted views
 };
 
-/// Mutual evidence of two views: the number of samples in a tile of one view that the other one passes through or
+/// Mutual evidence of two views: the number of samples in a tile of one view that the other view passes through or
 /// supports.
 struct view_verdict {
   std::uint32_t other;
   std::uint32_t rank;  ///< pseudo-random; decides which verdicts are kept if there are too many
   std::uint16_t through;
-  std::uint16_t all;  ///< samples passed through or supported
+  std::uint16_t all;  ///< number of samples that the other view passes through or supports
   [[nodiscard]] double conflict() const noexcept { return static_cast<double>(through) / all; }
 };
 
@@ -169,7 +169,7 @@ class view_verdicts {
  public:
   static constexpr std::size_t most = std::size_t{128} * 2 * 16;  ///< 16 tiles of this view and of the other view
 
-  /// O(log most).
+  /// Adds a verdict. O(log most).
   void add(const view_verdict& verdict) {
     if (kept_.size() < most) {
       kept_.push_back(verdict);

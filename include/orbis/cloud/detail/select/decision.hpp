@@ -29,8 +29,8 @@ template <std::predicate<std::size_t> Keep>
   return out;
 }
 
-/// Returns the indices, ascending, of the points that are not outliers by their score. Points without a score (NaN) are
-/// treated according to `policy`, except that a finite point, which is then the only finite one, is kept.
+/// Returns the indices, ascending, of the points that are not outliers by their score. Of the points without a score
+/// (NaN), finite ones are kept and non-finite ones are treated according to `policy`.
 template <std::predicate<float> Outlier>
 [[nodiscard]] std::vector<std::uint32_t> inliers_by_score(const point_view& points, std::span<const float> score,
                                                           non_finite policy, Outlier&& outlier) {

@@ -50,7 +50,7 @@ void center(const Policy& policy, surroundings& around, reference& r) {
 struct threshold_options {
   double lowest = 0.55;         ///< lower limit of the threshold
   double without_valley = 1.6;  ///< lower limit of the threshold if there is only one population
-  bool shoulders = true;        ///< also detect a shoulder of the bulk, which flying pixels form
+  bool shoulders = true;        ///< true to detect a shoulder of the bulk as well; flying pixels form one
   double least_ratio = 1.6;     ///< minimum `ratio` of a valley
   bool needs_valley = false;    ///< true to remove nothing if there is no valley
 };

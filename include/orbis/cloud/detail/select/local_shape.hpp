@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Properties of a point's neighbourhood other than density: the usual value around it, and its deviation from a plane.
+/// Properties of a point's neighbourhood other than density: the typical value of a quantity, and the deviation from
+/// a plane.
 #pragma once
 
 #include <algorithm>

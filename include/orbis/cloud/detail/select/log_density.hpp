@@ -22,7 +22,7 @@ namespace orbis::cloud::detail {
 [[nodiscard]] inline std::ptrdiff_t quantile_rank(std::ptrdiff_t count, double q) noexcept {
   return static_cast<std::ptrdiff_t>(q * static_cast<double>(count - 1) + 0.5);
 }
-/// Returns the `q` quantile of `values`; 0 if empty. Reorders them. O(n).
+/// Returns the `q` quantile of `values`; 0 if empty. Reorders `values`. O(n).
 template <std::ranges::contiguous_range Values>
 [[nodiscard]] double quantile(Values&& values, double q) {
   if (std::ranges::empty(values)) return 0;

@@ -238,7 +238,7 @@ class surroundings {
   std::span<const float> ranges_;  ///< one per point of the cloud
   neighbor_graph graph_;
   std::vector<float> log_spacing_;
-  std::vector<float> local_;  ///< empty before the first use
+  std::vector<float> local_;  ///< usual log spacing around each point; empty before the first use
   sparse_values flat_;        ///< `off_plane` of the analysed points
   std::vector<char> gone_;
 };

@@ -71,7 +71,7 @@ class point_block {
  public:
   static constexpr std::size_t capacity = 256;
 
-  /// @pre size > 0, metres
+  /// `size`: edge of a cell, metres. @pre size > 0
   explicit point_block(double size) : inverse_size_{1.0 / size} {}
 
   /// Loads `count` points; `point(i)` returns the coordinates of the i-th. @pre count <= capacity
