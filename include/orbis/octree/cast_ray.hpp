@@ -33,7 +33,7 @@ enum class ray_end {
 struct ray_hit {
   ray_end end = ray_end::out_of_grid;
   voxel_key key;               ///< the voxel in which the ray ended
-  vec3 point = zeros<vec3>();  ///< its centre, metres; key and point are zero if the ray starts outside the grid
+  vec3 point = zeros<vec3>();  ///< voxel centre, metres; key and point are zero if the ray starts outside the grid
 
   /// Returns true if the ray hit an occupied voxel.
   [[nodiscard]] explicit operator bool() const noexcept { return end == ray_end::hit; }

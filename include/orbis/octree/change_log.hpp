@@ -41,8 +41,8 @@ class change_log {
     return ++revision_;
   }
 
-  /// Records that voxels of the octant that contains `k` changed in this revision: those whose bits are set in `mask`,
-  /// in Morton order. Can be called repeatedly for an octant. Amortised O(1), as long as no revision exceeds twice the
+  /// Records that the voxels selected by `mask` (bits in Morton order) of the octant that contains `k` changed in this
+  /// revision. Can be called repeatedly for an octant. Amortised O(1), as long as no revision exceeds twice the
   /// capacity.
   /// @pre revision() != 0; coordinates < 2^21
   void record(const voxel_key& k, std::uint64_t mask) {
@@ -232,7 +232,7 @@ class change_log {
   std::uint64_t complete_since_ = 0;
   std::uint64_t exact_since_ = 0;
   std::size_t capacity_ = std::size_t{1} << 18U;
-  std::size_t limit_ = 2 * capacity_;  ///< number of entries at which the current revision's are merged
+  std::size_t limit_ = 2 * capacity_;  ///< number of entries at which those of the current revision are merged
 };
 
 }  // namespace orbis::octree

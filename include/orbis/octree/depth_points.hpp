@@ -126,8 +126,8 @@ void append_world_points(const Depth& depth, const pixel_rays& rays, const se3& 
       points.emplace_back(p[0], p[1], p[2]);
     }
 }
-/// As above, but computes the camera's rays in every call; with lens distortion this takes longer than computing the
-/// points. For several images, reuse a pixel_rays object.
+/// Like the overload with pixel_rays, but computes the camera's rays in every call; with lens distortion this takes
+/// longer than computing the points. For several images, reuse a pixel_rays object.
 template <camera::depth_source Depth, camera::camera_model Camera>
 void append_world_points(const Depth& depth, const Camera& camera, const se3& T_world_camera,
                          std::vector<vec3f>& points) {

@@ -10,8 +10,8 @@ namespace orbis::octree {
 
 /// Selects the rays of a scan that are traversed.
 enum class ray_mode {
-  every_ray,   ///< from the sensor to every point (OctoMap's `discretize = false`)
-  discretized  ///< from the sensor to the centre of every voxel that holds points (`discretize = true`)
+  every_ray,   ///< rays from the sensor to every point (OctoMap's `discretize = false`)
+  discretized  ///< rays from the sensor to the centre of every voxel that holds points (`discretize = true`)
 };
 
 struct integration_options {
@@ -29,8 +29,8 @@ struct integration_summary {
   std::size_t used = 0;       ///< number of points within range
   std::size_t truncated = 0;  ///< number of points beyond the range
   std::size_t rejected = 0;   ///< number of points that are NaN, infinite, or too far outside the grid
-  std::size_t free = 0;       ///< number of voxels observed free; for a map, excluding those already at the lower bound
-  std::size_t occupied = 0;   ///< number of voxels observed occupied
+  std::size_t free = 0;       ///< number of voxels observed as free; for a map, except those at the lower bound
+  std::size_t occupied = 0;   ///< number of voxels observed as occupied
 };
 
 }  // namespace orbis::octree

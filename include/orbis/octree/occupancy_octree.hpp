@@ -53,8 +53,8 @@ class scan;  // scan.hpp
 /// A leaf of the pruned octree: a cube of voxels with equal log-odds.
 template <class T>
 struct octree_leaf {
-  voxel_key key;    ///< its lowest voxel
-  int depth = 0;    ///< the tree's depth if the leaf is a single voxel
+  voxel_key key;    ///< lowest voxel of the leaf
+  int depth = 0;    ///< depth of the leaf in the tree; tree_depth() for a single voxel
   vec3 center;      ///< metres
   double size = 0;  ///< edge, metres
   T log_odds{};
@@ -96,12 +96,12 @@ class occupancy_octree {
   // -- insertion
 
   /// Integrates a scan: `points` in the world frame (metres), seen from `origin`. Every voxel crossed by rays is
-  /// observed free once, and every voxel that contains points is observed occupied once, regardless of the numbers of
-  /// rays and points; if both apply, it is observed occupied. Coordinates are first rounded to float. The result does
-  /// not depend on the policy or on the order of the points. Points that are non-finite or outside the grid are counted
-  /// as rejected; if the origin is non-finite, all are. In mode every_ray, a scan with many points per voxel, such as
-  /// one from a depth image, takes little more time than the image: O(points + voxels near surfaces). Other scans take
-  /// O(points x voxels per ray).
+  /// observed as free once, and every voxel that contains points is observed as occupied once, regardless of the
+  /// numbers of rays and points; a voxel to which both apply is observed as occupied. Coordinates are first rounded to
+  /// float. The result does not depend on the policy or on the order of the points. Points that are non-finite or
+  /// outside the grid are counted as rejected; if the origin is non-finite, all points are. In mode every_ray, a scan
+  /// with many points per voxel, such as one from a depth image, takes little more time than the image: O(points +
+  /// voxels near surfaces). Other scans take O(points x voxels per ray).
   template <execution_policy Policy, point_range Points, point_like Origin>
   integration_summary integrate(const Policy& policy, const Points& points, const Origin& origin,
                                 const integration_options& options = {}) {
@@ -127,7 +127,8 @@ class occupancy_octree {
   }
 
   /// Applies the voxels of a scan that was marked before, for example on another thread (see scan_marker); `integrate`
-  /// marks and applies in one call. Returns the numbers of voxels observed free and occupied. O(bricks observed).
+  /// marks and applies in one call. Returns the numbers of voxels observed as free and as occupied. O(bricks
+  /// observed).
   /// @pre the scan was marked for this grid
   integration_summary apply(const scan& voxels);
 
@@ -263,8 +264,8 @@ class occupancy_octree {
   template <class P>
   requires point_like<P> || std::same_as<P, voxel_key>
   [[nodiscard]] std::optional<double> probability(const P& p) const { return probability_at<Model>(value(p)); }
-  /// Returns an object with these queries that is several times faster for positions near each other. Use one per
-  /// thread; valid until the map changes.
+  /// Returns an accessor, which answers single-voxel queries several times faster for positions near each other. Use
+  /// one per thread; valid until the map changes.
   [[nodiscard]] octree_accessor<Model> accessor() const noexcept { return {store_, grid_}; }
   /// Returns the state of `p`.
   template <class P>
@@ -305,8 +306,9 @@ class occupancy_octree {
   /// Smallest box around all known voxels; empty if there are none.
   [[nodiscard]] std::optional<bounding_box> bounds() const;
 
-  /// Heap memory in bytes of the map (including memory shared with copies), and of the reused scan buffers.
+  /// Heap memory in bytes of the map and its change log, including memory shared with copies, without the scan buffers.
   [[nodiscard]] std::size_t memory_bytes() const noexcept { return store_.memory_bytes() + track_.log.memory_bytes(); }
+  /// Heap memory in bytes of the reused scan buffers.
   [[nodiscard]] std::size_t buffer_bytes() const noexcept { return scratch_.memory_bytes(); }
 
  private:

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Compact storage of the voxels that one scan observes free and occupied, and the marker that finds them.
+/// Compact storage of the voxels that one scan observes as free and as occupied, and the marker that finds them.
 #pragma once
 
 #include <array>
@@ -28,15 +28,15 @@ struct scan_brick;
 class scan_masks;
 }  // namespace detail
 
-/// The voxels that one scan observes free and occupied: two disjoint sets, as bit masks of octants of 4x4x4 voxels,
-/// grouped by bricks of 8x8x8. A mask is stored only if it is neither empty nor that of a completely free octant. A
-/// depth image of 640x480 pixels takes about 10 kB at 5 cm and 100 kB at 2 cm.
+/// The voxels that one scan observes as free and as occupied: two disjoint sets, as bit masks of octants of 4x4x4
+/// voxels, grouped by bricks of 8x8x8. A mask is stored only if it is neither empty nor that of a completely free
+/// octant. A depth image of 640x480 pixels takes about 10 kB at 5 cm and 100 kB at 2 cm.
 class scan {
  public:
   /// One brick. In the 8-bit masks, bit i is octant i.
   struct part {
     std::uint64_t name = 0;     ///< see detail::node_name
-    std::uint32_t first = 0;    ///< index in words() of its first mask; free masks precede occupied ones
+    std::uint32_t first = 0;    ///< index in words() of the brick's first mask; free masks precede occupied ones
     std::uint8_t free = 0;      ///< octants that have a mask of free voxels
     std::uint8_t occupied = 0;  ///< octants that have a mask of occupied voxels
     std::uint8_t full = 0;      ///< octants that are completely free, without masks
@@ -71,7 +71,7 @@ class scan {
     });
     return m;
   }
-  /// Returns the numbers of voxels observed free and occupied. O(words).
+  /// Returns the numbers of voxels observed as free and as occupied. O(words).
   [[nodiscard]] std::pair<std::size_t, std::size_t> counts() const noexcept {
     std::size_t free = 0, occupied = 0;
     for (const part& p : parts_)
@@ -104,7 +104,7 @@ class scan {
 
 using scan_voxels [[deprecated("use octree::scan")]] = scan;
 
-/// Finds the voxels that `occupancy_octree::integrate` would observe free and occupied, without a map; see
+/// Finds the voxels that `occupancy_octree::integrate` would observe as free and as occupied, without a map; see
 /// occupancy_octree::apply and scan_history::set. Reuses its buffers: marking allocates nothing once the buffers have
 /// grown. Use one marker per thread.
 class scan_marker {

@@ -4,9 +4,9 @@
 /// bit-identical to one built from all scans in order.
 ///
 /// Log-odds are clamped, so the order of scans matters, and a scan cannot be subtracted, because clamping loses
-/// information. Instead, the history keeps the voxels that each scan observed free and occupied, and replays the
-/// octants of 4x4x4 voxels whose observations changed, starting from an empty state with all scans in order. Replaying
-/// is cheap, because no ray is traversed again.
+/// information. Instead, the history keeps the voxels that each scan observed as free and as occupied, and replays
+/// the octants of 4x4x4 voxels whose observations changed, starting from an empty state with all scans in order.
+/// Replaying is cheap, because no ray is traversed again.
 #pragma once
 
 #include <chrono>
@@ -115,7 +115,7 @@ class scan_history {
   void set(std::uint64_t frame, const scan& voxels);
   /// Removes a scan; the octants that it observed become stale. Returns true if it existed. O(its bricks + scans).
   bool remove(std::uint64_t frame);
-  /// Returns the voxels of a scan, valid until it changes; null if the scan does not exist. O(log scans).
+  /// Returns the voxels of a scan, valid until the scan changes; null if it does not exist. O(log scans).
   [[nodiscard]] const scan* find_scan(std::uint64_t frame) const noexcept;
   [[nodiscard]] bool contains(std::uint64_t frame) const noexcept { return find_scan(frame) != nullptr; }
   /// Number of scans.

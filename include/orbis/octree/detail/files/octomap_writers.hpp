@@ -155,7 +155,7 @@ class bt_writer {
     nodes_ = 1;
     (void)upper_walk<float, bt_writer>{parts, *this}.walk(root_level_);
   }
-  /// The format cannot store a root without children, so its children are written.
+  /// Writes a tree with one value as eight leaves, because the format cannot store a root without children.
   [[nodiscard]] octomap_nodes write_root(float value) {
     put_bytes16(out_.room(2), is_occupied<Model>(value) ? occupied_children : free_children);
     out_.set_size(2);

@@ -64,7 +64,7 @@ template <sensor_model Model>
   return large != nullptr && is_saturated_free<Model>(*large);
 }
 
-/// Adds the voxels of the named brick whose values a miss cannot lower further to `saturated` (word i: octant i).
+/// Adds to `saturated` (word i: octant i) those voxels of the named brick whose values a miss cannot lower further.
 template <sensor_model Model>
 void find_saturated(const brick_store<typename Model::value_type>& store, std::uint64_t name,
                     std::array<std::uint64_t, 8>& saturated) {

@@ -78,12 +78,13 @@ class brick_store {
   /// Returns true if there are leaves larger than a brick.
   [[nodiscard]] bool has_large() const noexcept { return !large_.empty(); }
   [[nodiscard]] std::size_t large_count() const noexcept { return large_.size(); }
-  /// Returns the value and level of the leaf larger than a brick that contains `k`, if it exists.
+  /// Returns the value and level of the leaf that contains `k` and is larger than a brick, if it exists.
   [[nodiscard]] std::optional<std::pair<T, int>> find_large(const voxel_key& k) const noexcept {
     const auto* const leaf = large_.find(k);
     return leaf != nullptr ? std::optional{std::pair{leaf->value, named_level(leaf->name)}} : std::nullopt;
   }
-  /// Returns the value of the leaf larger than a brick that contains `k`, valid until the store changes, or null.
+  /// Returns the value of the leaf that contains `k` and is larger than a brick; null if there is none. Valid until the
+  /// store changes.
   [[nodiscard]] const T* find_large_value(const voxel_key& k) const noexcept {
     const auto* const leaf = large_.find(k);
     return leaf != nullptr ? &leaf->value : nullptr;

@@ -41,8 +41,8 @@ inline constexpr std::uint64_t low_bits = 0x0101010101010101;  ///< the first vo
 /// Leaves of an octant that is not a leaf itself.
 struct octant_leaves {
   std::uint64_t first;      ///< lowest voxel of each leaf
-  std::uint64_t large;      ///< subset of these that are leaves of 2x2x2 voxels
-  std::size_t inner_nodes;  ///< the octant, and those of its groups of 2x2x2 voxels that are not leaves
+  std::uint64_t large;      ///< lowest voxel of each leaf of 2x2x2 voxels, a subset of `first`
+  std::size_t inner_nodes;  ///< number of inner nodes: the octant, and its groups of 2x2x2 voxels that are not leaves
 };
 template <class T>
 [[nodiscard]] octant_leaves find_leaves(const octant_view<T>& o) noexcept {

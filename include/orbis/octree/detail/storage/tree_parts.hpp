@@ -15,8 +15,8 @@ namespace orbis::octree::detail {
 /// A brick that is not a leaf, or a leaf of at least the size of a brick.
 template <class T>
 struct tree_part {
-  std::uint64_t order;      ///< Morton order of its lowest brick
-  voxel_key key;            ///< its lowest voxel
+  std::uint64_t order;      ///< Morton order of the part's lowest brick
+  voxel_key key;            ///< the part's lowest voxel
   int level;                ///< brick_level or more
   const brick<T>* content;  ///< null: the part is a leaf
   T value;                  ///< value of the leaf

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Descent through the octree to find the voxels that the rays of a view observe free.
+/// Descent through the octree to find the voxels that the rays of a view observe as free.
 #pragma once
 
 #include <algorithm>

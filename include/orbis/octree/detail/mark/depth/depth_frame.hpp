@@ -105,7 +105,7 @@ struct depth_rays {
                           std::vector<std::uint32_t>& unsure) const {
     return frame.test_pixels(frame.ends, t, box, near_z, unsure);
   }
-  /// Returns true if a ray of `part` may cross the voxel, which lies in the tile of `size` x `size` pixels at (u, v).
+  /// Returns true if a ray of `part`, a box in the tile of `size` x `size` pixels at (u, v), may cross the voxel.
   [[nodiscard]] bool may_cross(const voxel_test& t, const pixel_box& part, std::int32_t u, std::int32_t v,
                                std::int32_t size) const {
     const pixel_rays& rays = frame.ends.rays();

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Finds the voxels that a depth image observes free and occupied. Voxels are found by projecting them into the image,
-/// not by walking along rays, and are exactly the voxels that the traversal of every ray finds.
+/// Finds the voxels that a depth image observes as free and as occupied. Voxels are found by projecting them into the
+/// image, not by walking along rays, and are exactly the voxels that the traversal of every ray finds.
 #pragma once
 
 #include <cstddef>
@@ -55,13 +55,14 @@ class depth_integrator {
  public:
   /// Marks in `masks` the same voxels as integrating the image's world points (see append_world_points) in mode
   /// every_ray, except that free voxels that a miss would not change (see `saturated`) may be missing, and an occupied
-  /// voxel may also be marked free. The summary's voxel counts stay zero. The voxels are the same under every policy.
+  /// voxel may also be marked as free. The summary's voxel counts stay zero. The voxels are the same under every
+  /// policy.
   ///
   /// If the rays are too sparse for this method, or too close to the border of the grid, marks only the occupied voxels
   /// and sets `needs_rays`: the caller must mark the rays to the pixels, see `points`.
   ///
-  /// `saturated(name, mask)` sets the bits of these voxels in the named brick; it can be called from several threads.
-  /// O(pixels + bricks seen + voxels at surfaces).
+  /// `saturated(name, mask)` sets the bits of those voxels of the named brick that a miss would not change; it can be
+  /// called from several threads. O(pixels + bricks seen + voxels at surfaces).
   /// @pre depth and camera have the same size
   template <execution_policy Policy>
   integration_summary mark(const Policy& policy, const voxel_grid& grid, const depth_scan& scan,

@@ -19,7 +19,7 @@
 namespace orbis::octree::detail {
 
 /// Finds the neighbours of the sensor's voxel through which rays in a range of directions may pass before they leave
-/// this neighbourhood; a ray takes at most one step along each axis in it.
+/// this neighbourhood; a ray takes at most one step along each axis there.
 class first_step_order {
  public:
   explicit first_step_order(const depth_sensor& sensor) noexcept

@@ -94,7 +94,7 @@ struct voxel_test {
 /// Terms that decide the crossing of a ray and a cube, see voxel_test; for several rays, several cubes, or both.
 template <class V>
 struct ray_and_cube {
-  std::array<V, 3> direction;  ///< g
+  std::array<V, 3> direction;  ///< direction g of the ray
   std::array<V, 3> size;       ///< absolute value of g along each axis
   V length;                    ///< sum of the sizes
 
@@ -123,8 +123,8 @@ struct voxel_crossing {
   typename V::mask_type may, sure;
 };
 
-/// Tests the rays `of` through (x, y, 1), which end at depth `z` > 0, against a voxel. Correct on every target; targets
-/// may differ in the rays that stay undecided.
+/// Tests the rays in the mask `of`, which pass through (x, y, 1) and end at depth `z` > 0, against a voxel. Correct on
+/// every target; targets may differ in the rays that stay undecided.
 template <class V>
 [[nodiscard]] ORBIS_ALWAYS_INLINE voxel_crossing<V> test_rays(const voxel_test& t, const V& x, const V& y, const V& z,
                                                               const typename V::mask_type& of) noexcept {
@@ -223,8 +223,8 @@ struct sampled_pixels {
   }
 };
 
-/// Returns the children that are certainly crossed by the ray given for each child, through (x, y, 1) to depth `z`.
-/// `world`: the parent's centre relative to the camera's. z <= 0: no ray
+/// Returns the children that are certainly crossed by their rays: each child has a ray through (x, y, 1) to depth `z`,
+/// or none if z <= 0. `world`: the parent's centre relative to the camera's.
 template <class Floats>
 [[nodiscard]] ORBIS_ALWAYS_INLINE auto children_crossed(const depth_scene& s, const child_offsets& o,
                                                         const float3& world, const Floats& x, const Floats& y,

@@ -36,7 +36,7 @@ struct pixel_placement {
   float fx = 1, fy = 1, cx = 0, cy = 0;
   float last_u = 0, last_v = 0;    ///< last column and row
   float error_u = 0, error_v = 0;  ///< maximum distance of a ray from the centre of its pixel
-  float far = 0;  ///< rays with deeper ends are traversed one by one: no other rays cross the voxels around them
+  float far = 0;  ///< rays that end beyond this depth are traversed one by one: no other rays cross the voxels there
   std::int32_t stride = 0;
 };
 
@@ -184,7 +184,7 @@ class organised_rays {
  private:
   static constexpr std::size_t fewest_rays = 4096, most_rays = std::size_t{1} << 24U;
 
-  /// The smaller focal length determines the largest distance between rays.
+  /// The smaller of the two focal lengths, which determines the largest distance between rays.
   [[nodiscard]] double focal() const { return std::min(fit_.camera().k().fx, fit_.camera().k().fy); }
   /// Error of rays in excess of the allowance of depth_scene. The allowance includes 10 u |c|_1 for the rounding of
   /// points, which must not be counted twice, and 19 u |c|_1 in reserve. A ray may deviate along both x and y, so by

@@ -48,7 +48,7 @@ class pinhole_fit {
   [[nodiscard]] so3 rotation() const { return so3{mat3(transposed(axes_))}; }
   /// Maximum deviation of the rays of points from the rays of their pixels, at z = 1, along x and along y.
   [[nodiscard]] double error() const noexcept { return error_; }
-  /// Approximate share of the image's pixels with points, for the smallest possible image.
+  /// Approximate share of the image's pixels that have points, for the smallest possible image.
   [[nodiscard]] double filled() const noexcept { return filled_; }
   /// Mean depth of the rays' ends, metres.
   [[nodiscard]] double mean_z() const noexcept { return mean_z_; }

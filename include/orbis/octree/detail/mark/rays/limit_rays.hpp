@@ -16,7 +16,7 @@
 
 namespace orbis::octree::detail {
 
-/// Limits the ray from `origin` to a point to `limit` metres. @pre the point is further away, at `distance`; limit >= 0
+/// Limits the ray from `origin` to a point at `distance` metres to `limit` metres. @pre distance > limit >= 0
 [[nodiscard]] inline float3 cut_off(const float3& origin, const float3& ray, double distance, double limit) noexcept {
   const auto scale = static_cast<float>(distance), range = static_cast<float>(limit);
   float3 end;
@@ -33,7 +33,7 @@ struct ray_batch {
   alignas(64) std::array<std::array<float, capacity>, 3> end{};
   alignas(64) std::array<std::array<std::int32_t, capacity>, 3> way{};
   bits hit{};  ///< bit i: ray i ends at a point
-  bits cut{};  ///< bit i: ray i is limited; if neither bit is set, there is no ray i
+  bits cut{};  ///< bit i: ray i is limited; there is no ray i if neither `hit` nor `cut` has bit i
 
   void set(std::size_t i, const float3& to, const std::array<std::int32_t, 3>& cells, bool is_hit) noexcept {
     for (std::size_t axis = 0; axis != 3; ++axis) {
@@ -89,7 +89,7 @@ struct ray_lanes {
 struct ray_frame {
   const voxel_grid& grid;
   float3 origin;
-  voxel_key from;  ///< offsets of voxels are relative to this one
+  voxel_key from;  ///< voxel of the origin, to which offsets of voxels are relative
 };
 
 struct limit_rays_kernel {
@@ -140,7 +140,7 @@ struct limit_rays_kernel {
   }
 };
 
-/// Finds the hits of a batch whose voxel differs from that of the previous ray; neighbouring points mostly end in the
+/// Finds those hits of a batch whose voxel differs from that of the previous ray; neighbouring points are mostly in the
 /// same voxel.
 struct fresh_hits_kernel {
   template <simd::target Target>

@@ -31,8 +31,8 @@ struct ray_setup {
   std::uint32_t done = 0;    ///< rays with a certain result; the others must be traversed step by step
   std::uint32_t step_u = 0;  ///< the ray crosses a face across u between the last two planes
   std::uint32_t step_v = 0;
-  std::uint32_t step_u_first = 0;  ///< the face across u comes first
-  std::uint32_t end_u = 0;         ///< the ray crosses a face across u between the last plane and its end
+  std::uint32_t step_u_first = 0;  ///< the ray crosses the face across u before the one across v
+  std::uint32_t end_u = 0;         ///< the ray crosses a face across u between the last plane and the end of the ray
   std::uint32_t end_v = 0;
   std::uint32_t end_u_first = 0;
 
@@ -54,7 +54,7 @@ struct ray_setup {
 
 /// Upper bound, in voxels, on the difference between the results of a traversal and those of this header.
 inline constexpr double ray_doubt = 1e-8;
-/// Rays that cross more planes are traversed step by step.
+/// Maximum number of planes that a ray crosses; rays that cross more are traversed step by step.
 inline constexpr std::int32_t max_ray_planes = 4096;
 
 struct set_up_rays_kernel {

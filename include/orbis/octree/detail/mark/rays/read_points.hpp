@@ -23,7 +23,7 @@ struct point_view {
   }
 };
 
-/// True if the points of a range already have this format.
+/// True if the points of a range are stored in the format of point_view.
 template <class Points>
 concept float_triples = std::ranges::contiguous_range<Points> && requires(const std::ranges::range_value_t<Points>& p) {
   requires sizeof(p) == 3 * sizeof(float);

@@ -167,8 +167,8 @@ class dense_rays {
     around.mark(masks);
   }
   /// Returns true if this method is faster than a traversal, according to measured costs in nanoseconds per ray: a
-  /// traversal has a constant cost per plane of voxels that the ray crosses; this method has a constant cost per ray
-  /// and one for the voxels that it must test individually, which are more if there are fewer rays per voxel.
+  /// traversal has a constant cost per plane of voxels that the ray crosses; this method has a constant cost per ray,
+  /// and a cost for the voxels that it must test individually, which increases with fewer rays per voxel.
   [[nodiscard]] bool is_worthwhile(double voxel) const {
     // `apart`: spacing of the rays at their ends, in voxels.
     const double planes = sample_.length / voxel, apart = windows_.spacing * planes;
