@@ -59,7 +59,7 @@ struct log_line {
 struct ray_step {
   ray_evidence_options evidence{.resolve_ghosts = false, .ratio = 0.5};
   std::vector<std::uint32_t> distrusted{};  ///< indices of the views that do not count as evidence
-  bool need_support = false;                ///< removes points without support; for clouds built from these views
+  bool need_support = false;                ///< true to remove points without support; for clouds built from the views
 };
 
 /// Criteria for neighbours that form a surface; density tests keep points on surfaces.
