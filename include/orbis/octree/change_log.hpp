@@ -111,7 +111,7 @@ class change_log {
     set_capacity(capacity);
     revision_ = complete_since_ = exact_since_ = revision;
   }
-  /// Stops recording: discards all changes; until the next clear() no revision is complete, including the current one.
+  /// Stops recording: discards all changes; no revision, not even the current one, is complete until the next clear().
   /// A log that never had a revision has revision() == 0. O(1).
   void stop() {
     clear();

@@ -29,7 +29,7 @@ class direction_index {
   static constexpr float widest = 3.0F;
 
   struct entry {
-    float least_u = infinity, most_u = -infinity;  ///< pixel minus its affine estimate
+    float least_u = infinity, most_u = -infinity;  ///< bounds of a pixel minus its affine estimate
     float least_v = infinity, most_v = -infinity;
     /// Maximum distance (at z = 1) from a point in the cells to the nearest ray; infinite if unknown.
     float spacing = 0.0F;

@@ -51,7 +51,7 @@ class first_step_order {
 
  private:
   struct axis_range {
-    double least, most;    ///< absolute coordinates of directions
+    double least, most;    ///< bounds of the directions' absolute coordinates along the axis
     double first, second;  ///< distances to the first and to the second face, metres
   };
 

@@ -176,7 +176,7 @@ class binned_rays {
     }
     rays.keep(places.left_out);
   }
-  /// Sorts the added rays: `range(worker)` returns the points that each worker added.
+  /// Sorts the added rays. `range(worker)` returns the points that the worker added.
   template <execution_policy Policy, class Range>
   void sort(const Policy& policy, Range&& range) {
     begin_.resize(cells_ + 1);
