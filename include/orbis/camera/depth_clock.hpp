@@ -17,7 +17,7 @@ class depth_clock {
   /// Adds the time stamps of a frame, seconds; returns the smoothed difference, depth minus colour. A difference below
   /// 0.5 ms is negligible and returned as zero. A jump of more than 8 ms is adopted immediately, because it means that
   /// colour images are now paired with depth images from another frame interval. If the depth image has no time stamp,
-  /// or the two differ by more than 0.1 s, the difference is unchanged.
+  /// or the two time stamps differ by more than 0.1 s, the difference is unchanged.
   [[nodiscard]] double update(double timestamp, std::optional<double> depth_timestamp) {
     constexpr double longest = 0.1, jump = 0.008, least = 0.0005;  // seconds
     constexpr double memory = 30.0;                                // frames

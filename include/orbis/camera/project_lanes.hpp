@@ -27,7 +27,7 @@ concept double_lanes = requires(const L& x, const double* p) {
   { x* x + 1.0 / x } -> std::same_as<L>;
   select(x < x, x, x);
 };
-/// Type of the mask returned by comparisons of these vectors.
+/// Type of the mask that comparisons of `L` return.
 template <double_lanes L>
 using mask_of = decltype(std::declval<L>() < std::declval<L>());
 
@@ -40,7 +40,7 @@ struct lane_projection {
   L j[2][3];
 };
 
-/// Lanes in which both numbers are finite.
+/// Lanes in which `u` and `v` are finite.
 template <double_lanes L>
 [[nodiscard]] ORBIS_ALWAYS_INLINE mask_of<L> is_finite(const L& u, const L& v) {
   constexpr double most = std::numeric_limits<double>::max();

@@ -86,7 +86,7 @@ class radial_tangential {
 
  private:
   static constexpr int max_iterations = 30;
-  /// Threshold on the squared relative step; after such a step, the remaining error is about the square of the step.
+  /// Threshold on the squared relative step. The remaining error is about the square of the last step.
   static constexpr double converged = 1e-20;
 
   /// The ray that distorts to `target`, from the initial guess `m`; every step must stay in the domain.
@@ -156,7 +156,7 @@ class radial_tangential {
     return {target.x() * scale, target.y() * scale};
   }
 
-  /// The squared radius at which `r g(r^2)` stops increasing: with `g = n / q` the first sign change of `n q + 2 s (n'
+  /// The squared radius at which `r g(r^2)` stops increasing: with `g = n / q`, the first sign change of `n q + 2 s (n'
   /// q - n q')`, or of `q`.
   [[nodiscard]] static double domain(const coefficients& d) {
     const std::array<double, 4> n{1.0, d.k1, d.k2, d.k3};

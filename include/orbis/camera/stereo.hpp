@@ -68,7 +68,7 @@ class rectification {
   [[nodiscard]] const pinhole& camera() const noexcept { return camera_; }
   /// Distance between the camera centres, metres.
   [[nodiscard]] double baseline() const noexcept { return baseline_; }
-  /// Rotation from the rectified left camera's frame to the original left camera's frame; both have the same origin.
+  /// Rotation from the rectified left camera's frame to the original left camera's frame, which has the same origin.
   [[nodiscard]] const so3& R_left_rectified() const noexcept { return R_left_rectified_; }
   /// Returns true if the images are already rectified and need no remapping.
   [[nodiscard]] bool is_identity() const noexcept { return !maps_; }
@@ -126,7 +126,7 @@ template <camera_model Camera>
   return true;
 }
 
-/// Returns true if images of these cameras are already rectified.
+/// Returns true if images of the rig's cameras are already rectified.
 template <camera_model Left, camera_model Right>
 [[nodiscard]] bool is_rectified(const stereo_rig<Left, Right>& rig) {
   constexpr double tiny = 1e-9;

@@ -85,7 +85,7 @@ inline constexpr int warp_cell = 16;
 /// Parabolas in inverse depth for the displacement in x, the displacement in y, and the depth ratio.
 using warp_parabolas = std::array<float, 9>;
 
-/// Warped positions of a row of pixels; NaN where undefined. All lengths are multiples of a cell.
+/// Warped positions of a row of pixels; NaN where undefined. All lengths are multiples of `warp_cell`.
 struct warped_row {
   std::vector<float> x, y, ratio;
   explicit warped_row(std::size_t size) : x(size), y(size), ratio(size) {}
@@ -126,10 +126,10 @@ struct warp_row_kernel {
   }
 };
 
-/// Evaluates one of the two functions above for all pixels of an image. Both are smooth over a few pixels and over
-/// inverse depth: they are computed at nodes for three inverse depths, and interpolated linearly between nodes and by a
-/// parabola in inverse depth. The error is a few thousandths of a pixel for the motion during a read-out. Only very
-/// near points, and points next to a node that does not project to a pixel, are projected individually.
+/// Evaluates `warp_to_frame` or `warp_to_row` for all pixels of an image. Both functions are smooth over a few pixels
+/// and over inverse depth: they are computed at nodes for three inverse depths, and interpolated linearly between nodes
+/// and by a parabola in inverse depth. The error is a few thousandths of a pixel for the motion during a read-out. Only
+/// very near points, and points next to a node that does not project to a pixel, are projected individually.
 template <camera_model Camera>
 class row_warp {
  public:
@@ -157,7 +157,7 @@ class row_warp {
 
   /// Computes the warped positions of the pixels of row `y` at their inverse depths. Entries of pixels without depth
   /// may have any finite non-negative value. O(pixels). @pre the lengths of `inverse_depth` and `out` are multiples of
-  /// a cell
+  /// `warp_cell`
   void evaluate(const Camera& camera, int y, std::span<const float> inverse_depth, warped_row& out) {
     const auto* const above = nodes_.data() + static_cast<std::size_t>(y / warp_cell) * across_;
     const auto* const below = above + across_;

@@ -15,7 +15,7 @@ namespace orbis::camera::detail {
 /// Computes the memory offset of the pixel nearest to each position, or -1 outside the image.
 struct nearest_pixels_kernel {
   struct arguments {
-    std::size_t count;  ///< number of pixels; whole cells
+    std::size_t count;  ///< number of pixels, a multiple of warp_cell
     int width, height;
     std::int32_t stride;  ///< row stride of the image in memory
     const float *x, *y;
@@ -44,11 +44,11 @@ inline constexpr float same_surface = 0.03F;
 /// Interpolates inverse depth linearly between pixels, using only pixels that lie on the target surface.
 struct read_surface_kernel {
   struct arguments {
-    std::size_t count;  ///< number of pixels; whole cells
+    std::size_t count;  ///< number of pixels, a multiple of warp_cell
     int width, height;
     const float* surface;  ///< inverse depth of the target surface
     const float *x, *y;    ///< position at which the target surface was observed
-    const float* ratio;    ///< ratio of the depth at that position to the depth at this pixel
+    const float* ratio;    ///< ratio of the depth at (x, y) to the depth at this pixel
     const float* inverse;  ///< inverse depth of the original image, with a border of one zero pixel
     float* metres;         ///< 0 where undefined
   };
