@@ -178,7 +178,7 @@ template <int N>
 }
 
 /// The rotation matrix closest to `m` (smallest sum of squared differences). Errors: degenerate if `m` contains a
-/// reflection (determinant below 0), is singular to rounding, or is not finite.
+/// reflection (determinant below 0), is singular up to rounding, or is not finite.
 ///
 /// Source: S. Umeyama, "Least-squares estimation of transformation parameters between two point
 /// patterns", PAMI 13(4), 1991.

@@ -36,7 +36,7 @@ namespace detail {
 template <class T, class S>
 concept factor_of = std::same_as<T, S> || std::integral<T>;
 
-/// True if loops of this many operations are unrolled and their functions inlined.
+/// True if functions with this number of operations are inlined and their loops unrolled.
 template <int Operations>
 inline constexpr bool is_small = Operations <= 64;
 
@@ -281,7 +281,7 @@ requires(M > 0 && N > 0) [[nodiscard]] inline matrix<M + N, 1, S> stacked(const 
   return out;
 }
 
-/// The `P x Q` part of a matrix whose first entry is (row, column).
+/// The `P x Q` block of a matrix, starting at (row, column).
 template <int P, int Q, class S, int R, int C, int O>
 requires(P > 0 && Q > 0 && P <= R && Q <= C)
     [[nodiscard]] inline matrix<P, Q, S> block(const Eigen::Matrix<S, R, C, O, R, C>& m, int row, int column) {
@@ -292,7 +292,7 @@ requires(P > 0 && Q > 0 && P <= R && Q <= C)
           m.data()[(row + r) * detail::row_step<R, C, O> + (column + c) * detail::column_step<R, C, O>];
   return out;
 }
-/// Writes `part` into a matrix, its first entry at (row, column).
+/// Writes `part` into a matrix, starting at (row, column).
 template <class S, int R, int C, int O, int P, int Q, int OP>
 requires(P > 0 && Q > 0 && P <= R && Q <= C) inline void set_block(Eigen::Matrix<S, R, C, O, R, C>& m, int row,
                                                                    int column,
@@ -395,7 +395,7 @@ template <class M>
 
 /// @name Entries
 /// @{
-/// True if no entry is infinite or not a number.
+/// True if no entry is infinite or NaN.
 template <class S, int R, int C, int O>
 requires(R > 0 && C > 0) [[nodiscard]] inline bool all_finite(const Eigen::Matrix<S, R, C, O, R, C>& a) {
   bool finite = true;

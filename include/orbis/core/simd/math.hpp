@@ -118,7 +118,7 @@ template <std::size_t N, target Target>
   y = y * (1.5 - half * y * y);
   return y * (1.5 - half * y * y);
 }
-/// sqrt(x) to about two units in the last place, for the same range of x as above; 0 for 0.
+/// sqrt(x) to about two units in the last place, for the same x as `reciprocal_root`; also 0 for 0.
 template <std::size_t N, target Target>
 [[nodiscard]] ORBIS_ALWAYS_INLINE vec<double, N, Target> square_root(const vec<double, N, Target>& x) noexcept {
   return select(x == 0.0, x, x * reciprocal_root(x));

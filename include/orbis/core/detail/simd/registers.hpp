@@ -4,8 +4,8 @@
 ///
 /// The compilers' vector types provide arithmetic, shifts, comparisons, conversions and constant shuffles. This file
 /// provides the rest, one function each. Every function that needs an instruction set carries its target attribute and
-/// takes registers by reference: a kernel template, which has no attribute, can then call it, and the call is inlined
-/// once the template is inlined into a function that has the attribute.
+/// takes registers by reference. A kernel template, which has no attribute, can then call it; the call is inlined once
+/// the template is inlined into a function that has the attribute.
 #pragma once
 
 #include <cstddef>
