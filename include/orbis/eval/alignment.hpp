@@ -28,7 +28,7 @@ struct pose_pair {
 };
 
 /// Pairs the poses of two trajectories by time stamp (nearest pairs first; each pose is used at most once). @pre both
-/// are sorted by time
+/// trajectories are sorted by time
 [[nodiscard]] inline std::vector<pose_pair> pair_poses(const trajectory& estimate, const trajectory& reference,
                                                        double max_time_difference) {
   const auto stamps = [](const trajectory& poses) {
@@ -127,7 +127,7 @@ struct alignment {
 }
 
 /// Aligns two trajectories: pairs poses by time, then aligns the pairs. Errors: those of `align` above.
-/// @pre both are sorted by time
+/// @pre both trajectories are sorted by time
 [[nodiscard]] inline result<alignment> align(const trajectory& estimate, const trajectory& reference,
                                              const alignment_options& options = {}) {
   return align(pair_poses(estimate, reference, options.max_time_difference), options.with_scale);

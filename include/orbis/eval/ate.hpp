@@ -23,7 +23,7 @@ struct absolute_trajectory_error {
 
 /// Aligns `estimate` to `reference` and compares the positions of paired poses. Errors: no_data (fewer than 3 pairs),
 /// degenerate (all positions are on one line). O(n log n).
-/// @pre both are sorted by time
+/// @pre both trajectories are sorted by time
 [[nodiscard]] inline result<absolute_trajectory_error> ate(const trajectory& estimate, const trajectory& reference,
                                                            const alignment_options& options = {}) {
   const auto pairs = pair_poses(estimate, reference, options.max_time_difference);

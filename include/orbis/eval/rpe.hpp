@@ -24,7 +24,7 @@ namespace orbis::eval {
 
 struct rpe_options {
   std::size_t delta_frames = 1;           ///< interval in paired poses; used if `delta_seconds` is empty
-  std::optional<double> delta_seconds{};  ///< interval in seconds; a motion ends at the pose nearest in time to its end
+  std::optional<double> delta_seconds{};  ///< interval, seconds; motions end at the pose nearest to the interval's end
   double max_time_difference = 0.02;      ///< maximum time difference between paired poses, seconds
 };
 
@@ -37,7 +37,7 @@ struct relative_pose_error {
 /// motions whose duration differs from it by more than a quarter (across a gap) are excluded. Errors: no_data (no
 /// motion to compare), invalid_argument (a delta of 0 or less), degenerate (the reference has positions only, see
 /// `lacks_orientations`; relative motions require orientations). O(n log n).
-/// @pre both are sorted by time
+/// @pre both trajectories are sorted by time
 [[nodiscard]] inline result<relative_pose_error> rpe(const trajectory& estimate, const trajectory& reference,
                                                      const rpe_options& options = {}) {
   constexpr const char* where = "relative pose error";

@@ -25,7 +25,7 @@ struct trajectory_scale {
 /// consecutive tenths of the poses (jackknife), because the errors of successive poses are correlated. For a depth
 /// camera whose depth is `stored / depth_scale`, the true depth scale is `depth_scale / scale`. Errors: those of
 /// `align`. O(n log n). Source: B. Efron, "The jackknife, the bootstrap and other resampling plans", SIAM 1982.
-/// @pre both are sorted by time
+/// @pre both trajectories are sorted by time
 [[nodiscard]] inline result<trajectory_scale> estimate_scale(const trajectory& estimate, const trajectory& reference,
                                                              double max_time_difference = 0.02) {
   constexpr std::size_t parts = 10;
