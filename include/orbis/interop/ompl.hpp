@@ -38,7 +38,7 @@ namespace orbis::interop {
 /// the state is ignored, because rotation about the vertical axis does not change the robot's shape.
 class ompl_position {
  public:
-  /// @pre the space has one of these types
+  /// @pre the space has one of the types above
   explicit ompl_position(const ompl::base::StateSpace& space) : is_compound_{space.isCompound()} {
     const ompl::base::StateSpace* const part =
         is_compound_ ? space.as<ompl::base::CompoundStateSpace>()->getSubspace(0).get() : &space;

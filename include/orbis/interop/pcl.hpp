@@ -106,7 +106,7 @@ template <point_like P>
   return out;
 }
 
-/// Copies the points to a PCL cloud, with colours if both types have them; all other fields have PCL's defaults.
+/// Copies the points to a PCL cloud, with colours if the cloud and `P` have them; all other fields have PCL's defaults.
 template <point_like P = pcl::PointXYZRGB>
 [[nodiscard]] pcl::PointCloud<P> to_pcl(const point_cloud& cloud) {
   pcl::PointCloud<P> out;
