@@ -39,8 +39,8 @@ namespace orbis::mapping {
 struct map_options {
   dense_options dense{};
   /// Removal of moved objects from the depth images before they are converted to points, see moving_filter: removes
-  /// cells that rays of the keyframes just before and after pass through. (The ray-evidence filter uses the rays of the
-  /// original images.) For depth images that are not a depth_view<std::uint16_t>, depths beyond 16 m are ignored.
+  /// cells through which rays of the preceding and following keyframes pass. (The ray-evidence filter uses the rays of
+  /// the original images.) For depth images that are not a depth_view<std::uint16_t>, depths beyond 16 m are ignored.
   /// Empty: only the filter removes moved objects.
   std::optional<moving_filter_options> moving{};
   filter_options filter{};
@@ -401,10 +401,11 @@ requires depth_map<Octree, Camera>
 /// range is in ascending order of `frame`. The times in the result are those for passing images to the map, excluding
 /// replay; after filtering, they are the mean over all keyframes. `options.resolution` and `options.integration` are
 /// those of the live map, and the unfiltered octree is always built. Additional errors: `invalid_argument` if the frame
-/// numbers are not ascending; those of the live map, except if images stay in memory because they cannot be written to
-/// their file. After an error the live map may contain some of the new images and poses already; calling the function
-/// again corrects it. @pre the images in the live map are those that `keyframe_points::masked` returns with
-/// `point_options(options.dense)`, except for keyframes that are `live_map::is_filtered`, which are added again
+/// numbers are not ascending; those of the live map, except a failure to write images to their file, because these
+/// images stay in memory. After an error the live map may contain some of the new images and poses already; calling the
+/// function again corrects it. @pre the images in the live map are those that `keyframe_points::masked` returns with
+/// `point_options(options.dense)`, except for keyframes for which `live_map::is_filtered` returns true: these are added
+/// again
 template <execution_policy Policy, keyframe_range Keyframes, octree::replayable_octree Octree,
           camera::camera_model Camera, depth_history Depths>
 requires requires(const std::ranges::range_value_t<Keyframes>& k) {

@@ -149,9 +149,9 @@ class dense_cloud {
     for (const frame& f : frames_) out.insert(out.end(), f.ranges.begin(), f.ranges.end());
     return out;
   }
-  /// Finalises the cloud and frees the memory needed for changes, `cloud` and `ranges`. Call it after their last use;
-  /// no keyframe may be added, removed or moved afterwards. With a voxel size a few bytes for each voxel remain, for
-  /// `select`, `masked_depth` and `measurements`; without one nothing is freed. O(bricks).
+  /// Finalises the cloud and frees the memory that changes, `cloud` and `ranges` need. Call it after their last use; no
+  /// keyframe may be added, removed or moved afterwards. With a voxel size, a few bytes for each voxel remain, for
+  /// `select`, `masked_depth` and `measurements`; without one, nothing is freed. O(bricks).
   void finish() {
     finished_ = true;
     voxels_.finish();
@@ -209,8 +209,9 @@ class dense_cloud {
   /// The whole depth image of keyframe `number` (every pixel, regardless of the stride; the stored values, see
   /// `view_like`) with 0 in the pixels that the cloud excludes: those with a depth out of range, flying pixels if they
   /// are removed, and pixels that belong to a point that is not in `kept`. A pixel that the stride skips belongs to the
-  /// point in its voxel, or otherwise to the point of its block of stride x stride pixels if their depths agree within
-  /// 3 cm and 2 % per pixel between them; a pixel that belongs to no point is excluded. O(pixels).
+  /// point in its voxel. Without one, it belongs to the point of its block of stride x stride pixels if the depths of
+  /// the two pixels agree within 3 cm and 2 % per pixel between them. A pixel that belongs to no point is excluded.
+  /// O(pixels).
   /// @pre same as for `measurements`
   template <execution_policy Policy, keyframe_like Keyframe>
   [[nodiscard]] auto masked_depth(const Policy& policy, const Keyframe& k, std::size_t number,
@@ -298,8 +299,8 @@ class dense_cloud {
   }
 
  private:
-  /// Returns true if the depth of a pixel agrees with that of the pixel of its block that is in the cloud: within 3 cm
-  /// and 2 % for each pixel between them, so that slanted surfaces agree at any stride.
+  /// Returns true if the depth of a pixel agrees with the depth of the pixel that represents its block in the cloud:
+  /// within 3 cm and 2 % for each pixel between them, so that slanted surfaces agree at any stride.
   template <class Depth>
   [[nodiscard]] bool is_like_its_block(const Depth& depth, int x, int y) const {
     const int dx = x % options_.stride, dy = y % options_.stride;

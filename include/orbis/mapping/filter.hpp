@@ -41,7 +41,7 @@ enum class filter_kind {
 
 struct filter_options {
   filter_kind kind = filter_kind::automatic;
-  cloud::select_options automatic{};  ///< its `ranges` and `samples` are set from the map
+  cloud::select_options automatic{};  ///< `ranges` and `samples` are set from the map
   cloud::statistical_options statistical{};
   cloud::radius_options radius{};
   cloud::log_statistical_options log_statistical{};

@@ -101,9 +101,9 @@ struct correction_progress {
 /// octree::scan_history) and its depth image (in `Depths`), so that a keyframe can be moved, changed and removed.
 ///
 /// When nothing is pending, the map is bit-identical to the one that `integrate` builds from the depth images in the
-/// order of their frames, each from the pose that it was marked with (`used_pose`): with tolerance 0 and after `finish`
-/// from the current poses, otherwise from poses within the tolerance. It depends neither on policies nor on time
-/// limits.
+/// order of their frames, each from the `used_pose` of its keyframe. With tolerance 0 or after `finish`, these are the
+/// current poses; otherwise, they are within the tolerance of the current poses. The map depends neither on policies
+/// nor on time limits.
 ///
 /// Not thread-safe; live_map_thread.hpp provides a map with its own thread. With orbis::compiled, an octree with a
 /// model other than log_odds<> also needs octree/scan_history-inl.hpp.
@@ -290,9 +290,9 @@ class live_map {
     progress.done = pending() == 0;
     return progress;
   }
-  /// Moves every keyframe whose pose differs in any bit, drops the frames between keyframes, and updates the map: it
-  /// then equals the map rebuilt from the current keyframes and poses. Returns the work done. Errors: those of
-  /// `correct`.
+  /// Moves every keyframe whose pose differs in any bit from its pose in the map, drops the frames between keyframes,
+  /// and updates the map, which then equals the map rebuilt from the current keyframes and poses. Returns the work
+  /// done. Errors: those of `correct`.
   template <execution_policy Policy>
   result<correction_progress> finish(const Policy& policy) {
     correction_progress all{.keyframes = 0, .bricks = 0, .done = true};
@@ -326,13 +326,13 @@ class live_map {
   [[nodiscard]] std::size_t size() const noexcept { return keyframes_.size(); }
   [[nodiscard]] std::size_t frames() const noexcept { return frames_.size(); }
   [[nodiscard]] bool contains(std::uint64_t frame) const noexcept { return find(frame) != nullptr; }
-  /// Returns the pose with which a keyframe was marked; empty if it is not in the map. O(log keyframes).
+  /// Returns the pose with which a keyframe was marked; empty if the keyframe is not in the map. O(log keyframes).
   [[nodiscard]] std::optional<se3> used_pose(std::uint64_t frame) const {
     const entry* const k = find(frame);
     return k == nullptr ? std::nullopt : k->used;
   }
-  /// Returns the latest pose given for a keyframe, to which `correct` moves it; empty if it is hidden or not a
-  /// keyframe. O(log keyframes).
+  /// Returns the pose to which `correct` moves a keyframe, the latest one given; empty if the keyframe is hidden or
+  /// does not exist. O(log keyframes).
   [[nodiscard]] std::optional<se3> wanted_pose(std::uint64_t frame) const {
     const entry* const k = find(frame);
     return k == nullptr ? std::nullopt : k->wanted;
@@ -489,8 +489,8 @@ class live_map {
     }
     return {};
   }
-  /// Reads the depth images of these keyframes, and calls `work(policy, i)` for those that could be read, each on its
-  /// own thread if there are several. A keyframe whose image is lost is removed.
+  /// Reads the depth images of the keyframes `frames`, and calls `work(policy, i)` for each image that could be read,
+  /// on separate threads if there are several. A keyframe whose image is lost is removed.
   template <class Policy, class Work>
   result<void> read_and_work(const Policy& policy, std::span<const std::uint64_t> frames, const Work& work) {
     const std::size_t count = frames.size();

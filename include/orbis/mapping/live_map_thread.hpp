@@ -150,7 +150,7 @@ class live_map_thread {
     if (listeners_.poll_poses) push({.kind = job::poll});  // poses may have moved since the last poll
     wait_until_idle();
   }
-  /// Updates the map to all current keyframes and poses (see live_map::finish), and waits for completion as above.
+  /// Updates the map to all current keyframes and poses (see live_map::finish), and waits as `wait` does.
   void finish() {
     push({.kind = job::finish});
     wait_until_idle();
@@ -383,7 +383,7 @@ class live_map_thread {
     map_.set_poses(polled_.poses, unlisted::hide);
     return polled_;
   }
-  /// Number of recent keyframes that have not been compared with the newest one yet.
+  /// Number of recent keyframes that are due for re-evaluation, see moving_filter::revise.
   [[nodiscard]] std::size_t due() const noexcept { return moving_ ? moving_->due() : 0; }
   void revise(std::chrono::nanoseconds time) {
     const auto start = clock::now();

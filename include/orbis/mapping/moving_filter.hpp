@@ -50,10 +50,11 @@ class moving_filter {
   explicit moving_filter(Camera camera, const moving_filter_options& options = {})
       : judge_{std::move(camera), options} {}
 
-  /// Calls live_map::add_keyframe without the pixels that rays of the most recent keyframes pass through. Afterwards
-  /// these keyframes are due for re-evaluation, see revise. A keyframe with a pose that is not finite is added to the
-  /// map unchanged. The result is the same for every policy. Errors: those of live_map::add_keyframe and set_depth.
-  /// O(pixels + cells x keyframes), and marking. @pre same as for live_map::add_keyframe; all calls pass the same `map`
+  /// Adds a keyframe to the map (live_map::add_keyframe), without the pixels through which rays of the most recent
+  /// keyframes pass. Afterwards these keyframes are due for re-evaluation, see revise. A keyframe with a pose that is
+  /// not finite is added to the map unchanged. The result is the same for every policy. Errors: those of
+  /// live_map::add_keyframe and set_depth. O(pixels + cells x keyframes), and marking. @pre same as for
+  /// live_map::add_keyframe; all calls pass the same `map`
   template <execution_policy Policy, octree::replayable_octree Octree, depth_history Depths>
   result<octree::integration_summary> add_keyframe(const Policy& policy, live_map<Octree, Camera, Depths>& map,
                                                    std::uint64_t frame, const depth_view& depth,
@@ -77,13 +78,13 @@ class moving_filter {
     if (added && !settled) return fail(std::move(settled.error()));
     return added;
   }
-  /// Number of recent keyframes that have not been compared with all others in the window. O(keyframes).
+  /// Number of recent keyframes that are due for re-evaluation, see revise. O(keyframes).
   [[nodiscard]] std::size_t due() const noexcept {
     return static_cast<std::size_t>(std::ranges::count_if(judge_.views(), [](const auto& v) { return is_due(v); }));
   }
   /// Re-evaluates one of the recent keyframes that are due, and updates its image in the map (live_map::set_depth) if
-  /// the verdict has changed; live_map::correct then updates the map. Call it until nothing is due, or the next
-  /// keyframe is more urgent: the remaining ones are evaluated together with that one. Errors: those of
+  /// the verdict has changed; live_map::correct then updates the map. Call it until no keyframe is due or a more urgent
+  /// one arrives; the remaining keyframes are then evaluated together with that one. Errors: those of
   /// live_map::set_depth; the keyframe is nevertheless evaluated. O(cells), and marking if the image changes.
   template <execution_policy Policy, octree::replayable_octree Octree, depth_history Depths>
   result<void> revise(const Policy& policy, live_map<Octree, Camera, Depths>& map) {

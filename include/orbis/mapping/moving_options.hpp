@@ -20,7 +20,7 @@ struct moving_filter_options {
   /// range of depths around that end: rays that graze a surface are not evidence.
   float slant = 1.0F;
   int min_through = 1;  ///< minimum number of keyframes whose rays pass through a removed cell, > 0
-  double ratio = 1.0;   ///< that number must exceed this factor times the number of keyframes that show the cell
+  double ratio = 1.0;   ///< minimum ratio (exclusive) of keyframes with rays through a cell to keyframes that show it
   /// Distance in cells up to which neighbours of a removed cell are removed too, if they belong to the same surface and
   /// the keyframes that show them do not outnumber those whose rays pass through them. >= 0
   int grow = 4;

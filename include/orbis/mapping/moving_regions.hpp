@@ -48,7 +48,7 @@ struct moving_region_options {
 /// Grows marked pixels along the surfaces of a depth image, moving and static ones at the same time: a cell is moving
 /// if its nearest mark is. Surfaces end at depth discontinuities. The remaining pixels of a keyframe can be integrated
 /// into a map. Tracking detects moving objects in front of the camera immediately (`slam::tracked_feature::moving`),
-/// including a person walking along with the camera, whom no later ray passes through; `moving_filter` detects moved
+/// including a person walking along with the camera, through whom no later ray passes; `moving_filter` detects moved
 /// objects that tracking has missed.
 ///
 /// Works on cells of 4x4 pixels. Reuses its memory: allocates nothing after the first few images. Not thread-safe.

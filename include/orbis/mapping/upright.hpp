@@ -32,7 +32,7 @@ namespace detail {
 
 struct found_up {
   vec3 up;              ///< unit vector
-  double fixing = 0.0;  ///< weight of the normals that determine `up`, in the direction in which it is least certain
+  double fixing = 0.0;  ///< weight of the normals that determine `up`, in the direction in which `up` is least certain
   double along = 0.0;   ///< weight of the normals along `up`
 };
 
@@ -191,15 +191,15 @@ struct upright_options {
   /// of an accelerometer at rest. Ignored if not finite or zero.
   std::optional<vec3> gravity_camera{};
   double max_tilt = 50.0 * std::numbers::pi / 180.0;  ///< maximum angle between up and the camera's -y axis, radians
-  double min_support = 0.06;  ///< minimum share of the image's blocks with depth that determine the direction
+  double min_support = 0.06;  ///< minimum share of blocks that determine the direction, among blocks with depth
 };
 
 struct upright_view {
   /// Rotates vectors from the camera frame to an upright world: z up, x the horizontal part of the viewing direction.
   so3 R_world_camera;
   upright_source source = upright_source::assumed;
-  /// From 0 (assumed) to 1 (gravity): share of the image's blocks with depth that determine the direction. Above 0.2,
-  /// the error was below 2 degrees in our tests.
+  /// From 0 (assumed) to 1 (gravity): share of blocks that determine the direction, among the image's blocks with
+  /// depth. Above 0.2, the error was below 2 degrees in our tests.
   double confidence = 0.0;
 
   /// The upward direction in the camera frame; a unit vector.
@@ -207,8 +207,8 @@ struct upright_view {
 };
 
 /// The rotation to a world with z up in which x is the horizontal part of the viewing direction; `up_camera`: a unit
-/// vector in the camera frame. For a camera that looks straight down, x points to the top of its image; straight up, to
-/// the bottom.
+/// vector in the camera frame. If the camera looks straight down, x points to the top of its image; if it looks
+/// straight up, to the bottom.
 [[nodiscard]] inline so3 upright_rotation(const vec3& up_camera) {
   vec3 ahead = vec3(0.0, 0.0, 1.0) - up_camera.z() * up_camera;
   if (norm(ahead) < 1e-3) {

@@ -80,7 +80,7 @@ class map_jobs {
     --images_;
     return frame;
   }
-  /// Drops the depth images of these frames.
+  /// Drops the depth images of `frames`.
   void forget(const std::vector<std::uint64_t>& frames) {
     images_ -= std::erase_if(jobs_, [&](const map_job& j) {
       return j.has_image() && std::find(frames.begin(), frames.end(), j.frame) != frames.end();

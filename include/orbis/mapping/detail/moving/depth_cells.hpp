@@ -112,9 +112,9 @@ class depth_cells {
     });
   }
 
-  /// Calls `visit(cell, visibility)` for each cell that `view` shows or that its rays pass through. `margin(z)`:
-  /// tolerance for noise at depth `z`, metres; `slant`: for rays that pass through, a window's range of depths times
-  /// this factor is added to the margin. O(cells).
+  /// Calls `visit(cell, visibility)` for each cell that `view` shows or through which its rays pass. `margin(z)`:
+  /// tolerance for noise at depth `z`, metres; `slant`: for rays that pass through a cell, a window's range of depths
+  /// times this factor is added to the margin. O(cells).
   template <execution_policy Policy, camera::camera_model Camera, class Margin, class Visit>
   void ask(const Policy& policy, const depth_cells& view, const cell_grid& grid, const Camera& camera,
            const se3& T_view_this, float slant, const Margin& margin, const Visit& visit) const {

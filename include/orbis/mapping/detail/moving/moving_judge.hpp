@@ -32,8 +32,8 @@ struct removed_cell {
   float depth = 0.0F;  ///< depth of its nearest pixel, metres
 };
 
-/// Sets the pixels of these cells to 0 in `pixels`, a copy of the stored values of `depth`, and also the pixels of
-/// adjacent cells that belong to the same surface. Returns the number of removed pixels. O(cells)
+/// Sets the pixels of `cells` to 0 in `pixels`, a copy of the stored values of `depth`, and also the pixels of adjacent
+/// cells that belong to the same surface. Returns the number of removed pixels. O(cells)
 template <camera::depth_source Depth>
 std::size_t remove_cells(const Depth& depth, const std::vector<removed_cell>& cells,
                          const moving_filter_options& options, image_view<mapping::depth_pixel<Depth>> pixels) {
@@ -72,7 +72,7 @@ class moving_judge {
     std::vector<std::uint8_t> through;  ///< number of other views whose rays pass through each cell
     std::vector<std::uint8_t> shown;    ///< number of other views that also show each cell
     std::vector<std::uint8_t> removed;  ///< 1: removed by the verdict of the last call to `accept`
-    bool due = false;                   ///< true if the view has not been compared with the newest one
+    bool due = false;                   ///< true if the view lacks the evidence of the newest one
     bool unjudged = false;              ///< true if the view has new evidence since its last evaluation
 
     [[nodiscard]] depth_view depth() const { return depth_view{pixels.view(), scale, min_depth, max_depth}; }
@@ -91,10 +91,10 @@ class moving_judge {
            options.grow >= 0);
   }
 
-  /// Adds a keyframe, in place of the oldest if the window is full, and compares the others with it: `pose_of(view)`
-  /// returns the pose of a view, if it has one. The other views are due afterwards, see ask_newest. The result is the
-  /// same for every policy. O(pixels + cells x keyframes). @pre the pose is finite; depth has the camera's size; no
-  /// other view is due
+  /// Adds a keyframe, in place of the oldest if the window is full, and collects the evidence of the other views for
+  /// its cells. `pose_of(view)` returns the pose of a view, if it has one. Afterwards the other views are due for the
+  /// evidence of the new keyframe, see ask_newest. The result is the same for every policy. O(pixels + cells x
+  /// keyframes). @pre the pose is finite; depth has the camera's size; no other view is due
   template <execution_policy Policy, class PoseOf>
   view& add(const Policy& policy, std::uint64_t frame, const depth_view& depth, const se3& T_world_camera,
             const PoseOf& pose_of) {
@@ -118,7 +118,7 @@ class moving_judge {
     }
     return now;
   }
-  /// Compares the newest keyframe with another view, if the comparison is due. O(cells).
+  /// Collects the evidence of the newest keyframe for the cells of view `about`, if that view is due. O(cells).
   template <execution_policy Policy, class PoseOf>
   void ask_newest(const Policy& policy, view& about, const PoseOf& pose_of) {
     if (!std::exchange(about.due, false)) return;
