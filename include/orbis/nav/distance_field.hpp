@@ -184,9 +184,9 @@ class distance_field : public metric_distances<squared_distances> {
   /// Otherwise compares the field with the whole map: after changes that the log does not record (see
   /// occupancy_octree::track_changes), and every time if changes are not tracked. Costs as much as
   /// squared_distances::update, plus O(bricks of the field + octants of the map) for the comparison. For a leaf with an
-  /// edge of 256 voxels or more, only the part within reach of its faces costs time and memory; if such a leaf has
-  /// appeared or disappeared since the last comparison, the field is rebuilt. @pre every call passes the same map, with
-  /// the same grid
+  /// edge of 256 voxels or more, only the part within reach of its faces costs time and memory; if a leaf of this size
+  /// has appeared or disappeared since the last comparison, the field is rebuilt. @pre every call passes the same map,
+  /// with the same grid
   template <planning_map Map>
   void update(const Map& map) {
     assert(map_access<Map>::grid(map) == grid_);
@@ -261,8 +261,8 @@ class distance_field : public metric_distances<squared_distances> {
     }
     apply();
   }
-  /// Lists the octants in which the field may differ from the map; initialises an empty field with the cubes. Returns
-  /// false if those initial cubes no longer match the map.
+  /// Lists the octants in which the field may differ from the map; initialises an empty field with the large leaves of
+  /// the map as cubes. Returns false if the cubes that the field was initialised with no longer match the map.
   template <planning_map Map>
   bool find_differences(const Map& map) {
     octants_.clear();

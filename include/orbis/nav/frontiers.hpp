@@ -39,7 +39,7 @@ namespace orbis::nav {
 
 /// Frontier voxels in an octant of 4x4x4 voxels: bit i is the voxel at index i of the Morton curve.
 struct frontier_octant {
-  octree::voxel_key octant;  ///< its lowest voxel
+  octree::voxel_key octant;  ///< lowest voxel of the octant
   std::uint64_t mask = 0;
   friend bool operator==(const frontier_octant&, const frontier_octant&) = default;
 };

@@ -131,7 +131,7 @@ struct next_view {
 /// All failed searches together expand fewer than 2 * `path.max_expanded` cells, regardless of the number of
 /// candidates: each search expands at most half of the remaining number. If more cells than that are reachable, for
 /// example because unknown space is free and no region is given, some searches may give up; the result is then the best
-/// of the views to which a path was found, if there is one.
+/// of the views to which a path was found, if any.
 ///
 /// Deterministic. Typically takes a millisecond per candidate, plus the cost of find_path.
 /// @pre 0 < min_distance <= max_distance; 0 <= max_elevation < pi / 2; lambda >= 0

@@ -27,7 +27,7 @@
 namespace orbis::nav {
 namespace detail {
 
-/// State of a voxel. @pre in the grid
+/// State of a voxel. @pre `k` is in the grid
 template <planning_map Map>
 [[nodiscard]] octree::occupancy state_of(const Map& map, const octree::voxel_key& k) {
   if constexpr (requires { map_access<Map>::state(map, k); }) {
@@ -150,7 +150,7 @@ class planning_view {
   [[nodiscard]] bool is_free(const vec3& p) const { return is_free(p, p); }
   /// Returns true if the robot touches no obstacle on the straight segment from `a` to `b` (metres). False if an end is
   /// outside the region, or the segment is longer than four times the edge of the map's grid. O(length / distance to
-  /// the obstacles), plus the cost of `overlaps` for every 4 voxels near them.
+  /// the obstacles), plus the cost of `overlaps` for every 4 voxels of the segment near obstacles.
   [[nodiscard]] bool is_free(const vec3& a, const vec3& b) const {
     const double cell = resolution();
     if (!is_in_region(a) || !is_in_region(b) || !is_short(a, b)) return false;
@@ -167,8 +167,8 @@ class planning_view {
                                                                           options_};
     return thicker.is_free(a, b);
   }
-  /// Returns true if the field alone proves a segment free. False does not mean that it is blocked: a test with the map
-  /// may find it free. O(length / distance to the obstacles).
+  /// Returns true if the field alone proves a segment free. False does not mean that the segment is blocked: a test
+  /// with the map may find it free. O(length / distance to the obstacles).
   [[nodiscard]] bool is_surely_free(const vec3& a, const vec3& b) const {
     if (!is_in_region(a) || !is_in_region(b) || !is_short(a, b)) return false;
     squared_distance_view::reader reader{field_->voxels()};

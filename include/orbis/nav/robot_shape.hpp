@@ -53,8 +53,8 @@ struct swept_shape {
                                        box.max - s.shape.low * vec3(0.0, 0.0, 1.0)};
   return touches(octree::capsule{s.a, s.b, s.shape.radius}, stretched);
 }
-/// Exact: the robot touches the box if, in the part of the motion where its height range overlaps the box's, its circle
-/// touches the box seen from above.
+/// Exact: in the part of the motion in which the height ranges of the robot and the box overlap, tests the robot's
+/// circle against the box, both seen from above.
 [[nodiscard]] inline bool touches(const swept_shape<vertical_cylinder>& s, const octree::bounding_box& box) noexcept {
   const double rise = s.b.z() - s.a.z();
   const double lowest = box.min.z() - s.shape.high, highest = box.max.z() - s.shape.low;  // of the reference point
@@ -109,8 +109,8 @@ namespace detail {
 }
 
 /// The shape of a robot with constant orientation: `swept(shape, a, b)` is the volume that it sweeps on a straight
-/// segment, for `octree::overlaps`, and `covering_balls(shape)` returns balls that make most of these tests
-/// unnecessary.
+/// segment, for `octree::overlaps`, and `covering_balls(shape)` returns balls that make most calls of
+/// `octree::overlaps` unnecessary.
 template <class S>
 concept robot_shape = std::copyable<S> && requires(const S& shape, const vec3& p) {
   { swept(shape, p, p) } -> octree::overlap_shape;

@@ -289,8 +289,8 @@ ORBIS_INLINE void squared_distances::update_line(std::span<const std::uint64_t> 
 
 namespace detail {
 
-/// Offers the squares of the distances along x that are smaller than in `other`, repeated for the eight rows of a
-/// slice.
+/// Offers the squares of those distances along x (`from`) that are less than their counterparts in `other`, repeated
+/// for the eight rows of a slice.
 inline void offer_row(std::uint64_t from, std::uint64_t other, slice_offer& out) noexcept {
   const auto a = std::bit_cast<std::array<std::uint8_t, 8>>(from);
   const auto b = std::bit_cast<std::array<std::uint8_t, 8>>(other);

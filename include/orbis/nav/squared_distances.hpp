@@ -12,9 +12,9 @@
 ///     space(x, y, z) = min over k of plane(x, y, k) + (z - k)^2
 ///
 /// A change propagates through the stages and ends where a value is unchanged. In each stage, a source that increased
-/// marks the slices of 8x8 voxels in which a value equals the source's previous offer as stale: the offer may have been
-/// the minimum, so the slice is recomputed once. Sources that decreased lower their targets. The values therefore do
-/// not depend on the order of changes.
+/// marks as stale the slices of 8x8 voxels in which a value equals its previous offer: that offer may have been the
+/// minimum, so the slice is recomputed once. Sources that decreased lower their targets. The values therefore do not
+/// depend on the order of changes.
 #pragma once
 
 #include <algorithm>
@@ -43,7 +43,7 @@ struct octant_obstacles {
   std::uint64_t mask = 0;
 };
 
-/// A node of an octree: a cube with an edge of 2^level voxels, aligned to multiples of that.
+/// A node of an octree: a cube with an edge of 2^level voxels, aligned to multiples of its edge.
 struct voxel_cube {
   octree::voxel_key low;  ///< any voxel in it
   int level = 0;
@@ -120,8 +120,7 @@ class squared_distance_view {
   }
   /// Returns true if the result of a directory look-up is a brick index.
   [[nodiscard]] static bool is_brick(std::uint32_t found) noexcept { return found < detail::brick_directory::inner; }
-  /// The value of all voxels of a brick that is not stored, where `found` is the result of the directory look-up: 0 or
-  /// `far`.
+  /// The value, 0 or `far`, of all voxels of a brick that is not stored. `found`: result of the directory look-up.
   [[nodiscard]] std::uint16_t value_without_brick(std::uint32_t found) const noexcept {
     return found == detail::brick_directory::inner ? static_cast<std::uint16_t>(far - elsewhere_) : elsewhere_;
   }
@@ -139,7 +138,8 @@ class squared_distance_view {
 /// Distances that are updated with the obstacles: after any sequence of updates, the values are bitwise identical to
 /// those of a field rebuilt from the same obstacles. No bounds need to be specified. Memory is proportional to the
 /// space near obstacles or, if unset space counts as an obstacle (`elsewhere_is_obstacle`), to the free space: about
-/// 2.9 kB for each block of 8x8x8 voxels with a voxel within reach, which is released when it no longer has one.
+/// 2.9 kB for each block of 8x8x8 voxels with a voxel within reach; the memory is released when the block no longer has
+/// one.
 ///
 /// Not thread-safe. Readers on other threads use copies of `view()`.
 class squared_distances : public squared_distance_view {
@@ -229,7 +229,7 @@ class squared_distances : public squared_distance_view {
   [[nodiscard]] const std::uint16_t* squares(int distance) const noexcept {
     return squares_.data() + 8 * (distance + squares_pad_);
   }
-  /// Maximum distance at which an offer of `least` matters, in voxels; negative if it matters nowhere.
+  /// Maximum distance, in voxels, at which `least` plus the squared distance is within `bound()`; negative if none.
   [[nodiscard]] int offer_reach(std::uint16_t least) const noexcept;
 
   /// Clears the change lists of the previous update; propagates the new changes through all stages.

@@ -23,8 +23,8 @@ concept has_change_log = requires(const Map& map) {
 /// Stores the last revision of a map that was read.
 class map_follower {
  public:
-  /// Updates derived data from `map` by calling `some(log, since)` or `all()`, as below; calls `all()` if the map has
-  /// no log.
+  /// Updates derived data from `map` by calling `some(log, since)` or `all()`, see the overload below; calls `all()` if
+  /// the map has no log.
   template <class Map, class Some, class All>
   void follow(const Map& map, Some&& some, All&& all) {
     if constexpr (has_change_log<Map>) {
@@ -36,8 +36,8 @@ class map_follower {
     }
   }
   /// Like the overload above, for a copy of the map to which `log` belongs, made at `revision`. Calls `some(log,
-  /// since)` if all possible differences from the last revision read are changes after revision `since`, `all()` if the
-  /// log does not reach back that far, and nothing if this revision was read last.
+  /// since)` if the log lists all possible differences from the last revision read, as changes after revision `since`;
+  /// calls `all()` if the log does not reach back that far; does nothing if this revision was read last.
   template <class Some, class All>
   void follow(const octree::change_log& log, std::uint64_t revision, Some&& some, All&& all) {
     assert(revision <= log.revision());

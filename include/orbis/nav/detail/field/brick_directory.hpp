@@ -41,8 +41,8 @@ class brick_directory {
     const std::uint32_t b = blocks_.find(name(p));
     return b == none ? without_number(p) : numbers_[b][place(p)];
   }
-  /// Sets the result of `find` to `inner` for positions without an index in the cube of 2^level bricks that contains
-  /// `p`.
+  /// Makes `find` return `inner` for the positions that have no index and are in the cube of 2^level bricks that
+  /// contains `p`.
   /// @pre no brick has an index; level >= 3; the cube is in the grid
   void add_cube(const brick_place& p, int level) {
     cubes_.set(cube_name(p, level), 0);
@@ -55,7 +55,7 @@ class brick_directory {
     return false;
   }
   [[nodiscard]] bool has_cubes() const noexcept { return levels_ != 0; }
-  /// `inner` or `none`: the result that `find` would return for `p` if it had no index. O(levels of cubes).
+  /// `inner` or `none`: the result that `find` would return for `p` if `p` had no index. O(levels of cubes).
   [[nodiscard]] std::uint32_t without_number(const brick_place& p) const noexcept {
     return has_cubes() && is_in_cube(p, 0) ? inner : none;
   }

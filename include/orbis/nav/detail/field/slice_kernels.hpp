@@ -34,7 +34,7 @@ struct choose_offer_kernel {
   }
 };
 
-/// Finds the slices among eight consecutive ones (`targets`; `tops`: the largest value of each) in which a value equals
+/// Finds those of eight consecutive slices (`targets`; `tops`: the largest value of each) that contain a value equal to
 /// the source's offer; returns them as bits. `from`: distance of the source from the first slice, in slices. Examines
 /// slices [first, last] except those in `skip`.
 struct equal_slices_kernel {
@@ -76,7 +76,7 @@ struct lower_slices_kernel {
   }
 };
 
-/// Returns true if a value of the slice equals the source's offer; `squares` are added to the offer.
+/// Returns true if a value of the slice equals the value of `offer` plus that of `squares`.
 struct equal_rows_kernel {
   using signature = bool(const std::uint16_t* target, const slice_offer* offer, const std::uint16_t* squares);
   template <class Target>
@@ -87,7 +87,8 @@ struct equal_rows_kernel {
   }
 };
 
-/// Lowers a copy of the slice; returns true if it differs from the slice.
+/// Writes a copy of the slice with values lowered to `offer` plus `squares`; returns false, and writes nothing, if no
+/// value is lowered.
 struct lower_rows_kernel {
   using signature = bool(const std::uint16_t* target, const slice_offer* offer, const std::uint16_t* squares,
                          std::uint16_t bound, std::uint16_t* lowered, std::uint16_t* top);
@@ -107,8 +108,9 @@ struct lower_rows_kernel {
   }
 };
 
-/// Adds the offers of the eight rows of a slice of distances along x (`rows`: 64 bytes, 255 where far) to `best`.
-/// `squares - 8 * i`: squared distances of row i to the rows of the target. Returns the largest value in `best`.
+/// Adds the offers of the eight rows of a slice of distances along x (`rows`: 64 bytes; 255 means `far_away`) to
+/// `best`. `squares - 8 * i`: squared distances of row i to the rows of the target. Returns the largest value in
+/// `best`.
 struct add_rows_kernel {
   using signature = std::uint16_t(std::uint16_t* best, const std::uint8_t* rows, const std::uint16_t* squares);
   template <class Target>

@@ -48,8 +48,8 @@ class voxel_columns {
     const int found = next(occupied_, 0, x, y, z);
     return found < levels() ? found : std::numeric_limits<int>::max();
   }
-  /// A level up to which all voxels from `z` upwards are occupied: the end of the run, or of the 64-bit word that
-  /// contains `z` if that comes first.
+  /// The highest level of the run of occupied voxels that starts at `z`, or of the 64-bit word that contains `z` if the
+  /// run continues beyond it.
   /// @pre the voxel at `z` is occupied; z >= 0
   [[nodiscard]] int end_of_run(int x, int y, int z) const noexcept {
     return z + std::countr_one(occupied_[place(x, y) + static_cast<std::size_t>(z >> 6)] >> (z & 63)) - 1;
@@ -59,7 +59,7 @@ class voxel_columns {
     return next(known_, ~std::uint64_t{0}, x, y, z);
   }
 
-  /// Sets all octants in a box of octants that were not set before. @pre the box lies in the box of columns
+  /// Sets the states of all octants in a box of octants. @pre none was set before; the box lies in the box of columns
   void set(const octree::key_box& octants, const octree::octant_states& s) noexcept {
     const std::uint64_t all = ~std::uint64_t{0};
     const bool is_uniform = s.known == all && (s.occupied == 0 || s.occupied == all);

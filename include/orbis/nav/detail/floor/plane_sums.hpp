@@ -32,7 +32,7 @@ struct level_window {
   int step = 1, enough = 1;
 };
 
-/// Sums over the columns that count; z is the level relative to the central one.
+/// Sums over the columns that count (see level_window); z is the level relative to that of the central column.
 struct plane_sums {
   double n = 0, x = 0, y = 0, z = 0, xx = 0, xy = 0, yy = 0, xz = 0, yz = 0;
   int lowest = 0, highest = 0;  ///< extremes of z and 0

@@ -59,8 +59,8 @@ class cell_floods {
   [[nodiscard]] bool may_reach_any(const std::vector<key>& cells, std::size_t max_cells) {
     return std::any_of(cells.begin(), cells.end(), [&](const key& k) { return may_reach(k, max_cells); });
   }
-  /// The cell nearest to the goal that is connected to the start, among the `max_cells` cells that a flood examines;
-  /// empty if there are no doors. O(cells that are nearer to the goal, or enclosed together with such a cell), or
+  /// Of the cells connected to the start, the one nearest to the goal, among the `max_cells` cells that a flood
+  /// examines; empty if there are no doors. O(cells nearer to the goal, plus the cells enclosed together with them), or
   /// O(cells connected to the start).
   [[nodiscard]] std::optional<key> nearest(std::size_t max_cells) {
     // Visit cells around the goal in order of distance, as long as there are fewer of them than cells in a flood.
@@ -120,7 +120,7 @@ class cell_floods {
     if (m == mark::none) m = space_.is_free(k) ? mark::free : mark::blocked;
     return m != mark::blocked;
   }
-  /// Like `add`. @pre in the space and free
+  /// Like `add`. @pre `k` is in the space and free
   bool begin(const key& k, mark which) {
     if (mark_at(k) <= mark::free) mark_at(k) = mark::free;
     return add(k, which);

@@ -26,9 +26,9 @@ namespace orbis::nav::detail {
 inline constexpr double blocked = -std::numeric_limits<double>::infinity();
 
 /// Returns true if the segment from `a` to `b` is free. `margin(p)`: the distance that the robot can certainly move
-/// from `p` in any direction; `blocked`; or a negative value if neither is certain. `is_blocked(p, q)`: exact test of
-/// whether an obstacle prevents the robot from moving from `p` to `q`. Advances by the available margin, as in J. C.
-/// Hart, "Sphere tracing", The Visual Computer 12, 1996.
+/// from `p` in any direction, `blocked` if it certainly does not fit at `p`, or a negative value if neither is certain.
+/// `is_blocked(p, q)`: exact test of whether an obstacle prevents the robot from moving from `p` to `q`. Advances by
+/// the available margin, as in J. C. Hart, "Sphere tracing", The Visual Computer 12, 1996.
 template <class Margin, class IsBlocked>
 [[nodiscard]] bool is_segment_free(const vec3& a, const vec3& b, double cell, Margin&& margin, IsBlocked&& is_blocked) {
   const double length = norm(b - a);
@@ -71,7 +71,7 @@ template <class Margin>
 }
 
 /// Cost of the segment from `a` to `b`: the exact integral of the density, which is constant in each cell. O(cells on
-/// the segment). @pre both lie in the space
+/// the segment). @pre `a` and `b` lie in the space
 ///
 /// J. Amanatides, A. Woo, "A fast voxel traversal algorithm for ray tracing", Eurographics, 1987.
 template <class Space>

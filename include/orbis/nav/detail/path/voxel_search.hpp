@@ -130,7 +130,7 @@ class voxel_search {
   static constexpr double infinity = std::numeric_limits<double>::infinity();
   static constexpr bool is_flat = Space::dimensions == 2;
   static constexpr std::uint32_t brick_bits = is_flat ? 6 : 9;  ///< cells of a brick: 8x8x8, or 8x8 on a floor
-  static constexpr std::uint32_t from = ~std::uint32_t{1}, to = ~std::uint32_t{0};  ///< the indices of both ends
+  static constexpr std::uint32_t from = ~std::uint32_t{1}, to = ~std::uint32_t{0};  ///< indices of start and goal
 
   /// Certainty of a cell's cost.
   enum class trust : std::uint8_t {
@@ -142,7 +142,7 @@ class voxel_search {
     double cost = infinity;
     double density = 0.0;  ///< 0: not computed
     std::uint32_t parent = from;
-    std::uint32_t tried = to;  ///< the last parent whose line was blocked or cost more than expected
+    std::uint32_t tried = to;  ///< the last parent whose line to this cell was blocked or cost more than expected
     std::uint32_t barred = 0;  ///< bit mask of neighbours (for the goal: exits) whose step to this cell is blocked
     std::uint8_t free = 0;     ///< 0: not tested, 1: no, 2: yes
     trust known = trust::bound;
