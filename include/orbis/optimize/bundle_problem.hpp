@@ -159,7 +159,7 @@ struct bundle_summary {
   int linear_iterations = 0;       ///< iterations of an iterative solver of the reduced system
   std::size_t observations = 0;    ///< number of observations used
   std::size_t left_out = 0;        ///< number of observations that are not finite or have no projection at the start
-  std::size_t first_left_out = 0;  ///< index of the first of these
+  std::size_t first_left_out = 0;  ///< index of the first observation that was left out
   bundle_times seconds;
 };
 

@@ -34,9 +34,9 @@ struct self_calibrated {
   /// Covariance of the parameters, in the order of `camera::parameters_of`; 0 for those that were not estimated.
   parameter_matrix covariance = zeros<parameter_matrix>();
   std::size_t observations = 0;  ///< number of observations used
-  std::size_t outliers = 0;      ///< number of these that were excluded at the end
-  double initial_rms = 0.0;      ///< RMS residual of the inliers in standard deviations, before the adjustment ...
-  double final_rms = 0.0;        ///< ... and after
+  std::size_t outliers = 0;      ///< number of used observations that were excluded at the end
+  double initial_rms = 0.0;      ///< RMS residual of the inliers before the adjustment, standard deviations
+  double final_rms = 0.0;        ///< RMS residual of the inliers after the adjustment, standard deviations
   int iterations = 0;
 };
 

@@ -46,7 +46,7 @@ struct triangulation_options {
 struct triangulation {
   triangulation_status status = triangulation_status::too_few_views;
   vec3 point = zeros<vec3>();  ///< in the world frame, metres; valid only if `ok()`
-  double parallax = 0.0;       ///< angle between the rays (with more than two views: between two distant ones), radians
+  double parallax = 0.0;       ///< angle between the rays, radians; with more than two views, of two rays far apart
   double error = 0.0;          ///< root mean square distance between projections and rays at z = 1
   [[nodiscard]] bool ok() const noexcept { return status == triangulation_status::ok; }
 };

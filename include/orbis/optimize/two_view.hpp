@@ -125,8 +125,8 @@ struct two_view_options {
   double deviation = 1.0;            ///< standard deviation of a matched pixel, along each axis, pixels
   std::size_t min_points = 50;       ///< minimum number of points of a reconstruction
   double min_parallax = 0.02;        ///< minimum median parallax of the points, radians
-  double max_rotation = 0.01;        ///< maximum standard deviation of the rotation, radians ...
-  double max_direction = 0.035;      ///< ... and of the direction of the translation, radians
+  double max_rotation = 0.01;        ///< maximum standard deviation of the rotation, radians
+  double max_direction = 0.035;      ///< maximum standard deviation of the direction of the translation, radians
   double max_depth = 0.3;            ///< maximum standard deviation of a point's depth, relative to the depth
   double confidence = 0.999;         ///< confidence of RANSAC
   std::size_t max_iterations = 500;  ///< maximum number of RANSAC iterations for either model
@@ -141,8 +141,8 @@ struct two_view_reconstruction {
   std::size_t inliers = 0;           ///< matches that agree with the motion, including distant ones that give no point
   double parallax = 0.0;             ///< median angle between the two rays to a point, radians
   double rmse = 0.0;                 ///< root mean square distance of the inliers from their epipolar lines, pixels
-  double rotation_deviation = 0.0;   ///< standard deviation of the rotation, radians ...
-  double direction_deviation = 0.0;  ///< ... and of the direction of the translation, radians
+  double rotation_deviation = 0.0;   ///< standard deviation of the rotation, radians
+  double direction_deviation = 0.0;  ///< standard deviation of the direction of the translation, radians
   bool from_homography = false;      ///< true if a homography explains the matches better than epipolar geometry
 };
 

@@ -75,8 +75,8 @@ class bundle_equations {
     analyze_reduced();
   }
 
-  /// Initialises the estimates, with the observations that are not ignored and have a projection; writes their number
-  /// to `summary`.
+  /// Initialises the estimates, and selects the observations that are not ignored and have a projection; writes the
+  /// number of these observations to `summary`.
   template <class Policy>
   void begin(const Policy& policy, std::span<const camera_state> cameras, std::span<const vec3> points,
              const bundle_options& options, bundle_summary& summary) {
@@ -485,7 +485,7 @@ class bundle_equations {
       for (int i = 0; i != camera_size; ++i) diagonal_[static_cast<Eigen::Index>(camera_size * u) + i] = h(i, i);
     }
   }
-  /// Returns true if no point failed; otherwise stores the first camera that observes it.
+  /// Returns true if no point failed; otherwise stores the first camera that observes the failed point.
   [[nodiscard]] bool is_regular(std::size_t failed_point) {
     if (failed_point == bundle_structure::none) return true;
     for (const bundle_structure::segment& s : structure_.segments) {

@@ -22,8 +22,8 @@ namespace orbis::optimize::detail {
 /// points with the same first camera are also adjacent, so that their pairs update a common part of the reduced system.
 /// Reuses its memory.
 ///
-/// O(observations + pairs of observations of the same point + pairs of movable cameras); one bit for each pair of
-/// cameras.
+/// O(observations + pairs of observations of the same point + pairs of movable cameras). Memory: also one bit for each
+/// pair of movable cameras.
 class bundle_structure {
  public:
   static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
@@ -57,12 +57,13 @@ class bundle_structure {
   std::vector<std::uint32_t> point_source;  ///< index of point p in the caller's array
   std::vector<group> groups;
   std::vector<std::uint32_t> mixed_unknown;  ///< for each observation by a movable camera: the unknown of the camera
-  std::vector<std::uint32_t> mixed_place;    ///< for each of these: its place, counting only places of movable cameras
-  std::vector<std::uint32_t> pair_slot;      ///< slot of each pair of observations
+  /// For each observation by a movable camera: its place, counting only places of movable cameras.
+  std::vector<std::uint32_t> mixed_place;
+  std::vector<std::uint32_t> pair_slot;  ///< slot of each pair of observations
 
   // Movable cameras, and blocks of the reduced system: the lower triangle including the diagonal, row by row.
   std::vector<std::uint32_t> count;            ///< number of observations by each camera
-  std::vector<std::uint32_t> unknown, camera;  ///< for each camera, the index of its unknown or `none`; and the inverse
+  std::vector<std::uint32_t> unknown, camera;  ///< for each camera, its unknown or `none`; for each unknown, its camera
   std::vector<block_place> slots;
   std::vector<std::uint32_t> diagonal_slot;  ///< slot of each movable camera
 
@@ -90,10 +91,10 @@ class bundle_structure {
 
  private:
   struct entry {
-    std::uint32_t observation, other;  ///< `other`: index of its point or its camera, depending on the order
+    std::uint32_t observation, other;  ///< `other`: index of the observation's point or camera, depending on the order
   };
   struct span_of_cameras {
-    /// The first and last movable cameras that observe a point, and the number of movable cameras that do.
+    /// The first and last movable cameras that observe a point, and the number of movable cameras that observe it.
     std::uint32_t first = none, last = none, seen = 0;
   };
 
@@ -136,7 +137,7 @@ class bundle_structure {
       }
   }
 
-  /// Sorts points by their first movable camera, the last one, and the number of movable cameras.
+  /// Sorts points by their first and last movable cameras and by the number of their movable cameras.
   void order_points(std::size_t points) {
     const auto n = static_cast<std::uint32_t>(unknowns());
     spans_.assign(points, {});

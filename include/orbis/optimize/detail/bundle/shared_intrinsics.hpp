@@ -208,8 +208,8 @@ class shared_intrinsics {
     loss_.width = 2.447 * noise_;
   }
 
-  /// Excludes images with too few observations, points with fewer than two observations or not determined by them, and
-  /// all images and points outside the largest connected component.
+  /// Excludes images with too few observations, points that have fewer than two observations or are not determined by
+  /// their observations, and all images and points outside the largest connected component.
   void keep_connected() {
     for (out& o : out_)
       if (o == out::alone) o = out::no;
@@ -329,7 +329,7 @@ class shared_intrinsics {
     std::vector<seen> by;
     block_t3 theta_point;
     theta_vector theta_gradient;
-    mat3 inverse;  ///< inverse of its own block
+    mat3 inverse;  ///< inverse of the point's own block
     vec3 gradient;
   };
 
@@ -374,7 +374,7 @@ class shared_intrinsics {
     part.is_determined = rows_.size() >= 2;
   }
 
-  /// Adds `part` to a matrix, starting at (row, column); only the used entries of theta.
+  /// Adds `part` to a matrix, starting at (row, column), without the unused entries of theta.
   template <int R, int C>
   void add(Eigen::MatrixXd& to, Eigen::Index row, Eigen::Index column, const matrix<R, C>& part) const {
     const int rows = row == pose_rows_ ? count_ : R, columns = column == pose_rows_ ? count_ : C;
@@ -524,7 +524,7 @@ class shared_intrinsics {
   std::vector<view_type> views_;
   std::vector<seen> seen_;                      ///< contribution of each observation at the last linearisation
   std::vector<point_part> parts_;               ///< contribution of each point at the last linearisation
-  std::vector<jacobians> rows_;                 ///< for the residuals of the most recently linearised point
+  std::vector<jacobians> rows_;                 ///< derivatives of the residuals of the last linearised point
   Eigen::MatrixXd direct_, reduced_, removed_;  ///< lower triangles; `direct_`: before elimination and damping
   std::vector<double> gradient_;
   eliminated point_;

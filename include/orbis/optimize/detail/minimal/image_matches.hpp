@@ -17,8 +17,8 @@
 
 namespace orbis::optimize::detail {
 
-/// The point (x, y) of a pixel at z = 1, and the derivative of the pixel with respect to that point, made upper
-/// triangular by a rotation, which converts distances at z = 1 to pixels.
+/// The point (x, y) of a pixel at z = 1, and the derivative of the pixel with respect to that point. The derivative
+/// converts distances at z = 1 to pixels; a rotation makes it upper triangular.
 struct metric_ray {
   double x = 0.0, y = 0.0;
   double xx = 1.0, xy = 0.0, yy = 1.0;

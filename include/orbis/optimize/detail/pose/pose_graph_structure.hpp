@@ -88,8 +88,8 @@ class pose_graph_structure {
   std::vector<std::uint32_t> vertices;              ///< the vertex of each unknown
   std::vector<edge_bundle> bundles;                 ///< bundles between two unknowns come first
   std::vector<std::uint32_t> bundled;               ///< indices of the edges, ordered by bundle
-  std::vector<block_place> places;                  ///< blocks of the bundles between two unknowns, in their order
-  std::vector<std::uint32_t> first_touch, touches;  ///< bundles at each unknown: 2 * bundle, plus 1 where it is `to`
+  std::vector<block_place> places;                  ///< for each bundle between two unknowns, in order: its block
+  std::vector<std::uint32_t> first_touch, touches;  ///< at each unknown: 2 * bundle, plus 1 if the unknown is its `to`
 
   /// Determines the unknowns and, if the graph differs from that of the previous call, the blocks (`changed` is then
   /// true).

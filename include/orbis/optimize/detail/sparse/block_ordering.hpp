@@ -101,8 +101,8 @@ class quotient_graph {
   static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
   enum kind : std::uint8_t { variable, element, gone };
 
-  /// A variable's elements are [begin, variables), its variables [variables, end); an element's
-  /// variables are [begin, end).
+  /// The list of a node. A variable has its elements in [begin, variables) and its variables in [variables, end); an
+  /// element has its variables in [begin, end).
   struct range {
     std::size_t begin = 0, variables = 0, end = 0;
   };
@@ -276,7 +276,7 @@ class quotient_graph {
   std::vector<range> list_;
   std::vector<std::uint32_t> degree_;  ///< for variables: upper bound on the number of blocks connected by elimination
   std::vector<kind> state_;
-  std::vector<std::uint64_t> remains_;  ///< for elements: 1 + weight outside the clique; for variables: membership
+  std::vector<std::uint64_t> remains_;  ///< elements: 1 + weight outside the clique; variables: mark of the clique
   std::vector<std::uint32_t> bucket_, next_, previous_;  ///< lists of the variables of each degree
   std::vector<std::uint32_t> merged_, last_merged_;      ///< chains of variables eliminated together
   std::vector<std::uint32_t> pool_, clique_, touched_;

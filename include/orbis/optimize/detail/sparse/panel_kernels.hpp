@@ -13,7 +13,7 @@
 
 namespace orbis::optimize::detail {
 
-/// The number of rows beyond the last that a kernel may read and write, which are padding at the end of a panel.
+/// The number of rows beyond the last that a kernel may read and write: the padding at the end of a panel.
 inline constexpr std::size_t panel_slack = 16;
 
 /// Computes `out = A B^T`: A has `rows` rows, B has N; both have `depth` columns, `stride` apart. `out` has N columns,
