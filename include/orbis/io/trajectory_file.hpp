@@ -49,8 +49,8 @@ namespace orbis::io {
 /// `describe_units`.
 [[nodiscard]] std::string describe_spans(const trajectory& a, const trajectory& b);
 
-/// Names the unit in which the times of one of two trajectories seem to be, if the time spans would then agree: "the
-/// times of the first seem to be in milliseconds"; otherwise empty.
+/// An explanation for two trajectories whose time spans agree only if the times of one have another unit: "the times of
+/// the first seem to be in milliseconds". Empty for all other trajectories.
 [[nodiscard]] std::string describe_units(const trajectory& a, const trajectory& b);
 
 /// Writes a trajectory file atomically: 9 decimals for the time, 9 significant digits for the rest. Errors:

@@ -240,7 +240,7 @@ inline repeated_times keep_first(std::vector<pose_lines::entry>& entries) {
 }
 
 /// Explains why different poses have equal times. `entries` have distinct, ascending times. Times have too few digits
-/// if they are multiples of a power of ten seconds that is not shorter than their median interval.
+/// if they are multiples of 1, 0.1, ... seconds, and this unit is not much shorter than their median interval.
 [[nodiscard]] inline std::string explain_equal_times(const std::vector<pose_lines::entry>& entries) {
   std::vector<double> times;
   for (const pose_lines::entry& e : entries) times.push_back(e.pose.timestamp);

@@ -42,7 +42,7 @@ template <std::size_t N>
   return trimmed(line).empty() ? std::optional{all} : std::nullopt;
 }
 
-/// The pose of a camera with the projection matrix K [I t] in the frame of camera 0, in metres.
+/// The pose in the frame of camera 0, in metres, of a camera with the projection matrix K [I t].
 [[nodiscard]] inline se3 kitti_place(const std::array<double, 12>& p) {
   return se3{so3{}, -vec3{(p[3] - p[2] * p[11]) / p[0], (p[7] - p[6] * p[11]) / p[5], p[11]}};
 }

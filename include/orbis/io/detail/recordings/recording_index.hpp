@@ -27,14 +27,14 @@ struct recording_entry {
   std::filesystem::path color;
   std::filesystem::path depth;              ///< empty in a recording of one camera
   std::optional<se3> T_world_camera;        ///< ground truth, if there is one
-  std::optional<double> depth_timestamp{};  ///< time of the depth image, seconds, if it differs
+  std::optional<double> depth_timestamp{};  ///< time of the depth image, seconds, if it differs from `timestamp`
 };
 
 /// A recording without its image data.
 struct recording_index {
   std::vector<recording_entry> frames;  ///< in chronological order, never empty when returned
   trajectory ground_truth;
-  std::optional<camera::camera_settings> camera;  ///< set if it is in the format's own files, or guessed
+  std::optional<camera::camera_settings> camera;  ///< set if found in the format's own files, or guessed
   std::string camera_guess;                       ///< name and origin of a guessed camera, else empty
   std::optional<color_camera> color;              ///< set if colour has to be resampled to the depth camera
   std::vector<std::string> notes;                 ///< warnings for the user

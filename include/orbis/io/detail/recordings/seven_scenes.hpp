@@ -113,8 +113,8 @@ inline std::vector<std::filesystem::path> seven_scenes_sequences(const std::file
   return {};
 }
 
-/// The index of a 7-Scenes recording, with times computed from the frame numbers at 30 frames per second. A scene
-/// folder with a single folder seq-XX is replaced by the latter. `camera-intrinsics.txt` is assumed to describe the
+/// The index of a 7-Scenes recording, with times computed from the frame numbers at 30 frames per second. If `folder`
+/// is a scene with a single folder seq-XX, that folder is indexed. `camera-intrinsics.txt` is assumed to describe the
 /// depth camera, whose image size is that of the first depth image. Errors: no_data, not_found, unreadable, malformed
 /// (a pose, with its file), invalid_argument (a scene with several sequences).
 [[nodiscard]] inline result<recording_index> index_seven_scenes(std::filesystem::path folder) {

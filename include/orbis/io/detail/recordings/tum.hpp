@@ -213,8 +213,8 @@ inline void convert_frame_numbers(recording_index& index, double fps) {
   index.notes.emplace_back(text);
 }
 
-/// Converts the times of the ground truth to seconds at `fps` frames per second if they are frame numbers and more
-/// frames then have a pose, and adds a note. @pre the times of the frames are in seconds
+/// If the times of the ground truth are frame numbers, and more frames have a pose after the conversion, converts the
+/// times to seconds at `fps` frames per second and adds a note. @pre the times of the frames are in seconds
 inline void convert_numbered_truth(recording_index& index, double max_distance, double fps) {
   if (!are_frame_numbers(timestamps(index.ground_truth))) return;
   const auto known = [&](const trajectory& truth) {
@@ -256,8 +256,9 @@ inline void convert_numbered_truth(recording_index& index, double max_distance, 
   return present(folder / "rgb.txt") || present(folder / "depth.txt") || !find_association_list(folder).empty();
 }
 
-/// Sets the camera of a TUM benchmark sequence, which is identified by `rgbd_dataset_freiburg1` (2, 3) in the path of
-/// `folder` (the innermost such folder is used) or by `freiburg1` at the beginning of the folder's own name.
+/// Sets the camera of a TUM benchmark sequence if the name of `folder` begins with `freiburg1` (or 2, or 3), or if a
+/// folder in its path has a name that begins with `rgbd_dataset_freiburg1` (or 2, or 3); the innermost of these folders
+/// counts.
 inline void guess_tum_camera(const std::filesystem::path& folder, recording_index& index) {
   const auto full = std::filesystem::absolute(folder / "").lexically_normal().parent_path();
   for (const auto& [word, preset] :
@@ -279,9 +280,9 @@ inline void guess_tum_camera(const std::filesystem::path& folder, recording_inde
 /// The index of a TUM recording. `associations.txt` is used if it exists; otherwise colour and depth images are paired
 /// by `associate` within `max_time_difference` seconds, and images without a partner are noted. The ground truth is
 /// interpolated at the colour images' time stamps. The camera is that of the benchmark's sequences
-/// (`guess_tum_camera`). Time stamps that are all frame numbers are converted to seconds at `fps` frames per second.
-/// Errors: not_found (a list, the first image), unreadable, no_data (empty lists, no pair), malformed (ground truth,
-/// with the line number).
+/// (`guess_tum_camera`). If all time stamps are frame numbers, they are converted to seconds at `fps` frames per
+/// second. Errors: not_found (a list, the first image), unreadable, no_data (empty lists, no pair), malformed (ground
+/// truth, with the line number).
 [[nodiscard]] inline result<recording_index> index_tum(const std::filesystem::path& folder,
                                                        double max_time_difference = 0.020, double fps = 30.0) {
   recording_index index;

@@ -135,7 +135,7 @@ class camera_path {
     return std::min({1.0, t / ramp, (1.0 - t) / ramp});
   }
 
-  static constexpr double ramp = 0.06;  ///< fraction of the path for acceleration, and for deceleration
+  static constexpr double ramp = 0.06;  ///< fraction of the motion's time for acceleration, and again for deceleration
 
   synthetic_path_options options_;
   std::uint64_t seed_;

@@ -34,7 +34,7 @@ class canvas {
         height_{texels(height, texel)},
         texels_(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_)) {}
 
-  /// Number of texels that cover a length, both in metres.
+  /// Number of texels with an edge of `texel` metres that cover `length` metres.
   [[nodiscard]] static int texels(double length, double texel) noexcept {
     return std::max(1, static_cast<int>(length / texel + 0.999));
   }

@@ -89,7 +89,7 @@ struct painted_solids {
   return looks;
 }
 
-/// A furnished room with its looks. The light on the person is computed for the initial position.
+/// A furnished room with its looks. The light on the person is computed for the person's initial position.
 [[nodiscard]] inline painted_solids painted(const scene& room) {
   painted_solids all{room.solids(), {}, {{0.0, 0.0, room.options().height - 0.5}}};
   for (const solid& s : all.solids)

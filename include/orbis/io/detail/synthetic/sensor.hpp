@@ -97,8 +97,8 @@ class sensor {
            chance * static_cast<double>(safe_cosine_ - lost_cosine_) > static_cast<double>(cosine - lost_cosine_);
   }
 
-  /// Marks pixels that the projector does not illuminate: seen from the projector, a pixel further to the right in the
-  /// row appears further to the left.
+  /// Marks pixels that the projector does not illuminate: those for which a pixel further to the right in the row
+  /// appears further to the left when seen from the projector.
   [[nodiscard]] std::vector<bool> projector_shadow(std::span<const float> depth) const {
     std::vector<bool> dark(depth.size());
     const double shift = focal_ * options_.baseline;

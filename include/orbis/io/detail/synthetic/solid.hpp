@@ -33,7 +33,7 @@ struct solid {
   triple centre;  ///< metres, world
   triple half;    ///< half sizes, metres
   double cos_yaw = 1.0, sin_yaw = 0.0;
-  double cos_tilt = 1.0, sin_tilt = 0.0;  ///< tilt of a capsule, whose upper end moves towards its own x axis
+  double cos_tilt = 1.0, sin_tilt = 0.0;  ///< tilt of a capsule: moves its upper end towards its own x axis
   material surface = material::plain;
   std::uint64_t seed = 0;  ///< seed of the texture
 
