@@ -29,7 +29,7 @@ using map_type = orbis::octree::occupancy_octree<>;
 
 int report_error(int code, const std::string& why) { return examples::report_error("explore", code, why); }
 
-/// A furnished room, divided by two walls, each with a door. z is up, the floor at z = 0, and the centre at the origin.
+/// A furnished room, divided by two walls, each with a door. z is up; the origin is the centre of the floor.
 class building {
  public:
   explicit building(std::uint64_t seed)

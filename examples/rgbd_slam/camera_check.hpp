@@ -27,20 +27,20 @@ struct focal_doubt {
 
 /// Comparison of the fits of a pinhole camera and a camera with lens distortion.
 struct lens_comparison {
-  double pinhole_focal, lens_focal;  ///< fx of each, pixels
+  double pinhole_focal, lens_focal;  ///< fx of each camera, pixels
   double pinhole_rms, lens_rms;      ///< RMS reprojection error, in standard deviations
   bool is_determined;                ///< true if the motion determines the distortion
   /// Returns true if the images show distortion.
   [[nodiscard]] bool has_distortion() const;
 };
 
-/// The doubt that follows from calibrated parameters; empty if the calibration is inconclusive, for example because a
+/// The doubt that calibrated parameters raise; empty if the calibration is inconclusive, for example because a
 /// parameter was held.
 [[nodiscard]] std::optional<focal_doubt> find_doubt(std::span<const orbis::slam::calibrated_parameter> found);
-/// The doubt that follows from a map made with the camera. A wrong focal length scales the distances between poses by a
-/// few percent, but so does distortion that a pinhole camera does not model: empty if distortion fits the images
-/// clearly better, or if the images are inconclusive. Runs one or two small self-calibrations, which take a few tenths
-/// of a second; empty if `go_on` cancels one of them.
+/// The doubt that a map made with the camera raises. A wrong focal length scales the distances between poses by a few
+/// percent, but so does distortion that a pinhole camera does not model. Empty if distortion fits the images clearly
+/// better, if the images are inconclusive, or if `go_on` cancels a calibration. Runs one or two small
+/// self-calibrations, which take a few tenths of a second.
 [[nodiscard]] std::optional<focal_doubt> find_doubt(const orbis::slam::map& map,
                                                     const orbis::camera::any_camera& camera,
                                                     const orbis::slam::options& options,

@@ -31,8 +31,8 @@ void forget_stop();
 void begin_dispensable(std::string notice);
 /// Returns true if the work since `begin_dispensable` must be abandoned.
 [[nodiscard]] bool is_given_up();
-/// Marks the end of this work. Returns `stop_requested`; from then on, a first signal has no effect, because the rest
-/// of the run takes almost no time.
+/// Marks the end of the work that may be abandoned. Returns `stop_requested`; from then on, a first signal has no
+/// effect, because the rest of the run takes almost no time.
 bool end_dispensable();
 /// Removes the temporary files and ends the program, even while threads are running.
 [[noreturn]] void end_program(int code);

@@ -32,7 +32,7 @@ struct way {
   nav::found_path path;
 };
 
-/// Positions on the camera's path and along its optical axis where the robot fits, on the floor for a driving robot.
+/// Positions where the robot fits, on the camera's path and along the optical axis; for a driving robot, on the floor.
 template <nav::planning_space View>
 std::vector<vec3> free_places(const View& view, const orbis::trajectory& cameras) {
   std::vector<vec3> places;

@@ -85,7 +85,7 @@ orbis::image<rgb8> draw_floor(const navigation_picture& what, const window& w, i
     return cell ? cost_color(costs((*cell)[0], (*cell)[1])) : nothing;
   });
 }
-/// The largest distance in the slice, metres: the floor counts as an obstacle.
+/// The largest distance in the slice, metres; the floor counts as an obstacle.
 double largest_distance(const navigation_picture& what) {
   constexpr double least = 0.1;  // more than the noise of the floor
   const double reach = what.field->reach();

@@ -92,8 +92,8 @@ orbis::octree::bounding_box box_to_search(const octree& map, const settings& s) 
   return {(box.min.array() - margin).matrix(), (box.max.array() + margin).matrix()};
 }
 
-/// The maximum memory of the distance field in bytes: the memory of all blocks with the size of the field's reach that
-/// contain an obstacle or are next to one. O(leaves).
+/// The maximum memory of the distance field in bytes: the memory of all blocks, with an edge of `reach` metres, that
+/// contain an obstacle or are next to such a block. O(leaves).
 double most_field_bytes(const octree& map, double reach) {
   const auto block_of = [&](double x) { return static_cast<std::int64_t>(std::floor(x / reach)); };
   std::set<std::array<std::int64_t, 3>> occupied, near;

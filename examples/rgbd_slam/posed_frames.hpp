@@ -169,7 +169,7 @@ class posed_frames {
     depths_->put(e.index, frame.depth);
     colors_.put(e.index, frame.color);
   }
-  /// Returns the images of entry `number`, from the background thread if it has been started for them.
+  /// Returns the images of entry `number`, from the background thread if it was started for this entry.
   [[nodiscard]] std::shared_ptr<unpacked> unpack(std::size_t number) const {
     std::shared_ptr<unpacked> images;
     if (ahead_.valid()) {

@@ -12,7 +12,7 @@
 namespace app {
 
 inline constexpr int live_map_niceness = 3;  ///< keyframes should appear in the map soon
-inline constexpr int viewer_niceness = 10;   ///< may skip frames; holds no lock for which tracking waits
+inline constexpr int viewer_niceness = 10;   ///< the viewer may skip frames, and holds no lock that tracking waits for
 
 /// Reduces this thread's share of a busy processor by one fifth per step of niceness.
 inline void lower_priority([[maybe_unused]] int niceness) {

@@ -279,7 +279,7 @@ std::string text_table(const std::vector<std::pair<std::string, std::string>>& r
   return t + "</table></div>\n";
 }
 
-/// Formats the first ranges and the number of the others: "4, 100 ... 120".
+/// Formats the first ranges, and the number of omitted ones: "4, 100 ... 120".
 std::string list_ranges(std::span<const frame_range> ranges) {
   constexpr std::size_t most = 12;
   std::string list;

@@ -51,7 +51,7 @@ inline constexpr std::size_t most_maps = 9;
 /// creating it, so that the error is reported before the run starts. Errors: write_failed.
 [[nodiscard]] std::optional<orbis::error> find_unwritable(const settings& s);
 
-/// Finds the files of the output folder `out`, which are created in `folder`.
+/// Lists the files of the output folder `out`. New files are created in `folder`.
 class file_lists {
  public:
   file_lists(std::filesystem::path out, std::filesystem::path folder)
@@ -68,8 +68,8 @@ class file_lists {
 
 class result_files {
  public:
-  /// Creates the folders and checks that files can be created in them. Errors: write_failed; invalid_argument (a file
-  /// name that is reserved or that two results have).
+  /// Creates the folders and checks that files can be created in them. Errors: write_failed; invalid_argument (a
+  /// reserved file name, or the same name for two results).
   [[nodiscard]] static orbis::result<result_files> begin(const settings& s);
   result_files(result_files&&) noexcept = default;
   result_files& operator=(result_files&&) = delete;
@@ -82,8 +82,8 @@ class result_files {
   /// The path at which the floor map is created, next to its image; empty if the settings request none.
   [[nodiscard]] std::filesystem::path floor_map() const { return floor_map_in({}); }
   [[nodiscard]] file_lists lists() const { return {out_, folder()}; }
-  /// The error with the path at which the file will appear instead of the path at which it is created; with the output
-  /// folder if the error names no file. @pre the files are not in place yet
+  /// Replaces, in an error, the path at which a file is created by the path at which it will appear. An error that
+  /// names no file gets the output folder. @pre the files are not in place yet
   [[nodiscard]] orbis::error with_final_path(orbis::error e) const;
 
   /// Creates the folders for optional files, which `take_optional` adds to the results, either all or none. Errors:
@@ -92,7 +92,7 @@ class result_files {
   /// The counterparts of `folder` and `floor_map` for the optional files.
   [[nodiscard]] std::filesystem::path optional_folder() const { return folder() / optional_name; }
   [[nodiscard]] std::filesystem::path optional_floor_map() const { return floor_map_in(optional_name); }
-  /// Adds the optional files to the other files: all, or none if it returns an error. Errors: write_failed.
+  /// Adds the optional files to the other files: all of them, or none on an error. Errors: write_failed.
   [[nodiscard]] orbis::result<void> take_optional();
   /// Removes the optional files.
   void drop_optional() noexcept;

@@ -118,7 +118,7 @@ struct live_results {
   std::vector<double> delay_ms;             ///< time from the creation of each keyframe to its insertion
   std::size_t behind_frames_max = 0;        ///< maximum number of frames tracked between creation and insertion
   std::size_t frames = 0;                   ///< inserted frames between keyframes
-  std::vector<double> frame_delay_ms;       ///< time from the arrival of each of these frames to its insertion
+  std::vector<double> frame_delay_ms;       ///< delay of each inserted frame between keyframes, arrival to insertion
   std::size_t dropped_frames = 0;           ///< frames between keyframes, dropped because the map was busy
   std::size_t refused_frames = 0;           ///< frames between keyframes whose reference keyframe was not in the map
   std::vector<double> correction_ms;        ///< time taken by each correction to move keyframes

@@ -25,8 +25,8 @@ struct camera_inspection {
 [[nodiscard]] camera_inspection find_shutter(const frame_source& source, const settings& s, bool checks_camera,
                                              console& console);
 
-/// The camera with the given shutter, for a camera file. An estimate of zero is omitted, because another recording may
-/// be conclusive.
+/// The camera with the given shutter, for a camera file. An estimate of zero is omitted: it may only mean that this
+/// recording is inconclusive.
 [[nodiscard]] orbis::camera::camera_settings with_shutter(orbis::camera::camera_settings camera,
                                                           const shutter_results& shutter);
 

@@ -116,8 +116,8 @@ source_frame with_right(orbis::camera::stereo_frame pair) {
   return f;
 }
 
-/// Subtracts an origin from all positions, so that results are near zero; adds a note if it is not zero. Results are
-/// not in the frame of a ground truth that has positions only.
+/// Subtracts an origin from all positions of the ground truth, so that results are near zero; adds a note if the origin
+/// is not zero. Does not change a ground truth that has positions only, and notes that results are in another frame.
 void subtract_origin(frame_source& source) {
   if (source.ground_truth.empty()) return;
   source.truth_has_positions_only = orbis::eval::has_positions_only(source.ground_truth);
@@ -360,8 +360,8 @@ sensor_kind choose_sensor(const settings& s) {
                                                                                      : sensor_kind::rgbd;
 }
 
-/// Opens a camera: a folder is played as if it were a camera; numbers, files in /dev, and all devices if the sensor has
-/// no depth, are video cameras; other names are OpenNI2 devices.
+/// Opens a camera: plays a folder as if it were a camera; opens a video camera if the device is a number or a file in
+/// /dev, or if the sensor has no depth; otherwise opens an OpenNI2 device.
 result<std::unique_ptr<camera_device>> open_device(const settings& s) {
   device_options options{.name = s.input.string(), .sensor = wanted_sensor(s)};
   const auto camera = camera_option(s);

@@ -29,7 +29,7 @@ struct source_frame : orbis::camera::rgbd_frame {
 
 struct frame_source {
   std::string title, kind;
-  std::string images_of;  ///< the used topics of a bag, or the used folders; empty for other sources
+  std::string images_of;  ///< topics of a bag, or folders, from which the images are read; empty for other sources
   orbis::camera::camera_settings camera;
   bool camera_is_refined = false;                 ///< the camera was calibrated with the recording
   double usual_max_depth = app::usual_max_depth;  ///< default maximum depth in a map, metres

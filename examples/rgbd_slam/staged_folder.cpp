@@ -57,7 +57,7 @@ descriptor open_folder(const fs::path& folder) {
   return descriptor{::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)};
 }
 
-/// A link to an open folder, which the user may rename. Broken on systems without it.
+/// A link to an open folder that remains valid if the user renames the folder. Broken on systems without /proc.
 fs::path link_to(const descriptor& folder) { return "/proc/self/fd/" + std::to_string(folder.get()); }
 
 /// Locks folders during its lifetime. No effect on file systems without locks.
@@ -105,7 +105,7 @@ constexpr const char* locked_by_another = "another program has locked the folder
 struct move {
   std::string from, to, old;
   bool replaces = false;  ///< a file exists at `to`
-  bool has_old = false;   ///< it also exists at `old`
+  bool has_old = false;   ///< that file also exists at `old`
 };
 
 /// Added to the errno value if the files that were already moved cannot be moved back.
@@ -288,9 +288,9 @@ struct cleared_folders {
   std::string obstacle;  ///< the reason why the folders could not be locked or cleared; empty if they were
 };
 
-/// Locks `folders`, and completes the transactions of ended processes in them or removes their hidden folders. Also
-/// locks the folders of the other files of these transactions. All folders are locked together: locking starts again
-/// whenever a folder is found that is not locked yet.
+/// Locks `folders`, completes the transactions that ended processes left in them, and removes the hidden folders of
+/// these processes. Also locks the folders of the other files of these transactions. All folders are locked together:
+/// locking starts again whenever a folder is found that is not locked yet.
 cleared_folders lock_and_clear(const std::vector<opened_folder>& folders) {
   cleared_folders cleared;
   std::vector<fs::path> paths;

@@ -46,8 +46,8 @@ struct hidden_folders {
 
 class staged_folder {
  public:
-  /// Prefix of the names of hidden folders, and the name of the folder in each of them for other files. No result may
-  /// have a name with this prefix.
+  /// Prefix of the names of hidden folders, and the name of a folder for other files in each hidden folder. No result
+  /// may have a name with this prefix.
   static constexpr const char* private_name = ".rgbd_slam";
 
   /// Completes the moves into `folder` that ended processes have begun, and removes the other hidden folders of ended
@@ -82,7 +82,7 @@ class staged_folder {
   staged_folder() = default;
   /// Finds the present paths of the folders. @pre hidden.mutex is locked
   void follow(hidden_folders& hidden);
-  /// Renames the hidden folder, which an interrupt must still find. @pre hidden.mutex is locked
+  /// Renames the hidden folder, also in `hidden`, so that an interrupt finds the folder. @pre hidden.mutex is locked
   std::error_code rename_hidden(const std::filesystem::path& to, hidden_folders& hidden);
   /// Keeps the hidden folder after the end of this process. @pre hidden.mutex is locked
   void leave(hidden_folders& hidden);

@@ -64,7 +64,7 @@ struct topic : bag_topic {
   std::string frame_id;       ///< coordinate frame of the first image
   std::vector<double> times;  ///< times in the headers, ascending
   std::size_t unread = 0;     ///< number of omitted messages
-  std::string reason;         ///< the reason why the first of them is omitted
+  std::string reason;         ///< the reason for the first omission
   [[nodiscard]] bool is_compressed() const { return type == "sensor_msgs/CompressedImage"; }
   [[nodiscard]] bool is_depth() const { return is_depth_encoding(encoding) || name.ends_with("/compressedDepth"); }
   [[nodiscard]] bool is_read() const { return is_compressed() || is_known_encoding(encoding); }
@@ -660,7 +660,7 @@ class bag_recording final : public file_recording {
                     " pixels, but the camera has " + std::to_string(width) + "x" + std::to_string(height) +
                     (is_depth ? ": depth is not registered to colour" + unregistered_ : ""));
   }
-  /// Applies `decode` to a message of either type.
+  /// Applies `decode` to a message of type `Image` or `CompressedImage`.
   template <class Decode>
   [[nodiscard]] auto decoded(const topic& of, std::size_t i, const Decode& decode) const
       -> decltype(decode(ros_messages::image{}, std::string{})) {

@@ -66,8 +66,8 @@ inline constexpr std::size_t whole_message = std::size_t{1} << 30U;  ///< bytes;
 /// Lists the messages in a database. Leaves the database and its write-ahead log unchanged, and creates no files.
 [[nodiscard]] orbis::result<std::unique_ptr<bag_file>> open_sqlite_bag(const std::filesystem::path& path);
 
-/// Returns true if `path` is a bag or a folder with one. Examines the first bytes of the file, its name if it is
-/// damaged, or the files in the folder.
+/// Returns true if `path` is a bag or a folder with one. Examines the name of a file and its first bytes, or the files
+/// in a folder.
 [[nodiscard]] bool is_bag(const std::filesystem::path& path);
 
 /// A bag that consists of one or more files: a single file, or the folder of a rosbag2 with its parts, whose

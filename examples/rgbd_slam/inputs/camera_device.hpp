@@ -21,7 +21,7 @@ class camera_device {
  public:
   virtual ~camera_device() = default;
   /// Waits for the next frame; empty if none arrives within `patience`. Errors: no_data (end of a played recording),
-  /// others (the device is disconnected). It is called on one thread only.
+  /// others (the device is disconnected). Called on one thread only.
   [[nodiscard]] virtual orbis::result<std::optional<source_frame>> next(std::chrono::milliseconds patience) = 0;
 
   std::string name;

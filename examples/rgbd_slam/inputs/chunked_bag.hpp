@@ -65,7 +65,7 @@ class chunked_bag : public bag_file {
     bool is_complete = true;
   };
 
-  /// Returns true if a complete index of known topics is at a position.
+  /// Returns true if there is a complete index of known topics at a position.
   bool has_index(std::uint64_t at);
   void define(const bag_record& r);
   void add(std::uint32_t channel, const bag_message& m);

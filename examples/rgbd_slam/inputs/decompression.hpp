@@ -13,7 +13,7 @@ namespace app {
 
 struct decompressed {
   std::string bytes;
-  bool is_complete = false;  ///< false if the input is truncated or damaged: `bytes` precede the damage
+  bool is_complete = false;  ///< false if the input is truncated or damaged; `bytes` is then the part before the damage
 };
 
 /// Decompresses "lz4", "zstd" or "bz2", up to `most` bytes of output; memory is allocated as the output is produced.

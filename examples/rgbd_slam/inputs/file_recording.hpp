@@ -31,7 +31,7 @@ class file_recording {
 
   orbis::slam::sensor_kind sensor = orbis::slam::sensor_kind::monocular;
   std::string kind;       ///< "video", "ROS bag"
-  std::string images_of;  ///< the used topics of a bag; empty for videos
+  std::string images_of;  ///< topics of a bag from which the images are read; empty for videos
   orbis::camera::camera_settings camera;
   orbis::trajectory ground_truth;            ///< empty if unknown
   std::string truth_of;                      ///< the topic and the frames of the ground truth
@@ -50,8 +50,8 @@ struct file_recording_options {
 [[nodiscard]] bool has_videos();
 
 /// Opens a video: images of one camera or, if `sensor` is stereo, the left and the right image of a rectified pair side
-/// by side. Times are those in the container. The camera is that in the options or in `camera.toml` next to the file.
-/// Reads the whole file once. Errors: unsupported (this build cannot read videos, or not this format), not_found,
+/// by side. Times are those in the container. The camera is the one in the options or in `camera.toml` next to the
+/// file. Reads the whole file once. Errors: unsupported (this build cannot read videos, or not this format), not_found,
 /// no_data, malformed (image size different from the camera's), invalid_argument (no camera, no baseline).
 [[nodiscard]] orbis::result<std::unique_ptr<file_recording>> open_video(const std::filesystem::path& path,
                                                                         const file_recording_options& options);

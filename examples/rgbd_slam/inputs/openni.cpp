@@ -29,8 +29,7 @@ std::string reason() {
   return text.substr(begin, text.find('\n', begin) - begin);
 }
 
-/// The mode of a stream with this pixel format and the given width, or else the largest mode up to that width or
-/// 640x480, at the highest rate.
+/// The widest mode of a stream with this pixel format that is not wider than `width`, at the highest frame rate.
 std::optional<openni::VideoMode> find_mode(const openni::SensorInfo& info, openni::PixelFormat format, int width) {
   std::optional<openni::VideoMode> best;
   const auto& modes = info.getSupportedVideoModes();

@@ -41,7 +41,7 @@ class rosbag1_file final : public chunked_bag {
   enum operation : std::uint8_t { message = 2, bag_header, index, chunk, chunk_info, connection };
 
   std::uint64_t first_record() override { return magic; }
-  /// 0 if the bag was not closed.
+  /// Position of the topic definitions; 0 if the bag was not closed.
   std::uint64_t definitions() override { return read_header().definitions; }
 
   /// The numbers in the header of the bag.

@@ -47,8 +47,8 @@ class video_recording final : public file_recording {
   }
 
  private:
-  /// Reads a frame. Few containers support exact seeking, so the file is read forwards, and from the beginning for
-  /// earlier frames.
+  /// Reads a frame. Few containers support exact seeking, so the file is read forwards, and again from the beginning
+  /// for an earlier frame.
   [[nodiscard]] result<orbis::image<orbis::rgb8>> read(std::size_t i) const {
     const std::lock_guard lock{mutex_};
     if (i < next_) {

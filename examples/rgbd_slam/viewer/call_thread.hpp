@@ -12,9 +12,9 @@
 
 namespace app {
 
-/// A thread with the priority of its creator that makes calls on behalf of a low-priority thread. These calls lock
-/// mutexes that high-priority threads need. This avoids priority inversion: on a machine with few cores, a low-priority
-/// thread may not be scheduled for a long time while it holds a lock.
+/// A thread that makes calls on behalf of a low-priority thread, with the priority of its own creator. The calls lock
+/// mutexes that high-priority threads need, so the higher priority avoids priority inversion: on a machine with few
+/// cores, a low-priority thread may not be scheduled for a long time while it holds a lock.
 class call_thread {
  public:
   /// Throws if no thread can be created.

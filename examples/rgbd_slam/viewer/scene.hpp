@@ -90,7 +90,7 @@ struct shown_numbers {
   double tracking_ms = 0.0, tracking_p95_ms = 0.0;
   std::size_t insertions = 0;
   double insert_ms = 0.0, insert_p95_ms = 0.0;  ///< time taken to insert a keyframe into the octree
-  std::size_t behind_frames = 0;                ///< maximum number of frames tracked before an insertion
+  std::size_t behind_frames = 0;                ///< maximum number of frames tracked between creation and insertion
   std::size_t corrections = 0;
   double correction_ms = 0.0;  ///< time taken by the last correction
 };

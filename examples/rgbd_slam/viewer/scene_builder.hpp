@@ -75,9 +75,9 @@ class scene_builder {
   scene_builder& operator=(const scene_builder&) = delete;
   ~scene_builder();
 
-  /// Adds a frame. Lock-free; never waits for the other functions. The frame replaces the previous one if that is not
-  /// in the scene yet, except for the path and the colours of keyframes; the number of these colours is limited until
-  /// the next update. Reads the pixels that are stored for a keyframe. Call it from one thread only.
+  /// Adds a frame. Lock-free; never waits for the other functions. If the previous frame is not in the scene yet, this
+  /// frame replaces it, but the points of the path and the colours of keyframes are kept. Stores a limited number of
+  /// colours between two updates, and samples the colours of a keyframe during the call. Call it from one thread only.
   void push(viewer_frame frame);
 
   /// Updates the scene and returns it. Queries SLAM and the map at most every few hundred milliseconds and spends at

@@ -26,7 +26,7 @@ class viewer {
   /// Opens the viewer selected in the settings and prints its address. Errors: no display; the port is in use.
   [[nodiscard]] static orbis::result<viewer> open(const settings& s, const frame_source& source, console& console);
 
-  /// Shows the frame that `make()` returns if the viewer is open. Call it from one thread only.
+  /// If the viewer is open, shows the frame that `make()` returns. Call it from one thread only.
   template <std::invocable Make>
   void show(Make&& make) noexcept {
     if (thread_) thread_->show(std::forward<Make>(make));

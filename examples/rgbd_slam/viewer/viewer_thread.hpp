@@ -46,7 +46,7 @@ class viewer_thread {
   /// Returns true if the viewer is open.
   [[nodiscard]] bool is_open() const noexcept { return is_open_; }
 
-  /// Shows the frame that `make()` returns if the viewer is open. Does not block. Call it from one thread only.
+  /// If the viewer is open, shows the frame that `make()` returns. Does not block. Call it from one thread only.
   template <std::invocable Make>
   void show(Make&& make) noexcept {
     if (!is_open()) return;
