@@ -55,7 +55,7 @@ template <camera::camera_model Camera>
                                                   const Camera& camera, const pnp_options& options,
                                                   pnp_workspace& workspace);
 
-/// Same as above, with temporary working memory.
+/// Like the overload with a workspace, but with temporary working memory.
 template <camera::camera_model Camera>
 [[nodiscard]] result<pose_estimate> estimate_pose(std::span<const vec3> points_world, std::span<const vec2> pixels,
                                                   const Camera& camera, const pnp_options& options = {}) {

@@ -189,7 +189,7 @@ struct pose_graph_summary {
   double initial_cost = 0.0;  ///< half the sum of the robust loss over the edges
   double final_cost = 0.0;    ///< never above `initial_cost`
   int iterations = 0;         ///< accepted steps
-  int factorizations = 0;     ///< including those of rejected steps
+  int factorizations = 0;     ///< number of factorisations, including those of rejected steps
   pose_graph_times seconds;
 };
 

@@ -398,7 +398,7 @@ template <model_estimator E>
       *run.best(), {run.inliers().begin(), run.inliers().end()}, run.exact_score(), iteration};
 }
 
-/// Same as above, with temporary working memory.
+/// Like the overload with a workspace, but with temporary working memory.
 template <model_estimator E>
 [[nodiscard]] result<ransac_estimate<typename E::model>> ransac(const E& estimator, const ransac_options& options) {
   ransac_workspace workspace;

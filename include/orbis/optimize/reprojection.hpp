@@ -62,8 +62,8 @@ struct reprojection {
     return difference(*pixel, point_camera.z(), o);
   }
 
-  /// Same as above; also writes the derivative with respect to the point in the camera frame to `j`. Without depth, its
-  /// third row is 0.
+  /// Like the overload without `j`; also writes the derivative with respect to the point in the camera frame to `j`.
+  /// Without depth, its third row is 0.
   [[nodiscard]] std::optional<vec3> residual(const vec3& point_camera, const pose_observation& o, mat3& j) const {
     matrix<2, 3> projection;
     const auto pixel = camera.project(point_camera, projection);

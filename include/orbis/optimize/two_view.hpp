@@ -37,7 +37,7 @@ struct essential_options {
 
 struct relative_pose_estimate {
   se3 T_first_second;                  ///< pose of the second camera in the frame of the first; unit translation
-  mat3 essential;                      ///< `second^T E first = 0` for rays, of norm sqrt(2)
+  mat3 essential;                      ///< `second^T E first = 0` for matching rays; norm sqrt(2)
   std::vector<std::uint32_t> inliers;  ///< indices of all matches within the threshold, ascending
   std::size_t in_front = 0;            ///< number of inliers whose rays intersect in front of both cameras
   double parallax = 0.0;               ///< median angle between the two rays of an inlier, radians

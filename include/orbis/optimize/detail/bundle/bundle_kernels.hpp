@@ -74,7 +74,7 @@ struct camera_work {
   const std::uint32_t* point = nullptr;
   const double* positions = nullptr;  ///< positions of the points, four values each
   // Outputs.
-  double* normal = nullptr;  ///< `point_size` values per point, to which the observations are added
+  double* normal = nullptr;  ///< `point_size` values per point, to which the observations contribute
   double* mixed = nullptr;   ///< one `mixed_tile` per eight observations if the camera is movable
   double* sums = nullptr;    ///< `camera_numbers` values; null if the camera is fixed
 };

@@ -50,7 +50,7 @@ class shared_intrinsics {
   enum class out : std::uint8_t {
     no,
     outlier,  ///< inconsistent with the estimate
-    alone     ///< its image or its point is not determined or not connected to the others
+    alone     ///< its image or point is not determined, or not connected to the largest component
   };
 
  public:
@@ -312,13 +312,13 @@ class shared_intrinsics {
   /// The contribution of an observation to the normal equations.
   struct seen {
     bool takes_part = false;
-    std::uint32_t row = none;  ///< first row of its image's unknowns
+    std::uint32_t row = none;  ///< first row of the image's unknowns
     block_63 pose_point;
     vec6 gradient;  ///< with respect to the image pose
   };
   /// The sum of the contributions of a point's observations.
   struct point_part {
-    bool is_determined = false;  ///< true if determined by these observations
+    bool is_determined = false;  ///< true if the observations determine the point
     mat3 own = zeros<mat3>();
     vec3 gradient = zeros<vec3>();
     block_t3 theta_point = zeros<block_t3>();
@@ -503,7 +503,7 @@ class shared_intrinsics {
 
   /// The derivatives of one residual.
   struct jacobians {
-    std::uint32_t row;  ///< first row of its image's unknowns
+    std::uint32_t row;  ///< first row of the image's unknowns
     double weight;
     matrix<3, 6> by_pose;
     by_theta_type by_theta;

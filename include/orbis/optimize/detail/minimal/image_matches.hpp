@@ -23,7 +23,7 @@ struct metric_ray {
   double x = 0.0, y = 0.0;
   double xx = 1.0, xy = 0.0, yy = 1.0;
   [[nodiscard]] vec3 direction() const { return {x, y, 1.0}; }
-  /// Changes the unit of distances.
+  /// Multiplies all distances by `factor`, which changes their unit.
   void scale_metric(double factor) {
     xx *= factor;
     xy *= factor;

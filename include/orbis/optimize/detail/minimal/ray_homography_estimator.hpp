@@ -34,7 +34,7 @@ namespace orbis::optimize::detail {
 class ray_homography_estimator {
  public:
   struct model {
-    mat3 forward, backward;  ///< both give positive z for rays that are transferred to the front of the camera
+    mat3 forward, backward;  ///< both matrices give positive z for rays that are transferred to the front of the camera
   };
   static constexpr std::size_t sample_size = 4;
 
