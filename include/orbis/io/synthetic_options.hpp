@@ -67,7 +67,7 @@ struct synthetic_sensor_options {
 
   double axial_noise = 1.0;       ///< factor applied to the published standard deviation
   double lateral_noise = 0.5;     ///< standard deviation in pixels of the position of a ray near a depth edge
-  double flying_pixels = 0.15;    ///< fraction of the pixels on a depth edge with a depth between its two sides
+  double flying_pixels = 0.15;    ///< fraction of pixels on a depth edge whose depth is between its two sides
   double disparity_step = 0.125;  ///< resolution of the disparity, pixels of the infrared camera
   double infrared_focal = 580.0;  ///< focal length of the infrared camera, pixels: disparity = focal * baseline / depth
   double baseline = 0.075;        ///< distance from projector to camera, metres

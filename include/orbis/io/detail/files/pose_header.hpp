@@ -36,7 +36,7 @@ inline constexpr pose_columns usual_columns{0, 1, 2, 3, 4, 5, 6, 7};
 
 /// The columns listed in a header line.
 struct pose_header {
-  std::optional<std::size_t> quaternion;  ///< first of its four columns; empty if the line does not list them
+  std::optional<std::size_t> quaternion;  ///< first column of the quaternion; empty if the line does not list it
   bool w_first = false;                   ///< w, x, y, z; otherwise x, y, z, w
   bool nanoseconds = false;
   bool is_comment = false;
