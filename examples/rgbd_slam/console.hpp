@@ -41,7 +41,7 @@ class console {
   /// Seconds since the start of the program.
   [[nodiscard]] double total() const;
 
-  /// Returns a progress callback for a library call in this stage, which cancels work that was abandoned.
+  /// Returns a progress callback for a library call in this stage. The callback cancels work that was abandoned.
   [[nodiscard]] auto progress() {
     return [this](std::size_t done, std::size_t total) {
       advance(done, total);

@@ -30,7 +30,7 @@ struct eye {
   }
 };
 
-/// A camera at an azimuth and elevation (radians) from the points, at the smallest distance at which all are visible.
+/// A camera at an azimuth and elevation (radians) from the points, at the smallest distance that shows them all.
 eye look_at(const std::vector<vec3>& points, double azimuth, double elevation, double field, int width, int height) {
   eye e;
   e.forward =

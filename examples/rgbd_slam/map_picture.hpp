@@ -24,7 +24,7 @@ struct view_from_above {
   orbis::image<orbis::rgb8> picture;
   double pixels_per_metre;
 };
-/// Draws a view from above; the frame's y axis points up. Otherwise like `draw_aslant`.
+/// Draws a view from above; the frame's y axis points up in the picture. Otherwise like `draw_aslant`.
 [[nodiscard]] view_from_above draw_from_above(const std::vector<voxel>& voxels, const std::vector<voxel>& in_view,
                                               const view_frame& frame, coloring how, int width, int height);
 

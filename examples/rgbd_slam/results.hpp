@@ -32,7 +32,7 @@ struct spread {
 struct voxel {
   orbis::vec3f center;
   float size;           ///< edge length, metres
-  orbis::rgb8 color{};  ///< mean colour of the points in it
+  orbis::rgb8 color{};  ///< mean colour of the points in the cube
 };
 
 struct tree_numbers {

@@ -26,7 +26,7 @@ enum exit_code : int {
   undetermined = 5,
   interrupted = 130
 };
-/// The exit code of a command that an error prevents.
+/// The exit code of a command that fails because of an error.
 [[nodiscard]] inline exit_code code_of(const orbis::error& e) {
   return e.code == orbis::errc::invalid_argument ? bad_usage : bad_input;
 }
@@ -77,7 +77,7 @@ struct settings {
   std::filesystem::path save_map;  ///< file for the landmark map; empty: none
   bool live_map = true;            ///< build the octree during tracking; otherwise at the end
   std::size_t depth_memory = 16;   ///< memory for depth images of keyframes, MB; images beyond it are written to a file
-  bool map_every_frame = false;    ///< insert frames between keyframes into the live map, until the final filter
+  bool map_every_frame = false;    ///< also insert frames between keyframes into the live map; the final map omits them
   bool realtime = false;           ///< play frames at the rate of their timestamps
   bool localize_only = false;      ///< do not change the loaded map
   bool moving = true;              ///< detect moving objects

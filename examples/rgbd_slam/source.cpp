@@ -39,7 +39,7 @@ using orbis::slam::sensor_kind;
 
 constexpr const char* camera_request = "specify a camera";
 
-/// Adds the command-line option to a reader's request for a camera.
+/// If `e` is a reader's request for a camera, adds the command-line option to it.
 orbis::error with_option(orbis::error e) {
   if (e.message.ends_with(camera_request))
     e.message +=

@@ -161,7 +161,7 @@ bool may_be_replaced(const fs::path& path) {
   return !fs::exists(there) || fs::is_regular_file(there) || fs::is_symlink(there);
 }
 
-/// The moves for the files in `from` that have one of the names.
+/// The moves of the files in `from` that have one of the names.
 std::vector<move> moves_to(const fs::path& folder, const fs::path& from, const std::vector<std::string>& names) {
   std::vector<move> moves;
   for (const std::string& name : names) {
@@ -285,7 +285,7 @@ struct opened_folder {
 struct cleared_folders {
   std::vector<descriptor> descriptors;
   std::unique_ptr<folder_locks> locks;
-  std::string obstacle;  ///< the reason why the folders could not be locked or cleared; empty if they were
+  std::string obstacle;  ///< the reason why the folders could not be locked or cleared; empty if there is none
 };
 
 /// Locks `folders`, completes the transactions that ended processes left in them, and removes the hidden folders of

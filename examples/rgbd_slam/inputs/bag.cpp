@@ -516,7 +516,8 @@ class bag_recording final : public file_recording {
                        [&](const ros_messages::transform& t) { tree.add(t); });
     return tree;
   }
-  /// `T_a_b` for frames that do not move relative to each other (in ROS 1 also published on /tf); empty if unknown.
+  /// `T_a_b` for frames that do not move relative to each other, even if it is published on /tf, as in ROS 1; empty if
+  /// unknown.
   [[nodiscard]] std::optional<orbis::se3> static_transform(const std::string& a, const std::string& b) {
     if (const auto found = static_frames().transform(a, b)) return found;
     if (!all_frames_) all_frames_ = frames_with([](const std::string&) { return true; });

@@ -14,10 +14,10 @@
 #include "inputs/file_recording.hpp"
 
 extern "C" {
-/// `app::open_video`.
+/// Implements `app::open_video`.
 void rgbd_slam_open_video(const std::filesystem::path& path, const app::file_recording_options& options,
                           orbis::result<std::unique_ptr<app::file_recording>>& opened);
-/// `app::open_video_camera`.
+/// Implements `app::open_video_camera`.
 void rgbd_slam_open_video_camera(const app::device_options& options,
                                  orbis::result<std::unique_ptr<app::camera_device>>& opened);
 }

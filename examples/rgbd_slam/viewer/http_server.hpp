@@ -41,7 +41,7 @@ struct http_limits {
   std::chrono::milliseconds silence{2000};            ///< maximum time between requests on a connection
   std::chrono::milliseconds request{2000};            ///< maximum time from the first byte of a request to the last
   std::chrono::milliseconds sending{5000};            ///< time within which a client must read some part of a response
-  std::size_t bytes_per_millisecond = 64;  ///< minimum rate at which a client must read a response, after `sending`
+  std::size_t bytes_per_millisecond = 64;  ///< minimum rate at which a client must read after the time `sending`
   std::chrono::milliseconds closing{500};  ///< time for a client to read the last response
 };
 

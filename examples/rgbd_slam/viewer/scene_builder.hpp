@@ -48,7 +48,7 @@ struct slam_graph {
   /// that are not in the active map.
   std::vector<std::optional<orbis::sim3>> poses;
   std::vector<orbis::se3> keyframes;  ///< keyframe poses of the active map
-  std::vector<shown_edge> edges;      ///< edges between these keyframes
+  std::vector<shown_edge> edges;      ///< edges between the keyframes in `keyframes`
 };
 
 /// Data sources of the scene in addition to frames. `update` calls them; each may be empty.
