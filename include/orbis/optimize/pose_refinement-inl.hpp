@@ -114,7 +114,7 @@ class pose_refiner {
         if (!(cholesky.factor(lambda) > 0.0)) continue;
         const vec6 step = cholesky.solve(-now.g);
         if (!all_finite(step)) continue;
-        // The model predicts a decrease of at least half of this.
+        // The model predicts a decrease of at least half of -g^T step.
         if (-dot(now.g, step) <= negligible * now.cost || squared_norm(step) < 1e-20)
           return refinement_status::converged;
         const se3 there = se3::exp(step) * T_camera_world_;
