@@ -314,7 +314,7 @@ result<void> result_files::take_optional() {
 void result_files::drop_optional() noexcept {
   try {
     for (const staged_folder& f : folders_) fs::remove_all(f.path() / optional_name);
-  } catch (const std::exception&) {  // they are removed at the end
+  } catch (const std::exception&) {  // the files are removed at the end
   }
 }
 

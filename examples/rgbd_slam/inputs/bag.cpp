@@ -610,7 +610,7 @@ class bag_recording final : public file_recording {
 
   /// Reads the poses of the camera's frame in the root frame at the times of the images.
   result<void> read_truth_of_frames(const std::string& name) {
-    constexpr double most_gap = 0.5, most_distance = 0.05;  // seconds; between two transforms, and to the nearest one
+    constexpr double most_gap = 0.5, most_distance = 0.05;  // seconds, between transforms and to the nearest one
     const auto is_named = [&](const std::string& topic) { return topic == name; };
     const frame_tree tree = frames_with(is_named);
     const std::vector<std::string> path = tree.path_to_root(first_->frame_id);

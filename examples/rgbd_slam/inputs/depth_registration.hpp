@@ -57,7 +57,7 @@ class depth_registration {
     const orbis::vec3 a = corners_(x, y) * z + t_color_depth_, b = corners_(x + 1, y + 1) * z + t_color_depth_;
     const auto p = color.project(a), q = color.project(b);
     if (!p || !q) return;
-    constexpr double more = 0.25, most = 64.0;  // pixels; larger squares are closer than depth cameras can measure
+    constexpr double more = 0.25, most = 64.0;  // pixels; larger squares would be too near for depth cameras
     const double left = std::min(p->x(), q->x()) - more, right = std::max(p->x(), q->x()) + more;
     const double top = std::min(p->y(), q->y()) - more, bottom = std::max(p->y(), q->y()) + more;
     if (!(right - left < most && bottom - top < most && right >= 0.0 && bottom >= 0.0 && left < out.width() &&

@@ -13,7 +13,7 @@ using orbis::fail;
 
 namespace {
 constexpr auto poll_interval = 50ms;  // time between checks of whether the run has ended
-constexpr auto longest_wait = 10s;    // without a frame, until the camera counts as disconnected
+constexpr auto longest_wait = 10s;    // time without a frame after which the camera counts as disconnected
 }  // namespace
 
 live_source::live_source(std::unique_ptr<camera_device> device)

@@ -30,7 +30,7 @@ class mcap_file final : public chunked_bag {
   std::optional<bag_record> record_at(byte_source& from, std::uint64_t at) override {
     constexpr std::uint64_t most_head = 256, most_definition = 1U << 20U;  // bytes
     std::string bytes = from.read(at, most_head);
-    message_reader in{bytes, message_encoding::ros1};  // has the same layout of numbers and strings
+    message_reader in{bytes, message_encoding::ros1};  // ROS 1 has the same layout of numbers and strings
     const auto code = in.number<std::uint8_t>();
     const auto length = in.number<std::uint64_t>();
     if (!in.ok() || code == 0 || length > std::uint64_t{1} << 62U) return std::nullopt;

@@ -233,7 +233,7 @@ class http_server::connection {
   clock::time_point last_{};  // deadline for the whole response
   std::string received_;      // data of the next requests
   std::vector<std::shared_ptr<const std::string>> parts_;
-  std::size_t part_ = 0, sent_ = 0;  // bytes of that part
+  std::size_t part_ = 0, sent_ = 0;  // index of the current part, and its bytes sent so far
   bool closes_ = false;              // closes the connection after this response
   std::size_t ignored_ = 0;          // bytes received after the last response
 };
