@@ -22,7 +22,7 @@
 namespace app {
 
 /// A frame of an RGB-D, stereo or monocular camera. For a stereo camera, `color` is the left image; `depth` is empty
-/// and `depth_scale` meaningless until `frame_source::complete` computes them. A monocular frame never has depth.
+/// and `depth_scale` is meaningless until `frame_source::complete` computes them. A monocular frame never has depth.
 struct source_frame : orbis::camera::rgbd_frame {
   orbis::image<orbis::rgb8> right;  ///< empty unless the sensor is a stereo camera
 };

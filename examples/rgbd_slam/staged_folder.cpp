@@ -190,8 +190,8 @@ std::optional<std::vector<std::string>> read_list(const fs::path& path) {
   return texts;
 }
 
-/// Returns true for a hidden folder of this program. Folders of other users, who may create one in a folder like /tmp,
-/// do not count unless the parent folder belongs to the same user.
+/// Returns true if `path` is a hidden folder of this program. A folder of another user, for example in /tmp, does not
+/// count unless the parent folder belongs to the same user.
 bool is_hidden_folder(const fs::path& path) {
   struct stat status {};
   struct stat parent {};

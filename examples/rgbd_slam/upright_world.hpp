@@ -21,7 +21,7 @@ class upright_worlds {
  public:
   upright_worlds(const frame_source& source, const settings& s);
 
-  /// The pose of the camera at `frame` in the world frame that starts with this frame. With ground truth, it is the
+  /// The pose of the camera at `frame` in the world frame that starts with this frame. With ground truth, this is the
   /// world frame of the ground truth, rotated if its z axis does not point up; without ground truth (or with positions
   /// only), the camera is at the origin and looks along x. The direction of gravity in the settings applies only to the
   /// very first frame (`is_first`).
