@@ -45,9 +45,9 @@ struct http_limits {
   std::chrono::milliseconds closing{500};  ///< time for a client to read the last response
 };
 
-/// Serves 127.0.0.1 on one thread. It rejects requests for another host (from a foreign page whose name resolves to
-/// 127.0.0.1), methods other than GET, and ranges. The destructor closes all connections; it waits for the computation
-/// of at most one response, and never for clients.
+/// An HTTP server on 127.0.0.1 with one thread. It rejects requests whose Host header names another host (a page of
+/// another site whose name resolves to 127.0.0.1), methods other than GET, and range requests. The destructor closes
+/// all connections; it waits for the computation of at most one response, and never for clients.
 class http_server {
  public:
   /// `answer` is called on the server's thread for each accepted request; if it throws, `failed` is called and the

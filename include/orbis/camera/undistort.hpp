@@ -29,8 +29,8 @@ concept has_intrinsics = camera_model<C> && requires(const C& camera) {
 /// every frame. 8 bytes per pixel.
 class undistortion {
  public:
-  /// Creates the map to an ideal camera at the position of `camera`, rotated by `R_camera_ideal`. O(pixels of `ideal`)
-  /// projections.
+  /// Creates the table of pixels for an ideal camera at the position of `camera`, rotated by `R_camera_ideal`. One
+  /// projection per pixel of `ideal`.
   template <camera_model Camera>
   undistortion(const Camera& camera, const pinhole& ideal, const mat3& R_camera_ideal = identity<mat3>())
       : source_width_{camera.width()},

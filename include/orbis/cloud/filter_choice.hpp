@@ -43,17 +43,18 @@ struct density_evidence {
   double removed = 0;          ///< share of the points that the test removes; 0: the test is not part of the chain
 };
 
-/// Measurements on which a choice is based. Lengths in metres; shares are of all finite points.
+/// Measurements on which a choice is based. Lengths in metres; shares are of all finite points; widths are natural
+/// logarithms of ratios of spacings.
 struct filter_evidence {
   std::size_t points = 0;                   ///< number of points
   std::size_t finite = 0;                   ///< number of finite points
   std::size_t judged = 0;                   ///< number of points with spacing > 0 and, if any range is known, a range
   double median_spacing = 0;                ///< median over the points of the mean neighbour distance
-  double left_scale = 0;                    ///< width of the bulk below its median with the chosen reference, log
-  double right_scale = 0;                   ///< width of the bulk above its median, log
-  double global_scale = 0;                  ///< width with one reference for all points, log
-  std::optional<double> range_scale;        ///< width with a reference that depends on range, if ranges are known
-  double local_scale = 0;                   ///< width with the surroundings as the reference
+  double left_scale = 0;                    ///< width of the bulk below its median, with the chosen reference
+  double right_scale = 0;                   ///< width of the bulk above its median, with the chosen reference
+  double global_scale = 0;                  ///< width of the bulk with one reference for all points
+  std::optional<double> range_scale;        ///< width of the bulk with a reference for each range, if ranges are known
+  double local_scale = 0;                   ///< width of the bulk with the surroundings as the reference
   std::vector<density_evidence> density{};  ///< one entry per test performed
   double isolated = 0;                      ///< share of points removed as isolated groups
   double clustered = 0;                     ///< share of points removed as small clusters

@@ -132,7 +132,7 @@ class stereo_matcher {
   struct match_found {
     std::uint32_t query;
     float column;
-    float difference;  ///< per pixel
+    float difference;  ///< mean difference per pixel
   };
   struct placed {
     float column = std::numeric_limits<float>::quiet_NaN();

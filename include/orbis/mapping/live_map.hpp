@@ -366,7 +366,7 @@ class live_map {
     double reach = 0.0;  ///< largest depth in its image, metres
     bool waiting = false;
     bool filtered = false;
-    std::uint64_t listed = 0;  ///< index of the last call to set_poses that listed it
+    std::uint64_t listed = 0;  ///< index of the last call to set_poses that listed the keyframe
   };
   struct transient {
     std::uint64_t frame, keyframe;

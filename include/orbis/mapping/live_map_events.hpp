@@ -21,7 +21,7 @@ struct live_map_snapshot {
   Octree map;
   std::uint64_t revision = 0;  ///< revision of the change log
   std::size_t keyframes = 0;   ///< number of keyframes added and not removed
-  std::size_t frames = 0;      ///< number of frames between keyframes in the map
+  std::size_t frames = 0;      ///< number of other frames in the map
   std::size_t pending = 0;     ///< keyframes and bricks waiting for a correction; 0: the map is up to date
 };
 

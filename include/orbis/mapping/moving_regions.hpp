@@ -41,7 +41,7 @@ struct marked_pixel {
 struct moving_region_options {
   /// Maximum distance along a surface from a marked pixel, metres.
   float reach = 0.8F;
-  /// Minimum number of moving marks in the image; with fewer, nothing is removed.
+  /// Minimum number of marked pixels on moving objects; with fewer, nothing is removed.
   std::size_t least_marks = 5;
 };
 

@@ -34,15 +34,15 @@ struct motion_state {
   vec3 acceleration = zeros<vec3>();  ///< metres / second^2
 };
 
-/// A piece of a path over a parameter from 0 to `length`: a straight line along `direction`, or a corner that turns
+/// A piece of a path, parameterised from 0 to `length`: a straight line along `direction`, or a corner that turns
 /// from `direction` to `turned`. In a corner, with l = parameter / length, the derivative turns from one unit vector to
 /// the other,
 ///
 ///     q' = (1 - w) direction + w turned,    w = l^2 (3 - 2 l),
 ///
 /// so that |q'| <= 1, and with q'' = 0 at both ends: lines and corners join with continuous velocity and curvature. A
-/// corner is a Bezier curve of degree 4 with its control points on both legs of the corner, each leg half of `length`
-/// long: the end of the leg, its middle, and the corner (see corner_points).
+/// corner is a Bezier curve of degree 4. Each of its two legs is `length` / 2 long; the control points are the end and
+/// the middle of each leg, and the corner itself (see corner_points).
 struct path_piece {
   vec3 start = zeros<vec3>();
   vec3 direction = vec3(1.0, 0.0, 0.0), turned = vec3(1.0, 0.0, 0.0);  ///< unit vectors
@@ -98,8 +98,8 @@ class robot_trajectory {
     double gain;   ///< second time derivative of the parameter
   };
 
-  /// Computes the knots of the fastest motion within the limits. Over an interval of a piece, with the square u of the
-  /// parameter's speed linear in the parameter, |q'| <= a and |q''| <= b,
+  /// Computes the knots of the fastest motion within the limits. Let u be the square of the parameter's speed, linear
+  /// in the parameter over an interval of length h. If |q'| <= a and |q''| <= b in the interval, then
   ///
   ///     speed^2 <= a^2 u,    |acceleration| <= a |du| / (2 h) + b u,
   ///

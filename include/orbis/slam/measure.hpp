@@ -137,8 +137,9 @@ template <camera::camera_model Camera, feature_extractor Extractor, camera::dept
   return measure_rgbd(rig, extract, color, depth, memory);
 }
 
-/// Sets `depth` of `f.as_read` to the depth at the time of each keypoint's colour image row: reads the depth image
-/// where the moving camera sees the same point. @pre all images have the size of the camera
+/// Sets `depth` of each keypoint in `f.as_read` to the depth at the time when its row of the colour image was read. The
+/// depth is that of the pixel at which the moving camera sees the same point in the depth image. @pre all images have
+/// the size of the camera
 template <camera::camera_model Camera, feature_descriptor D, camera::depth_source Depth>
 void follow_rows(const camera_rig<Camera>& rig, const frame_motion& m, basic_frame<D>& f, const Depth& depth) {
   for (keypoint_as_read& k : f.as_read) {

@@ -54,7 +54,7 @@ struct culling_options {
   int coarser_levels = 1;               ///< for `redundant`: number of levels by which the observations may be coarser
 };
 
-/// Use of depth images in pose estimation: aligns points of a frame with surfaces of keyframes. For sensors with a
+/// Use of depth images in pose estimation: points of a frame are aligned with surfaces of keyframes. For sensors with a
 /// depth image.
 struct depth_term_options {
   bool enabled = true;           ///< adds the depth term to the keypoint residuals in every pose refinement
@@ -122,7 +122,7 @@ struct fusion_options {
 
 /// Conditions for accepting a loop.
 struct loop_options {
-  std::uint32_t distance = 64;   ///< maximum descriptor distance between the two keyframes
+  std::uint32_t distance = 64;   ///< maximum descriptor distance of a match between the two keyframes
   float ratio = 0.85F;           ///< maximum ratio of the best to the second-best distance
   std::size_t min_matches = 20;  ///< minimum number of descriptor matches between the two keyframes
   /// Inlier threshold for the descriptor matches, in standard deviations of the depth or, if no lengths are measured,

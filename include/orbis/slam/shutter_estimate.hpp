@@ -13,9 +13,9 @@ namespace orbis::slam {
 /// 0 in `shutter`, and have a deviation that is large or not finite.
 struct shutter_estimate {
   camera::shutter shutter{};  ///< the estimate, with the same read-out for both images
-  double read_out = 0.0;      ///< estimate of the read-out before the significance test, seconds
+  double read_out = 0.0;      ///< estimated read-out, not yet tested for significance, seconds
   double read_out_deviation = std::numeric_limits<double>::infinity();  ///< standard deviation, seconds
-  double delay = 0.0;  ///< estimate of the depth image's delay before the significance test, seconds
+  double delay = 0.0;  ///< estimated delay of the depth image, not yet tested for significance, seconds
   double delay_deviation = std::numeric_limits<double>::infinity();  ///< standard deviation, seconds
 };
 

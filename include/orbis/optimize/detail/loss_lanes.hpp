@@ -13,7 +13,7 @@
 namespace orbis::optimize::detail {
 
 /// `lanes_of_loss<Loss>::weigh(loss, s, cost, weight)` computes rho(s) and its derivative, up to rounding, for finite s
-/// >= 0. Losses without a specialisation are evaluated eight times.
+/// >= 0. Losses without a specialisation are evaluated lane by lane.
 template <robust_loss Loss>
 struct lanes_of_loss {
   template <camera::double_lanes L>

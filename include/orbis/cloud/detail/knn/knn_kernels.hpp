@@ -80,7 +80,7 @@ struct nearby_leaves {
   }
 };
 
-/// Partial result for the `wanted` smallest values of a list of squared distances.
+/// Sum of the roots, and maximum, of the `wanted` smallest squared distances in a list.
 struct nearest_sum {
   double roots = 0;           ///< sum of the roots, with relative error up to `roots_slack`; negative if unknown
   float largest_squared = 0;  ///< the `wanted`-th smallest squared distance

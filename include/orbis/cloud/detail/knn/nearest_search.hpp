@@ -386,7 +386,7 @@ class nearest_search {
   nearby_leaves near_rows_;                                             ///< rows of leaves near the row near_rows_of_
   std::size_t near_rows_of_ = std::numeric_limits<std::size_t>::max();  ///< row of near_rows_; initially none
   float near_rows_reach_ = -1;      ///< squared distance up to which near rows are complete; negative if unknown
-  float too_many_rows_ = infinity;  ///< smallest squared distance at which the row had too many near rows
+  float too_many_rows_ = infinity;  ///< smallest squared distance at which near_rows_of_ had too many near rows
   line_vector<std::uint32_t> chosen_;
   line_vector<float> found_;
   line_vector<std::uint32_t> places_;  ///< places of the found points; empty if not requested
@@ -399,7 +399,7 @@ class nearest_search {
   std::array<float, leaf_width> largest_{};  ///< squared distance to the `wanted`-th nearest
   float hoped_;              ///< multiple of `usual_` that usually suffices; smaller for more neighbours
   float reach_;              ///< multiple of `usual_` that nearly always suffices
-  float shared_reach_ = -1;  ///< `shared_` has all points within this squared distance of the run's box
+  float shared_reach_ = -1;  ///< `shared_` contains all points within this squared distance of the run's box
   float usual_ = -1;         ///< squared distance to the `wanted`-th nearest; negative if not yet known
 };
 

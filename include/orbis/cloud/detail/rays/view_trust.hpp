@@ -30,8 +30,8 @@
 
 namespace orbis::cloud::detail {
 
-/// For each depth of a row, counts how many of the eight surrounding depths agree with it. Most depths agree with at
-/// least two, which is tested with vector operations. Reads sixteen depths beyond the rows.
+/// For each depth of a row, counts how many of the eight surrounding depths agree with it. A first pass with
+/// vector operations finds the many depths that agree with at least two. Reads sixteen depths beyond the rows.
 struct count_agreeing_depths {
   using signature = void(const float*, const float*, const float*, float, float, float*, std::size_t);
   template <simd::target Target>

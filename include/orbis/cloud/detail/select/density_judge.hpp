@@ -30,7 +30,7 @@ struct reference {
   bulk width;  ///< width of the residuals, whose median is 0
 };
 
-/// Width of the bulk used to compare references.
+/// A single width of the bulk, for comparing references.
 [[nodiscard]] inline double bulk_width(const bulk& b) noexcept { return std::max(b.left_scale, 0.5 * b.right_scale); }
 
 [[nodiscard]] inline std::vector<float> finite_values(std::vector<float> values) {

@@ -26,8 +26,8 @@ namespace orbis::features::detail {
 inline constexpr std::array<std::uint16_t, 7> gaussian_weights{18, 34, 48, 56, 48, 34, 18};
 inline constexpr int smooth_block = 64;  ///< number of pixels written at a time
 
-/// Weighted sums along a row, minus 2^15 so that they fit into signed words. In every block of one register of bytes,
-/// the sums of the even pixels precede those of the odd pixels.
+/// Weighted sums along a row, minus 2^15 so that they fit into signed words. The pixels are processed in
+/// blocks of one vector register of bytes; within a block, the sums of the even pixels precede those of the odd pixels.
 /// @pre `line` is readable from -3 to 4 + `count` rounded up to whole blocks
 struct smooth_along_kernel {
   // The weights are a parameter, because the compiler generates slow shifts and sums of products from constants.

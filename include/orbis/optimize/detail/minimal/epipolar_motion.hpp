@@ -27,8 +27,8 @@ namespace orbis::optimize::detail {
   return columns;
 }
 
-/// Returns the unit vector at a distance of |d| radians from the unit vector `p` along a great circle. `d` is in
-/// coordinates of `tangent_basis(p)`, which is also the derivative with respect to `d` at 0.
+/// Returns the unit vector at a distance of |d| radians from the unit vector `p` along a great circle. `d` is
+/// expressed in the basis `tangent_basis(p)`, which is also the derivative of the result with respect to `d` at d = 0.
 [[nodiscard]] inline vec3 step_on_sphere(const vec3& p, const vec2& d) {
   const double angle = std::sqrt(d.x() * d.x() + d.y() * d.y());
   const double factor = angle < 1e-8 ? 1.0 : std::sin(angle) / angle, along = std::cos(angle);

@@ -154,8 +154,8 @@ class depth_tracker {
   /// Returns the result of the last call to `find_surfaces`.
   [[nodiscard]] bool has_surfaces() const noexcept { return !placed_.empty(); }
 
-  /// Returns the cost with respect to the surfaces around a pose close to the true one; empty if they do not constrain
-  /// the pose.
+  /// Returns a quadratic model of the depth cost near `at`, which must be close to the true pose; empty if the surfaces
+  /// do not constrain the pose.
   /// @pre find_surfaces was called
   [[nodiscard]] std::optional<pose_quadratic> term_at(const moving_pose& at, const camera::shutter& shutter) {
     const association seen = associate<Camera>(samples_, 1, placed_, at, shutter, rig_, close, planes_);

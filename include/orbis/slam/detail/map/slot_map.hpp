@@ -40,8 +40,8 @@ class slot_map {
     return last_id();
   }
 
-  /// Begins or ends the import of objects and ids from another source, such as a file. Erased ids of the source count
-  /// as erased at the end of the import.
+  /// Begins or ends the import of objects and ids from another source, such as a file. Ids that were erased in the
+  /// source are treated as if they were erased when the import ends.
   void adopt(bool on) noexcept { slots_.adopt(on); }
   /// Adds an id whose object is already erased.
   /// @pre `replacement` is `no_id`, or the id of an object that will be added

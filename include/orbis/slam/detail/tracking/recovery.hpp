@@ -42,7 +42,7 @@ class recovery {
     if (!c_.depth.find_surfaces(t.maps, predicted)) return std::nullopt;
     return c_.depth.align(search_starts(c_.last.T_world_camera, predicted, interval), t.frame.shutter);
   }
-  /// Tracks from a pose aligned by depth; refines it on the local map.
+  /// Tracks starting from a pose aligned by depth, and refines the pose on the local map.
   std::size_t track_from_depth(const task& t, const depth_alignment& aligned) {
     frame_type& f = t.frame;
     f.T_world_camera = aligned.at.T_world_camera;

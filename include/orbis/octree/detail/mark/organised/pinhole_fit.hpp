@@ -326,7 +326,7 @@ class pinhole_fit {
   mat3 axes_ = identity<mat3>();  ///< R_camera_world
   double fx_ = 0.0, fy_ = 0.0, cx_ = 0.0, cy_ = 0.0;
   double square_ = 0.0;  ///< sum of squared residuals, at z = 1
-  double size_ = 0.0;    ///< size in pixels of the image, excluding the margin
+  double size_ = 0.0;    ///< number of pixels of the image, excluding the margin
   double slope_ = 0.0;   ///< largest slope of the sides of the image
   double error_ = 0.0, mean_z_ = 0.0, filled_ = 0.0;
   camera::pinhole camera_;
