@@ -200,7 +200,7 @@ class back_end {
   std::atomic<bool> stopped_{false};
   local_mapper<Camera, D, Places> mapper_;
   loop_closer<Camera, D, Places> closer_;
-  std::unique_ptr<worker<map_id>> global_;  ///< null without threads, like the other workers
+  std::unique_ptr<worker<map_id>> global_;  ///< null, like the other workers, if there are no threads
   std::unique_ptr<worker<map_keyframe>> loops_, mapping_;
 };
 

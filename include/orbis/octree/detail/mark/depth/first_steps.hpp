@@ -25,9 +25,9 @@ class first_step_order {
   explicit first_step_order(const depth_sensor& sensor) noexcept
       : source_{sensor.grid, sensor.pose.centre, *sensor.key} {}
 
-  /// Returns the voxels as a bit mask. `low` and `high`: smallest and greatest coordinates of the directions, whose
-  /// largest coordinate is about 1. Rays may deviate from them by a few roundings of float. Bit (dx + 1) + 3 (dy + 1) +
-  /// 9 (dz + 1) is the voxel at offset (dx, dy, dz).
+  /// Returns these neighbours as a bit mask: bit (dx + 1) + 3 (dy + 1) + 9 (dz + 1) is the voxel at offset (dx, dy,
+  /// dz). `low` and `high`: smallest and greatest coordinates of the directions, whose largest coordinate is about 1.
+  /// Rays may deviate from the directions by rounding errors of a few float ulps.
   [[nodiscard]] std::uint32_t voxels(float3 low, float3 high) const noexcept {
     for (std::size_t i = 0; i != 3; ++i) {
       low[i] -= 1e-5F;

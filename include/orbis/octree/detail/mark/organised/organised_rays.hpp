@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Finds the voxels that the rays of an organised point cloud cross. The points of such a cloud are the pixels of a
-/// depth image, in pixel order, which is detected from the points. The voxels are found in the same way as for a depth
-/// image.
+/// Finds the voxels that the rays of an organised point cloud cross, in the same way as for a depth image. The points
+/// of such a cloud are the pixels of a depth image, in pixel order; this is inferred from the points.
 #pragma once
 
 #include <algorithm>
