@@ -39,12 +39,13 @@ namespace examples {
 }
 
 /// Throws if an option of the program or of the chosen commands has an invalid value that CLI11 accepts: an empty text
-/// (usually a variable that is not set), NaN, which passes range checks, or an integer that is negative or too large
-/// for its unsigned type.
+/// (usually a variable that is not set) where a value is required, NaN, which passes range checks, or an integer that
+/// is negative or too large for its unsigned type.
 inline void check_values(const CLI::App& cli) {
   for (const CLI::Option* option : cli.get_options())
     for (const std::string& text : option->results()) {
-      if (text.empty()) throw CLI::ValidationError{option->get_name(), "must not be empty"};
+      if (text.empty() && option->get_expected_min() > 0)
+        throw CLI::ValidationError{option->get_name(), "must not be empty"};
       const std::string type = option->get_type_name();
       if (double value = 0; type.starts_with("FLOAT") && CLI::detail::lexical_cast(text, value) && std::isnan(value))
         throw CLI::ValidationError{option->get_name(), orbis::in_quotes(text) + " is not a number"};
