@@ -45,7 +45,7 @@ int run(int argc, char** argv) {
   if (const auto code = examples::parse(cli, argc, argv)) return *code;
   const orbis::so3::quaternion q{p.data() + 3};  // x y z w
   if (!(q.norm() > 1e-6 && orbis::vec3{p.data()}.norm() + q.norm() < 1e6))
-    return report_error(1, "--pose: is not a valid pose");
+    return report_error(1, "--pose: not a valid pose");
   if (!(resolution >= 1e-4 && resolution <= 1e3))
     return report_error(1, "--resolution: must be between 0.0001 and 1000");
   if (!(scale == 0.0 || (scale >= 1e-3 && scale <= 1e9)))

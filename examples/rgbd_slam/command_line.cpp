@@ -159,7 +159,7 @@ void add_sensor_option(CLI::App& cmd, settings& s, const std::vector<std::string
 
 void add_camera_option(CLI::App& cmd, settings& s) {
   cmd.add_option("--camera", s.camera,
-                 "camera file (camera.toml, or JSON or YAML of Open3D, ROS, RealSense, ORB-SLAM) or preset: tum_fr1, "
+                 "camera file (camera.toml, or JSON or YAML from Open3D, ROS, RealSense, ORB-SLAM) or preset: tum_fr1, "
                  "tum_fr2, tum_fr3, "
                  "icl, kinect")
       ->check(CLI::Validator(
@@ -482,7 +482,7 @@ command_line::command_line() {
   add_frame_options(*map, s);
   add_map_options(*map, s);
 
-  way = cli.add_subcommand("plan", "find the shortest path of a robot in an octree map");
+  way = cli.add_subcommand("plan", "find the shortest path for a robot in an octree map");
   add_plan_options(*way, s, from, to);
 
   trial = cli.add_subcommand("benchmark", "run all recordings in folders, and print a table of the results");

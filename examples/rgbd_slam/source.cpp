@@ -43,7 +43,7 @@ constexpr const char* camera_request = "specify a camera";
 orbis::error with_option(orbis::error e) {
   if (e.message.ends_with(camera_request))
     e.message +=
-        " with --camera, which takes a file (camera.toml; JSON or YAML of Open3D, ROS, RealSense, ORB-SLAM) or "
+        " with --camera, which takes a file (camera.toml; JSON or YAML from Open3D, ROS, RealSense, ORB-SLAM) or "
         "tum_fr1, tum_fr2, tum_fr3, icl, kinect";
   if (e.code == orbis::errc::not_found && e.where.ends_with("depth.txt"))
     e.message += ". --format folders pairs the images in rgb/ and depth/ by their names; --sensor mono needs no depth";

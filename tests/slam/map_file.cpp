@@ -100,7 +100,7 @@ TEST_CASE("Rays in a file are rays, and where there is none there is no depth") 
 TEST_CASE("A file that is cut off says in which section") {
   const std::string bytes = slam::map_bytes(test::random_map(2, 60, 3));
   CHECK(fault_of("") == "some.map: not an orbis map: it does not begin with \"orbismap\"");
-  CHECK(fault_of(bytes.substr(0, 10)) == "some.map: the file ends before its version");
+  CHECK(fault_of(bytes.substr(0, 10)) == "some.map: the file ends before the version number");
   CHECK(fault_of(bytes.substr(0, 20)) == "some.map: section \"size\" is missing: the file ends at byte 20");
   CHECK(fault_of(bytes.substr(0, 100)) ==
         "some.map: section \"kfrm\" from byte 60 is cut off: the file ends at byte 100");
@@ -285,7 +285,7 @@ TEST_CASE("Keyframes that were forgotten are runs of ids, which versions before 
           slam::detail::put(to, slam::detail::gone_keyframe, std::uint32_t{1});
           slam::detail::put_pose(to, se3{});
           slam::detail::put(to, slam::detail::forgotten_keyframes, std::uint32_t{1});
-        })) == "some.map: keyframe 0: its replacement is forgotten");
+        })) == "some.map: keyframe 0: its replacement is not in the map");
 }
 
 TEST_CASE("Corrections of the scale are in the lengths that a file holds") {

@@ -22,7 +22,7 @@ namespace orbis::cloud {
 
 struct cluster_options {
   std::size_t neighbors = 12;  ///< number of nearest neighbours of each point that can be linked to it; > 0
-  /// Maximum length of a link, in multiples of the spacing (mean distance to the neighbours) of both points.
+  /// Maximum length of a link, in multiples of the spacing (mean distance to the neighbours) at each of its two points.
   double reach = 3.0;
   /// Components with fewer points count as small. 0: 1/250 of the number of points, at least 30 and at most 200.
   std::size_t min_size = 0;

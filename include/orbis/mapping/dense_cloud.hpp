@@ -300,7 +300,8 @@ class dense_cloud {
 
  private:
   /// Returns true if the depth of a pixel agrees with the depth of the pixel that represents its block in the cloud:
-  /// within 3 cm and 2 % for each pixel between them, so that slanted surfaces agree at any stride.
+  /// for each pixel of distance they may differ by 3 cm plus 2 % of the depth, so that slanted surfaces agree at any
+  /// stride.
   template <class Depth>
   [[nodiscard]] bool is_like_its_block(const Depth& depth, int x, int y) const {
     const int dx = x % options_.stride, dy = y % options_.stride;

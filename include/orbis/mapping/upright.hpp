@@ -219,7 +219,7 @@ struct upright_view {
   return so3{rows(ahead, cross(up_camera, ahead), up_camera)};
 }
 
-/// Finds the upright world of a depth image: from gravity if it is given, otherwise from planes.
+/// Finds the upright world frame for a depth image: from gravity if it is given, otherwise from planes.
 ///
 /// Planes are fitted to a few hundred blocks of a grid, in inverse depth, where a plane is linear and the noise of a
 /// disparity sensor is uniform. Each block votes for the directions along its normal (a floor, a table, a ceiling) and

@@ -72,8 +72,8 @@ class squared_distance_view {
   /// squared_distances::begin).
   [[nodiscard]] std::uint16_t elsewhere() const noexcept { return elsewhere_; }
   /// Calls `visit(lowest voxel, values)` for every stored brick: 8x8x8 squared distances, x fastest. Bricks that are
-  /// not stored have the value `elsewhere()`, or, in cubes that the field was initialised with, the opposite: 0 or
-  /// `far`. The order is unspecified.
+  /// not stored have the value `elsewhere()`; inside the cubes passed to `squared_distances::begin` they have `far` if
+  /// `elsewhere()` is 0, otherwise 0. The order is unspecified.
   template <class Visit>
   void for_each_brick(Visit&& visit) const {
     for (std::size_t i = 0; i != values_.size(); ++i) {

@@ -94,7 +94,7 @@ class covisibility_graph {
     const auto at = detail::find_pair(pairs, b);
     return at != pairs.end() && at->keyframe == b ? at->shared : 0;
   }
-  /// Returns true if two keyframes have an edge.
+  /// Returns true if two keyframes are connected by an edge.
   [[nodiscard]] bool connected(keyframe_id a, keyframe_id b) const {
     const std::uint32_t both = shared(a, b);
     return both != 0 && (both >= min_shared_ || is_only_edge(a, b) || is_only_edge(b, a));

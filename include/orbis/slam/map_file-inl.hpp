@@ -117,7 +117,7 @@ ORBIS_INLINE result<map> parse_map(std::span<const std::byte> bytes, const std::
   constexpr std::size_t head = detail::map_magic.size() + sizeof(detail::map_version);
   if (text.substr(0, detail::map_magic.size()) != detail::map_magic)
     return fail(errc::malformed, where, "not an orbis map: it does not begin with \"orbismap\"");
-  if (text.size() < head) return fail(errc::malformed, where, "the file ends before its version");
+  if (text.size() < head) return fail(errc::malformed, where, "the file ends before the version number");
   const auto version = load_number<std::uint32_t>(text.data() + detail::map_magic.size());
   if (version == 0 || version > detail::map_version)
     return fail(errc::unsupported, where,

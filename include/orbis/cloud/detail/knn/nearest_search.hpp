@@ -173,7 +173,7 @@ class nearest_search {
   }
 
  private:
-  /// Number of squared distances found, complete up to a bound.
+  /// Number of squared distances found; these include all distances up to `bound`.
   struct found_within {
     std::size_t count;
     float bound;

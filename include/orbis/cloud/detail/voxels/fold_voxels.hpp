@@ -186,7 +186,8 @@ class voxel_parts {
   static constexpr std::uint16_t first_of_voxel = 0xfffe;
   static constexpr bool keeps_coordinates = std::is_same_v<S, float>;
 
-  /// A point: its coordinates as float, or its key if they are double; later a voxel's centroid and first point.
+  /// First a point: its coordinates if they are float, its voxel key if they are double. Later a voxel: its centroid
+  /// and the index of its first point.
   struct entry {
     std::array<std::uint32_t, 3> words;
     std::uint32_t index;

@@ -70,7 +70,7 @@ ORBIS_ALWAYS_INLINE slice<Words> make_slice_group(const slice<Words>& a, const s
 
 /// Group `g` consists of bits `g`, `64 + g` and `128 + g`; group `64 + g` consists of bit `192 + g`, the parity of
 /// group `g`, and the parity of the previous group.
-/// @pre at most 64 * Words trains
+/// @pre at most 64 * Words train descriptors
 template <class Target, std::size_t Words, bit_string D>
 ORBIS_ALWAYS_INLINE void make_slice_table(std::span<const D> trains, slice_table<Words>& table) noexcept {
   std::array<slice<Words>, 256> rows{};

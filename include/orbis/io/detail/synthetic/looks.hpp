@@ -66,7 +66,7 @@ struct painted_solids {
   std::vector<triple> lamps;      ///< metres, world; each point is lit by the lamp that appears brightest at that point
 };
 
-/// Looks of the walls, floor and ceiling of a furnished room.
+/// Appearance of the walls, floor and ceiling of a furnished room.
 [[nodiscard]] inline face_looks looks_of_walls(const scene& room) noexcept {
   const solid& walls = room.solids().front();
   const synthetic_scene_options& o = room.options();

@@ -27,7 +27,7 @@ class renderer {
  public:
   static constexpr int tile = 16;  ///< edge, pixels
 
-  /// `solids` are the solids of `textures`, in the same order; the first is the room.
+  /// `solids` must be the solids from which `textures` was made, in the same order; the first is the room.
   renderer(const std::vector<solid>& solids, const texture_set& textures, const camera_pose& pose,
            const camera::intrinsics& k)
       : textures_{&textures}, pose_{pose}, k_{k}, inverse_fx_{1.0 / k.fx}, inverse_fy_{1.0 / k.fy} {

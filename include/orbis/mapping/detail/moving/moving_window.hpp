@@ -43,7 +43,7 @@ template <camera::depth_source Depth>
 }
 
 /// Delays each keyframe until the keyframes before and after it have been compared with it; returns the keyframes in
-/// order, together with their cells that show moved objects. Keeps at most `options.keyframes` + 1 keyframes. Without
+/// order, each with the cells that show moved objects. Keeps at most `options.keyframes` + 1 keyframes. Without
 /// options, no keyframe is evaluated.
 template <camera::camera_model Camera, keyframe_like Keyframe>
 class moving_window {

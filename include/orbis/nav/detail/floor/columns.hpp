@@ -23,7 +23,7 @@ namespace orbis::nav::detail {
 inline constexpr std::array<std::uint64_t, 4> octant_layers{0x000000000f0f0f0f, 0x00000000f0f0f0f0, 0x0f0f0f0f00000000,
                                                             0xf0f0f0f000000000};
 
-/// The voxels in a box of a map, column by column: bits for known voxels, and for occupied ones among them.
+/// The voxels in a box of a map, column by column: one bit each for "known" and for "occupied".
 class voxel_columns {
  public:
   /// Creates columns of unknown voxels. @pre low and size are multiples of 4

@@ -59,9 +59,10 @@ class cell_floods {
   [[nodiscard]] bool may_reach_any(const std::vector<key>& cells, std::size_t max_cells) {
     return std::any_of(cells.begin(), cells.end(), [&](const key& k) { return may_reach(k, max_cells); });
   }
-  /// Of the cells connected to the start, the one nearest to the goal, among the `max_cells` cells that a flood
-  /// examines; empty if there are no doors. O(cells nearer to the goal, plus the cells enclosed together with them), or
-  /// O(cells connected to the start).
+  /// Returns the cell nearest to the goal that is connected to the start; empty if there are no doors. Each flood
+  /// examines at most `max_cells` cells. Free cells are tried in order of their distance from the goal, up to about
+  /// 10^6 cells around it; if none of them is connected, the result is the nearest cell that the flood from the start
+  /// has reached.
   [[nodiscard]] std::optional<key> nearest(std::size_t max_cells) {
     // Visit cells around the goal in order of distance, as long as there are fewer of them than cells in a flood.
     constexpr double most = std::size_t{1} << 20U;

@@ -55,8 +55,8 @@ struct homography_equations {
   matrix<8> g = zeros<matrix<8>>();
   double cost = 0.0;
 
-  /// Adds the error `r` of a point. `by_point` is the derivative of `r` with respect to the point before projection; D
-  /// changes this point by `by_d * D * moved`.
+  /// Adds the error `r` of a point. `by_point` is the derivative of `r` with respect to the point before projection; a
+  /// small D moves that point by `by_d * D * moved`.
   void add(const vec2& r, const matrix<2, 3>& by_point, const mat3& by_d, const vec3& moved) {
     const matrix<2, 3> a = by_point * by_d;
     matrix<2, 8> j;

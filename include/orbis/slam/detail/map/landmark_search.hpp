@@ -39,7 +39,7 @@ struct search_list {
   [[nodiscard]] std::size_t size() const noexcept { return points.size(); }
 };
 
-/// Returns the rule for search windows around projections with a radius of `radius` pixels of a keypoint's level.
+/// Returns the rule for search windows with a radius of `radius` pixels, measured at the keypoint's pyramid level.
 [[nodiscard]] inline features::projection_rule make_rule(const pyramid_scales& scales, double radius) {
   return {.radius = static_cast<float>(radius),
           .levels = scales.levels(),

@@ -224,7 +224,7 @@ class map_reader {
     for (const auto& [id, e] : to_.erased)
       for (keyframe_id k = id; k != no_id && !to_.keyframes.contains(k);) {
         const auto at = to_.erased.find(k);
-        if (at == to_.erased.end()) return wrong("keyframe " + to_string(id) + ": its replacement is forgotten");
+        if (at == to_.erased.end()) return wrong("keyframe " + to_string(id) + ": its replacement is not in the map");
         const auto [first, is_new] = met.emplace(k, id);
         if (!is_new && first->second == id) return wrong("keyframe " + to_string(id) + ": is its own replacement");
         if (!is_new) break;  // the rest of the chain was checked before

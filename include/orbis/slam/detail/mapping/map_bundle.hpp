@@ -172,8 +172,8 @@ class bundle_solver {
       to.outliers[i] = squared_[i] > error_limit(!std::isnan(s.observations[i].right)) ? 1 : 0;
   }
 
-  /// Unmarks the outliers that agree with the current poses and points if a standard deviation of one pixel of the
-  /// level is assumed: a slightly misplaced patch remains an observation.
+  /// Unmarks the outliers that agree with the current poses and points within a standard deviation of one pixel at
+  /// their pyramid level, so that slightly misplaced patches remain observations.
   void keep_rough(const bundle_snapshot& s, bundle_solution& to) const {
     for (std::size_t i = 0; i != s.observations.size(); ++i) {
       const optimize::bundle_observation& o = s.observations[i];

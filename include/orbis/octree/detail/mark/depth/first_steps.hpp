@@ -88,7 +88,7 @@ class first_step_order {
   scan_origin source_;
 };
 
-/// Determines through which of the 26 neighbours of the sensor's voxel rays pass.
+/// Determines which of the 26 neighbours of the sensor's voxel are crossed by rays.
 class first_voxels {
  public:
   explicit first_voxels(const depth_sensor& sensor) noexcept : sensor_{sensor} {}

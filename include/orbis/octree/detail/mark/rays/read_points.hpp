@@ -35,7 +35,7 @@ concept float_triples = std::ranges::contiguous_range<Points> && requires(const 
 /// memory of the copies.
 class point_reader {
  public:
-  /// Returns a view, valid until the next call and as long as `points`.
+  /// Returns a view that is valid until the next call or until `points` changes.
   template <point_range Points>
   [[nodiscard]] point_view view(const Points& points) {
     const auto count = static_cast<std::size_t>(std::ranges::size(points));
