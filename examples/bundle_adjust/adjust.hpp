@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Bundle adjustment with a robust loss. The solver is compiled for each loss, in two source files.
+/// Bundle adjustment with a robust loss. The solver is compiled once for each loss; the compilations are divided
+/// between two source files.
 #pragma once
 
 #include <cmath>
@@ -28,7 +29,7 @@ struct settings {
 
 inline int report_error(int code, const std::string& why) { return examples::report_error("bundle_adjust", code, why); }
 
-/// The problem in a file, as input for the solver.
+/// A problem from a file, in the form that the solver takes.
 struct bundle {
   std::vector<optimize::bal_camera> cameras;
   std::vector<orbis::vec3> points;

@@ -13,9 +13,9 @@
 
 int run(int argc, char** argv) {
   settings s;
-  CLI::App cli{"Adjust cameras and points of a Bundle Adjustment in the Large file", "bundle_adjust"};
+  CLI::App cli{"Adjust the cameras and points in a file of Bundle Adjustment in the Large", "bundle_adjust"};
   cli.add_option("FILE", s.input, "input problem, uncompressed")->required();
-  cli.add_option("--out,--output", s.output, "output problem with the adjusted cameras and points");
+  cli.add_option("--out,--output", s.output, "write the problem with the adjusted cameras and points");
   cli.add_option("--loss", s.loss, "robust loss")
       ->check(CLI::IsMember({"none", "huber", "cauchy", "tukey"}))
       ->capture_default_str();

@@ -35,10 +35,10 @@ namespace examples {
   return number;
 }
 
-/// The memory files of a control group; empty if there is none.
+/// The contents of a control group's memory files; empty if there is no group.
 struct memory_group {
-  std::string limit;  ///< bytes, or a word if there is no limit
-  std::string use;    ///< bytes, including cached files
+  std::string limit;  ///< bytes, or "max" if there is no limit
+  std::string use;    ///< bytes in use, including cached files
   std::string stat;   ///< named values, including those of cached files
 };
 

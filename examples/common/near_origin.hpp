@@ -43,7 +43,7 @@ namespace examples {
   return middle;
 }
 
-/// Replaces points at a distance of more than `most` metres by NaN, because the square of the distance exceeds the
+/// Replaces points with a coordinate beyond `most` metres by NaN, because sums of squared distances might exceed the
 /// range of float. Returns the number of these points.
 inline std::size_t remove_distant(std::vector<orbis::vec3f>& points) {
   constexpr float most = 1e15F;

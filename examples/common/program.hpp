@@ -79,9 +79,9 @@ inline void occupy_standard_streams() {
 #endif
 }
 
-/// Runs `body`, which returns the exit code of the program. The code is 2 if the body throws (memory, threads), or if
-/// standard output cannot be written. A closed pipe or an exceeded file size limit does not end the program. The memory
-/// of the program is limited (`limit_memory`).
+/// Runs `body`, which returns the exit code of the program. The code is 2 if the body throws, for example because no
+/// memory or no thread is available, or if standard output cannot be written. A closed pipe or an exceeded file size
+/// limit does not end the program. The memory of the program is limited (`limit_memory`).
 template <class Body>
 [[nodiscard]] int run_program(const char* program, Body&& body) {
   occupy_standard_streams();

@@ -14,7 +14,7 @@
 
 namespace examples {
 
-/// Returns true if both names refer to the same existing file, directly or by links.
+/// Returns true if both names refer to the same existing file, directly or through links.
 [[nodiscard]] inline bool is_same_file(const std::filesystem::path& a, const std::filesystem::path& b) {
   std::error_code ignored;
   return std::filesystem::equivalent(a, b, ignored);
@@ -26,7 +26,7 @@ namespace examples {
          ") and would be overwritten: choose another name for the result";
 }
 
-/// The error message if the file `output` can certainly not be created or replaced; otherwise empty.
+/// The error message if the file `output` definitely cannot be created or replaced; otherwise empty.
 [[nodiscard]] inline std::string unwritable_message(const std::string& output) {
   const std::filesystem::path path{output}, folder = path.has_parent_path() ? path.parent_path() : ".";
   const std::string where = orbis::shortened_path(output);

@@ -25,11 +25,11 @@ class voxel_estimate {
     lengths_ += length;
     volume_ += volume;
   }
-  /// The number of voxels with an edge length of `resolution` metres.
+  /// The estimated number of voxels with an edge length of `resolution` metres.
   [[nodiscard]] double voxels(double resolution) const {
     return std::min(16.0 * lengths_ / resolution, volume_ / (resolution * resolution * resolution));
   }
-  /// The size of the octree in bytes, as measured for scenes that allow little pruning.
+  /// The estimated size of the octree in bytes, based on measurements of scenes that allow little pruning.
   [[nodiscard]] double bytes(double resolution) const { return 8.0 * voxels(resolution); }
   [[nodiscard]] bool takes_long(double resolution) const { return voxels(resolution) >= 1e8; }
   /// Returns true if there are at least two billion voxels, or if they do not fit into `memory` bytes (if known).
@@ -49,7 +49,7 @@ class voxel_estimate {
   double lengths_ = 0.0, volume_ = 0.0;
 };
 
-/// The estimate for a depth image: `depth(i)` in metres along z, 0 if there is none.
+/// The estimate for a depth image. `depth(i)`: depth of pixel `i` in metres along z; 0 if it is unknown.
 template <class Depth>
 [[nodiscard]] voxel_estimate voxels_of_depth(const orbis::camera::intrinsics& k, const Depth& depth) {
   voxel_estimate all;

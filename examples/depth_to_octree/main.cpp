@@ -40,7 +40,7 @@ int run(int argc, char** argv) {
   cli.add_option("MAP", output, "output .bt file")->required();
   cli.add_option("--pose", p, "camera-to-world pose: tx ty tz qx qy qz qw")->expected(7)->capture_default_str();
   cli.add_option("--camera", camera_name, "camera.toml, preset (tum_fr1 ...), or fx,fy,cx,cy")->capture_default_str();
-  cli.add_option("--scale", scale, "depth units per metre (from the camera file, or 1000)");
+  cli.add_option("--scale", scale, "depth units per metre (default: that of the camera; 1000 for fx,fy,cx,cy)");
   cli.add_option("--resolution", resolution, "voxel size in metres")->capture_default_str();
   if (const auto code = examples::parse(cli, argc, argv)) return *code;
   const orbis::so3::quaternion q{p.data() + 3};  // x y z w

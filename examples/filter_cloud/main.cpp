@@ -32,7 +32,8 @@ int run(int argc, char** argv) {
   cli.add_option("--filter", filter, "outlier filter; auto: selected by analysing the cloud")
       ->capture_default_str()
       ->check(CLI::IsMember(names));
-  cli.add_option("--neighbors", k, "number of neighbours (the default of the filter)")->check(CLI::Range(1, 100'000));
+  cli.add_option("--neighbors", k, "number of neighbours (default: depends on the filter)")
+      ->check(CLI::Range(1, 100'000));
   cli.add_option("--sigma", sigma, "(range-)statistical: limit in standard deviations")->capture_default_str();
   cli.add_option("--voxel", voxel, "reduce to one point per voxel of this size in metres; 0: off")
       ->capture_default_str();

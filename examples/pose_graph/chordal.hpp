@@ -18,7 +18,8 @@
 
 namespace examples {
 
-/// A graph vertex that is a vector of N numbers, to which steps are added. The graph is then a linear system.
+/// A graph vertex that is a vector of N numbers. The optimiser updates it by addition, so that the optimisation is a
+/// linear least-squares problem.
 template <int N>
 struct numbers {
   static constexpr int dof = N;

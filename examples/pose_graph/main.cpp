@@ -87,7 +87,7 @@ int run_command(int argc, char** argv) {
   settings s;
   CLI::App cli{"Optimise the poses of a g2o file (VERTEX_SE3:QUAT, EDGE_SE3:QUAT, FIX)", "pose_graph"};
   cli.add_option("FILE", s.input, "input graph")->required();
-  cli.add_option("--output", s.output, "output graph with the optimised poses");
+  cli.add_option("--output", s.output, "write the graph with the optimised poses");
   cli.add_option("--loss", s.loss, "robust loss")->check(CLI::IsMember({"none", "huber", "cauchy", "tukey"}));
   cli.add_option("--width", s.width, "width of the loss in standard deviations")
       ->check(CLI::PositiveNumber)

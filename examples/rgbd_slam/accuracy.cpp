@@ -71,7 +71,7 @@ void compare_with_truth(results& r, const frame_source& source, console& console
   if (source.surface_distance && r.map) {
     const auto error = map_error(r.map->cloud, r.map->kept, compared->T_truth_map, source.surface_distance);
     if (error) r.map->error_m = *error;
-    r.truth_note += " The map error is the error of the filtered cloud after alignment by the poses.";
+    r.truth_note += " The map error is that of the filtered cloud after alignment by the poses.";
   }
   if (!compared->no_rpe.empty()) console.warn(r.warnings.emplace_back("no RPE: " + compared->no_rpe));
   if (compared->truth_lacks_orientations && !source.truth_has_positions_only)

@@ -54,7 +54,7 @@ struct found_recording {
   fs::path path;
 };
 
-/// Returns true for a 7-Scenes sequence, and for a scene, whose folders are sequences.
+/// Returns true for the folder of a 7-Scenes sequence, and for the folder of a scene, which contains sequences.
 bool is_scene(const fs::path& path) {
   return orbis::io::detect_format(path) == orbis::io::recording_format::seven_scenes;
 }
@@ -88,7 +88,8 @@ orbis::result<std::vector<found_recording>> chosen_recordings(const settings& s)
     std::vector<fs::path> found;
     find_recordings(folder, seen, found);
     if (found.empty())
-      return orbis::fail(orbis::errc::no_data, folder.string(), "contains no recordings that are not already listed");
+      return orbis::fail(orbis::errc::no_data, folder.string(),
+                         "contains no recordings, or only recordings that are already listed");
     for (const fs::path& path : found) {
       const fs::path inside = path == folder ? fs::path{} : path.lexically_relative(folder);
       const std::string name = inside.empty() ? fs::weakly_canonical(path).filename().string() : inside.string();
@@ -142,7 +143,7 @@ const published_figures* find_figures(const fs::path& recording) {
 
 // -- runs ------------------------------------------------------------------------------------------------------------
 
-/// A mode in which a recording is run.
+/// A mode of running a recording.
 struct run_mode {
   std::string name;
   bool deterministic;
@@ -326,7 +327,7 @@ std::string cell(const char* format, const std::optional<double>& value, double 
   return value ? text(format, factor * *value) : "-";
 }
 
-/// The ratio of two numbers of a run, times `factor`; empty if one of them is unknown.
+/// The ratio `a` / `b`, times `factor`; empty if one of the numbers is unknown or `b` is zero.
 std::optional<double> ratio(std::optional<double> a, std::optional<double> b, double factor = 1.0) {
   if (!a || !b || *b == 0.0) return std::nullopt;
   return factor * *a / *b;
@@ -362,7 +363,8 @@ table results_table(const std::vector<row>& rows) {
   return t;
 }
 
-/// The deterministic runs of known recordings next to published figures; only the header if there are no such runs.
+/// A table that compares deterministic runs with the published figures for the same recordings; only the header if
+/// there are no such runs.
 table published_table(const std::vector<row>& rows) {
   table t{{"ATE mm", "this run"}};
   t.front().insert(t.front().end(), systems.begin(), systems.end());

@@ -29,7 +29,7 @@ struct calibration_rounds {
 
 struct calibration_limits {
   int most_rounds = 5;
-  double longest = std::numeric_limits<double>::infinity();  ///< maximum duration of the used part, seconds
+  double longest = std::numeric_limits<double>::infinity();  ///< maximum duration of the frames to use, seconds
   bool compares_lens = false;                                ///< computes `calibration_rounds::lens`
 };
 

@@ -34,13 +34,13 @@ struct lens_comparison {
   [[nodiscard]] bool has_distortion() const;
 };
 
-/// The doubt that calibrated parameters raise; empty if the calibration is inconclusive, for example because a
-/// parameter was held.
+/// Evidence in calibrated parameters that the camera's focal length is wrong; empty if the calibration is inconclusive,
+/// for example because a parameter was held.
 [[nodiscard]] std::optional<focal_doubt> find_doubt(std::span<const orbis::slam::calibrated_parameter> found);
-/// The doubt that a map made with the camera raises. A wrong focal length scales the distances between poses by a few
-/// percent, but so does distortion that a pinhole camera does not model. Empty if distortion fits the images clearly
-/// better, if the images are inconclusive, or if `go_on` cancels a calibration. Runs one or two small
-/// self-calibrations, which take a few tenths of a second.
+/// Evidence in a map made with the camera that its focal length is wrong. A wrong focal length scales the distances
+/// between poses by a few percent, but so does distortion that a pinhole camera does not model. Empty if distortion
+/// fits the images clearly better, if the images are inconclusive, or if `go_on` cancels a calibration. Runs one or two
+/// small self-calibrations, which take a few tenths of a second.
 [[nodiscard]] std::optional<focal_doubt> find_doubt(const orbis::slam::map& map,
                                                     const orbis::camera::any_camera& camera,
                                                     const orbis::slam::options& options,

@@ -188,8 +188,8 @@ result<camera_file> parse_camera(const named_values& values, const std::filesyst
   return file;
 }
 
-/// Reads a 3x3 camera matrix, the upper left part of a 4x4 matrix, or fx, fy, cx, cy. The depth scale is 5000 if the
-/// folder contains the list of the ETH3D layout.
+/// Reads a 3x3 camera matrix, the upper left part of a 4x4 matrix, or fx, fy, cx, cy. For a file with fx, fy, cx, cy,
+/// the depth scale is 5000 if the folder contains associated.txt, which indicates the ETH3D layout.
 result<camera_file> read_matrix(const std::string& text, const std::filesystem::path& path) {
   std::istringstream in{text};
   in.imbue(std::locale::classic());

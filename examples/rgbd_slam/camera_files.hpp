@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Cameras in files: camera.toml, and the files of other programs.
+/// Reading of camera files: camera.toml, and the files of other programs.
 #pragma once
 
 #include <filesystem>
@@ -12,7 +12,7 @@
 
 namespace app {
 
-/// A camera in a file of another program. A width of 0 means that the file does not specify the image size, so that
+/// A camera read from another program's file. A width of 0 means that the file does not specify the image size, so that
 /// images of any size are accepted.
 struct camera_file {
   orbis::camera::camera_settings camera;
@@ -32,8 +32,8 @@ struct camera_file {
 /// those of `read_camera_file`.
 [[nodiscard]] orbis::result<orbis::camera::camera_settings> named_camera(const std::string& name);
 
-/// The file of another program, with one of the usual names, that describes the camera of the recording in `folder`;
-/// empty if there is none.
+/// The path of another program's camera file for the recording in `folder`. The file must have one of the usual names;
+/// the path is empty if there is no such file.
 [[nodiscard]] std::filesystem::path find_camera_file(const std::filesystem::path& folder);
 
 }  // namespace app

@@ -73,15 +73,15 @@ void add_map_options(CLI::App& cmd, settings& s) {
   metres(cmd, "--resolution", s.resolution, "voxel size of the octree in metres", 0.001, 10.0);
   cmd.add_option(
          "--max-depth", s.max_depth,
-         "maximum depth of measurements in the map, in metres (4; stereo cameras: 20 times the baseline if that "
-         "is more)")
+         "maximum depth of measurements in the map, in metres (default: 4; for stereo cameras, 20 times the baseline "
+         "if that is more)")
       ->check(within(0.1, 1000.0, " m"))
       ->type_name("M");
   cmd.add_option("--filter", s.filter, "outlier filter of the cloud; auto: chosen by an analysis of the cloud")
       ->check(CLI::IsMember(filter_names()))
       ->capture_default_str()
       ->type_name("MODE");
-  cmd.add_option("--neighbors", s.neighbors, "number of neighbours for the filter (statistical: 50, radius: 5)")
+  cmd.add_option("--neighbors", s.neighbors, "number of neighbours for the filter (default: statistical 50, radius 5)")
       ->check(within<std::size_t>(1, 100'000))
       ->type_name("N");
   metres(cmd, "--radius", s.radius, "search radius of the radius filter in metres", 1e-6, 1000.0);
@@ -95,8 +95,8 @@ void add_map_options(CLI::App& cmd, settings& s) {
         0, 1'000'000)
       ->capture_default_str();
   cmd.add_option("--threads", s.threads,
-                 "number of threads for filter and octree (all cores); 1: a single thread for everything, implies "
-                 "--deterministic, and tracking waits for the live map")
+                 "number of threads for filter and octree (default: one per core); 1: a single thread for everything; "
+                 "this implies --deterministic, and tracking waits for the live map")
       ->check(within(1U, 1024U))
       ->type_name("N");
   cmd.add_flag("--quiet", s.quiet, "print errors only");
@@ -136,7 +136,7 @@ void add_plan_options(CLI::App& cmd, settings& s, std::string& from, std::string
       "--ground", s.on_floor,
       "the robot drives on the floor: the heights of start and goal are ignored, and the default of --robot-height is "
       "0.5");
-  cmd.add_option("--step", s.robot_step, "with --ground: maximum height of a step in metres (voxel size)")
+  cmd.add_option("--step", s.robot_step, "with --ground: maximum height of a step in metres (default: voxel size)")
       ->check(within(0.0, 10.0, " m"))
       ->type_name("M");
   cmd.add_option_function<std::string>(
@@ -178,12 +178,12 @@ void add_recording_options(CLI::App& cmd, settings& s) {
       ->check(CLI::IsMember({"auto", "tum", "7scenes", "icl", "scannet", "folders", "kitti", "asl", "pairs", "images"}))
       ->capture_default_str()
       ->type_name("F");
-  cmd.add_option("--topics", s.topics, "image topics of a ROS bag: COLOUR,DEPTH or LEFT,RIGHT (chosen automatically)")
+  cmd.add_option("--topics", s.topics, "image topics of a ROS bag: COLOUR,DEPTH or LEFT,RIGHT (default: automatic)")
       ->delimiter(',')
       ->expected(1, 2)
       ->type_name("A,B");
   cmd.add_option("--truth-topic", s.truth_topic,
-                 "ground truth of a ROS bag: topic of poses, odometry or transforms (/tf) (none)")
+                 "ground truth of a ROS bag: topic of poses, odometry or transforms (/tf); default: none")
       ->type_name("NAME");
   add_camera_option(cmd, s);
 }
@@ -265,7 +265,8 @@ void add_viewer_options(CLI::App& cmd, settings& s) {
       ->check(within(0U, 65535U))
       ->capture_default_str()
       ->type_name("N");
-  cmd.add_flag("--viewer-hold", s.viewer_hold, "keep the viewer open after the run until it is closed, or Ctrl-C");
+  cmd.add_flag("--viewer-hold", s.viewer_hold,
+               "after the run, keep the viewer open until it is closed or Ctrl-C is pressed");
 }
 
 void add_calibration_options(CLI::App& cmd, settings& s) {
@@ -320,7 +321,7 @@ std::string build_features() {
          "\nFrames that arrive while another one is being tracked are dropped; summary.json counts them.";
 }
 
-/// The error if recordings of the sensor do not exist in the requested layout; otherwise empty.
+/// The error if `--format` names a layout that does not exist for the sensor; otherwise empty.
 std::string wrong_format(const settings& s) {
   using list = std::vector<std::string>;
   const list formats = s.sensor == "rgbd"     ? list{"tum", "7scenes", "icl", "scannet", "folders"}
@@ -385,7 +386,7 @@ void set_profile_defaults(const CLI::App& cmd, settings& s) {
   if (is_open("--depth-memory")) s.depth_memory = small_settings::depth_memory;
 }
 
-/// Parses "x,y,z"; empty if the text has another form.
+/// Parses "x,y,z"; empty if the text is not three finite numbers.
 std::optional<orbis::vec3> parse_vector(const std::string& text) {
   orbis::vec3 p;
   char rest = 0;

@@ -19,8 +19,8 @@ namespace app {
 
 /// Calls `work()` on another thread. Returns its result or rethrows its exception. The result is empty if the work was
 /// abandoned (`interrupts::is_given_up`) and does not end promptly by itself. The work is then still running, so all
-/// data to which it refers must outlive it, and the program must end by `interrupts::end_program`. If no thread can be
-/// created, calls `work` on the current thread.
+/// data to which it refers must outlive it, and the program must end through `interrupts::end_program`. If no thread
+/// can be created, calls `work` on the current thread.
 template <class Work>
 [[nodiscard]] std::optional<std::invoke_result_t<Work&>> run_dispensable(Work work) {
   constexpr std::chrono::milliseconds poll_interval{20}, moment{500};

@@ -60,8 +60,8 @@ sigset_t watched() {
   for (;;) std::raise(signal);
 }
 
-/// Prints on standard error unless that would block, as it would on a full pipe: further signals must be handled. Uses
-/// no stream, because a blocked thread may hold the lock of a stream.
+/// Prints to standard error unless that would block, for example on a full pipe, so that the thread can handle further
+/// signals. Uses no stream, because a blocked thread may hold the lock of a stream.
 void print_without_blocking(const std::string& text) {
   pollfd out{STDERR_FILENO, POLLOUT, 0};
   if (::poll(&out, 1, 0) == 1 && (out.revents & POLLOUT) != 0)

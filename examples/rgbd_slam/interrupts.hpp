@@ -6,9 +6,9 @@
 /// stop and to write its results so far, and the second signal ends the program immediately. Before a signal ends the
 /// program, the program's temporary files are removed.
 ///
-/// Afterwards, a run derives optional results (`begin_dispensable`). A signal during that time abandons them. After an
-/// earlier SIGINT they are completed; after SIGTERM or SIGHUP, whose senders do not wait long, they are abandoned if
-/// they take more than a few seconds.
+/// Afterwards, a run derives optional results (`begin_dispensable`). A signal during that time abandons them. If SIGINT
+/// arrived earlier, they are completed; if SIGTERM or SIGHUP arrived, whose senders do not wait long, they are
+/// abandoned if they take more than a few seconds.
 #pragma once
 
 #include <functional>

@@ -28,8 +28,8 @@ class keyframe_depths {
   keyframe_depths& operator=(const keyframe_depths&) = delete;
   ~keyframe_depths() { wait(); }
 
-  /// Copies the image; first waits until the previous one is compressed and rethrows an exception of that compression.
-  /// Call it from one thread only.
+  /// Copies the image. First waits until the previous image is compressed, and rethrows any exception thrown by its
+  /// compression. Call it from one thread only.
   void put(std::uint64_t frame, const orbis::image<std::uint16_t>& depth) {
     finish();
     std::shared_future<void> ahead;
@@ -42,7 +42,7 @@ class keyframe_depths {
     const std::lock_guard lock{ahead_mutex_};
     ahead_ = std::move(ahead);
   }
-  /// Waits until the last image is compressed, and rethrows an exception of that compression.
+  /// Waits until the last image is compressed, and rethrows any exception thrown by its compression.
   void finish() const {
     if (const std::shared_future<void> last = ahead(); last.valid()) last.get();
   }

@@ -32,7 +32,7 @@ std::string describe(const built_map& map) {
          std::string{to_string(map.filter.mode)} + ", octree of " + count_text(map.octree.num_leaves()) + " leaves";
 }
 
-/// The first part of the explanation of why points were removed.
+/// The beginning of the sentence that explains why points were removed; empty if there were no moving objects.
 std::string describe(const orbis::mapping::moving_count& moving) {
   if (moving.pixels == 0) return {};
   return std::to_string(moving.pixels) + " pixels of " + std::to_string(moving.keyframes) +
@@ -54,7 +54,8 @@ tree_numbers describe_tree(const tree& map, std::uintmax_t bytes) {
   return {n.leaves, n.occupied_leaves, n.free_leaves, bytes};
 }
 
-/// The occupied leaves with the mean colour of their points, or only of the points with the indices `only`.
+/// The occupied leaves, each with the mean colour of its points. `only`: indices of the points to use; null: all
+/// points.
 std::vector<voxel> occupied_voxels(const tree& map, const orbis::point_cloud& cloud,
                                    const std::vector<std::uint32_t>* only = nullptr) {
   voxel_colors colors{map.resolution()};

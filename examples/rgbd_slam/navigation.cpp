@@ -97,7 +97,7 @@ orbis::result<navigation_results> navigate(const octree& map, const orbis::traje
   const auto start = console::clock::now();
   const auto note = [&](const std::optional<way>& found, bool drives) {
     if (!found) {
-      r.path_status = "fewer than two positions that the camera saw are known to be free";
+      r.path_status = "the camera saw fewer than two positions that are known to be free";
       return;
     }
     r.path_status = to_string(found->path.status);

@@ -171,8 +171,8 @@ orbis::result<mapped> map_cloud_file(const settings& s, const std::filesystem::p
   return mapped{std::move(r), map_cloud(std::move(cloud), moved, console), {}};
 }
 
-/// Sets the times of poses in KITTI's layout to those in `times.txt`. If both trajectories are in this layout, their
-/// times remain the numbers of the lines.
+/// Sets the times of poses in KITTI's layout to those in `times.txt`. If both trajectories are in this layout, the line
+/// numbers remain their times.
 orbis::result<void> complete_times(const settings& s, orbis::io::trajectory_reading& estimate,
                                    orbis::io::trajectory_reading& truth, std::vector<std::string>& warnings) {
   const auto has_times = [](const auto& read) { return read.layout != orbis::io::trajectory_layout::kitti; };

@@ -27,7 +27,8 @@
 namespace app {
 namespace {
 
-/// Ends the run if it would overwrite a file that it must not replace, or if it cannot write its results.
+/// Checks the outputs before the run starts. Prints the error and returns the exit code if the run would overwrite a
+/// file that it must not replace, or if it cannot write its results.
 std::optional<exit_code> check_outputs(const frame_source& source, const settings& s, console& console) {
   if (const auto conflict = find_overwritten(s, input_files(s, source.files)))
     return console.error(*conflict), bad_usage;
@@ -175,7 +176,7 @@ orbis::result<void> report_without_map(results& r, const frame_source& source, c
   return written;
 }
 
-/// The exit code of a run that wrote its results; reports the error that limits the results, if there is one.
+/// Returns the exit code of a run that wrote its results. If an error made the results incomplete, prints it.
 exit_code end_tracked(const results& r, const tracked_frames& tracked, const completion& end,
                       const frame_source& source, const settings& s, console& console) {
   if (tracked.stopped) return console.error(explain_stop(tracked, source)), bad_input;

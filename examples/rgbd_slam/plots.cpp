@@ -18,7 +18,7 @@ namespace {
 using orbis::vec2;
 using orbis::vec3;
 
-/// Writes a note below a picture if its frame differs from the frame of the files.
+/// Writes a note below a picture if its coordinate frame differs from that of the files.
 void add_frame_note(sheet& s, const results& r, const view_frame& frame) {
   const std::string note = view_frame_note(frame, r.slam ? r.slam->unit() : "metres");
   if (!note.empty()) s.text(note, {60, 806}, faint, 11);

@@ -60,8 +60,8 @@ class posed_frames {
            const orbis::camera::rgbd_frame& frame) {
     add({i, {}, T_world_camera, corrected_by}, frame);
   }
-  /// Adds frame `i` of the source, a keyframe whose pose is set later by `place`. `corrected_by`: the motion by which
-  /// its images were corrected; if there is no motion, they are the source's images.
+  /// Adds frame `i` of the source, a keyframe whose pose is set later by `place`. `corrected_by`: the camera motion for
+  /// which its images were corrected; zero if they are unchanged images of the source.
   void add(std::size_t i, orbis::slam::map_keyframe keyframe, const orbis::slam::frame_motion& corrected_by,
            const orbis::camera::rgbd_frame& frame) {
     add({i, keyframe, {}, corrected_by}, frame);
@@ -153,7 +153,7 @@ class posed_frames {
   [[nodiscard]] std::optional<orbis::error> unspilled() const { return depths_->unspilled(); }
   /// The depth images, which are shared with the live map.
   [[nodiscard]] keyframe_depths& depths() const { return *depths_; }
-  /// The last error in reading an image, which was then left without pixels; empty if there was none.
+  /// The last error in reading an image, which was then treated as empty; nullopt if there was none.
   [[nodiscard]] const std::optional<orbis::error>& read_error() const { return read_error_; }
 
  private:

@@ -21,7 +21,7 @@ struct small_settings {
   static constexpr std::size_t depth_memory = 8;  ///< --depth-memory, MB
 };
 
-/// Applies a profile to the options of SLAM; bench/board measures the cost.
+/// Applies a profile to the options of SLAM. The benchmark bench/board estimates the computing time on a small board.
 inline void set_profile(std::string_view profile, orbis::slam::options& o) {
   if (profile != "small") return;
   o.features.max_features = 600;

@@ -189,7 +189,8 @@ std::optional<orbis::error> find_unwritable(const settings& s) {
   return std::nullopt;
 }
 
-/// Checks that enough files can be open at the end of a run, so that a run does not lose its results then.
+/// Checks in advance that the process can open a few more files, because a run that cannot do so at its end would lose
+/// its results.
 result<void> check_descriptors(const fs::path& out) {
   std::vector<descriptor> spare;
   for (int i = 0; i != 8; ++i)

@@ -21,10 +21,10 @@
 
 namespace app {
 
-/// Names of files, in the order of the documentation.
+/// Names of files, in the order in which the documentation lists them.
 using file_names = std::vector<std::string>;
 
-/// The trajectory file of a map that was not merged with the main one; the first has number 2.
+/// The name of the trajectory file for a map that was not merged with the main map; the first such map has number 2.
 [[nodiscard]] std::string trajectory_name(std::size_t number);
 /// The maximum number of maps with a trajectory file, including the main one.
 inline constexpr std::size_t most_maps = 9;
@@ -47,8 +47,8 @@ inline constexpr std::size_t most_maps = 9;
 [[nodiscard]] std::optional<orbis::error> find_overwritten(const settings& s,
                                                            const std::vector<std::filesystem::path>& inputs);
 
-/// Returns an error if an output folder can neither be written nor created, as far as this can be checked without
-/// creating it, so that the error is reported before the run starts. Errors: write_failed.
+/// Returns an error (write_failed) if an output folder can be neither written nor created. Creates nothing, so that it
+/// can be called before the run starts; it therefore does not find all errors.
 [[nodiscard]] std::optional<orbis::error> find_unwritable(const settings& s);
 
 /// Lists the files of the output folder `out`. New files are created in `folder`.
@@ -92,7 +92,7 @@ class result_files {
   /// The counterparts of `folder` and `floor_map` for the optional files.
   [[nodiscard]] std::filesystem::path optional_folder() const { return folder() / optional_name; }
   [[nodiscard]] std::filesystem::path optional_floor_map() const { return floor_map_in(optional_name); }
-  /// Adds the optional files to the other files: all of them, or none on an error. Errors: write_failed.
+  /// Adds the optional files to the other files: all of them, or none if this fails. Errors: write_failed.
   [[nodiscard]] orbis::result<void> take_optional();
   /// Removes the optional files.
   void drop_optional() noexcept;

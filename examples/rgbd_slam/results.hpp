@@ -44,7 +44,7 @@ struct map_results {
   orbis::point_cloud cloud;         ///< before the filter
   std::vector<std::uint32_t> kept;  ///< indices of the points that the filter kept
   std::string filter_mode, filter_reason;
-  std::size_t moving_pixels = 0, moving_keyframes = 0;  ///< removed pixels of moving objects, and their keyframes
+  std::size_t moving_pixels = 0, moving_keyframes = 0;  ///< removed pixels of moving objects; affected keyframes
   std::uintmax_t cloud_bytes = 0, filtered_bytes = 0;   ///< sizes of the files
   double resolution = 0.0;
   tree_numbers unfiltered, filtered;
@@ -99,7 +99,7 @@ struct slam_results {
   /// The unit of lengths, for display.
   [[nodiscard]] const char* unit() const { return sensor == orbis::slam::sensor_kind::monocular ? "units" : "metres"; }
   std::size_t frames = 0, tracked = 0, lost = 0, relocalized = 0, landmarks = 0;
-  std::optional<std::size_t> dropped;  ///< frames of a live camera dropped while tracking was busy; empty: no camera
+  std::optional<std::size_t> dropped;  ///< frames of a live camera dropped while tracking was busy; empty: not live
   std::size_t loops_closed = 0, maps_merged = 0, keyframes_culled = 0;
   shutter_results shutter;
   intrinsics_results intrinsics;

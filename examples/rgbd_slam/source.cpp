@@ -39,7 +39,8 @@ using orbis::slam::sensor_kind;
 
 constexpr const char* camera_request = "specify a camera";
 
-/// If `e` is a reader's request for a camera, adds the command-line option to it.
+/// If `e` is a reader's request for a camera, or reports that depth.txt is missing, adds the command-line options that
+/// help.
 orbis::error with_option(orbis::error e) {
   if (e.message.ends_with(camera_request))
     e.message +=
@@ -491,9 +492,9 @@ frame_source make_synthetic(const settings& s) {
   return source;
 }
 
-/// Adds a note if voxels are so small that a frame takes seconds, and fails if one frame alone may exhaust the memory.
-/// The estimate is the largest one among a few frames; if all frames together exhaust the memory, the run abandons the
-/// map.
+/// Adds a note if voxels are so small that inserting a frame takes seconds, and fails if one frame alone may exhaust
+/// the memory. The estimate is the largest one among a few frames; if all frames together exhaust the memory, the run
+/// abandons the map.
 result<void> check_resolution(frame_source& source, const settings& s) {
   const orbis::camera::intrinsics& k = source.camera.model.k();
   if (source.frames == 0 || source.is_monocular() || source.is_live) return {};  // live frames cannot be read twice

@@ -57,7 +57,8 @@ descriptor open_folder(const fs::path& folder) {
   return descriptor{::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)};
 }
 
-/// A link to an open folder that remains valid if the user renames the folder. Broken on systems without /proc.
+/// The path of a link to an open folder. The link remains valid if the user renames the folder; it is broken on systems
+/// without /proc.
 fs::path link_to(const descriptor& folder) { return "/proc/self/fd/" + std::to_string(folder.get()); }
 
 /// Locks folders during its lifetime. No effect on file systems without locks.
@@ -105,7 +106,7 @@ constexpr const char* locked_by_another = "another program has locked the folder
 struct move {
   std::string from, to, old;
   bool replaces = false;  ///< a file exists at `to`
-  bool has_old = false;   ///< that file also exists at `old`
+  bool has_old = false;   ///< `old` is a hard link to that file
 };
 
 /// Added to the errno value if the files that were already moved cannot be moved back.

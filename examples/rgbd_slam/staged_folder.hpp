@@ -63,7 +63,7 @@ class staged_folder {
   staged_folder& operator=(staged_folder&&) = delete;
   ~staged_folder() { discard(); }
 
-  /// A path of the hidden folder that stays valid if the user renames one of the folders that contain it.
+  /// A path to the hidden folder that remains valid if the user renames one of the folders that contain it.
   [[nodiscard]] std::filesystem::path path() const;
   /// The folder into which the files will be moved.
   [[nodiscard]] const std::filesystem::path& target() const { return folder_; }
@@ -80,9 +80,10 @@ class staged_folder {
 
  private:
   staged_folder() = default;
-  /// Finds the present paths of the folders. @pre hidden.mutex is locked
+  /// Finds the current paths of the folders. @pre hidden.mutex is locked
   void follow(hidden_folders& hidden);
-  /// Renames the hidden folder, also in `hidden`, so that an interrupt finds the folder. @pre hidden.mutex is locked
+  /// Renames the hidden folder and updates its path in `hidden`, so that the handling of an interrupt finds the folder.
+  /// @pre hidden.mutex is locked
   std::error_code rename_hidden(const std::filesystem::path& to, hidden_folders& hidden);
   /// Keeps the hidden folder after the end of this process. @pre hidden.mutex is locked
   void leave(hidden_folders& hidden);

@@ -97,7 +97,7 @@ orbis::slam::track_result track_frame(slam_system& slam, const frame_source& sou
   return slam.track(f);
 }
 
-/// Returns true if the frames of a camera ended normally: end of a played recording, or interruption by the user.
+/// Returns true if a camera's frames ended normally: the played recording ended, or the user interrupted the run.
 bool is_planned_end(const orbis::error& e) {
   return e.code == orbis::errc::no_data || e.code == orbis::errc::cancelled;
 }
@@ -223,7 +223,8 @@ scene_sources make_sources(const slam_system& slam, const live_mapping* live) {
   return sources;
 }
 
-/// Returns `make()`, which starts threads of the run. If the system provides too few threads, closes the viewer first.
+/// Returns `make()`, which starts threads of the run. If the system cannot start enough threads, closes the viewer and
+/// tries again.
 template <class Make>
 std::invoke_result_t<const Make&> with_threads(viewer& viewer, console& console, const Make& make) {
   try {
@@ -369,7 +370,7 @@ orbis::error explain_stop(const tracked_frames& tracked, const frame_source& sou
   orbis::error e = *tracked.stopped;
   e.message += "; stopped after " + std::to_string(tracked.slam.frames) +
                (source.is_live ? "" : " of " + std::to_string(source.frames)) + " frames, " +
-               (tracked.slam.tracked == 0 ? "of which none could be tracked" : "whose results are kept");
+               (tracked.slam.tracked == 0 ? "none of which could be tracked" : "whose results are kept");
   return e;
 }
 

@@ -34,8 +34,8 @@ struct tracked_frames {
 };
 
 /// Tracks the frames of the source until a frame is unreadable, Ctrl-C is pressed, or memory is exhausted. Errors: a
-/// map that cannot be loaded. `files`: receive the landmark map, if the settings request one, and depth images that do
-/// not fit into memory (see `posed_frames`). `viewer` shows the progress.
+/// map that cannot be loaded. `files`: where to write the landmark map, if the settings request one, and depth images
+/// that do not fit into memory (see `posed_frames`). `viewer` shows the progress.
 [[nodiscard]] orbis::result<tracked_frames> track(const frame_source& source, const shutter_results& shutter,
                                                   const settings& s, const result_files& files, viewer& viewer,
                                                   console& console);

@@ -26,7 +26,8 @@ class upright_worlds {
   /// only), the camera is at the origin and looks along x. The direction of gravity in the settings applies only to the
   /// very first frame (`is_first`).
   [[nodiscard]] orbis::se3 start_world(const orbis::camera::rgbd_frame& frame, bool is_first);
-  /// The source of the vertical direction of the world frame that starts at this time; empty if there is none.
+  /// The source of the vertical direction for the world frame that starts at `timestamp`; empty if no world frame
+  /// starts then.
   [[nodiscard]] std::optional<world_results> world_starting_at(double timestamp) const;
 
  private:

@@ -2,9 +2,9 @@
 /// @file
 /// Vocabularies in the text format of DBoW2, the format of ORB-SLAM's vocabulary.
 ///
-/// The first line contains branching, depth, the score (0 to 5; ignored, because a vocabulary of orbis does not store a
-/// score) and the weighting (0 tf-idf, 1 tf, 2 idf, 3 binary). Each subsequent line is a node; nodes are numbered from
-/// 1. A line contains the index of the parent (0: the root), 1 for a word or 0 for an inner node, the bytes of the
+/// The first line contains the branching factor, the depth, the type of score (0 to 5; ignored, because orbis does not
+/// store it) and the weighting (0 tf-idf, 1 tf, 2 idf, 3 binary). Each subsequent line is a node; nodes are numbered
+/// from 1. A line contains the index of the parent (0: the root), 1 for a word or 0 for an inner node, the bytes of the
 /// descriptor, and the weight.
 #pragma once
 
@@ -65,7 +65,7 @@ constexpr void set_byte(bit_words<Bits>& descriptor, std::size_t i, std::uint8_t
 }
 
 /// Parses the vocabulary in `text`; `where` names the source in errors. Words are renumbered; bags of words and scores
-/// are the same as in DBoW2. Errors, with the line number: malformed.
+/// are the same as in DBoW2. Errors (with the line number): malformed.
 template <std::size_t Bits = 256>
 [[nodiscard]] result<basic_vocabulary<Bits>> parse_dbow_text(std::string_view text, const std::string& where = "text") {
   std::size_t line_number = 0;

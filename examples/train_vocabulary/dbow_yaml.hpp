@@ -259,7 +259,7 @@ class dbow_yaml_parser {
     return take_number(value, to) && take_field(value).empty();
   }
 
-  /// Converts the nodes from the order in the file to the order of their ids, and then to the order of orbis.
+  /// Sorts the nodes by id, and then level by level, the order of orbis. Returns false on an error.
   bool order() {
     const std::size_t n = nodes_.size();
     std::vector<std::uint32_t> entry(n + 1, 0);  // for each id: the index of its node, counted from 1; 0: none
@@ -304,8 +304,8 @@ class dbow_yaml_parser {
   std::size_t line_ = 1;
 };
 
-/// Parses the vocabulary in `text`; `where` names the source in errors. Words are renumbered. Errors, with the line
-/// number: malformed; unsupported (descriptors that do not have `Bits` bits).
+/// Parses the vocabulary in `text`; `where` names the source in errors. Words are renumbered. Errors (with the line
+/// number): malformed, unsupported (descriptors that do not have `Bits` bits).
 template <std::size_t Bits = 256>
 [[nodiscard]] result<basic_vocabulary<Bits>> parse_dbow_yaml(std::string_view text, const std::string& where = "text") {
   return dbow_yaml_parser<Bits>{text, where}.parse();

@@ -22,8 +22,8 @@ namespace dbow {
 using namespace orbis;
 using namespace orbis::places;
 
-/// Reads a vocabulary in the format of orbis, DBoW2 (text) or DBoW3 (YAML), which is detected from the first bytes.
-/// Errors: not_found, unreadable, malformed, unsupported (such as gzip).
+/// Reads a vocabulary in the format of orbis, DBoW2 (text) or DBoW3 (YAML); detects the format from the first bytes.
+/// Errors: not_found, unreadable, malformed, unsupported (a file compressed with gzip, for example).
 template <std::size_t Bits = 256>
 [[nodiscard]] result<basic_vocabulary<Bits>> load_vocabulary(const std::filesystem::path& path) {
   if (std::error_code ignored;

@@ -50,7 +50,7 @@ int write(const settings& s, const places::vocabulary& words) {
   return 0;
 }
 
-/// The message if the output file is a file of one of the recordings; empty otherwise.
+/// The error message if the output file belongs to one of the recordings; empty otherwise.
 std::string overwritten_input(const settings& s) {
   std::error_code ignored;
   if (!std::filesystem::exists(s.output, ignored)) return {};

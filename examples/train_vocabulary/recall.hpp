@@ -20,7 +20,7 @@ namespace recall {
 
 using sources::view;
 
-/// Database views, query views, and the criterion for the same place.
+/// Database views, query views, and the criterion for two views of the same place.
 struct task {
   std::string name;
   orbis::camera::camera_settings camera{};
@@ -28,7 +28,7 @@ struct task {
   double overlap = 0.6;   ///< minimum share of each view's surface that is visible in the other
   double turned = 0.6;    ///< maximum rotation between the two views, radians
   bool within = false;    ///< true if the queries are views in the database
-  std::size_t apart = 0;  ///< minimum distance from the query, in views; used if `within` is true
+  std::size_t apart = 0;  ///< minimum difference of the indices of query and match; used if `within` is true
 };
 
 struct outcome {

@@ -63,7 +63,7 @@ struct view {
   return static_cast<double>(inside) / static_cast<double>(a.surface.size());
 }
 
-/// The views of one camera.
+/// A camera and the views that it captured.
 struct tour {
   orbis::camera::camera_settings camera;
   std::vector<view> views{};
@@ -79,8 +79,8 @@ struct tour {
   return images;
 }
 
-/// `views` views of the room with the seed `seed`, along a path around it. `again`: along another path, with different
-/// light and sensor noise.
+/// `views` views of the room with the seed `seed`, along a path around it. If `again` is true, the path differs and
+/// the images are darker.
 [[nodiscard]] inline tour of_room(std::uint64_t seed, int views, int features, std::size_t place, bool again = false) {
   orbis::io::synthetic_options options{.frames = views, .seed = seed};
   if (again) {

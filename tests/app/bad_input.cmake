@@ -204,7 +204,7 @@ check(frames EQUAL 8)
 # Before anything could be tracked: what is wrong is the image, not that tracking never started.
 make_recording(${WORK}/dark_and_damaged 6 16)
 file(WRITE ${WORK}/dark_and_damaged/depth/000003.png "this is no picture")
-app_fails(2 "depth/000003.png: .*stopped after 3 of 6 frames, of which none could be tracked" run dark_and_damaged --out dark --quiet)
+app_fails(2 "depth/000003.png: .*stopped after 3 of 6 frames, none of which could be tracked" run dark_and_damaged --out dark --quiet)
 summary(frames ${WORK}/dark frames)
 check(frames EQUAL 3)
 

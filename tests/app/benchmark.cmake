@@ -80,6 +80,6 @@ endforeach()
 app(1 benchmark scenes --quick)
 check(out MATCHES "\noffice/seq-01 .*\noffice/seq-02 ")
 
-app_fails(2 "temporary: contains no recordings that are not already listed" benchmark temporary)
+app_fails(2 "temporary: contains no recordings, or only recordings that are already listed" benchmark temporary)
 app_fails(2 "nowhere: does not exist" benchmark nowhere)
 app_fails(1 "--json excludes --markdown" benchmark data --json --markdown)

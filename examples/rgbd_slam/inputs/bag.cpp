@@ -72,8 +72,8 @@ struct topic : bag_topic {
   [[nodiscard]] bool is_registered() const {
     return (contains(name, "registered") || contains(name, "aligned")) && !contains(name, "to_infra");
   }
-  /// Returns true if the name indicates infrared or thermal images, or the confidence of depth: a component is one of
-  /// these words, or contains one of them but not "depth" ("image_ir", but not "aligned_depth_to_infra1").
+  /// Returns true if the name indicates infrared or thermal images, or depth confidence. Ignores components that
+  /// contain "depth": "image_ir" indicates infrared, but "aligned_depth_to_infra1" does not.
   [[nodiscard]] bool is_auxiliary() const {
     for (std::string_view rest = name; !rest.empty();) {
       std::string_view component = rest.substr(0, rest.find('/'));
@@ -307,7 +307,7 @@ class bag_recording final : public file_recording {
   }
 
   /// Reads the times of the headers, in the order of the file, or the recording times if the headers have none. Omits
-  /// messages that cannot be read and repeated times.
+  /// unreadable messages and messages with a repeated time.
   result<void> read_times() {
     struct entry {
       topic* of;

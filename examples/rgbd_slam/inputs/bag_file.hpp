@@ -22,7 +22,7 @@ namespace app {
 /// The position of a message, and the time at which it was recorded.
 struct bag_message {
   std::int64_t time = 0;  ///< nanoseconds
-  std::uint64_t at = 0;   ///< position in the file or chunk; in SQLite the row
+  std::uint64_t at = 0;   ///< position in the file or chunk; for SQLite, the row
   std::uint32_t chunk = 0, file = 0;
 };
 
@@ -52,7 +52,7 @@ inline constexpr std::size_t whole_message = std::size_t{1} << 30U;  ///< bytes;
 [[nodiscard]] std::string ros1_type(std::string_view type);
 /// Returns true if the messages of a topic are listed. `type` is spelt as in ROS 1.
 [[nodiscard]] bool is_listed(std::string_view name, std::string_view type);
-/// Returns true for the topic with the depth unit in metres in a librealsense bag.
+/// Returns true for the topic of a librealsense bag that states the depth unit in metres.
 [[nodiscard]] bool is_depth_unit(std::string_view name, std::string_view type);
 /// Finds the topic with the name, type and encoding of `t` in a list; if it is missing, appends it without messages.
 [[nodiscard]] bag_topic& topic_like(std::vector<bag_topic>& topics, const bag_topic& t);

@@ -43,7 +43,7 @@ struct device_options {
 [[nodiscard]] bool has_video_cameras();
 
 /// Opens a depth camera (Astra, Xtion, PrimeSense), or plays an .oni file. The device registers depth to colour.
-/// `name`: the URI or the file. Errors: unsupported (not in this build), not_found.
+/// `name`: the URI of the device, or the path of the .oni file. Errors: unsupported (not in this build), not_found.
 [[nodiscard]] orbis::result<std::unique_ptr<camera_device>> open_openni(const device_options& options);
 /// Opens a video camera; if `sensor` is stereo, a camera that delivers two rectified images side by side. `name`: the
 /// device file (/dev/video0) or number. Errors: those of `open_openni` and `check_camera`.

@@ -27,7 +27,7 @@ class frame_pairs {
   };
 
   /// `interval`: time between frames of a stream, seconds. Paired frames are less than half an interval apart, and at
-  /// most 20 ms, as for recordings.
+  /// most 20 ms, which is also the limit for recordings.
   explicit frame_pairs(double interval = 1.0 / 30.0) : most_apart_{std::min(0.020, 0.49 * interval)} {}
 
   /// Adds the next frame of a stream with its time in seconds; returns the pair that it completes, if any.

@@ -23,11 +23,11 @@ class frame_tree {
     bool is_constant = true;
   };
 
-  /// Sets a static transform; it replaces an earlier one.
+  /// Sets a static transform, which replaces an earlier one of the same child frame.
   void set(const ros_messages::transform& t) {
     links_.insert_or_assign(t.child_frame_id, link{t.header.frame_id, t.T_parent_child});
   }
-  /// Adds a transform; a link with different transforms is a moving link.
+  /// Adds a transform. A link for which different transforms are added is a moving link.
   void add(const ros_messages::transform& t) {
     const auto [at, is_new] = links_.try_emplace(t.child_frame_id, link{t.header.frame_id, t.T_parent_child});
     link& known = at->second;
@@ -40,7 +40,7 @@ class frame_tree {
     const auto at = links_.find(frame);
     return at == links_.end() ? nullptr : &at->second;
   }
-  /// The frame, its parent, and so on to the root. In a cycle, each frame occurs once.
+  /// The frame, its parent, and so on up to the root. In a cycle, each frame occurs once.
   [[nodiscard]] std::vector<std::string> path_to_root(std::string frame) const {
     std::vector<std::string> path{frame};
     for (const link* up = find(frame); up != nullptr; up = find(path.back())) {

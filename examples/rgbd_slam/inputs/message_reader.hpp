@@ -54,7 +54,8 @@ class message_reader {
     for (T& v : values) v = number<T>();
     return values;
   }
-  /// The number of elements in a sequence; `ok()` is false if that many elements of `least` bytes extend past the end.
+  /// The number of elements in a sequence. Afterwards, `ok()` is false if that many elements, of at least `least` bytes
+  /// each, would extend past the end.
   [[nodiscard]] std::size_t count(std::size_t least) {
     const std::size_t n = number<std::uint32_t>();
     if (n > rest() / least) ok_ = false;

@@ -16,7 +16,7 @@ using orbis::errc;
 using orbis::fail;
 using orbis::result;
 
-/// Plays `size` frames; `read(i)` returns a frame.
+/// Plays `size` frames; `read(i)` returns frame `i`.
 template <class Recording, class Read>
 class playback final : public camera_device {
   using clock = std::chrono::steady_clock;

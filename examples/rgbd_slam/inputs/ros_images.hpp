@@ -17,7 +17,7 @@
 
 namespace app {
 
-/// The scale for storing depth that is in metres in a bag: 0.2 mm steps, up to 13 m.
+/// Stored units per metre for depth that a bag contains in metres: steps of 0.2 mm, up to 13 m.
 inline constexpr double metres_scale = 5000.0;
 
 /// Returns true if images with this encoding or format are depth images.

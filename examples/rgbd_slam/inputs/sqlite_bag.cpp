@@ -127,7 +127,7 @@ class sqlite_bag final : public bag_file {
     sqlite3_limit(opened, SQLITE_LIMIT_LENGTH, static_cast<int>(longest));
     sqlite3_exec(opened, "PRAGMA locking_mode = EXCLUSIVE; PRAGMA writable_schema = ON", nullptr, nullptr, nullptr);
   }
-  /// The address with which SQLite opens a database as immutable.
+  /// The URI by which SQLite opens a database as immutable.
   static std::string immutable(const std::string& path) {
     std::string address = "file:";
     for (const char c : path) {

@@ -22,7 +22,7 @@ using orbis::result;
 class video_camera final : public camera_device {
  public:
   explicit video_camera(cv::VideoCapture reader) : reader_{std::move(reader)} {}
-  /// Ignores the time limit, because V4L2 itself waits for a frame, for at most ten seconds.
+  /// Ignores the time limit, because V4L2 itself waits at most ten seconds for a frame.
   result<std::optional<source_frame>> next(std::chrono::milliseconds) override {
     if (!reader_.grab()) return fail(errc::unreadable, name, "no longer delivers images; it may be disconnected");
     const double time = opened_at_ + seconds_now<std::chrono::steady_clock>() - opened_;

@@ -131,7 +131,7 @@ class http_server::connection {
   [[nodiscard]] int socket() const { return socket_; }
   [[nodiscard]] short events() const { return state_ == state::sends ? POLLOUT : POLLIN; }
   [[nodiscard]] clock::time_point deadline() const { return deadline_; }
-  /// Returns true between requests.
+  /// Returns true while no request is being received or answered.
   [[nodiscard]] bool is_idle() const { return state_ == state::reads && received_.empty(); }
 
   /// Reads or writes as far as possible without waiting. Returns false if the connection ends.

@@ -33,11 +33,11 @@ struct http_answer {
 
 [[nodiscard]] http_answer text_answer(int status, std::string text);
 
-/// Limits on the resources that clients can use. A client can extend neither a time limit by sending slowly nor the
-/// time limit of a whole response by reading slowly.
+/// Limits on the resources that clients can use. A client that sends slowly extends no time limit, and a client that
+/// reads slowly does not extend the time limit for a whole response.
 struct http_limits {
   std::size_t header_bytes = std::size_t{16} << 10U;  ///< maximum size of a request
-  std::size_t connections = 32;                       ///< maximum number; a further one replaces an idle one or waits
+  std::size_t connections = 32;                       ///< maximum number; one more replaces an idle connection or waits
   std::chrono::milliseconds silence{2000};            ///< maximum time between requests on a connection
   std::chrono::milliseconds request{2000};            ///< maximum time from the first byte of a request to the last
   std::chrono::milliseconds sending{5000};            ///< time within which a client must read some part of a response

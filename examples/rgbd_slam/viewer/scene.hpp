@@ -79,7 +79,7 @@ struct shown_voxels {
   std::uint64_t revision = 0;  ///< increases with every change
   double resolution = 0.0;     ///< metres
   std::size_t count = 0;       ///< number of cubes
-  float floor = 0.0F;          ///< lower and upper height that enclose nearly all cubes, metres
+  float floor = 0.0F;          ///< lower and upper limits of the height of nearly all cubes, metres
   float ceiling = 0.0F;
   std::map<block_index, voxel_block> blocks;
   std::string absent;  ///< the reason why there are no voxels; empty otherwise

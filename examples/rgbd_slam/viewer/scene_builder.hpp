@@ -44,8 +44,8 @@ struct viewer_frame {
 /// Keyframes of SLAM and their graph.
 struct slam_graph {
   std::vector<orbis::slam::map_keyframe> asked;  ///< requested keyframes, identified by their ids at creation
-  /// The poses of the requested keyframes, with the scale of data relative to them (1 with depth); empty for keyframes
-  /// that are not in the active map.
+  /// The poses of the requested keyframes; empty for keyframes that are not in the active map. The scale of a pose
+  /// applies to positions stored in the keyframe's frame; it is 1 unless the camera is monocular.
   std::vector<std::optional<orbis::sim3>> poses;
   std::vector<orbis::se3> keyframes;  ///< keyframe poses of the active map
   std::vector<shown_edge> edges;      ///< edges between the keyframes in `keyframes`
@@ -85,7 +85,8 @@ class scene_builder {
   const viewer_scene& update(const scene_sources& sources);
   /// Like `update`, but always queries immediately.
   const viewer_scene& update_at_once(const scene_sources& sources);
-  /// Like `update_at_once`, one last time, after the last frame; then frees the data needed to apply later corrections.
+  /// Updates the scene like `update_at_once`, then frees the data needed to apply later corrections. Call it after the
+  /// last frame.
   void finish(const scene_sources& sources);
   /// Frees the data needed to apply later corrections. The scene remains unchanged.
   void forget();
@@ -184,7 +185,7 @@ class scene_builder {
       number_pace_{std::chrono::milliseconds{200}};
 };
 
-/// The rays through the corners of the images. @pre the table is not empty
+/// The rays through the corners of the images. @pre `rays` is not empty
 [[nodiscard]] frustum_rays corner_rays(const orbis::camera::ray_table& rays);
 
 }  // namespace app

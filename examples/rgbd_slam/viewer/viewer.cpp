@@ -63,7 +63,7 @@ void viewer::finish(const settings& s, console& console) {
   if (s.viewer_hold && thread_->is_open() && !interrupts::stop_requested()) {
     interrupts::keep_results({});  // all files are written: Ctrl-C only closes the viewer
     console.stage("viewer");
-    console.finish(s.viewer == "web" ? "open until Ctrl-C" : "open until it is closed, or Ctrl-C");
+    console.finish(s.viewer == "web" ? "open until Ctrl-C" : "open until it is closed or Ctrl-C is pressed");
     while (thread_->is_open() && !interrupts::stop_requested())
       std::this_thread::sleep_for(std::chrono::milliseconds{50});
   }

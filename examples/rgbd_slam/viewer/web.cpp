@@ -36,7 +36,7 @@ std::optional<std::uint64_t> parse_since(const http_request& request) {
   return value;
 }
 
-/// Limits that leave most of the file descriptors to the run.
+/// Returns limits that leave most of the process's file descriptors to the SLAM run.
 http_limits limits() {
   http_limits made;
   if (rlimit files{}; ::getrlimit(RLIMIT_NOFILE, &files) == 0)
@@ -82,7 +82,7 @@ class web_backend final : public viewer_backend {
   };
 
   [[nodiscard]] http_answer answer(const http_request& request);
-  /// Stores the first exception of the server's thread for `draw`.
+  /// Stores the first exception thrown in the server's thread; `draw` rethrows it.
   void note(std::exception_ptr failure) {
     const std::lock_guard lock{mutex_};
     if (!failure_) failure_ = std::move(failure);

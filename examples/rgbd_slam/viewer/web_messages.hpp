@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Messages to the page in the browser. Numbers are little-endian, like typed arrays on all machines that run browsers.
+/// Messages to the page in the browser. Numbers are little-endian, as in typed arrays on all machines with a browser.
 #pragma once
 
 #include <cstdint>
@@ -10,7 +10,7 @@
 
 namespace app {
 
-/// The scene's numbers, names and revisions as JSON. `session`: distinguishes the revisions of different servers.
+/// The scene's numbers, names and revisions as JSON. `session`: identifies the server to which the revisions belong.
 [[nodiscard]] std::string state_json(const viewer_scene& scene, std::uint64_t session);
 
 /// The message for a frame: u32 length of the JSON, the JSON, u32 number of features, for each u16 x, y (eighths of a
@@ -18,8 +18,8 @@ namespace app {
 [[nodiscard]] std::string frame_message(const std::string& json, const shown_frame* frame);
 
 /// The message for a graph: u32 number of keyframes, for each the 3 x 4 matrix T_world_camera (12 f32, row by row); u32
-/// number of edges, for each u32 a, b, kind (0 covisible, 1 tree, 2 loop); u32 number of points of the path, for each
-/// f32 x, y, z, u32 begins.
+/// number of edges, for each u32 a, b, kind (0 covisible, 1 tree, 2 loop); u32 number of points on the path, for each
+/// f32 x, y, z, u32 1 if it is not connected to the previous point, else 0.
 [[nodiscard]] std::string graph_message(const shown_graph& graph);
 
 /// The header of the message for voxels: f32 resolution, floor, ceiling (metres), u32 revision, u32 number of blocks,

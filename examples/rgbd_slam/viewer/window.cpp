@@ -102,7 +102,7 @@ class gl_program {
   GLuint program_ = 0;
 };
 
-/// Instances on the graphics card, each with floats and a colour.
+/// A list of instances on the graphics card; each has attributes made of floats, and then a colour.
 class instance_list {
  public:
   /// `sizes`: number of floats in each attribute before the colour.
@@ -143,7 +143,7 @@ class instance_list {
   GLsizei count_ = 0;
 };
 
-/// The last error message of GLFW, which reports errors only by a callback.
+/// The last error message of GLFW, which reports errors only through a callback.
 std::string& last_glfw_error() {
   static std::string text;
   return text;
