@@ -25,7 +25,8 @@ namespace orbis::camera {
 /// - `with(camera, p)`: a camera with the same image size and the parameters `p`, empty if they are invalid (a focal
 /// length that is not positive, a NaN);
 /// - `project(camera, point, by_point, by_parameters)`: like `camera.project(point, by_point)`; also computes the
-///   derivative of the pixel with respect to the parameters (2 x count). Both are unchanged if the result is empty.
+///   derivative of the pixel with respect to the parameters (2 x count). The derivatives are unchanged if there is
+///   no pixel.
 template <class Camera>
 struct parameters_of {};
 
@@ -50,8 +51,8 @@ namespace detail {
   return k;
 }
 
-/// The derivative of a pixel with respect to fx, fy, cx, cy, column by column, for (x, y) on the plane z = 1 after
-/// distortion.
+/// Writes the derivative of a pixel with respect to fx, fy, cx and cy to `j`, column by column. `x`, `y`: the distorted
+/// position on the plane z = 1.
 inline void by_camera_matrix(double x, double y, double* j) {
   j[0] = x, j[1] = 0.0;
   j[2] = 0.0, j[3] = y;

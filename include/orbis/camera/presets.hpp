@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Cameras of common public recordings, identified by names.
+/// Cameras of common public recordings, identified by name.
 #pragma once
 
 #include <array>

@@ -179,7 +179,7 @@ class shutter_correction {
       return value < 65534.5 ? static_cast<std::uint16_t>(value + 0.5) : T{};
   }
 
-  /// Moves each depth to the frame's time, into `nearest_`, and stores inverse depths in `inverse_`.
+  /// Moves each depth to its pixel at the frame's time, in `nearest_`; stores its original inverse in `inverse_`.
   template <class Depth>
   void move_depths(const Depth& depth) {
     const int width = camera_.width(), height = camera_.height();

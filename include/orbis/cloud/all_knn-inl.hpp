@@ -55,8 +55,9 @@ neighbor_table find_all_knn(const Policy& policy, const point_view& points, std:
   return static_cast<float>(sum / divisor);
 }
 
-/// Mean of the roots of the `wanted` smallest of `found`, excluding the smallest (the point itself); `sum` holds the
-/// known part of their sum. Infinity if fewer were found, which happens if their squares overflow.
+/// Mean distance from a point to its `wanted` - 1 nearest others. `found`: squared distances, including that of the
+/// point to itself. `sum`: the approximate sum of their roots, which is used unless it is unknown or its error affects
+/// the rounded mean. Infinity if fewer than `wanted` were found, which happens if squared distances overflow.
 [[nodiscard]] inline float mean_of_nearest(const nearest_sum& sum, std::span<float> found, std::size_t wanted) {
   if (found.size() < wanted) return std::numeric_limits<float>::infinity();
   const auto divisor = static_cast<double>(wanted - 1);

@@ -76,8 +76,9 @@ struct nearest_place {
   [[nodiscard]] bool found() const noexcept { return place != std::numeric_limits<std::uint32_t>::max(); }
 };
 
-/// Finds the point nearest to `q` among those for which `counts(place)` is true. Ties are resolved in favour of the
-/// lowest index, except at `q` itself. `found()` is false if there is no such point. @pre q is finite
+/// Finds the point nearest to `q` among those for which `counts(place)` is true. Of several nearest points, it is the
+/// one with the lowest index; any of them if they coincide with `q`. `found()` is false if there is no such point.
+/// @pre q is finite
 template <class Counts>
 [[nodiscard]] nearest_place find_nearest(const leaf_hierarchy& tree, const knn_kernels& kernels,
                                          const std::array<float, 3>& q, const Counts& counts) {

@@ -26,18 +26,18 @@ struct cluster_options {
   double reach = 3.0;
   /// Components with fewer points count as small. 0: 1/250 of the number of points, at least 30 and at most 200.
   std::size_t min_size = 0;
-  /// Minimum distance of a removed small component from every large one, in multiples of the local spacing: the spacing
-  /// of the large component at its nearest point, or that of the small component if that is larger.
+  /// A small component is kept if it is not farther than this from a large one, in multiples of the local spacing: the
+  /// spacing at the nearest point of the large component, or that in the small component if that is larger.
   double min_gap = 6.0;
   cloud::non_finite non_finite = cloud::non_finite::drop;
 };
 
-/// Result of the cluster filter: inliers, components, and the removed components.
+/// Result of the cluster filter: the inliers, the components, and which of them are removed.
 struct cluster_result {
   static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
 
   std::vector<std::uint32_t> inliers;    ///< indices, ascending
-  std::vector<std::uint32_t> component;  ///< component of each point, or `none`; numbered in the order of first points
+  std::vector<std::uint32_t> component;  ///< component of each point, or `none`; ordered by their first points
   std::vector<std::uint32_t> sizes;      ///< number of points of each component
   std::vector<char> removed;             ///< for each component, nonzero if it is removed
   std::size_t min_size = 0;              ///< the `min_size` that was applied

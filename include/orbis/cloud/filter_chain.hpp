@@ -74,11 +74,11 @@ struct density_step {
   filter_mode mode = filter_mode::log_statistical;  ///< one of the three log-statistical modes
   std::size_t neighbors = 8;                        ///< number of neighbours over which the spacing is averaged; > 0
   log_line usual{};      ///< log spacing of the bulk as a function of log range; slope 0: constant
-  double offset = 0;     ///< offset of the bulk from its surroundings in the local mode
+  double offset = 0;     ///< log spacing of the bulk relative to its surroundings, in the local mode
   double threshold = 0;  ///< outliers: log spacing - usual > threshold
   surface_test surface{};
-  /// Log spacing on surfaces as a function of log range; neighbours that are not much sparser count as a surface.
-  /// Empty: `usual`.
+  /// Usual log spacing on surfaces as a function of log range; neighbours that are not much sparser than this count as
+  /// points on a surface. Empty: `usual`.
   std::optional<log_line> surface_spacing{};
 
   [[nodiscard]] const log_line& surface_line() const noexcept { return surface_spacing ? *surface_spacing : usual; }
@@ -89,7 +89,7 @@ struct density_step {
 struct isolation_step {
   std::size_t neighbors = 8;  ///< number of neighbours over which the spacing is averaged; > 0
   log_line usual{};           ///< log spacing of the bulk as a function of log range; slope 0: constant
-  double offset = 0;          ///< offset of the bulk from its surroundings, log
+  double offset = 0;          ///< log spacing of the bulk relative to its surroundings
   double reach = 2.5;
   std::size_t min_size = 30;
 };

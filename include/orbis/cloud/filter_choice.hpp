@@ -38,7 +38,7 @@ struct density_evidence {
   double surface_end = 0;      ///< beyond this log spacing, most points do not lie on surfaces
   double valley_position = 0;  ///< position of the deepest valley before a later peak
   double valley_ratio = 0;     ///< ratio of the later peak to the valley; 1.6 or more indicates two populations
-  double shoulder = 0;         ///< share of the points between the bulk and the threshold at the valley
+  double shoulder = 0;         ///< share of points in a shoulder: above the bulk, below the valley, off surfaces
   double threshold = 0;        ///< threshold that was chosen
   double removed = 0;          ///< share of the points that the test removes; 0: the test is not part of the chain
 };

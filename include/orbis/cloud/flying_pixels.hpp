@@ -48,7 +48,7 @@ struct flying_pixel_count {
   friend bool operator==(const flying_pixel_count&, const flying_pixel_count&) = default;
 };
 
-/// Buffers that successive calls can share: nothing is allocated after the first call for images of one size. Not
+/// Buffers that successive calls can share: nothing is allocated after the first call for images of the same size. Not
 /// thread-safe.
 class flying_pixel_workspace {
  public:

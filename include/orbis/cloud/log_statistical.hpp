@@ -29,7 +29,7 @@ struct log_statistical_options {
 /// Decision of the filter, and the statistics on which it is based.
 struct log_statistical_result {
   std::vector<std::uint32_t> inliers;  ///< indices, ascending
-  std::vector<float> mean_distance;    ///< per point, metres; NaN for non-finite points and a single point
+  std::vector<float> mean_distance;    ///< per point, metres; NaN for non-finite points and for a single point
   std::size_t judged = 0;              ///< number of points with a positive, finite mean distance
   double median = 0;                   ///< median of the logarithms of the positive, finite mean distances
   double threshold = 0;                ///< points with log(mean distance) - median above this are outliers

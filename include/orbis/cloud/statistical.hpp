@@ -41,7 +41,7 @@ struct statistical_options {
 /// Decision of the filter, and the statistics it is based on.
 struct statistical_result {
   std::vector<std::uint32_t> inliers;  ///< indices, ascending
-  std::vector<float> mean_distance;    ///< per point, metres; NaN for non-finite points and a single point
+  std::vector<float> mean_distance;    ///< per point, metres; NaN for non-finite points and for a single point
   double mean = 0;                     ///< mu of the mean distances, metres
   double standard_deviation = 0;       ///< sigma, with denominator n - 1
   double threshold = 0;                ///< mu + alpha sigma; points above it are outliers

@@ -21,7 +21,7 @@ namespace orbis::cloud {
 
 namespace detail {
 
-/// Depths of the eight pixels around a pixel, 0 outside the image; opposite pixels are at i and 7 - i.
+/// Depths of the eight pixels around a pixel, 0 outside the image; opposite pixels have the indices i and 7 - i.
 template <camera::depth_source Depth>
 [[nodiscard]] std::array<float, 8> depths_around(const Depth& depth, int x, int y) {
   std::array<float, 8> out{};
@@ -54,15 +54,15 @@ template <camera::depth_source Depth>
 
 }  // namespace detail
 
-/// Measurements of views as world points, sampled on a grid over each image, excluding stray pixels. Callers that
-/// iterate over the views before a cloud is filtered can draw the samples in the same pass, see
+/// World points measured in the views, sampled on a grid over each image, excluding stray pixels. Callers that already
+/// iterate over the views before they filter a cloud can draw the samples in the same pass, see
 /// select_options::samples. Memory: 16 bytes per sample, at most `across * across` samples per view.
 class view_samples {
  public:
-  static constexpr std::uint32_t tiles = 4;  ///< number of tiles of each image along either axis
+  static constexpr std::uint32_t tiles = 4;  ///< number of tiles along each axis of an image
 
-  /// Two depths agree if they differ by at most `margin + margin_growth z^2` (see ray_evidence_options). @pre across >
-  /// 0
+  /// Two depths agree if they differ by at most `margin + margin_growth z^2` (see ray_evidence_options).
+  /// @pre across > 0
   explicit view_samples(const ray_evidence_options& evidence = {}, int across = 20)
       : margin_{evidence.margin}, margin_growth_{evidence.margin_growth}, across_{across} {
     assert(across > 0);

@@ -38,7 +38,7 @@ template <execution_policy Policy, std::floating_point S>
 /// Returns one point for each occupied voxel, in the order in which the voxels first occur: the centroid of its points,
 /// with the mean of their colours if `colors` is not empty. The result is the same for every policy. Skips non-finite
 /// points and points more than 2^31 voxels from the origin. O(n). Temporary memory: 25 MB, plus about 20 bytes per
-/// point (25 with colours) unless one thread processes at most 2^17 points.
+/// point (25 with colours) if there are several threads or more than 2^17 points.
 ///
 /// Coordinates are summed in double in the order of the points. If many voxels are occupied, the points are first
 /// partitioned so that the voxels of each part fit into the cache.

@@ -43,7 +43,7 @@ struct brick_place {
 };
 
 /// Finds the voxel of a point with one conversion to fixed point. Returns false if the point is not finite or more than
-/// 2^31 voxels from the origin. `steps_per_metre`: 1024 per voxel.
+/// 2^31 voxels from the origin. `steps_per_metre`: 1024 / voxel edge in metres.
 [[nodiscard]] inline bool locate(const vec3& point, double steps_per_metre, brick_place& out) noexcept {
   std::array<double, 3> scaled;
   for (std::size_t a = 0; a != 3; ++a)
@@ -65,8 +65,8 @@ struct brick_place {
 
 }  // namespace detail
 
-/// Part of a set of measurements, the input of `voxel_sums`, grouped into runs of measurements in the same brick.
-/// Reuses its memory.
+/// A list of measurements to add to or remove from `voxel_sums`, stored as runs of consecutive measurements in the same
+/// brick. Reuses its memory.
 class voxel_measurements {
  public:
   /// `size`: edge of a voxel, metres. @pre size > 0
@@ -158,7 +158,7 @@ class voxel_sums {
     return bytes;
   }
 
-  /// Position of every voxel in the order of `cloud`: sorted by brick, then by voxel, each in the order of z, y and x.
+  /// The order of the voxels in `cloud`: bricks sorted by z, then y, then x; in each brick, its voxels in the same way.
   /// Valid until the next change. O(bricks log bricks).
   class order {
    private:
@@ -193,8 +193,8 @@ class voxel_sums {
     class reader {
      public:
       explicit reader(const choice& of) noexcept : of_{&of} {}
-      /// Returns true if the voxel that contains the point (world frame, metres) was chosen; empty if the voxel is not
-      /// occupied.
+      /// Returns true if the voxel that contains the point (world frame, metres) was chosen, false if not; empty if the
+      /// voxel is not occupied.
       [[nodiscard]] std::optional<bool> find(const vec3& point) {
         detail::brick_place at;
         if (!detail::locate(point, 1024.0 / of_->sums_->size_, at)) return std::nullopt;

@@ -147,7 +147,7 @@ class temporary_file {
 
 namespace orbis {
 
-/// Reads a regular file. Refuses endless files (devices), files that may block (pipes), and files of more than
+/// Reads a regular file. Refuses endless files (devices), files that may block (pipes), and files larger than
 /// `max_bytes`. Errors: not_found, unreadable; malformed (too large).
 [[nodiscard]] inline result<std::string> read_file(const std::filesystem::path& path,
                                                    std::uintmax_t max_bytes = std::numeric_limits<std::size_t>::max()) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Quotation of text from files and arguments in messages, shortened and on one line.
+/// Quotes text from files and arguments for use in messages: shortened, and on one line.
 #pragma once
 
 #include <cstddef>

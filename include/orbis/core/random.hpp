@@ -13,8 +13,8 @@
 namespace orbis {
 
 /// SplitMix64's finaliser: a well-mixed 64-bit hash of `x`. Use `mix64(seed ^ mix64(index))` for counter-based noise,
-/// which needs no state and no evaluation order. Source: Steele, Lea, Flood, "Fast splittable pseudorandom number
-/// generators", OOPSLA 2014.
+/// which needs no state and no fixed order of evaluation. Source: Steele, Lea, Flood, "Fast splittable pseudorandom
+/// number generators", OOPSLA 2014.
 [[nodiscard]] constexpr std::uint64_t mix64(std::uint64_t x) noexcept {
   x += 0x9e3779b97f4a7c15ULL;
   x = (x ^ (x >> 30U)) * 0xbf58476d1ce4e5b9ULL;

@@ -9,8 +9,8 @@
 
 namespace orbis {
 
-/// `a * b`, rounded: never contracted into a fused multiply-add, as compilers otherwise do for sums of products with
-/// `-march=native` and on ARM.
+/// `a * b`, rounded: never contracted into a fused multiply-add, which compilers otherwise use for sums of products
+/// with `-march=native` and on ARM.
 template <std::floating_point S>
 [[nodiscard]] inline S rounded_product(S a, S b) noexcept {
 #if defined(__clang__)

@@ -21,9 +21,9 @@
 ///   double total = orbis::simd::kernel<sum_of_squares, double(std::span<const double>)>()(values);
 /// @endcode
 ///
-/// Declare functions that a kernel calls with vectors ORBIS_ALWAYS_INLINE, and write lambdas in a kernel as `[&](auto&
-/// v) ORBIS_INLINE_LAMBDA {...}`: code that is not inlined is compiled for the baseline. Use the same N for all targets
-/// if the order of sums matters; otherwise use `native_vec<T, Target>`, which fills one register.
+/// If a kernel passes vectors to a function, declare that function ORBIS_ALWAYS_INLINE; write lambdas in a kernel as
+/// `[&](auto& v) ORBIS_INLINE_LAMBDA {...}`. Code that is not inlined is compiled for the baseline. Use the same N for
+/// all targets if the order of sums matters; otherwise use `native_vec<T, Target>`, which fills one register.
 ///
 /// | header | contents |
 /// | --- | --- |

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Cholesky factorisation of the normal equations of a few unknowns, on the stack.
+/// Cholesky factorisation of normal equations with few unknowns, without heap memory.
 #pragma once
 
 #include <cmath>

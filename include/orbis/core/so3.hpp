@@ -157,7 +157,7 @@ class basic_so3 {
   }
 
  private:
-  /// Below this squared angle, the series is exact to rounding.
+  /// Squared angle below which the series is accurate to rounding.
   static constexpr S small = std::same_as<S, float> ? S(1e-4) : S(1e-8);
 
   // Written out because expression templates would slow down the compilation of every file that includes this header.

@@ -27,8 +27,8 @@ struct stamped_pose {
 using trajectory = std::vector<stamped_pose>;
 
 /// Returns the pose at `timestamp` seconds. Between two poses at most `max_gap` seconds apart, interpolates the
-/// position linearly and the rotation along the shortest path. Elsewhere, returns the nearest pose if it is at most
-/// `max_distance` seconds away, or empty. O(log n). @pre `poses` is sorted by time
+/// position linearly and the rotation along the shortest path. Elsewhere, returns the nearest pose, or empty if it
+/// is more than `max_distance` seconds away. O(log n). @pre `poses` is sorted by time
 [[nodiscard]] inline std::optional<se3> interpolate(const trajectory& poses, double timestamp, double max_gap,
                                                     double max_distance) {
   const auto after = std::lower_bound(poses.begin(), poses.end(), timestamp,

@@ -110,7 +110,7 @@ struct alignment {
 ///
 /// Source: R. Hartley, J. Trumpf, Y. Dai, H. Li, "Rotation averaging", IJCV 103, 2013, section 5.2.
 [[nodiscard]] inline result<alignment> align_poses(const std::vector<pose_pair>& pairs) {
-  if (pairs.empty()) return fail(errc::no_data, "pose alignment", "no pose has a reference pose");
+  if (pairs.empty()) return fail(errc::no_data, "pose alignment", "no estimated pose has a reference pose");
   const auto n = static_cast<double>(pairs.size());
   vec3 mean_e = zeros<vec3>(), mean_r = zeros<vec3>();
   mat3 mean_rotation = zeros<mat3>();

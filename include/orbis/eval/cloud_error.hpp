@@ -18,7 +18,7 @@
 
 namespace orbis::eval {
 
-/// A callable that returns the distance (metres, the sign is ignored) from a point to the surface. It is called
+/// A callable that returns the distance (metres; the sign is ignored) from a point to the surface. It is called
 /// concurrently from several threads.
 template <class F>
 concept distance_function = requires(const F& distance, const vec3& point) {

@@ -15,7 +15,7 @@
 
 namespace orbis::eval {
 
-/// Minimum number of poses with equal orientations for treating a trajectory as positions only.
+/// Minimum number of poses, all equally oriented, for treating a trajectory as one without orientations.
 inline constexpr std::size_t min_poses_without_orientation = 5;
 /// Maximum angle between orientations that count as equal, radians.
 inline constexpr double equal_orientations = 1e-9;

@@ -23,7 +23,7 @@
 namespace orbis::eval {
 
 struct rpe_options {
-  std::size_t delta_frames = 1;           ///< interval in paired poses; used if `delta_seconds` is empty
+  std::size_t delta_frames = 1;           ///< interval, number of paired poses; used if `delta_seconds` is empty
   std::optional<double> delta_seconds{};  ///< interval, seconds; motions end at the pose nearest to the interval's end
   double max_time_difference = 0.02;      ///< maximum time difference between paired poses, seconds
 };
@@ -34,9 +34,9 @@ struct relative_pose_error {
 };
 
 /// Compares the motions of `estimate` and `reference` over a delta of frames or seconds. With a delta in seconds,
-/// motions whose duration differs from it by more than a quarter (across a gap) are excluded. Errors: no_data (no
-/// motion to compare), invalid_argument (a delta of 0 or less), degenerate (the reference has positions only, see
-/// `lacks_orientations`; relative motions require orientations). O(n log n).
+/// motions whose duration differs from the delta by more than a quarter, e.g. across a gap in the trajectory, are
+/// excluded. Errors: no_data (no motion to compare), invalid_argument (a delta of 0 or less), degenerate (the reference
+/// has positions only, see `lacks_orientations`; relative motions require orientations). O(n log n).
 /// @pre both trajectories are sorted by time
 [[nodiscard]] inline result<relative_pose_error> rpe(const trajectory& estimate, const trajectory& reference,
                                                      const rpe_options& options = {}) {
@@ -45,8 +45,7 @@ struct relative_pose_error {
     return fail(errc::invalid_argument, where, "the delta must be positive");
   const auto pairs = pair_poses(estimate, reference, options.max_time_difference);
   if (lacks_orientations(pairs))
-    return fail(errc::degenerate, where,
-                "the reference has no orientations: all are equal, but the estimate rotates");
+    return fail(errc::degenerate, where, "the reference has no orientations: all are equal, but the estimate rotates");
 
   const auto end_of_motion = [&](std::size_t i) -> std::optional<std::size_t> {
     if (!options.delta_seconds)

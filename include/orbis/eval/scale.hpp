@@ -21,9 +21,9 @@ struct trajectory_scale {
   std::size_t pairs = 0;   ///< number of pose pairs used
 };
 
-/// The scale of the similarity that best aligns `estimate` with `reference`. Its deviation is estimated by omitting
-/// consecutive tenths of the poses (jackknife), because the errors of successive poses are correlated. For a depth
-/// camera whose depth is `stored / depth_scale`, the true depth scale is `depth_scale / scale`. Errors: those of
+/// The scale of the similarity that best aligns `estimate` with `reference`. Its standard deviation is estimated by
+/// omitting each tenth of the poses in turn (jackknife), because the errors of successive poses are correlated. For a
+/// depth camera whose depth is `stored / depth_scale`, the true depth scale is `depth_scale / scale`. Errors: those of
 /// `align`. O(n log n). Source: B. Efron, "The jackknife, the bootstrap and other resampling plans", SIAM 1982.
 /// @pre both trajectories are sorted by time
 [[nodiscard]] inline result<trajectory_scale> estimate_scale(const trajectory& estimate, const trajectory& reference,

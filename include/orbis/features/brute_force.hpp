@@ -29,7 +29,7 @@ struct brute_force_source {
     detail::hamming_workspace search;
   };
 
-  /// Returns one candidate per query; none if there are no train descriptors. O(queries x trains).
+  /// Finds one candidate per query; none if there are no train descriptors. O(queries x trains).
   template <class Descriptor>
   requires descriptor_distance<Distance, Descriptor>
   void search(std::vector<candidate>& candidates, workspace& memory, const feature_view<Descriptor>& queries,

@@ -15,8 +15,8 @@
 namespace orbis::features {
 
 /// Standard deviation of a measured depth: `constant + quadratic * z^2`, metres. The defaults suit a Kinect and are
-/// close to Nguyen, Izadi, Lovell, "Modeling Kinect sensor noise for improved 3D reconstruction and tracking", 3DIMPVT
-/// 2012.
+/// close to those of Nguyen, Izadi, Lovell, "Modeling Kinect sensor noise for improved 3D reconstruction and tracking",
+/// 3DIMPVT 2012.
 struct depth_noise {
   double constant = 0.0012;
   double quadratic = 0.0019;
@@ -29,7 +29,7 @@ struct keypoint_depth_options {
   int min_valid = 3;            ///< minimum number of pixels with depth in the window
   float edge_sigmas = 4.0F;     ///< minimum size of a depth edge, in standard deviations of the depth
   float edge_relative = 0.02F;  ///< minimum size of a depth edge, as a fraction of the depth
-  float min_share = 0.7F;       ///< minimum fraction of the valid pixels in the largest group without an edge; > 0.5
+  float min_share = 0.7F;       ///< minimum share of the valid pixels that have no depth edge between them; > 0.5
   double position_sigma = 0.5;  ///< sigma of the keypoint position, pixels; adds to the depth deviation on slopes
   depth_noise noise{};
 };

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Keypoints, descriptors, and their combination.
+/// Keypoints, descriptors, and features, which combine both.
 #pragma once
 
 #include <array>

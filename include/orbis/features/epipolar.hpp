@@ -61,7 +61,7 @@ struct epipolar_source {
     static_assert(epipolar_geometry<Other>, "orbis: epipolar(...) requires an epipolar_geometry, such as ray_geometry");
   }
 
-  /// Returns one candidate for each query with a train keypoint close to its line. Computes O(queries x trains)
+  /// Finds one candidate for each query with a train keypoint close to its line. Computes O(queries x trains)
   /// distances to lines.
   /// @pre one keypoint for each descriptor on both sides
   template <class Descriptor, epipolar_geometry Geometry>

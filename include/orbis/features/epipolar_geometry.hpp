@@ -36,7 +36,7 @@ concept epipolar_geometry = requires(const G& geometry, std::size_t i, const key
   { geometry.epipole() } -> std::same_as<std::optional<vec2f>>;
 };
 
-/// The line of a homogeneous vector, empty if it is degenerate.
+/// Converts a homogeneous vector to a line; empty if it is degenerate.
 [[nodiscard]] inline std::optional<epipolar_line> to_line(const vec3& l) noexcept {
   const double norm = std::hypot(l.x(), l.y());
   if (!(norm > 0.0) || !std::isfinite(norm) || !std::isfinite(l.z())) return std::nullopt;
@@ -44,15 +44,15 @@ concept epipolar_geometry = requires(const G& geometry, std::size_t i, const key
                        static_cast<float>(l.z() / norm)};
 }
 
-/// The pixel of a homogeneous vector, empty if it is at infinity.
+/// Converts a homogeneous vector to a pixel; empty if it is at infinity.
 [[nodiscard]] inline std::optional<vec2f> to_pixel(const vec3& p) noexcept {
   if (!(std::abs(p.z()) > 1e-12 * norm(p))) return std::nullopt;
   return vec2f{static_cast<float>(p.x() / p.z()), static_cast<float>(p.y() / p.z())};
 }
 
-/// Epipolar geometry of two images from any central camera, based on the rays through their keypoints: lines and points
-/// are in the plane z = 1 of the train camera, in pixels of a pinhole camera with the given focal length. Refers to the
-/// rays, which must outlive it; a ray that is NaN, or does not point forward, has no match.
+/// Epipolar geometry of two images from any central cameras, based on the rays through their keypoints. Lines and
+/// points are in the plane z = 1 of the train camera, in pixels of a pinhole camera with the given focal length. Refers
+/// to the rays, which must outlive it; a ray that is NaN, or does not point forward, has no match.
 class ray_geometry {
  public:
   /// @pre one ray per keypoint on each side; focal > 0 (pixels)

@@ -100,8 +100,8 @@ struct workspace_of_part<Part> {
 template <class Part>
 using workspace_of = typename detail::workspace_of_part<Part>::type;
 
-/// The first part of a matcher. Its function `search(candidates, workspace, queries, trains, needs, where...)` returns
-/// the candidates in ascending order of query, at most one per query.
+/// The first part of a matcher. Its function `search(candidates, workspace, queries, trains, needs, where...)`
+/// replaces `candidates` with at most one candidate per query, in ascending order of query.
 template <class S>
 concept match_source = requires {
   typename S::match_source_tag;

@@ -36,7 +36,7 @@ struct orb_options {
   int levels = 8;             ///< number of pyramid levels; levels too small for a patch are omitted
   float scale_factor = 1.2F;  ///< ratio of the image sizes of successive levels, > 1
   int threshold = 14;         ///< minimum brightness difference of a corner (in the slightly smoothed image)
-  int min_threshold = 3;      ///< threshold in cells without a corner at `threshold`; if equal, no corner is weaker
+  int min_threshold = 3;      ///< threshold in cells where `threshold` finds no corner; at most `threshold`
 };
 
 /// Finds keypoints on the levels of an image pyramid and describes them. Detection, selection, orientation and

@@ -38,7 +38,7 @@ struct projection_rule {
   float range_tolerance = 0.2F;   ///< fraction by which the distance may exceed the point's range at either end
   int levels = 8;                 ///< number of levels of the extractor's pyramid
   float scale_factor = 1.2F;      ///< ratio of the image sizes of successive levels
-  int finer = 1, coarser = 1;     ///< levels to search around the predicted one
+  int finer = 1, coarser = 1;     ///< number of levels to search on either side of the predicted one
 };
 
 /// The predicted pyramid level of a point that appears at the finest level at `max_distance`: log(max_distance /
@@ -114,7 +114,7 @@ struct projected_source {
     typename windowed_source<Distance>::workspace search;
   };
 
-  /// Returns one candidate for each query with a train keypoint in its window.
+  /// Finds one candidate for each query with a train keypoint in its window.
   /// @pre one point per query; one keypoint per train descriptor; `grid` was built from these keypoints
   template <class Descriptor, class Points, class Project>
   requires descriptor_distance<Distance, Descriptor> && projects<Project, Points>
@@ -125,7 +125,7 @@ struct projected_source {
     windowed(distance).search(candidates, memory.search, queries, trains, needs, memory.windows, grid);
   }
 
-  /// Returns one candidate for each query with a train keypoint in its window; builds the grid in its workspace.
+  /// Finds one candidate for each query with a train keypoint in its window; builds the grid in its workspace.
   template <class Descriptor, class Points, class Project>
   requires descriptor_distance<Distance, Descriptor> && projects<Project, Points>
   void search(std::vector<candidate>& candidates, workspace& memory, const feature_view<Descriptor>& queries,

@@ -36,7 +36,7 @@ namespace detail {
 struct pixel_rows {
   const std::uint8_t* first = nullptr;
   std::ptrdiff_t stride = 0;  ///< distance between rows
-  int readable = 0;           ///< number of readable pixels per row, including those after the requested ones
+  int readable = 0;           ///< number of readable pixels per row; may be more than are needed
 };
 
 /// A square of `side` x `side` pixels, and the strip of the same height along which it slides.

@@ -46,7 +46,7 @@ struct windowed_source {
     keypoint_grid grid;
   };
 
-  /// Returns one candidate for each query with a train keypoint in its window.
+  /// Finds one candidate for each query with a train keypoint in its window.
   /// @pre one window per query; one keypoint per train descriptor; `grid` was built from these keypoints
   template <class Descriptor>
   requires descriptor_distance<Distance, Descriptor>
@@ -61,7 +61,7 @@ struct windowed_source {
     });
   }
 
-  /// Returns one candidate for each query with a train keypoint in its window; builds the grid in its workspace.
+  /// Finds one candidate for each query with a train keypoint in its window; builds the grid in its workspace.
   template <class Descriptor>
   requires descriptor_distance<Distance, Descriptor>
   void search(std::vector<candidate>& candidates, workspace& memory, const feature_view<Descriptor>& queries,

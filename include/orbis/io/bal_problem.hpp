@@ -3,8 +3,8 @@
 /// Bundle adjustment problems in the form of "Bundle Adjustment in the Large".
 ///
 /// A camera consists of an angle-axis rotation R, a translation t, a focal length f and two coefficients of radial
-/// distortion k1, k2. It projects X to -f (1 + k1 r^2 + k2 r^4) d with p = R X + t, d = (p.x, p.y) / p.z and r = |d|:
-/// it looks along its negative z axis; the origin of pixel coordinates is the centre of the image, with y upwards.
+/// distortion k1, k2. It projects X to -f (1 + k1 r^2 + k2 r^4) d with p = R X + t, d = (p.x, p.y) / p.z and r = |d|.
+/// The camera looks along its negative z axis; pixel coordinates are relative to the centre of the image, y upwards.
 ///
 /// Source: S. Agarwal, N. Snavely, S. M. Seitz, R. Szeliski, "Bundle adjustment in the large", ECCV 2010,
 /// and https://grail.cs.washington.edu/projects/bal.
@@ -35,8 +35,8 @@ struct bal_problem {
   std::vector<bal_observation> observations;   ///< in the file's order
 };
 
-/// Projection of a point by a camera of this format; empty for a point in the plane z = 0 of the camera, and if the
-/// result is not finite. Points behind the camera are projected too, as in the residuals of the paper.
+/// Projects a point by a camera of this format; empty if the point lies in the camera's plane z = 0, or if the result
+/// is not finite. Points behind the camera are projected too, as in the residuals of the paper.
 [[nodiscard]] inline std::optional<vec2> project_bal(std::span<const double, 9> camera, const vec3& point) {
   const vec3 p = so3::exp(vec3(camera[0], camera[1], camera[2])) * point + vec3(camera[3], camera[4], camera[5]);
   const vec2 d = head<2>(p) / p.z();

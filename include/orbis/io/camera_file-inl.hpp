@@ -187,7 +187,7 @@ ORBIS_INLINE result<void> write_camera(const std::filesystem::path& path, const 
       const auto& d = model.distortion();
       for (const double value : {d.k1, d.k2, d.k3, d.k4}) add(value);
     } else {
-      static_assert(std::is_same_v<Model, camera::pinhole>, "no code to write the distortion of this camera model");
+      static_assert(std::is_same_v<Model, camera::pinhole>, "cannot write the distortion of this camera model");
     }
   });
   return write_file_atomically(path, [&](std::ostream& out) {

@@ -38,8 +38,8 @@ namespace orbis::io {
 /// Reads a camera file; see `parse_camera`. Errors: not_found, unreadable, malformed, unsupported.
 [[nodiscard]] result<camera::camera_settings> read_camera(const std::filesystem::path& path);
 
-/// Writes a camera file atomically, such that reading the file returns exactly the same settings (shutter times up to
-/// rounding). Errors: write_failed.
+/// Writes a camera file atomically. Reading the file returns exactly the same settings (shutter times up to rounding).
+/// Errors: write_failed.
 result<void> write_camera(const std::filesystem::path& path, const camera::camera_settings& settings);
 
 }  // namespace orbis::io

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A point cloud with all other values that its file stores for each point: intensity, normals, time, labels.
+/// A point cloud together with the other values that its file stores for each point: intensity, normals, time, labels.
 #pragma once
 
 #include <algorithm>
@@ -35,7 +35,7 @@ struct cloud_with_fields {
 
 namespace detail {
 
-/// The texts, separated by commas; if there are many, only the first ones and the number of omitted ones.
+/// Joins the texts with commas; of more than 12 texts, lists the first 12 and the number of the others.
 [[nodiscard]] inline std::string joined(const std::vector<std::string>& texts) {
   constexpr std::size_t most = 12;
   std::string all;

@@ -25,7 +25,7 @@ enum class cloud_format { ply, pcd };
 /// coordinate origin. Errors: not_found, unreadable, malformed, unsupported (neither PLY nor PCD).
 [[nodiscard]] result<point_cloud> read_cloud(const std::filesystem::path& path, const vec3& origin = zeros<vec3>());
 
-/// Reads a cloud like `read_cloud`, with all other values that the file stores for each point. Errors: those of
+/// Reads a cloud like `read_cloud`, and keeps all other values that the file stores for each point. Errors: those of
 /// `read_cloud`.
 [[nodiscard]] result<cloud_with_fields> read_cloud_with_fields(const std::filesystem::path& path,
                                                                const vec3& origin = zeros<vec3>());

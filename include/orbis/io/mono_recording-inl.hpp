@@ -73,8 +73,8 @@ ORBIS_INLINE result<mono_recording> open_mono_recording(const std::filesystem::p
     }
     return fail(detail::unknown_recording(
         folder,
-        "rgb.txt (TUM), image_0 or image_2 with calib.txt (KITTI), mav0/cam0 (ASL, EuRoC), PNG or JPEG images in it or "
-        "in rgb, color, images, left or data"));
+        "rgb.txt (TUM), image_0 or image_2 with calib.txt (KITTI), mav0/cam0 (ASL, EuRoC), PNG or JPEG images in the "
+        "folder or in rgb, color, images, left or data"));
   };
   auto index = read_index();
   if (!index) return fail(index.error());

@@ -29,9 +29,9 @@
 namespace orbis::io {
 
 /// The supported layouts of recordings of one camera. `automatic`: the layout is detected. `tum`: a list `rgb.txt` (or
-/// `left.txt`). `kitti`: `image_0` (or 2, 1, 3) with `calib.txt` and `times.txt`. `asl`: `mav0/cam0`, or a single
-/// camera's folder. `rgbd`: the colour images of recordings that `open_recording` reads. `images`: a plain folder of
-/// images.
+/// `left.txt`). `kitti`: a folder `image_0` ... `image_3` with `calib.txt` and `times.txt`. `asl`: `mav0/cam0`, or a
+/// single camera's folder. `rgbd`: the colour images of recordings that `open_recording` reads. `images`: a plain
+/// folder of images.
 enum class mono_format { automatic, tum, kitti, asl, rgbd, images };
 
 /// The name of a format: "tum", "kitti", "asl", "rgbd", "images", "auto".

@@ -26,8 +26,9 @@ namespace orbis::io {
 [[nodiscard]] result<point_cloud> parse_pcd(std::string_view bytes, const std::string& where = {},
                                             const vec3& origin = zeros<vec3>());
 
-/// Parses a PCD file like `parse_pcd`, with all other fields and the viewpoint. Notes report a viewpoint other than the
-/// identity, omitted data, and colours whose range differs from that of their type. Errors: those of `parse_pcd`.
+/// Parses a PCD file like `parse_pcd`, and keeps all other fields and the viewpoint. Notes report a viewpoint other
+/// than the identity, omitted data, and colours whose range differs from that of their type. Errors: those of
+/// `parse_pcd`.
 [[nodiscard]] result<cloud_with_fields> parse_pcd_with_fields(std::string_view bytes, const std::string& where = {},
                                                               const vec3& origin = zeros<vec3>());
 

@@ -35,15 +35,15 @@ struct ply_options {
 
 /// Parses the vertices of a PLY file in memory: `x y z` of any type and, if present, colours: `red green blue`,
 /// `r g b`, `diffuse_red diffuse_green diffuse_blue`, or packed `rgb` or `rgba`. 8-bit channels are unchanged. The
-/// range of floating-point channels is 0 to 1 if no value is greater, otherwise 0 to 255; that of wider integers is 0
-/// to 255 if no value is greater, otherwise 0 to 65535. Ignores everything else. `origin` is subtracted from the
-/// coordinates before they are converted to float, whose resolution is half a metre at 5000 km. Errors: malformed
-/// (damaged, truncated), unsupported (no vertices with x, y and z).
+/// range of floating-point channels is 0 to 1 if no value exceeds 2. Otherwise it is, like that of wider integers, the
+/// first of 0 to 255, 0 to 4095 and 0 to 65535 that contains all values. Ignores everything else. `origin` is
+/// subtracted from the coordinates before they are converted to float, whose resolution is half a metre at 5000 km.
+/// Errors: malformed (damaged, truncated), unsupported (no vertices with x, y and z).
 [[nodiscard]] result<point_cloud> parse_ply(std::string_view bytes, const std::string& where = {},
                                             const vec3& origin = zeros<vec3>());
 
-/// Parses a PLY file like `parse_ply`, with all other properties of the vertices except lists. Notes report omitted
-/// data, and colours whose range differs from that of their type. Errors: those of `parse_ply`.
+/// Parses a PLY file like `parse_ply`, and keeps all other properties of the vertices except lists. Notes report
+/// omitted data, and colours whose range differs from that of their type. Errors: those of `parse_ply`.
 [[nodiscard]] result<cloud_with_fields> parse_ply_with_fields(std::string_view bytes, const std::string& where = {},
                                                               const vec3& origin = zeros<vec3>());
 
@@ -57,7 +57,7 @@ struct ply_vertex {
   rgb8 color{};
 };
 
-/// Points of any type as vertices: `read(of, begin, out)` writes the vertices starting at index `begin` to `out`.
+/// A type-erased source of vertices: `read(of, begin, out)` fills `out` with the vertices from index `begin` on.
 struct ply_vertices {
   const void* of = nullptr;
   void (*read)(const void* of, std::size_t begin, std::span<ply_vertex> out) = nullptr;

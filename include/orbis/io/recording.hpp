@@ -118,7 +118,7 @@ class recording {
     return iterator(*this);
   }
   [[nodiscard]] std::default_sentinel_t end() const noexcept { return {}; }
-  /// The error if the last iteration ended before the last frame.
+  /// The error that ended the last iteration before the last frame, if any.
   [[nodiscard]] const result<void>& status() const noexcept { return status_; }
 
  private:
@@ -139,8 +139,8 @@ class recording {
 
 namespace detail {
 
-/// The index of the recording in `folder`; sets a `format` of `automatic` to the detected one. `fps`: frame rate of
-/// images without time stamps. Errors: those of `open_recording`.
+/// The index of the recording in `folder`. If `format` is `automatic`, sets it to the detected format. `fps`: frame
+/// rate of images without time stamps. Errors: those of `open_recording`.
 [[nodiscard]] result<recording_index> index_recording(const std::filesystem::path& folder, recording_format& format,
                                                       double max_time_difference, double fps);
 

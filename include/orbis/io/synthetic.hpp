@@ -37,7 +37,7 @@ namespace detail::synthetic {
 class scene;
 struct recorded_room;
 
-/// A parallel policy with the same number of threads. The rendered images do not depend on the policy.
+/// A parallel policy with the number of threads of `policy`. The rendered images do not depend on the policy.
 template <execution_policy Policy>
 [[nodiscard]] parallel_policy as_parallel(const Policy& policy) {
   if constexpr (std::is_same_v<Policy, parallel_policy>)

@@ -20,7 +20,7 @@ struct synthetic_scene_options {
   double texture_density = 1.0;  ///< scales the number of patches painted on every surface; 0: none
   bool person = false;           ///< adds a person who walks around the room, opposite to the camera, at 1 m/s
   double wall_period = 0.0;      ///< if above 0, all walls show the same picture, repeated with this period, metres
-  double light = 1.0;            ///< relative illumination: the exposure time is the sensor's `exposure` divided by it
+  double light = 1.0;            ///< relative illumination; exposure time: `exposure` / `light`, at most `max_exposure`
 };
 
 /// The gait of a legged robot with the camera on its body: its motion is added to the path, in proportion to the speed
@@ -67,7 +67,7 @@ struct synthetic_sensor_options {
 
   double axial_noise = 1.0;       ///< factor applied to the published standard deviation
   double lateral_noise = 0.5;     ///< standard deviation in pixels of the position of a ray near a depth edge
-  double flying_pixels = 0.15;    ///< fraction of pixels on a depth edge whose depth is between its two sides
+  double flying_pixels = 0.15;    ///< fraction of pixels on a depth edge with a depth between those of its sides
   double disparity_step = 0.125;  ///< resolution of the disparity, pixels of the infrared camera
   double infrared_focal = 580.0;  ///< focal length of the infrared camera, pixels: disparity = focal * baseline / depth
   double baseline = 0.075;        ///< distance from projector to camera, metres

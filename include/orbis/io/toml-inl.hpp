@@ -40,7 +40,8 @@ namespace detail {
   return true;
 }
 
-/// Returns true if `text`, the rest of a value after a date, is valid: a time, or the end of the value.
+/// Returns false if `text`, which follows a date, begins with a "T" that no time follows, or with a blank that neither
+/// a time nor the end of the value follows.
 [[nodiscard]] constexpr bool may_follow_date(std::string_view text) noexcept {
   if (text.empty() || std::string_view{"Tt "}.find(text[0]) == std::string_view::npos) return true;
   const char next = text.size() > 1 ? text[1] : '\n';

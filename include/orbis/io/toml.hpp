@@ -19,9 +19,9 @@ namespace orbis::io {
 inline constexpr std::size_t max_toml_bytes = 16384;
 
 /// Parses `text` as a table. `where` names the source in errors. Errors: malformed, with the line number if known (not
-/// TOML; more than `max_toml_bytes`; a list of lists over several lines, whose lines could be table headers).
-/// Limitations, because of defects in toml++: two forms of valid TOML are rejected: keys with quotes after a dot in
-/// inline tables (`x = {a."b" = 1}`), and bare keys that contain a date followed by "T" or a blank, but no time
+/// TOML; more than `max_toml_bytes`; a list of lists over several lines that look like table headers).
+/// Because of defects in toml++, two forms of valid TOML are rejected, too: keys with quotes after a dot in inline
+/// tables (`x = {a."b" = 1}`), and bare keys that contain a date followed by "T" or a blank, but no time
 /// (`2024-01-01Tx = 1`, `2024-01-01 = 1`).
 [[nodiscard]] result<toml::table> parse_toml(std::string_view text, const std::filesystem::path& where = {});
 

@@ -25,15 +25,15 @@ namespace orbis::io {
 /// Parses a trajectory; its first lines determine the layout: EuRoC (the header lists the quaternion with w first, or
 /// lists no quaternion while fields are separated by commas and times have 19 digits), KITTI (12 numbers) or TUM.
 /// Fields are separated by blanks, commas or semicolons. Accepts `#` comments and a line of column names before the
-/// poses; if it contains time, position and quaternion, other columns may precede them. The first time stamp determines
-/// the unit of time: nanoseconds if the header specifies them and the time stamp is a whole number, otherwise by its
-/// number of digits (13: milliseconds, 16: microseconds, 19: nanoseconds, otherwise seconds). Poses with NaN, infinity,
-/// or a zero quaternion or rotation count as lost. Of poses with equal times, the first one is kept; if a later run in
-/// the file has other poses during the time of the first run, only the first run is kept. Notes report all of this.
-/// Errors: malformed, with the line number (too few numbers, a quaternion that is too large or almost zero);
-/// unsupported (a header that lists the quaternion before the position, or in another order); degenerate (a quarter of
-/// the poses have the time of another pose and differ from it; with several runs, a quarter of the poses of the first
-/// run or more than half of all poses). O(n log n).
+/// poses; if it contains time, position and quaternion, other columns may precede them. The unit of time is
+/// nanoseconds if the header specifies them and the first time stamp is a whole number; otherwise the number of digits
+/// of the first time stamp determines it (13: milliseconds, 16: microseconds, 19: nanoseconds, else seconds). Poses
+/// with NaN, infinity, or a zero quaternion or rotation count as lost. Of poses with equal times, the first one is
+/// kept; if a later run in the file has other poses during the time of the first run, only the first run is kept. Notes
+/// report all of this. Errors: malformed, with the line number (too few numbers, a quaternion that is too large or
+/// almost zero); unsupported (a header that lists the quaternion before the position, or in another order); degenerate
+/// (at least a quarter of the poses have the time of another pose and differ from it; with several runs, at least a
+/// quarter of the poses of the first run or more than half of all poses). O(n log n).
 [[nodiscard]] result<trajectory_reading> parse_trajectory_file(std::string_view text,
                                                                const std::filesystem::path& where = {});
 
@@ -41,7 +41,7 @@ namespace orbis::io {
 /// degenerate.
 [[nodiscard]] result<trajectory_reading> read_trajectory_file(const std::filesystem::path& path);
 
-/// Sets the times of a trajectory in KITTI's layout from a file with one time per line, ascending. Errors: not_found,
+/// Sets the times of a trajectory in KITTI's layout from a file with ascending times, one per line. Errors: not_found,
 /// unreadable, malformed (an invalid line, with its number, or different numbers of times and poses).
 [[nodiscard]] result<void> set_times(trajectory_reading& read, const std::filesystem::path& times);
 
@@ -49,8 +49,8 @@ namespace orbis::io {
 /// `describe_units`.
 [[nodiscard]] std::string describe_spans(const trajectory& a, const trajectory& b);
 
-/// An explanation for two trajectories whose time spans agree only if the times of one have another unit: "the times of
-/// the first seem to be in milliseconds". Empty for all other trajectories.
+/// An explanation for two trajectories whose time spans agree only if the times of one are in another unit: "the times
+/// of the first seem to be in milliseconds". Empty for all other trajectories.
 [[nodiscard]] std::string describe_units(const trajectory& a, const trajectory& b);
 
 /// Writes a trajectory file atomically: 9 decimals for the time, 9 significant digits for the rest. Errors:

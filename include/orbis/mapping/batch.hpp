@@ -109,10 +109,11 @@ class static_depth {
   image<mapping::depth_pixel<Depth>> copy_;
 };
 
-/// The steps of `build_map`. `into.wants(k, whole)` returns true if `into` lacks this keyframe's depth image; `whole`
-/// is false if moved objects were removed from the image. `into.scan(k, depth)` takes one depth image before the cloud
-/// is filtered; `into.unfiltered()` returns the map of these images. `into.filtered(cloud, kept, depths, ms, progress)`
-/// returns the map after filtering: `depths(use)` calls `use(k, depth)` with the remaining pixels of each depth image.
+/// The steps of `build_map`. `into.wants(k, whole)` returns true if `into` needs this keyframe's depth image; `whole`
+/// is false if moved objects were removed from the image. `into.scan(k, depth)` integrates one depth image before the
+/// cloud is filtered; `into.unfiltered()` returns the map of these images. `into.filtered(cloud, kept, depths, ms,
+/// progress)` returns the map after filtering: `depths(use)` calls `use(k, depth)` with the remaining pixels of each
+/// depth image.
 template <class Octree, execution_policy Policy, keyframe_range Keyframes, camera::camera_model Camera, class Into>
 [[nodiscard]] result<built_map<Octree>> build_map_into(const Policy& policy, const Keyframes& keyframes,
                                                        const Camera& camera, const map_options& options,
@@ -311,7 +312,7 @@ struct fresh_octrees {
   }
 };
 
-/// Updates a live map, which contains most of the keyframes already.
+/// Updates a live map that already contains most of the keyframes.
 template <class Live, class Policy>
 struct live_octree {
   const Policy& policy;
@@ -373,8 +374,8 @@ struct live_octree {
 
 /// Removes moved objects from the depth images, if requested, adds the keyframes to a cloud, filters it, and integrates
 /// each keyframe's depth image, with rays from the keyframe's pose and without the pixels whose points the filter
-/// removed (`dense_cloud::masked_depth`). Filtering the whole cloud compares points of different keyframes; the
-/// automatic filter also uses the points that rays of the keyframes' depth images pass through. The octrees are
+/// removed (`dense_cloud::masked_depth`). The filter compares points of different keyframes; the automatic filter
+/// also takes into account through which points the rays of the keyframes' depth images pass. The octrees are
 /// bit-identical to those that a `live_map` builds from the same depth images and poses.
 ///
 /// The range is traversed twice and, depending on the filter, up to three times more. At most
@@ -396,16 +397,16 @@ requires depth_map<Octree, Camera>
 }
 
 /// As above, but updates a live map that was built while these keyframes were recorded: moves its keyframes to their
-/// current poses, adds missing ones, hides others, and then applies the result of the filter. The octrees are
-/// bit-identical to those of the function above. Each keyframe has a member `frame`, its index in the live map; the
-/// range is in ascending order of `frame`. The times in the result are those for passing images to the map, excluding
-/// replay; after filtering, they are the mean over all keyframes. `options.resolution` and `options.integration` are
-/// those of the live map, and the unfiltered octree is always built. Additional errors: `invalid_argument` if the frame
-/// numbers are not ascending; those of the live map, except a failure to write images to their file, because these
-/// images stay in memory. After an error the live map may contain some of the new images and poses already; calling the
-/// function again corrects it. @pre the images in the live map are those that `keyframe_points::masked` returns with
-/// `point_options(options.dense)`, except for keyframes for which `live_map::is_filtered` returns true: these are added
-/// again
+/// current poses, adds missing ones, hides those that are not in the range or have no finite pose, and then applies the
+/// result of the filter. The octrees are bit-identical to those of the function above. Each keyframe has a member
+/// `frame`, its index in the live map; the range is in ascending order of `frame`. The insertion times in the result
+/// are those for passing images to the map, excluding replay; after filtering, each is the mean over all keyframes.
+/// `options.resolution` and `options.integration` are those of the live map, and the unfiltered octree is always built.
+/// Additional errors: `invalid_argument` if the frame numbers are not ascending; those of the live map, except a
+/// failure to write images to their file, because these images stay in memory. After an error the live map may contain
+/// some of the new images and poses already; calling the function again corrects it. @pre the images in the live map
+/// are those that `keyframe_points::masked` returns with `point_options(options.dense)`, except for keyframes for which
+/// `live_map::is_filtered` returns true: these are added again
 template <execution_policy Policy, keyframe_range Keyframes, octree::replayable_octree Octree,
           camera::camera_model Camera, depth_history Depths>
 requires requires(const std::ranges::range_value_t<Keyframes>& k) {

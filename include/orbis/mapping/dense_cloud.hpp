@@ -34,11 +34,11 @@ struct dense_options {
   float min_depth = 0.0F;   ///< metres along the optical axis
   float max_depth = 4.0F;   ///< metres along the optical axis
   double voxel_size = 0.0;  ///< metres; points in a voxel are replaced by their centroid. 0: every point is kept
-  /// Removal of pixels between two surfaces before they become points; empty: no removal.
+  /// Removal of flying pixels, whose depth lies between two surfaces, before they become points; empty: no removal.
   std::optional<cloud::flying_pixel_options> flying_pixels{};
 };
 
-/// Selection of the pixels that become points of the cloud.
+/// Returns the options that select the pixels that become points of the cloud.
 [[nodiscard]] inline keyframe_point_options point_options(const dense_options& options) {
   return {options.stride, options.min_depth, options.max_depth, options.flying_pixels};
 }
@@ -149,9 +149,10 @@ class dense_cloud {
     for (const frame& f : frames_) out.insert(out.end(), f.ranges.begin(), f.ranges.end());
     return out;
   }
-  /// Finalises the cloud and frees the memory that changes, `cloud` and `ranges` need. Call it after their last use; no
-  /// keyframe may be added, removed or moved afterwards. With a voxel size, a few bytes for each voxel remain, for
-  /// `select`, `masked_depth` and `measurements`; without one, nothing is freed. O(bricks).
+  /// Finalises the cloud and frees the memory that only `cloud`, `ranges` and changes of the keyframes use. Call it
+  /// after the last call to `cloud` and `ranges`; no keyframe may be added, removed or moved afterwards. With a voxel
+  /// size, a few bytes for each voxel remain, for `select`, `masked_depth` and `measurements`; without one, nothing is
+  /// freed. O(bricks).
   void finish() {
     finished_ = true;
     voxels_.finish();
@@ -209,9 +210,9 @@ class dense_cloud {
   /// The whole depth image of keyframe `number` (every pixel, regardless of the stride; the stored values, see
   /// `view_like`) with 0 in the pixels that the cloud excludes: those with a depth out of range, flying pixels if they
   /// are removed, and pixels that belong to a point that is not in `kept`. A pixel that the stride skips belongs to the
-  /// point in its voxel. Without one, it belongs to the point of its block of stride x stride pixels if the depths of
-  /// the two pixels agree within 3 cm and 2 % per pixel between them. A pixel that belongs to no point is excluded.
-  /// O(pixels).
+  /// point in its voxel. Without voxels, it belongs to the point of its block of stride x stride pixels if the depths
+  /// of the two pixels differ by at most 3 cm plus 2 % for each pixel of distance between them. A pixel that belongs to
+  /// no point is excluded. O(pixels).
   /// @pre same as for `measurements`
   template <execution_policy Policy, keyframe_like Keyframe>
   [[nodiscard]] auto masked_depth(const Policy& policy, const Keyframe& k, std::size_t number,

@@ -134,8 +134,8 @@ template <execution_policy Policy, point_range Points, class Automatic, class By
       report.mode = {options.cluster};
       report.reason = "requested; " +
                       std::to_string(std::count(result.removed.begin(), result.removed.end(), char{1})) + " of " +
-                      std::to_string(result.sizes.size()) + " components are smaller than " +
-                      std::to_string(result.min_size) + " points and far from the others";
+                      std::to_string(result.sizes.size()) + " components have fewer than " +
+                      std::to_string(result.min_size) + " points and are far from the others";
       break;
     }
     case filter_kind::ray_evidence:
@@ -151,7 +151,7 @@ template <execution_policy Policy, point_range Points, class Automatic, class By
 
 }  // namespace detail
 
-/// Runs the filter. `ranges`: for each point the distance from which it was observed, metres, or empty. O(n log n).
+/// Runs the filter. `ranges`: the distance from which each point was observed, metres; may be empty. O(n log n).
 template <execution_policy Policy, point_range Points>
 [[nodiscard]] filtered_indices filter_points(const Policy& policy, const Points& points, std::span<const float> ranges,
                                              const filter_options& options = {}) {

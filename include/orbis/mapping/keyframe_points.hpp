@@ -27,7 +27,7 @@ struct keyframe_point_options {
   int stride = 1;          ///< every stride-th pixel of every stride-th row; > 0
   float min_depth = 0.0F;  ///< metres along the optical axis
   float max_depth = 4.0F;  ///< metres along the optical axis
-  /// Removal of pixels between two surfaces; empty: no removal.
+  /// Removal of flying pixels, whose depths lie between those of two surfaces; empty: no removal.
   std::optional<cloud::flying_pixel_options> flying_pixels{};
 };
 

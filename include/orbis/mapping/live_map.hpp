@@ -85,7 +85,7 @@ enum class completeness { complete, filtered };
 
 /// Limits of one call to live_map::correct.
 struct correction_limits {
-  /// Time limit; work on the current keyframe, or on the current few dozen bricks, is finished first.
+  /// Time limit; the keyframe or the batch of a few dozen bricks in progress is finished first.
   std::chrono::nanoseconds time = std::chrono::nanoseconds::max();
   std::optional<vec3> robot{};  ///< position in the world frame; keyframes near it are moved first
 };
@@ -101,9 +101,9 @@ struct correction_progress {
 /// octree::scan_history) and its depth image (in `Depths`), so that a keyframe can be moved, changed and removed.
 ///
 /// When nothing is pending, the map is bit-identical to the one that `integrate` builds from the depth images in the
-/// order of their frames, each from the `used_pose` of its keyframe. With tolerance 0 or after `finish`, these are the
-/// current poses; otherwise, they are within the tolerance of the current poses. The map depends neither on policies
-/// nor on time limits.
+/// order of their frames, each at the `used_pose` of its keyframe. With tolerance 0 or after `finish`, these poses
+/// equal the current ones; otherwise, they are within the tolerance of the current ones. The map depends neither on
+/// policies nor on time limits.
 ///
 /// Not thread-safe; live_map_thread.hpp provides a map with its own thread. With orbis::compiled, an octree with a
 /// model other than log_odds<> also needs octree/scan_history-inl.hpp.
@@ -202,11 +202,11 @@ class live_map {
     }
     return kept;
   }
-  /// Adds a frame between keyframes whose pose was measured relative to `keyframe`: it is marked relative to the
-  /// keyframe's pose in the map. It adds observations to the map but is not kept for corrections: it is removed from
-  /// the map when there are more than `max_frames`, when its keyframe moves, is hidden or removed, and with `finish`.
-  /// Accepts any depth source. Returns false if `max_frames` is 0, the keyframe is not in the map, the pose is not
-  /// finite, or the frame is a keyframe. O(marking). @pre depth has the camera's size
+  /// Adds a frame that lies between keyframes. Its pose was measured relative to `keyframe`, and it is inserted
+  /// relative to that keyframe's pose in the map. It adds observations to the map but is not kept for corrections: it
+  /// is removed from the map when there are more than `max_frames`, when its keyframe moves, is hidden or removed, and
+  /// with `finish`. Accepts any depth source. Returns false if `max_frames` is 0, the keyframe is not in the map, the
+  /// pose is not finite, or the frame is a keyframe. O(marking). @pre depth has the camera's size
   template <execution_policy Policy, camera::depth_source Depth>
   bool add_frame(const Policy& policy, std::uint64_t frame, const Depth& depth, std::uint64_t keyframe,
                  const se3& T_keyframe_camera) {
@@ -221,7 +221,8 @@ class live_map {
     frames_.push_back({frame, keyframe});
     return true;
   }
-  /// Removes a culled keyframe; `correct` updates the map. Returns false if it does not exist. O(its bricks).
+  /// Removes a culled keyframe; `correct` updates the map. Returns false if it does not exist. O(bricks of the
+  /// keyframe).
   bool remove(std::uint64_t frame) {
     entry* const k = find(frame);
     if (k == nullptr) return false;
@@ -322,23 +323,23 @@ class live_map {
   [[nodiscard]] const Camera& camera() const noexcept { return camera_; }
   [[nodiscard]] const live_map_options& options() const noexcept { return options_; }
   [[nodiscard]] const Depths& depths() const noexcept { return depths_; }
-  /// Number of keyframes, in the map or hidden, and number of frames between keyframes in the map.
+  /// Number of keyframes, including hidden ones; `frames`: number of frames between keyframes in the map.
   [[nodiscard]] std::size_t size() const noexcept { return keyframes_.size(); }
   [[nodiscard]] std::size_t frames() const noexcept { return frames_.size(); }
   [[nodiscard]] bool contains(std::uint64_t frame) const noexcept { return find(frame) != nullptr; }
-  /// Returns the pose with which a keyframe was marked; empty if the keyframe is not in the map. O(log keyframes).
+  /// Returns the pose of a keyframe in the map; empty if the keyframe is not in the map. O(log keyframes).
   [[nodiscard]] std::optional<se3> used_pose(std::uint64_t frame) const {
     const entry* const k = find(frame);
     return k == nullptr ? std::nullopt : k->used;
   }
-  /// Returns the pose to which `correct` moves a keyframe, the latest one given; empty if the keyframe is hidden or
-  /// does not exist. O(log keyframes).
+  /// Returns the latest pose set for a keyframe, to which `correct` moves it; empty if the keyframe is hidden or does
+  /// not exist. O(log keyframes).
   [[nodiscard]] std::optional<se3> wanted_pose(std::uint64_t frame) const {
     const entry* const k = find(frame);
     return k == nullptr ? std::nullopt : k->wanted;
   }
-  /// Returns true if a keyframe's depth image lacks the pixels that a filter removed: the image was set by `set_depth`,
-  /// or passed to `add_keyframe` as filtered. O(log keyframes).
+  /// Returns true if a keyframe's depth image lacks pixels that a filter removed: the image was changed by `set_depth`
+  /// or `edit_depths`, or passed to `add_keyframe` as filtered. O(log keyframes).
   [[nodiscard]] bool is_filtered(std::uint64_t frame) const noexcept {
     const entry* const k = find(frame);
     return k != nullptr && k->filtered;

@@ -25,10 +25,10 @@ struct live_map_snapshot {
   std::size_t pending = 0;     ///< keyframes and bricks waiting for a correction; 0: the map is up to date
 };
 
-/// Use of a depth image.
+/// The function to which a depth image was passed.
 enum class depth_use : std::uint8_t {
   keyframe,  ///< add_keyframe
-  frame      ///< add_frame: between keyframes
+  frame      ///< add_frame: a frame between keyframes
 };
 
 /// A keyframe or frame was inserted into the map, and is visible to readers.
@@ -69,8 +69,8 @@ template <class Octree>
 struct live_map_listeners {
   std::function<void()> started{};  ///< called first on the map's thread, to name the thread or lower its priority
   /// Fills in the current poses and returns true, or returns false if the poses have not changed since the last call;
-  /// with `always`, always fills them in. Hidden keyframes keep their depth images, which costs memory, because they
-  /// may return with their map of the atlas. List culled keyframes in `removed` to remove them from the map.
+  /// with `always`, always fills them in. Hidden keyframes may return with their map of the atlas, so their depth
+  /// images are kept in memory. List culled keyframes in `removed` to remove them from the map.
   std::function<bool(keyframe_poses& now, bool always)> poll_poses{};
   /// May change a depth image before it is inserted: a filter sets the pixels that it removes to 0. Called on the map's
   /// thread, so that no other thread waits for it.
@@ -81,8 +81,8 @@ struct live_map_listeners {
   std::function<void(const live_correction_event&)> corrected{};
   /// Called with each new snapshot and the log of changes up to it; the log may be read during the call.
   std::function<void(const live_map_snapshot<Octree>&, const octree::change_log&)> published{};
-  /// Called if a depth image could not be stored or read, see live_map, or the thread ended, see
-  /// live_map_thread::failure.
+  /// Called if a depth image could not be stored or read (see live_map), or if an error ended the thread (see
+  /// live_map_thread::failure).
   std::function<void(const error&)> failed{};
 };
 
@@ -109,7 +109,7 @@ struct live_map_counters {
   std::size_t dropped_frames = 0;     ///< frames dropped because too many images were waiting
   std::size_t refused_frames = 0;     ///< frames rejected by the map
   std::size_t corrections = 0;        ///< number of finished corrections
-  std::size_t most_waiting = 0;       ///< maximum number of waiting depth images
+  std::size_t most_waiting = 0;       ///< largest number of depth images that waited at the same time
 };
 
 }  // namespace orbis::mapping

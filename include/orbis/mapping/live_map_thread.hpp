@@ -150,7 +150,7 @@ class live_map_thread {
     if (listeners_.poll_poses) push({.kind = job::poll});  // poses may have moved since the last poll
     wait_until_idle();
   }
-  /// Updates the map to all current keyframes and poses (see live_map::finish), and waits as `wait` does.
+  /// Brings the map up to date with all keyframes and poses (see live_map::finish), and waits as `wait` does.
   void finish() {
     push({.kind = job::finish});
     wait_until_idle();
@@ -232,7 +232,7 @@ class live_map_thread {
     if (dropped && listeners_.overflowed) listeners_.overflowed({dropped->frame, intended_use(*dropped)});
     return added;
   }
-  /// A copy, in recycled memory if available.
+  /// Returns a copy of the image, in recycled memory if available.
   [[nodiscard]] image<std::uint16_t> recycled_copy(image_view<const std::uint16_t> pixels) {
     image<std::uint16_t> copy;
     {

@@ -21,7 +21,8 @@ struct depth_pixel<camera::depth_view<T>> {
 
 }  // namespace detail
 
-/// Pixel type of a copy of the depth image: the stored values of a `camera::depth_view`, otherwise metres.
+/// Pixel type of a copy of a depth image: for a `camera::depth_view` the type of its stored values, otherwise a type
+/// for metres.
 template <camera::depth_source Depth>
 using depth_pixel = typename detail::depth_pixel<Depth>::type;
 

@@ -4,11 +4,11 @@
 /// removed if rays of other keyframes pass through them.
 ///
 /// The log-odds of a voxel become those of free space only if more rays pass through it than end in it. A person
-/// walking through a room leaves voxels in which one or two scans end and which few later scans see. The depth images
-/// of a few keyframes contain more information, because each measurement indicates that the space before its end is
-/// empty. `cloud/ray_evidence.hpp` does the same for a whole cloud, and cites its sources. Coarse depth images with
-/// decisions that can be reverted later are described by G. Kim, A. Kim, "Remove, then Revert: Static Point Cloud Map
-/// Construction Using Multiresolution Range Images", IROS 2020.
+/// walking through a room leaves occupied voxels in which rays of one or two scans end and through which few later rays
+/// pass. The depth images of a few keyframes contain more information, because each measurement shows that the space in
+/// front of the measured point is empty. `cloud/ray_evidence.hpp` does the same for a whole cloud, and cites its
+/// sources. Coarse depth images with decisions that can be reverted later are described by G. Kim, A. Kim, "Remove,
+/// then Revert: Static Point Cloud Map Construction Using Multiresolution Range Images", IROS 2020.
 #pragma once
 
 #include <algorithm>
@@ -33,12 +33,12 @@
 namespace orbis::mapping {
 
 /// Compares the most recent keyframes of a live map with each other, and applies the result to the map: a surface is
-/// removed from a keyframe when rays of a later one pass through it, and restored when a later one shows it again. A
-/// keyframe is inserted first; the others are compared with it afterwards, one at a time, so that no insertion waits
-/// for the comparison. The result is a depth image with fewer pixels (`live_map::set_depth`); the map still corresponds
-/// to the depth images and poses of its keyframes. Keyframes are compared at the latest poses given to the map
-/// (`live_map::wanted_pose`), because these belong to the same moment; in the map, a keyframe waiting for a correction
-/// is still at an earlier pose.
+/// removed from a keyframe when rays of other keyframes pass through it, and restored when enough later ones show it
+/// again. A keyframe is inserted first; the others are compared with it afterwards, one at a time, so that no insertion
+/// waits for the comparison. The result is a depth image with fewer pixels (`live_map::set_depth`); the map still
+/// corresponds to the depth images and poses of its keyframes. Keyframes are compared at the latest poses given to the
+/// map (`live_map::wanted_pose`), because these are consistent with each other, whereas a keyframe that waits for a
+/// correction is still at an earlier pose in the map.
 ///
 /// Stores the most recent keyframes' depth images, 3.5 bytes per pixel. Memory is reused from keyframe to keyframe.
 template <camera::camera_model Camera>
@@ -50,9 +50,9 @@ class moving_filter {
   explicit moving_filter(Camera camera, const moving_filter_options& options = {})
       : judge_{std::move(camera), options} {}
 
-  /// Adds a keyframe to the map (live_map::add_keyframe), without the pixels through which rays of the most recent
-  /// keyframes pass. Afterwards these keyframes are due for re-evaluation, see revise. A keyframe with a pose that is
-  /// not finite is added to the map unchanged. The result is the same for every policy. Errors: those of
+  /// Adds a keyframe to the map (live_map::add_keyframe), without the pixels that rays of the most recent keyframes
+  /// pass through. Afterwards these keyframes are due for re-evaluation, see revise. A keyframe with a pose that is not
+  /// finite is added to the map unchanged. The result is the same for every policy. Errors: those of
   /// live_map::add_keyframe and set_depth. O(pixels + cells x keyframes), and marking. @pre same as for
   /// live_map::add_keyframe; all calls pass the same `map`
   template <execution_policy Policy, octree::replayable_octree Octree, depth_history Depths>

@@ -32,8 +32,8 @@ namespace detail {
 
 struct found_up {
   vec3 up;              ///< unit vector
-  double fixing = 0.0;  ///< weight of the normals that determine `up`, in the direction in which `up` is least certain
-  double along = 0.0;   ///< weight of the normals along `up`
+  double fixing = 0.0;  ///< weight of the normals that determine `up`; the minimum over all directions of tilt
+  double along = 0.0;   ///< weight of the normals parallel to `up`
 };
 
 /// Weight of a normal at an angle with sine `off`; 1 at 0, and 0 at `reach` and above (Tukey's biweight).
@@ -43,10 +43,10 @@ struct found_up {
   return u > 0 ? u * u : 0.0;
 }
 
-/// Weights of the normals along and across the direction `up`.
+/// Weights of the normals that are parallel to `up` (`along`) and perpendicular to it (`across`).
 struct up_ballot {
   double along = 0.0, across = 0.0;  ///< weights
-  mat3 spread = zeros<mat3>();       ///< scatter of the normals across `up`, minus that of the normals along it
+  mat3 spread = zeros<mat3>();       ///< scatter of the perpendicular normals minus that of the parallel ones
 
   up_ballot(std::span<const vec3> normals, const vec3& up, double reach) {
     for (const vec3& n : normals) {
@@ -169,7 +169,7 @@ template <camera::depth_source Depth>
 
 /// Information from which the upward direction was determined.
 enum class upright_source {
-  gravity,  ///< measured, and passed by the caller
+  gravity,  ///< measured gravity, passed by the caller
   floor,    ///< a floor, tables or a ceiling in the depth image, with or without walls
   walls,    ///< at least two walls in different directions, and too little floor
   assumed   ///< no information: the camera is assumed to be level, its -y axis up

@@ -62,8 +62,8 @@ std::optional<double> find_floor(const Map& map) {
 
 namespace detail {
 
-/// Replaces each value by the extreme of the values at most `radius` away along both axes: combines ranges of doubling
-/// lengths, and finally two overlapping ranges. The value `nothing` means "no value". O(values x log radius).
+/// Replaces each value by the extreme of the values at most `radius` away along both axes: combines ranges whose
+/// lengths double, and finally two overlapping ranges. The value `nothing` means "no value". O(values x log radius).
 template <class Extreme>
 void spread_extremes(image<int>& values, int radius, int nothing, const Extreme& extreme) {
   std::vector<int> line;
@@ -148,7 +148,7 @@ class floor_search {
       return floor_state::occupied;
     return in_doubt();
   }
-  /// Sets the radius of is_steep, in cells. Call it after `flood` and before `judge_surface`.
+  /// Sets the radius within which is_steep fits a plane, in cells. Call it after `flood` and before `judge_surface`.
   void set_radius(int radius) {
     radius_ = std::min(radius, std::max(levels_.width(), levels_.height()));
     // Integer sums are faster if they fit.
@@ -271,7 +271,7 @@ class floor_search {
   octree::occupancy unknown_;
   int radius_ = 1;
   plane_sums (*sums_)(const level_window&) = nullptr;
-  std::vector<surface> surfaces_;     ///< surfaces sorted by column, the lowest first in each
+  std::vector<surface> surfaces_;     ///< surfaces sorted by column, and from low to high in each column
   std::vector<std::uint32_t> first_;  ///< index of each column's first surface
   std::vector<bool> reached_;
   image<int> levels_;

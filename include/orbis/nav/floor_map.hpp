@@ -79,8 +79,9 @@ struct floor_map {
 
 /// Height (metres) of the floor: the top of the lowest large horizontal layer. A layer is large if its surface with
 /// free space directly above it is at least half that of the largest layer. Two adjacent voxel layers count as one,
-/// because a floor may lie between them; the observed floor is within these voxels, up to one voxel lower. Empty if
-/// there is no such surface. O(octants + tops of larger leaves in octants; at most 2^24 of the latter).
+/// because a floor may lie between them. The true floor is inside the voxels of the layer, so it is up to one voxel
+/// lower than the result. Empty if there is no such surface. O(octants + octants on top of larger leaves, at most 2^24
+/// of which are examined).
 template <planning_map Map>
 [[nodiscard]] std::optional<double> find_floor(const Map& map);
 
@@ -103,10 +104,10 @@ template <planning_map Map>
 /// After: A. Hornung et al., "OctoMap", Autonomous Robots 34, 2013 (projection of a height band); P. Fankhauser et al.,
 /// "Probabilistic terrain mapping for mobile robots with uncertain localization", RA-L 3, 2018 (steps and slopes).
 ///
-/// Errors: no_data (no floor is found, or nothing is known at its height), invalid_argument (more than 2^26 cells, each
-/// counted once for each 64 voxels of known height in the layer: pass a region, or reduce `below` and `above`). Uses 16
-/// bytes for each of these units, and about 40 bytes per cell. O(octants + cells x (height of the layer + (radius /
-/// resolution)^2 where it is not level)).
+/// Errors: no_data (no floor is found, nothing is known at its height, or the floor or the region is outside the grid),
+/// invalid_argument (the region's `min` exceeds its `max`, or the columns of the known part of the layer take more than
+/// 2^26 words of 64 voxels each: pass a smaller region, or reduce `below` and `above`). Uses 16 bytes per word, and
+/// about 40 bytes per cell. O(octants + cells x (height of the layer + (radius / resolution)^2 where it is not level)).
 /// @pre height, radius > 0; step, below, above >= 0; 0 <= max_slope < pi / 2
 template <planning_map Map>
 [[nodiscard]] result<floor_map> make_floor_map(const Map& map, const ground_robot& robot = {},

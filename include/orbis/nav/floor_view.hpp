@@ -44,8 +44,8 @@ class floor_view {
     look_at_obstacles(unknown, [&](int x, int y) { return map.states(x, y); });
   }
   /// Creates a view for the centre of a robot on a cost map (see inflate), which accounts for the robot's radius: cells
-  /// with a cost of at least `inscribed` are obstacles; in other cells a metre costs 1 + clearance_weight cost / 252;
-  /// preferred_clearance is ignored.
+  /// with a cost of at least `inscribed` are obstacles; in other cells, the cost per metre is 1 + clearance_weight *
+  /// cost / 252; preferred_clearance is ignored.
   /// @pre same as for the constructor with a radius; `costs` belongs to `map` and outlives the view
   floor_view(const floor_map& map, const image<std::uint8_t>& costs, const planning_options& options = {},
              octree::occupancy unknown = octree::occupancy::occupied)

@@ -166,7 +166,8 @@ class frontiers {
     std::array<octree::octant_states, 1024> states_;
   };
 
-  /// Calls `visit(name, is above)` for the face neighbours of the octant with Morton code `name` that lie in the grid.
+  /// Calls `visit(code, is_above)` for the two octants beside the one with Morton code `name` along the axis, if they
+  /// lie in the grid. `is_above`: std::true_type for the upper one, otherwise std::false_type.
   template <unsigned Axis, class Visit>
   void for_each_beside(std::uint64_t name, Visit&& visit) const {
     constexpr std::uint64_t one = std::uint64_t{1} << Axis, along = 0x1249249249249249U << Axis;

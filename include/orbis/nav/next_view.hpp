@@ -37,9 +37,9 @@
 
 namespace orbis::nav {
 
-/// Returns points on a frontier for the camera to look at (metres): large clusters are split by a lattice of cubes, and
-/// each point is the mean of a cube's voxels. Larger clusters come first. `spacing`: edge of the cubes, metres, rounded
-/// to a power of two of voxels, at least 4.
+/// Returns points on a frontier for the camera to look at (metres): clusters are split by a lattice of cubes, and each
+/// point is the mean of the frontier voxels in one cube. The points are in the order of `clusters`. `spacing`: edge
+/// length of the cubes, metres, rounded to a power of two of voxels, at least 4 voxels.
 [[nodiscard]] inline std::vector<vec3> candidate_viewpoints(std::span<const frontier_cluster> clusters,
                                                             const octree::voxel_grid& grid, double spacing = 0.8) {
   const double levels = std::round(std::log2(std::max(4.0, spacing / grid.resolution())));
@@ -75,7 +75,7 @@ struct next_view_options {
   double max_distance = 2.0;   ///< maximum distance of the camera from the place, metres
   double max_elevation = 0.5;  ///< maximum angle of the camera's axis above or below the horizontal, radians
   double min_gain = 0.0;       ///< minimum unknown space that a view must see, cubic metres
-  /// Penalty for path length: the utility of a view is its gain times exp(-lambda * length), 1 / metres.
+  /// Penalty for path length, 1 / metres: the utility of a view is its gain times exp(-lambda * length).
   double lambda = 0.2;
   path_options path{};
   std::uint64_t seed = 1;  ///< seed of the random candidates

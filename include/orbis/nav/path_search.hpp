@@ -78,7 +78,7 @@ struct found_path {
   /// path ends at the centre of the reached cell nearest to the goal (empty if the goal is not finite).
   std::vector<vec3> points{};
   double length = 0.0;       ///< length of the path, metres
-  double cost = 0.0;         ///< see planning_options; equals the length in a uniform space. Ignores floor heights
+  double cost = 0.0;         ///< see planning_options; in a uniform space, the length (on a floor, horizontal length)
   std::size_t expanded = 0;  ///< number of expanded cells; 0 if the straight segment was used without a search
 };
 

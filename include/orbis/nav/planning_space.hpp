@@ -11,8 +11,8 @@
 
 namespace orbis::nav {
 
-/// Costs of moving in addition to length, and the region of the search. A path costs the integral of the density along
-/// it (metres). The density of a cell is
+/// Options for the cost of paths, and the region of the search. A path costs the integral of the density along it
+/// (metres). The density of a cell is
 ///
 ///     (1 + clearance_weight (1 - d / preferred_clearance)^2) u,    d < preferred_clearance
 ///

@@ -129,7 +129,7 @@ class path_monitor {
 
   std::vector<vec3> points_;
   detail::map_follower follower_;
-  std::vector<bool> is_suspect_;  ///< true for segments that changes affected and that are not known to be free
+  std::vector<bool> is_suspect_;  ///< true for segments that are not known to be free
   std::vector<octree::bounding_box> sweeps_;
   std::size_t tested_ = 0;
 };

@@ -24,8 +24,8 @@ struct vertical_capsule {
   double radius = 0.2;
   double low = 0.2, high = 0.8;
 };
-/// All points at a horizontal distance of at most `radius` from the vertical line through the reference point, and
-/// `low` to `high` above it, metres. @pre radius > 0; low < high
+/// All points at a horizontal distance of at most `radius` from the reference point, and at a height from `low` to
+/// `high` above it, metres. @pre radius > 0; low < high
 struct vertical_cylinder {
   double radius = 0.2;
   double low = 0.0, high = 1.0;

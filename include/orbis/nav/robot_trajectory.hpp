@@ -41,8 +41,8 @@ struct motion_state {
 ///     q' = (1 - w) direction + w turned,    w = l^2 (3 - 2 l),
 ///
 /// so that |q'| <= 1, and with q'' = 0 at both ends: lines and corners join with continuous velocity and curvature. A
-/// corner is a Bezier curve of degree 4. Each of its two legs is `length` / 2 long; the control points are the end and
-/// the middle of each leg, and the corner itself (see corner_points).
+/// corner is a Bezier curve of degree 4. It replaces two straight legs of `length` / 2 each; its control points are the
+/// point where the legs meet, and the middle and the other end of each leg (see corner_points).
 struct path_piece {
   vec3 start = zeros<vec3>();
   vec3 direction = vec3(1.0, 0.0, 0.0), turned = vec3(1.0, 0.0, 0.0);  ///< unit vectors
@@ -116,10 +116,10 @@ class robot_trajectory {
 
 namespace detail {
 
-/// Returns true if a robot is free along a Bezier curve. The curve is in the convex hull of its control points, so its
-/// distance from the segment between its ends is at most the distance of the farthest control point. Tests a robot
-/// inflated by that distance along the segment and, if it is not free, each half of the curve recursively. Nothing is
-/// sampled.
+/// Returns true if a robot is certainly free along a Bezier curve. The curve is in the convex hull of its control
+/// points, so its distance from the segment between its ends is at most the distance of the farthest control point.
+/// Tests a robot inflated by that distance along the segment and, if it is not free, each half of the curve
+/// recursively. Nothing is sampled.
 template <inflatable_space Space>
 [[nodiscard]] bool is_free_curve(const Space& space, const std::array<vec3, 5>& points, int halvings = 6) {
   const vec3 along = points[4] - points[0];
@@ -146,9 +146,9 @@ template <inflatable_space Space>
 
 /// Makes a trajectory along a polyline, from rest to rest, within the limits. Corners are rounded (see path_piece)
 /// where the robot fits: each rounded corner is certified as a whole by an exact test of the volume that an inflated
-/// robot (for a user-defined shape, its covering balls) sweeps along pieces of the curve's convex hull. If none of
-/// several corner sizes fits, the robot stops at the corner. The robot is therefore free at all times. Speed and
-/// acceleration are within the limits everywhere, not only at samples.
+/// robot (for a user-defined shape, its covering balls) sweeps along chords of the curve. If none of several corner
+/// sizes fits, the robot stops at the corner. The robot is therefore free at all times. Speed and acceleration are
+/// within the limits everywhere, not only at samples.
 ///
 /// On a floor (`floor_view`), the points keep their heights. Between them, the height is interpolated linearly, so the
 /// robot's true height may differ: `view.on_ground(position)` returns it. The limits hold for the polyline's motion.

@@ -119,8 +119,9 @@ ORBIS_INLINE std::uint32_t squared_distances::make(const detail::brick_place& p)
   return number;
 }
 
-/// Returns true if removing a brick would not change any value. If the distances equal the implied value, so do all
-/// stages, because no stage has a value less than the distance.
+/// Returns true if removing a brick would not change any value. It is sufficient to compare the distances with the
+/// value that the brick has when it is not stored: if they are all 0, all voxels are obstacles; if they are all far, so
+/// are the other stages, whose values are never less than the distances.
 ORBIS_INLINE bool squared_distances::is_needless(std::uint32_t brick) const {
   const std::uint16_t without = value_without_brick(directory_.without_number(places_[brick]));
   const stages& s = stages_[brick];
@@ -289,8 +290,8 @@ ORBIS_INLINE void squared_distances::update_line(std::span<const std::uint64_t> 
 
 namespace detail {
 
-/// Offers the squares of those distances along x (`from`) that are less than their counterparts in `other`, repeated
-/// for the eight rows of a slice.
+/// Sets each of the eight rows of the offer to the squares of the distances along x in `from` where they are less than
+/// in `other`, and to `no_offer` elsewhere.
 inline void offer_row(std::uint64_t from, std::uint64_t other, slice_offer& out) noexcept {
   const auto a = std::bit_cast<std::array<std::uint8_t, 8>>(from);
   const auto b = std::bit_cast<std::array<std::uint8_t, 8>>(other);

@@ -225,14 +225,16 @@ class squared_distances : public squared_distance_view {
   [[nodiscard]] bool is_full(std::uint32_t found) const noexcept { return value_without_brick(found) == 0; }
   [[nodiscard]] std::uint8_t row_bits(std::uint32_t found) const noexcept { return is_full(found) ? 0xff : 0; }
   [[nodiscard]] std::uint16_t bound() const noexcept { return static_cast<std::uint16_t>(reach_ * reach_); }
-  /// The squared distances of eight rows, the first one `distance` rows away, each repeated eight times.
+  /// The squared distances to eight consecutive rows, the first of which is `distance` rows away; each is repeated
+  /// eight times.
   [[nodiscard]] const std::uint16_t* squares(int distance) const noexcept {
     return squares_.data() + 8 * (distance + squares_pad_);
   }
   /// Maximum distance, in voxels, at which `least` plus the squared distance is within `bound()`; negative if none.
   [[nodiscard]] int offer_reach(std::uint16_t least) const noexcept;
 
-  /// Clears the change lists of the previous update; propagates the new changes through all stages.
+  /// `begin_update` clears the change lists of the previous update; `finish_update` propagates the new changes through
+  /// all stages.
   void begin_update();
   void finish_update();
   void set_obstacles(std::span<const octant_obstacles> octants);

@@ -39,7 +39,7 @@ class store_reader {
   [[nodiscard]] const brick_store<T>& store() const noexcept { return *store_; }
 
  private:
-  /// Upper bound on the size of the smallest node that contains both `k` and the last octant.
+  /// A node that contains the last octant also contains `k` if and only if its edge, in voxels, exceeds this value.
   [[nodiscard]] std::uint32_t distance(const voxel_key& k) const noexcept {
     return (k.x ^ at_.x) | (k.y ^ at_.y) | (k.z ^ at_.z);
   }
@@ -60,7 +60,7 @@ class store_reader {
   }
 
   const brick_store<T>* store_;
-  voxel_key at_{~0U, ~0U, ~0U};  ///< the last voxel read; initially far from all others
+  voxel_key at_{~0U, ~0U, ~0U};  ///< a voxel in the last octant; initially far from all others
   std::uint32_t cells_ = 0;      ///< edge in voxels of the node around `at_` that `octant_` represents
   const chunk* chunk_ = nullptr;
   const brick<T>* brick_ = nullptr;

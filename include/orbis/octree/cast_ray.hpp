@@ -132,8 +132,8 @@ class ray_caster {
     const bool is_free = known == 0 || reader_.is_below(Model::occupancy_threshold);
     return is_free && (options_.ignore_unknown || known == ~std::uint64_t{0});
   }
-  /// Returns the edge, in voxels, of a node around `k`, from a brick to a chunk, in which no voxel stops a ray; 0 if
-  /// there is none.
+  /// Returns the edge, in voxels, of the largest node around `k` (a brick, eight bricks or a chunk) that is known to
+  /// contain no voxel that stops a ray; 0 if there is none.
   [[nodiscard]] std::uint32_t passable_cells(const voxel_key& k) noexcept {
     const seen_chunk& c = chunk_at(k);
     const std::uint32_t place = detail::place_in_chunk(k);
@@ -193,7 +193,7 @@ class ray_caster {
   voxel_grid grid_;
   ray_options options_;
   std::array<seen_chunk, chunks_kept> seen_{};
-  std::size_t here_ = 0;  ///< index of the chunk read last
+  std::size_t here_ = 0;  ///< index of the last chunk that was looked up
 };
 
 /// Casts many rays: sets `out[i]` to the result for the ray from `origins[i]` along `directions[i]`. The result is the

@@ -93,8 +93,8 @@ class change_log {
   /// Oldest revision for which queries are exact; for older revisions the masks may contain additional voxels.
   [[nodiscard]] std::uint64_t exact_since() const noexcept { return exact_since_; }
 
-  /// Sets the number of entries (octants and revisions) above which the oldest are merged. The current revision is
-  /// never merged, regardless of its size.
+  /// Sets the number of entries (one per octant and revision) above which the oldest are merged. The current revision
+  /// is never merged, regardless of its size.
   void set_capacity(std::size_t entries) {
     capacity_ = entries;
     limit_ = 2 * entries;

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
 /// Decay: change of a voxel's value with the time since its last observation. Objects seen long ago may have moved
-/// away; their voxels fade towards unknown and finally become unknown.
+/// away, so the evidence for their voxels fades.
 ///
 /// A policy is a pure function of a voxel's value, so that a map can apply it once per distinct value
-/// (`occupancy_octree::transform`). Write a custom policy for another kind of decay or to erase voxels: an empty result
-/// means unknown.
+/// (`occupancy_octree::transform`). Write a custom policy for another kind of decay, or to make voxels unknown again:
+/// it returns an empty result for these.
 #pragma once
 
 #include <algorithm>
@@ -25,8 +25,9 @@ template <sensor_model M>
   return M::occupancy_threshold > 0 ? T{0} : largest_free_value<M>();
 }
 
-/// Exponential decay: log-odds halve every `half_life`. Two applications are equivalent to one with the sum of the
-/// elapsed times, up to rounding. Free voxels never become occupied, or vice versa.
+/// Exponential decay: the difference between the log-odds and resting_value halves every `half_life`. Two applications
+/// are equivalent to one with the sum of the elapsed times, up to rounding. Free voxels never become occupied, or vice
+/// versa.
 /// @pre half_life > 0, elapsed >= 0
 template <sensor_model M = log_odds<>>
 struct exponential_decay {

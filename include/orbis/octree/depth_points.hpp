@@ -64,9 +64,9 @@ class pixel_rays {
   /// separable.
   [[nodiscard]] const vec2& focal() const noexcept { return focal_; }
   [[nodiscard]] const vec2& center() const noexcept { return center_; }
-  /// Returns the x of the rays of row `v`, NaN if a pixel has no ray.
+  /// Returns the x components of the rays of row `v`, one per column; NaN where a pixel has no ray.
   [[nodiscard]] const float* x(int v) const noexcept { return x_.data() + (separable_ ? 0 : row(v)); }
-  /// Returns the y of the rays of row `v`; a single value if separable.
+  /// Returns the y components of the rays of row `v`; a single value if separable.
   [[nodiscard]] const float* y(int v) const noexcept { return y_.data() + (separable_ ? v : row(v)); }
   [[nodiscard]] std::pair<float, float> at(int u, int v) const noexcept { return {x(v)[u], y(v)[separable_ ? 0 : u]}; }
   [[nodiscard]] std::size_t memory_bytes() const noexcept { return (x_.capacity() + y_.capacity()) * sizeof(float); }

@@ -29,7 +29,7 @@ struct integration_summary {
   std::size_t used = 0;       ///< number of points within range
   std::size_t truncated = 0;  ///< number of points beyond the range
   std::size_t rejected = 0;   ///< number of points that are NaN, infinite, or too far outside the grid
-  std::size_t free = 0;       ///< number of voxels observed as free; for a map, except those at the lower bound
+  std::size_t free = 0;       ///< number of voxels observed as free; a map excludes those already at the lower bound
   std::size_t occupied = 0;   ///< number of voxels observed as occupied
 };
 

@@ -14,7 +14,7 @@ namespace orbis::octree {
 
 namespace detail {
 
-/// Voxels of a map that a miss would not change, for point_integrator and depth_integrator.
+/// Returns the callback that finds the voxels of a map that a miss would not change.
 template <sensor_model Model>
 [[nodiscard]] saturated_voxels saturated_in(const brick_store<typename Model::value_type>& store) {
   using map = brick_store<typename Model::value_type>;

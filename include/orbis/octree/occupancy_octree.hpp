@@ -185,8 +185,8 @@ class occupancy_octree {
     }
   }
   /// Replaces every voxel's value by `change(value)`, a std::optional; empty makes the voxel unknown. `change` must
-  /// depend only on its argument, as decay policies do (decay.hpp): it is called once for each distinct value of an
-  /// octant. O(octants).
+  /// depend only on its argument, as decay policies do (decay.hpp): one call may serve all voxels of an octant that
+  /// have the same value. O(octants).
   template <class Change>
   requires std::is_invocable_r_v<std::optional<value_type>, Change&, value_type> void transform(Change&& change) {
     begin_change();
@@ -248,7 +248,7 @@ class occupancy_octree {
 
   // -- queries
 
-  /// Returns the value stored at `p` (metres), empty if unknown or outside the grid. O(1), as are the single-voxel
+  /// Returns the value stored at `p` (metres), empty if unknown or outside the grid. O(1), like the single-voxel
   /// queries below.
   template <point_like P>
   [[nodiscard]] std::optional<value_type> value(const P& p) const {
@@ -293,7 +293,7 @@ class occupancy_octree {
     detail::visit_leaves(store_, tree_depth(),
                          [&](const voxel_key& key, int level, value_type v) { visit(make_leaf(key, level, v)); });
   }
-  /// Counts the nodes of the pruned octree. O(bricks + octants that are not uniform), as are the four functions below.
+  /// Counts the nodes of the pruned octree. O(bricks + octants that are not uniform), like the four functions below.
   [[nodiscard]] octree_counts counts() const;
   /// Number of leaves of the pruned octree, of any size.
   [[nodiscard]] std::size_t num_leaves() const { return counts().leaves; }

@@ -68,9 +68,9 @@ class octant_reader {
 };
 
 /// Calls `visit(lowest voxel, level, states)` for every octant (level 2) with a voxel in `box` and at least one known
-/// voxel, and for every leaf larger than 8x8x8 voxels (level > 3) with a voxel in `box`, all of whose octants have
-/// these states. The order is unspecified. O(blocks of 32x32x32 voxels with bricks + large leaves + octants in the box
-/// that are not uniform).
+/// voxel, and for every leaf larger than 8x8x8 voxels (level > 3) with a voxel in `box`; `states` then holds for each
+/// octant of the leaf. The order is unspecified. O(blocks of 32x32x32 voxels with bricks + large leaves + octants in
+/// the box that are not uniform).
 template <octree_map Map, std::invocable<const voxel_key&, int, const octant_states&> Visit>
 void for_each_octant(const Map& map, const key_box& box, Visit&& visit) {
   using model = typename Map::model;

@@ -155,7 +155,7 @@ class overlap_search {
     const auto along = [](std::uint32_t a, std::uint32_t b) { return (b >> chunk_level) - (a >> chunk_level) + 1.0; };
     return along(keys.low.x, keys.high.x) * along(keys.low.y, keys.high.y) * along(keys.low.z, keys.high.z);
   }
-  /// Searches below the smallest node, of at least a chunk, that contains all keys.
+  /// Searches below the smallest node that contains all keys and is at least as large as a chunk.
   [[nodiscard]] bool from_common_node(const key_box& keys) const {
     const std::uint32_t differ = (keys.low.x ^ keys.high.x) | (keys.low.y ^ keys.high.y) | (keys.low.z ^ keys.high.z);
     const int level = std::max(chunk_level, static_cast<int>(std::bit_width(differ)));

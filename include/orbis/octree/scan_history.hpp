@@ -33,7 +33,7 @@
 
 namespace orbis::octree {
 
-/// Limits of one call to replay. When a limit is reached, the remaining octants stay stale for the next call.
+/// Limits of one call to replay. When a limit is reached, the remaining octants stay stale until the next call.
 struct replay_limits {
   std::chrono::nanoseconds time = std::chrono::nanoseconds::max();  ///< checked after every few dozen bricks
   std::size_t bricks = std::numeric_limits<std::size_t>::max();
@@ -126,8 +126,8 @@ class scan_history {
   /// Number of bricks with stale octants.
   [[nodiscard]] std::size_t stale_bricks() const noexcept { return uses_.stale().size(); }
   /// Replays stale octants, those stale for longest first, as one revision of the change log. Returns the number of
-  /// bricks replayed: at least one, if any is stale, regardless of the time limit. The map is the same under every
-  /// policy. Allocates nothing once its buffers have grown. O(bricks x scans that use each).
+  /// bricks replayed: at least one, regardless of the time limit, if any is stale and `limits.bricks` is not 0. The map
+  /// is the same under every policy. Allocates nothing once its buffers have grown. O(bricks x scans that use each).
   template <execution_policy Policy>
   std::size_t replay(const Policy& policy, const replay_limits& limits = {}) {
     return replay_stale(detail::as_parallel(policy), limits);
@@ -142,7 +142,7 @@ class scan_history {
 
  private:
   using value_type = typename Octree::value_type;
-  static constexpr std::size_t batch = 64;  ///< number of bricks that one thread replays before they are stored
+  static constexpr std::size_t batch = 64;  ///< number of bricks per thread that are replayed before they are stored
 
   struct entry {
     std::uint64_t frame = 0;
@@ -160,10 +160,10 @@ class scan_history {
   /// Position (existing or for insertion) of the scan of `frame` among the scans that use a brick.
   [[nodiscard]] std::vector<detail::brick_use>::iterator find_place(std::vector<detail::brick_use>& uses,
                                                                     std::uint64_t frame) const noexcept;
-  /// Updates the bricks' lists of scans from the old voxels of scan `number` to `after`. If the scan is the newest in a
-  /// brick, apply_fresh handles the brick; otherwise octants become stale.
+  /// Updates the bricks' lists of scans before the voxels of scan `number` are replaced by `after`. If the scan is new
+  /// in a brick and newer than the brick's other scans, apply_fresh handles the brick; otherwise octants become stale.
   void change_uses(std::uint32_t number, const scan& after);
-  /// Applies the parts of a scan that are the newest in their bricks.
+  /// Applies the parts of a scan that are in fresh_.
   void apply_fresh(std::uint32_t number);
   std::size_t replay_stale(const parallel_policy& policy, const replay_limits& limits);
   /// Replays the first `count` stale bricks.
@@ -177,7 +177,7 @@ class scan_history {
 
   scan_marker marker_;
   scan marked_;
-  std::vector<std::uint32_t> fresh_;  ///< parts of the current scan that are the newest in their bricks
+  std::vector<std::uint32_t> fresh_;  ///< parts of the current scan that are new, and the newest in their bricks
   std::vector<detail::replayed_brick<value_type>> replayed_;
   std::vector<std::uint64_t> unknown_;  ///< bricks whose voxels have all become unknown
 };

@@ -77,7 +77,7 @@ template <class M>
 concept hit_raises_and_miss_lowers = M::miss < 0 && 0 < M::hit;
 template <class M>
 concept clamps_are_ordered = M::clamp_min < M::clamp_max;
-/// The lower bound is free, the upper bound occupied.
+/// A voxel at the lower bound is free; one at the upper bound is occupied.
 template <class M>
 concept threshold_is_between_clamps = M::clamp_min < M::occupancy_threshold&& M::occupancy_threshold <= M::clamp_max;
 /// A sensor model: additive hit and miss, bounds, and the minimum value of an occupied voxel. All are compile-time

@@ -73,7 +73,7 @@ class voxel_layer {
  public:
   using value_type = T;
 
-  /// Returns the value of voxel `k`, or null if it has none. O(1), as are the functions below unless stated otherwise.
+  /// Returns the value of voxel `k`, or null if it has none. O(1), like the functions below unless stated otherwise.
   [[nodiscard]] const T* find(const voxel_key& k) const noexcept {
     const std::uint64_t code = morton_code(k);
     const std::uint32_t i = index_.find(code >> 6U);

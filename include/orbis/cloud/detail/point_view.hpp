@@ -114,8 +114,8 @@ class basic_viewed_points {
   [[nodiscard]] operator const basic_point_view<S>&() const noexcept { return view_; }
 
  private:
-  /// Returns true if the coordinates exist and are stored inside the point. The coordinates of a packed struct, for
-  /// example, would be copies.
+  /// Returns true if the coordinates exist and are stored inside the point. For a packed struct, for example,
+  /// the addresses are those of temporary copies.
   template <class P>
   [[nodiscard]] static bool holds_coordinates(const P& point, const std::array<const S*, 3>& axis) noexcept {
     const auto begin = reinterpret_cast<std::uintptr_t>(std::addressof(point));

@@ -10,7 +10,7 @@
 
 #include <orbis/core/simd/level.hpp>
 
-/// Marks a kernel and every function that it calls with vectors, so that they are inlined into the function that is
+/// Marks a kernel, and every function to which it passes vectors, so that they are inlined into the function that is
 /// compiled for a target.
 #define ORBIS_ALWAYS_INLINE __attribute__((always_inline)) inline
 /// Forces inlining of a lambda in a kernel; write it after the parameters.
@@ -30,7 +30,7 @@ namespace orbis::simd {
 
 // Compilation targets: the template argument `Target` of kernels and of `vec`.
 
-/// The baseline of the compiler flags: SSE2, NEON.
+/// The baseline that the compiler flags select: SSE2 or NEON.
 struct portable {
   static constexpr std::size_t bytes = 16;  ///< size of a register
   static constexpr level needs = level::portable;
@@ -87,7 +87,7 @@ inline constexpr bool is_one_of = (std::is_same_v<T, List> || ...);
 /// Selects the code of a kernel for the best of `Targets` that `highest` and the processor allow.
 ///
 /// `Kernel` has a static member template `run<Target>`, declared ORBIS_ALWAYS_INLINE, with the signature `Signature`;
-/// no parameter is a vector. It is always compiled for `portable`, and for each of `Targets`; the default is `avx2` and
+/// no parameter is a vector. The kernel is compiled for `portable` and for each of `Targets`, by default `avx2` and
 /// `avx512`.
 template <class Kernel, class Signature, target... Targets>
 [[nodiscard]] Signature* kernel(level highest = level::avx512) noexcept {

@@ -12,8 +12,8 @@
 ///   }
 /// @endcode
 ///
-/// An object that selects its kernels when it is constructed must be constructed while the limit exists. The limit is
-/// the only state in this header that threads share; the library itself never sets it.
+/// An object that selects its kernels when it is constructed must be constructed while the limit exists. A limit
+/// applies to all threads; the library itself never sets one.
 #pragma once
 
 #include <algorithm>
@@ -33,7 +33,7 @@ namespace orbis::simd {
 
 /// Instruction sets that kernels are compiled for; each includes the previous ones.
 enum class level {
-  portable,  ///< the baseline of the compiler flags; SSE2 on x86-64, NEON on ARM
+  portable,  ///< the baseline that the compiler flags select: SSE2 on x86-64, NEON on ARM
   popcnt,    ///< + SSE4.2, POPCNT
   avx2,      ///< + AVX2, FMA, BMI
   avx512     ///< + AVX-512 F, BW, DQ, VL

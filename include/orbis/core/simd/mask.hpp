@@ -16,7 +16,7 @@ namespace orbis::simd {
 
 namespace detail {
 
-/// Two halves of a mask that does not fit into one register.
+/// The two halves of a mask or vector that does not fit into one register.
 template <class Half>
 struct halves {
   Half low, high;
@@ -70,7 +70,7 @@ struct mask {
   static constexpr bool is_bits = is_native && detail::masks_are_bits<Size * N>;
   using half = mask<Size, N / 2, Target>;
   using word = detail::word_of_bits<N>;
-  using lane = detail::signed_of_size<Size>;  ///< lane of a native mask that is not a bit word: -1 if set, else 0
+  using lane = detail::signed_of_size<Size>;  ///< lane of a native mask that is not stored as bits: -1 if set, else 0
   using storage =
       std::conditional_t<!is_native, detail::halves<half>, std::conditional_t<is_bits, word, detail::reg<lane, N>>>;
   storage v;
@@ -137,7 +137,7 @@ template <std::size_t Size, std::size_t N, class Target>
   return a & !b;
 }
 
-/// Bit i is set if lane i is set; the bits above are zero.
+/// Bit i is set if lane i is set; the remaining high bits are zero.
 template <std::size_t Size, std::size_t N, class Target>
 [[nodiscard]] ORBIS_ALWAYS_INLINE std::conditional_t<(N > 32), std::uint64_t, std::uint32_t> bits(
     const mask<Size, N, Target>& m) noexcept {

@@ -2,9 +2,9 @@
 /// @file
 /// `vec<T, N, Target>`: a vector of N numbers with element-wise arithmetic.
 ///
-/// A vector that does not fit into one register of the target is split into halves, so N may be any power of two. Lanes
-/// are rounded according to IEEE 754, and a product is never fused into a sum: all targets give the same bits. Integers
-/// wrap modulo 2^bits.
+/// A vector that does not fit into one register of the target is split into halves, so N may be any power of two.
+/// Results are rounded according to IEEE 754, and a product is never fused with a sum: all targets give the same bits.
+/// Integers wrap modulo 2^bits.
 #pragma once
 
 #include <cstddef>
@@ -90,7 +90,7 @@ struct vec {
   static constexpr bool is_native = N * sizeof(T) <= Target::bytes;  ///< fits into one register
   using native = detail::reg<T, is_native ? N : 2>;
   using storage = std::conditional_t<is_native, native, detail::halves<half>>;
-  /// The unsigned counterpart of a signed integer type, whose sums wrap instead of overflowing.
+  /// The register type for arithmetic: unsigned for signed integers, so that results wrap instead of overflowing.
   using modular = detail::reg<typename detail::modular_of<T>::type, is_native ? N : 2>;
 
   storage v;  ///< the register, or the halves

@@ -54,7 +54,7 @@ inline constexpr time_unit time_units[] = {
   return t * unit.value_or(detect_unit(stamp)).seconds;
 }
 
-/// A time in seconds for messages, with at most 6 decimals.
+/// Formats a time in seconds for messages, with at most 6 decimals.
 [[nodiscard]] inline std::string describe(double seconds) {
   char text[400];  // the largest double has 309 digits
   const int length = std::snprintf(text, sizeof text, "%.6f", seconds);
@@ -70,7 +70,7 @@ inline constexpr time_unit time_units[] = {
   return describe(*first) + " to " + describe(*last);
 }
 
-/// The median difference of consecutive times. @pre times ascend, times.size() >= 2
+/// The median difference between consecutive times. @pre times ascend, times.size() >= 2
 [[nodiscard]] inline double median_interval(const std::vector<double>& times) {
   std::vector<double> steps;
   for (std::size_t i = 1; i < times.size(); ++i) steps.push_back(times[i] - times[i - 1]);

@@ -20,7 +20,7 @@ concept has_change_log = requires(const Map& map) {
   { map.changes() } -> std::convertible_to<const octree::change_log&>;
 };
 
-/// Stores the last revision of a map that was read.
+/// Stores the revision at which a map was last read.
 class map_follower {
  public:
   /// Updates derived data from `map` by calling `some(log, since)` or `all()`, see the overload below; calls `all()` if
@@ -35,9 +35,9 @@ class map_follower {
       all();
     }
   }
-  /// Like the overload above, for a copy of the map to which `log` belongs, made at `revision`. Calls `some(log,
-  /// since)` if the log lists all possible differences from the last revision read, as changes after revision `since`;
-  /// calls `all()` if the log does not reach back that far; does nothing if this revision was read last.
+  /// Like the overload above, for a copy that was made at `revision` of the map to which `log` belongs. Calls `all()`
+  /// if the log does not reach back to the last revision read. Otherwise, if that is not `revision`, calls `some(log,
+  /// since)`: the changes after revision `since` in the log include all differences between the two.
   template <class Some, class All>
   void follow(const octree::change_log& log, std::uint64_t revision, Some&& some, All&& all) {
     assert(revision <= log.revision());

@@ -19,7 +19,7 @@
 
 namespace orbis::camera::detail {
 
-/// Read-out time of a row, seconds: linear in the row.
+/// The time at which a row is read, relative to the frame's time, seconds; a linear function of the row's index.
 struct row_time {
   double first = 0.0, per_row = 0.0;
 
@@ -82,7 +82,7 @@ enum class warp_direction { to_frame, to_row };
 
 /// Spacing of the nodes of a `row_warp` in pixels; also the number of pixels that are evaluated together.
 inline constexpr int warp_cell = 16;
-/// Parabolas in inverse depth for the displacement in x, the displacement in y, and the depth ratio.
+/// Coefficients of three parabolas in inverse depth: the displacement in x, the displacement in y, the depth ratio.
 using warp_parabolas = std::array<float, 9>;
 
 /// Warped positions of a row of pixels; NaN where undefined. All lengths are multiples of `warp_cell`.
@@ -91,7 +91,7 @@ struct warped_row {
   explicit warped_row(std::size_t size) : x(size), y(size), ratio(size) {}
 };
 
-/// Evaluates the parabolas of a row, interpolated between its nodes. Returns true if an inverse depth is larger than
+/// Evaluates the parabolas of a row, interpolated between its nodes. Returns true if any inverse depth is larger than
 /// `most`.
 struct warp_row_kernel {
   struct arguments {

@@ -56,7 +56,7 @@ struct box_axes {
   }
 };
 
-/// Leaves near a group of queries, or rows of leaves, with their boxes.
+/// The leaves, or the rows of leaves, near a group of queries, with their boxes.
 struct nearby_leaves {
   explicit nearby_leaves(std::size_t most)
       : stride{(most / leaf_width + 2) * leaf_width}, boxes(6 * stride), leaves(stride) {}
@@ -80,7 +80,7 @@ struct nearby_leaves {
   }
 };
 
-/// Sum of the roots, and maximum, of the `wanted` smallest squared distances in a list.
+/// The maximum of the `wanted` smallest squared distances in a list, and the sum of their square roots.
 struct nearest_sum {
   double roots = 0;           ///< sum of the roots, with relative error up to `roots_slack`; negative if unknown
   float largest_squared = 0;  ///< the `wanted`-th smallest squared distance
@@ -380,8 +380,8 @@ struct sum_nearest {
     }
   };
 
-  /// Returns a sum of roots with `times` times the root of the largest squared distance added; negative if it is
-  /// unknown.
+  /// Adds the root of the largest squared distance `times` times to a sum of roots; returns the result, negative if the
+  /// sum is unknown.
   static ORBIS_ALWAYS_INLINE double with_largest(double roots, std::size_t times, float largest_squared) noexcept {
     return roots < 0 ? -1.0 : roots + static_cast<double>(times) * std::sqrt(static_cast<double>(largest_squared));
   }
@@ -457,9 +457,9 @@ struct sum_nearest_each {
   }
 
  private:
-  /// Handles points whose distances fit into two registers: all distances below the `wanted`-th smallest then fit into
-  /// one. Both steps have a high latency for one point but a high throughput for several points in sequence. Returns
-  /// the mask of the remaining points.
+  /// Handles the points that have at most 32 distances, which fit into two registers. The distances below the
+  /// `wanted`-th smallest fit into one, because `wanted` is at most 16. Each of the two loops has a high latency for
+  /// one point but a high throughput for several points in sequence. Returns the mask of the remaining points.
   template <simd::target Target>
   static ORBIS_ALWAYS_INLINE std::uint32_t sum_few(const float* found, std::size_t stride, std::uint32_t points,
                                                    const std::uint32_t* counts, std::size_t wanted, nearest_sum* out) {
@@ -502,8 +502,8 @@ struct ranked_of_leaf {
   }
 };
 
-/// Adds the boxes selected by the bits of `wanted` to `near`; the first box is that of leaf `first`, or of row `first`
-/// of leaves.
+/// Appends to `near` those of sixteen boxes that the bits of `wanted` select. `first`: the index of the leaf, or of the
+/// row of leaves, in the first of the sixteen boxes.
 struct gather_leaves {
   template <simd::target Target>
   static ORBIS_ALWAYS_INLINE void run(const box_row& boxes, std::uint32_t wanted, std::uint32_t first,

@@ -126,7 +126,7 @@ class leaf_order {
   [[nodiscard]] std::span<const entry> entries() const noexcept { return entries_; }
   /// Frees the memory of the entries.
   void drop_entries() noexcept { std::vector<entry>{}.swap(entries_); }
-  /// Entries that were left out, in ascending order. Each has at least `most_copies` identical points in the order.
+  /// Ranges of left-out entries, ascending. At least `most_copies` points identical to each entry remain.
   [[nodiscard]] std::span<const range> left_out() const noexcept { return left_out_; }
   [[nodiscard]] std::array<float, 3> position(std::uint32_t i) const noexcept { return points_[i]; }
 
@@ -225,11 +225,11 @@ struct surplus_copy {
 /// The leaves of a cloud and their bounding boxes. Takes about 18 bytes per point, even during construction.
 struct leaf_hierarchy {
   std::vector<point_row> leaves;
-  std::vector<std::vector<box_row>> levels;  ///< [0]: boxes of the leaves; the last one is a single row
+  std::vector<std::vector<box_row>> levels;  ///< [0]: boxes of the leaves; the last level is a single row
   std::vector<std::uint32_t> members;        ///< indices of the points, leaf by leaf; the last leaf is padded with 0
-  std::vector<surplus_copy> left_out;        ///< identical points beyond `most_copies`, in no leaf
+  std::vector<surplus_copy> left_out;        ///< surplus copies of identical points, which are in no leaf
   std::size_t in_leaves = 0;                 ///< number of points in the leaves
-  std::size_t finite = 0;                    ///< number of points in the leaves or left out
+  std::size_t finite = 0;                    ///< number of points in the leaves plus those left out
 
   /// Number of points in a leaf.
   [[nodiscard]] std::size_t leaf_size(std::size_t leaf) const noexcept {

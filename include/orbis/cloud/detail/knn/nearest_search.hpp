@@ -25,8 +25,8 @@ struct open_row {
   std::uint32_t row;
 };
 
-/// Gathers the contents of rows of `level` (level 0: leaves; otherwise rows of the level below) that are within squared
-/// distance `bound` of `box`. Returns false if there are too many. `open` is scratch.
+/// Gathers the leaves (`level` 0), or the rows of the level below `level`, that are within squared distance `bound` of
+/// `box`. Returns false if there are too many. `open` is scratch.
 [[nodiscard]] inline bool gather_near(const leaf_hierarchy& tree, std::uint32_t level, const knn_kernels& kernels,
                                       const box3& box, float bound, std::vector<open_row>& open, nearby_leaves& near) {
   near.count = 0;
@@ -117,7 +117,7 @@ class nearest_search {
   /// Searches for the points of one leaf, then calls `f(i, found, bound)` for the i-th point, in any order. `found`
   /// holds squared distances up to `bound`, including the nearest, followed by sixteen infinities; it holds fewer than
   /// `wanted` if squared distances overflow. `f` may reorder `found`, and returns the `wanted`-th smallest.
-  /// `found_places` returns their places.
+  /// `found_places(i)` returns the places of the found points.
   template <class F>
   void visit_leaf(std::size_t l, F&& f) {
     search_leaf(l, [&](std::size_t first, std::size_t last, const box3& box) {
@@ -182,7 +182,7 @@ class nearest_search {
   static constexpr float infinity = std::numeric_limits<float>::infinity();
   static constexpr float most = std::numeric_limits<float>::max();
   static constexpr float most_spread = 32;  ///< maximum squared extent of a run of points, relative to `usual_`
-  static constexpr float spare = 1.3F;      ///< factor by which the search radius for near rows exceeds that of a leaf
+  static constexpr float spare = 1.3F;      ///< ratio of the squared search radius for near rows to that for a leaf
 
   [[nodiscard]] std::array<float, 3> query(std::size_t l, std::size_t i) const noexcept {
     const point_row& leaf = tree_->leaves[l];
@@ -383,8 +383,8 @@ class nearest_search {
   std::size_t stride_;
   nearby_leaves shared_;                                                ///< candidates of a run of points
   nearby_leaves own_;                                                   ///< candidates of one point
-  nearby_leaves near_rows_;                                             ///< rows of leaves near the row near_rows_of_
-  std::size_t near_rows_of_ = std::numeric_limits<std::size_t>::max();  ///< row of near_rows_; initially none
+  nearby_leaves near_rows_;                                             ///< rows of leaves near row near_rows_of_
+  std::size_t near_rows_of_ = std::numeric_limits<std::size_t>::max();  ///< row to which near_rows_ belongs, or none
   float near_rows_reach_ = -1;      ///< squared distance up to which near rows are complete; negative if unknown
   float too_many_rows_ = infinity;  ///< smallest squared distance at which near_rows_of_ had too many near rows
   line_vector<std::uint32_t> chosen_;

@@ -30,15 +30,15 @@ namespace orbis::cloud::detail {
 /// per-point data indexed by place, so that the data of neighbours are close in memory.
 ///
 /// The points of a leaf have their neighbours in few leaves. These are listed once, and a neighbour is encoded in one
-/// byte: index in the list, and point in the leaf. With more than 16 listed leaves a neighbour takes two bytes; with
-/// more than 256 it is encoded as a place. Distances are recomputed. Takes about k + 3 bytes per point on a surface,
-/// and 18 for the point's position and index; a `neighbor_table` takes 8 k.
+/// byte: the position of its leaf in the list, and its own position in the leaf. With more than 16 listed leaves a
+/// neighbour takes two bytes; with more than 256 it is encoded as a place. Distances are recomputed. Takes about k + 3
+/// bytes per point on a surface, and 18 for the point's position and index; a `neighbor_table` takes 8 k.
 class neighbor_graph {
  public:
   neighbor_graph() = default;
   /// Finds the `min(k, points - 1)` nearest other points of every point of `tree`. O(n k log k); the result is the same
-  /// for every policy. Takes 4 bytes per point of the cloud during construction. @pre k > 0; `tree` was built for k + 1
-  /// copies; its indices are less than `count`
+  /// for every policy. Takes 4 bytes per point of the cloud during construction. @pre k > 0; `tree` keeps k + 1
+  /// copies of identical points; its indices are less than `count`
   template <execution_policy Policy>
   neighbor_graph(const Policy& policy, leaf_hierarchy tree, std::size_t count, std::size_t k)
       : tree_{std::move(tree)}, width_{std::min(k, std::max<std::size_t>(tree_.finite, 1) - 1)} {
@@ -205,8 +205,8 @@ class neighbor_graph {
 
   leaf_hierarchy tree_;
   std::size_t width_ = 0;
-  std::vector<std::uint32_t> start_;              ///< start of each leaf in the words of its chunk
-  std::vector<std::vector<std::uint32_t>> rows_;  ///< one vector per chunk of leaves
+  std::vector<std::uint32_t> start_;              ///< for each leaf, the position of its rows in its chunk's words
+  std::vector<std::vector<std::uint32_t>> rows_;  ///< encoded rows, one vector of words per chunk of leaves
 };
 
 }  // namespace orbis::cloud::detail

@@ -43,8 +43,8 @@ struct rank_bracket {
   }
 };
 
-/// Estimates the value that `rank` of `count` values do not exceed, where `bound` is the largest: an interpolation
-/// between the distributions of squared distances in a plane and in space.
+/// Estimates the `rank`-th smallest of `count` squared distances up to `bound`, as a compromise between the
+/// distributions for points in a plane and for points in space.
 [[nodiscard]] inline float guess_ranked(float bound, std::size_t rank, std::size_t count) noexcept {
   return bound * (1.0F - 0.92F * (1.0F - static_cast<float>(rank) / static_cast<float>(count)));
 }

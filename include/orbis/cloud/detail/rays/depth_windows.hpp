@@ -55,7 +55,7 @@ class depth_windows {
   std::vector<float> nearest_;
   std::vector<float> farthest_;
   std::vector<float> middle_;
-  std::vector<float> row_nearest_;  ///< nearest depth in the row of the window's centre
+  std::vector<float> row_nearest_;  ///< nearest depth in the middle row of each pixel's window
   std::vector<float> row_farthest_;
   std::vector<float> tile_farthest_;
 };

@@ -25,7 +25,7 @@ struct seen_block {
   alignas(64) std::array<float, size> depth;         ///< depth of the point, metres; undefined outside the image
 };
 
-/// Evidence of a view for a block's points; bit i of word w is point 16 w + i.
+/// The evidence that a view provides about a block's points; bit i of word w is point 16 w + i.
 struct block_verdict {
   static constexpr std::size_t words = point_blocks::block_size / 16;
   std::array<std::uint16_t, words> through;

@@ -68,8 +68,8 @@ template <camera::camera_model Camera>
   return 1.02 * angle + 0.02;
 }
 
-/// Uses bounding boxes to find blocks of points for which a view has no evidence. Conservative: may accept blocks
-/// without evidence.
+/// Uses bounding boxes to find blocks of points for which a view has no evidence. Conservative: may miss some of
+/// these blocks.
 template <camera::camera_model Camera>
 class block_test {
  public:

@@ -30,8 +30,8 @@
 
 namespace orbis::cloud::detail {
 
-/// For each depth of a row, counts how many of the eight surrounding depths agree with it. A first pass with
-/// vector operations finds the many depths that agree with at least two. Reads sixteen depths beyond the rows.
+/// For each depth of a row, counts with vector operations how many of the eight surrounding depths agree with it. This
+/// first pass finds the many depths that agree with at least two. Reads sixteen depths beyond the rows.
 struct count_agreeing_depths {
   using signature = void(const float*, const float*, const float*, float, float, float*, std::size_t);
   template <simd::target Target>
@@ -134,8 +134,8 @@ struct no_view_action {
 };
 
 struct view_trust_options {
-  double conflict = 0.1;  ///< lower limit of the conflict of a distrusted view
-  double excess = 3;      ///< lower limit of the conflict of a distrusted view, as a multiple of the usual conflict
+  double conflict = 0.1;  ///< a view is distrusted only if its conflict exceeds this value
+  double excess = 3;      ///< a view is distrusted only if its conflict exceeds this multiple of the usual one
   int samples = 20;       ///< number of samples along either axis of each view; > 0
   std::size_t least = 4;  ///< minimum number of views; with fewer, no view is distrusted
 };
@@ -162,12 +162,12 @@ struct view_verdict {
   return static_cast<std::uint32_t>(mix64((std::uint64_t{of} << 32U | by) ^ mix64(tile)) >> 32U);
 }
 
-/// Verdicts that involve one view. With up to 128 views, all are kept; with more views, only that number is kept: those
-/// with the lowest ranks, which are an unbiased sample. Memory thus grows linearly with the number of views, and a view
+/// Verdicts that involve one view. With up to 128 views, all are kept. Of more than `most` verdicts, those with the
+/// lowest ranks are kept, which are an unbiased sample. Memory thus grows linearly with the number of views, and a view
 /// that overlaps with few others loses no verdicts.
 class view_verdicts {
  public:
-  static constexpr std::size_t most = std::size_t{128} * 2 * 16;  ///< 16 tiles of this view and of the other view
+  static constexpr std::size_t most = std::size_t{128} * 2 * 16;  ///< 128 views, 16 tiles of each and of this view
 
   /// Adds a verdict. O(log most).
   void add(const view_verdict& verdict) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Finds the threshold of a density test, in the valley between two populations of points that are not on surfaces.
+/// Chooses density tests and their thresholds: the valley between two populations of points that are not on surfaces.
 #pragma once
 
 #include <algorithm>
@@ -57,7 +57,7 @@ struct threshold_options {
 
 /// Finds the threshold of a density test. Sparse points on surfaces, such as regions seen from afar or at a grazing
 /// angle, are not outliers, regardless of their number. The histogram therefore contains only the other points, and the
-/// threshold exceeds the spacing above which more than 40 % of the sparser points lie on surfaces.
+/// threshold is high enough that at most about 40 % of the points above it lie on surfaces.
 template <execution_policy Policy>
 [[nodiscard]] density_evidence find_threshold(const Policy& policy, surroundings& around, const reference& r,
                                               const threshold_options& manner) {

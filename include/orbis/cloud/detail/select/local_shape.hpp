@@ -25,8 +25,8 @@
 
 namespace orbis::cloud::detail {
 
-/// Writes the `count` smallest values of each column of a table of 16 columns, ascending, and the largest value, into
-/// the rows of `out`: low quantiles, 16 at a time. @pre no value is NaN
+/// For each column of a table with 16 columns, writes the `count` smallest values, ascending, and then the largest
+/// value to the rows of `out`. Finds low quantiles of 16 sets of values at a time. @pre no value is NaN
 struct smallest_of_columns {
   static constexpr std::size_t columns = 16;
   static constexpr std::size_t count = 5;
@@ -59,8 +59,9 @@ struct smallest_of_columns {
 };
 
 /// For each place, computes the typical value in its neighbourhood: the 35 % quantile of the values of its 12 nearest
-/// neighbours, repeated in several rounds to extend the neighbourhood. Non-finite values (NaN) and those of points
-/// without neighbours are ignored and left unchanged. O(n rounds); the result is the same for every policy.
+/// neighbours, repeated in several rounds to extend the neighbourhood. Non-finite values are ignored. They are left
+/// unchanged, as are the values of points none of whose neighbours has a finite value. O(n rounds); the result is the
+/// same for every policy.
 /// @pre values has an entry for each place
 template <execution_policy Policy>
 [[nodiscard]] std::vector<float> smoothed_over_neighbors(const Policy& policy, const neighbor_graph& graph,

@@ -137,8 +137,8 @@ struct valley {
   double position = 0;  ///< distance above the median
   double ratio = 0;     ///< height of the later peak / height of the valley
 };
-/// Smooths the histogram of `values - median` and finds the position in [lowest, 3.2] at which the highest peak to its
-/// right is the largest multiple of the height there. O(n).
+/// Smooths the histogram of `values - median` and finds the position in [lowest, 3.2] at which the ratio of the
+/// highest peak to its right to the height there is largest. O(n).
 [[nodiscard]] inline valley deepest_valley(std::span<const float> values, double median, double lowest) {
   constexpr double first = 0.3;
   constexpr double width = 0.08;

@@ -84,8 +84,8 @@ class sparse_values {
 class surroundings {
  public:
   static constexpr std::size_t width = 12;       ///< number of neighbours in the graph; increased if more are averaged
-  static constexpr std::size_t shape_width = 8;  ///< number of neighbours whose shape is analysed
-  static constexpr float bulk_end = 0.3F;        ///< log spacing above usual up to which the shape is not analysed
+  static constexpr std::size_t shape_width = 8;  ///< number of neighbours that determine the shape
+  static constexpr float bulk_end = 0.3F;        ///< residual at which the bulk ends; below it, no shape is needed
 
   /// Builds the neighbour graph. `left`: for each point, nonzero to include it; non-finite points are never included.
   /// `ranges`: for each point of the cloud, metres, non-finite or negative if unknown; empty if all are unknown. The

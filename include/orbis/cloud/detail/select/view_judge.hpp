@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Evaluates the evidence of views about a cloud, as a step of a filter chain.
+/// Evaluates a cloud against its views; the result is a step of a filter chain.
 #pragma once
 
 #include <algorithm>

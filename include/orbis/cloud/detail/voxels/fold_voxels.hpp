@@ -186,8 +186,8 @@ class voxel_parts {
   static constexpr std::uint16_t first_of_voxel = 0xfffe;
   static constexpr bool keeps_coordinates = std::is_same_v<S, float>;
 
-  /// First a point: its coordinates if they are float, its voxel key if they are double. Later a voxel: its centroid
-  /// and the index of its first point.
+  /// A point of a part: its coordinates (if float) or its voxel key (if double), and its index. After the part has been
+  /// accumulated, a voxel: its centroid and the index of its first point.
   struct entry {
     std::array<std::uint32_t, 3> words;
     std::uint32_t index;
@@ -300,7 +300,7 @@ class voxel_parts {
   std::size_t bits_;
   std::vector<std::uint32_t> starts_;  ///< start of each part in the entries, and the end
   std::unique_ptr<std::uint16_t[]>
-      part_of_;  ///< part of each point; at the end also marks the first point of each voxel
+      part_of_;  ///< part of each point; later, `first_of_voxel` for the first point of each voxel
   table_memory<entry> memory_;
   entry* entries_ = nullptr;
 };

@@ -34,7 +34,7 @@ struct voxel_cells {
   }
 };
 
-/// 32-bit hash of a cell, with the best mixing in the upper bits; for scalars or lanes.
+/// 32-bit hash of a cell, whose upper bits are mixed best; for scalars or vectors of lanes.
 template <class U>
 [[nodiscard]] ORBIS_ALWAYS_INLINE constexpr U mixed_cell(const U& x, const U& y, const U& z) noexcept {
   // Distant cells may differ in their upper bits only, which a product would lose.

@@ -56,7 +56,7 @@ class voxel_table {
     for (const std::uint32_t hash : hashes) __builtin_prefetch(&rows_[slots_[first_slot(hash)]]);
   }
   /// Calls `add(record)` with the record of a key, or with that of a new row created by point `first`. `record` is a
-  /// copy that is stored afterwards. @pre hash == mixed_key(key), there is room for one more row
+  /// copy, which is written back afterwards. @pre hash == mixed_key(key), there is room for one more row
   template <class Add>
   void update(const voxel_key& key, std::uint32_t hash, std::uint32_t first, const Add& add) {
     std::size_t i = first_slot(hash);

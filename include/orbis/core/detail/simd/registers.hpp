@@ -49,8 +49,8 @@ enum class order { equal = 0, less = 1, less_equal = 2, unequal = 4 };
 
 // -- SSE2: 16 bytes ---------------------------------------------------------------------------------------------------
 
-/// Returns `b` where it is larger (smaller) than `a`, else `a`. Uses the intrinsic, because g++ 12 compiles the
-/// expression to a comparison and a blend if one operand is a constant.
+/// Sets each lane of `out` to `b` if `b` is larger (Max) or smaller (not Max) than `a`, else to `a`. Uses the
+/// intrinsic, because g++ 12 compiles the expression to a comparison and a blend if one operand is a constant.
 template <bool Max, class V>
 ORBIS_ALWAYS_INLINE void extremum_16(V& out, const V& a, const V& b) noexcept {
   if constexpr (sizeof(a[0]) == 8)

@@ -118,8 +118,8 @@ ORBIS_INLINE void fast9::find_peaks(image_view<const std::uint8_t> image, const 
   }
 }
 
-/// Smooths the pixels that the circles of rows [first, last) cover. Called for bands of rows, so that the pixels are
-/// still in the cache when the circles are evaluated.
+/// Smooths rows [first, last) and the pixels on the circles around them. Called for bands of rows, so that the pixels
+/// are still in the cache when the circles are evaluated.
 ORBIS_INLINE void fast9::smooth_band(image_view<const std::uint8_t> image, int left, int count, int first, int last,
                                      workspace& memory) {
   const std::size_t pitch = static_cast<std::size_t>(count) + 2 * row_margin;

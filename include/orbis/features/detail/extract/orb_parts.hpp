@@ -17,8 +17,8 @@ namespace orbis::features::detail {
 /// Detects FAST-9/16 corners: nine contiguous pixels on the circle of radius 3 are all brighter or all darker than the
 /// centre by more than a threshold. The response is the largest threshold at which the pixel is still a corner; only
 /// pixels with a larger response than their eight neighbours count. The threshold adapts to the texture: a cell of the
-/// area with a corner of at least `strong` keeps only such corners; other cells keep all corners of at least `weak`. A
-/// response does not depend on the threshold, so one pass finds both.
+/// area that has a corner with a response of at least `strong` keeps only such corners; other cells keep all corners
+/// with a response of at least `weak`. A response does not depend on the threshold, so one pass finds both.
 ///
 /// The defaults differ from other implementations in three respects. Slight smoothing, and keeping a corner whose
 /// neighbour has an equal response, improve repeatability (by several per cent, most under noise and shifts). A

@@ -39,8 +39,8 @@ struct image_moments {
   friend bool operator==(const image_moments&, const image_moments&) = default;
 };
 
-/// Masks of the pixels in the disc among the 32 pixels of a row from -15 to 16, indexed by the distance of the row from
-/// the centre.
+/// Masks that select the disc's pixels from pixels -15 to 16 of a row, relative to the centre; indexed by the distance
+/// of the row from the centre.
 inline constexpr auto disc_masks = [] {
   std::array<std::array<std::uint8_t, 32>, disc_radius + 1> masks{};
   for (std::size_t dy = 0; dy != masks.size(); ++dy)

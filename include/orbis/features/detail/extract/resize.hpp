@@ -68,7 +68,7 @@ inline void make_plan(resize_plan& plan, int from, int to) {
   }
 }
 
-/// Interpolates a source row horizontally, in units of 1/256.
+/// Interpolates a source row horizontally; the results are in units of 1/256.
 struct resize_along_kernel {
   using signature = void(const resize_plan& plan, const std::uint8_t* from, std::uint16_t* to);
   template <class Target>
@@ -136,8 +136,8 @@ struct resize_across_kernel {
 };
 
 /// Scales an image to the size of `to` by bilinear interpolation: weights in 1/256, one rounding at the end.
-/// Bit-identical to OpenCV's INTER_LINEAR_EXACT. Fast for downscaling factors up to 1.8. Downscaling by more than 2
-/// skips pixels. O(pixels of both images).
+/// Bit-identical to OpenCV's INTER_LINEAR_EXACT. Fast for downscaling factors up to 1.8. Downscaling by a factor
+/// above 2 skips pixels. O(pixels of both images).
 /// @pre neither image is empty; every row of `to`, including the last, is writable up to a multiple of 32 pixels
 inline void resize(image_view<const std::uint8_t> from, image_view<std::uint8_t> to, resize_workspace& memory) {
   assert(!from.empty() && !to.empty());

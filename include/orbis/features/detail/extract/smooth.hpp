@@ -22,13 +22,13 @@
 
 namespace orbis::features::detail {
 
-/// A Gaussian with sigma 2 at -3 ... 3, in units of 1/256; the weights sum to exactly one.
+/// The weights of a Gaussian with sigma 2 at -3 ... 3, in units of 1/256; their sum is exactly one.
 inline constexpr std::array<std::uint16_t, 7> gaussian_weights{18, 34, 48, 56, 48, 34, 18};
 inline constexpr int smooth_block = 64;  ///< number of pixels written at a time
 
 /// Weighted sums along a row, minus 2^15 so that they fit into signed words. The pixels are processed in
 /// blocks of one vector register of bytes; within a block, the sums of the even pixels precede those of the odd pixels.
-/// @pre `line` is readable from -3 to 4 + `count` rounded up to whole blocks
+/// @pre `line` is readable from index -3 to n + 4, where n is `count` rounded up to whole blocks
 struct smooth_along_kernel {
   // The weights are a parameter, because the compiler generates slow shifts and sums of products from constants.
   using signature = void(const std::uint8_t* line, int count, const std::array<std::uint16_t, 7>& weights,
@@ -57,7 +57,7 @@ struct smooth_along_kernel {
   }
 };
 
-/// Weighted sums of seven rows of sums, rounded, in pixel order.
+/// Sums seven rows of `smooth_along_kernel` with their weights, rounds the sums, and restores the order of the pixels.
 struct smooth_across_kernel {
   using signature = void(const std::array<const std::int16_t*, 7>& rows, int count, std::uint8_t* to);
   template <class Target>

@@ -56,7 +56,7 @@ ORBIS_ALWAYS_INLINE void search_pairs(std::span<const D> queries, std::span<cons
   }
 }
 
-/// Calls `visit(index)` for every bit that is set in both, in ascending order.
+/// Calls `visit(index)` for every bit that is set in both `bits` and `valid`, in ascending order.
 template <std::size_t Words, class Visit>
 ORBIS_ALWAYS_INLINE void for_each_bit(const slice<Words>& bits, const slice<Words>& valid, Visit&& visit) {
   for (std::size_t w = 0; w != Words; ++w)

@@ -30,9 +30,9 @@ struct slice_table {
   std::array<slice<Words>, 2> parity;  ///< set if the distance is odd, indexed by the parity of the query
 };
 
-/// Positions of a query's slices.
+/// The slices of a `slice_table` that a query selects.
 struct slice_query {
-  std::array<std::uint8_t, slice_groups> majority;  ///< offsets into a group, in units of a 32nd of a slice
+  std::array<std::uint8_t, slice_groups> majority;  ///< offset of the slice in each group, in units of 1/32 slice
   std::uint64_t parity;
 };
 

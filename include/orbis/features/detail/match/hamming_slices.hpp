@@ -118,8 +118,8 @@ inline constexpr std::array<slice<Words>, 2> constant_slices = [] {
   return zeros_and_ones;
 }();
 
-/// Bit `i` of `limit` for all train descriptors. Loaded from memory, because a broadcast from a scalar costs several
-/// instructions.
+/// Bit `i` of `limit`, repeated for all train descriptors. Loaded from memory, because a broadcast from a scalar costs
+/// several instructions.
 template <class Target>
 [[nodiscard]] ORBIS_ALWAYS_INLINE slice_plane<Target> limit_plane(std::uint32_t limit, std::size_t i) noexcept {
   return slice_plane<Target>::load(constant_slices<slice_words<Target>>[(limit >> i) & 1U].words.data());

@@ -22,14 +22,14 @@ struct search_among_workspace {
     std::uint32_t distance = none;
     std::uint32_t query = none;
   };
-  std::vector<std::uint32_t> indices, distances;  ///< for the train descriptors to compare with the current query
+  std::vector<std::uint32_t> indices, distances;  ///< of the train descriptors compared with the current query
   std::vector<nearest_query> reverse;             ///< indexed by train descriptor
 };
 
-/// Returns one candidate for each query with at least one listed train descriptor. `list(q, add)` calls `add(t)` once
+/// Finds one candidate for each query with at least one listed train descriptor. `list(q, add)` calls `add(t)` once
 /// for every train descriptor `t` to compare with query `q`, in any order; the result does not depend on the order. The
 /// reverse neighbour of a train descriptor is the nearest query that was compared with it. For use by sources; accepts
-/// any distance, and is fast for large numbers of Hamming distances.
+/// any distance, and is fast for the Hamming distance, which it computes for a whole list at once.
 template <class Distance, class Descriptor, class List>
 requires descriptor_distance<Distance, Descriptor>
 void search_among(const Distance& distance, std::vector<candidate>& candidates, search_among_workspace& memory,

@@ -104,7 +104,7 @@ inline std::uint32_t packed_rgb(const rgb8& c) {
   return static_cast<std::uint32_t>(c.r) << 16 | static_cast<std::uint32_t>(c.g) << 8 | c.b;
 }
 
-/// A number for a message, with at most six digits.
+/// Formats a number for a message, with at most six digits.
 inline std::string shortened(double value) {
   char text[32];
   const auto [end, failure] = std::to_chars(text, text + sizeof text, value, std::chars_format::general, 6);
@@ -112,9 +112,9 @@ inline std::string shortened(double value) {
 }
 
 /// Colours from three columns. PLY does not define the range of a channel, so it is inferred from the largest value in
-/// all channels of the same kind (8-bit, wider integer, floating point). Rounding, interpolation and lighting may raise
-/// floating-point values above 1, and cameras may deliver 12-bit values. Notes report a range that differs from that of
-/// the type.
+/// all channels of the same kind (8-bit, wider integer, floating point). For floating-point values up to 2 the range is
+/// 0 to 1, because rounding, interpolation and lighting may raise them above 1. For other values it is the smallest
+/// range of 8, 12 or 16 bits that contains them. Notes report a range that differs from that of the type.
 inline std::vector<rgb8> channel_colors(const std::array<const cloud_field*, 3>& channels, std::size_t size,
                                         std::vector<std::string>& notes) {
   const auto is_byte = [](scalar_type type) { return byte_size(type) == 1; };
@@ -149,8 +149,8 @@ inline std::vector<rgb8> channel_colors(const std::array<const cloud_field*, 3>&
 }
 
 /// Colours packed as 0xAARRGGBB into integers or the bits of floats; empty if the column contains other numbers. In
-/// text, whole numbers in a float column are treated as integers, because their bits would be colours with an unusual
-/// alpha. `alpha` receives the most significant bytes.
+/// text files, whole numbers in a float column are treated as integers, because their bits as floats would give colours
+/// with an unusual alpha. `alpha` receives the most significant bytes.
 inline std::optional<std::vector<rgb8>> packed_colors(const cloud_field& column, std::size_t size, bool is_text,
                                                       std::string& alpha, std::vector<std::string>& notes) {
   std::vector<rgb8> colors(size);

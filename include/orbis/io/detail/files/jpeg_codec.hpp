@@ -100,7 +100,7 @@ class jpeg_decoder {
     return true;
   }
 
-  /// Decodes to 8-bit colour. Returns false on an error; see `message`. @pre read_header() was true
+  /// Decodes to 8-bit colour. Returns false on an error; see `message`. @pre read_header() returned true
   bool read_pixels(rgb8* to) {
     if (setjmp(errors_.jump) != 0) return false;
     info_.out_color_space = JCS_RGB;
@@ -185,7 +185,7 @@ class jpeg_encoder {
     return true;
   }
 
-  /// Returns the JPEG, moved out of this object. @pre write() was true
+  /// Returns the JPEG, moved out of this object. @pre write() returned true
   [[nodiscard]] std::string take() { return std::move(bytes_); }
   /// Returns true if `write` failed because it ran out of memory.
   [[nodiscard]] bool out_of_memory() const { return errors_.base.msg_code == JERR_OUT_OF_MEMORY; }

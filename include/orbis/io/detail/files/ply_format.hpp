@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The header of a PLY file, and a reader of the numbers of its body.
+/// The header of a PLY file, and a reader for the numbers in its body.
 #pragma once
 
 #include <algorithm>

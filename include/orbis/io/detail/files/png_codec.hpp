@@ -2,7 +2,7 @@
 /// @file
 /// A PNG decoder and encoder for bytes in memory.
 ///
-/// libpng reports errors by `longjmp`. Functions that call `setjmp` have only trivial local variables, so that no
+/// libpng reports errors with `longjmp`. Functions that call `setjmp` have only trivial local variables, so that no
 /// destructor is skipped; objects that own memory belong to the caller.
 #pragma once
 
@@ -86,7 +86,7 @@ class png_decoder {
     return true;
   }
 
-  /// Decodes into rows of `rowbytes` bytes. Returns false on an error; see `message`. @pre read_header() was true
+  /// Decodes into rows of `rowbytes` bytes. Returns false on an error; see `message`. @pre read_header() returned true
   bool read_pixels(unsigned char* to, std::size_t rowbytes, void (*transform)(png_structp)) {
     if (setjmp(trouble_.jump) != 0) return false;
     transform(png_);

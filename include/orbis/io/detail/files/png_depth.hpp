@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A decoder for the PNG files of depth cameras that uses libdeflate: it takes half the time of libpng and gives the
+/// A decoder for the PNG files of depth cameras, based on libdeflate: it takes half the time of libpng and gives the
 /// same pixels. All other files, including damaged ones, are left to libpng. This header is empty unless
-/// ORBIS_LIBDEFLATE is defined, as in orbis::compiled if the library is found.
+/// ORBIS_LIBDEFLATE is defined, which orbis::compiled does for itself if CMake finds libdeflate.
 ///
 /// "Portable Network Graphics (PNG) Specification", second edition, W3C 2003: chunks (5), filters (9).
 #pragma once
@@ -32,7 +32,7 @@ struct packed_depth {
   std::vector<char> pixels;
 };
 
-/// Reads the chunks; empty if anything is unusual or damaged. O(bytes).
+/// Reads the chunks of such a PNG file; empty for any other file and for a damaged one. O(bytes).
 [[nodiscard]] inline std::optional<packed_depth> read_depth_chunks(std::string_view bytes) {
   using namespace std::string_view_literals;
   const auto number = [](std::string_view at) { return load_number<std::uint32_t>(at.data(), std::endian::big); };

@@ -88,8 +88,8 @@ struct column_name {
   return names;
 }
 
-/// Returns true if the `letters.size()` names from `first` on end in these letters, in any order, and are otherwise
-/// equal.
+/// Returns true if the `letters.size()` names starting at index `first` each end in a different one of the letters, in
+/// any order, and are otherwise equal.
 [[nodiscard]] inline bool are_components(const std::vector<column_name>& names, std::size_t first,
                                          std::string_view letters) {
   if (first + letters.size() > names.size()) return false;

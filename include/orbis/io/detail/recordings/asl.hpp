@@ -127,8 +127,8 @@ struct asl_images {
   std::vector<stamped_file> files;
 };
 
-/// Reads `sensor.yaml` and `data.csv` from a camera's folder and adds both to the files of `to`. Errors: not_found (a
-/// file), unreadable, no_data, malformed (with file and line), unsupported.
+/// Reads `sensor.yaml` and `data.csv` from a camera's folder and adds both to `to.files`. Errors: not_found (a file),
+/// unreadable, no_data, malformed (with file and line), unsupported.
 [[nodiscard]] inline result<asl_images> read_asl_images(const std::filesystem::path& where, recording_index& to) {
   std::string missing;
   for (const char* const name : {"sensor.yaml", "data.csv"})

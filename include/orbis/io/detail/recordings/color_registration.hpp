@@ -37,7 +37,8 @@ namespace orbis::io::detail {
 /// Assigns a colour to each pixel of a depth image. Colour is resampled to depth, not the reverse, so that the measured
 /// depth remains unchanged: a depth image with more pixels would need interpolation and would have holes at the edges
 /// of surfaces. If the positions of the two cameras differ, a pixel's depth determines its position in the colour
-/// image; a pixel without depth is treated as far away. A colour image of higher resolution is averaged first.
+/// image; a pixel without depth is treated as far away. A colour image of higher resolution is first downsampled by
+/// averaging.
 class color_registration {
  public:
   color_registration(const color_camera& color, const camera::pinhole& depth)

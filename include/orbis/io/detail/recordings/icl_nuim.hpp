@@ -38,7 +38,7 @@ inline se3 mirrored_y(const se3& pose) {
 }
 
 /// Returns true if `folder` is an ICL-NUIM recording. It must contain the data set's trajectory file, because other
-/// recordings with numbered images have other cameras.
+/// recordings with numbered images come from other cameras.
 [[nodiscard]] inline bool is_icl_nuim(const std::filesystem::path& folder) {
   return !present(folder / "rgb.txt") && present(folder / "rgb") && present(folder / "depth") &&
          !icl_ground_truth(folder).empty();
@@ -62,7 +62,7 @@ inline se3 mirrored_y(const se3& pose) {
   }
   attach_ground_truth(index, max_time_difference);
   if (auto camera = camera::preset("icl")) index.camera = *std::move(camera);
-  index.camera_guess = "icl, of the ICL-NUIM data set";
+  index.camera_guess = "icl, the camera of the ICL-NUIM data set";
   return index;
 }
 

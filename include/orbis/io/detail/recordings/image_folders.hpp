@@ -51,7 +51,7 @@ namespace orbis::io::detail {
       folder, {"aligned_depth_to_color", "aligned_depth", "depth_aligned", "depth_registered", "depth", "depths"});
 }
 
-/// Returns true if `folder` contains colour images and a folder for depth images.
+/// Returns true if `folder` contains a folder of colour images and a folder for depth images.
 [[nodiscard]] inline bool is_image_folders(const std::filesystem::path& folder) {
   return !find_color_folder(folder).empty() && !find_depth_folder(folder).empty();
 }
@@ -72,8 +72,8 @@ namespace orbis::io::detail {
     return fail(errc::invalid_argument, where.string(),
                 "the names of colour images (" + color.paths.front().filename().string() + ") and depth images (" +
                     depth.paths.front().filename().string() +
-                    ") do not match: both need numbers or times, or lists rgb.txt and depth.txt (time stamp and "
-                    "file name per line)");
+                    ") do not match: both must contain numbers or times, or the folder must contain the lists rgb.txt "
+                    "and depth.txt (a time stamp and a file name per line)");
   }
   return associate(color.keys, depth.keys, color.keys_are == image_keys::numbers ? 0.0 : max_time_difference);
 }
@@ -123,8 +123,8 @@ namespace orbis::io::detail {
   for (const auto& [images, kind] : {std::pair{&color, "colour"}, std::pair{&depth, "depth"}})
     if (const std::size_t lonely = images->paths.size() - index.frames.size(); lonely != 0)
       index.notes.push_back(std::to_string(lonely) + " of " + std::to_string(images->paths.size()) + " " + kind +
-                            " images have no counterpart and are skipped: colour is " + span(color) + ", depth " +
-                            span(depth));
+                            " images have no counterpart and are skipped: colour images are " + span(color) +
+                            ", depth images " + span(depth));
   note_unused_folders(folder, {color_folder, depth_folder}, index.notes);
   if (const auto truth = read_ground_truth(folder, max_time_difference, index, fps); !truth) return fail(truth.error());
   return index;

@@ -37,7 +37,7 @@ namespace orbis::io::detail {
   return paths;
 }
 
-/// The meaning of image names.
+/// The order that image names determine: by time, by number, or only alphabetical.
 enum class image_keys { times, numbers, alphabet };
 
 /// Images in ascending order of their keys: times in seconds, frame numbers, or indices in alphabetical order.
@@ -56,11 +56,11 @@ struct keyed_images {
   }
 };
 
-/// The last number in a file name, which may have a fraction or consist of seconds and nanoseconds, and the text around
+/// The last number in a file name (whole, with a fraction, or seconds and nanoseconds), and the text before and after
 /// it.
 struct name_number {
   std::string_view before, number, after;
-  std::string_view fraction;  ///< the part after the underscore in `seconds_nanoseconds`; `number` is the part before
+  std::string_view fraction;  ///< the part after `_` or `-` in `seconds_nanoseconds`; `number` contains both parts
 
   explicit name_number(std::string_view stem) {
     constexpr std::string_view digits = "0123456789";

@@ -111,8 +111,8 @@ struct kitti_calibration {
 }
 
 /// The poses of the camera with the pose `T_first_camera` in the frame of camera 0, from `poses.txt` in the sequence's
-/// folder or from the benchmark's file in `../../poses`; empty if neither exists. Adds the file to those of `index`.
-/// Adds notes about lost poses, and about a number of poses that differs from the number of `times`. Errors:
+/// folder or from the benchmark's file in `../../poses`; empty if neither exists. Adds the file to `index.files`.
+/// Adds notes if poses are lost, and if the number of poses differs from `times`, the number of time stamps. Errors:
 /// unreadable, malformed (with the line number).
 [[nodiscard]] inline result<std::vector<std::optional<se3>>> read_kitti_poses(const std::filesystem::path& folder,
                                                                               const se3& T_first_camera,
@@ -151,8 +151,8 @@ inline void add_kitti_frame(std::size_t n, const std::vector<double>& times,
   index.ground_truth.push_back({times[n], *poses[n]});
 }
 
-/// Sorts the frames of a sequence by time; keeps the first of frames with the same number. `images`: the cameras'
-/// folders. Errors: no_data, and those of `check_first_frame`.
+/// Sorts the frames of a sequence by time; of several frames with the same number, keeps the first. `images`: the
+/// cameras' folders. Errors: no_data, and those of `check_first_frame`.
 [[nodiscard]] inline result<void> sort_kitti_frames(const std::vector<std::filesystem::path>& images, std::size_t times,
                                                     recording_index& index) {
   const auto folder = images.front().parent_path();
@@ -192,8 +192,8 @@ inline void add_kitti_frame(std::size_t n, const std::vector<double>& times,
 }
 
 /// The index of a sequence. Images without a partner or a time are skipped and noted. Errors: not_found (a folder, a
-/// file), unreadable, malformed (with file and line), no_data (no pair); errors in reading the first image, which
-/// determines the image size.
+/// file), unreadable, malformed (with file and line), no_data (no pair); and errors from reading the first image,
+/// which determines the image size.
 [[nodiscard]] inline result<stereo_index> index_kitti(const std::filesystem::path& folder) {
   const auto cameras = kitti_cameras(folder);
   if (!cameras)

@@ -148,9 +148,9 @@ inline constexpr double mono_pose_distance = 0.020;
 }
 
 /// The index of a plain folder with PNG or JPEG images, in the folder itself or in its subfolder `rgb`, `color`,
-/// `images`, `left` or `data`. The names of the images determine their order (`order_by_name`); their times are those
-/// in `times.txt` or `timestamps.txt` (one per line), or in the names. `fps`: frame rate of numbered images. Errors:
-/// no_data, unreadable, malformed (with file and line).
+/// `colour`, `image`, `images`, `left` or `data`. The names of the images determine their order (`order_by_name`);
+/// their times are those in `times.txt` or `timestamps.txt` (one per line), or in the names. `fps`: frame rate of
+/// numbered images. Errors: no_data, unreadable, malformed (with file and line).
 [[nodiscard]] inline result<recording_index> index_image_folder(const std::filesystem::path& folder, double fps) {
   recording_index index;
   const auto where = find_image_folder(folder);

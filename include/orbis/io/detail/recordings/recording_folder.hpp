@@ -20,7 +20,7 @@
 
 namespace orbis::io::detail {
 
-/// Returns the image `read` from `path` if it has the size of its camera. Errors: malformed, and those of `read`.
+/// Returns `read`, the image in the file `path`, if it has the size of its camera. Errors: malformed, those of `read`.
 template <class T>
 [[nodiscard]] result<image<T>> sized(result<image<T>> read, const std::filesystem::path& path, int width, int height) {
   if (!read || (read->width() == width && read->height() == height)) return read;
@@ -72,7 +72,7 @@ inline result<void> check_first_frame(const recording_index& index, const std::f
   return paths;
 }
 
-/// Returns true if the name of a file has the extension of PNG.
+/// Returns true if the name of a file has the extension `.png`, in upper or lower case.
 [[nodiscard]] inline bool is_png_name(const std::filesystem::path& path) {
   return lower_cased(path.extension().string()) == ".png";
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// ScanNet scenes as exported by its tools: `color/N.jpg`, `depth/N.png`, `pose/N.txt`, and in `intrinsic` (or next to
+/// ScanNet scenes as its tools export them: `color/N.jpg`, `depth/N.png`, `pose/N.txt`, and in `intrinsic` (or next to
 /// the folders) `intrinsic_color.txt`, `intrinsic_depth.txt`, `extrinsic_color.txt`, `extrinsic_depth.txt`.
 ///
 /// Source: A. Dai et al., "ScanNet: richly-annotated 3D reconstructions of indoor scenes", CVPR 2017, and the data

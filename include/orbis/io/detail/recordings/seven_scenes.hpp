@@ -4,7 +4,7 @@
 /// `frame-XXXXXX.pose.txt`, optionally `camera-intrinsics.txt`.
 ///
 /// Source: J. Shotton et al., "Scene coordinate regression forests for camera relocalization in RGB-D
-/// images", CVPR 2013. Depth is in millimetres, 0 and 65535 are invalid; colour and depth come from two cameras and are
+/// images", CVPR 2013. Depth is in millimetres; 0 and 65535 are invalid. Colour and depth come from two cameras and are
 /// not registered to each other.
 #pragma once
 

@@ -36,8 +36,8 @@ struct stamped_file {
   std::filesystem::path path;
 };
 
-/// Sorts the entries of a list by time and removes repeated time stamps; notes report changes. Errors: no_data (the
-/// list is empty).
+/// Sorts the entries of a list by time and removes repeated time stamps; adds notes about changes. Errors: no_data
+/// (the list is empty).
 template <class Entry>
 [[nodiscard]] result<std::vector<Entry>> in_order_of_time(const std::filesystem::path& list, std::vector<Entry> entries,
                                                           std::vector<std::string>& notes) {
@@ -146,7 +146,7 @@ struct associated_files {
 
 /// Parses a line with two pairs of a time stamp and a file, in either order (the file whose path contains "depth" is
 /// the depth image; if neither or both contain it, colour is first). Fields are separated by blanks, commas or
-/// semicolons; file names may contain blanks if only one field between them is a number.
+/// semicolons; file names may contain blanks if the second time stamp is the only number between them.
 [[nodiscard]] inline std::optional<associated_files> parse_association(std::string_view line,
                                                                        const std::filesystem::path& folder) {
   const std::optional<double> t1 = parse_time_stamp(next_separated(line));
@@ -229,8 +229,8 @@ inline void convert_numbered_truth(recording_index& index, double max_distance, 
   index.notes.emplace_back("the times of the ground truth are frame numbers, too");
 }
 
-/// Reads `groundtruth.txt` of a folder, if it exists, into an index with known frames, and sets their poses
-/// (`attach_ground_truth`). `fps`: frames per second, for poses with frame numbers instead of times. Errors:
+/// Reads `groundtruth.txt` of a folder, if it exists, into an index that contains the frames already, and sets their
+/// poses (`attach_ground_truth`). `fps`: frames per second, for poses with frame numbers instead of times. Errors:
 /// unreadable, malformed (with the line number), unsupported.
 [[nodiscard]] inline result<void> read_ground_truth(const std::filesystem::path& folder, double max_time_difference,
                                                     recording_index& index, double fps) {
@@ -314,7 +314,7 @@ inline void guess_tum_camera(const std::filesystem::path& folder, recording_inde
     if (index.frames.empty())
       return fail(errc::no_data, folder.string(),
                   "no colour image has a depth image within " + describe(max_time_difference) +
-                      " s: the times in rgb.txt are " + describe_span(times) + ", in depth.txt " +
+                      " s: the times in rgb.txt are " + describe_span(times) + ", those in depth.txt " +
                       describe_span(depth_times));
     for (const auto& [list, kind] : {std::pair{&*color, "colour"}, std::pair{&*depth, "depth"}})
       if (const std::size_t lonely = list->size() - index.frames.size(); lonely != 0)

@@ -38,7 +38,7 @@ struct triple {
 [[nodiscard]] inline triple to_triple(const vec3& v) noexcept { return {v.x(), v.y(), v.z()}; }
 [[nodiscard]] inline vec3 to_vec3(triple v) noexcept { return {v.x, v.y, v.z}; }
 
-/// A noise word that depends only on the three keys.
+/// Returns a pseudorandom word that depends only on the three arguments.
 [[nodiscard]] inline std::uint64_t noise_word(std::uint64_t seed, std::uint64_t stream, std::uint64_t index) noexcept {
   return mix64(seed ^ mix64(index * 0x100000001b3ULL + stream));
 }
@@ -63,7 +63,7 @@ struct triple {
   return static_cast<double>(i) > v ? i - 1 : i;
 }
 
-/// Smooth one-dimensional noise in [-1, 1], with about one oscillation per unit of `t`.
+/// Smooth one-dimensional noise in [-1, 1]: interpolates between random values at integer `t`.
 [[nodiscard]] inline double smooth_noise(std::uint64_t seed, std::uint64_t stream, double t) noexcept {
   const std::int64_t cell = floor_to_int(t);
   const double f = t - static_cast<double>(cell);

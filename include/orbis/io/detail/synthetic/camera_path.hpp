@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Path of a hand-held or robot-mounted camera, once around a room.
+/// Path of a hand-held or robot-mounted camera around a room, in one or two rounds.
 #pragma once
 
 #include <algorithm>

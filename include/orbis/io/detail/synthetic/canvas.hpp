@@ -110,7 +110,7 @@ class canvas {
     return static_cast<float>(
         upper_fraction(noise_word(seed, static_cast<std::uint64_t>(i), static_cast<std::uint64_t>(j))));
   }
-  /// Smooth noise in [-1, 1] with one oscillation per unit of `u` and `v`.
+  /// Noise in [-1, 1]: interpolates bilinearly between random values at integer `u` and `v`.
   [[nodiscard]] static float value_noise(std::uint64_t seed, double u, double v) noexcept {
     const std::int64_t i = floor_to_int(u), j = floor_to_int(v);
     const auto f = static_cast<float>(u - static_cast<double>(i)), g = static_cast<float>(v - static_cast<double>(j));

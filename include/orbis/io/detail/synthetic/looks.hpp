@@ -26,7 +26,7 @@ struct face_look {
   double period = 0.0;                 ///< metres; if above 0, the picture repeats with this period along both axes
   double coarseness = 1.0;             ///< size of the face's texels relative to those of other faces
 };
-/// Looks of the six faces of a solid, indexed by 2 * axis, plus one for the positive side.
+/// Appearance of the six faces of a solid, indexed by 2 * axis, plus one for the positive side.
 using face_looks = std::array<face_look, 6>;
 
 /// Number of patches per square metre for a material: books and clutter have many corners, a plain surface has few.
@@ -44,14 +44,14 @@ using face_looks = std::array<face_look, 6>;
   return 0.0;
 }
 
-/// The look of face `face` of a solid made of `m`; different faces and seeds look different.
+/// Appearance of face `face` of a solid made of `m`; the patches differ between faces and between seeds.
 [[nodiscard]] inline face_look usual_look(material m, std::uint64_t seed, int face, double density = 1.0) noexcept {
   return {.surface = m,
           .patches = density * usual_patches(m),
           .contrast = m == material::clutter ? 1.0 : 0.8,
           .seed = noise_word(seed, 7, static_cast<std::uint64_t>(face))};
 }
-/// All six looks of a solid with its own material and seed.
+/// Appearance of the six faces of a solid, according to its material and seed.
 [[nodiscard]] inline face_looks usual_looks(const solid& s, double density = 1.0) noexcept {
   face_looks looks;
   for (int face = 0; face != 6; ++face)
@@ -59,7 +59,7 @@ using face_looks = std::array<face_look, 6>;
   return looks;
 }
 
-/// Solids with their looks, and the lamps among them: the input for painting textures.
+/// Solids, the appearance of their faces, and the lamps that light them: the input for painting textures.
 struct painted_solids {
   std::vector<solid> solids;
   std::vector<face_looks> looks;  ///< one per solid
@@ -89,7 +89,7 @@ struct painted_solids {
   return looks;
 }
 
-/// A furnished room with its looks. The light on the person is computed for the person's initial position.
+/// A furnished room, ready to be painted. The light on the person is computed for the person's initial position.
 [[nodiscard]] inline painted_solids painted(const scene& room) {
   painted_solids all{room.solids(), {}, {{0.0, 0.0, room.options().height - 0.5}}};
   for (const solid& s : all.solids)

@@ -77,9 +77,9 @@ class scene {
     }
   }
 
-  /// The surfaces: first the room itself, then all objects in it.
+  /// The solids at the start: first the room itself, then all objects in it.
   [[nodiscard]] const std::vector<solid>& solids() const noexcept { return solids_; }
-  /// The surfaces `time` seconds after the start; only the person moves.
+  /// The solids `time` seconds after the start; only the person moves.
   [[nodiscard]] std::vector<solid> solids_at(double time) const {
     std::vector<solid> now = solids_;
     if (options_.person) {

@@ -23,7 +23,7 @@ namespace orbis::io::detail::synthetic {
 /// The published standard deviation of the depth noise (metres) at depth `z` (metres).
 [[nodiscard]] inline double axial_deviation(double z) noexcept { return 0.0012 + 0.0019 * (z - 0.4) * (z - 0.4); }
 
-/// The sensor with the exposure time and noise that automatic exposure would choose. `light`: illumination relative to
+/// The sensor with the exposure time and noise that result from automatic exposure. `light`: illumination relative to
 /// the illumination for which `exposure` is correct.
 [[nodiscard]] inline synthetic_sensor_options exposed(synthetic_sensor_options sensor, double light) noexcept {
   const double longest = std::max(sensor.exposure, sensor.max_exposure), needed = sensor.exposure / light;

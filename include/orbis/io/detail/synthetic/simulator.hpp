@@ -57,8 +57,8 @@ class simulator {
     return out;
   }
 
-  /// Like `exact`, but row `y` of the image is exposed `row_time(y)` seconds after `time`. `at(time)` returns the
-  /// `moment` at any time.
+  /// Like `exact`, but row `y` of the image is exposed `row_time(y)` seconds after `time`. `at(t)` returns the
+  /// `moment` at the time `t`.
   template <execution_policy Policy, class At, class RowTime>
   [[nodiscard]] exact_view exact_rows(const Policy& policy, const At& at, double time, const RowTime& row_time,
                                       bool with_color = true) const {
@@ -71,7 +71,7 @@ class simulator {
     return out;
   }
 
-  /// The measured frame at `time`. `at(time)` returns the `moment` at any time. `key`: different for each frame.
+  /// The measured frame at `time`. `at(t)` returns the `moment` at the time `t`. `key`: different for each frame.
   template <execution_policy Policy, class At>
   [[nodiscard]] camera::rgbd_frame frame(const Policy& policy, const At& at, double time, std::uint64_t key) const {
     exact_view seen = color_view(policy, at, time);

@@ -95,8 +95,8 @@ struct hit {
   int axis = 0;                                        ///< axis of the face; for cylinders 2 (a cap) or 0 (the side)
 };
 
-/// The first intersection with t > 0 of the ray `origin + t direction`, in the solid's own frame. A ray from inside a
-/// solid hits only a room.
+/// The first intersection with t > 0 of the ray `origin + t direction`, in the solid's own frame. A ray that starts
+/// inside a solid hits it only if the solid is a room.
 [[nodiscard]] inline hit intersect(const solid& s, triple origin, triple direction) noexcept {
   const auto inverse = [](double d) { return 1.0 / (d == 0.0 ? 1e-30 : d); };
   hit h;

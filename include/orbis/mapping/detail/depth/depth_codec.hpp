@@ -135,7 +135,7 @@ class group_reader {
 
 inline constexpr unsigned run_bits = 1, step_bits = 2;
 
-/// Compresses depth images. Reuses its buffers, about 2 bytes per pixel and 130 kB.
+/// Compresses depth images. Reuses its buffers, which take about 2 bytes per pixel plus 130 kB.
 class depth_encoder {
  public:
   /// Returns the compressed image, valid until the next call; at most 1 byte longer than the pixels. Linear.

@@ -31,7 +31,8 @@ namespace orbis::mapping::detail {
 /// Unused ranges of a file; adjacent ones are joined.
 class free_ranges {
  public:
-  /// Allocates a range of `size` bytes and returns its start: in a large enough hole, otherwise at the end of the file.
+  /// Allocates `size` bytes in the first unused range that is large enough, otherwise at the end of the file. Returns
+  /// the start of the allocated range.
   [[nodiscard]] std::uint64_t take(std::uint64_t size) {
     for (auto hole = holes_.begin(); hole != holes_.end(); ++hole) {
       if (hole->second < size) continue;

@@ -35,8 +35,8 @@ struct map_job {
   [[nodiscard]] bool has_image() const noexcept { return kind <= between; }
 };
 
-/// A job queue. A bound on the number of images bounds the whole queue: between two images, it holds at most one pose
-/// and one removal per keyframe.
+/// A job queue. A limit on the number of images limits the whole queue, because between two images it holds at most one
+/// pose and one removal for each keyframe.
 class map_jobs {
  public:
   [[nodiscard]] bool empty() const noexcept { return jobs_.empty(); }

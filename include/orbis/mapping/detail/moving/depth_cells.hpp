@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A depth image divided into cells of 4x4 pixels, with tests of the rays of one image against the points of another.
+/// A depth image divided into cells of 4x4 pixels, with tests of the points of one image against the rays of another.
 #pragma once
 
 #include <algorithm>
@@ -28,7 +28,7 @@ struct cell_grid {
   static constexpr int edge = 4;  ///< edge of a cell, pixels
 
   int across = 0, down = 0;
-  std::vector<vec2f> rays;  ///< at z = 1; NaN where the camera has no ray
+  std::vector<vec2f> rays;  ///< x and y at z = 1; NaN where the camera has no ray
 
   template <camera::camera_model Camera>
   explicit cell_grid(const Camera& camera)
@@ -113,8 +113,8 @@ class depth_cells {
   }
 
   /// Calls `visit(cell, visibility)` for each cell that `view` shows or through which its rays pass. `margin(z)`:
-  /// tolerance for noise at depth `z`, metres; `slant`: for rays that pass through a cell, a window's range of depths
-  /// times this factor is added to the margin. O(cells).
+  /// tolerance for noise at depth `z`, metres; `slant`: rays pass through a cell only if they end beyond it by more
+  /// than the margin plus this factor times the range of depths in the window. O(cells).
   template <execution_policy Policy, camera::camera_model Camera, class Margin, class Visit>
   void ask(const Policy& policy, const depth_cells& view, const cell_grid& grid, const Camera& camera,
            const se3& T_view_this, float slant, const Margin& margin, const Visit& visit) const {

@@ -71,8 +71,8 @@ class moving_judge {
     depth_cells cells;
     std::vector<std::uint8_t> through;  ///< number of other views whose rays pass through each cell
     std::vector<std::uint8_t> shown;    ///< number of other views that also show each cell
-    std::vector<std::uint8_t> removed;  ///< 1: removed by the verdict of the last call to `accept`
-    bool due = false;                   ///< true if the view lacks the evidence of the newest one
+    std::vector<std::uint8_t> removed;  ///< 1: removed by the last accepted verdict
+    bool due = false;                   ///< true if the evidence of the newest view has not been collected
     bool unjudged = false;              ///< true if the view has new evidence since its last evaluation
 
     [[nodiscard]] depth_view depth() const { return depth_view{pixels.view(), scale, min_depth, max_depth}; }
@@ -92,9 +92,9 @@ class moving_judge {
   }
 
   /// Adds a keyframe, in place of the oldest if the window is full, and collects the evidence of the other views for
-  /// its cells. `pose_of(view)` returns the pose of a view, if it has one. Afterwards the other views are due for the
-  /// evidence of the new keyframe, see ask_newest. The result is the same for every policy. O(pixels + cells x
-  /// keyframes). @pre the pose is finite; depth has the camera's size; no other view is due
+  /// its cells. `pose_of(view)` returns the pose of a view, if it has one. Marks the other views as due: the evidence
+  /// of the new keyframe for their cells is collected by ask_newest. The result is the same for every policy. O(pixels
+  /// + cells x keyframes). @pre the pose is finite; depth has the camera's size; no other view is due
   template <execution_policy Policy, class PoseOf>
   view& add(const Policy& policy, std::uint64_t frame, const depth_view& depth, const se3& T_world_camera,
             const PoseOf& pose_of) {
@@ -210,8 +210,8 @@ class moving_judge {
     else
       with_model(camera_);
   }
-  /// Removes the cells adjacent to removed ones if they belong to the same surface and the evidence does not support
-  /// them.
+  /// Also removes the neighbours of removed cells if they belong to the same surface, except those shown by more views
+  /// than have rays through them.
   void grow(const view& v) {
     const int across = grid_.across, down = grid_.down;
     grown_.clear();
@@ -235,7 +235,7 @@ class moving_judge {
   cell_grid grid_;
   std::deque<view> views_;
   std::vector<view> spare_;
-  std::vector<std::uint8_t> verdict_;  ///< verdict computed last
+  std::vector<std::uint8_t> verdict_;  ///< the most recent verdict; 1: removed
   std::vector<std::size_t> grown_;
   image<std::uint16_t> masked_;
 };

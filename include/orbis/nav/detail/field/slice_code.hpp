@@ -13,7 +13,7 @@ namespace orbis::nav::detail {
 inline constexpr int max_reach = 181;
 /// The value of a voxel that is farther from all obstacles than the field's reach.
 inline constexpr std::uint16_t far_away = 0x7fff;
-/// Value of a source without an offer (see slice_kernels.hpp): with a square added, it exceeds every value.
+/// Stands for "no offer" in a slice_offer: with or without a square added, it exceeds every value of a voxel.
 inline constexpr std::uint16_t no_offer = 0x8000;
 
 /// Values of 8x8 voxels, at index y * 8 + x.

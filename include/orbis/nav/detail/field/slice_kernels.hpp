@@ -76,7 +76,7 @@ struct lower_slices_kernel {
   }
 };
 
-/// Returns true if a value of the slice equals the value of `offer` plus that of `squares`.
+/// Returns true if any value of the slice equals `offer` plus `squares`.
 struct equal_rows_kernel {
   using signature = bool(const std::uint16_t* target, const slice_offer* offer, const std::uint16_t* squares);
   template <class Target>
@@ -87,8 +87,8 @@ struct equal_rows_kernel {
   }
 };
 
-/// Writes a copy of the slice with values lowered to `offer` plus `squares`; returns false, and writes nothing, if no
-/// value is lowered.
+/// Writes a copy of the slice to `lowered`, with values lowered to `offer` plus `squares` where that is less and at
+/// most `bound`, and its largest value to `top`. Returns false, and writes nothing, if no value is lowered.
 struct lower_rows_kernel {
   using signature = bool(const std::uint16_t* target, const slice_offer* offer, const std::uint16_t* squares,
                          std::uint16_t bound, std::uint16_t* lowered, std::uint16_t* top);
@@ -108,9 +108,9 @@ struct lower_rows_kernel {
   }
 };
 
-/// Adds the offers of the eight rows of a slice of distances along x (`rows`: 64 bytes; 255 means `far_away`) to
-/// `best`. `squares - 8 * i`: squared distances of row i to the rows of the target. Returns the largest value in
-/// `best`.
+/// Lowers `best` to the smallest offer of eight rows of distances along x (`rows`: 64 bytes; 255 means `far_away`)
+/// where that is less. `squares - 8 * i`: squared distances of row i to the rows of the target. Returns the largest
+/// value in `best`.
 struct add_rows_kernel {
   using signature = std::uint16_t(std::uint16_t* best, const std::uint8_t* rows, const std::uint16_t* squares);
   template <class Target>

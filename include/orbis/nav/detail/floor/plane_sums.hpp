@@ -27,8 +27,8 @@ struct level_window {
   int x = 0, y = 0;             ///< coordinates of the first column, <= 0
   int width = 0, height = 0;
   int level = 0;  ///< level of the central column
-  /// A column counts if its level differs by at most `step` per cell of distance; all columns at a distance of `enough`
-  /// or more cells count. `step` times `enough` fits in an int.
+  /// A column counts if its level differs from `level` by at most `step` per cell of distance; distances beyond
+  /// `enough` cells count as `enough`. `step` times `enough` fits in an int.
   int step = 1, enough = 1;
 };
 

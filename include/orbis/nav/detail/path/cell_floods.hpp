@@ -144,12 +144,13 @@ class cell_floods {
     flood.push_back({squared_norm(space_.center(k) - (which == mark::near ? goal_ : start_)), k});
     std::push_heap(flood.begin(), flood.end());
   }
-  /// Updates the nearest cell with `k`, which is connected to the start.
+  /// Makes `k`, a cell connected to the start, the nearest cell if it is nearer to the goal.
   void update_nearest(const key& k) {
     if (const double away = squared_norm(space_.center(k) - goal_); away < nearest_away_)
       nearest_away_ = away, nearest_ = k;
   }
-  /// Adds the neighbours of one more cell. Returns true if the floods meet at one of them. @pre not empty
+  /// Adds the neighbours of one more cell to a flood. Returns true if the floods meet at one of them. @pre flood is not
+  /// empty
   bool grow(std::vector<entry>& flood, mark which) {
     std::pop_heap(flood.begin(), flood.end());
     const key k = flood.back().cell;
@@ -180,12 +181,12 @@ class cell_floods {
   const Space& space_;
   vec3 start_, goal_;
   std::vector<entry> near_{}, far_{};  ///< cells of each flood whose neighbours have not been visited
-  std::vector<key> seen_far_{};        ///< all cells of the other flood
+  std::vector<key> seen_far_{};        ///< all cells of the flood that does not begin at the start
   std::vector<std::unique_ptr<brick>> bricks_{};
   hash_index index_{};
   std::uint64_t last_name_ = ~std::uint64_t{0};
   brick* last_brick_ = nullptr;
-  std::optional<key> nearest_{};  ///< nearest to the goal, in the flood of the start
+  std::optional<key> nearest_{};  ///< the cell of the flood from the start that is nearest to the goal
   double nearest_away_ = std::numeric_limits<double>::infinity();
 };
 

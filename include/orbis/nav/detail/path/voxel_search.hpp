@@ -40,7 +40,8 @@ enum class search_end : std::uint8_t {
 /// - On the grid: A*, P. Hart, N. Nilsson, B. Raphael, "A formal basis for the heuristic determination of minimum cost
 ///   paths", IEEE Transactions on Systems Science and Cybernetics 4(2), 1968. The result is optimal on the grid.
 /// - At any angle: lazy Theta*, A. Nash, S. Koenig, C. Tovey, "Lazy Theta*: any-angle path planning and path length
-///   analysis in 3D", AAAI 2010. A cell is first assigned its predecessor's parent, as if it were visible.
+///   analysis in 3D", AAAI 2010. A cell is first connected to its predecessor's parent, as if the straight line
+///   between them were free.
 ///
 /// Both methods test whether a step is possible, and compute the cost of a line, only when the cell is expanded; until
 /// then, costs are lower bounds. A cell whose cost increases is put back into the queue. (Lazy evaluation of edges, as
@@ -60,8 +61,9 @@ class voxel_search {
   explicit voxel_search(const Space& space, bool any_angle = false, double weight = 1.0)
       : space_{space}, any_angle_{any_angle}, is_uniform_{space.is_uniform()}, weight_{any_angle ? weight : 1.0} {}
 
-  /// The cells with a free straight segment from `p` to their centre: the cell of `p` or, if it is not one of them, its
-  /// neighbours. @pre `p` lies in the space
+  /// The cells at which a path from `p` may begin: the cell of `p` if the straight segment from `p` to its centre is
+  /// free, otherwise the neighbours of that cell for which the corresponding segment is free. @pre `p` lies in the
+  /// space
   [[nodiscard]] std::vector<key> doors(const vec3& p) const {
     const key own = *space_.key(p);
     const auto is_door = [&](const key& k) { return space_.contains(k) && space_.is_free(p, space_.center(k)); };
@@ -129,7 +131,7 @@ class voxel_search {
  private:
   static constexpr double infinity = std::numeric_limits<double>::infinity();
   static constexpr bool is_flat = Space::dimensions == 2;
-  static constexpr std::uint32_t brick_bits = is_flat ? 6 : 9;  ///< cells of a brick: 8x8x8, or 8x8 on a floor
+  static constexpr std::uint32_t brick_bits = is_flat ? 6 : 9;  ///< bits of an index in a brick (8x8 or 8x8x8 cells)
   static constexpr std::uint32_t from = ~std::uint32_t{1}, to = ~std::uint32_t{0};  ///< indices of start and goal
 
   /// Certainty of a cell's cost.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Writers of the nodes of OctoMap's files. Nodes are written in preorder from the bricks, one mask of 64 voxels at a
+/// Writers for the nodes of OctoMap files. Nodes are written in preorder from the bricks, one mask of 64 voxels at a
 /// time.
 ///
 /// A `.bt` node has two bits per child (0 unknown, 1 free, 2 occupied, 3 an inner node); an `.ot` node has a value and
@@ -28,7 +28,7 @@
 
 namespace orbis::octree::detail {
 
-/// A byte buffer that grows in place if the system can move pages.
+/// A byte buffer that grows by std::realloc, which can often remap pages instead of copying them.
 class node_buffer {
  public:
   [[nodiscard]] std::size_t size() const noexcept { return size_; }
@@ -155,7 +155,7 @@ class bt_writer {
     nodes_ = 1;
     (void)upper_walk<float, bt_writer>{parts, *this}.walk(root_level_);
   }
-  /// Writes a tree with one value as eight leaves, because the format cannot store a root without children.
+  /// Writes a tree that is a single leaf as eight leaves, because the format cannot store a root without children.
   [[nodiscard]] octomap_nodes write_root(float value) {
     put_bytes16(out_.room(2), is_occupied<Model>(value) ? occupied_children : free_children);
     out_.set_size(2);
@@ -216,7 +216,7 @@ class bt_writer {
   int root_level_;
   node_buffer out_;
   std::size_t nodes_ = 0;
-  unsigned pruned_levels_ = 0;  ///< bit l: a node at level l became a leaf or could have become one
+  unsigned pruned_levels_ = 0;  ///< bit l: a node at level l was or could have been pruned to a leaf
   int stop_level_ = max_tree_depth + 1;
 };
 

@@ -98,7 +98,7 @@ class brick_uses {
   hash_index index_;
   std::vector<used_brick> bricks_;
   std::vector<std::uint32_t> free_;   ///< unused brick indices
-  std::vector<std::uint32_t> queue_;  ///< indices of stale bricks, starting at done_
+  std::vector<std::uint32_t> queue_;  ///< indices of the stale bricks, which start at position done_
   std::size_t done_ = 0;
 };
 

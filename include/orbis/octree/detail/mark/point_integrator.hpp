@@ -72,7 +72,7 @@ class point_integrator {
     return finish(policy);
   }
 
-  /// Second half of mode `discretized`: marks the rays to the centres of the voxels that are occupied in `ends`.
+  /// Second step of mode `discretized`: marks the rays to the centres of the voxels that are occupied in `ends`.
   /// @pre `ends` does not belong to this object
   template <execution_policy Policy>
   integration_summary mark_centers(const Policy& policy, const voxel_grid& grid, const scan_masks& ends,
@@ -119,7 +119,7 @@ class point_integrator {
     std::size_t batched = 0;  ///< number of centres waiting in the batch
     batch_keys keys;
     ray_batch rays;
-    std::array<std::uint64_t, 1024> seen;  ///< recently marked voxels, in which rays of the next image row often end
+    std::array<std::uint64_t, 1024> seen;  ///< recently marked voxels; rays of the next image row often end in them
 
     void clear() noexcept {
       seen.fill(~std::uint64_t{0});

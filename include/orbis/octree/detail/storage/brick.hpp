@@ -356,7 +356,7 @@ class brick_store {
     if (empty()) clear();
   }
 
-  /// Replaces a large leaf with its brick that contains `k` and the siblings of the nodes on the path to it.
+  /// Splits a large leaf into the brick that contains `k`, and the siblings of the nodes on the path to this brick.
   void split(std::uint64_t name, T value, const voxel_key& k) {
     large_.erase(name);
     voxel_key node = named_key(name);

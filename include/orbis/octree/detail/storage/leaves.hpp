@@ -72,8 +72,9 @@ inline constexpr auto octant_offsets = [] {
   return {octant.x + k.x, octant.y + k.y, octant.z + k.z};
 }
 
-/// Calls `on_leaf(key, level, value)` for leaves of at least an octant, and `on_octant(key, brick, i)`, which returns
-/// the number of inner nodes in the octant, for the other octants. Returns the total number of inner nodes.
+/// Calls `on_leaf(key, level, value)` for leaves at least as large as an octant. Calls `on_octant(key, brick, i)`,
+/// which returns the number of inner nodes in the octant, for the other octants. Returns the total number of inner
+/// nodes.
 template <class T, class OnLeaf, class OnOctant>
 std::size_t walk_octants(const std::vector<tree_part<T>>& parts, int root_level, OnLeaf&& on_leaf,
                          OnOctant&& on_octant) {
@@ -118,7 +119,7 @@ std::size_t visit_octant(const voxel_key& key, const octant_view<T>& o, block<T>
   return leaves.inner_nodes;
 }
 
-/// Visits the leaves of some parts of a store.
+/// Visits the leaves of the given parts of a store.
 template <class T, class Visit>
 std::size_t visit_parts(const brick_store<T>& store, const std::vector<tree_part<T>>& parts, int root_level,
                         Visit&& visit) {

@@ -77,7 +77,7 @@ struct packed_octant {
     return changed;
   }
 };
-/// Mask j holds bit j of every place.
+/// Bit p of mask j is bit j of place p.
 inline constexpr std::array<std::uint64_t, 6> place_planes{0xaaaaaaaaaaaaaaaa, 0xcccccccccccccccc, 0xf0f0f0f0f0f0f0f0,
                                                            0xff00ff00ff00ff00, 0xffff0000ffff0000, 0xffffffff00000000};
 /// An octant with more distinct values than palettes can hold.
@@ -135,7 +135,7 @@ class octant_pools {
   void write(std::uint32_t record, Use&& use) {
     with_pool(*this, pool_number(record), [&](auto& p) { use(p.items.writable(place_in_pool(record))); });
   }
-  /// Returns an unused record of the pool with index `number`.
+  /// Returns an unused record of pool `number`.
   [[nodiscard]] std::uint32_t add(unsigned number) {
     return number << 29U | with_pool(*this, number, [](auto& p) {
              if (p.free.empty()) {

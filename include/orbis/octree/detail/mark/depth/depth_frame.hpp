@@ -38,7 +38,7 @@ struct depth_frame : view_frame {
   direction_index map;  ///< for cameras other than pinholes
   std::vector<descent_worker> workers;
 
-  /// Computes the parameters of the tests. `ray_error`: maximum deviation of rays from their pixels' rays, at z = 1.
+  /// Computes the parameters of the tests. `ray_error`: maximum deviation of a ray from that of its pixel, at z = 1.
   /// @pre `ends` and, if needed, `map` belong to the image
   void set_scene(const depth_sensor& sensor, float ray_error = 0.0F) {
     const pixel_rays& rays = ends.rays();
@@ -71,7 +71,8 @@ struct depth_frame : view_frame {
     const pixel_rays& rays = ends.rays();
     if (!rays.separable()) return true;
     const auto is_moderate = [](float first, float last) { return std::max(std::abs(first), std::abs(last)) <= most; };
-    return is_moderate(rays.x(0)[0], rays.x(0)[rays.width() - 1]) && is_moderate(*rays.y(0), *rays.y(rays.height() - 1));
+    return is_moderate(rays.x(0)[0], rays.x(0)[rays.width() - 1]) &&
+           is_moderate(*rays.y(0), *rays.y(rays.height() - 1));
   }
   [[nodiscard]] static bool is_dense(double mean_z, double voxel, double focal) {
     return mean_z < 0.45 * voxel * focal;

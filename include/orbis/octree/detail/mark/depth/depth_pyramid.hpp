@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Nearest and farthest ray end in any box of pixels, in four look-ups.
+/// Finds the nearest and the farthest ray end in any box of pixels with four look-ups.
 ///
-/// The min/max mipmaps of A. Tevs, I. Ihrke, H.-P. Seidel, "Maximum mipmaps for fast, accurate, and
+/// Uses the min/max mipmaps of A. Tevs, I. Ihrke, H.-P. Seidel, "Maximum mipmaps for fast, accurate, and
 /// scalable dynamic height field rendering", I3D 2008, with overlapping cells.
 #pragma once
 
@@ -39,8 +39,8 @@ template <class Cells>
   return simd::bits_as<std::uint32_t>(max(simd::bits_as<std::uint16_t>(a), simd::bits_as<std::uint16_t>(b)));
 }
 
-/// Reduces two rows of depths to one row of cells of 2x2 pixels. `strict` counts a missing depth as 0; `some` ignores
-/// it (0 if all are missing). Reads up to 16 values beyond the last cell.
+/// Reduces two rows of depths to one row of cells of 2x2 pixels. In `strict`, a missing depth counts as 0; in `some`,
+/// it is ignored, and a cell without any depth is 0. Reads up to 16 values beyond the last cell.
 struct first_cells_kernel {
   template <simd::target Target>
   static ORBIS_ALWAYS_INLINE void run(const float* upper, const float* lower, float scale, int cells,

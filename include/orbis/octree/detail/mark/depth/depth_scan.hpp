@@ -24,7 +24,7 @@ struct other_depth {
   [[nodiscard]] float operator()(int u, int v) const { return read(source, u, v); }
 };
 
-/// Refers to the image and the camera passed to its constructor. Reading a pixel takes one switch over the types.
+/// Refers to the image and the camera passed to its constructor. Reading a pixel takes one switch on the image type.
 class depth_scan {
  public:
   template <camera::depth_source Depth, camera::camera_model Camera>
@@ -38,7 +38,7 @@ class depth_scan {
                            [](const void* d, int u, int v) -> float { return (*static_cast<const Depth*>(d))(u, v); }};
   }
 
-  /// Calls `f(image)` with the depth_view or other_depth.
+  /// Calls `f(image)`, where `image` is a depth_view or an other_depth.
   template <class F>
   decltype(auto) visit(F&& f) const {
     return std::visit(f, image_);

@@ -18,10 +18,10 @@
 
 namespace orbis::octree::detail {
 
-/// The plane z = 1 divided into cells of about 8x8 pixels. A cell stores the deviations of the pixels of its rays from
-/// `focal * (x, y) + center`, and the spacing of the rays in it. Cells are combined into larger ones: entry (i, j) of
-/// level k represents the cells i, i + 1 of the rows j, j + 1 of 2^k x 2^k cells each, so that one entry covers any
-/// region that is at most one cell of its level wide.
+/// The plane z = 1 divided into cells of about 8x8 pixels. For its rays, a cell stores the range of the differences
+/// between their pixels and the affine estimate `focal * (x, y) + center`, and the spacing of the rays. Cells are
+/// combined into larger ones: entry (i, j) of level k represents the cells i, i + 1 of the rows j, j + 1 of 2^k x 2^k
+/// cells each, so that one entry covers any region that is at most one cell of its level wide.
 class direction_index {
  public:
   static constexpr int max_levels = 16;
@@ -29,7 +29,7 @@ class direction_index {
   static constexpr float widest = 3.0F;
 
   struct entry {
-    float least_u = infinity, most_u = -infinity;  ///< bounds of a pixel minus its affine estimate
+    float least_u = infinity, most_u = -infinity;  ///< range of pixel u minus its affine estimate
     float least_v = infinity, most_v = -infinity;
     /// Maximum distance (at z = 1) from a point in the cells to the nearest ray; infinite if unknown.
     float spacing = 0.0F;
@@ -96,7 +96,7 @@ class direction_index {
   [[nodiscard]] const std::array<std::int32_t, max_levels>& width() const noexcept { return width_; }
   [[nodiscard]] const std::array<std::int32_t, max_levels>& height() const noexcept { return height_; }
   [[nodiscard]] const entry* entries() const noexcept { return entries_.data(); }
-  /// Cell of a coordinate; monotonic.
+  /// Cell that contains a coordinate; never decreases as the coordinate increases.
   [[nodiscard]] std::int32_t column(float x) const noexcept { return cell((x - min_x_) * per_x_, width_[0]); }
   [[nodiscard]] std::int32_t row(float y) const noexcept { return cell((y - min_y_) * per_y_, height_[0]); }
   /// Entry for the rays with x in [x0, x1] and y in [y0, y1].

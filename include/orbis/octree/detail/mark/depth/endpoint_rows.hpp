@@ -29,7 +29,7 @@ struct ray_endpoint {
   fate what = fate::none;
   float3 point{};   ///< end point, metres
   voxel_key key{};  ///< voxel that contains the end
-  float z = 0.0F;   ///< depth of the end along the optical axis, up to a few roundings
+  float z = 0.0F;   ///< depth of the end along the optical axis, up to a few rounding errors
 };
 
 /// The sensor of one depth image.
@@ -90,7 +90,7 @@ struct end_row {
   int width = 0;
   const float* x = nullptr;
   const float* y = nullptr;
-  bool one_y = false;  ///< true if y is a single value
+  bool one_y = false;  ///< true if y points to a single value for the whole row
   float* z = nullptr;  ///< in: metres, 0 if missing; out: depth of the ray's end, 0 if the ray is ignored
   std::array<std::int32_t*, 3> key{};  ///< out: voxels of used ends, -1 for other pixels
 };

@@ -26,7 +26,7 @@ class first_step_order {
       : source_{sensor.grid, sensor.pose.centre, *sensor.key} {}
 
   /// Returns these neighbours as a bit mask: bit (dx + 1) + 3 (dy + 1) + 9 (dz + 1) is the voxel at offset (dx, dy,
-  /// dz). `low` and `high`: smallest and greatest coordinates of the directions, whose largest coordinate is about 1.
+  /// dz). `low` and `high`: smallest and greatest coordinates of the directions; the largest is of the order of 1.
   /// Rays may deviate from the directions by rounding errors of a few float ulps.
   [[nodiscard]] std::uint32_t voxels(float3 low, float3 high) const noexcept {
     for (std::size_t i = 0; i != 3; ++i) {

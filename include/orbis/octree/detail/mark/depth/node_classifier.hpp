@@ -23,8 +23,8 @@ namespace orbis::octree::detail {
 ///
 /// The relevant rays are those from the centre to the world points, rounded to float; the tests use the rays of the
 /// pixels and rounded node centres. With u = 2^-24 and c a node's centre:
-/// - the sum that yields a world point p has an error of at most 10 u |p - t|_1 + u |t|_1, and relative to the node the
-///   first part shrinks with the distance;
+/// - the sum that yields a world point p has an error of at most 10 u |p - t|_1 + u |t|_1 (t: the camera's centre);
+///   at the node, the first part becomes 10 u |c|_1, because the deviation of a ray is proportional to the distance;
 /// - rotating c with the rotation rounded to float has an error of 7 u |c|_1, in addition to the 2 u |c|_1 of c itself,
 ///   and each step down the octree adds u |c|_1: less than 25 u |c|_1 from a root of 16 levels;
 /// - the direction of the traversal is a float vector: u |c|_1; the error of the sums in double is negligible;
@@ -36,9 +36,9 @@ struct depth_scene {
   float per_fx = 1, per_fy = 1;                      ///< 1 / f
   float last_u = 0, last_v = 0;                      ///< last column and row
   float min_x = 0, max_x = 0, min_y = 0, max_y = 0;  ///< bounds of all rays
-  float margin_0 = 0, margin_1 = 0;                  ///< constant part in metres; part per metre of |c|_1
-  float pixel_margin = 0.01F;                        ///< allowance for the rounding of pixels
-  float near_z = 0;                                  ///< nodes that come closer than this are not projected
+  float margin_0 = 0, margin_1 = 0;                  ///< `margin`: constant part in metres; part per metre of |c|_1
+  float pixel_margin = 0.01F;                        ///< allowance for the rounding of pixel coordinates
+  float near_z = 0;                                  ///< nodes that reach below this depth are not projected
   /// Maximum depth up to which the ray of at least one pixel certainly passes through a ball inside a voxel; elements 1
   /// and 2: the same for the rays of aligned tiles of 2x2 and 4x4 pixels. For pinholes; see dense().
   std::array<float, 3> dense_z{};
@@ -68,7 +68,7 @@ struct child_offsets {
   alignas(32) std::array<float, 8> world_x{}, world_y{}, world_z{};  ///< in the world frame
   float half = 0;                                                    ///< half a child's edge
   float half_z = 0;                                                  ///< half of a child's extent along z
-  std::array<float, 4> half_side{};  ///< half of a child's extent across the sides of the view
+  std::array<float, 4> half_side{};  ///< half of a child's extent perpendicular to each side of the view, unscaled
 
   child_offsets() = default;
   child_offsets(const depth_scene& s, float half_edge) : half{half_edge} {
@@ -232,7 +232,7 @@ struct classify_children_kernel {
   static ORBIS_ALWAYS_INLINE auto log2_rounded_up(const Floats& x) noexcept {
     return ((simd::bits_as<std::int32_t>(x) + 0x7fffff) >> 23) - 127;
   }
-  /// Offset, in floats, of a map's entries for the rays of a rectangle.
+  /// Offset, in floats, of the map's entry for the rays that pass through a rectangle at z = 1.
   template <class Floats>
   static ORBIS_ALWAYS_INLINE auto entry_offset(const direction_index& map, const Floats& x0, const Floats& x1,
                                                const Floats& y0, const Floats& y1) noexcept {

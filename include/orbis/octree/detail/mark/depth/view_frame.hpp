@@ -29,7 +29,8 @@ struct view_extent {
   float min_x, max_x, min_y, max_y;
 };
 
-/// Reuses its memory between views. Call set_view, build `pyramid`, and then call list_nodes.
+/// A view and the nodes at which its descent starts. Call set_view, build `pyramid`, and then call list_nodes. Reuses
+/// its memory between views.
 struct view_frame {
   using classify_kernel = void(const depth_scene&, const child_offsets&, const float3&, bool, children&);
   static constexpr int list_level = 5;  ///< level of the nodes that are distributed to the threads
@@ -37,7 +38,7 @@ struct view_frame {
   struct node {
     voxel_key key;
     float3 center;  ///< in the camera frame
-    bool inside;    ///< projects into the image
+    bool inside;    ///< true if the node projects into the image
   };
 
   // Kernels with eight lanes are no faster on AVX-512.
@@ -90,7 +91,7 @@ struct view_frame {
   struct bounds_at_1 {
     float x0, x1, y0, y1;
   };
-  /// Bounds of the rays of a box of pixels. `room`: maximum distance in pixels of a ray from the centre of its pixel.
+  /// Bounds of the rays of a box of pixels. `room`: maximum distance of a ray from the centre of its pixel, in pixels.
   [[nodiscard]] bounds_at_1 bounds(const pixel_box& box, float room) const noexcept {
     const auto edge = [&](std::int32_t pixel, float off, float centre, float per_f) {
       return (static_cast<float>(pixel) + off - centre) * per_f;

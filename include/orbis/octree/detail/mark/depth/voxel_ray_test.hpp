@@ -47,12 +47,12 @@ namespace orbis::octree::detail {
 /// 1996). A ray that ends at z g has left the cube if that point is beyond a far face, and has not reached it if the
 /// point is before a near face. No division is needed.
 ///
-/// Directions have a relative error of at most margin / |c| (see depth_scene). It is covered by `slack`, in addition to
-/// twice the margin in h. The axes are flipped so that c has no negative coordinate.
+/// Directions have a relative error of at most margin / |c| (see depth_scene). `slack` covers this error; in addition,
+/// the tests change h by twice the margin. The axes are flipped so that c has no negative coordinate.
 struct voxel_test {
   float3 centre{}, x_axis{}, y_axis{}, z_axis{};  ///< relative to the camera's centre; flipped
   float half = 0, inner_half = 0, outer_half = 0, slack = 0, margin = 0, margin_1 = 0;
-  float3 before{};  ///< for each axis, maximum distance before the centre at which a ray may end: half, or infinity
+  float3 before{};  ///< how far before the centre, along each axis, a ray that crosses the voxel can end
 
   voxel_test(const depth_scene& s, const float3& c, float half_edge) noexcept
       : half{half_edge}, margin{s.margin(std::fabs(c[0]) + std::fabs(c[1]) + std::fabs(c[2]))}, margin_1{s.margin_1} {

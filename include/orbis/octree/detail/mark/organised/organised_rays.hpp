@@ -35,7 +35,7 @@ struct pixel_placement {
   float fx = 1, fy = 1, cx = 0, cy = 0;
   float last_u = 0, last_v = 0;    ///< last column and row
   float error_u = 0, error_v = 0;  ///< maximum distance of a ray from the centre of its pixel
-  float far = 0;  ///< rays that end beyond this depth are traversed one by one: no other rays cross the voxels there
+  float far = 0;  ///< rays that end beyond this depth, where they are far apart, are traversed one by one
   std::int32_t stride = 0;
 };
 
@@ -147,7 +147,7 @@ class organised_rays {
   /// Marks the voxels of the added rays. Voxels that a miss would not change according to `saturated` may be missing,
   /// see depth_integrator::mark, as may those that are occupied in `masks`. Returns false, and marks nothing, if rays
   /// come too close to the border of the grid, or if many rays share a pixel. `end_of(i)`: the ray_endpoint of the i-th
-  /// point. (The unused range keeps the signature the same as that of dense_rays::mark.)
+  /// point. (The unused range makes the signature the same as that of dense_rays::mark.)
   template <execution_policy Policy, class Range, class EndOf, class Saturated>
   [[nodiscard]] bool mark(const Policy& policy, const depth_sensor& scan, Range&&, const EndOf& end_of,
                           scan_masks& masks, const Saturated& saturated) {
@@ -185,9 +185,10 @@ class organised_rays {
 
   /// The smaller of the two focal lengths, which determines the largest distance between rays.
   [[nodiscard]] double focal() const { return std::min(fit_.camera().k().fx, fit_.camera().k().fy); }
-  /// Error of rays in excess of the allowance of depth_scene. The allowance includes 10 u |c|_1 for the rounding of
-  /// points, which must not be counted twice, and 19 u |c|_1 in reserve. A ray may deviate along both x and y, so by
-  /// sqrt(2) times the error in total; the float coordinates have errors of about 7 u, plus the rounding of cx and cy.
+  /// The part of the rays' error that exceeds the allowance in depth_scene. The allowance includes 10 u |c|_1 for the
+  /// rounding of points, which must not be counted twice, and 19 u |c|_1 in reserve. A ray may deviate along both x and
+  /// y, so by sqrt(2) times the error in total; the float coordinates have errors of about 7 u, plus the rounding of cx
+  /// and cy.
   [[nodiscard]] float ray_error() const {
     constexpr double u = 0x1p-24;
     const auto& k = fit_.camera().k();
@@ -251,12 +252,12 @@ class organised_rays {
   se3 pose_;
   pixel_placement placement_;
   place_in_pixels* place_ = nullptr;
-  std::span<float> ends_;                           ///< ends of the frame, before it is cropped
+  std::span<float> ends_;                           ///< depths of the image in frame_, before it is cropped
   std::size_t count_ = 0;                           ///< number of rays
   std::vector<std::int32_t> pixel_;                 ///< pixel of each ray
   std::vector<float> z_;                            ///< depth of the end of each ray
-  std::vector<placed_part> parts_;                  ///< part of the image for each worker's rays
-  std::vector<std::uint32_t> numbers_;              ///< index of each pixel's ray, if it has one
+  std::vector<placed_part> parts_;                  ///< part of the image in which each worker placed rays
+  std::vector<std::uint32_t> numbers_;              ///< for each pixel that has a ray, the index of the ray
   std::vector<std::vector<std::uint32_t>> second_;  ///< additional rays of occupied pixels, for each band of rows
 };
 

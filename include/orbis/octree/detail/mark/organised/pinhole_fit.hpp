@@ -48,7 +48,7 @@ class pinhole_fit {
   [[nodiscard]] so3 rotation() const { return so3{mat3(transposed(axes_))}; }
   /// Maximum deviation of the rays of points from the rays of their pixels, at z = 1, along x and along y.
   [[nodiscard]] double error() const noexcept { return error_; }
-  /// Approximate share of the image's pixels that have points, for the smallest possible image.
+  /// Approximate share of pixels that have points, in the smallest image that contains the sampled pixels.
   [[nodiscard]] double filled() const noexcept { return filled_; }
   /// Mean depth of the rays' ends, metres.
   [[nodiscard]] double mean_z() const noexcept { return mean_z_; }
@@ -327,7 +327,7 @@ class pinhole_fit {
   double fx_ = 0.0, fy_ = 0.0, cx_ = 0.0, cy_ = 0.0;
   double square_ = 0.0;  ///< sum of squared residuals, at z = 1
   double size_ = 0.0;    ///< number of pixels of the image, excluding the margin
-  double slope_ = 0.0;   ///< largest slope of the sides of the image
+  double slope_ = 0.0;   ///< largest |x| or |y| of the sides of the image, at z = 1
   double error_ = 0.0, mean_z_ = 0.0, filled_ = 0.0;
   camera::pinhole camera_;
 };

@@ -33,7 +33,7 @@ struct ray_batch {
   alignas(64) std::array<std::array<float, capacity>, 3> end{};
   alignas(64) std::array<std::array<std::int32_t, capacity>, 3> way{};
   bits hit{};  ///< bit i: ray i ends at a point
-  bits cut{};  ///< bit i: ray i is limited; there is no ray i if neither `hit` nor `cut` has bit i
+  bits cut{};  ///< bit i: ray i is limited; if bit i is set in neither mask, there is no ray i
 
   void set(std::size_t i, const float3& to, const std::array<std::int32_t, 3>& cells, bool is_hit) noexcept {
     for (std::size_t axis = 0; axis != 3; ++axis) {
@@ -50,7 +50,7 @@ struct ray_batch {
       cut[w] &= left[w];
     }
   }
-  /// Returns eight bits, starting at bit i. @pre i is a multiple of eight
+  /// Returns eight bits of `b`, starting at bit i. @pre i is a multiple of eight
   [[nodiscard]] static std::uint32_t eight(const bits& b, std::size_t i) noexcept {
     return static_cast<std::uint32_t>(b[i >> 6U] >> (i & 63U)) & 0xffU;
   }
@@ -78,7 +78,7 @@ struct ray_lanes {
     leaves = mask::from_bits(there & ((std::uint64_t{1} << floats::count) - 1)) &
              simd::mask_as<4>((way(0) | way(1) | way(2)) != integers(0));
   }
-  /// Extent of the rays along an axis, up to rounding.
+  /// Components of the rays along axis `a`, up to rounding.
   [[nodiscard]] ORBIS_ALWAYS_INLINE floats along(const float3& a) const noexcept {
     return simd::approximate_multiply_add(floats(a[0]), ray[0],
                                           simd::approximate_multiply_add(floats(a[1]), ray[1], floats(a[2]) * ray[2]));

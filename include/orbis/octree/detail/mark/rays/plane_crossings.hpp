@@ -47,7 +47,7 @@ struct queued_rays {
 struct plane_stack {
   static constexpr unsigned fraction = 22;     ///< fraction bits of a coordinate; ten bits are left for the cell
   static constexpr std::uint32_t doubt = 12;   ///< maximum error of a coordinate, in units of 2^-22 cells
-  static constexpr float order_doubt = 7e-6F;  ///< maximum error of the order of two crossings, in cells
+  static constexpr float order_doubt = 7e-6F;  ///< maximum error of the distances that order two crossings, in cells
   static constexpr std::uint8_t marked = 0xff;
 
   std::uint8_t* planes = nullptr;
@@ -213,7 +213,7 @@ struct stack_placement {
   [[nodiscard]] std::size_t axis_v() const noexcept { return axis == 2 ? 1 : 2; }
 };
 
-/// Returns a mask; bit i is set if any of the i-th bytes is set.
+/// Returns a mask; bit i is set if the i-th byte at `a`, `b` or `c` is not zero.
 [[nodiscard]] inline std::uint64_t marks(const std::uint8_t* a, const std::uint8_t* b, const std::uint8_t* c) noexcept {
   using bytes = simd::vec<std::uint8_t, 64, simd::portable>;
   return simd::bits((bytes::load(a) | bytes::load(b) | bytes::load(c)) != bytes(0));

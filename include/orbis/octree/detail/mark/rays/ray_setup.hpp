@@ -29,10 +29,10 @@ struct ray_setup {
   alignas(64) std::array<std::int32_t, lanes> cell_u, cell_v;  ///< cell after the last plane
   // Bit i refers to ray i.
   std::uint32_t done = 0;    ///< rays with a certain result; the others must be traversed step by step
-  std::uint32_t step_u = 0;  ///< the ray crosses a face across u between the last two planes
+  std::uint32_t step_u = 0;  ///< the ray crosses a face perpendicular to u between the last two planes
   std::uint32_t step_v = 0;
-  std::uint32_t step_u_first = 0;  ///< the ray crosses the face across u before the one across v
-  std::uint32_t end_u = 0;         ///< the ray crosses a face across u between the last plane and the end of the ray
+  std::uint32_t step_u_first = 0;  ///< the ray crosses the face perpendicular to u before the one perpendicular to v
+  std::uint32_t end_u = 0;         ///< the ray crosses a face perpendicular to u between the last plane and its end
   std::uint32_t end_v = 0;
   std::uint32_t end_u_first = 0;
 

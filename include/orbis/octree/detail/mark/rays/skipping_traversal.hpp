@@ -41,7 +41,7 @@ class skipping_traversal {
   /// Exit of the ray from the current node with edge `cells`.
   struct node_exit {
     crossing face;
-    std::array<std::uint32_t, 3> steps;  ///< number of steps to leave the node along each axis separately
+    std::array<std::uint32_t, 3> steps;  ///< for each axis, number of steps along it that leave the node
   };
   /// Finds the exit from the current node. @pre cells is a power of two, at most 32
   [[nodiscard]] node_exit find_node_exit(std::uint32_t cells) noexcept {

@@ -25,8 +25,8 @@ struct binned_ray {
 };
 static_assert(sizeof(binned_ray) == 16);
 
-/// Rays of one window. Per cell: the deepest end (0 if the cell is empty), the index of its ray, and the start of the
-/// cell's rays among the sorted rays. `rays`: all rays, in the order of their indices.
+/// Rays of one window. For each cell: the depth of the deepest end (0 if the cell is empty), the index of its ray, and
+/// the start of the cell's rays among the sorted rays. `rays`: all rays, in the order of their indices.
 struct window_rays {
   const float* z = nullptr;
   const std::int32_t* deepest = nullptr;
@@ -48,7 +48,7 @@ struct window_tables {
   float3 origin{};
   std::array<float3, 3> axes{};  ///< axes of the cube
   float per_cell = 1;
-  std::uint32_t nowhere = 0;  ///< the cell of rays in no window
+  std::uint32_t nowhere = 0;  ///< the cell for rays that are in no window
   alignas(64) std::array<float, 16> min_x{}, min_y{};
   alignas(64) std::array<float, 16> width{}, height{};
   alignas(64) std::array<std::int32_t, 16> stride{}, begin{};

@@ -54,7 +54,7 @@ struct window_frame : view_frame {
     scene.tiles = {2.05F, 4.1F, 8.2F};
     set_spacing(half_diagonal());
   }
-  /// Maximum distance in cells of a ray from the centre of its cell.
+  /// Maximum distance of a ray from the centre of its cell, in cells.
   [[nodiscard]] float room() const noexcept { return 0.51F + 4e-6F * scene.fx; }
 };
 
@@ -168,7 +168,7 @@ class dense_rays {
   }
   /// Returns true if this method is faster than a traversal, according to measured costs in nanoseconds per ray: a
   /// traversal has a constant cost per plane of voxels that the ray crosses; this method has a constant cost per ray,
-  /// and a cost for the voxels that it must test individually, which increases with fewer rays per voxel.
+  /// and a cost for the voxels that it must test individually, which increases as the rays become sparser.
   [[nodiscard]] bool is_worthwhile(double voxel) const {
     // `apart`: spacing of the rays at their ends, in voxels.
     const double planes = sample_.length / voxel, apart = windows_.spacing * planes;

@@ -20,7 +20,7 @@ namespace orbis::octree::detail {
 /// A window on one face of the cube |x|, |y|, |z| <= 1, divided into square cells. Face 2 i is on the positive side of
 /// the cube's i-th axis, face 2 i + 1 on the negative one. The window's z axis points from the centre to the face.
 struct direction_window {
-  static constexpr std::int32_t padding = 16;  ///< minimum number of empty cells after a row
+  static constexpr std::int32_t padding = 16;  ///< minimum number of empty cells after each row
 
   std::array<float3, 3> axes{};  ///< x, y and z axes of the window, in the world frame
   float min_x = 0, min_y = 0;    ///< start of the first cell, at z = 1
@@ -42,7 +42,7 @@ struct direction_windows {
   static constexpr std::uint32_t most_cells = 1U << 22U;
 
   std::array<direction_window, faces> window{};
-  double spacing = 1;       ///< spacing of the rays at z = 1, if they are spread evenly over the windows
+  double spacing = 1;       ///< spacing of the rays at z = 1, assuming that they are spread evenly over the windows
   float cell = 1;           ///< edge of a cell, at z = 1
   std::uint32_t cells = 0;  ///< total number of cells of all windows
 
