@@ -7,7 +7,7 @@
 /// | `types.hpp` | short names for vectors and matrices |
 /// | `so3.hpp, se3.hpp, sim3.hpp` | rotations, poses, similarities: Lie groups with exp and log |
 /// | `small_matrix.hpp` | arithmetic on fixed-size matrices that compiles fast |
-/// | `small_cholesky.hpp` | Cholesky solver for the normal equations of a few unknowns |
+/// | `small_cholesky.hpp` | Cholesky solver for normal equations with few unknowns |
 /// | `jacobi.hpp` | eigenvalues and singular values of small matrices, nearest rotation to a matrix |
 /// | `thread_pool.hpp` | persistent worker threads for parallel loops |
 /// | `trajectory.hpp` | stamped poses, pose interpolation, association of time stamps |

@@ -9,7 +9,7 @@
 /// | `features/orb.hpp` | `orb_extractor`: ORB features, distributed evenly |
 /// | `features/pyramid.hpp` | `image_pyramid`: an image at several scales |
 /// | `features/grey.hpp` | conversion of colour and 16-bit images to 8-bit grey images |
-/// | `features/hamming.hpp` | `hamming`, the distance of binary descriptors |
+/// | `features/hamming.hpp` | `hamming`, the distance between binary descriptors |
 /// | `features/match.hpp` | `match`, `candidate`, concepts of sources and stages |
 /// | `features/matcher.hpp` | matchers composed of a source and stages with `\|` |
 /// | `features/stages.hpp` | stages: ratio test, cross check, distance, uniqueness, rotation |
@@ -18,7 +18,7 @@
 /// | `features/projected.hpp` | source that searches near the projections of known points |
 /// | `features/project_points.hpp` | projection by a camera and its pose, for `projected` |
 /// | `features/epipolar.hpp` | source that searches along epipolar lines |
-/// | `features/epipolar_geometry.hpp` | epipolar lines between two images of any cameras |
+/// | `features/epipolar_geometry.hpp` | epipolar lines between two images from any cameras |
 /// | `features/stereo.hpp` | `stereo_matcher`: right-image coordinates of features in a stereo pair |
 /// | `features/grid.hpp` | spatial index of keypoints |
 /// | `features/depth.hpp` | depth at a keypoint and its standard deviation |

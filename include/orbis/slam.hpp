@@ -6,11 +6,11 @@
 /// | --- | --- |
 /// | `system.hpp` | the SLAM system for RGB-D, stereo and monocular cameras: tracks frames, returns poses and the map |
 /// | `options.hpp` | all settings of the system |
-/// | `shutter_estimate.hpp` | the estimate of a rolling shutter |
+/// | `shutter_estimate.hpp` | the shutter timing estimated from frames |
 /// | `track_result.hpp` | the result of tracking a frame: state, pose, timings, counters |
 /// | `events.hpp` | callbacks for new keyframes, corrections of the map and changes of state |
 /// | `ids.hpp` | the ids of landmarks, keyframes and maps |
-/// | `extractor.hpp` | requirements on extractors and descriptors |
+/// | `extractor.hpp` | requirements for extractors and descriptors |
 /// | `frame.hpp` | frames and keyframes: features, depth and the observed landmarks |
 /// | `landmark.hpp` | a 3D point of the map and its observations |
 /// | `map.hpp` | keyframes, landmarks, observations, covisibility graph and spanning tree |

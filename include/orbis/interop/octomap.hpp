@@ -24,7 +24,7 @@
 
 namespace orbis::interop {
 
-/// A voxel payload that accumulates colours and returns one colour.
+/// A voxel payload that combines observed colours into one.
 template <class P>
 concept color_payload = octree::voxel_payload<P> && requires(P& payload, const P& constant, const rgb8& color) {
   payload.update(color);
@@ -132,7 +132,7 @@ struct orbis::nav::map_access<octomap::OcTree> {
       if (const octomap::OcTreeNode* const c = child(tree, node, i))
         descend(tree, c, octree::child_key(low, i, octree::node_cells(static_cast<int>(level) - 1)), level - 1, visit);
   }
-  /// States of the voxels of an octant. For a larger leaf, the states of any octant in it.
+  /// States of the voxels of an octant. For a leaf larger than an octant: the states of each octant in it, all equal.
   [[nodiscard]] static octree::octant_states states(const octomap::OcTree& tree, const octomap::OcTreeNode* node) {
     octree::octant_states s;
     const auto add = [&](const octomap::OcTreeNode* leaf, std::uint64_t voxels) {

@@ -125,7 +125,7 @@ class ompl_motion_validator : public ompl::base::MotionValidator {
   Space space_;
 };
 
-/// Sets `space` as the state and motion checker of `information`. Call it before `setup()`.
+/// Makes `information` check states and motions with `space`. Call it before `setup()`.
 /// @pre same as for ompl_motion_validator
 template <nav::planning_space Space>
 void use_planning_space(const ompl::base::SpaceInformationPtr& information, const Space& space) {

@@ -78,8 +78,8 @@ class bundle_adjuster {
                        std::span<const observation> observations, const bundle_options& options = {},
                        progress callback = {}, Report&& report = {});
 
-  /// Solves again with the observations of the last call to `solve`, from these estimates and with these options; a
-  /// different set of observations may be ignored, and different poses or points may be fixed. Ordering and structure
+  /// Solves again with the observations of the last call to `solve`, starting at the given `cameras` and `points`. The
+  /// options may ignore a different set of observations, and fix different poses or points. Ordering and structure
   /// are reused unless the fixed poses change.
   /// @pre the same number of cameras and points as in that call; the observations are unchanged and in the same memory
   template <execution_policy Policy, class Report = detail::no_report>

@@ -26,8 +26,8 @@ struct bundle_observation {
   double depth_weight = 1.0;                                ///< see `pose_observation`
 };
 
-/// Manifold of a camera state: the type of the state and the effect of a step. `m.retract(p, d)` is the state after the
-/// step `d` from `p`, with `retract(p, 0) == p`. A step has `M::dimension` entries.
+/// Manifold of a camera state: the type of the state and the effect of a step. `m.retract(p, d)` is the state to
+/// which the step `d` leads from `p`, with `retract(p, 0) == p`. A step has `M::dimension` entries.
 template <class M>
 concept camera_manifold = std::copyable<M> &&
     requires(const M& m, const typename M::point& p, const typename M::tangent& d) {
@@ -81,7 +81,7 @@ concept bundle_residual = std::copyable<R> && camera_manifold<typename R::camera
 /// A residual that depends on the point only through its coordinates q in the camera frame. Its camera state is a pose
 /// with steps `T_world_camera * exp(d)`, followed by `R::intrinsic_dimension` more parameters. All derivatives are then
 /// products of the derivative with respect to q with R_camera_world and with (-I, hat(q)), which halves the solver's
-/// arithmetic operations. The view has the members `rotation` (R_camera_world) and `translation`.
+/// arithmetic. The view has the members `rotation` (R_camera_world) and `translation`.
 template <class R>
 concept camera_frame_residual =
     bundle_residual<R> && R::camera_manifold::dimension ==

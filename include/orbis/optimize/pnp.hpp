@@ -2,7 +2,7 @@
 /// @file
 /// Perspective-n-point: the camera pose from known points and their pixels, many of which may be mismatched.
 ///
-/// Sources: M. Fischler, R. Bolles, CACM 24 (1981) for P3P in RANSAC; see `ransac.hpp` for the parts of RANSAC.
+/// Sources: M. Fischler, R. Bolles, CACM 24 (1981) for P3P in RANSAC; see `ransac.hpp` for the components of RANSAC.
 #pragma once
 
 #include <array>

@@ -54,8 +54,8 @@ struct point_to_plane {
   }
 };
 
-/// Depth measurement, by the camera `pose`, of the plane through the point `point`; both are indices into the caller's
-/// arrays.
+/// A depth measurement, made by the camera with index `pose`, of the plane through the point with index `point`; both
+/// indices refer to the caller's arrays.
 struct plane_observation {
   std::uint32_t pose = 0;
   std::uint32_t point = 0;

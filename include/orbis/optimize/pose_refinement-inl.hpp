@@ -84,7 +84,7 @@ class pose_pieces {
 struct pose_normal_equations {
   mat6 h;  ///< the lower triangle
   vec6 g;
-  double cost;  ///< half the robust cost
+  double cost;  ///< half the sum of the robust loss
 };
 
 /// A refinement with a given camera model.

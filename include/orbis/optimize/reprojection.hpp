@@ -36,9 +36,9 @@ struct camera_view {
 };
 
 /// The reprojection error, projected minus observed, in pixels: two coordinates and, with depth, a third: `u - bf / z`,
-/// the column in a camera displaced by the baseline. In this unit, the error of a disparity-based depth sensor is
-/// nearly constant, like that of the pixel. Satisfies `camera_frame_residual`; the estimated camera state is the pose
-/// `T_world_camera`. Source: R. Mur-Artal, J. D. Tardos, "ORB-SLAM2", T-RO 33 (2017).
+/// the column in a camera displaced by the baseline. In terms of this column, the error of a disparity-based depth
+/// sensor is nearly constant, like that of the pixel. Satisfies `camera_frame_residual`; the estimated camera state is
+/// the pose `T_world_camera`. Source: R. Mur-Artal, J. D. Tardos, "ORB-SLAM2", T-RO 33 (2017).
 template <camera::camera_model Camera>
 struct reprojection {
   Camera camera;

@@ -90,8 +90,8 @@ struct posed_camera_manifold {
 /// @endcode
 ///
 /// The template arguments are the indices of the estimated parameters, in the order of `camera::parameters_of<Camera>`;
-/// the others keep their values. Without indices, all are estimated. For `radial_tangential`, estimate only some:
-/// numerator and denominator of its distortion are correlated.
+/// the others keep their values. Without indices, all are estimated. For `radial_tangential`, estimate only some,
+/// because the numerator and the denominator of its distortion are correlated.
 ///
 /// Each camera has its own intrinsics, as for photographs of unknown origin; several cameras cannot share them.
 /// `bundle_options::fixed_poses` fixes the intrinsics of a camera together with its pose. For images from one known
@@ -182,8 +182,8 @@ struct bal_camera {
   }
 };
 
-/// The manifold of a `bal_camera`: a step moves the pose in the camera's own frame, and adds to focal length, k1 and
-/// k2.
+/// The manifold of a `bal_camera`: the first six entries of a step move the pose in the camera's own frame; the others
+/// are added to the focal length, k1 and k2.
 struct bal_manifold {
   using point = bal_camera;
   using tangent = matrix<9>;

@@ -47,7 +47,7 @@ struct step_workspace {
 };
 
 namespace detail {
-/// A problem with the members available to a policy, for the concept below; never constructed.
+/// A problem with exactly the members that a policy may use; needed only by the concept below and never constructed.
 struct any_stepped_problem {
   double cost() const;
   const Eigen::VectorXd& gradient() const;
@@ -237,10 +237,10 @@ struct dogleg {
 };
 
 /// Choice of the solver for the reduced system of bundle adjustment: a dense factorisation for up to `dense_limit`
-/// cameras, which takes (C n)^3 / 3 multiplications for n cameras with C unknowns each and is the fastest method for up
-/// to about a hundred cameras with many common points; a block-sparse factorisation in a fill-reducing order if the
-/// factor has at most `fill_limit` blocks, which is typical of thousands of cameras along a path; otherwise conjugate
-/// gradients with a block-diagonal preconditioner and inexact steps.
+/// cameras, which takes about (C n)^3 / 6 multiplications for n cameras with C unknowns each and is the fastest method
+/// for up to about a hundred cameras with many common points; a block-sparse factorisation in a fill-reducing order if
+/// the factor has at most `fill_limit` blocks, which is typical of thousands of cameras along a path; otherwise
+/// conjugate gradients with a block-diagonal preconditioner and inexact steps.
 struct reduced_solver_options {
   std::size_t dense_limit = 100;
   std::size_t fill_limit = 2'000'000;

@@ -46,7 +46,7 @@ struct triangulation_options {
 struct triangulation {
   triangulation_status status = triangulation_status::too_few_views;
   vec3 point = zeros<vec3>();  ///< in the world frame, metres; valid only if `ok()`
-  double parallax = 0.0;       ///< angle between the rays, radians; with more than two views, of two rays far apart
+  double parallax = 0.0;       ///< angle between the rays, radians; with more than two views, between two distant rays
   double error = 0.0;          ///< root mean square distance between projections and rays at z = 1
   [[nodiscard]] bool ok() const noexcept { return status == triangulation_status::ok; }
 };
@@ -73,9 +73,9 @@ template <class S>
 [[nodiscard]] triangulation triangulate(const se3& T_world_first, const vec3& first_ray, const se3& T_world_second,
                                         const vec3& second_ray, const triangulation_options& options = {});
 
-/// Returns the point whose projections to z = 1 have the smallest sum of squared distances from all rays: starts at the
+/// Returns the point whose projections to z = 1 have the smallest sum of squared distances from all rays. Starts at the
 /// point nearest to the rays and refines it with a few Levenberg-Marquardt steps. O(views) per step. `poses` are the
-/// cameras' `T_world_camera`. @pre poses.size() == rays.size()
+/// cameras' `T_world_camera`. @pre poses.size() == directions.size()
 template <std::ranges::contiguous_range Poses, std::ranges::contiguous_range Rays>
 requires std::same_as<std::ranges::range_value_t<Poses>, se3> && std::same_as<std::ranges::range_value_t<Rays>, vec3>
 [[nodiscard]] triangulation triangulate(const Poses& poses, const Rays& directions,

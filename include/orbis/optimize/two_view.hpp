@@ -156,13 +156,13 @@ template <class Match>
 }  // namespace detail
 
 /// Reconstructs the scene and the motion from matched pixels, or returns the reason for failure. `first_pixels[i]`
-/// matches `second_pixels[i]`; many may be wrong. `deviations`: standard deviation of each match relative to
-/// `options.deviation` (the scale of a keypoint's level); empty: all are equal. Ambiguous cases are rejected so that a
-/// result is reliable; on failure, try again with the next image. Deterministic for a given `options.seed`. Errors:
-/// `invalid_argument` for spans of different lengths or options out of range; `no_data` if fewer than `min_points`
-/// matches are usable; `degenerate` if the motion is not determined: pure rotation, too little parallax, two motions
-/// that explain the matches about equally well (as for a plane), too few points or too large standard deviations. The
-/// message gives the reason.
+/// matches `second_pixels[i]`; many may be wrong. `deviations`: the standard deviation of each match relative to
+/// `options.deviation`, for example the scale of the keypoint's pyramid level; if empty, all are equal. Ambiguous cases
+/// are rejected so that a result is reliable; on failure, try again with the next image. Deterministic for a given
+/// `options.seed`. Errors: `invalid_argument` for spans of different lengths or options out of range; `no_data` if
+/// fewer than `min_points` matches are usable; `degenerate` if the motion is not determined: pure rotation, too little
+/// parallax, two motions that explain the matches about equally well (as for a plane), too few points or too large
+/// standard deviations. The message gives the reason.
 template <camera::camera_model Camera>
 [[nodiscard]] result<two_view_reconstruction> reconstruct_two_views(std::span<const vec2> first_pixels,
                                                                     std::span<const vec2> second_pixels,

@@ -18,7 +18,7 @@ enum class weighting : std::uint8_t {
   binary   ///< value 1 for every word
 };
 
-/// A word and its value, > 0.
+/// A word and its value, which is positive.
 struct word_value {
   std::uint32_t word = 0;
   float value = 0.0F;

@@ -20,7 +20,7 @@ namespace orbis::places {
 
 /// The links of a node, stored separately from its descriptor.
 struct tree_node {
-  std::uint32_t first_child = 0;   ///< index of the first child; the last is before the first child of the next node
+  std::uint32_t first_child = 0;   ///< index of the first child; the children end where those of the next node begin
   std::uint32_t inner_before = 0;  ///< number of nodes with children before this one
 };
 
@@ -78,7 +78,7 @@ template <std::size_t Bits>
     if (next > tree.node_count) return "more children than nodes";
   }
   tree.nodes.back() = {static_cast<std::uint32_t>(next), inner};
-  if (next != tree.node_count) return "fewer children than nodes";
+  if (next != tree.node_count) return "some nodes have no parent";
   if (!child_counts.empty() && child_counts.back() == 0) return "the last inner node has no children";
   if (tree.node_count - inner != (tree.word_count() == 0 ? 1 : tree.word_count()))
     return std::to_string(tree.node_count - inner) + " leaves, but " + std::to_string(tree.word_count()) + " words";

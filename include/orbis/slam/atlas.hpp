@@ -26,7 +26,7 @@ class basic_atlas {
  public:
   using map_type = basic_map<D>;
 
-  /// Creates an atlas with one empty map. The arguments are those of `basic_map`; all maps have the same values.
+  /// Creates an atlas with one empty map. The arguments are passed to the constructor of every new map.
   explicit basic_atlas(int levels = 8, double scale_factor = 1.2, std::uint32_t min_shared = 15)
       : levels_{levels}, scale_factor_{scale_factor}, min_shared_{min_shared} {
     create();
@@ -84,14 +84,14 @@ class basic_atlas {
     if (active_ == from) active_ = into;
     return offsets;
   }
-  /// Returns the current id of a keyframe, after merges of its map. The keyframe may have been erased since (see
-  /// `basic_map::replacement`). Ids in a removed map are returned unchanged. O(merges).
+  /// Returns the current id of a keyframe, which changes when its map is merged into another one. The keyframe may have
+  /// been erased since (see `basic_map::replacement`). Ids in a removed map are returned unchanged. O(merges).
   [[nodiscard]] map_keyframe current(map_keyframe k) const {
     for (auto to = merged_.find(k.map); to != merged_.end(); to = merged_.find(k.map))
       k = {to->second.into, k.keyframe + to->second.offsets.keyframes};
     return k;
   }
-  /// Returns the current id of a landmark, after merges of its map. @pre l != no_id
+  /// Returns the current id of a landmark, which changes when its map is merged into another one. @pre l != no_id
   [[nodiscard]] landmark_id current(map_id map, landmark_id l) const {
     for (auto to = merged_.find(map); to != merged_.end(); to = merged_.find(map)) {
       map = to->second.into;

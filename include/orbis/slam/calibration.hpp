@@ -29,9 +29,9 @@ struct calibration_options {
   /// (focal lengths; principal point and tangential distortion; radial distortion). Groups above this limit are held
   /// fixed.
   double max_effect = 2.0;
-  /// Weight of depth relative to tracking. Depth errors are correlated between images (misregistration with colour, the
-  /// depth camera's own distortion) and would be attributed to the lens; a small weight is sufficient to fix the scale
-  /// of the map.
+  /// Weight of the depth residuals, relative to their weight in tracking. Depth errors are correlated between images
+  /// (misregistration with colour, the depth camera's own distortion) and would be attributed to the lens; a small
+  /// weight is sufficient to fix the scale of the map.
   double depth_weight = 0.0025;
   bool keeps_aspect = true;  ///< keeps the given ratio of the focal lengths, for example 1 for square pixels
   /// Maximum number of consecutive keyframes; those with the most observations are chosen. The cost is cubic in this

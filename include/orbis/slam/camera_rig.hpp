@@ -21,7 +21,7 @@ struct camera_rig {
   pyramid_scales scales{};               ///< scales of the extractor's image pyramid
   double min_depth = 0.1;                ///< metres; depth outside [min_depth, max_depth] is not used
   double max_depth = 10.0;               ///< metres
-  bool scale_is_known = true;            ///< false if no depth is measured: lengths are in an arbitrary unit per map
+  bool scale_is_known = true;            ///< false if no depth is measured: each map has an arbitrary unit of length
 
   [[nodiscard]] const Camera& camera() const noexcept { return model.camera; }
   /// Returns the standard deviation, in metres, of a depth (metres) measured at a keypoint on a pyramid level.

@@ -71,13 +71,14 @@ class covisibility_graph {
     decrease(a, b, count);
     decrease(b, a, count);
   }
-  /// Removes a keyframe from all pairs. O(d^2) at most.
+  /// Removes all pairs of a keyframe. O(d^2) at most.
   void erase(keyframe_id k) {
     const auto gone = nodes_.extract(k.value());
     if (gone.empty()) return;
     for (const covisible& other : gone.mapped().pairs) decrease(other.keyframe, k, other.shared);
   }
-  /// Adds another graph after adding `offset` to its ids. @pre all ids of this graph are less than `offset`
+  /// Merges another graph into this one, with its ids increased by `offset`. @pre all ids of this graph are less than
+  /// `offset`
   void append(covisibility_graph&& other, std::uint32_t offset) {
     for (auto& [id, n] : other.nodes_) {
       assert(!nodes_.contains(id + offset));

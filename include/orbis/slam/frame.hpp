@@ -32,8 +32,8 @@ enum class sensor_kind : std::uint8_t { unknown, rgbd, stereo, monocular };
   return "unknown";
 }
 
-/// Change in the depth of a keypoint if the depth image was captured `step` seconds later or earlier than assumed, in
-/// metres; 0 if unknown.
+/// Change in the depth of a keypoint if the depth image had been captured `step` seconds later or earlier than assumed,
+/// in metres; 0 if unknown.
 struct depth_change {
   static constexpr double step = 0.008;  ///< seconds; short enough that few depth edges are crossed
   float later = 0.0F, earlier = 0.0F;

@@ -13,7 +13,7 @@
 
 namespace orbis::slam {
 
-/// The pixels around a landmark in one image, on the surface through the landmark. Pixel (u, v) shows the point
+/// The pixels around a landmark in one image, which show the surface around the landmark. Pixel (u, v) shows the point
 /// `position + (u - centre) * across + (v - centre) * down`.
 struct landmark_patch {
   static constexpr int size = 24;  ///< pixels per side, most of which are a margin for motion blur

@@ -91,7 +91,8 @@ class basic_map {
   /// was removed, or if 2^18 or more landmarks have been added since it was erased.
   [[nodiscard]] landmark_id replacement(landmark_id id) const noexcept { return content_.landmarks.replacement(id); }
   /// Returns the current keyframe for `id`: `id` if it exists, otherwise its nearest existing ancestor in the spanning
-  /// tree; `no_id` if no keyframe is left, or if the keyframe was forgotten and the map was read from a file.
+  /// tree, or a former child if the root was erased; `no_id` if no keyframe is left, or if the keyframe was forgotten
+  /// and the map was read from a file.
   [[nodiscard]] keyframe_id replacement(keyframe_id id) const noexcept { return content_.keyframes.replacement(id); }
   [[deprecated("use replacement")]] [[nodiscard]] landmark_id replacement_of(landmark_id id) const noexcept {
     return replacement(id);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Reading and writing maps in files.
+/// Reading and writing of map files.
 ///
 /// A file is little-endian; equal maps give equal bytes on every machine:
 ///

@@ -4,8 +4,8 @@
 /// coordinates.
 ///
 /// Tracking and adjustment compare right coordinates (`optimize::reprojection`), either in a second camera or in a
-/// virtual one that models the depth sensor. To support another kind of sensor, pass a function that creates such a
-/// frame to `system::track_measured`.
+/// virtual one that models the depth sensor. To support another kind of sensor, pass a function that measures its
+/// frames to `system::track_measured`.
 #pragma once
 
 #include <algorithm>

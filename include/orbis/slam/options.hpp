@@ -21,7 +21,7 @@ namespace orbis::slam {
 /// Conditions under which a frame becomes a keyframe.
 struct keyframe_options {
   double interval = 0.3;  ///< seconds since the last keyframe after which motion alone triggers a new one
-  /// Translation since the last keyframe that counts as motion, metres; without depth, in median depths.
+  /// Translation since the last keyframe that counts as motion, metres; without depth, in units of the median depth.
   double moved = 0.06;
   double turned = 0.06;             ///< rotation since the last keyframe that counts as motion, radians
   double inlier_ratio = 0.75;       ///< a frame with a smaller share of the reference's landmarks becomes a keyframe
@@ -60,9 +60,9 @@ struct depth_term_options {
   bool enabled = true;           ///< adds the depth term to the keypoint residuals in every pose refinement
   bool recovers = true;          ///< localises the camera by depth when localisation by keypoints fails
   std::size_t points = 400;      ///< maximum number of points per frame
-  double effective_points = 40;  ///< maximum effective number of points: neighbouring depth errors are correlated
+  double effective_points = 40;  ///< maximum total weight, in independent points: neighbouring errors are correlated
   std::size_t surfaces = 16;     ///< maximum number of keyframe surfaces kept; about 130 kB each
-  double weakest = 0.002;        ///< directions with a smaller mean squared normal component are unconstrained
+  double weakest = 0.002;        ///< directions with a smaller mean squared normal component count as unconstrained
   double min_share = 0.7;        ///< for localisation by depth: minimum share of the points on surfaces that fit them
   std::size_t min_points = 100;  ///< for localisation by depth: minimum number of points on known surfaces
   std::size_t min_inliers = 5;   ///< minimum number of landmarks per pose direction not constrained by surfaces
@@ -130,16 +130,16 @@ struct loop_options {
   double alignment_threshold = 3.0;
   std::size_t min_aligned = 12;  ///< minimum number of inliers among the descriptor matches
   std::size_t neighbors = 10;    ///< number of neighbours of the candidate whose landmarks are also searched for
-  double wide_radius = 12.0;     ///< search radius for landmarks around the first estimate of the pose, pixels
-  double radius = 4.0;           ///< search radius around the refined pose, pixels
+  double wide_radius = 12.0;     ///< landmark search radius at the first pose estimate, pixels of a keypoint's level
+  double radius = 4.0;           ///< landmark search radius at the refined pose, pixels of a keypoint's level
   std::uint32_t landmark_distance = 50;  ///< maximum descriptor distance for landmarks
   std::size_t min_inliers = 40;         ///< minimum number of landmarks around the candidate that the keyframe observes
-  std::size_t supporters = 5;           ///< number of neighbours of the keyframe that are examined as supporters
+  std::size_t supporters = 5;           ///< maximum number of neighbours of the keyframe that are tested for agreement
   std::size_t min_supporters = 2;       ///< minimum number of neighbours that agree; all, if the keyframe has fewer
   std::size_t supporter_inliers = 20;   ///< minimum number of landmarks that an agreeing neighbour observes
-  double max_translation = 0.1;         ///< constant part of the allowed translational drift, metres
+  double max_translation = 0.1;         ///< fixed part of the allowed translational drift, metres
   double translation_per_metre = 0.05;  ///< additional drift allowed per metre of the path between the keyframes
-  double max_rotation = 5.0 * std::numbers::pi / 180.0;        ///< constant part of allowed rotational drift, radians
+  double max_rotation = 5.0 * std::numbers::pi / 180.0;        ///< fixed part of the allowed rotational drift, radians
   double rotation_per_metre = 1.0 * std::numbers::pi / 180.0;  ///< additional drift allowed per metre of the path
   /// Maximum standard deviation of the logarithm of the scale between both ends if no lengths are measured. Scale drift
   /// is then unbounded, and of the four limits above, only `max_rotation` applies.
@@ -186,8 +186,9 @@ struct place_options {
 struct moving_options {
   bool enabled = true;            ///< off: every feature counts as static
   std::size_t min_features = 20;  ///< minimum number of features of a moving object
-  double share = 0.15;            ///< minimum share of the matches that disagree with a single pose
-  double seasoned = 1.0;          ///< age at which a landmark is fully trusted to be static, seconds
+  /// A moving object is searched for if more than this share of the matches disagrees with a single camera pose.
+  double share = 0.15;
+  double seasoned = 1.0;  ///< age at which a landmark is fully trusted to be static, seconds
   double reach = 0.2;  ///< radius around moving features within which features of unknown motion are excluded, metres
   double hold = 3.0;   ///< seconds for which moved features stay excluded after coming to rest
 };
@@ -228,9 +229,9 @@ struct options {
   std::size_t min_start_points = 100;   ///< minimum number of keypoints (with depth, if measured) for starting a map
   std::size_t min_inliers = 20;         ///< minimum number of inliers of a tracked frame
   double motion_radius = 15.0;          ///< search radius around the last frame's points, pixels of a keypoint's level
-  double search_radius = 4.0;  ///< search radius for landmarks around a refined pose, pixels of a keypoint's level
-  std::size_t local_keyframes = 40;  ///< maximum number of keyframes whose landmarks are searched for in a frame
-  camera::shutter shutter{};         ///< exposure times of the image rows; the default is a global shutter
+  double search_radius = 4.0;           ///< search radius for landmarks at a refined pose, pixels of a keypoint's level
+  std::size_t local_keyframes = 40;     ///< maximum number of keyframes whose landmarks are searched for in a frame
+  camera::shutter shutter{};            ///< exposure times of the image rows; the default is a global shutter
   /// Estimates the shutter from the frames, starting from `shutter`, and applies significant changes during tracking:
   /// after two seconds, and each time the observation time has grown by half. The existing map is not changed, and the
   /// first frames of a map are not localised again. Takes a few milliseconds per frame. For recordings: estimate from
@@ -265,9 +266,10 @@ struct options {
 };
 
 /// Returns the settings of a rectified stereo camera with focal length `focal` (pixels) and `baseline` (metres), based
-/// on `settings`. Sets `bf`, the range of depth (from one baseline to a disparity of one pixel), and `close_depth` to
-/// 40 baselines, up to which the depth of a single pair is accurate enough (R. Mur-Artal, J. D. Tardos, "ORB-SLAM2",
-/// T-RO 33 (2017), section III.A). Farther points become landmarks by parallax. @pre focal > 0, baseline > 0
+/// on `settings`. Sets `bf`; the depth range, from one baseline to the depth with a disparity of one pixel; and
+/// `close_depth`: 40 baselines, up to which the depth from a single pair is accurate enough (R. Mur-Artal, J. D.
+/// Tardos, "ORB-SLAM2", T-RO 33 (2017), section III.A). Farther points become landmarks by parallax.
+/// @pre focal > 0, baseline > 0
 [[nodiscard]] inline options stereo_options(double focal, double baseline, options settings = {}) {
   assert(focal > 0.0 && baseline > 0.0);
   settings.bf = focal * baseline;

@@ -13,7 +13,7 @@ namespace orbis::slam {
 class pyramid_scales {
  public:
   pyramid_scales() : pyramid_scales(8, 1.2) {}
-  /// Creates the scales of `levels` levels, each smaller than the previous one by `factor`.
+  /// Creates the scales of `levels` levels, each smaller than the previous one by the factor `factor`.
   pyramid_scales(int levels, double factor) : levels_{levels}, factor_{factor} {
     for (int octave = 0; octave != tabled; ++octave)
       scales_[static_cast<std::size_t>(octave)] = std::pow(factor, octave);

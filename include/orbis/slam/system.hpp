@@ -135,7 +135,7 @@ class system {
   /// tracking thread only; takes no lock, so it does not wait for the back end. O(features).
   [[nodiscard]] std::optional<tracked_frame> last_frame() const;
 
-  /// Sets `T_world_camera` of the first frame of every map started by the next frame or later
+  /// Sets `T_world_camera` of the first frame of every map started by the next or a later frame
   /// (`options::initial_pose`). For the tracking thread only. Example: if the gravity direction is known for each
   /// frame, new maps can start upright.
   void set_initial_pose(const se3& T_world_camera) {
@@ -154,8 +154,8 @@ class system {
   void stop() noexcept;
 
   /// Returns the poses of the frames that were tracked in the active map: all, or those within
-  /// `options::trajectory_frames`. Frames follow later corrections of their keyframe, and the first 100 frames of a map
-  /// are localised again after five more keyframes. O(frames).
+  /// `options::trajectory_frames`. The poses follow later corrections of the keyframes, and the first 100 frames of a
+  /// map are localised again after five more keyframes. O(frames).
   [[nodiscard]] orbis::trajectory trajectory() const;
   /// As above, for another map; empty if that map does not exist or none of its frames is left.
   [[nodiscard]] orbis::trajectory trajectory(map_id map) const;

@@ -74,7 +74,7 @@ class bit_votes {
 };
 
 struct k_majority_options {
-  std::uint32_t clusters = 10;  ///< maximum number; fewer if there are fewer distinct descriptors
+  std::uint32_t clusters = 10;  ///< maximum number of clusters; there are fewer if there are fewer distinct descriptors
   int max_iterations = 10;
   std::uint64_t seed = 1;
 };

@@ -42,7 +42,7 @@ template <class Target, std::size_t Bits>
   return best & 0xffffU;
 }
 
-/// Sets `nearest[i]` to the nearest centre of descriptor `i`.
+/// The arguments of `assign_nearest`, which sets `nearest[i]` to the index of the nearest centre of descriptor `i`.
 template <std::size_t Bits>
 struct assignment {
   const bit_words<Bits>* centres;
@@ -61,7 +61,7 @@ struct assignment_kernel {
   }
 };
 
-/// Executes an assignment. @pre 0 < centre_count < 65536
+/// Assigns each descriptor to its nearest centre. @pre 0 < centre_count < 65536
 template <std::size_t Bits>
 void assign_nearest(const assignment<Bits>& a) {
   simd::kernel<assignment_kernel, void(const assignment<Bits>&), simd::popcnt, simd::avx2>()(a);

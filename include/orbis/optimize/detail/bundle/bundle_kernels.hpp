@@ -68,7 +68,7 @@ struct camera_work {
   const R& residual;
   const typename R::view& view;
   std::size_t count = 0;
-  const double* measurements = nullptr;                   ///< for residuals evaluated in lanes
+  const double* measurements = nullptr;                   ///< for residuals evaluated eight at a time
   const typename R::observation* observations = nullptr;  ///< for residuals evaluated individually
   const double* information = nullptr;                    ///< 0 for excluded observations
   const std::uint32_t* point = nullptr;

@@ -41,7 +41,7 @@ class bundle_structure {
   struct group {
     std::uint32_t first_point = 0, points = 0;
     std::uint32_t first_mixed = 0, cameras = 0;
-    std::size_t first_pair = 0;  ///< index of the group's first pair (a > b, a ascending); shared by equal groups
+    std::size_t first_pair = 0;  ///< index of the first pair (a > b, a ascending); shared by groups of the same cameras
   };
   /// Consecutive points with all their observations; ends at the beginning of the next chunk.
   struct chunk {

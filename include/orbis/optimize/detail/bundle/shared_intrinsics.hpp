@@ -511,13 +511,13 @@ class shared_intrinsics {
 
   residual_type residual_;
   double noise_ = 1.0;  ///< standard deviation of the whitened residuals
-  huber loss_{2.447};   ///< square root of the chi-squared gate for two coordinates, times the noise
+  huber loss_{2.447};   ///< width: square root of the chi-squared gate for two coordinates, times noise_
   estimate now_;
   basis_type basis_ = zeros<basis_type>();        ///< derivatives of the parameters, one column per unknown
   int count_ = 0;                                 ///< number of unknowns of the camera
   std::vector<bundle_observation> observations_;  ///< ordered by point
   std::vector<std::size_t> begins_;               ///< start of each point's observations, followed by the end
-  std::vector<out> out_;                          ///< reason for the exclusion of each observation
+  std::vector<out> out_;                          ///< for each observation, the reason for its exclusion
   std::vector<std::uint32_t> row_of_;             ///< for each image: its first unknown; `none` if its pose is fixed
   Eigen::Index pose_rows_ = 0;
 

@@ -47,24 +47,26 @@ struct pixel_gradient {
   double xx, yx, yy;
   explicit pixel_gradient(const metric_ray& r) : xx{1.0 / r.xx}, yx{-r.xy / (r.xx * r.yy)}, yy{1.0 / r.yy} {}
   [[nodiscard]] vec2 operator()(double gx, double gy) const { return {xx * gx, yx * gx + yy * gy}; }
-  /// Multiplies by the transpose.
+  /// Returns the product of the transposed conversion matrix and `g`.
   [[nodiscard]] vec2 back(const vec2& g) const { return {xx * g.x() + yx * g.y(), yy * g.y()}; }
 };
 
-/// An essential matrix and its motion: rotation and direction of the translation of `T_second_first`.
+/// An essential matrix and the motion that it represents: the rotation and the direction of translation of
+/// `T_second_first`.
 struct epipolar_motion {
   so3 rotation;
   vec3 direction;
   mat3 e;
   epipolar_motion(const so3& r, const vec3& t) : rotation{r}, direction{t}, e{hat<double>(t) * r.rotation_matrix()} {}
-  /// Returns the motion after a step: `exp(d.head<3>())` on the left of the rotation, the rest on the sphere of
-  /// directions.
+  /// Returns the motion after a step: the rotation is multiplied by `exp(head<3>(d))` from the left, and the direction
+  /// moves by `tail<2>(d)` on the unit sphere.
   [[nodiscard]] epipolar_motion moved(const matrix<5>& d) const {
     return {so3::exp(head<3>(d)) * rotation, step_on_sphere(direction, tail<2>(d))};
   }
 };
 
-/// Returns the squared Sampson distance of a match in units of its metric.
+/// Returns the squared Sampson distance of a match, where distances are in pixels or in the unit set by
+/// `metric_ray::scale_metric`.
 [[nodiscard]] inline double squared_sampson(const mat3& e, const image_match& m) {
   const vec3 first = m.first.direction(), second = m.second.direction();
   const vec3 line = e * first, other = transposed(e) * second;

@@ -96,7 +96,7 @@ class essential_estimator {
     }
   }
 
-  /// Gauss-Newton on the rotation and the direction of the translation.
+  /// Refines an essential matrix by Gauss-Newton on the rotation and the direction of the translation.
   [[nodiscard]] std::optional<mat3> refine(const mat3& start, std::span<const std::uint32_t> inliers) const {
     return refine(start, inliers, 4);
   }

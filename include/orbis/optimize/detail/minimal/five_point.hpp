@@ -39,7 +39,7 @@ class five_point_solutions {
   std::size_t size_ = 0;
 };
 
-/// Polynomials in x, y and z: degree 1 as coefficients of x, y, z and 1; degrees 2 and 3 in the order of these tables.
+/// Polynomials in x, y and z, represented by their coefficients in the order of the terms in the tables below.
 namespace epipolar_cubics {
 
 using linear = std::array<double, 4>;
@@ -50,7 +50,7 @@ using exponents = std::array<std::uint8_t, 3>;
 inline constexpr std::array<exponents, 4> linear_terms{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {0, 0, 0}}};
 inline constexpr std::array<exponents, 10> quadric_terms{
     {{2, 0, 0}, {1, 1, 0}, {1, 0, 1}, {1, 0, 0}, {0, 2, 0}, {0, 1, 1}, {0, 1, 0}, {0, 0, 2}, {0, 0, 1}, {0, 0, 0}}};
-/// First the terms to eliminate, then the rest: x, y and 1 times powers of z.
+/// The first ten terms are eliminated; the others are x, y and 1, each multiplied by powers of z.
 inline constexpr std::array<exponents, 20> cubic_terms{
     {{3, 0, 0}, {0, 3, 0}, {2, 1, 0}, {1, 2, 0}, {2, 0, 1}, {2, 0, 0}, {0, 2, 1}, {0, 2, 0}, {1, 1, 1}, {1, 1, 0},
      {1, 0, 2}, {1, 0, 1}, {1, 0, 0}, {0, 1, 2}, {0, 1, 1}, {0, 1, 0}, {0, 0, 3}, {0, 0, 2}, {0, 0, 1}, {0, 0, 0}}};
@@ -70,7 +70,7 @@ template <std::size_t A, std::size_t B, std::size_t N>
 inline constexpr auto linear_products = product_table(linear_terms, linear_terms, quadric_terms);
 inline constexpr auto quadric_products = product_table(quadric_terms, linear_terms, cubic_terms);
 
-/// `sum += sign * a * b`.
+/// Adds `sign * a * b` to `sum`.
 inline void add_product(quadric& sum, const linear& a, const linear& b, double sign = 1.0) noexcept {
   for (std::size_t i = 0; i != 4; ++i)
     for (std::size_t j = 0; j != 4; ++j) sum[linear_products[i][j]] += sign * a[i] * b[j];
@@ -108,7 +108,7 @@ inline void add_product(cubic& sum, const quadric& a, const linear& b) noexcept 
   return all;
 }
 
-/// Gauss-Newton on the cubics; returns false if it does not converge to a common root.
+/// Refines `p` by Gauss-Newton on the cubics; returns false if it does not converge to a common root.
 [[nodiscard]] inline bool polish(const std::array<cubic, 10>& cubics, vec3& p) {
   double last = 0.0;
   vec3 previous = p;
@@ -213,8 +213,8 @@ inline void add_product(cubic& sum, const quadric& a, const linear& b) noexcept 
 
 /// Returns all essential matrices with `second[i]^T E first[i] = 0`, for rays of any length. Empty if there are
 /// infinitely many (for example if all rays are in one plane through the centre, or a ray is repeated), or if the rays
-/// are not finite. Rays that differ only by a rotation are not a failure: every translation then gives a matrix. O(1),
-/// no allocation.
+/// are not finite. Rays that differ only by a rotation are not treated as a failure, although every translation then
+/// gives a solution. O(1), no allocation.
 [[nodiscard]] inline five_point_solutions five_point(const std::array<vec3, 5>& first,
                                                      const std::array<vec3, 5>& second) {
   namespace poly = epipolar_cubics;

@@ -21,8 +21,8 @@
 
 namespace orbis::optimize::detail {
 
-/// Returns the homography of four pairs of points, computed from projective bases and normalised to norm 1. Empty if
-/// three points are collinear, or if some points would be behind a camera.
+/// Returns the homography that maps four points to four others, computed from projective bases and normalised to norm
+/// 1. Empty if three points are collinear, or if some points would be behind a camera.
 [[nodiscard]] inline std::optional<mat3> homography_of_four(const std::array<vec2, 4>& first,
                                                             const std::array<vec2, 4>& second) {
   mat3 bases[2];
@@ -67,7 +67,7 @@ struct homography_equations {
     }
     cost += squared_norm(r);
   }
-  /// Returns I + D for a Gauss-Newton step; empty if there is no step.
+  /// Returns I + D for a Gauss-Newton step; empty if the equations do not determine a step.
   [[nodiscard]] std::optional<mat3> step() const {
     small_cholesky<8> factors;
     if (!factors.set(h) || !(factors.factor(1e-9) > 0.0)) return std::nullopt;
@@ -145,7 +145,7 @@ class homography_estimator {
     std::copy(errors.begin(), errors.end(), out.begin());
   }
 
-  /// Gauss-Newton on the transfer errors in both images.
+  /// Refines a homography by Gauss-Newton on the transfer errors in both images.
   [[nodiscard]] std::optional<model> refine(const model& start, std::span<const std::uint32_t> inliers) const {
     return refine(start, inliers, 4);
   }

@@ -92,8 +92,8 @@ struct best_rotation {
                        eigen.values[3] * size};
 }
 
-/// Returns the transform that best maps the first points of n pairs with these moments to the second points; empty if
-/// the moments do not determine a rotation.
+/// Returns the transform that best maps the first points of n pairs to the second points, given the moments of the
+/// pairs; empty if these do not determine a rotation.
 [[nodiscard]] inline std::optional<sim3> transform_between(const pair_moments& moments, std::size_t n,
                                                            bool with_scale) {
   const double spread = std::sqrt(moments.from_spread) * std::sqrt(moments.to_spread);
@@ -109,7 +109,8 @@ struct best_rotation {
   return sim3(rotation, moments.to_mean - scale * (rotation * moments.from_mean), scale);
 }
 
-/// Returns the transform between weighted pairs; empty if the points do not determine a rotation.
+/// Returns the transform that best maps the first points of n weighted pairs to the second points; empty if the points
+/// do not determine a rotation.
 template <class Pair>
 [[nodiscard]] std::optional<sim3> align_pairs(std::size_t n, const Pair& pair, bool with_scale) {
   return transform_between(compute_moments(n, pair), n, with_scale);

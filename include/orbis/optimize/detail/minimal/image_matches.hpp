@@ -18,7 +18,7 @@
 namespace orbis::optimize::detail {
 
 /// The point (x, y) of a pixel at z = 1, and the derivative of the pixel with respect to that point. The derivative
-/// converts distances at z = 1 to pixels; a rotation makes it upper triangular.
+/// converts distances at z = 1 to pixels; a rotation in the image plane has made it upper triangular.
 struct metric_ray {
   double x = 0.0, y = 0.0;
   double xx = 1.0, xy = 0.0, yy = 1.0;

@@ -21,7 +21,8 @@
 
 namespace orbis::optimize::detail {
 
-/// Returns a real root of `c3 x^3 + c2 x^2 + c1 x + c0`; if there are three, the best separated one.
+/// Returns a real root of `c3 x^3 + c2 x^2 + c1 x + c0`; if there are three, the outer root that is farther from the
+/// middle one.
 /// @pre |c3| >= |c0|
 [[nodiscard]] inline double real_root_of_cubic(double c3, double c2, double c1, double c0) {
   if (c3 == 0.0) return 0.0;  // then c0 is also 0
@@ -103,7 +104,7 @@ struct conic {
   return largest > 0.0;
 }
 
-/// Newton's method on the three distances, from an accurate initial value.
+/// Refines the depths by Newton's method on the three distances; `l` must be an accurate initial value.
 inline void polish_depths(vec3& l, const std::array<double, 3>& cosines, const std::array<double, 3>& squared) {
   const auto [b12, b13, b23] = cosines;
   const auto [a12, a13, a23] = squared;
@@ -127,8 +128,8 @@ inline void polish_depths(vec3& l, const std::array<double, 3>& cosines, const s
   }
 }
 
-/// Calls `solution(R, t)` for each pose from the world to the camera with `R * points_world[i] + t` on the ray
-/// `rays[i]` (unit vectors). R is a rotation matrix up to rounding.
+/// Calls `solution(R, t)` for each transform from the world to the camera frame that places `R * points_world[i] + t`
+/// on the ray `rays[i]` (a unit vector) for every i. R is a rotation matrix up to rounding.
 template <class Solution>
 void for_each_p3p(const std::array<vec3, 3>& points_world, const std::array<vec3, 3>& rays, Solution&& solution) {
   const vec3 &y1 = rays[0], &y2 = rays[1], &y3 = rays[2];

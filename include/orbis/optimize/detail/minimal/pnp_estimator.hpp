@@ -119,7 +119,7 @@ struct pose_equations {
   double cost;
 };
 
-/// Gauss-Newton on a pose; `sum_up(pose, equations)` computes the equations.
+/// Refines a pose by Gauss-Newton; `sum_up(pose, equations)` computes the equations.
 template <class SumUp>
 [[nodiscard]] std::optional<centred_pose> descend_pose(const centred_pose& start, int steps, const SumUp& sum_up) {
   struct state {
@@ -156,7 +156,7 @@ class pnp_estimator {
  public:
   struct model {
     centred_pose pose;
-    std::array<float, 12> rows{};  ///< the pose, for the loops over the matches
+    std::array<float, 12> rows{};  ///< the pose as read by the loops over the matches
   };
   static constexpr std::size_t sample_size = 3;
 
@@ -196,7 +196,7 @@ class pnp_estimator {
     return u * u + v * v;
   }
 
-  /// A few steps of Gauss-Newton.
+  /// Refines a model by a few Gauss-Newton steps.
   [[nodiscard]] std::optional<model> refine(const model& start, std::span<const std::uint32_t> inliers) const {
     return refine(start, inliers, 3);
   }

@@ -21,7 +21,7 @@
 
 namespace orbis::optimize::detail {
 
-/// The transform from the world frame, relative to the centre of the points, to the camera frame.
+/// The transform from the world frame, with its origin moved to the centre of the points, to the camera frame.
 struct centred_pose {
   mat3 rotation = identity<mat3>();
   vec3 translation = zeros<vec3>();
@@ -37,7 +37,7 @@ struct pnp_matches {
   std::vector<vec3> rays;               ///< unit vectors
   std::vector<double> columns;          ///< eight lists, `stride` apart
   std::vector<float> float_columns;     ///< the same values as float
-  std::vector<double> gathered;         ///< the matches of one refinement
+  std::vector<double> gathered;         ///< contiguous copies of the matches in a refinement
   std::size_t stride = 0;               ///< size, rounded up to whole blocks
   vec3 centre = zeros<vec3>();
 

@@ -22,8 +22,8 @@
 
 namespace orbis::optimize::detail {
 
-/// Returns the squared distance of a transferred ray from the observed one, in units of the metric; infinite behind the
-/// camera.
+/// Returns the squared distance, in the unit of `metric_ray`, of a transferred ray from the observed one; infinite if
+/// the transferred ray points behind the camera.
 [[nodiscard]] inline double squared_transfer(const vec3& p, const metric_ray& seen) {
   if (!(p.z() > 0.0)) return std::numeric_limits<double>::infinity();
   const double dx = p.x() / p.z() - seen.x, dy = p.y() / p.z() - seen.y;
@@ -54,14 +54,14 @@ class ray_homography_estimator {
     return {make_model(*h, matches_[s[0]].first.direction())};
   }
 
-  /// Returns the mean of the errors of both transfers.
+  /// Returns the mean of the squared errors of both transfers.
   [[nodiscard]] double squared_error(const model& m, std::size_t i) const {
     const image_match& x = matches_[i];
     return 0.5 * (squared_transfer(m.forward * x.first.direction(), x.second) +
                   squared_transfer(m.backward * x.second.direction(), x.first));
   }
 
-  /// Gauss-Newton on the transfer errors in both images.
+  /// Refines a homography by Gauss-Newton on the transfer errors in both images.
   [[nodiscard]] std::optional<model> refine(const model& start, std::span<const std::uint32_t> inliers) const {
     return refine(start, inliers, 4);
   }

@@ -2,7 +2,7 @@
 /// @file
 /// Hypotheses for the motion between two views, and their support among the matches.
 ///
-/// Distances are in units of the metric of the matches, which is their standard deviation.
+/// Distances are in units of the standard deviation of the match.
 #pragma once
 
 #include <algorithm>
@@ -35,7 +35,8 @@ inline constexpr double line_gate = 3.841, point_gate = 5.991;
 
 [[nodiscard]] inline double square(double x) { return x * x; }
 
-/// Returns the weight of the Geman-McClure loss; the argument is in units of its squared scale.
+/// Returns the weight of the Geman-McClure loss for a squared residual, given in units of the squared scale of the
+/// loss.
 [[nodiscard]] inline double geman_mcclure_weight(double squared) {
   const double w = 1.0 / (1.0 + squared);
   return w * w;
@@ -94,17 +95,18 @@ enum class agreement : std::uint8_t {
   behind,  ///< rays coplanar with the translation, but not intersecting in front of both cameras
 };
 
-/// Support of a motion. `score`: sum over the agreeing matches of the gate minus the squared distance.
+/// Support of a motion. `score`: the sum, over the agreeing matches, of the maximum squared distance minus the actual
+/// one.
 struct motion_support {
   double score = 0.0;
   std::size_t far = 0, near = 0, behind = 0;
   [[nodiscard]] std::size_t inliers() const noexcept { return far + near; }
 };
 
-/// Minimum parallax, in standard deviations, that distinguishes a point from a point at infinity.
+/// Minimum parallax, in standard deviations, at which a point is distinguished from a point at infinity.
 inline constexpr double least_disparity = 4.0;
 
-/// Returns the squared distance between the observed position of a ray and its position at infinite depth.
+/// Returns the squared distance of the second ray of a match from its expected position for a point at infinite depth.
 [[nodiscard]] inline double squared_disparity(const mat3& rotation, const image_match& m) {
   return squared_transfer(rotation * m.first.direction(), m.second);
 }
@@ -144,8 +146,8 @@ inline constexpr double least_disparity = 4.0;
   return sum;
 }
 
-/// The scores of a homography and of an essential matrix: the sum, over matches and both images, of the gate for a
-/// point minus the squared distance, for distances within the model's own gate.
+/// The scores of a homography and of an essential matrix: sums over the matches in both images. A match whose squared
+/// distance is below the gate of the model adds `point_gate` minus the squared distance; other matches add nothing.
 /// Source: R. Mur-Artal, J. M. M. Montiel, J. D. Tardos, "ORB-SLAM", T-RO 31 (2015), equations 1 and 2.
 struct model_scores {
   double homography = 0.0, essential = 0.0;

@@ -66,8 +66,8 @@ class two_view_search {
       return refined && score(refined->e) > enough;
     });
   }
-  /// Searches for additional motions, starting from translation directions over the whole sphere, each with the best
-  /// rotation.
+  /// Searches for additional motions, starting from evenly distributed directions of translation, each combined with
+  /// the rotation `turn`.
   void add_sampled_motions(const so3& turn) {
     constexpr std::array scales{20.0, 20.0, 10.0, 10.0, 5.0, 5.0};
     constexpr std::size_t few = 150;
@@ -105,7 +105,7 @@ class two_view_search {
   }
 
  private:
-  /// Returns true if two refined motions are equal within tolerance.
+  /// Returns true if two refined motions are equal up to the tolerances.
   [[nodiscard]] static bool same(const epipolar_motion& a, const epipolar_motion& b) {
     constexpr double turned = 0.02, apart = 0.1;  // tolerances of rotation and direction, radians
     return (a.rotation.inverse() * b.rotation).angle() < turned &&
@@ -151,9 +151,10 @@ struct two_view_inliers {
   }
 
  private:
-  /// Uses the larger of two estimates: one from the noise of matches with independent errors, and one from the change
-  /// of the motion when the matches in a part of the image are left out (delete-a-group jackknife). The latter covers
-  /// correlated errors: those of neighbouring matches, of moving objects, and of the rows of a rolling shutter.
+  /// Estimates the deviations as the larger of two values: one from the noise of matches with independent errors, and
+  /// one from the change of the motion when the matches in a part of the image are left out (delete-a-group jackknife).
+  /// The latter covers correlated errors: those of neighbouring matches, of moving objects, and of the rows of a
+  /// rolling shutter.
   void estimate_deviations(const epipolar_motion& motion) {
     constexpr std::size_t side = 3, parts = side * side;
     std::vector<const Match*> order = all;

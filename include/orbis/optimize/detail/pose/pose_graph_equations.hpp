@@ -153,7 +153,7 @@ class pose_graph_equations {
     return cost;
   }
 
-  /// Sums the contributions of all bundles at an unknown.
+  /// Sums the contributions of all bundles that connect an unknown to other vertices.
   void gather(std::size_t u) {
     block hessian = zeros<block>();
     vector gradient = zeros<vector>();

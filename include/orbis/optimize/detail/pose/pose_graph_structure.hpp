@@ -19,14 +19,14 @@
 
 namespace orbis::optimize::detail {
 
-/// The result of a check.
+/// The result of checking a graph: a status, and the index of the vertex or edge that caused a failure.
 struct pose_graph_finding {
   pose_graph_status status = pose_graph_status::converged;  ///< `converged` means no failure
   std::size_t where = 0;
 };
 
-/// Returns true if a matrix is symmetric and positive definite, independent of the units of its rows; optionally also
-/// accepts semidefinite matrices.
+/// Returns true if a matrix is symmetric and positive definite; the units of its rows do not affect the result.
+/// Optionally also accepts semidefinite matrices.
 template <int N>
 [[nodiscard]] bool is_information(const matrix<N, N>& given, bool semidefinite) {
   if (!all_finite(given)) return false;
@@ -89,7 +89,7 @@ class pose_graph_structure {
   std::vector<edge_bundle> bundles;                 ///< bundles between two unknowns come first
   std::vector<std::uint32_t> bundled;               ///< indices of the edges, ordered by bundle
   std::vector<block_place> places;                  ///< for each bundle between two unknowns, in order: its block
-  std::vector<std::uint32_t> first_touch, touches;  ///< at each unknown: 2 * bundle, plus 1 if the unknown is its `to`
+  std::vector<std::uint32_t> first_touch, touches;  ///< for each unknown, its bundles: 2 * bundle, plus 1 if it is `to`
 
   /// Determines the unknowns and, if the graph differs from that of the previous call, the blocks (`changed` is then
   /// true).

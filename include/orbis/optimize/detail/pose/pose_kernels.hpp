@@ -38,7 +38,7 @@ struct pose_sums {
   std::array<double, 9> corner{};
   std::array<double, 6> rotation{};
   std::array<double, 6> gradient{};
-  double cost = 0.0;  ///< half the robust cost
+  double cost = 0.0;  ///< half the sum of the robust loss
 };
 
 /// The constants of one pass over the observations.
@@ -79,7 +79,7 @@ ORBIS_ALWAYS_INLINE void see(const pose_lanes& in, std::size_t i, const L& infor
 }
 
 /// Computes the equations of the first `count` observations, a multiple of eight. A point without a projection has the
-/// cost of a point at the gate, so that losing points never reduces the cost of a step.
+/// cost of a point at the gate, so that a step cannot reduce the cost by losing points.
 template <simd::target Target, class Camera>
 ORBIS_ALWAYS_INLINE void sum_pose(const pose_lanes& in, std::size_t count, const Camera& camera, const pose_at& at,
                                   const huber& loss, pose_sums& out) {

@@ -108,7 +108,7 @@ requires(B >= 1) class block_cholesky {
     for (const std::uint32_t row : symbolic_.rows_of(node)) place_of_row_[row] = place++;
   }
 
-  /// Subtracts from the panel of `s` the products with the columns of an earlier supernode.
+  /// Subtracts the contribution of an earlier supernode from the panel of `s`.
   void apply(const supernode_update& u, std::size_t s) {
     const supernode& source = symbolic_.supernodes[u.source];
     const supernode& node = symbolic_.supernodes[s];

@@ -23,7 +23,7 @@ struct block_place {
   friend bool operator==(const block_place&, const block_place&) = default;
 };
 
-/// The neighbours of every block: `neighbors(i)` are the blocks that share a place with i.
+/// The neighbours of every block row: `neighbors(i)` contains each j for which (i, j) or (j, i) is one of the places.
 class block_adjacency {
  public:
   block_adjacency() = default;
@@ -156,7 +156,7 @@ class quotient_graph {
   void in_clique_mark(std::uint32_t i, bool in) { remains_[i] = in ? in_clique : 0; }
   [[nodiscard]] bool is_in_clique(std::uint32_t i) const { return remains_[i] == in_clique; }
 
-  /// Collects all variables that share a neighbour or an element with the pivot.
+  /// Collects all variables that are neighbours of the pivot or share an element with it.
   void collect_clique(std::uint32_t pivot) {
     clique_.clear();
     in_clique_mark(pivot, true);
@@ -238,7 +238,7 @@ class quotient_graph {
     }
   }
 
-  /// Merges variables with the same elements and neighbours: they remain indistinguishable.
+  /// Merges variables with the same elements and neighbours, because they would remain indistinguishable.
   void merge_indistinguishable() {
     std::sort(hashes_.begin(), hashes_.end(),
               [](const hashed& a, const hashed& b) { return a.hash != b.hash ? a.hash < b.hash : a.node < b.node; });
@@ -274,9 +274,9 @@ class quotient_graph {
   std::uint32_t size_;
   std::vector<std::uint32_t> weight_;  ///< number of blocks that a node represents
   std::vector<range> list_;
-  std::vector<std::uint32_t> degree_;  ///< for variables: upper bound on the number of blocks connected by elimination
+  std::vector<std::uint32_t> degree_;  ///< for variables: upper bound on the number of adjacent blocks
   std::vector<kind> state_;
-  std::vector<std::uint64_t> remains_;  ///< elements: 1 + weight outside the clique; variables: mark of the clique
+  std::vector<std::uint64_t> remains_;  ///< elements: 1 + weight outside the clique; variables: `in_clique` or 0
   std::vector<std::uint32_t> bucket_, next_, previous_;  ///< lists of the variables of each degree
   std::vector<std::uint32_t> merged_, last_merged_;      ///< chains of variables eliminated together
   std::vector<std::uint32_t> pool_, clique_, touched_;

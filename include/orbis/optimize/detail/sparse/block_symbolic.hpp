@@ -28,7 +28,8 @@ struct supernode {
   std::uint32_t rows = 0;      ///< number of block rows
 };
 
-/// The rows `[begin, end)` of supernode `source`'s panel are in the columns of another supernode, which they update.
+/// The update of a supernode by an earlier one, `source`: the rows `[begin, end)` of the panel of `source` correspond
+/// to columns of the updated supernode.
 struct supernode_update {
   std::uint32_t source = 0;
   std::uint32_t begin = 0, end = 0;  ///< positions in the source's rows
@@ -42,7 +43,7 @@ struct block_symbolic {
   std::vector<std::uint32_t> rows;
   std::vector<std::uint32_t> supernode_of;  ///< supernode of each block column of the factor
   std::vector<supernode_update> updates;    ///< ordered by target, then by source
-  std::vector<std::size_t> first_update;    ///< first update of each supernode as target; one extra entry at the end
+  std::vector<std::size_t> first_update;    ///< index of each target's first update; one extra entry at the end
   std::size_t factor_blocks = 0;  ///< number of blocks in the lower triangle of the panels, including explicit zeros
 
   [[nodiscard]] std::size_t size() const { return order.size(); }

@@ -14,8 +14,8 @@
 
 namespace orbis::optimize::detail {
 
-/// Left-looking factorisation in panels of eight columns. Takes n^3 / 3 multiplications; allocates nothing for a matrix
-/// of the same size as the previous one. Every processor gives the same bits. Not thread-safe.
+/// Left-looking factorisation in panels of eight columns. Takes about n^3 / 6 multiplications; allocates nothing for a
+/// matrix of the same size as the previous one. Every processor gives the same bits. Not thread-safe.
 class dense_cholesky {
  public:
   /// Resizes to an n x n matrix of zeros.

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
 /// The two inner loops of a blocked Cholesky factorisation, on column-major panels whose block columns are `N` wide.
-/// Every instruction set gives the same bits: each element is a sum in the same order, without fused multiply-adds.
+/// Every instruction set gives the same bits: the terms of each element are added in the same order, without fused
+/// multiply-adds.
 #pragma once
 
 #include <cstddef>

@@ -63,7 +63,7 @@ class reduced_solver {
         put(places_[k].column, places_[k].row, transposed(off_diagonal[k]));
     return dense_.factor();
   }
-  /// A block row in which the matrix is not positive definite, after `factor` has returned false.
+  /// The block row at which the matrix was found not to be positive definite, after `factor` has returned false.
   [[nodiscard]] std::uint32_t failed_block() const {
     if (kind_ == kind::sparse) return sparse_.failed_block();
     if (kind_ == kind::iterative) return iterative_.failed_block();

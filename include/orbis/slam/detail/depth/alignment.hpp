@@ -111,7 +111,7 @@ association associate(std::span<const surface_sample> samples, std::size_t strid
 /// The cost of the plane residuals as a quadratic function of a motion of the camera frame
 /// (`exp(step) * T_camera_world`), excluding the directions that the planes do not constrain.
 struct depth_equations {
-  pose_quadratic term;     ///< cost with the information of at most the given number of independent points
+  pose_quadratic term;     ///< the cost, scaled down if there are more than `points` planes
   int determined = 0;      ///< number of determined pose directions, out of six
   double least = 0.0;      ///< mean squared normal component in the least determined direction
   double deviation = 0.0;  ///< root mean square of the residuals, in standard deviations

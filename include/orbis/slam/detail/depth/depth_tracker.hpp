@@ -97,7 +97,7 @@ class surface_memory {
 struct depth_alignment {
   moving_pose at;
   int determined = 0;   ///< number of pose directions that the surfaces determine, out of six
-  double least = 0.0;   ///< strength of the weakest determined direction: `depth_equations::least`
+  double least = 0.0;   ///< strength of the weakest direction: see `depth_equations::least`
   association seen;     ///< counts at the aligned pose
   bool is_only = true;  ///< true if no other pose fits nearly as well
 };
@@ -166,7 +166,8 @@ class depth_tracker {
     return e.term;
   }
 
-  /// Counts the points of the frame that are on the surfaces around it, given a pose. @pre find_surfaces was called
+  /// Counts the points of the frame that agree with the surfaces around it at a given pose. @pre find_surfaces was
+  /// called
   [[nodiscard]] association agreement(const moving_pose& at, const camera::shutter& shutter) {
     return associate<Camera>(samples_, 1, placed_, at, shutter, rig_, close, planes_);
   }
@@ -227,7 +228,7 @@ class depth_tracker {
  private:
   static constexpr alignment_gate close{.distance = 0.03, .deviations = 2.0, .cosine = 0.85};
 
-  /// Iterates with a shrinking gate that starts at `distance` (metres).
+  /// Aligns the frame iteratively, with a gate that starts at `distance` (metres) and shrinks.
   depth_alignment descend(const moving_pose& start, const camera::shutter& shutter, std::size_t stride, double distance,
                           int iterations) {
     depth_alignment a;

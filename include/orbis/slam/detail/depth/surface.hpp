@@ -22,13 +22,13 @@ namespace orbis::slam::detail {
 struct surface_cell {
   float x = 0.0F, y = 0.0F, z = 0.0F;     ///< a point on it, metres; `z` is 0 if there is no plane
   float nx = 0.0F, ny = 0.0F, nz = 0.0F;  ///< unit normal, towards the camera
-  float measured = 0.0F;                  ///< measured depth of the cell, excluding its neighbours, metres
+  float measured = 0.0F;                  ///< depth measured in this cell alone, without its neighbours, metres
   [[nodiscard]] bool is_there() const noexcept { return z > 0.0F; }
   [[nodiscard]] vec3 point() const { return {static_cast<double>(x), static_cast<double>(y), static_cast<double>(z)}; }
   [[nodiscard]] vec3 normal() const {
     return {static_cast<double>(nx), static_cast<double>(ny), static_cast<double>(nz)};
   }
-  /// Returns the measured point on the same ray.
+  /// Returns the point at the measured depth on the ray through `point()`.
   [[nodiscard]] vec3 measured_point() const { return static_cast<double>(measured / z) * point(); }
 };
 

@@ -55,7 +55,7 @@ class surface_sampler {
  private:
   static constexpr std::size_t across = 5, bin_count = across * across;
 
-  /// Returns the bin of a normal. Normals point towards the camera, so that x and y are sufficient.
+  /// Returns the bin of a normal. Normals point towards the camera, so x and y are sufficient.
   [[nodiscard]] static std::size_t bin_of(const surface_cell& c) noexcept {
     const auto part = [](float x) {
       const auto i = static_cast<int>((x + 1.0F) * 0.5F * static_cast<float>(across));

@@ -37,7 +37,7 @@ struct motion_split {
 
 /// Minimum trust for a match to count as static.
 inline constexpr double enough_trust = 0.7;
-/// The weight of a match without trust.
+/// Minimum weight of a match, however low its trust.
 inline constexpr double least_trust = 0.02;
 
 /// Returns true if the number of outliers justifies a search for a second motion.
@@ -47,9 +47,9 @@ inline constexpr double least_trust = 0.02;
   return outliers >= o.min_features && static_cast<double>(outliers) > o.share * static_cast<double>(matches);
 }
 
-/// Searches for a second rigid motion among matches many of which disagree with a single pose, and decides which of the
-/// two motions is that of the camera: the one with the greater sum of trust times spread. Matches with old landmarks
-/// are trusted: an object that biases the pose is assumed to have appeared recently, or to be small compared with the
+/// Searches for a second rigid motion when many matches disagree with a single pose, and decides which of the two
+/// motions is that of the camera: the one with the greater sum of trust times spread. Matches with old landmarks are
+/// trusted: an object that biases the pose is assumed to have appeared recently, or to be small compared with the
 /// background. The candidate poses include the one estimated only from the trusted matches, starting from the
 /// prediction. The second motion is found by RANSAC among the outliers of the first, as in P. H. S. Torr, "Geometric
 /// motion segmentation and model selection", Phil. Trans. R. Soc. A 356 (1998).
@@ -234,7 +234,7 @@ class motion_splitter {
     return count >= options_.min_features;
   }
 
-  /// Returns true if most of the nearest points of a match are outliers. O(matches).
+  /// Returns true if most of the points nearest to that of a match are outliers. O(matches).
   [[nodiscard]] bool is_among_outliers(std::span<const std::uint8_t> outliers, std::size_t which) const {
     struct neighbour {
       double distance = std::numeric_limits<double>::infinity();

@@ -29,7 +29,8 @@
 
 namespace orbis::slam::detail {
 
-/// Removes features of a frame, keeping the order of the others. `leave_out`: one entry per feature.
+/// Removes features of a frame, keeping the order of the others. `leave_out`: one entry per feature, nonzero for those
+/// to remove.
 template <feature_descriptor D>
 void remove_features(basic_frame<D>& f, std::span<const std::uint8_t> leave_out) {
   std::size_t kept = 0;
@@ -54,7 +55,7 @@ void remove_features(basic_frame<D>& f, std::span<const std::uint8_t> leave_out)
   f.grid = features::keypoint_grid(f.features.keypoints);
 }
 
-/// The features of the last frame on moving objects. Call for each frame: `find`, then `judge` on matches of static
+/// The features on moving objects in the last frame. Call for each frame: `find`, then `judge` on matches of static
 /// features, `spread` when the pose is known, and `take_out` at the end. As long as nothing moves, each of these
 /// functions returns immediately and changes nothing.
 ///
@@ -122,8 +123,9 @@ class moving_features {
     std::erase_if(matches, [&](const features::match& m) { return is_left_out_[m.train] != 0; });
   }
 
-  /// Searches for a second motion after refinement of a frame's pose on matches of `list`, if many of them disagree. If
-  /// one is found, replaces the pose and landmarks of the frame. Returns the number of matches that agree.
+  /// Searches for a second motion after a frame's pose has been refined on the matches of `list`, if many of them
+  /// disagree or a moving object may bias the pose. If one is found, replaces the pose and landmarks of the frame.
+  /// Returns the number of matches that agree.
   std::size_t judge(basic_frame<D>& f, const basic_map<D>& m, const search_list<D>& list,
                     std::span<const features::match> matches, std::size_t inliers, const se3& predicted) {
     if (!is_enabled() || inliers == 0) return inliers;

@@ -5,8 +5,8 @@
 /// `take_...`, `apply_poses` and `erase_outliers` access the map; the solver works on the snapshot. Keyframes,
 /// landmarks and observations may be added between these calls: new keyframes follow their parent in the spanning tree;
 /// new landmarks, and landmarks with a single observation, are not adjusted and follow the keyframe that created them.
-/// The root of the map is held fixed. If lengths are not measured, all data relative to a keyframe are scaled with the
-/// lengths in its view.
+/// The root of the map is held fixed. If lengths are not measured, the adjustment may change them: all data relative to
+/// a keyframe are then scaled by the same factor as the lengths in its view.
 ///
 /// Source: R. Mur-Artal, J. D. Tardos, "ORB-SLAM2", T-RO 33 (2017), section III.E.
 #pragma once
@@ -36,8 +36,8 @@ struct report {
   std::size_t observations = 0;  ///< number of observations used
   std::size_t outliers = 0;      ///< number of observations that disagreed and were erased
   int iterations = 0;
-  double initial_cost = 0.0;  ///< half the robust cost (sum of robustified squared errors)
-  double final_cost = 0.0;    ///< half the robust cost at the end, excluding outliers
+  double initial_cost = 0.0;  ///< half the sum of the robust loss over the observations
+  double final_cost = 0.0;    ///< half the sum of the robust loss at the end, excluding outliers
 };
 
 struct snapshot : bundle_snapshot {

@@ -56,9 +56,9 @@ template <feature_descriptor D>
   return taken;
 }
 
-/// Searches for landmarks in a frame at `T_world_camera`: within `radius` pixels (of the predicted level) around their
-/// projections, with a descriptor distance of at most `distance`. In the matches, `query` is the index of a landmark
-/// and `train` that of a keypoint; no keypoint is matched twice. O(landmarks).
+/// Searches for landmarks in a frame at `T_world_camera`: within `radius` pixels (at the predicted pyramid level) of
+/// their projections, with a descriptor distance of at most `distance`. In the matches, `query` is the index of a
+/// landmark and `train` that of a keypoint; no keypoint is matched twice. O(landmarks).
 template <camera::camera_model Camera, feature_descriptor D>
 [[nodiscard]] std::vector<features::match> find_landmarks(const landmark_snapshot<D>& known, const basic_frame<D>& f,
                                                           const se3& T_world_camera, const camera_rig<Camera>& rig,

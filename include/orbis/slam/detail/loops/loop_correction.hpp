@@ -9,8 +9,9 @@
 /// keyframes follow their parent.
 ///
 /// Source: R. Mur-Artal, J. M. M. Montiel, J. D. Tardos, "ORB-SLAM: a versatile and accurate monocular SLAM system",
-/// T-RO 31 (2015), sections VII.C and VII.D; with depth, poses have no scale. H. Strasdat, J. M. M. Montiel, A. J.
-/// Davison, "Scale drift-aware large scale monocular SLAM", RSS 2010, for the scale without depth.
+/// T-RO 31 (2015), sections VII.C and VII.D; if depth is measured, the poses have no scale. H. Strasdat, J. M. M.
+/// Montiel, A. J. Davison, "Scale drift-aware large scale monocular SLAM", RSS 2010, for the scale if depth is not
+/// measured.
 #pragma once
 
 #include <algorithm>
@@ -107,9 +108,9 @@ template <class T>
   return summary.iterations;
 }
 
-/// Optimises poses with respect to the edges, whose ends are indices of poses; poses with a nonzero entry in `is_fixed`
-/// are held fixed. If `scale_is_known`, all scales are 1 and stay 1; otherwise scales are optimised as well. Returns
-/// the number of iterations; empty, with unusable poses, on failure or if `callback` cancels.
+/// Optimises poses with respect to the edges, whose ends are indices into `poses`; poses with a nonzero entry in
+/// `is_fixed` are held fixed. If `scale_is_known`, all scales are 1 and stay 1; otherwise scales are optimised as well.
+/// Returns the number of iterations; empty, with unusable poses, on failure or if `callback` cancels.
 template <class S = double>
 [[nodiscard]] std::optional<int> optimize_poses(std::type_identity_t<std::span<basic_sim3<S>>> poses,
                                                 const std::vector<essential_edge>& edges,
@@ -154,9 +155,9 @@ struct solution {
   int iterations = 0;
 };
 
-/// Copies the data needed for the correction. Empty if a keyframe of the match no longer exists. O(keyframes + pairs
-/// that share landmarks + features of the neighbourhood).
-/// @pre both keyframes of the match are in the map
+/// Copies the data needed for the correction. Empty if a keyframe of the match no longer exists, or both are the same.
+/// O(keyframes + pairs that share landmarks + features of the neighbourhood).
+/// @pre both keyframes of the match are, or were, in this map
 template <feature_descriptor D>
 [[nodiscard]] std::optional<snapshot<D>> take(const basic_map<D>& m, const loop_match& match,
                                               const loop_correction_options& o = {}) {

@@ -40,7 +40,7 @@ template <feature_descriptor D>
 struct snapshot {
   loop_match match;
   landmark_snapshot<D> landmarks;  ///< around the candidate
-  std::vector<image<D>> images;    ///< images around the keyframe
+  std::vector<image<D>> images;    ///< the keyframe and its neighbours
 };
 
 /// A keyframe that observes a landmark of the candidate's neighbourhood.

@@ -26,7 +26,7 @@ struct report {
   id_offsets offsets;     ///< offsets added to the ids of the merged map
   keyframe_id keyframe;   ///< keyframe of the match, with its new id
   keyframe_id candidate;  ///< candidate of the match
-  sim3 T_into_from;       ///< motion of the merged map
+  sim3 T_into_from;       ///< transform applied to the merged map
 };
 
 template <feature_descriptor D>

@@ -53,7 +53,8 @@ class counter {
   }
 
   std::vector<entry> entries_;
-  std::vector<std::uint32_t> table_;  ///< index of the entry + 1, or 0; the size is a power of two; at least half free
+  /// In each slot, the index of an entry plus one, or 0. The size is a power of two; at least half of the slots are 0.
+  std::vector<std::uint32_t> table_;
 };
 
 }  // namespace orbis::slam::detail

@@ -21,7 +21,7 @@ void put(std::string& to, T... values) {
   (append_little_endian(to, values), ...);
 }
 
-inline constexpr std::size_t section_head = 12, section_tail = 4;  ///< bytes of name and length; bytes of the checksum
+inline constexpr std::size_t section_head = 12, section_tail = 4;  ///< bytes before and after the content
 
 /// Appends a section; `write(std::string&)` appends its content.
 template <class Write>
@@ -36,7 +36,7 @@ void put_section(std::string& to, std::string_view name, Write&& write) {
   put(to, crc32c(std::as_bytes(std::span{to}).subspan(begin)));
 }
 
-/// Reads numbers from the content of a section. After the end, it returns zeros and sets `ended`.
+/// Reads numbers from the content of a section. Past the end, it returns zeros and sets `ended`.
 class section_reader {
  public:
   explicit section_reader(std::string_view content) : content_{content} {}

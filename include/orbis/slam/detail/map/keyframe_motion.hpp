@@ -47,9 +47,10 @@ template <feature_descriptor D>
   return around;
 }
 
-/// Returns the motion of every keyframe of a map, given new poses of some of them (with the scales of the lengths in
-/// view). The others move with their parent in the spanning tree; their motion is the identity if no ancestor has a new
-/// pose. New poses of erased keyframes are ignored. O(keyframes).
+/// Returns the motion of every keyframe of a map, given new poses of some of them; the scale of a new pose is the
+/// factor by which the lengths in the keyframe's view change. The other keyframes move with their parents in the
+/// spanning tree; their motion is the identity if no ancestor has a new pose. New poses of erased keyframes are
+/// ignored. O(keyframes).
 template <feature_descriptor D>
 [[nodiscard]] keyframe_motions propagate_motion(const basic_map<D>& m, std::span<const keyframe_id> solved,
                                                 std::span<const sim3> T_world_camera) {

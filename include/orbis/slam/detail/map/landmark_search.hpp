@@ -22,12 +22,12 @@ struct candidate_point {
   landmark_id landmark;           ///< `no_id` for a point known only from the depth of the last frame
 };
 
-/// Points with their descriptors and search windows, which have the same indices.
+/// Points with their descriptors and search windows, as parallel arrays.
 template <feature_descriptor D>
 struct search_list {
   std::vector<candidate_point> points;
   std::vector<D> descriptors;
-  std::vector<features::keypoint> keypoints;  ///< earlier observations; only the angle is used
+  std::vector<features::keypoint> keypoints;  ///< earlier keypoints of the points, if known; only the angle is used
   std::vector<features::window> windows;
 
   void add(const candidate_point& p, const D& d, const features::keypoint& k, const features::window& w) {
@@ -46,8 +46,8 @@ struct search_list {
           .scale_factor = static_cast<float>(scales.factor())};
 }
 
-/// Adds a point observed by the last frame if it projects into the image. The window has a radius of `radius` pixels of
-/// the level of that observation.
+/// Adds a point observed by the last frame if it projects into the image. The window has a radius of `radius` pixels,
+/// measured at the pyramid level of that observation.
 template <camera::camera_model Camera, feature_descriptor D>
 void add_seen_point(search_list<D>& list, const features::camera_projection<Camera>& project,
                     const pyramid_scales& scales, const candidate_point& point, const D& descriptor,

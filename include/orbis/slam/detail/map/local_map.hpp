@@ -38,9 +38,9 @@ template <feature_descriptor D>
 }
 
 /// Returns the keyframes around a frame, at most `limit`: the reference, the keyframes that share landmarks with the
-/// frame (in descending order of the number shared), then neighbours of the first of these in the covisibility graph
-/// and in the spanning tree. The cost depends on the observations of the frame's landmarks and on these neighbours, not
-/// on the size of the map.
+/// frame (in descending order of the number shared), then neighbours of the first five of these in the covisibility
+/// graph and in the spanning tree. The cost depends on the observations of the frame's landmarks and on these
+/// neighbours, not on the size of the map.
 template <feature_descriptor D>
 [[nodiscard]] std::vector<keyframe_id> local_keyframes(const basic_map<D>& m, const basic_frame<D>& f,
                                                        keyframe_id reference, std::size_t limit) {

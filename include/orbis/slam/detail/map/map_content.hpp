@@ -27,9 +27,9 @@ struct erased_keyframe {
   std::uint64_t number = 0;  ///< sequence number of the erasure
 };
 
-/// Number of subsequently assigned ids after which an erased landmark may be forgotten. Replacements are queried only
-/// for frames and loop matches of the last few seconds; a 30 Hz camera creates this number of landmarks in about a
-/// hundred seconds.
+/// An erased landmark may be forgotten once this number of ids has been assigned after its erasure. Replacements are
+/// queried only for frames and loop matches of the last few seconds; a 30 Hz camera creates this number of landmarks in
+/// about a hundred seconds.
 inline constexpr std::uint32_t remembered_landmarks = 1U << 18U;
 
 template <feature_descriptor D>
@@ -42,7 +42,7 @@ struct map_content {
   slot_map<basic_keyframe<D>, keyframe_id> keyframes;
   slot_map<basic_landmark<D>, landmark_id, remembered_landmarks> landmarks;
   spanning_tree tree;
-  std::map<keyframe_id, erased_keyframe> erased;  ///< erased keyframes that are not forgotten
+  std::map<keyframe_id, erased_keyframe> erased;  ///< erased keyframes whose poses are still known
   std::uint64_t erasures = 0;  ///< number of erasures so far, greater than the sequence number of any erased keyframe
   std::size_t forgotten = 0;   ///< number of keyframe ids that neither exist nor are in `erased`
 };
@@ -54,7 +54,7 @@ inline constexpr std::uint32_t most_landmarks_of_file = 1U << 28U;
 inline constexpr std::uint32_t most_keyframes_of_file = 1U << 28U;
 /// State of a keyframe id in a file, stored before its data.
 inline constexpr std::uint8_t gone_keyframe = 0, kept_keyframe = 1, forgotten_keyframes = 2;
-/// Value stored instead of a landmark's number of observations: the length of a run of erased ids follows.
+/// Value that replaces a landmark's number of observations in a file if the length of a run of erased ids follows.
 inline constexpr std::uint32_t run_of_gone = 0xffffffffU;
 
 }  // namespace orbis::slam::detail

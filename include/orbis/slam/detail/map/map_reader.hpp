@@ -226,7 +226,7 @@ class map_reader {
         const auto at = to_.erased.find(k);
         if (at == to_.erased.end()) return wrong("keyframe " + to_string(id) + ": its replacement is not in the map");
         const auto [first, is_new] = met.emplace(k, id);
-        if (!is_new && first->second == id) return wrong("keyframe " + to_string(id) + ": is its own replacement");
+        if (!is_new && first->second == id) return wrong("keyframe " + to_string(id) + ": it is its own replacement");
         if (!is_new) break;  // the rest of the chain was checked before
         k = at->second.replacement;
       }

@@ -62,7 +62,7 @@ class paged_slots {
     size_ += count / page_size * page_size;
     for (count %= page_size; count != 0; --count) push_back(gone);
   }
-  /// @pre contains(i); `now` is `gone`, or `erased` with another id
+  /// @pre contains(i); `now` is `gone`, or `erased` combined with another id
   void erase(std::uint32_t i, std::uint32_t now) {
     assert(contains(i) && (now & erased) != 0);
     const std::uint32_t page = page_of(i);
@@ -117,8 +117,8 @@ class paged_slots {
   static constexpr std::uint32_t chunk_size = 256 * page_size;
 
   struct retired_page {
-    std::uint32_t first;  ///< first id of the page
-    std::uint32_t since;  ///< size() when the last id of the page was erased
+    std::uint32_t first;  ///< an id of the page
+    std::uint32_t since;  ///< `size()` when the page was retired
   };
 
   template <class MayHold, class Wanted>
@@ -187,7 +187,7 @@ class paged_slots {
   std::uint32_t remembered_;
   std::uint32_t size_ = 0;
   bool adopts_ = false;
-  std::size_t adopted_from_ = 0;          ///< index in `retired_` of the first page of the import
+  std::size_t adopted_from_ = 0;          ///< index in `retired_` of the first page retired during the import
   std::vector<std::uint32_t> chunks_;     ///< for each id / 2^16: index of a group of 256 `pages_`, or `none`
   std::vector<std::uint32_t> pages_;      ///< for each group of 256 ids: index of the page of `slots_`, or `none`
   std::vector<std::uint32_t> slots_;      ///< the stored numbers, page after page

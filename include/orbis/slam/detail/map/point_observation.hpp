@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The observation of a point by a keypoint, and a test of whether they agree.
+/// The observation of a point by a keypoint, and a test for their agreement.
 #pragma once
 
 #include <algorithm>
@@ -17,7 +17,7 @@
 namespace orbis::slam::detail {
 
 /// Returns the observation of any `point` (world, metres) by keypoint `i` of a frame; the standard deviation of the
-/// keypoint is a pixel of its level.
+/// keypoint is one pixel of its level.
 template <camera::camera_model Camera, feature_descriptor D>
 [[nodiscard]] optimize::pose_observation make_observation(const camera_rig<Camera>& rig, const basic_frame<D>& f,
                                                           std::size_t i, const vec3& point) {
@@ -46,13 +46,13 @@ template <camera::camera_model Camera, feature_descriptor D>
   return o;
 }
 
-/// The 95 % chi-square limit for a squared error in standard deviations, with two coordinates, or three with depth.
+/// The 95 % chi-square limit of a squared error, divided by its variance, for two coordinates, or for three with depth.
 [[nodiscard]] constexpr double error_limit(bool has_depth) noexcept {
   return optimize::chi_squared_gate(has_depth ? 3 : 2);
 }
 
-/// Returns true if keypoint `i` of a frame agrees with `point` (world, metres): the reprojection error is below
-/// `error_limit`.
+/// Returns true if keypoint `i` of a frame agrees with `point` (world, metres): the squared reprojection error, divided
+/// by its variance, is at most `error_limit`.
 template <camera::camera_model Camera, feature_descriptor D>
 [[nodiscard]] bool agrees(const camera_rig<Camera>& rig, const basic_frame<D>& f, const se3& T_camera_world,
                           std::size_t i, const vec3& point) {

@@ -51,7 +51,7 @@ class slot_map {
     return last_id();
   }
   /// Adds `count` ids whose objects are already erased, without replacement. O(1) amortised.
-  /// @pre at most `most_ids` ids in all
+  /// @pre at most `most_ids` ids in total
   void add_gone(std::uint32_t count) {
     assert(count <= most_ids - slots_.size());
     slots_.push_gone(count);
@@ -101,10 +101,10 @@ class slot_map {
     return no_id;
   }
 
-  /// Appends all objects and erased ids of `other`; the erased ids count as erased at this moment. Returns the offset
-  /// added to the ids of `other`. Ids inside the objects are not changed. O(ids of `other`); 256 consecutive forgotten
-  /// ids may take one step.
-  /// @pre at most `most_ids` ids in all
+  /// Appends all objects and erased ids of `other`; its erased ids count as erased at the time of the call. Returns the
+  /// offset added to the ids of `other`. Ids inside the objects are not changed. O(ids of `other`); 256 consecutive
+  /// forgotten ids may take one step.
+  /// @pre at most `most_ids` ids in total
   std::uint32_t append(slot_map&& other) {
     assert(other.slots_.size() <= most_ids - slots_.size());
     const std::uint32_t offset = slots_.size();

@@ -105,8 +105,8 @@ struct view_pair {
 /// - the angle between the rays is large enough (not required if depth is used);
 /// - the point agrees with both keypoints (chi-square, 95 %), and with their depth if available;
 /// - the ratio of its distances from the two cameras agrees with the keypoints' pyramid levels.
-/// Returns the number of new landmarks. Computes O(neighbours x keypoints^2) distances to epipolar lines. @pre
-/// m.has_keyframe(newest)
+/// Returns the number of new landmarks. Computes O(neighbours x keypoints^2) distances to epipolar lines.
+/// @pre m.has_keyframe(newest)
 template <feature_descriptor D, camera::camera_model Camera>
 std::size_t triangulate_landmarks(basic_map<D>& m, keyframe_id newest, const camera_rig<Camera>& rig,
                                   const triangulation_options& o = {}) {

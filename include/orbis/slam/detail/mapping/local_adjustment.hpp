@@ -53,9 +53,9 @@ struct snapshot : bundle_snapshot {
 }
 
 /// Copies keyframe `newest`, the keyframes that share the most landmarks with it, and their landmarks. Other keyframes
-/// that observe these landmarks are included but held fixed, as are the root of the map and keyframes localised by
-/// depth. Empty if there is nothing to adjust. `memory`: a previous snapshot, whose memory is reused. O(observations of
-/// the landmarks).
+/// that observe these landmarks are included but held fixed, as are the root keyframe of the map and the keyframes
+/// localised by depth. Empty if there is nothing to adjust. `memory`: a previous snapshot, whose memory is reused.
+/// O(observations of the landmarks).
 /// @pre m.has_keyframe(newest)
 template <feature_descriptor D, camera::camera_model Camera>
 [[nodiscard]] snapshot take(const basic_map<D>& m, keyframe_id newest, const camera_rig<Camera>& rig,
@@ -91,8 +91,8 @@ template <feature_descriptor D, camera::camera_model Camera>
   return s;
 }
 
-/// Returns the motion of a keyframe in the world frame; for a keyframe added later, the motion of its nearest ancestor
-/// in the snapshot. Empty if it did not move.
+/// Returns the motion of a keyframe in the world frame; for a keyframe added since `take`, the motion of its nearest
+/// ancestor in the snapshot. Empty if it did not move.
 template <feature_descriptor D>
 [[nodiscard]] std::optional<se3> find_motion(const basic_map<D>& m, keyframe_id k, const snapshot& s,
                                              const bundle_solution& solved) {

@@ -47,7 +47,7 @@ template <feature_descriptor D>
   return age >= o.age && age <= o.age + 1 && support(m, l) < o.min_support;
 }
 
-/// Removes the unreliable landmarks among those observed by the last keyframes and the neighbours of the newest one.
+/// Removes the unreliable landmarks among those observed by the latest keyframes and the neighbours of the newest one.
 /// Call after each keyframe. Returns the number of removed landmarks. O(observations of these keyframes).
 template <feature_descriptor D>
 std::size_t cull_landmarks(basic_map<D>& m, keyframe_id newest, const culling_options& o) {
@@ -65,10 +65,10 @@ std::size_t cull_landmarks(basic_map<D>& m, keyframe_id newest, const culling_op
   return removed;
 }
 
-/// Returns true if enough of a keyframe's landmarks closer than `close_depth` (metres; infinite if no depth is
-/// measured, so that all count) are observed by enough other keyframes at about the same or a finer pyramid level.
-/// False for a keyframe without close landmarks. O(observations of its landmarks). Source: R. Mur-Artal, J. D. Tardos,
-/// "ORB-SLAM2", T-RO 33 (2017), section III.C, after ORB-SLAM (2015), VI.E.
+/// Returns true if enough of a keyframe's close landmarks are observed by enough other keyframes, at about the same or
+/// a finer pyramid level. A landmark is close up to a depth of `close_depth` (metres; infinite if no depth is measured,
+/// so that all landmarks count). False for a keyframe without close landmarks. O(observations of its landmarks).
+/// Source: R. Mur-Artal, J. D. Tardos, "ORB-SLAM2", T-RO 33 (2017), section III.C, after ORB-SLAM (2015), VI.E.
 template <feature_descriptor D>
 [[nodiscard]] bool is_redundant(const basic_map<D>& m, keyframe_id id, double close_depth, const culling_options& o) {
   const auto& k = m.at(id);

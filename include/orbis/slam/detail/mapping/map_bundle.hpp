@@ -56,7 +56,7 @@ struct bundle_snapshot {
     poses.push_back(T_world_camera);
     is_fixed.push_back(fixed ? 1 : 0);
   }
-  /// Adds a landmark with the observations by those keyframes for which `index_of(id)` is not `no_id`.
+  /// Adds a landmark with its observations by the keyframes for which `index_of(id)` is not `no_id`.
   template <feature_descriptor D, camera::camera_model Camera, class IndexOf>
   void add_landmark(const basic_map<D>& m, const basic_landmark<D>& l, const camera_rig<Camera>& rig,
                     IndexOf&& index_of) {
@@ -91,12 +91,12 @@ bool erase_outlier(basic_map<D>& m, landmark_id l, const observation& source) {
   return true;
 }
 
-/// The result of an adjustment, with the indices of the snapshot.
+/// The result of an adjustment; its arrays are indexed like those of the snapshot.
 struct bundle_solution {
   std::vector<se3> poses;
   std::vector<vec3> points;
   std::vector<std::uint8_t> outliers;  ///< for each observation: 1 if it disagrees with the result
-  bool usable = false;                 ///< true if poses and points are valid, and better than before
+  bool usable = false;                 ///< true if poses and points are valid and no worse than before
   bool complete = false;               ///< false if the adjustment was stopped or failed
   int iterations = 0;
   double initial_cost = 0.0;  ///< half the robust cost (sum of robustified squared errors)
@@ -172,8 +172,8 @@ class bundle_solver {
       to.outliers[i] = squared_[i] > error_limit(!std::isnan(s.observations[i].right)) ? 1 : 0;
   }
 
-  /// Unmarks the outliers that agree with the current poses and points within a standard deviation of one pixel at
-  /// their pyramid level, so that slightly misplaced patches remain observations.
+  /// Unmarks patch observations that agree with the current poses and points if their standard deviation is assumed to
+  /// be one pixel of their level, so that slightly misplaced patches remain observations.
   void keep_rough(const bundle_snapshot& s, bundle_solution& to) const {
     for (std::size_t i = 0; i != s.observations.size(); ++i) {
       const optimize::bundle_observation& o = s.observations[i];

@@ -25,15 +25,15 @@
 
 namespace orbis::slam::detail {
 
-/// A pose and the twist of the camera at its time.
+/// The pose of the camera at a time, and its twist at that time.
 struct moving_pose {
   se3 T_world_camera;
   vec6 twist = zeros<vec6>();  ///< twist of the camera in its own frame, per second, translation first
 };
 
 /// The prior of the twist, independent of the frame's measurements: the mean motion since a previous pose, extrapolated
-/// by part of its change, with a standard deviation for the acceleration of a hand-held camera. Without a previous
-/// pose, the prior only limits the twist to that of a hand-held camera.
+/// by part of its change, with a standard deviation that allows for the acceleration of a hand-held camera. Without a
+/// previous pose, the prior only limits the twist to that of a hand-held camera.
 struct twist_prior {
   std::optional<se3> T_world_before{};  ///< the previous pose, if any
   double interval = 0.0;                ///< time since the previous pose, seconds
@@ -292,7 +292,7 @@ class early_depth_twist {
     gain_ = change * inverse(change + inverse(of_twist));
   }
 
-  mat6 pose_covariance_ = zeros<mat6>(), former_covariance_ = zeros<mat6>();  ///< covariances determined only by pixels
+  mat6 pose_covariance_ = zeros<mat6>(), former_covariance_ = zeros<mat6>();  ///< pose covariances from pixels alone
   mat6 gain_ = identity<mat6>();
 };
 

@@ -35,9 +35,9 @@ void keep_as_read(basic_frame<D>& f) {
 }
 
 /// Moves the keypoints from their positions as read to those at the frame's time; sets their rays and depths, the grid
-/// and `f.twist`. `depth_of(i)`: the depth of the point observed by a keypoint without measured depth, if known; 0: the
-/// point is distant, and only the rotation is applied. A keypoint that would leave the image keeps its position as
-/// read. Does nothing if `as_read` is empty (`keep_as_read`). O(features).
+/// and `f.twist`. `depth_of(i)` returns the depth of the point that keypoint `i`, without measured depth, observes; 0
+/// if it is unknown: the point is then treated as distant, so that only the rotation is applied. A keypoint that would
+/// leave the image keeps its position as read. Does nothing if `as_read` is empty (`keep_as_read`). O(features).
 template <feature_descriptor D, camera::camera_model Camera, class DepthOf>
 void move_to_frame_time(basic_frame<D>& f, const camera_rig<Camera>& rig, const camera::shutter& shutter,
                         const vec6& twist, DepthOf&& depth_of) {

@@ -24,14 +24,15 @@
 
 namespace orbis::slam::detail {
 
-/// Compares each tracked frame with the last keyframes, after the next frame has been tracked: the motion is determined
-/// from both neighbouring frames. Periodically proposes the resulting shutter.
+/// Compares each tracked frame with the last keyframes once the next frame has been tracked, because the motion is
+/// determined from both neighbouring frames. Periodically proposes the resulting shutter.
 class shutter_observer {
  public:
   [[nodiscard]] shutter_estimate estimate() const { return estimate_; }
 
-  /// Reads the depth of the keypoints of a frame as if its depth image had been captured at other times, and sets the
-  /// depth changes. `read_depth(frame, motion)` sets the depths of `as_read`; `assumed`: the motion of the frame.
+  /// Sets the depth changes of a frame's keypoints, by reading their depths as if the depth image had been captured
+  /// earlier or later. `read_depth(frame, motion)` sets the depths of `as_read`; `assumed`: the motion and the shutter
+  /// assumed for the frame.
   template <feature_descriptor D, class ReadDepth>
   static void set_changes(basic_frame<D>& f, const frame_motion& assumed, ReadDepth&& read_depth) {
     basic_frame<D> now, later, earlier;
@@ -110,8 +111,8 @@ class shutter_observer {
 
   /// Revises the estimate each time the observation time has grown by half, and discards the measurements made with the
   /// previous shutter: the equations are valid only near the assumed values, and the gates of tracking are biased
-  /// towards these. Depth slopes are noisy, so that their squares are too large and a step towards the delay is about
-  /// half as long as it should be: several steps are needed.
+  /// towards these values. Because depth slopes are noisy, their squares are too large, and a step towards the true
+  /// delay is only about half as long as it should be: several steps are needed.
   [[nodiscard]] std::optional<camera::shutter> decide(const camera::shutter& assumed) {
     constexpr double first = 2.0, often = 0.5, same = 0.001;  // seconds
     if (watched_ - looked_ < often) return std::nullopt;
@@ -139,11 +140,12 @@ class shutter_observer {
 
   shutter_estimator estimator_;
   shutter_estimate estimate_;
-  std::optional<shutter_estimate> last_;  ///< estimate at the last change
+  std::optional<shutter_estimate> last_;  ///< estimate at the last change of the shutter
   std::vector<std::pair<map_keyframe, row_view>> views_;
   row_view pending_;
   std::optional<map_keyframe> pending_keyframe_;
-  std::optional<vec6> before_, before_that_;             ///< motion to the pending frame, and to the frame before it
+  /// Mean twist in the interval before the pending frame, and in the interval before that one.
+  std::optional<vec6> before_, before_that_;
   double watched_ = 0.0, decided_ = 0.0, looked_ = 0.0;  ///< seconds
 };
 

@@ -178,7 +178,7 @@ class back_end {
     stopped_ = true;
     closer_.stop();
   }
-  /// Returns true if the limit of waiting keyframes is reached and no more keyframes should be created.
+  /// Returns true if the maximum number of keyframes are waiting, so that no more should be created.
   [[nodiscard]] bool is_full() const { return mapping_ && mapping_->waiting() >= most_waiting(); }
   /// Waits until `is_full` is false.
   void wait_for_room() const {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Estimation of the exposure time from motion blur of patches.
+/// Estimation of the exposure time from the motion blur of patches.
 #pragma once
 
 #include <algorithm>
@@ -17,8 +17,8 @@ class exposure_estimation {
   /// Returns the `i`-th exposure time to compare, seconds.
   [[nodiscard]] static constexpr double candidate(std::size_t i) noexcept { return 0.004 * static_cast<double>(i); }
 
-  /// Adds the correlations of a patch in a frame, one per candidate. The more the blur of a patch changes, the greater
-  /// its effect.
+  /// Adds the correlations of a patch in a frame, one per candidate. A patch has more effect the more its correlation
+  /// depends on the exposure time.
   void add(const std::array<double, count>& correlations) noexcept {
     constexpr double memory = 0.999;
     weight_ = memory * weight_ + 1.0;

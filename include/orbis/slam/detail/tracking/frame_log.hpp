@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The tracked frames, each relative to a keyframe, so that they follow later corrections. If limited, only the latest
-/// frames are kept; the others are only counted.
+/// The tracked frames, each relative to a keyframe, so that they follow later corrections. A limited log keeps only the
+/// latest frames and counts the others.
 #pragma once
 
 #include <algorithm>

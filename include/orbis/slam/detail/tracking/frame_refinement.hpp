@@ -27,21 +27,21 @@ class frame_refinement {
  public:
   explicit frame_refinement(Context& context) : c_{context} {}
 
-  /// With a rolling shutter, reads the row measurements of a frame again and corrects its keypoints to its time, based
-  /// on the motion from the last frame to its current pose.
+  /// With a rolling shutter, reads the row measurements of a frame again and corrects its keypoints to the frame's
+  /// time, based on the motion from the last frame to the frame's current pose.
   void correct_rows(const task& t) const {
     if (t.frame.shutter.is_global()) return;
     t.read_rows(t.frame, {t.frame.shutter, motion_between(c_.last, t.frame)});
     move_keypoints(t.frame);
   }
-  /// With a rolling shutter, corrects the keypoints of a frame to its time, based on the motion from the last frame to
-  /// its current pose.
+  /// With a rolling shutter, corrects the keypoints of a frame to the frame's time, based on the motion from the last
+  /// frame to the frame's current pose.
   void move_keypoints(frame_type& f) const {
     if (!f.shutter.is_global()) move_to_frame_time(f, c_.rig, f.shutter, motion_between(c_.last, f));
   }
 
-  /// Matches the landmarks around the reference, within `radius` pixels of a keypoint's level, and their patches.
-  /// Refines the pose, and returns the number of landmarks that agree with it.
+  /// Searches for the landmarks around the reference keyframe, within `radius` pixels of a keypoint's level, and for
+  /// their patches. Refines the pose, and returns the number of landmarks that agree with it.
   std::size_t match_local_map(const task& t, double radius) {
     frame_type& f = t.frame;
     auto& m = t.map();

@@ -53,8 +53,8 @@ class front_end {
 
   /// The outcome of tracking a frame.
   struct outcome {
-    /// Number of landmarks that agree with the pose (number of points with depth, if the frame starts a map); 0 if the
-    /// frame has no pose or, with `is_tracking()`, if only depth determines the pose.
+    /// Number of landmarks that agree with the pose (if the frame starts a map: the number of points it starts with); 0
+    /// if the frame has no pose or, with `is_tracking()`, if only depth determines the pose.
     std::size_t inliers = 0;
     std::optional<map_keyframe> made;   ///< the keyframe created from the frame, if any
     std::optional<map_keyframe> first;  ///< the preceding keyframe, created from an earlier frame to start a map
@@ -73,7 +73,7 @@ class front_end {
     return context_.observer ? std::optional{context_.observer->estimate()} : std::nullopt;
   }
   /// Sets the shutter of a frame, and keeps the frame's keypoints as read if they need correction.
-  /// @pre `f.shutter.depth_delay` is the difference of the frame's timestamps
+  /// @pre `f.shutter.depth_delay` is the difference between the timestamps of the frame's images
   void set_shutter(frame_type& f) const {
     const double by_clock = f.shutter.depth_delay;
     f.shutter = shutter_;
@@ -282,10 +282,10 @@ class front_end {
   camera::shutter shutter_;
   frame_log log_;
   track_counters counters_;
-  double held_since_ = 0.0;           ///< time of the last tracked frame not localised by depth alone, seconds
-  std::optional<double> lost_since_;  ///< time from which the camera counts as lost; empty: that of the next lost frame
+  double held_since_ = 0.0;           ///< time of the last frame localised by landmarks or made a keyframe, seconds
+  std::optional<double> lost_since_;  ///< time since which the camera is lost; if empty, the next lost frame sets it
   landmark_id first_new_;             ///< the first landmark created from the last frame; `no_id`: none
-  std::size_t most_erased_ = 2 * latest_erased;  ///< maximum number of erased keyframes before some are forgotten
+  std::size_t most_erased_ = 2 * latest_erased;  ///< number of erased keyframes at which some are forgotten
 };
 
 }  // namespace orbis::slam::detail

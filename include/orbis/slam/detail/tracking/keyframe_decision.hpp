@@ -51,9 +51,9 @@ template <feature_descriptor D>
   return e;
 }
 
-/// Returns true if the view has changed significantly, if too few of the close keypoints observe landmarks, or if some
-/// time has passed since the last keyframe and the camera has moved. Always false with too few inliers, and for a
-/// camera at rest.
+/// Returns true if the view has changed significantly, if too few close keypoints observe landmarks and many others
+/// could become landmarks, or if some time has passed since the last keyframe and the camera has moved. Always false
+/// with too few inliers.
 [[nodiscard]] inline bool is_keyframe_due(const keyframe_evidence& e, const keyframe_options& o) {
   if (e.inliers <= o.min_inliers) return false;
   const double ratio = e.keyframes < 2 ? o.inlier_ratio_start : o.inlier_ratio;

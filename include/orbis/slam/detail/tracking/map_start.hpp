@@ -45,11 +45,11 @@ class map_start {
     begins_map_ = false;
     first_.reset();
   }
-  /// Discards the candidates for the first frame of a map without depth. Call after a frame was tracked.
+  /// Discards the candidates for the first frame of a map without depth. Call after a frame has been tracked.
   void forget_candidates() { pair_.reset(); }
 
   /// Starts a map from a frame if its measurements are sufficient; without depth, together with an earlier frame. The
-  /// map becomes active. Returns the number of its points.
+  /// map becomes active. Returns the number of points from which the map starts; 0 if no map was started.
   std::size_t begin(const task& t) {
     frame_type& f = t.frame;
     std::size_t points = start_points(f, c_.settings);
@@ -70,7 +70,7 @@ class map_start {
     c_.state = track_state::tracking;
     return points;
   }
-  /// Adds the landmarks of both frames. The second frame must already be a keyframe.
+  /// Adds the landmarks that both frames observe. The second frame must already be a keyframe.
   void add_landmarks(basic_map<descriptor>& m, keyframe_id second) {
     for (const start_point& p : std::exchange(points_, {})) {
       const landmark_id l = m.add_landmark(second, p.second, p.position);
@@ -80,8 +80,8 @@ class map_start {
   }
 
  private:
-  /// Activates a new map, unless no map has been started yet. If the previous map has few keyframes, it is passed to
-  /// `drop_map`.
+  /// Creates and activates a map; if no map has been started yet, the active map is used instead. If the previous map
+  /// has few keyframes, it is passed to `drop_map`.
   void enter_new_map(const task& t) {
     if (c_.state == track_state::not_started) return;
     const map_id before = t.maps.active_id();
@@ -111,7 +111,7 @@ class map_start {
   monocular_start<typename Context::camera_type, descriptor> pair_;
   bool begins_map_ = false;
   std::optional<first_frame> first_;
-  std::vector<start_point> points_;  ///< points of both frames in the world frame, until the second frame is a keyframe
+  std::vector<start_point> points_;  ///< points that both frames observe, until the second one is a keyframe
 };
 
 }  // namespace orbis::slam::detail

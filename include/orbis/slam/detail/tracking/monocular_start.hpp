@@ -30,7 +30,7 @@ namespace orbis::slam::detail {
 
 /// A point that two frames observe.
 struct start_point {
-  std::uint32_t first = 0, second = 0;  ///< keypoints of the two frames
+  std::uint32_t first = 0, second = 0;  ///< its keypoints in the two frames
   vec3 position = zeros<vec3>();        ///< position in the world frame
 };
 
@@ -39,7 +39,7 @@ struct start_point {
 template <feature_descriptor D>
 struct monocular_start_result {
   basic_frame<D> first;              ///< its pose is the identity
-  se3 T_first_second;                ///< pose of the last frame
+  se3 T_first_second;                ///< pose of the second frame
   std::vector<start_point> points;   ///< in ascending order of the first frame's keypoints
   double parallax = 0.0;             ///< median angle between the two rays to a point, radians
   double rotation_deviation = 0.0;   ///< standard deviation of the rotation, radians

@@ -46,7 +46,7 @@ class motion_model {
   }
 
  private:
-  std::optional<vec6> velocity_;  ///< twist of the camera in its own frame, per interval
+  std::optional<vec6> velocity_;  ///< twist of the camera in its own frame, per `interval_`
   double interval_ = 0.0;         ///< seconds
 };
 

@@ -250,7 +250,7 @@ struct match_patch_kernel {
 /// Measures the position of a patch in `image`, at most three pixels of the patch from the expected position. Both are
 /// blurred by motion: the patch by `patch_smear`, the image by `image_smear` (in pixels of the patch). Each is
 /// additionally blurred by the motion of the other, which makes both equal: blur along two lines does not depend on
-/// their order. The mean and the contrast of the patch may differ. Empty if the patch lacks texture in a direction,
+/// their order. Patch and image may differ in mean and contrast. Empty if the patch lacks texture in some direction,
 /// leaves the image, or is not found.
 ///
 /// Sources: S. Baker, I. Matthews, "Lucas-Kanade 20 years on", IJCV 56 (2004), for the inverse compositional steps;

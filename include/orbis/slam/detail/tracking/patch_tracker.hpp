@@ -69,8 +69,8 @@ class patch_tracker {
 
   /// Moves the keypoints that observe landmarks to the positions of their patches in the image, and sets
   /// `f.deviations`. `twist`: the twist of the camera in its own frame, per second. Returns false, and leaves
-  /// `f.deviations` empty, if no patch is found. `estimates`: the frame contributes to the estimate of the exposure.
-  /// O(features).
+  /// `f.deviations` empty, if no patch is found. `estimates`: true if the frame contributes to the estimate of the
+  /// exposure time. O(features).
   /// @pre is_ready()
   [[nodiscard]] bool align(basic_frame<D>& f, const basic_map<D>& m, const vec6& twist, bool estimates = true) {
     const double seconds = exposure();
@@ -358,7 +358,7 @@ class patch_tracker {
   frame_image image_;
   exposure_estimation estimation_;
   double deviation_ = 0.5;             ///< standard deviation of a patch's position, pixels of its level
-  std::vector<moved_keypoint> moved_;  ///< keypoints of the last frame
+  std::vector<moved_keypoint> moved_;  ///< keypoints of the last aligned frame
   std::vector<double> errors_;         ///< reused working memory
 };
 

@@ -21,8 +21,8 @@
 
 namespace orbis::slam::detail {
 
-/// Localises frames when tracking is weak or lost. `Context` is a `tracking_context`. The functions return the number
-/// of landmarks that agree with the pose, 0 on failure, and set the state.
+/// Localises frames when tracking is weak or lost. `Context` is a `tracking_context`. Unless stated otherwise, the
+/// functions set the state and return the number of landmarks that agree with the pose, 0 on failure.
 template <class Context>
 class recovery {
   using frame_type = typename Context::frame_type;
@@ -31,7 +31,8 @@ class recovery {
  public:
   recovery(Context& context, frame_refinement<Context>& refinement) : c_{context}, refinement_{refinement} {}
 
-  /// Aligns the depth of a frame, whose pose is near that of the last frame, with the surfaces of keyframes.
+  /// Aligns the depth of a frame, whose pose is near that of the last frame, with the surfaces of keyframes. Empty on
+  /// failure.
   [[nodiscard]] std::optional<depth_alignment> align_depth(const task& t) {
     constexpr double longest = 2.0;  // seconds
     const double interval = t.frame.timestamp - c_.last.timestamp;

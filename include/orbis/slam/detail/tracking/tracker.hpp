@@ -31,8 +31,8 @@
 namespace orbis::slam::detail {
 
 /// Refines the pose of `f` on matches of `list` (query) with its keypoints (train), starting from `f.T_world_camera`,
-/// and sets `f.landmarks` to those that agree with the result. Returns the number of matches that agree; 0, with an
-/// unchanged pose, if the pose cannot be determined.
+/// and sets `f.landmarks` to the landmarks of the matches that agree with the result. Returns the number of matches
+/// that agree; 0, with an unchanged pose, if the pose cannot be determined.
 template <feature_descriptor D, camera::camera_model Camera>
 std::size_t refine_on_matches(basic_frame<D>& f, const search_list<D>& list, std::span<const features::match> matches,
                               const camera_rig<Camera>& rig) {
@@ -113,7 +113,8 @@ class tracker {
   }
 
   /// Like `by_motion`, for a camera that may have turned in any direction by up to half of its field of view since the
-  /// last frame: tries the rotations with the most matches, at the position of the last frame. Takes about 80 searches.
+  /// last frame: searches with a grid of rotations at the position of the last frame, and tries those with the most
+  /// matches. Takes about 80 searches.
   std::size_t by_turning(basic_frame<D>& f, const basic_map<D>& m, const basic_frame<D>& last) const {
     const auto& camera = rig_.camera();
     const auto corner = camera.unproject({0.0, 0.0});

@@ -29,8 +29,8 @@
 
 namespace orbis::slam::detail {
 
-/// A frame to localise, with its environment. The frame is modified and finally moved from. Of the functions, only
-/// `localized` may be empty.
+/// A frame to localise, with the maps and the functions that this requires. The frame is modified and finally moved
+/// from. All functions except `localized` must be set.
 template <feature_descriptor D>
 struct tracking_task {
   basic_frame<D>& frame;
@@ -38,11 +38,11 @@ struct tracking_task {
   bool is_frozen = false;  ///< true if the maps are not changed and no map is started
   /// Returns true if the back end accepts another keyframe of an existing map.
   std::function<bool()> has_room;
-  /// Sets the row measurements of a rolling shutter (`as_read`), given the motion.
+  /// Sets the depths of the keypoints as read by a rolling shutter (`as_read`), given the motion.
   std::function<void(basic_frame<D>&, const frame_motion&)> read_rows;
   /// Returns the ids of the `count` keyframes with the most similar appearance.
   std::function<std::vector<map_keyframe>(const decltype(basic_frame<D>::features)&, std::size_t count)> find_similar;
-  /// Called for a map with few keyframes when another one becomes active.
+  /// Called for the previous map when a new one is started, if the previous map has few keyframes.
   std::function<void(map_id)> drop_map;
   /// Called when the pose has been estimated, before a keyframe is created.
   std::function<void()> localized;
@@ -124,8 +124,8 @@ struct tracking_context {
     return motion.is_known() ? vec6(mean + 0.5 * (mean - motion.twist())) : mean;
   }
 
-  /// Updates ids and poses kept from the last frame to the current state of the maps, which may have been merged,
-  /// corrected and culled since then.
+  /// Brings the ids and poses kept from the last frame up to date with the maps: since then, maps may have been merged
+  /// or corrected, and keyframes culled.
   void follow_maps(const atlas_type& maps) {
     const map_keyframe now = maps.current(reference);
     if (now.map != reference.map)

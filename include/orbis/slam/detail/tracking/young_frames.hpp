@@ -31,8 +31,8 @@
 namespace orbis::slam::detail {
 
 /// Keeps the first frames of a map. A new map has few landmarks, and keyframes that have not yet been adjusted with
-/// later ones; the frames between these keyframes would retain the initial errors in the trajectory. They are therefore
-/// localised again after several more keyframes, using the motion between their neighbours.
+/// later ones; the frames between these keyframes would keep their initial pose errors in the trajectory. They are
+/// therefore localised again after several more keyframes, using the motion between their neighbours.
 template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers>
 class young_frames {
  public:
