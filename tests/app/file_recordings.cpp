@@ -366,6 +366,18 @@ TEST_CASE("colour and depth of one camera are chosen, with a calibrated camera i
   CHECK(app::open_bag(path, {}).value()->images_of == "/left/image");
 }
 
+TEST_CASE("of a bag with images in hundreds of topics the user must choose") {
+  const temporary_folder folder;
+  const auto path = folder.path() / "a.bag";
+  test::ros_bag_writer bag{path};
+  bag.info("/cam7/camera_info", 1.0, k);
+  for (int i = 0; i != 501; ++i)
+    bag.image("/cam" + std::to_string(i) + "/image_raw", 1.0, "rgb8", view(plain(1, 2, 3)));
+  bag.close();
+  CHECK_THAT(message_of(app::open_bag(path, {})), Contains("a.bag: contains images in more than 500 topics"));
+  CHECK(app::open_bag(path, {.topics = {"/cam7/image_raw"}}).value()->camera.model.k() == k);
+}
+
 TEST_CASE("the camera of compressed images is next to them or one level higher") {
   const temporary_folder folder;
   const auto path = folder.path() / "a.bag";

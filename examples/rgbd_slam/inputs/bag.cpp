@@ -140,6 +140,8 @@ class bag_recording final : public file_recording {
   }
 
   result<void> set_up(const file_recording_options& options) {
+    for (const bag_topic& t : bag_.topics)
+      if (t.type == "sensor_msgs/CameraInfo") info_topics_.try_emplace(t.name, &t);
     if (auto listed = list_topics(); !listed) return listed;
     if (auto chosen = choose(options); !chosen) return chosen;
     if (auto read = read_times(); !read) return read;
@@ -192,6 +194,12 @@ class bag_recording final : public file_recording {
     return bag_.read(m, most);
   }
 
+  /// The messages in the order in which they are stored, in which each chunk is decompressed only once.
+  [[nodiscard]] static std::vector<bag_message> in_file_order(std::vector<bag_message> messages) {
+    std::ranges::sort(messages, {}, [](const bag_message& m) { return std::tuple{m.file, m.chunk, m.at}; });
+    return messages;
+  }
+
   /// Lists the image topics. Encoding and frame are those of the first readable message.
   result<void> list_topics() {
     for (bag_topic& from : bag_.topics) {
@@ -204,7 +212,7 @@ class bag_recording final : public file_recording {
         return true;
       };
       bool is_found = false;
-      for (const bag_message& m : t.messages) {
+      for (const bag_message& m : in_file_order(t.messages)) {
         const auto bytes = read(m);
         if (!bytes && bytes.error().code == errc::unsupported) return fail(bytes.error());
         if (!bytes) continue;
@@ -252,6 +260,10 @@ class bag_recording final : public file_recording {
       if (options.sensor && *options.sensor != sensor) return wrong("the topics do not match --sensor");
       return {};
     }
+    constexpr std::size_t most = 500;
+    if (topics_.size() > most)
+      return fail(errc::invalid_argument, path_,
+                  "contains images in more than " + std::to_string(most) + " topics: specify one or two of them");
     const bool needs_info = !options.camera;
     const auto has_info = [&](const topic& t) { return needs_info && info_topic(t) != nullptr; };
     // Preference: with camera information, visible light, uncompressed, then colour over grey, then rectified over raw.
@@ -390,14 +402,13 @@ class bag_recording final : public file_recording {
     const std::string next = above(of.name), higher = above(next);
     for (const std::string& name : {next + "/camera_info", of.is_compressed() ? higher + "/camera_info" : "",
                                     (of.is_compressed() ? above(higher) : higher) + "/info/camera_info"})
-      for (const bag_topic& t : bag_.topics)
-        if (t.name == name && t.type == "sensor_msgs/CameraInfo") return &t;
+      if (const auto at = info_topics_.find(name); at != info_topics_.end()) return at->second;
     return nullptr;
   }
   /// The first readable `CameraInfo` for the images in `of`; empty if there is none.
   [[nodiscard]] std::optional<ros_messages::camera_info> read_camera_info(const topic& of) const {
     if (const bag_topic* t = info_topic(of))
-      for (const bag_message& m : t->messages)
+      for (const bag_message& m : in_file_order(t->messages))
         if (const auto bytes = read(m))
           if (auto info = ros_messages::parse<ros_messages::camera_info>(*bytes, t->coding, t->name))
             return *std::move(info);
@@ -408,7 +419,7 @@ class bag_recording final : public file_recording {
   [[nodiscard]] std::optional<double> stored_scale() const {
     for (const bag_topic& t : bag_.topics)
       if (is_depth_unit(t.name, t.type) && second_->name.starts_with(t.name.substr(0, t.name.find("option/"))))
-        for (const bag_message& m : t.messages)
+        for (const bag_message& m : in_file_order(t.messages))
           if (const auto bytes = read(m)) {
             message_reader in{*bytes, t.coding};
             const auto metres = static_cast<double>(in.number<float>());
@@ -491,7 +502,7 @@ class bag_recording final : public file_recording {
   void for_each_transform(const Wanted& is_wanted, const F& f) const {
     for (const bag_topic& t : bag_.topics)
       if (is_transform_type(t.type) && is_wanted(t.name))
-        for (const bag_message& m : t.messages)
+        for (const bag_message& m : in_file_order(t.messages))
           if (const auto bytes = read(m))
             if (const auto transforms =
                     ros_messages::parse<std::vector<ros_messages::transform>>(*bytes, t.coding, t.name))
@@ -579,7 +590,7 @@ class bag_recording final : public file_recording {
     const bool has_child = from.type == "nav_msgs/Odometry";
     ros_messages::transform pose;
     std::size_t unread = 0;
-    for (const bag_message& m : from.messages) {
+    for (const bag_message& m : in_file_order(from.messages)) {
       const auto bytes = read(m);
       if (!bytes && bytes.error().code == errc::unsupported) return fail(bytes.error());
       message_reader in{bytes ? *bytes : std::string_view{}, from.coding};
@@ -690,6 +701,7 @@ class bag_recording final : public file_recording {
   std::string path_;
   mutable std::mutex mutex_;  // guards the bag
   mutable bag bag_;
+  std::map<std::string, const bag_topic*> info_topics_;  // of type CameraInfo, by name
   std::map<std::string, topic> topics_;
   topic* first_ = nullptr;   // colour, or the left image
   topic* second_ = nullptr;  // depth, or the right image; null: monocular

@@ -22,7 +22,7 @@ class byte_source {
   /// Opens a file. Errors: not_found, unreadable.
   [[nodiscard]] static orbis::result<byte_source> open(const std::filesystem::path& path) {
     std::error_code error;
-    if (!std::filesystem::exists(path, error))
+    if (!std::filesystem::exists(path, error) && (!error || error == std::errc::no_such_file_or_directory))
       return orbis::fail(orbis::errc::not_found, path.string(), "no such file");
     byte_source source{std::string{}};
     source.size_ = std::filesystem::file_size(path, error);

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <memory>
+#include <new>
 
 #ifdef RGBD_SLAM_BZ2
 #include <bzlib.h>
@@ -51,21 +52,21 @@ orbis::result<decompressed> decompress(std::string_view method, [[maybe_unused]]
   if (method == "lz4") {
 #ifdef RGBD_SLAM_LZ4
     LZ4F_dctx* made = nullptr;
-    if (LZ4F_isError(LZ4F_createDecompressionContext(&made, LZ4F_VERSION)) == 0) {
-      const std::unique_ptr<LZ4F_dctx, decltype(&LZ4F_freeDecompressionContext)> state{made,
-                                                                                       &LZ4F_freeDecompressionContext};
-      return run(bytes, most, [&](std::string_view in, char* to, std::size_t room) {
-        std::size_t read = in.size(), written = room;
-        const std::size_t left = LZ4F_decompress(state.get(), to, &written, in.data(), &read, nullptr);
-        if (LZ4F_isError(left) != 0) return progress{.is_bad = true};
-        return progress{read, written, left == 0};
-      });
-    }
+    if (LZ4F_isError(LZ4F_createDecompressionContext(&made, LZ4F_VERSION)) != 0) throw std::bad_alloc{};
+    const std::unique_ptr<LZ4F_dctx, decltype(&LZ4F_freeDecompressionContext)> state{made,
+                                                                                     &LZ4F_freeDecompressionContext};
+    return run(bytes, most, [&](std::string_view in, char* to, std::size_t room) {
+      std::size_t read = in.size(), written = room;
+      const std::size_t left = LZ4F_decompress(state.get(), to, &written, in.data(), &read, nullptr);
+      if (LZ4F_isError(left) != 0) return progress{.is_bad = true};
+      return progress{read, written, left == 0};
+    });
 #endif
     package = "liblz4-dev";
   } else if (method == "zstd") {
 #ifdef RGBD_SLAM_ZSTD
     const std::unique_ptr<ZSTD_DStream, decltype(&ZSTD_freeDStream)> state{ZSTD_createDStream(), &ZSTD_freeDStream};
+    if (state == nullptr) throw std::bad_alloc{};
     return run(bytes, most, [&](std::string_view in, char* to, std::size_t room) {
       ZSTD_inBuffer from{in.data(), in.size(), 0};
       ZSTD_outBuffer out{to, room, 0};
@@ -77,19 +78,18 @@ orbis::result<decompressed> decompress(std::string_view method, [[maybe_unused]]
   } else if (method == "bz2") {
 #ifdef RGBD_SLAM_BZ2
     bz_stream stream{};
-    if (BZ2_bzDecompressInit(&stream, 0, 0) == BZ_OK) {
-      const std::unique_ptr<bz_stream, decltype(&BZ2_bzDecompressEnd)> end{&stream, &BZ2_bzDecompressEnd};
-      return run(bytes, most, [&](std::string_view in, char* to, std::size_t room) {
-        const auto piece = [](std::size_t n) { return static_cast<unsigned>(std::min<std::size_t>(n, 1U << 30U)); };
-        stream.next_in = const_cast<char*>(in.data());  // not changed
-        stream.avail_in = piece(in.size());
-        stream.next_out = to;
-        stream.avail_out = piece(room);
-        const int state = BZ2_bzDecompress(&stream);
-        return progress{piece(in.size()) - stream.avail_in, piece(room) - stream.avail_out, state == BZ_STREAM_END,
-                        state != BZ_OK && state != BZ_STREAM_END};
-      });
-    }
+    if (BZ2_bzDecompressInit(&stream, 0, 0) != BZ_OK) throw std::bad_alloc{};
+    const std::unique_ptr<bz_stream, decltype(&BZ2_bzDecompressEnd)> end{&stream, &BZ2_bzDecompressEnd};
+    return run(bytes, most, [&](std::string_view in, char* to, std::size_t room) {
+      const auto piece = [](std::size_t n) { return static_cast<unsigned>(std::min<std::size_t>(n, 1U << 30U)); };
+      stream.next_in = const_cast<char*>(in.data());  // not changed
+      stream.avail_in = piece(in.size());
+      stream.next_out = to;
+      stream.avail_out = piece(room);
+      const int state = BZ2_bzDecompress(&stream);
+      return progress{piece(in.size()) - stream.avail_in, piece(room) - stream.avail_out, state == BZ_STREAM_END,
+                      state != BZ_OK && state != BZ_STREAM_END};
+    });
 #endif
     package = "libbz2-dev";
   }

@@ -3,10 +3,11 @@
 /// The coordinate frames of a robot and the transforms between them, as published on /tf_static and /tf.
 #pragma once
 
-#include <algorithm>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <orbis/core/se3.hpp>
@@ -43,18 +44,17 @@ class frame_tree {
   /// The frame, its parent, and so on up to the root. In a cycle, each frame occurs once.
   [[nodiscard]] std::vector<std::string> path_to_root(std::string frame) const {
     std::vector<std::string> path{frame};
-    for (const link* up = find(frame); up != nullptr; up = find(path.back())) {
-      if (std::ranges::find(path, up->parent) != path.end()) break;
+    std::set<std::string> known{frame};
+    for (const link* up = find(frame); up != nullptr && known.insert(up->parent).second; up = find(path.back()))
       path.push_back(up->parent);
-    }
     return path;
   }
   /// `T_a_b`; empty if the frames are not connected by constant links.
   [[nodiscard]] std::optional<orbis::se3> transform(const std::string& a, const std::string& b) const {
-    const auto up_a = constant_path(a), up_b = constant_path(b);
-    for (const auto& [frame_a, T_frame_a] : up_a)
-      for (const auto& [frame_b, T_frame_b] : up_b)
-        if (frame_a == frame_b) return T_frame_a.inverse() * T_frame_b;
+    const auto up_b = constant_path(b);
+    const std::map<std::string, orbis::se3> T_up_b{up_b.begin(), up_b.end()};
+    for (const auto& [frame, T_frame_a] : constant_path(a))
+      if (const auto met = T_up_b.find(frame); met != T_up_b.end()) return T_frame_a.inverse() * met->second;
     return std::nullopt;
   }
 

@@ -8,6 +8,8 @@
 #include <cmath>
 #include <cstdint>
 #include <cstring>
+#include <filesystem>
+#include <system_error>
 #include <thread>
 #include <utility>
 
@@ -60,6 +62,8 @@ class openni_camera final : public camera_device {
 
   result<void> open(const device_options& options) {
     name = options.name.empty() ? "OpenNI2" : options.name;
+    std::error_code ignored;
+    if (std::filesystem::is_fifo(options.name, ignored)) return fail(errc::unreadable, name, "is not a regular file");
     if (openni::OpenNI::initialize() != openni::STATUS_OK) return fail(errc::unreadable, name, reason());
     if (device_.open(options.name.empty() ? openni::ANY_DEVICE : options.name.c_str()) != openni::STATUS_OK)
       return fail(errc::not_found, name, "no depth camera is connected (" + reason() + ")");

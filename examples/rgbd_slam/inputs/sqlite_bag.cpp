@@ -6,6 +6,7 @@
 #ifdef RGBD_SLAM_SQLITE
 #include <algorithm>
 #include <map>
+#include <new>
 #include <utility>
 
 #include <sqlite3.h>
@@ -109,13 +110,15 @@ class sqlite_bag final : public bag_file {
       if (state == SQLITE_OK) return bytes;
     }
     return fail(errc::malformed, path_,
-                "message " + std::to_string(m.at) + " cannot be read: " + sqlite3_errstr(state));
+                "message " + std::to_string(m.at) +
+                    " cannot be read: " + (state == SQLITE_OK ? "it is larger than the file" : sqlite3_errstr(state)));
   }
 
  private:
   void connect(const std::string& name, int flags) {
     sqlite3* opened = nullptr;
     sqlite3_open_v2(name.c_str(), &opened, SQLITE_OPEN_READONLY | flags, "unix-none");
+    if (opened == nullptr) throw std::bad_alloc{};
     database_.reset(opened);
     reject_short_reads(opened);
     // Otherwise, SQLite deletes an empty write-ahead log, which the recorder may still be using.
