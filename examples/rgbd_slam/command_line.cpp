@@ -544,8 +544,9 @@ std::variant<settings, exit_code> command_line::read(int argc, char** argv) {
   for (const auto& [text, name, p] : {std::tuple{&from, "--from", &s.from}, {&to, "--to", &s.to}}) {
     if (chosen != way) break;
     const auto point = parse_vector(*text);
-    if (!point)
-      return report_error(std::string{name} + ": " + orbis::in_quotes(*text) + " is not x,y,z in metres", bad_usage);
+    if (!point || point->cwiseAbs().maxCoeff() > 1e7)
+      return report_error(std::string{name} + ": " + orbis::in_quotes(*text) + " is not x,y,z in metres, up to 1e7",
+                          bad_usage);
     *p = *point;
   }
   if (!gravity.empty()) {

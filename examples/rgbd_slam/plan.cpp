@@ -77,41 +77,46 @@ std::optional<orbis::error> find_conflict(const settings& s) {
   return find_overwritten({s.out, s.picture}, {s.input});
 }
 
-/// A box that contains all known space, the start and the goal, and limits the search for an unreachable goal.
+/// The box of the search: all known space with a margin.
 orbis::octree::bounding_box box_to_search(const octree& map, const settings& s) {
   constexpr double inf = std::numeric_limits<double>::infinity();
   orbis::octree::bounding_box box{vec3::Constant(inf), vec3::Constant(-inf)};
-  const auto take = [&](const vec3& p, double half) {
-    box.min = box.min.cwiseMin((p.array() - half).matrix());
-    box.max = box.max.cwiseMax((p.array() + half).matrix());
-  };
-  map.for_each_leaf([&](const octree::leaf& leaf) { take(leaf.center, 0.5 * leaf.size); });
-  for (const vec3& p : {s.from, s.to})
-    if (map.grid().key(p)) take(p, 0.0);
+  map.for_each_leaf([&](const octree::leaf& leaf) {
+    box.min = box.min.cwiseMin((leaf.center.array() - 0.5 * leaf.size).matrix());
+    box.max = box.max.cwiseMax((leaf.center.array() + 0.5 * leaf.size).matrix());
+  });
   const double margin = 1.0 + 2 * s.robot_radius;
   return {(box.min.array() - margin).matrix(), (box.max.array() + margin).matrix()};
 }
 
-/// The maximum memory of the distance field in bytes: the memory of all blocks, with an edge of `reach` metres, that
-/// contain an obstacle or are next to such a block. O(leaves).
-double most_field_bytes(const octree& map, double reach) {
-  const auto block_of = [&](double x) { return static_cast<std::int64_t>(std::floor(x / reach)); };
+/// Returns true if the distance field may take more than `limit` bytes: the memory of all blocks, with an edge of
+/// `reach` metres (at least 16 voxels), that contain the surface of an obstacle or are next to such a block.
+/// O(leaves + counted blocks).
+bool may_exceed(const octree& map, double reach, double limit) {
+  const double edge = std::max(reach / map.resolution(), 16.0), size = edge * map.resolution();
+  const double most = limit / (edge * edge * edge * sizeof(std::uint16_t));
+  const auto block_of = [&](double x) { return static_cast<std::int64_t>(std::floor(x / size)); };
   std::set<std::array<std::int64_t, 3>> occupied, near;
+  const auto is_over = [&](const auto& blocks) { return static_cast<double>(blocks.size()) > most; };
   map.for_each_leaf([&](const octree::leaf& leaf) {
-    if (!leaf.occupied) return;
+    if (!leaf.occupied || is_over(occupied)) return;
     std::array<std::int64_t, 3> low{}, high{};
     for (int i = 0; i != 3; ++i) {
       low[static_cast<std::size_t>(i)] = block_of(leaf.center[i] - 0.5 * leaf.size);
       high[static_cast<std::size_t>(i)] = block_of(leaf.center[i] + 0.5 * leaf.size);
     }
     for (auto z = low[2]; z <= high[2]; ++z)
-      for (auto y = low[1]; y <= high[1]; ++y)
-        for (auto x = low[0]; x <= high[0]; ++x) occupied.insert({x, y, z});
+      for (auto y = low[1]; y <= high[1] && !is_over(occupied); ++y) {
+        const bool is_face = z == low[2] || z == high[2] || y == low[1] || y == high[1];
+        const auto step = is_face ? 1 : std::max<std::int64_t>(1, high[0] - low[0]);
+        for (auto x = low[0]; x <= high[0]; x += step) occupied.insert({x, y, z});
+      }
   });
-  for (const auto& [x, y, z] : occupied)
+  for (const auto& [x, y, z] : occupied) {
+    if (is_over(occupied) || is_over(near)) return true;
     for (int n = 0; n != 27; ++n) near.insert({x + n % 3 - 1, y + n / 3 % 3 - 1, z + n / 9 - 1});
-  const double edge = reach / map.resolution();
-  return static_cast<double>(near.size()) * edge * edge * edge * sizeof(std::uint16_t);
+  }
+  return is_over(near);
 }
 
 // -- why there is no path
@@ -261,12 +266,13 @@ exit_code plan(const settings& s, console& console) {
     if (!made) return give_up({made.error().code, s.input.string(), made.error().message});
     floor = *std::move(made);
   } else {
-    const double reach = field_reach(s.robot_radius, cell), most = most_field_bytes(*map, reach);
-    if (const auto memory = examples::free_memory(); memory && most > static_cast<double>(*memory))
+    const double reach = field_reach(s.robot_radius, cell);
+    const auto memory = examples::free_memory();
+    if (memory && may_exceed(*map, reach, static_cast<double>(*memory)))
       return give_up({orbis::errc::invalid_argument, s.input.string(),
-                      text("the distance field, up to %.2f m from obstacles in voxels of %g mm, may take %.1f GB, more "
-                           "than the available memory",
-                           reach, 1000 * cell, 1e-9 * most)});
+                      text("the distance field, up to %.2f m from obstacles in voxels of %g mm, may take more than the "
+                           "%.1f GB of available memory",
+                           reach, 1000 * cell, 1e-9 * static_cast<double>(*memory))});
     field.emplace(*map, nav::distance_field_options{.reach = reach, .unknown = unknown});
   }
   console.finish(floor ? "floor map" : "distance field");

@@ -177,5 +177,15 @@ foreach(i RANGE 9)
 endforeach()
 file(WRITE ${WORK}/apart.ply "ply\nformat ascii 1.0\nelement vertex 1000\nproperty float x\nproperty float y\nproperty float z\nend_header\n${points}")
 app(0 map apart.ply --out apart --resolution 0.001 --filter none --quiet)
-app_fails(2 "apart/map.bt: the distance field, up to.* GB, more than the available memory" plan apart/map.bt --from 0,0,1 --to 9,9,1
+app_fails(2 "apart/map.bt: the distance field, up to.* may take more than the .* GB of available memory" plan apart/map.bt --from 0,0,1 --to 9,9,1
           --unknown free)
+
+# A file of a few bytes: one occupied voxel of 1638 m. Its faces alone would fill the memory.
+execute_process(COMMAND bash -c "printf '# Octomap OcTree binary file\n# c\nid OcTree\nsize 2\nres 0.05\ndata\n\\2\\0'"
+                OUTPUT_FILE ${WORK}/large.bt)
+app_fails(2 "large.bt: the distance field, up to.* may take more than the .* GB of available memory" plan large.bt
+          --from 0,0,1 --to 9,9,1 --unknown free)
+
+# Beyond a margin around known space, there is no path, not even a straight one, even if unknown space counts as free.
+app_fails(4 "goal outside; the nearest reachable position" plan plate/map.bt --from 0.5,0.5,0.5 --to 20,0.5,0.5 --unknown free)
+app_fails(1 "--to: .1e30,0,0. is not x,y,z in metres, up to 1e7" plan plate/map.bt --from 0.5,0.5,0.5 --to 1e30,0,0)
