@@ -195,14 +195,19 @@ class runner {
     const pid_t parent = ::getpid();
     process_ = ::fork();
     if (process_ == 0) become(argv.data(), log.c_str(), parent);
-    if (process_ < 0) throw std::system_error{errno, std::generic_category(), "fork"};
+    if (process_ < 0) {
+      process_ = 0;
+      outcome o;
+      o.failure = "cannot be started: " + std::generic_category().message(errno);
+      return o;
+    }
     const pid_t process = process_;
     lock.unlock();
     wait_for(process);
     lock.lock();
     int status = 0;
     rusage used{};
-    ::wait4(process_, &status, 0, &used);
+    const bool has_status = ::wait4(process_, &status, 0, &used) == process_;
     process_ = 0;
     lock.unlock();
 
@@ -212,7 +217,9 @@ class runner {
     };
     o.cpu_s = seconds(used.ru_utime) + seconds(used.ru_stime);
     o.peak_mb = static_cast<double>(used.ru_maxrss) / 1024.0;
-    if (status == 0) {
+    if (!has_status) {
+      o.failure = "its exit code is unknown";
+    } else if (status == 0) {
       const auto text = orbis::read_file(out / "summary.json");
       o.summary = text ? json::parse(*text, nullptr, false) : json{};
       if (!o.summary.is_object()) o.failure = "summary.json cannot be read";

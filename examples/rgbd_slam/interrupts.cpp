@@ -95,7 +95,8 @@ void print_without_blocking(const std::string& text) {
 }  // namespace
 
 void start() {
-  for (const int signal : {SIGINT, SIGTERM}) std::signal(signal, SIG_DFL);  // an ignored signal would never arrive
+  // An ignored signal would never arrive, and without SIGCHLD the exit code of a child process would be lost.
+  for (const int signal : {SIGINT, SIGTERM, SIGCHLD}) std::signal(signal, SIG_DFL);
   const sigset_t set = watched();
   pthread_sigmask(SIG_BLOCK, &set, nullptr);
   static_cast<void>(shared());

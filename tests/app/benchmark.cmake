@@ -71,6 +71,15 @@ foreach(signal INT TERM)
   check(NOT left)
 endforeach()
 
+# A parent that ignores the end of its children, as some process managers do, does not hide the failure of a run.
+file(WRITE ${WORK}/broken/rgb.txt "0 nowhere.png\n")
+file(WRITE ${WORK}/broken/depth.txt "0 nowhere.png\n")
+app(1 benchmark broken --quick)
+check(out MATCHES "nowhere.png: the first image.*does not exist")
+execute_process(COMMAND env --ignore-signal=SIGCHLD ${APP} benchmark broken --quick WORKING_DIRECTORY ${WORK}
+                RESULT_VARIABLE result OUTPUT_VARIABLE out ERROR_QUIET)
+check(result EQUAL 1 AND out MATCHES "nowhere.png: the first image.*does not exist")
+
 # The sequences of a scene are separate recordings.
 foreach(sequence seq-01 seq-02)
   file(COPY_FILE ${WORK}/data/room/rgb/000000.png ${WORK}/color.png)
