@@ -52,6 +52,7 @@ int run(int argc, char** argv) {
     return report_error(1, "--scale: must be between 0.001 and 1e9");
   for (const std::string& read : {input, camera_name})
     if (examples::is_same_file(output, read)) return report_error(1, examples::overwrite_message(output, read));
+  if (const std::string why = examples::unwritable_message(output); !why.empty()) return report_error(2, why);
   const auto depth = orbis::io::read_depth(input);
   if (!depth) return report_error(2, examples::describe(depth.error()));
   const auto camera = camera_named(camera_name, depth->width(), depth->height());

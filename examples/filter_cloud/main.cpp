@@ -48,6 +48,7 @@ int run(int argc, char** argv) {
   const auto format = orbis::io::cloud_format_by_extension(output);
   if (!format) return report_error(1, output + ": must end in .ply or .pcd");
   if (examples::is_same_file(output, input)) return report_error(1, examples::overwrite_message(output, input));
+  if (const std::string why = examples::unwritable_message(output); !why.empty()) return report_error(2, why);
   auto found = examples::read_near_origin(input);  // the output is in the original coordinates
   if (!found) return report_error(2, examples::describe(found.error()));
   auto& [read, origin] = *found;

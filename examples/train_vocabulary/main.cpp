@@ -82,8 +82,10 @@ int train(const settings& s) {
 
 int convert(const settings& s) {
   if (examples::is_same_file(s.output, s.input)) return report_error(1, examples::overwrite_message(s.output, s.input));
+  if (const std::string why = examples::unwritable_message(s.output); !why.empty()) return report_error(2, why);
   const auto words = dbow::load_vocabulary(s.input);
   if (!words) return report_error(2, examples::describe(words.error()));
+  if (words->empty()) return report_error(2, orbis::shortened_path(s.input) + ": the vocabulary contains no words");
   return write(s, *words);
 }
 
