@@ -172,7 +172,14 @@ orbis::result<void> report_without_map(results& r, const frame_source& source, c
     compare_with_truth(r, source, console);
     return write_report_files(r, r.slam->keyframes, files, console);
   });
-  if (!written) static_cast<void>(guarded([&] { return write_summary_only(r, files, console); }));
+  if (written) return written;
+  static_cast<void>(guarded([&] {
+    for (const char* name : {"report.html", "trajectory.png"}) {  // makes room on the disk
+      std::error_code ignored;
+      std::filesystem::remove(r.folder / name, ignored);
+    }
+    return write_summary_only(r, files, console);
+  }));
   return written;
 }
 
@@ -202,7 +209,10 @@ exit_code finish_run(results& r, const tracked_frames& tracked, completion& end,
     if (!reported) reported = orbis::fail(files.with_final_path(reported.error()));
   }
   if (auto done = files.put_in_place(); !done) return console.error(done.error()), bad_input;
-  if (!reported) return console.error(reported.error()), bad_input;
+  if (!reported) {
+    if (tracked.unsaved) console.error(*tracked.unsaved);
+    return console.error(reported.error()), bad_input;
+  }
   print_results(r, console);
   if (!end.is_running) viewer.finish(s, console);
   return end_tracked(r, tracked, end, source, s, console);
@@ -234,8 +244,16 @@ exit_code run_slam(const settings& s, console& console) {
   if (tracked->stopped && tracked->slam.frames == 0) return give_up(*tracked->stopped);
   add_tracking(r, *tracked, *source, s, console);
   if (r.slam->tracked == 0) return end_untracked(r, *tracked, *source, s, *files, console);
-  auto written = write_trajectories(*r.slam, files->folder());
-  if (written) written = write_camera_used(*source, shutter, files->folder());
+  const auto write_poses = [&]() -> orbis::result<void> {
+    auto written = write_trajectories(*r.slam, files->folder());
+    if (written) written = write_camera_used(*source, shutter, files->folder());
+    return written;
+  };
+  auto written = write_poses();
+  if (!written && files->drop_landmark_map()) {  // makes room on the disk
+    tracked->unsaved = {written.error().code, s.save_map.string(), "cannot be written beside the trajectory"};
+    written = write_poses();
+  }
   if (!written) return give_up(files->with_final_path(written.error()));
 
   // Build the map from the keyframes, evaluate, and write the report.

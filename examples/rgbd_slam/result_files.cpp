@@ -137,7 +137,8 @@ std::optional<orbis::error> find_overwritten(const std::vector<fs::path>& target
 
 result<void> finish_earlier_runs(const settings& s) {
   std::error_code ignored;
-  for (const fs::path& path : {s.out, s.save_map, s.floor_map, s.input, s.reference, s.load_map})
+  const fs::path camera = is_file_name(s.camera) ? s.camera : std::string{};
+  for (const fs::path& path : {s.out, s.save_map, s.floor_map, s.input, s.reference, s.load_map, camera})
     if (!path.empty())
       if (auto done = staged_folder::finish(fs::is_directory(path, ignored) ? path : parent_folder(path)); !done)
         return done;
@@ -173,6 +174,23 @@ std::optional<orbis::error> find_overwritten(const settings& s, const std::vecto
   return std::nullopt;
 }
 
+namespace {
+
+/// Returns true if a file belongs to another user, in a folder in which only the owners of files may replace them, such
+/// as /tmp.
+bool is_protected(const fs::path& folder, const fs::path& name) {
+  struct stat file {};
+  struct stat parent {};
+  if (::lstat((folder / name).c_str(), &file) != 0 || ::stat(folder.c_str(), &parent) != 0) return false;
+  const uid_t user = ::geteuid();
+  return (parent.st_mode & S_ISVTX) != 0 && user != 0 && user != file.st_uid && user != parent.st_uid;
+}
+orbis::error protected_error(const fs::path& file) {
+  return {orbis::errc::write_failed, file.string(), "belongs to another user and cannot be replaced"};
+}
+
+}  // namespace
+
 std::optional<orbis::error> find_unwritable(const settings& s) {
   std::vector<fs::path> folders{s.out};
   for (const fs::path& file : {s.save_map, s.floor_map})
@@ -186,6 +204,10 @@ std::optional<orbis::error> find_unwritable(const settings& s) {
     return orbis::error{orbis::errc::write_failed, folder.string(),
                         "cannot create files in " + there.string() + ": " + std::generic_category().message(why)};
   }
+  for (const std::string& name : result_names(s))
+    if (is_protected(s.out, name)) return protected_error(s.out / name);
+  for (const fs::path& file : {s.save_map, s.floor_map})
+    if (!file.empty() && is_protected(parent_folder(file), file.filename())) return protected_error(file);
   return std::nullopt;
 }
 
@@ -319,10 +341,31 @@ void result_files::drop_optional() noexcept {
   }
 }
 
+bool result_files::drop_landmark_map() const {
+  std::error_code ignored;
+  return !map_name_.empty() && fs::remove(landmark_map(), ignored);
+}
+
 result<void> result_files::put_in_place() {
   std::vector<staged_folder*> folders;
   for (staged_folder& f : folders_) folders.push_back(&f);
-  return staged_folder::put_in_place(folders, hidden());
+  return staged_folder::put_in_place(folders, hidden(), [this] { return list_other_results(); });
+}
+
+result<void> result_files::list_other_results() const {
+  constexpr const char* list = "files_of_earlier_runs";
+  const fs::path path = folder() / "summary.json";
+  const auto text = orbis::read_file(path);
+  if (!text) return {};  // this run has none
+  auto summary = nlohmann::ordered_json::parse(*text, nullptr, false);
+  const auto made = summary.find("files");
+  if (made == summary.end()) return {};
+  const file_names others = lists().of_earlier_runs(made->get<file_names>());
+  if (summary.value(list, file_names{}) == others) return {};
+  summary[list] = others;
+  return orbis::write_file_atomically(path, [&](std::ostream& out) {
+    out << summary.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) << '\n';
+  });
 }
 
 }  // namespace app

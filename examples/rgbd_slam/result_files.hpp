@@ -4,7 +4,7 @@
 ///
 /// At its end, a run moves all files that it created into place together, and replaces earlier files of the same names;
 /// it deletes no files. Other files of an earlier run remain; `summary.json` lists both. Files with a result's name
-/// that this program did not write are not replaced, nor are inputs of the run.
+/// that exist when the run begins and that this program did not write are not replaced, nor are inputs of the run.
 #pragma once
 
 #include <cstddef>
@@ -79,6 +79,8 @@ class result_files {
   [[nodiscard]] std::filesystem::path folder() const { return folders_.front().path(); }
   /// The path at which the landmark map is created. @pre the settings request one
   [[nodiscard]] std::filesystem::path landmark_map() const { return folders_[map_folder_].path() / map_name_; }
+  /// Removes the landmark map, to make room on the disk for other results. Returns false if there is none.
+  bool drop_landmark_map() const;
   /// The path at which the floor map is created, next to its image; empty if the settings request none.
   [[nodiscard]] std::filesystem::path floor_map() const { return floor_map_in({}); }
   [[nodiscard]] file_lists lists() const { return {out_, folder()}; }
@@ -100,6 +102,9 @@ class result_files {
   [[nodiscard]] orbis::result<void> put_in_place();
 
  private:
+  /// Updates the list of other results in summary.json, as another run may have written to the output folder since the
+  /// summary was written. Errors: write_failed.
+  [[nodiscard]] orbis::result<void> list_other_results() const;
   static inline const std::filesystem::path optional_name =
       std::filesystem::path{staged_folder::private_name} / "optional";
 

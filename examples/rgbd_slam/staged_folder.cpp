@@ -46,7 +46,7 @@ constexpr std::string_view prefix = ".rgbd_slam-", ready = ".ready";
 // transaction also lists the others, which list the first one.
 const fs::path own = staged_folder::private_name;
 const fs::path backup = own / "replaced", names_list = own / "names", others_list = own / "others",
-               first_list = own / "first";
+               first_list = own / "first", spare = own / "spare";
 
 auto failure(const fs::path& path, const std::string& what) {
   return orbis::fail(orbis::errc::write_failed, path.string(), what);
@@ -60,6 +60,15 @@ descriptor open_folder(const fs::path& folder) {
 /// The path of a link to an open folder. The link remains valid if the user renames the folder; it is broken on systems
 /// without /proc.
 fs::path link_to(const descriptor& folder) { return "/proc/self/fd/" + std::to_string(folder.get()); }
+
+/// Reserves space on the disk for the lists in a hidden folder, so that they can be written after the results have
+/// filled the disk. Returns 0 or an errno value. No effect on file systems that cannot reserve space.
+int reserve_space(const fs::path& hidden) {
+  const descriptor file{::open((hidden / spare).c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0600)};
+  if (file.get() < 0) return errno;
+  const int why = ::posix_fallocate(file.get(), 0, 12 * 1024);
+  return why == ENOSPC || why == EFBIG ? why : 0;
+}
 
 /// Locks folders during its lifetime. No effect on file systems without locks.
 ///
@@ -118,14 +127,18 @@ int rename_all(const std::vector<move>& moves) {
   const auto exists = [](const std::string& path) {
     return ::faccessat(AT_FDCWD, path.c_str(), F_OK, AT_SYMLINK_NOFOLLOW) == 0;
   };
+  const auto is_folder = [](const std::string& path) {
+    struct stat status {};
+    return ::lstat(path.c_str(), &status) == 0 && S_ISDIR(status.st_mode);
+  };
   const auto rename = [](const std::string& from, const std::string& to) {
     return ::rename(from.c_str(), to.c_str()) == 0;
   };
   for (std::size_t i = 0; i != moves.size(); ++i) {
     const move& next = moves[i];
     if (!exists(next.from) && exists(next.to)) continue;  // done by a child process that was killed
-    // If there is no hard link to the old file, it is moved aside.
-    const bool moves_aside = next.replaces && !next.has_old && exists(next.to);
+    // If there is no hard link to the old file, it is moved aside. A folder is not: the rename then fails.
+    const bool moves_aside = next.replaces && !next.has_old && exists(next.to) && !is_folder(next.to);
     if ((!moves_aside || rename(next.to, next.old)) && rename(next.from, next.to)) continue;
     const int why = errno < not_restored ? errno : EIO;
     for (std::size_t done = i + 1; done-- != 0;) {
@@ -203,13 +216,24 @@ bool is_hidden_folder(const fs::path& path) {
 }
 bool is_ready(const fs::path& hidden) { return hidden.filename().string().ends_with(ready); }
 
+/// Returns false if it is unknown whether the file exists: it cannot be examined, or its folder is missing (renamed, or
+/// on a disk that is not mounted).
+bool is_known(const fs::path& path) {
+  std::error_code failure;
+  if (fs::exists(fs::symlink_status(path, failure))) return true;
+  if (failure && failure != std::errc::no_such_file_or_directory) return false;
+  return fs::is_directory(path.parent_path(), failure);
+}
+
 /// The first hidden folder of the transaction to which a hidden folder belongs; empty if there is none, nullopt if it
 /// cannot be determined.
 std::optional<fs::path> first_of(const fs::path& hidden) {
   if (is_ready(hidden)) return hidden;
   const auto first = read_list(hidden / first_list);
   if (!first) return std::nullopt;
-  const fs::path path = first->size() == 1 ? first->front() : std::string{};
+  if (first->size() != 1) return fs::path{};
+  const fs::path path = first->front();
+  if (!is_known(path)) return std::nullopt;
   return is_ready(path) && is_hidden_folder(path) ? path : fs::path{};
 }
 /// The other existing hidden folders of a transaction; nullopt if they cannot be determined.
@@ -218,13 +242,12 @@ std::optional<std::vector<fs::path>> others_of(const fs::path& first) {
   if (!listed) return std::nullopt;
   std::vector<fs::path> others;
   for (const fs::path path : *listed) {
-    std::error_code failure;
-    const bool is_there = fs::exists(fs::symlink_status(path, failure));
-    if (failure && failure != std::errc::no_such_file_or_directory) return std::nullopt;
-    if (!is_there || !is_hidden_folder(path)) continue;
-    const auto first_there = first_of(path);
-    if (!first_there) return std::nullopt;
-    if (fs::equivalent(*first_there, first, failure)) others.push_back(path);
+    if (!is_known(path)) return std::nullopt;
+    if (!is_hidden_folder(path)) continue;
+    const auto its_first = read_list(path / first_list);
+    if (!its_first) return std::nullopt;
+    // Names are unique; the path differs if the user has renamed the folder of the first one.
+    if (its_first->size() == 1 && fs::path{its_first->front()}.filename() == first.filename()) others.push_back(path);
   }
   return others;
 }
@@ -236,13 +259,15 @@ std::vector<fs::path> hidden_folders_in(const fs::path& folder) {
     if (is_hidden_folder(it->path())) found.push_back(it->path());
   return found;
 }
-/// The hidden folders of ended processes in `folder`, from the earliest results to the latest, excluding folders that
-/// cannot be opened.
+/// The hidden folders of ended processes in `folder`, from the earliest results to the latest. Where the end of a
+/// process cannot be determined (no permission, or a file system without locks), only those with complete results.
 std::vector<fs::path> leftovers_in(const fs::path& folder) {
   std::vector<fs::path> found = hidden_folders_in(folder);
   std::erase_if(found, [](const fs::path& hidden) {
     const descriptor lock = open_folder(hidden);
-    return lock.get() < 0 || ::flock(lock.get(), LOCK_EX | LOCK_NB) != 0;
+    if (lock.get() < 0) return errno != EACCES || !is_ready(hidden);
+    if (::flock(lock.get(), LOCK_EX | LOCK_NB) == 0) return false;
+    return errno == EWOULDBLOCK || !is_ready(hidden);
   });
   std::vector<std::pair<fs::file_time_type, fs::path>> by_time;
   for (fs::path& hidden : found) {
@@ -256,25 +281,32 @@ std::vector<fs::path> leftovers_in(const fs::path& folder) {
   return found;
 }
 
-/// Completes the transaction whose first hidden folder is `first`. Returns false if that is not possible now.
+/// Completes the transaction whose first hidden folder is `first`. Returns the reason if that is not possible now.
 /// @pre the folders of all its files are locked
-bool finish_transaction(const fs::path& first) {
+std::optional<std::string> finish_transaction(const fs::path& first) {
   auto folders = others_of(first);
-  if (!folders) return false;
+  if (!folders) return "a folder of their files is missing or cannot be read";
   folders->push_back(first);  // is removed last
   std::vector<move> moves;
   for (const fs::path& hidden : *folders) {
     auto names = read_list(hidden / names_list);
-    if (!names) return false;
+    if (!names) return "their list cannot be read";
     std::error_code ignored;
     fs::create_directories(hidden / backup, ignored);  // usually exists
     std::erase_if(*names, [](const fs::path& name) { return name.empty() || name != name.filename(); });
-    for (move& m : moves_to(hidden.parent_path(), hidden, *names)) moves.push_back(std::move(m));
+    for (move& m : moves_to(hidden.parent_path(), hidden, *names)) {
+      if (!may_be_replaced(m.to)) return fs::path{m.to}.filename().string() + " is not a regular file";
+      moves.push_back(std::move(m));
+    }
   }
-  if (rename_all(moves) != 0) return false;
+  if (const int why = rename_all(moves); why != 0) return reason(why % not_restored);
   std::error_code ignored;
-  for (const fs::path& hidden : *folders) fs::remove_all(hidden, ignored);
-  return true;
+  for (const fs::path& hidden : *folders) {
+    const descriptor parent = open_folder(hidden.parent_path());
+    if (parent.get() >= 0) ::fsync(parent.get());
+    fs::remove_all(hidden, ignored);
+  }
+  return std::nullopt;
 }
 
 struct opened_folder {
@@ -306,8 +338,10 @@ cleared_folders lock_and_clear(const std::vector<opened_folder>& folders) {
     cleared.descriptors.push_back(open_folder(path));
     if (const int number = cleared.descriptors.back().get(); number >= 0) numbers.push_back(number);
   };
+  std::vector<fs::path> leftovers;
   for (std::size_t locked = 0; locked != paths.size();) {
     locked = paths.size();
+    leftovers.clear();
     cleared.locks.reset();
     cleared.locks = std::make_unique<folder_locks>(numbers);
     if (!cleared.locks->is_complete()) {
@@ -315,21 +349,28 @@ cleared_folders lock_and_clear(const std::vector<opened_folder>& folders) {
       return cleared;
     }
     for (const opened_folder& folder : folders)
-      for (const fs::path& left : leftovers_in(folder.path))
+      for (const fs::path& left : leftovers_in(folder.path)) {
+        leftovers.push_back(left);
         if (const auto first = first_of(left); first && !first->empty()) {
           add(first->parent_path());
           for (const fs::path& other : others_of(*first).value_or(std::vector<fs::path>{})) add(other.parent_path());
         }
+      }
   }
-  for (const opened_folder& folder : folders)
-    for (const fs::path& left : leftovers_in(folder.path)) {
-      const auto first = first_of(left);
-      std::error_code ignored;
-      if (first && (first->empty() || finish_transaction(*first)))
-        fs::remove_all(left, ignored);
-      else
-        cleared.obstacle = "the results of an earlier run, in a hidden folder, cannot be moved into place";
+  for (const fs::path& left : leftovers) {
+    if (!is_hidden_folder(left)) continue;  // finished together with another one
+    const auto first = first_of(left);
+    std::optional<std::string> why;
+    if (!first) why = "the folder of their other files is missing or cannot be read";
+    if (first && !first->empty()) why = finish_transaction(*first);
+    if (why) {  // later results must not be moved into place before earlier ones
+      cleared.obstacle = "the results of an earlier run, in the hidden folder " + left.filename().string() +
+                         ", cannot be moved into place: " + *why;
+      break;
     }
+    std::error_code ignored;
+    fs::remove_all(left, ignored);
+  }
   return cleared;
 }
 
@@ -374,6 +415,10 @@ result<staged_folder> staged_folder::open(const fs::path& folder, std::vector<st
     return failure(folder, "cannot create files in it: " + reason(why));
   }
   ::flock(made.staging_lock_.get(), LOCK_EX);
+  for (const fs::path& part : {own, backup})
+    if (!ec) fs::create_directory(made.staging_ / part, ec);
+  if (const int why = ec ? ec.value() : reserve_space(made.staging_); why != 0)
+    return failure(folder, "cannot create files in it: " + reason(why));
   return made;
 }
 
@@ -423,7 +468,8 @@ void staged_folder::leave(hidden_folders& hidden) {
   staging_lock_ = {};
 }
 
-result<void> staged_folder::put_in_place(std::span<staged_folder* const> folders, hidden_folders& hidden) {
+result<void> staged_folder::put_in_place(std::span<staged_folder* const> folders, hidden_folders& hidden,
+                                         const std::function<result<void>()>& complete) {
   {
     const std::lock_guard registers{hidden.mutex};
     for (staged_folder* f : folders) f->follow(hidden);
@@ -436,11 +482,7 @@ result<void> staged_folder::put_in_place(std::span<staged_folder* const> folders
   // Prepare all folders.
   std::error_code ec;
   for (const staged_folder* f : folders) {
-    for (const std::string& name : f->made())
-      if (!may_be_replaced(f->folder_ / name))
-        return failure(f->folder_ / name, "is not a regular file and will not be replaced");
-    if (fs::create_directories(f->staging_ / backup, ec); ec)
-      return failure(f->folder_, "cannot create files in it: " + ec.message());
+    fs::remove(f->staging_ / spare, ec);
     auto listed = write_list(f->staging_ / names_list, f->names_);
     if (listed)
       listed = f == &first ? write_list(f->staging_ / others_list, others)
@@ -454,6 +496,12 @@ result<void> staged_folder::put_in_place(std::span<staged_folder* const> folders
   for (const staged_folder* f : folders) opened.push_back({f->folder_, f->folder_lock_.get()});
   const auto cleared = lock_and_clear(opened);
   const std::lock_guard stays{hidden.mutex};
+  for (const staged_folder* f : folders)
+    for (const std::string& name : f->made())
+      if (!may_be_replaced(f->folder_ / name))
+        return failure(f->folder_ / name, "is not a regular file and will not be replaced");
+  if (cleared.obstacle.empty())
+    if (auto completed = complete(); !completed) return completed;
   // From here on, any program can complete the transaction.
   const fs::path unmarked = first.staging_;
   if (const std::error_code why = first.rename_hidden(marked, hidden))

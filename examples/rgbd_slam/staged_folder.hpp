@@ -14,6 +14,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <mutex>
 #include <span>
 #include <string>
@@ -74,9 +75,10 @@ class staged_folder {
 
   /// Moves the files of all folders into place: all of them, or none if it returns an error. If another program holds
   /// the lock of a folder, or files can be moved neither into place nor back, the error indicates that the next program
-  /// that uses the folder completes the moves. `hidden`: see `open`. Errors: write_failed.
-  [[nodiscard]] static orbis::result<void> put_in_place(std::span<staged_folder* const> folders,
-                                                        hidden_folders& hidden);
+  /// that uses the folder completes the moves. `hidden`: see `open`. `complete` completes the files; it is called after
+  /// the results of earlier runs have been moved into place. Errors: write_failed, and those of `complete`.
+  [[nodiscard]] static orbis::result<void> put_in_place(std::span<staged_folder* const> folders, hidden_folders& hidden,
+                                                        const std::function<orbis::result<void>()>& complete);
 
  private:
   staged_folder() = default;

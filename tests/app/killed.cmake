@@ -59,6 +59,43 @@ foreach(moved 0 7 14)
     check(NOT hidden)
   endforeach()
 endforeach()
+
+# One of the folders is missing: nothing is deleted, and the run is finished once the folder is there again, even under
+# another name.
+foreach(missing out maps)
+  file(REMOVE_RECURSE ${WORK}/out ${WORK}/maps ${WORK}/floors ${WORK}/away)
+  run_killed(0 run room --out out ${quick} --deterministic ${elsewhere})
+  file(RENAME ${WORK}/${missing} ${WORK}/away)
+  foreach(folder out maps floors)
+    if(NOT folder STREQUAL missing)
+      app_fails(2 "${folder}: the results of an earlier run, in the hidden folder .rgbd_slam-.*: .*missing"
+                map cloud.ply --out ${folder} ${quick})
+    endif()
+  endforeach()
+  if(missing STREQUAL maps)
+    file(RENAME ${WORK}/away ${WORK}/maps)
+  else()
+    file(RENAME ${WORK}/away ${WORK}/out)
+    file(RENAME ${WORK}/out ${WORK}/away)
+    app(0 eval away/trajectory.txt all/trajectory.txt)
+    file(RENAME ${WORK}/away ${WORK}/out)
+  endif()
+  app(0 map cloud.ply --out out ${quick})
+  must_be_of(all)
+  must_equal(maps/room.map all/room.map)
+  must_equal(floors/floor.yaml all/floor.yaml)
+endforeach()
+
+# The user creates a folder with the name of a result: it is kept, and later results wait for the earlier ones.
+file(REMOVE_RECURSE ${WORK}/out)
+run_killed(0 run room --out out ${quick} --deterministic)
+file(WRITE ${WORK}/out/map.bt/notes "mine")
+app_fails(2 "out: .*hidden folder .*: map.bt is not a regular file" run room --frames 2 --out out ${quick})
+must_exist(${WORK}/out map.bt/notes)
+check(NOT EXISTS ${WORK}/out/trajectory.txt)
+file(REMOVE_RECURSE ${WORK}/out/map.bt)
+app(0 map cloud.ply --out out ${quick})
+must_be_of(all)
 file(REMOVE_RECURSE ${WORK}/out)
 app(0 run room --frames 3 --out out ${quick} --deterministic)
 
@@ -202,6 +239,68 @@ must_exist(${WORK}/elsewhere/out map.bt report.html summary.json)
 must_exist(${WORK}/elsewhere/maps room.map)
 must_not_be_half_written(${WORK}/elsewhere/out)
 must_not_be_half_written(${WORK}/elsewhere/maps)
+
+# While a run waits for the lock, the user creates a folder with the name of a result, or deletes one of the folders: an
+# error, and nothing else is lost.
+foreach(change "mkdir waits/out/map.bt" "rm -rf waits/maps")
+  file(REMOVE_RECURSE ${WORK}/waits)
+  execute_process(COMMAND bash -c "
+    '${APP}' run room --frames 2 --out waits/out ${quick_text} --save-map waits/maps/room.map 2>waits.log &
+    run=$!
+    until [ -d waits/out ] || ! kill -0 $run; do sleep 0.01; done
+    exec 9<waits/out
+    until [ -e waits/out/.rgbd_slam-*/.rgbd_slam/optional ] || ! kill -0 $run; do sleep 0.01; done
+    flock -s 9
+    ${change}
+    exec 9<&-
+    wait $run" WORKING_DIRECTORY ${WORK} RESULT_VARIABLE result)
+  file(READ ${WORK}/waits.log err)
+  check(result EQUAL 2 AND err MATCHES "rgbd_slam: [^\n]*waits/[^\n]*\n$")
+  must_not_be_half_written(${WORK}/waits/out)
+  check(NOT EXISTS ${WORK}/waits/out/trajectory.txt)
+  if(change MATCHES mkdir)
+    check(IS_DIRECTORY ${WORK}/waits/out/map.bt)
+  endif()
+endforeach()
+
+# Another run of another kind ends while a run waits: both results are known as such, and can be replaced.
+execute_process(COMMAND bash -c "
+  '${APP}' map all/cloud.ply --out both --quiet --resolution 0.02 &
+  run=$!
+  until ls -d both/.rgbd_slam-* >/dev/null 2>&1 || ! kill -0 $run; do sleep 0.01; done
+  exec 9<both
+  flock -s 9
+  until [ -e both/.rgbd_slam-*/.rgbd_slam/names ] || ! kill -0 $run; do sleep 0.01; done
+  kill -STOP $run
+  exec 9<&-
+  '${APP}' run room --frames 2 --out both ${quick_text} --localize-only --load-map maps/room.map
+  kill -CONT $run
+  wait $run" WORKING_DIRECTORY ${WORK} RESULT_VARIABLE result)
+check(result EQUAL 0)
+must_exist(${WORK}/both trajectory.txt map.bt)
+app(0 run room --frames 2 --out both ${quick})
+
+# On a full disk the trajectory and the summary come before the landmark map and the report.
+file(MAKE_DIRECTORY ${WORK}/disk)
+foreach(size 76k 100k 160k 184k)
+  execute_process(COMMAND mount -t tmpfs -o size=${size} none disk WORKING_DIRECTORY ${WORK} RESULT_VARIABLE result
+                  OUTPUT_QUIET ERROR_QUIET)
+  if(NOT result EQUAL 0)
+    message(STATUS "[skipped] a full disk: no file system can be mounted here")
+    break()
+  endif()
+  execute_process(COMMAND ${APP} run room --frames 2 --out disk/out ${quick} --deterministic --save-map disk/room.map
+                  WORKING_DIRECTORY ${WORK} RESULT_VARIABLE result ERROR_VARIABLE err)
+  file(COPY ${WORK}/disk/ DESTINATION ${WORK}/disk_${size})
+  execute_process(COMMAND umount ${WORK}/disk)
+  check(result EQUAL 2 AND err MATCHES "No space left on device")
+  must_equal(disk_${size}/out/trajectory.txt two/trajectory.txt)
+  must_equal(disk_${size}/out/camera_used.toml two/camera_used.toml)
+  must_exist(${WORK}/disk_${size}/out summary.json)
+  if(NOT EXISTS ${WORK}/disk_${size}/room.map)
+    check(err MATCHES "disk/room.map: [^\n]*\n")
+  endif()
+endforeach()
 
 # What another user has put into the folder is neither moved nor removed, unless the folder is that user's.
 execute_process(COMMAND id -u OUTPUT_VARIABLE user OUTPUT_STRIP_TRAILING_WHITESPACE)
