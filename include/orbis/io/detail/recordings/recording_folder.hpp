@@ -51,13 +51,15 @@ inline void attach_ground_truth(recording_index& index, double max_distance) {
 }
 
 /// Fails if a frame list is empty or its first images do not exist, because the whole list is then wrong. Later images
-/// are checked when they are read. Errors: no_data, not_found.
+/// are checked when they are read. Errors: no_data, not_found, unreadable (the folder).
 inline result<void> check_first_frame(const recording_index& index, const std::filesystem::path& where) {
   if (index.frames.empty()) return fail(errc::no_data, where.string(), "the recording has no frames");
   for (const std::filesystem::path& path : {index.frames.front().color, index.frames.front().depth}) {
-    std::error_code ignored;
-    if (!path.empty() && !std::filesystem::exists(path, ignored))
-      return fail(errc::not_found, path.string(), "the first image of the recording does not exist");
+    std::error_code why;
+    if (path.empty() || std::filesystem::exists(path, why)) continue;
+    if (why && why != std::errc::no_such_file_or_directory)
+      return fail(errc::unreadable, path.string(), "cannot be opened: " + why.message());
+    return fail(errc::not_found, path.string(), "the first image of the recording does not exist");
   }
   return {};
 }
