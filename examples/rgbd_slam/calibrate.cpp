@@ -113,7 +113,7 @@ exit_code calibrate(const settings& s, console& console) {
             printed;
   if (!found->last.is_complete())
     console.warn(
-        "parameters marked as kept need more motion: rotate the camera about all axes, near and far from "
+        "parameters marked as kept need more motion: rotate the camera about all axes, close to and far from "
         "textured surfaces");
   const auto& lens = found->lens;
   if (lens && (lens->has_distortion() || (!lens->is_determined && has_other_focal_length(found->parameters))))

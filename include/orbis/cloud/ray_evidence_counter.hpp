@@ -92,11 +92,11 @@ class ray_evidence_counter {
   void remove(const Policy& policy, const View& view);
 
   /// Finds the parts of a view that the other views contradict, and discards their counts. Call it once for each view
-  /// after all views were added. Parts are tiles of `tile_size` pixels a side. A tile is contradicted if its rays pass
-  /// through points at most `ghost_reach` in front of the ends of the rays, and these points together have at least 1.5
-  /// times the support of the points that the tile itself supports (excluding its own support). The evidence of a
-  /// contradicted tile no longer counts, and the points that it supports are refuted. O(pixels + points in front of the
-  /// camera).
+  /// after all views have been added. Parts are tiles of `tile_size` pixels a side. A tile is contradicted if its rays
+  /// pass through points at most `ghost_reach` in front of the ends of the rays, and these points together have at
+  /// least 1.5 times the support of the points that the tile itself supports (excluding its own support). The evidence
+  /// of a contradicted tile no longer counts, and the points that it supports are refuted. O(pixels + points in front
+  /// of the camera).
   template <execution_policy Policy, posed_depth View>
   void review(const Policy& policy, const View& view);
   /// Edge of a tile in pixels: 32 for a width of 640.

@@ -52,7 +52,7 @@ class temporary_file {
   /// The path with which callers open the file; valid until the file is renamed.
   [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }
 
-  /// Flushes the file to the disk; returns false and sets `errno` if that fails.
+  /// Flushes the file to disk; returns false and sets `errno` if that fails.
   [[nodiscard]] bool sync() {
 #ifdef ORBIS_HAS_POSIX_FILES
     return ::fsync(file_) == 0 || errno == EINVAL || errno == ENOTSUP;  // some file systems have no fsync

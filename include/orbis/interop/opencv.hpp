@@ -96,7 +96,7 @@ template <shared_pixel T>
   return {view.height(), view.width(), cv_type<T>, view.data(), static_cast<std::size_t>(view.stride()) * sizeof(T)};
 }
 
-/// A `cv::Mat` header over constant pixels; the pixels must outlive it. `cv::Mat` has no const data: do not write to
+/// A `cv::Mat` header over constant pixels; the pixels must outlive it. `cv::Mat` cannot be read-only: do not write to
 /// the matrix.
 template <shared_pixel T>
 [[nodiscard]] const cv::Mat mat_over(image_view<const T> view) {  // NOLINT(readability-const-return-type)

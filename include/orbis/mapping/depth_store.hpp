@@ -40,7 +40,7 @@ struct depth_store_options {
 
 /// Stores depth images, indexed by frame, without loss.
 ///
-/// An image from a real or simulated sensor takes 0.05 to 0.2 of its original 16 bits per pixel, because a depth camera
+/// An image from a real or simulated sensor takes 5 to 20 % of its original 16 bits per pixel, because a depth camera
 /// that measures disparity produces few distinct depths (`detail/depth/depth_codec.hpp`). An image of pure noise is not
 /// compressed. Pixels are plain numbers; the caller defines their scale and meaning. Depth in `float` metres is not
 /// supported; its lowest bits are noise, which does not compress. Pixels can be removed later, and restored, without

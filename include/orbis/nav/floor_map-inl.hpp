@@ -22,7 +22,7 @@ namespace orbis::nav {
 
 namespace detail {
 
-/// Maximum number of octants on top of large leaves that find_floor examines; examining them takes about a second.
+/// Maximum number of octants in the highest layers of large leaves that find_floor examines; this takes about a second.
 inline constexpr std::uint64_t most_octants_on_leaves = std::uint64_t{1} << 24U;
 
 }  // namespace detail

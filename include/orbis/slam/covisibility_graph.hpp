@@ -138,7 +138,7 @@ class covisibility_graph {
     covisible strongest;
   };
 
-  /// Returns true if the edge to `b` is the only one of `a`, because no pair reaches `min_shared`.
+  /// Returns true if no pair of `a` reaches `min_shared`, so that the edge to `b` is its only edge.
   [[nodiscard]] bool is_only_edge(keyframe_id a, keyframe_id b) const {
     const covisible most = strongest(a);
     return most.keyframe == b && most.shared < min_shared_;

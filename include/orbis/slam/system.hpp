@@ -98,7 +98,7 @@ class system {
   /// Registers callbacks. @pre no frame has been tracked yet
   void listen(listeners callbacks);
 
-  /// Tracks the next frame. Frames whose size differs from the camera's, or without a finite timestamp, count as lost.
+  /// Tracks the next frame. Frames whose size differs from the camera's or whose timestamp is not finite count as lost.
   /// @pre timestamps increase
   track_result track(const camera::rgbd_frame& f) {
     return track(f.timestamp, f.color.view(), f.depth_metres(), f.depth_timestamp);

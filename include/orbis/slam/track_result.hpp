@@ -52,7 +52,7 @@ struct track_result {
   /// Twist of the camera in its own frame during the read-out of a rolling shutter, per second, translation first. Zero
   /// if unknown. Argument of `camera::shutter_correction`.
   vec6 twist = zeros<vec6>();
-  /// Shutter assumed for the frame, given or estimated, with this frame's depth image delay.
+  /// Shutter assumed for the frame, given or estimated; its depth delay is that of this frame.
   camera::shutter shutter{};
   track_timings timings;
   [[nodiscard]] bool tracked() const noexcept { return T_world_camera.has_value(); }

@@ -243,9 +243,9 @@ struct places_in_leaves {
 };
 
 /// Applies `near_in_leaves` or, with `places`, `places_in_leaves` to the points [first, last) of a leaf and the leaves
-/// of `near` whose boxes are within `bound` of them. The rows in `found` and `places` are `stride` long; sets their
-/// `counts`. `scratch`: sixteen rows, each longer than `near.leaves` by sixteen. Works in two passes, so that data
-/// written for a point in the first pass has reached the cache when the second pass reads it.
+/// of `near` whose boxes are within `bound` of them. The rows in `found` and `places` are `stride` long; `counts`
+/// receives their numbers of entries. `scratch`: sixteen rows, each longer than `near.leaves` by sixteen. Works in two
+/// passes, so that data written for a point in the first pass has reached the cache when the second pass reads it.
 struct near_in_leaves_each {
   template <simd::target Target>
   static ORBIS_ALWAYS_INLINE void run(const point_row* leaves, const nearby_leaves& near, const point_row& points,

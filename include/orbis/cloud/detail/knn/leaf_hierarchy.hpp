@@ -248,7 +248,7 @@ struct leaf_hierarchy {
 }
 
 /// Builds the hierarchy. `there`: for each point, nonzero to include it; empty to include all.
-/// @pre most_copies > 0, fewer than 2^32 points; there is empty or as long as points
+/// @pre most_copies > 0, fewer than 2^32 points; `there` is empty or has one entry per point
 template <execution_policy Policy>
 [[nodiscard]] leaf_hierarchy make_leaves(const Policy& policy, const point_view& points, std::size_t most_copies,
                                          std::span<const char> there = {}) {

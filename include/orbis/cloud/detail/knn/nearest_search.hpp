@@ -204,8 +204,8 @@ class nearest_search {
     return {found_.data() + i * stride_, counts_[i]};
   }
 
-  /// Searches for the points of a leaf, one run of points that share candidates at a time. `f(first, last, box)`
-  /// searches for a run with bounding box `box` and sets `largest_`.
+  /// Finds the neighbours of all points of a leaf, one run of points that share candidates at a time. `f(first, last,
+  /// box)` finds those of a run with bounding box `box` and sets `largest_`.
   template <class F>
   void search_leaf(std::size_t l, F&& f) {
     const std::size_t size = tree_->leaf_size(l);
@@ -275,7 +275,7 @@ class nearest_search {
     if (l / leaf_width == near_rows_of_ && bound <= near_rows_reach_) return gather_rows(box, bound, own_);
     return gather_near(*tree_, 0, kernels_, box, bound, open_, own_);
   }
-  /// Gathers the leaves near a box from the near rows.
+  /// Gathers the leaves in the near rows that are close to a box.
   [[nodiscard]] bool gather_rows(const box3& box, float bound, nearby_leaves& near) {
     near.count = 0;
     std::array<float, leaf_width> distance;

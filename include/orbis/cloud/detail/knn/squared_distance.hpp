@@ -10,7 +10,7 @@
 
 namespace orbis::cloud::detail {
 
-/// Computes `(dx^2 + dy^2) + dz^2`, each operation rounded in `S`. This is the summation order of the common k-d trees,
+/// Computes `(dx^2 + dy^2) + dz^2`, each operation rounded to `S`. This is the summation order of the common k-d trees,
 /// so that thresholds select the same points.
 template <std::floating_point S>
 [[nodiscard]] inline S squared_distance(const std::array<S, 3>& a, const std::array<S, 3>& b) noexcept {

@@ -34,11 +34,11 @@ class depth_windows {
   [[nodiscard]] int tiles_down() const noexcept { return (height_ + tile - 1) / tile; }
   /// Nearest depth in the window of each pixel, row-major; `none` if a pixel of the window has no depth.
   [[nodiscard]] const float* nearest() const noexcept { return nearest_.data(); }
-  /// Farthest depth in the window of each pixel, row-major; `none` if no pixel of the window has a depth.
+  /// Greatest depth in the window of each pixel, row-major; `none` if no pixel of the window has a depth.
   [[nodiscard]] const float* farthest() const noexcept { return farthest_.data(); }
   /// Depth of each pixel, row-major; `none` if the pixel has no depth.
   [[nodiscard]] const float* middle() const noexcept { return middle_.data(); }
-  /// Farthest depth in the windows of the tiles `[x0, x1] x [y0, y1]`. @pre the tiles exist
+  /// Greatest depth in the windows of the tiles `[x0, x1] x [y0, y1]`. @pre the tiles exist
   [[nodiscard]] float farthest_of_tiles(int x0, int y0, int x1, int y1) const noexcept {
     float out = none;
     for (int y = y0; y <= y1; ++y) {

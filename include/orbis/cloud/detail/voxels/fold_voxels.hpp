@@ -186,7 +186,7 @@ class voxel_parts {
   static constexpr std::uint16_t first_of_voxel = 0xfffe;
   static constexpr bool keeps_coordinates = std::is_same_v<S, float>;
 
-  /// A point of a part: its coordinates (if float) or its voxel key (if double), and its index. After the part has been
+  /// First a point: its coordinates (if float) or its voxel key (if double), and its index. After its part has been
   /// accumulated, a voxel: its centroid and the index of its first point.
   struct entry {
     std::array<std::uint32_t, 3> words;

@@ -24,8 +24,8 @@ class plain_yaml {
   /// Maximum size of a file; camera files are far smaller.
   static constexpr std::size_t max_bytes = 65536;
 
-  /// Parses a file. Errors: malformed, with the line number (not of this form, a repeated name, an unterminated list;
-  /// too large).
+  /// Parses a file. Errors: malformed, with the line number (not of this form, a repeated name, an unterminated list),
+  /// or larger than `max_bytes`.
   [[nodiscard]] static result<plain_yaml> parse(std::string_view text, const std::filesystem::path& where) {
     if (text.size() > max_bytes) return fail(errc::malformed, where.string(), "is too large for a settings file");
     if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);

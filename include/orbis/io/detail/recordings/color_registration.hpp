@@ -79,7 +79,7 @@ class color_registration {
   [[nodiscard]] static double max_reduction(const camera::pinhole& color) {
     return std::max(1, std::min(color.width(), color.height()));
   }
-  /// Samples bilinearly at `pixel` of the original image, before reduction.
+  /// Samples bilinearly at `pixel`, which is given in the unreduced image.
   void sample(image_view<const rgb8> from, const vec2& pixel, rgb8& to) const {
     const vec2 at((pixel.x() + 0.5) / shrink_ - 0.5, (pixel.y() + 0.5) / shrink_ - 0.5);
     const double right = from.width() - 1, bottom = from.height() - 1;

@@ -20,7 +20,7 @@
 
 namespace orbis::io::detail {
 
-/// Returns `read`, the image in the file `path`, if it has the size of its camera. Errors: malformed, those of `read`.
+/// Returns `read`, the image in the file `path`, if its size is that of the camera. Errors: malformed, those of `read`.
 template <class T>
 [[nodiscard]] result<image<T>> sized(result<image<T>> read, const std::filesystem::path& path, int width, int height) {
   if (!read || (read->width() == width && read->height() == height)) return read;

@@ -36,9 +36,10 @@ class view_frustum {
     close();
   }
 
-  /// Returns the largest distance by which a change of the pose moves a point of the frustum up to depth `reach`
-  /// (metres along the optical axis). The displacement is an affine function of the point, so its norm is largest at
-  /// one of the nine corners, which include the camera's centre. Infinite if the reach or a pose is not finite. O(1).
+  /// Returns the largest distance by which a change of the pose moves a point of the frustum. The frustum ends at
+  /// depth `reach` (metres along the optical axis). The displacement is an affine function of the point, so its norm is
+  /// largest at one of the nine corners, which include the camera's centre. Infinite if the reach or a pose is not
+  /// finite. O(1).
   [[nodiscard]] double displacement(const se3& T_world_before, const se3& T_world_after, double reach) const {
     double largest = norm(T_world_after.translation() - T_world_before.translation());
     for (const vec3& c : corners_) {

@@ -192,7 +192,7 @@ class moving_judge {
     views_.push_back(std::move(next));
     return views_.back();
   }
-  /// Counts the evidence of view `by` for the cells of view `about`.
+  /// Counts the evidence that view `by` provides about the cells of view `about`.
   template <class Policy>
   void ask(const Policy& policy, view& about, const view& by, const se3& T_by_about) const {
     about.unjudged = true;

@@ -173,7 +173,7 @@ class point_integrator {
         masks.mark_occupied({at(0), at(1), at(2)});
       }
     }
-    /// Adds the points [begin, end) in mode discretized.
+    /// Adds the points [begin, end) in the mode `discretized`.
     void add_ends(const voxel_grid& grid, std::size_t begin, std::size_t end, const point_source& point) {
       scan_brick* brick = nullptr;  // brick of the last point; neighbours are mostly in the same brick
       while (begin != end) {

@@ -43,7 +43,7 @@ class bundle_structure {
     std::uint32_t first_mixed = 0, cameras = 0;
     std::size_t first_pair = 0;  ///< index of the first pair (a > b, a ascending); shared by groups of the same cameras
   };
-  /// Consecutive points with all their observations; ends at the beginning of the next chunk.
+  /// A run of consecutive points with all their observations; it ends where the next chunk begins.
   struct chunk {
     std::size_t first_point = 0, first_segment = 0, first_group = 0, first_mixed = 0;
   };
@@ -102,7 +102,7 @@ class bundle_structure {
     return std::span{by_point_}.subspan(of_point_[source_point], of_point_[source_point + 1] - of_point_[source_point]);
   }
 
-  /// Sorts by camera, then by point: `by_point_` contains the observations of each point in ascending order of camera.
+  /// Sorts observations: `by_point_` contains those of each point in ascending order of camera.
   template <class Observation, class Usable>
   void sort(std::size_t cameras, std::size_t points, std::span<const Observation> observations,
             const Usable& is_usable) {

@@ -112,7 +112,8 @@ struct match_kernels {
   match_equations* equations = simd::kernel<match_equations_kernel, match_equations>();
 };
 
-/// The normal equations of half the sum of squares, for a motion on the left of the pose; `cost` is the sum of squares.
+/// The normal equations of half the sum of squares, for a motion applied on the left of the pose; `cost` is the sum of
+/// squares.
 struct pose_equations {
   mat6 h;
   vec6 g;

@@ -10,8 +10,8 @@
 
 namespace orbis::optimize::detail {
 
-/// Returns the root of a polynomial between `low` and `high`, at which the polynomial has opposite signs: Newton's
-/// method, with bisection if a step would leave the interval. `c[i]` is the coefficient of x^i.
+/// Returns a root of a polynomial between `low` and `high`, where its values have opposite signs. Uses Newton's method,
+/// or bisection if a step would leave the interval. `c[i]` is the coefficient of x^i.
 [[nodiscard]] inline double bracketed_root(const double* c, std::size_t degree, double low, double high,
                                            double at_low) {
   double x = 0.5 * (low + high);

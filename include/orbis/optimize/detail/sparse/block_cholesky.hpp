@@ -46,7 +46,7 @@ requires(B >= 1) class block_cholesky {
   /// The block whose pivot was not positive, after `factor` has returned false.
   [[nodiscard]] std::uint32_t failed_block() const { return failed_block_; }
 
-  /// Solves in place: replaces the right-hand side in `x` by the solution. @pre the last `factor` returned true
+  /// Solves in place: replaces the right-hand side in `x` with the solution. @pre the last `factor` returned true
   void solve(std::span<double> x);
 
  private:

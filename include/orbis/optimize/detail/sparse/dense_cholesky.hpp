@@ -64,7 +64,7 @@ class dense_cholesky {
   /// The row whose pivot was not positive, after `factor` has returned false.
   [[nodiscard]] std::size_t failed_row() const { return failed_row_; }
 
-  /// Solves in place: replaces the right-hand side in `x` by the solution. @pre the last `factor` returned true
+  /// Solves in place: replaces the right-hand side in `x` with the solution. @pre the last `factor` returned true
   void solve(std::span<double> x) const;
 
  private:

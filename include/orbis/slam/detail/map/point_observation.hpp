@@ -16,8 +16,8 @@
 
 namespace orbis::slam::detail {
 
-/// Returns the observation of any `point` (world, metres) by keypoint `i` of a frame; the standard deviation of the
-/// keypoint is one pixel of its level.
+/// Returns keypoint `i` of a frame as an observation of `point` (world, metres); the standard deviation of the keypoint
+/// is one pixel of its level.
 template <camera::camera_model Camera, feature_descriptor D>
 [[nodiscard]] optimize::pose_observation make_observation(const camera_rig<Camera>& rig, const basic_frame<D>& f,
                                                           std::size_t i, const vec3& point) {

@@ -42,8 +42,8 @@ struct twist_prior {
   double translation_deviation = 0.5;   ///< metres per second
   double rotation_deviation = 1.0;      ///< radians per second
 
-  /// Returns the prior `interval` seconds after a previous frame. With constant acceleration, a trend of 1 is exact,
-  /// but errors of the twist would oscillate indefinitely; a trend of one half damps them. @pre interval > 0
+  /// Returns the prior for a time `interval` seconds after a frame. With constant acceleration, a trend of 1 is exact,
+  /// but errors in the twist would oscillate indefinitely; a trend of one half damps them. @pre interval > 0
   [[nodiscard]] static twist_prior after(const moving_pose& before, double interval, bool twist_is_known) {
     constexpr double acceleration = 6.0;  // metres or radians per second squared
     const twist_prior unknown;

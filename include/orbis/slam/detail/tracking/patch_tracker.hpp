@@ -190,8 +190,8 @@ class patch_tracker {
     image_view<const std::uint8_t> level;
   };
 
-  /// Returns the standard deviation of a corner's position, pixels: it may be found anywhere on its streak of `length`
-  /// pixels.
+  /// Returns the standard deviation, in pixels, of the position of a corner that may be found anywhere on its streak of
+  /// `length` pixels.
   [[nodiscard]] static double corner_deviation(double length) noexcept {
     return std::sqrt(1.0 + length * length / 12.0);
   }

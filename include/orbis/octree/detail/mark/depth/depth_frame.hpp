@@ -115,7 +115,7 @@ struct depth_rays {
     const auto& tile = frame.map.tile_at(u, v, size);
     return tile.x0 <= tile.x1 && t.may_cross(tile.x0, tile.x1, tile.y0, tile.y1);
   }
-  /// Returns true if the traversal of a ray for which `test` was undecided visits the voxel.
+  /// Traverses a ray for which `test` was undecided; returns true if it visits the voxel.
   [[nodiscard]] bool visits(std::uint32_t number, const voxel_key& voxel) const {
     const auto [u, v] = frame.ends.pixel(number);
     return crosses(sensor, find_endpoint(ends, u, v), voxel);

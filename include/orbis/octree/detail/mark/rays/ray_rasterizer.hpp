@@ -165,7 +165,7 @@ class ray_rasterizer {
     masks.mark_free(key(at));
   }
 
-  /// Index of the slab that contains the last voxels marked by a ray with this number of planes.
+  /// Index of the slab that contains the last voxels marked by a ray that crosses this number of planes.
   [[nodiscard]] static std::int32_t last_slab(std::int32_t origin, std::int32_t step, std::int32_t planes) noexcept {
     return std::abs((origin + step * planes) / slab - origin / slab);
   }
