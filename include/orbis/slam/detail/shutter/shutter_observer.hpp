@@ -111,8 +111,7 @@ class shutter_observer {
 
   /// Revises the estimate each time the observation time has grown by half, and discards the measurements made with the
   /// previous shutter: the equations are valid only near the assumed values, and the gates of tracking are biased
-  /// towards these values. Because depth slopes are noisy, their squares are too large, and a step towards the true
-  /// delay is only about half as long as it should be: several steps are needed.
+  /// towards these values, so that several steps are needed.
   [[nodiscard]] std::optional<camera::shutter> decide(const camera::shutter& assumed) {
     constexpr double first = 2.0, often = 0.5, same = 0.001;  // seconds
     if (watched_ - looked_ < often) return std::nullopt;
