@@ -365,7 +365,7 @@ cleared_folders lock_and_clear(const std::vector<opened_folder>& folders) {
     if (first && !first->empty()) why = finish_transaction(*first);
     if (why) {  // later results must not be moved into place before earlier ones
       cleared.obstacle = "the results of an earlier run, in the hidden folder " + left.filename().string() +
-                         ", cannot be moved into place: " + *why;
+                         ", cannot be moved into place: " + *why + "; delete that folder if you do not need them";
       break;
     }
     std::error_code ignored;
