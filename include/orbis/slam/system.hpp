@@ -67,9 +67,9 @@ class stopwatch;
 ///
 /// Without threads (the default), `track` does all the work, and the same frames and options give bit-identical
 /// results. With threads (`options::threads`) mapping, loop closing and global adjustment run while frames are tracked.
-/// Call `track` from one thread; all other functions may be called from any thread. An exception on one of the system's
-/// threads (`std::bad_alloc`, or one thrown by a callback) ends that thread; `wait`, and `track` when it creates a
-/// keyframe, then rethrow the exception. A map may be left partly changed: destroy the system.
+/// Call `track`, `load_map`, `activate` and the functions for the tracking thread from one thread; all others may be
+/// called from any thread. An exception on one of the system's threads (`std::bad_alloc`, or one thrown by a callback)
+/// ends that thread; `wait`, and `track` when it creates a keyframe, then rethrow it. Then destroy the system.
 ///
 /// Template parameters: the camera model; the extractor, which determines the descriptor type; the matchers for
 /// tracking; place recognition. orbis::compiled contains the system for `camera::any_camera` and the default
