@@ -251,7 +251,7 @@ exit_code run_slam(const settings& s, console& console) {
   };
   auto written = write_poses();
   if (!written && files->drop_landmark_map()) {  // makes room on the disk
-    tracked->unsaved = {written.error().code, s.save_map.string(), "cannot be written beside the trajectory"};
+    tracked->unsaved = {written.error().code, s.save_map.string(), written.error().message};
     written = write_poses();
   }
   if (!written) return give_up(files->with_final_path(written.error()));

@@ -91,8 +91,8 @@ void remove_hidden_folders() {
   std::error_code ignored;
   // Removal fails if another thread creates a file at this moment, and is then tried again. Once the folder is gone, no
   // file can be created in it.
-  for (const fs::path& path : hidden().paths)
-    for (int i = 0; i != 1000 && fs::exists(path, ignored); ++i) fs::remove_all(path, ignored);
+  for (auto path = hidden().paths.rbegin(); path != hidden().paths.rend(); ++path)
+    for (int i = 0; i != 1000 && fs::exists(*path, ignored); ++i) fs::remove_all(*path, ignored);
 }
 
 }  // namespace
@@ -278,7 +278,7 @@ result<result_files> result_files::begin(const settings& s) {
 
 result_files::~result_files() {
   if (folders_.empty()) return;
-  folders_.clear();
+  while (!folders_.empty()) folders_.pop_back();  // the first one last, as it lists the others
   interrupts::set_clean_up({});
   const std::lock_guard lock{hidden().mutex};
   hidden().paths.clear();
@@ -307,10 +307,14 @@ orbis::error result_files::with_final_path(orbis::error e) const {
   return e;
 }
 
+bool result_files::is_deleted(const staged_folder& f, const std::error_code& error) const {
+  return &f != &folders_.front() && error == std::errc::no_such_file_or_directory;
+}
+
 result<void> result_files::begin_optional() {
   std::error_code ec;
   for (const staged_folder& f : folders_)
-    if (fs::create_directories(f.path() / optional_name, ec); ec)
+    if (fs::create_directories(f.path() / optional_name, ec); ec && !is_deleted(f, ec))
       return orbis::fail(orbis::errc::write_failed, out_.string(), "cannot create files in it: " + ec.message());
   return {};
 }
@@ -322,6 +326,7 @@ result<void> result_files::take_optional() {
     const fs::path folder = f.path();
     for (fs::directory_iterator it{folder / optional_name, ec}, end; !ec && it != end; it.increment(ec))
       moves.emplace_back(it->path(), folder / it->path().filename());
+    if (is_deleted(f, ec)) ec.clear();
   }
   std::size_t moved = 0;
   while (!ec && moved != moves.size()) {

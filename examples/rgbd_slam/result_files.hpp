@@ -11,6 +11,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -102,6 +103,9 @@ class result_files {
   [[nodiscard]] orbis::result<void> put_in_place();
 
  private:
+  /// Returns true if an error shows that the user has deleted a folder other than the output folder. Its files are left
+  /// out at the end (`put_in_place`).
+  [[nodiscard]] bool is_deleted(const staged_folder& f, const std::error_code& error) const;
   /// Updates the list of other results in summary.json, as another run may have written to the output folder since the
   /// summary was written. Errors: write_failed.
   [[nodiscard]] orbis::result<void> list_other_results() const;

@@ -2,6 +2,7 @@
 #include "staged_folder.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <chrono>
 #include <csignal>
@@ -46,7 +47,8 @@ constexpr std::string_view prefix = ".rgbd_slam-", ready = ".ready";
 // transaction also lists the others, which list the first one.
 const fs::path own = staged_folder::private_name;
 const fs::path backup = own / "replaced", names_list = own / "names", others_list = own / "others",
-               first_list = own / "first", spare = own / "spare";
+               first_list = own / "first";
+const std::array spare = {own / "spare_1", own / "spare_2", own / "spare_3"};
 
 auto failure(const fs::path& path, const std::string& what) {
   return orbis::fail(orbis::errc::write_failed, path.string(), what);
@@ -62,12 +64,14 @@ descriptor open_folder(const fs::path& folder) {
 fs::path link_to(const descriptor& folder) { return "/proc/self/fd/" + std::to_string(folder.get()); }
 
 /// Reserves space on the disk for the lists in a hidden folder, so that they can be written after the results have
-/// filled the disk. Returns 0 or an errno value. No effect on file systems that cannot reserve space.
+/// filled the disk. Returns 0 or an errno value.
 int reserve_space(const fs::path& hidden) {
-  const descriptor file{::open((hidden / spare).c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0600)};
-  if (file.get() < 0) return errno;
-  const int why = ::posix_fallocate(file.get(), 0, 12 * 1024);
-  return why == ENOSPC || why == EFBIG ? why : 0;
+  for (const fs::path& name : spare) {
+    const descriptor file{::open((hidden / name).c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0600)};
+    if (file.get() < 0) return errno;
+    if (const int why = ::posix_fallocate(file.get(), 0, 4096); why == ENOSPC || why == EFBIG) return why;
+  }
+  return 0;
 }
 
 /// Locks folders during its lifetime. No effect on file systems without locks.
@@ -216,39 +220,32 @@ bool is_hidden_folder(const fs::path& path) {
 }
 bool is_ready(const fs::path& hidden) { return hidden.filename().string().ends_with(ready); }
 
-/// Returns false if it is unknown whether the file exists: it cannot be examined, or its folder is missing (renamed, or
-/// on a disk that is not mounted).
-bool is_known(const fs::path& path) {
-  std::error_code failure;
-  if (fs::exists(fs::symlink_status(path, failure))) return true;
-  if (failure && failure != std::errc::no_such_file_or_directory) return false;
-  return fs::is_directory(path.parent_path(), failure);
-}
-
-/// The first hidden folder of the transaction to which a hidden folder belongs; empty if there is none, nullopt if it
-/// cannot be determined.
+/// The first hidden folder of the transaction to which a hidden folder belongs; empty if the transaction has not begun,
+/// nullopt if it cannot be determined: the first folder is missing (renamed, or on a disk that is not mounted).
 std::optional<fs::path> first_of(const fs::path& hidden) {
   if (is_ready(hidden)) return hidden;
   const auto first = read_list(hidden / first_list);
   if (!first) return std::nullopt;
   if (first->size() != 1) return fs::path{};
-  const fs::path path = first->front();
-  if (!is_known(path)) return std::nullopt;
-  return is_ready(path) && is_hidden_folder(path) ? path : fs::path{};
+  const fs::path marked = first->front();
+  if (is_ready(marked) && is_hidden_folder(marked)) return marked;
+  if (is_hidden_folder(fs::path{marked}.replace_extension())) return fs::path{};
+  return std::nullopt;
 }
-/// The other existing hidden folders of a transaction; nullopt if they cannot be determined.
+/// Returns true if a hidden folder belongs to the transaction whose first one has the file name `first`. Names are
+/// unique; the path may differ, as the user may have renamed a folder.
+bool belongs_to(const fs::path& hidden, const fs::path& first) {
+  const auto listed = read_list(hidden / first_list);
+  return is_hidden_folder(hidden) && listed && listed->size() == 1 && fs::path{listed->front()}.filename() == first;
+}
+/// The other hidden folders of a transaction; nullopt if one of them is missing or cannot be read. Empty if all moves
+/// are complete.
 std::optional<std::vector<fs::path>> others_of(const fs::path& first) {
   const auto listed = read_list(first / others_list);
   if (!listed) return std::nullopt;
-  std::vector<fs::path> others;
-  for (const fs::path path : *listed) {
-    if (!is_known(path)) return std::nullopt;
-    if (!is_hidden_folder(path)) continue;
-    const auto its_first = read_list(path / first_list);
-    if (!its_first) return std::nullopt;
-    // Names are unique; the path differs if the user has renamed the folder of the first one.
-    if (its_first->size() == 1 && fs::path{its_first->front()}.filename() == first.filename()) others.push_back(path);
-  }
+  std::vector<fs::path> others{listed->begin(), listed->end()};
+  for (const fs::path& path : others)
+    if (!belongs_to(path, first.filename())) return std::nullopt;
   return others;
 }
 
@@ -259,16 +256,17 @@ std::vector<fs::path> hidden_folders_in(const fs::path& folder) {
     if (is_hidden_folder(it->path())) found.push_back(it->path());
   return found;
 }
-/// The hidden folders of ended processes in `folder`, from the earliest results to the latest. Where the end of a
-/// process cannot be determined (no permission, or a file system without locks), only those with complete results.
+/// Returns true if the process that created a hidden folder has ended. Where that cannot be determined (no permission,
+/// or a file system without locks), returns true if the folder contains complete results.
+bool is_left(const fs::path& hidden) {
+  const descriptor lock = open_folder(hidden);
+  if (lock.get() < 0) return errno == EACCES && is_ready(hidden);
+  return ::flock(lock.get(), LOCK_EX | LOCK_NB) == 0 || (errno != EWOULDBLOCK && is_ready(hidden));
+}
+/// The hidden folders of ended processes in `folder`, from the earliest results to the latest.
 std::vector<fs::path> leftovers_in(const fs::path& folder) {
   std::vector<fs::path> found = hidden_folders_in(folder);
-  std::erase_if(found, [](const fs::path& hidden) {
-    const descriptor lock = open_folder(hidden);
-    if (lock.get() < 0) return errno != EACCES || !is_ready(hidden);
-    if (::flock(lock.get(), LOCK_EX | LOCK_NB) == 0) return false;
-    return errno == EWOULDBLOCK || !is_ready(hidden);
-  });
+  std::erase_if(found, [](const fs::path& hidden) { return !is_left(hidden); });
   std::vector<std::pair<fs::file_time_type, fs::path>> by_time;
   for (fs::path& hidden : found) {
     std::error_code no_list;
@@ -300,13 +298,24 @@ std::optional<std::string> finish_transaction(const fs::path& first) {
     }
   }
   if (const int why = rename_all(moves); why != 0) return reason(why % not_restored);
-  std::error_code ignored;
   for (const fs::path& hidden : *folders) {
     const descriptor parent = open_folder(hidden.parent_path());
     if (parent.get() >= 0) ::fsync(parent.get());
-    fs::remove_all(hidden, ignored);
   }
+  std::error_code ignored;
+  fs::remove(first / others_list, ignored);  // all moves are complete
+  for (const fs::path& hidden : *folders) fs::remove_all(hidden, ignored);
   return std::nullopt;
+}
+
+/// Removes the hidden folders of a transaction that has not begun.
+void give_up(const fs::path& hidden) {
+  std::error_code ignored;
+  const auto others = read_list(hidden / others_list);
+  for (const fs::path path : others.value_or(std::vector<std::string>{}))
+    if (belongs_to(path, hidden.filename().string() + std::string{ready}) && is_left(path))
+      fs::remove_all(path, ignored);
+  fs::remove_all(hidden, ignored);
 }
 
 struct opened_folder {
@@ -323,8 +332,8 @@ struct cleared_folders {
 
 /// Locks `folders`, completes the transactions that ended processes left in them, and removes the hidden folders of
 /// these processes. Also locks the folders of the other files of these transactions. All folders are locked together:
-/// locking starts again whenever a folder is found that is not locked yet.
-cleared_folders lock_and_clear(const std::vector<opened_folder>& folders) {
+/// locking starts again whenever a folder is found that is not locked yet. `own`: hidden folders of this process.
+cleared_folders lock_and_clear(const std::vector<opened_folder>& folders, const std::vector<fs::path>& own = {}) {
   cleared_folders cleared;
   std::vector<fs::path> paths;
   std::vector<int> numbers;
@@ -350,6 +359,7 @@ cleared_folders lock_and_clear(const std::vector<opened_folder>& folders) {
     }
     for (const opened_folder& folder : folders)
       for (const fs::path& left : leftovers_in(folder.path)) {
+        if (std::find(own.begin(), own.end(), left) != own.end()) continue;  // its lock could not be taken
         leftovers.push_back(left);
         if (const auto first = first_of(left); first && !first->empty()) {
           add(first->parent_path());
@@ -362,6 +372,7 @@ cleared_folders lock_and_clear(const std::vector<opened_folder>& folders) {
     const auto first = first_of(left);
     std::optional<std::string> why;
     if (!first) why = "the folder of their other files is missing or cannot be read";
+    if (first && first->empty()) give_up(left);
     if (first && !first->empty()) why = finish_transaction(*first);
     if (why) {  // later results must not be moved into place before earlier ones
       cleared.obstacle = "the results of an earlier run, in the hidden folder " + left.filename().string() +
@@ -476,27 +487,42 @@ result<void> staged_folder::put_in_place(std::span<staged_folder* const> folders
   }
   staged_folder& first = *folders.front();
   const fs::path marked = first.staging_.string() + std::string{ready};
-  std::vector<std::string> others;
-  for (const staged_folder* f : folders.subspan(1)) others.push_back(f->staging_.string());
 
   // Prepare all folders.
   std::error_code ec;
-  for (const staged_folder* f : folders) {
-    fs::remove(f->staging_ / spare, ec);
-    auto listed = write_list(f->staging_ / names_list, f->names_);
-    if (listed)
-      listed = f == &first ? write_list(f->staging_ / others_list, others)
-                           : write_list(f->staging_ / first_list, {marked.string()});
-    if (!listed) return listed;
-    ::fsync(f->staging_lock_.get());
-    ::fsync(f->folder_lock_.get());
+  const auto prepare = [&](staged_folder& f, const fs::path& list, const std::vector<std::string>& texts) {
+    for (const fs::path& name : spare) fs::remove(f.staging_ / name, ec);
+    auto listed = write_list(f.staging_ / names_list, f.names_);
+    if (listed) listed = write_list(f.staging_ / list, texts);
+    if (!listed) return result<void>{failure(f.folder_, "the list of new files " + listed.error().message)};
+    ::fsync(f.staging_lock_.get());
+    ::fsync(f.folder_lock_.get());
+    return listed;
+  };
+  std::vector<staged_folder*> prepared{&first};
+  std::vector<std::string> others;
+  std::optional<orbis::error> left_out;
+  for (staged_folder* f : folders.subspan(1)) {
+    if (auto done = prepare(*f, first_list, {marked.string()}); done) {
+      prepared.push_back(f);
+      others.push_back(f->staging_.string());
+    } else {
+      left_out = done.error();
+      left_out->message += "; the other results were written";
+      f->discard();
+    }
   }
+  if (auto done = prepare(first, others_list, others); !done) return done;
   // The results of earlier runs are moved into place first.
   std::vector<opened_folder> opened;
-  for (const staged_folder* f : folders) opened.push_back({f->folder_, f->folder_lock_.get()});
-  const auto cleared = lock_and_clear(opened);
+  std::vector<fs::path> ours;
+  for (const staged_folder* f : prepared) {
+    opened.push_back({f->folder_, f->folder_lock_.get()});
+    ours.push_back(f->staging_);
+  }
+  const auto cleared = lock_and_clear(opened, ours);
   const std::lock_guard stays{hidden.mutex};
-  for (const staged_folder* f : folders)
+  for (const staged_folder* f : prepared)
     for (const std::string& name : f->made())
       if (!may_be_replaced(f->folder_ / name))
         return failure(f->folder_ / name, "is not a regular file and will not be replaced");
@@ -509,13 +535,13 @@ result<void> staged_folder::put_in_place(std::span<staged_folder* const> folders
   const auto postponed = [&](const std::string& what) {
     auto failed =
         failure(first.folder_, what + "; the next command that uses the folder moves the new files into place");
-    for (staged_folder* f : folders) f->leave(hidden);
+    for (staged_folder* f : prepared) f->leave(hidden);
     return failed;
   };
   if (!cleared.obstacle.empty()) return postponed(cleared.obstacle);
 
   std::vector<move> moves;
-  for (const staged_folder* f : folders)
+  for (const staged_folder* f : prepared)
     for (move& m : moves_to(f->folder_, f->staging_, f->names_)) {
       m.has_old = m.replaces && ::link(m.to.c_str(), m.old.c_str()) == 0;
       moves.push_back(std::move(m));
@@ -527,8 +553,10 @@ result<void> staged_folder::put_in_place(std::span<staged_folder* const> folders
     if (first.rename_hidden(unmarked, hidden)) return postponed(what);
     return failure(first.folder_, what);  // no program completes this transaction
   }
-  for (const staged_folder* f : folders) ::fsync(f->folder_lock_.get());
-  for (staged_folder* f : folders) f->discard();
+  for (const staged_folder* f : prepared) ::fsync(f->folder_lock_.get());
+  fs::remove(first.staging_ / others_list, ec);  // all moves are complete
+  std::for_each(prepared.rbegin(), prepared.rend(), [](staged_folder* f) { f->discard(); });
+  if (left_out) return orbis::fail(*left_out);
   return {};
 }
 

@@ -73,10 +73,12 @@ class staged_folder {
   /// Removes the hidden folder with its files.
   void discard() noexcept;
 
-  /// Moves the files of all folders into place: all of them, or none if it returns an error. If another program holds
-  /// the lock of a folder, or files can be moved neither into place nor back, the error indicates that the next program
-  /// that uses the folder completes the moves. `hidden`: see `open`. `complete` completes the files; it is called after
-  /// the results of earlier runs have been moved into place. Errors: write_failed, and those of `complete`.
+  /// Moves the files of all folders into place: all of them, or none if it returns an error. Exception: if the files of
+  /// a folder other than the first cannot be listed (it was deleted, or its disk is full), they are left out, and the
+  /// error says so. If another program holds the lock of a folder, or files can be moved neither into place nor back,
+  /// the error indicates that the next program that uses the folder completes the moves. `hidden`: see `open`.
+  /// `complete` completes the files; it is called after the results of earlier runs have been moved into place. Errors:
+  /// write_failed, and those of `complete`.
   [[nodiscard]] static orbis::result<void> put_in_place(std::span<staged_folder* const> folders, hidden_folders& hidden,
                                                         const std::function<orbis::result<void>()>& complete);
 

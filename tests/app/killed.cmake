@@ -70,6 +70,10 @@ foreach(missing out maps)
     if(NOT folder STREQUAL missing)
       app_fails(2 "${folder}: the results of an earlier run, in the hidden folder .rgbd_slam-.*: .*missing"
                 map cloud.ply --out ${folder} ${quick})
+      file(MAKE_DIRECTORY ${WORK}/${missing})  # such as the folder at which a disk is not mounted
+      app_fails(2 "${folder}: the results of an earlier run, in the hidden folder .rgbd_slam-.*: .*missing"
+                map cloud.ply --out ${folder} ${quick})
+      file(REMOVE_RECURSE ${WORK}/${missing})
     endif()
   endforeach()
   if(missing STREQUAL maps)
@@ -240,8 +244,8 @@ must_exist(${WORK}/elsewhere/maps room.map)
 must_not_be_half_written(${WORK}/elsewhere/out)
 must_not_be_half_written(${WORK}/elsewhere/maps)
 
-# While a run waits for the lock, the user creates a folder with the name of a result, or deletes one of the folders: an
-# error, and nothing else is lost.
+# While a run waits for the lock, the user creates a folder with the name of a result: an error, and nothing else is
+# lost. If the user deletes the folder of the landmark map, the other results are written.
 foreach(change "mkdir waits/out/map.bt" "rm -rf waits/maps")
   file(REMOVE_RECURSE ${WORK}/waits)
   execute_process(COMMAND bash -c "
@@ -257,9 +261,13 @@ foreach(change "mkdir waits/out/map.bt" "rm -rf waits/maps")
   file(READ ${WORK}/waits.log err)
   check(result EQUAL 2 AND err MATCHES "rgbd_slam: [^\n]*waits/[^\n]*\n$")
   must_not_be_half_written(${WORK}/waits/out)
-  check(NOT EXISTS ${WORK}/waits/out/trajectory.txt)
   if(change MATCHES mkdir)
     check(IS_DIRECTORY ${WORK}/waits/out/map.bt)
+    check(NOT EXISTS ${WORK}/waits/out/trajectory.txt)
+  else()
+    check(err MATCHES "waits/maps: .*. the other results were written")
+    must_equal(waits/out/trajectory.txt two/trajectory.txt)
+    must_exist(${WORK}/waits/out summary.json map.bt)
   endif()
 endforeach()
 
@@ -300,6 +308,21 @@ foreach(size 76k 100k 160k 184k)
   if(NOT EXISTS ${WORK}/disk_${size}/room.map)
     check(err MATCHES "disk/room.map: [^\n]*\n")
   endif()
+endforeach()
+
+foreach(inodes 18 20 22 24 26)
+  execute_process(COMMAND mount -t tmpfs -o size=4m,nr_inodes=${inodes} none disk WORKING_DIRECTORY ${WORK}
+                  RESULT_VARIABLE result OUTPUT_QUIET ERROR_QUIET)
+  if(NOT result EQUAL 0)
+    break()
+  endif()
+  execute_process(COMMAND ${APP} run room --frames 2 --out disk/out ${quick} --deterministic WORKING_DIRECTORY ${WORK}
+                  RESULT_VARIABLE result ERROR_VARIABLE err)
+  file(COPY ${WORK}/disk/ DESTINATION ${WORK}/disk_${inodes})
+  execute_process(COMMAND umount ${WORK}/disk)
+  check(result EQUAL 0 OR (result EQUAL 2 AND err MATCHES "No space left on device"))
+  must_equal(disk_${inodes}/out/trajectory.txt two/trajectory.txt)
+  must_exist(${WORK}/disk_${inodes}/out summary.json)
 endforeach()
 
 # What another user has put into the folder is neither moved nor removed, unless the folder is that user's.

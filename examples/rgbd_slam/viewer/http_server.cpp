@@ -103,7 +103,7 @@ bool is_local(std::string_view host) {
     if (host.find_first_not_of("0123456789", colon + 1) != host.npos) return false;
     host = host.substr(0, colon);
   }
-  return host == http_server::address || host == "localhost";
+  return host == http_server::address || is_same_name(host, "localhost");
 }
 
 }  // namespace
