@@ -208,6 +208,8 @@ std::optional<orbis::error> find_unwritable(const settings& s) {
     if (is_protected(s.out, name)) return protected_error(s.out / name);
   for (const fs::path& file : {s.save_map, s.floor_map})
     if (!file.empty() && is_protected(parent_folder(file), file.filename())) return protected_error(file);
+  const fs::path picture = fs::path{s.floor_map}.replace_extension(".pgm");
+  if (!s.floor_map.empty() && is_protected(parent_folder(picture), picture.filename())) return protected_error(picture);
   return std::nullopt;
 }
 
@@ -354,23 +356,23 @@ bool result_files::drop_landmark_map() const {
 result<void> result_files::put_in_place() {
   std::vector<staged_folder*> folders;
   for (staged_folder& f : folders_) folders.push_back(&f);
-  return staged_folder::put_in_place(folders, hidden(), [this] { return list_other_results(); });
+  return staged_folder::put_in_place(folders, hidden(), [this] { list_other_results(); });
 }
 
-result<void> result_files::list_other_results() const {
+void result_files::list_other_results() const {
   constexpr const char* list = "files_of_earlier_runs";
   const fs::path path = folder() / "summary.json";
   const auto text = orbis::read_file(path);
-  if (!text) return {};  // this run has none
+  if (!text) return;  // this run has none
   auto summary = nlohmann::ordered_json::parse(*text, nullptr, false);
   const auto made = summary.find("files");
-  if (made == summary.end()) return {};
+  if (made == summary.end()) return;
   const file_names others = lists().of_earlier_runs(made->get<file_names>());
-  if (summary.value(list, file_names{}) == others) return {};
+  if (summary.value(list, file_names{}) == others) return;
   summary[list] = others;
-  return orbis::write_file_atomically(path, [&](std::ostream& out) {
+  static_cast<void>(orbis::write_file_atomically(path, [&](std::ostream& out) {
     out << summary.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) << '\n';
-  });
+  }));  // without space on the disk, the list remains as it is
 }
 
 }  // namespace app

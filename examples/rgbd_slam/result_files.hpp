@@ -107,8 +107,8 @@ class result_files {
   /// out at the end (`put_in_place`).
   [[nodiscard]] bool is_deleted(const staged_folder& f, const std::error_code& error) const;
   /// Updates the list of other results in summary.json, as another run may have written to the output folder since the
-  /// summary was written. Errors: write_failed.
-  [[nodiscard]] orbis::result<void> list_other_results() const;
+  /// summary was written.
+  void list_other_results() const;
   static inline const std::filesystem::path optional_name =
       std::filesystem::path{staged_folder::private_name} / "optional";
 

@@ -47,7 +47,7 @@ constexpr std::string_view prefix = ".rgbd_slam-", ready = ".ready";
 // transaction also lists the others, which list the first one.
 const fs::path own = staged_folder::private_name;
 const fs::path backup = own / "replaced", names_list = own / "names", others_list = own / "others",
-               first_list = own / "first";
+               first_list = own / "first", complete_list = own / "complete";
 const std::array spare = {own / "spare_1", own / "spare_2", own / "spare_3"};
 
 auto failure(const fs::path& path, const std::string& what) {
@@ -69,7 +69,8 @@ int reserve_space(const fs::path& hidden) {
   for (const fs::path& name : spare) {
     const descriptor file{::open((hidden / name).c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0600)};
     if (file.get() < 0) return errno;
-    if (const int why = ::posix_fallocate(file.get(), 0, 4096); why == ENOSPC || why == EFBIG) return why;
+    if (const int why = ::posix_fallocate(file.get(), 0, 4096); why == ENOSPC || why == EDQUOT || why == EFBIG)
+      return why;
   }
   return 0;
 }
@@ -256,66 +257,78 @@ std::vector<fs::path> hidden_folders_in(const fs::path& folder) {
     if (is_hidden_folder(it->path())) found.push_back(it->path());
   return found;
 }
-/// Returns true if the process that created a hidden folder has ended. Where that cannot be determined (no permission,
-/// or a file system without locks), returns true if the folder contains complete results.
+/// Returns true if the process that created a hidden folder has ended, or may not be examined and has complete results.
 bool is_left(const fs::path& hidden) {
   const descriptor lock = open_folder(hidden);
   if (lock.get() < 0) return errno == EACCES && is_ready(hidden);
-  return ::flock(lock.get(), LOCK_EX | LOCK_NB) == 0 || (errno != EWOULDBLOCK && is_ready(hidden));
+  return ::flock(lock.get(), LOCK_EX | LOCK_NB) == 0;
 }
-/// The hidden folders of ended processes in `folder`, from the earliest results to the latest.
-std::vector<fs::path> leftovers_in(const fs::path& folder) {
-  std::vector<fs::path> found = hidden_folders_in(folder);
-  std::erase_if(found, [](const fs::path& hidden) { return !is_left(hidden); });
-  std::vector<std::pair<fs::file_time_type, fs::path>> by_time;
-  for (fs::path& hidden : found) {
-    std::error_code no_list;
-    const fs::file_time_type time = fs::last_write_time(hidden / names_list, no_list);
-    by_time.emplace_back(no_list ? fs::file_time_type::min() : time, std::move(hidden));
+/// The time at which the results in a hidden folder were complete; the earliest time if they never were.
+fs::file_time_type completion_time(const fs::path& hidden) {
+  std::error_code no_list;
+  const fs::file_time_type time = fs::last_write_time(hidden / names_list, no_list);
+  return no_list ? fs::file_time_type::min() : time;
+}
+
+void sync_folder(const fs::path& folder) {
+  if (const descriptor opened = open_folder(folder); opened.get() >= 0) ::fsync(opened.get());
+}
+
+/// Removes the hidden folders of a transaction that is complete or has not begun. `list`: the list of the others in
+/// `first`. Keeps `first` while one of the others is missing or still in use, so that it is known to belong to it.
+void remove_hidden(const fs::path& first, const fs::path& list) {
+  std::string marked = first.filename().string();
+  if (!is_ready(first)) marked += ready;
+  std::error_code ignored;
+  bool are_gone = true;
+  for (const fs::path path : read_list(first / list).value_or(std::vector<std::string>{})) {
+    if (belongs_to(path, marked) && is_left(path)) fs::remove_all(path, ignored);
+    are_gone &= !is_hidden_folder(path) && fs::is_directory(path.parent_path(), ignored);
   }
-  std::sort(by_time.begin(), by_time.end());
-  found.clear();
-  for (auto& [time, hidden] : by_time) found.push_back(std::move(hidden));
-  return found;
+  if (are_gone) fs::remove_all(first, ignored);
+}
+/// Marks a transaction as complete: all files have been moved, and their folders synced.
+void mark_complete(const fs::path& first) {
+  std::error_code ignored;
+  fs::rename(first / others_list, first / complete_list, ignored);
+  sync_folder(first / own);
+}
+bool is_complete(const fs::path& first) {
+  std::error_code ignored;
+  return fs::exists(fs::symlink_status(first / complete_list, ignored));
 }
 
 /// Completes the transaction whose first hidden folder is `first`. Returns the reason if that is not possible now.
 /// @pre the folders of all its files are locked
 std::optional<std::string> finish_transaction(const fs::path& first) {
-  auto folders = others_of(first);
-  if (!folders) return "a folder of their files is missing or cannot be read";
-  folders->push_back(first);  // is removed last
-  std::vector<move> moves;
-  for (const fs::path& hidden : *folders) {
-    auto names = read_list(hidden / names_list);
-    if (!names) return "their list cannot be read";
-    std::error_code ignored;
-    fs::create_directories(hidden / backup, ignored);  // usually exists
-    std::erase_if(*names, [](const fs::path& name) { return name.empty() || name != name.filename(); });
-    for (move& m : moves_to(hidden.parent_path(), hidden, *names)) {
-      if (!may_be_replaced(m.to)) return fs::path{m.to}.filename().string() + " is not a regular file";
-      moves.push_back(std::move(m));
+  if (!is_complete(first)) {
+    auto folders = others_of(first);
+    if (!folders) return "a folder of their files is missing or cannot be read";
+    folders->push_back(first);
+    std::vector<move> moves;
+    for (const fs::path& hidden : *folders) {
+      auto names = read_list(hidden / names_list);
+      if (!names) return "their list cannot be read";
+      std::error_code ignored;
+      fs::create_directories(hidden / backup, ignored);  // usually exists
+      std::erase_if(*names, [](const fs::path& name) { return name.empty() || name != name.filename(); });
+      for (move& m : moves_to(hidden.parent_path(), hidden, *names)) {
+        if (!may_be_replaced(m.to)) return fs::path{m.to}.filename().string() + " is not a regular file";
+        moves.push_back(std::move(m));
+      }
     }
+    if (const int why = rename_all(moves); why != 0) return reason(why % not_restored);
+    for (const fs::path& hidden : *folders) sync_folder(hidden.parent_path());
+    mark_complete(first);
   }
-  if (const int why = rename_all(moves); why != 0) return reason(why % not_restored);
-  for (const fs::path& hidden : *folders) {
-    const descriptor parent = open_folder(hidden.parent_path());
-    if (parent.get() >= 0) ::fsync(parent.get());
-  }
-  std::error_code ignored;
-  fs::remove(first / others_list, ignored);  // all moves are complete
-  for (const fs::path& hidden : *folders) fs::remove_all(hidden, ignored);
+  remove_hidden(first, complete_list);
   return std::nullopt;
 }
 
-/// Removes the hidden folders of a transaction that has not begun.
-void give_up(const fs::path& hidden) {
-  std::error_code ignored;
-  const auto others = read_list(hidden / others_list);
-  for (const fs::path path : others.value_or(std::vector<std::string>{}))
-    if (belongs_to(path, hidden.filename().string() + std::string{ready}) && is_left(path))
-      fs::remove_all(path, ignored);
-  fs::remove_all(hidden, ignored);
+/// Returns true if all files of a hidden folder have been moved.
+bool is_emptied(const fs::path& hidden) {
+  const auto names = read_list(hidden / names_list);
+  return names && !names->empty() && moves_to(hidden.parent_path(), hidden, *names).empty();
 }
 
 struct opened_folder {
@@ -332,8 +345,8 @@ struct cleared_folders {
 
 /// Locks `folders`, completes the transactions that ended processes left in them, and removes the hidden folders of
 /// these processes. Also locks the folders of the other files of these transactions. All folders are locked together:
-/// locking starts again whenever a folder is found that is not locked yet. `own`: hidden folders of this process.
-cleared_folders lock_and_clear(const std::vector<opened_folder>& folders, const std::vector<fs::path>& own = {}) {
+/// locking starts again whenever a folder is found that is not locked yet. `ours`: hidden folders of this process.
+cleared_folders lock_and_clear(const std::vector<opened_folder>& folders, const std::vector<fs::path>& ours = {}) {
   cleared_folders cleared;
   std::vector<fs::path> paths;
   std::vector<int> numbers;
@@ -345,9 +358,17 @@ cleared_folders lock_and_clear(const std::vector<opened_folder>& folders, const 
     if (std::find(paths.begin(), paths.end(), path) != paths.end()) return;
     paths.push_back(path);
     cleared.descriptors.push_back(open_folder(path));
-    if (const int number = cleared.descriptors.back().get(); number >= 0) numbers.push_back(number);
+    const int number = cleared.descriptors.back().get();
+    if (number >= 0)
+      numbers.push_back(number);
+    else
+      cleared.obstacle = path.string() + ", which contains results of an earlier run, cannot be opened";
   };
-  std::vector<fs::path> leftovers;
+  const auto add_parents = [&](const fs::path& first, const fs::path& list) {
+    for (const fs::path other : read_list(first / list).value_or(std::vector<std::string>{}))
+      if (is_hidden_folder(other)) add(other.parent_path());
+  };
+  std::vector<std::pair<fs::file_time_type, fs::path>> leftovers;
   for (std::size_t locked = 0; locked != paths.size();) {
     locked = paths.size();
     leftovers.clear();
@@ -357,30 +378,35 @@ cleared_folders lock_and_clear(const std::vector<opened_folder>& folders, const 
       cleared.obstacle = locked_by_another;
       return cleared;
     }
-    for (const opened_folder& folder : folders)
-      for (const fs::path& left : leftovers_in(folder.path)) {
-        if (std::find(own.begin(), own.end(), left) != own.end()) continue;  // its lock could not be taken
-        leftovers.push_back(left);
-        if (const auto first = first_of(left); first && !first->empty()) {
-          add(first->parent_path());
-          for (const fs::path& other : others_of(*first).value_or(std::vector<fs::path>{})) add(other.parent_path());
-        }
+    for (std::size_t i = 0; i != locked; ++i)
+      for (const fs::path& left : hidden_folders_in(paths[i])) {
+        if (std::find(ours.begin(), ours.end(), left) != ours.end() || !is_left(left)) continue;
+        leftovers.emplace_back(completion_time(left), left);
+        const auto first = first_of(left);
+        if (!first) continue;
+        if (!first->empty()) add(first->parent_path());
+        add_parents(first->empty() ? left : *first, others_list);
+        add_parents(*first, complete_list);
       }
+    if (!cleared.obstacle.empty()) return cleared;
   }
-  for (const fs::path& left : leftovers) {
+  std::sort(leftovers.begin(), leftovers.end());
+  for (const auto& [time, left] : leftovers) {
     if (!is_hidden_folder(left)) continue;  // finished together with another one
     const auto first = first_of(left);
     std::optional<std::string> why;
-    if (!first) why = "the folder of their other files is missing or cannot be read";
-    if (first && first->empty()) give_up(left);
+    if (first && first->empty()) remove_hidden(left, others_list);
     if (first && !first->empty()) why = finish_transaction(*first);
+    // Its first folder may be among the others under another path, and is then finished in its turn.
+    const bool has_first = std::any_of(leftovers.begin(), leftovers.end(), [&, of = &left](const auto& other) {
+      return is_ready(other.second) && belongs_to(*of, other.second.filename());
+    });
+    if (!first && !has_first && !is_emptied(left)) why = "the folder of their other files is missing or cannot be read";
     if (why) {  // later results must not be moved into place before earlier ones
       cleared.obstacle = "the results of an earlier run, in the hidden folder " + left.filename().string() +
                          ", cannot be moved into place: " + *why + "; delete that folder if you do not need them";
       break;
     }
-    std::error_code ignored;
-    fs::remove_all(left, ignored);
   }
   return cleared;
 }
@@ -480,7 +506,7 @@ void staged_folder::leave(hidden_folders& hidden) {
 }
 
 result<void> staged_folder::put_in_place(std::span<staged_folder* const> folders, hidden_folders& hidden,
-                                         const std::function<result<void>()>& complete) {
+                                         const std::function<void()>& complete) {
   {
     const std::lock_guard registers{hidden.mutex};
     for (staged_folder* f : folders) f->follow(hidden);
@@ -526,8 +552,7 @@ result<void> staged_folder::put_in_place(std::span<staged_folder* const> folders
     for (const std::string& name : f->made())
       if (!may_be_replaced(f->folder_ / name))
         return failure(f->folder_ / name, "is not a regular file and will not be replaced");
-  if (cleared.obstacle.empty())
-    if (auto completed = complete(); !completed) return completed;
+  if (cleared.obstacle.empty()) complete();
   // From here on, any program can complete the transaction.
   const fs::path unmarked = first.staging_;
   if (const std::error_code why = first.rename_hidden(marked, hidden))
@@ -554,7 +579,7 @@ result<void> staged_folder::put_in_place(std::span<staged_folder* const> folders
     return failure(first.folder_, what);  // no program completes this transaction
   }
   for (const staged_folder* f : prepared) ::fsync(f->folder_lock_.get());
-  fs::remove(first.staging_ / others_list, ec);  // all moves are complete
+  mark_complete(first.staging_);
   std::for_each(prepared.rbegin(), prepared.rend(), [](staged_folder* f) { f->discard(); });
   if (left_out) return orbis::fail(*left_out);
   return {};

@@ -78,9 +78,9 @@ class staged_folder {
   /// error says so. If another program holds the lock of a folder, or files can be moved neither into place nor back,
   /// the error indicates that the next program that uses the folder completes the moves. `hidden`: see `open`.
   /// `complete` completes the files; it is called after the results of earlier runs have been moved into place. Errors:
-  /// write_failed, and those of `complete`.
+  /// write_failed.
   [[nodiscard]] static orbis::result<void> put_in_place(std::span<staged_folder* const> folders, hidden_folders& hidden,
-                                                        const std::function<orbis::result<void>()>& complete);
+                                                        const std::function<void()>& complete);
 
  private:
   staged_folder() = default;

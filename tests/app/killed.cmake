@@ -90,6 +90,16 @@ foreach(missing out maps)
   must_equal(floors/floor.yaml all/floor.yaml)
 endforeach()
 
+# What is left of a complete run, all of whose files were moved, blocks nothing; files that were not moved do.
+set(left ${WORK}/emptied/.rgbd_slam-left)
+file(MAKE_DIRECTORY ${left}/.rgbd_slam)
+execute_process(COMMAND printf "${WORK}/gone/.rgbd_slam-first.ready\\0" OUTPUT_FILE ${left}/.rgbd_slam/first)
+execute_process(COMMAND printf "room.map\\0" OUTPUT_FILE ${left}/.rgbd_slam/names)
+app(0 map cloud.ply --out emptied ${quick})
+file(WRITE ${left}/room.map "a map")
+app_fails(2 "emptied: .* hidden folder .rgbd_slam-left,.*missing" map cloud.ply --out emptied ${quick})
+must_exist(${left} room.map)
+
 # The user creates a folder with the name of a result: it is kept, and later results wait for the earlier ones.
 file(REMOVE_RECURSE ${WORK}/out)
 run_killed(0 run room --out out ${quick} --deterministic)
