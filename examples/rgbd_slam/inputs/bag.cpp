@@ -194,9 +194,11 @@ class bag_recording final : public file_recording {
     return bag_.read(m, most);
   }
 
+  /// Messages in ascending order of this key are in the order in which they are stored.
+  [[nodiscard]] static auto place_of(const bag_message& m) { return std::tuple{m.file, m.chunk, m.at}; }
   /// The messages in the order in which they are stored, in which each chunk is decompressed only once.
   [[nodiscard]] static std::vector<bag_message> in_file_order(std::vector<bag_message> messages) {
-    std::ranges::sort(messages, {}, [](const bag_message& m) { return std::tuple{m.file, m.chunk, m.at}; });
+    std::ranges::sort(messages, {}, place_of);
     return messages;
   }
 
@@ -330,9 +332,7 @@ class bag_recording final : public file_recording {
     for (topic* t : {first_, second_})
       if (t != nullptr)
         for (const bag_message& m : t->messages) entries.push_back({t, &m, 0});
-    std::ranges::sort(entries, {}, [](const entry& e) {
-      return std::tuple{e.message->file, e.message->chunk, e.message->at};
-    });
+    std::ranges::sort(entries, {}, [](const entry& e) { return place_of(*e.message); });
     for (entry& e : entries) {
       constexpr std::size_t most = 1024;  // bytes; the time is at the beginning
       const auto bytes = read(*e.message, most);
