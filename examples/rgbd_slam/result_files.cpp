@@ -17,6 +17,7 @@
 
 #include <orbis/core/file.hpp>
 
+#include "../common/same_file.hpp"
 #include "interrupts.hpp"
 
 namespace app {
@@ -67,9 +68,28 @@ file_names recorded(const fs::path& folder) {
 
 fs::path parent_folder(const fs::path& file) { return file.has_parent_path() ? file.parent_path() : fs::path{"."}; }
 
-bool are_one_file(const fs::path& a, const fs::path& b) {
-  std::error_code ignored;
-  return fs::equivalent(a, b, ignored);
+/// The image that belongs to a floor map.
+fs::path floor_image(const fs::path& floor_map) { return fs::path{floor_map}.replace_extension(".pgm"); }
+
+/// The files that the run may write, except for the landmark map.
+std::vector<fs::path> target_files(const settings& s) {
+  std::vector<fs::path> targets;
+  for (const std::string& name : result_names(s)) targets.push_back(s.out / name);
+  if (!s.floor_map.empty()) {
+    targets.push_back(s.floor_map);
+    targets.push_back(floor_image(s.floor_map));
+  }
+  return targets;
+}
+
+/// Returns true if a file belongs to another user, in a folder in which only the owners of files may replace them, such
+/// as /tmp.
+bool is_protected(const fs::path& path) {
+  struct stat file {};
+  struct stat parent {};
+  if (::lstat(path.c_str(), &file) != 0 || ::stat(parent_folder(path).c_str(), &parent) != 0) return false;
+  const uid_t user = ::geteuid();
+  return (parent.st_mode & S_ISVTX) != 0 && user != 0 && user != file.st_uid && user != parent.st_uid;
 }
 
 using identity = std::pair<dev_t, ino_t>;
@@ -146,19 +166,14 @@ result<void> finish_earlier_runs(const settings& s) {
 }
 
 std::optional<orbis::error> find_overwritten(const settings& s, const std::vector<fs::path>& inputs) {
-  std::vector<fs::path> targets;
-  for (const std::string& name : result_names(s)) targets.push_back(s.out / name);
-  if (!s.floor_map.empty()) {
-    targets.push_back(s.floor_map);
-    targets.push_back(fs::path{s.floor_map}.replace_extension(".pgm"));
-  }
+  std::vector<fs::path> targets = target_files(s);
   // A landmark map may overwrite the loaded one if the user asks for it.
   if (auto found = find_overwritten(targets, {s.load_map})) return found;
   targets.push_back(s.save_map);
   if (auto found = find_overwritten(targets, inputs)) return found;
 
   const file_names ours = recorded(s.out);
-  const fs::path floor_picture = fs::path{s.floor_map}.replace_extension(".pgm");
+  const fs::path floor_picture = floor_image(s.floor_map);
   if (!s.floor_map.empty() && is_there(floor_picture)) {  // the user has not named it
     const auto map = orbis::read_file(s.floor_map);
     if (!map || map->find(floor_picture.filename().string()) == std::string::npos)
@@ -174,23 +189,6 @@ std::optional<orbis::error> find_overwritten(const settings& s, const std::vecto
   return std::nullopt;
 }
 
-namespace {
-
-/// Returns true if a file belongs to another user, in a folder in which only the owners of files may replace them, such
-/// as /tmp.
-bool is_protected(const fs::path& folder, const fs::path& name) {
-  struct stat file {};
-  struct stat parent {};
-  if (::lstat((folder / name).c_str(), &file) != 0 || ::stat(folder.c_str(), &parent) != 0) return false;
-  const uid_t user = ::geteuid();
-  return (parent.st_mode & S_ISVTX) != 0 && user != 0 && user != file.st_uid && user != parent.st_uid;
-}
-orbis::error protected_error(const fs::path& file) {
-  return {orbis::errc::write_failed, file.string(), "belongs to another user and cannot be replaced"};
-}
-
-}  // namespace
-
 std::optional<orbis::error> find_unwritable(const settings& s) {
   std::vector<fs::path> folders{s.out};
   for (const fs::path& file : {s.save_map, s.floor_map})
@@ -204,12 +202,11 @@ std::optional<orbis::error> find_unwritable(const settings& s) {
     return orbis::error{orbis::errc::write_failed, folder.string(),
                         "cannot create files in " + there.string() + ": " + std::generic_category().message(why)};
   }
-  for (const std::string& name : result_names(s))
-    if (is_protected(s.out, name)) return protected_error(s.out / name);
-  for (const fs::path& file : {s.save_map, s.floor_map})
-    if (!file.empty() && is_protected(parent_folder(file), file.filename())) return protected_error(file);
-  const fs::path picture = fs::path{s.floor_map}.replace_extension(".pgm");
-  if (!s.floor_map.empty() && is_protected(parent_folder(picture), picture.filename())) return protected_error(picture);
+  std::vector<fs::path> targets = target_files(s);
+  targets.push_back(s.save_map);
+  for (const fs::path& target : targets)
+    if (is_protected(target))
+      return orbis::error{orbis::errc::write_failed, target.string(), "belongs to another user and cannot be replaced"};
   return std::nullopt;
 }
 
@@ -243,7 +240,7 @@ result<result_files> result_files::begin(const settings& s) {
     for (const fs::path& f : {s.out, folder})
       if (fs::create_directories(f, ec); ec)
         return orbis::fail(orbis::errc::write_failed, f.string(), "cannot be created: " + ec.message());
-    for (index = 0; index != places.size() && !are_one_file(places[index].folder, folder);) ++index;
+    for (index = 0; index != places.size() && !examples::is_same_file(places[index].folder, folder);) ++index;
     if (index == places.size()) places.push_back({folder, {}});
     file_names& names = places[index].names;
     for (const std::string& name : others) {
@@ -265,7 +262,7 @@ result<result_files> result_files::begin(const settings& s) {
   }
   if (!s.floor_map.empty()) {
     files.floor_name_ = s.floor_map.filename().string();
-    const std::string picture = fs::path{s.floor_map}.replace_extension(".pgm").filename().string();
+    const std::string picture = floor_image(s.floor_map).filename().string();
     if (auto added = add(s.floor_map, {files.floor_name_, picture}, files.floor_folder_); !added)
       return orbis::fail(added.error());
   }

@@ -239,8 +239,8 @@ bool belongs_to(const fs::path& hidden, const fs::path& first) {
   const auto listed = read_list(hidden / first_list);
   return is_hidden_folder(hidden) && listed && listed->size() == 1 && fs::path{listed->front()}.filename() == first;
 }
-/// The other hidden folders of a transaction; nullopt if one of them is missing or cannot be read. Empty if all moves
-/// are complete.
+/// The other hidden folders of a transaction; nullopt if one of them is missing or cannot be read. @pre the transaction
+/// is not complete
 std::optional<std::vector<fs::path>> others_of(const fs::path& first) {
   const auto listed = read_list(first / others_list);
   if (!listed) return std::nullopt;
@@ -385,8 +385,7 @@ cleared_folders lock_and_clear(const std::vector<opened_folder>& folders, const 
         const auto first = first_of(left);
         if (!first) continue;
         if (!first->empty()) add(first->parent_path());
-        add_parents(first->empty() ? left : *first, others_list);
-        add_parents(*first, complete_list);
+        for (const fs::path& list : {others_list, complete_list}) add_parents(first->empty() ? left : *first, list);
       }
     if (!cleared.obstacle.empty()) return cleared;
   }
